@@ -1,0 +1,149 @@
+"""The sections of an ``mcgv`` bitstream, and the header that tells how to read them.
+
+=================  ==========================================================================================
+``mesh``           base frame on its lattice and connectivity (`gvpipe.connectivity`)
+``order``          vertex order, empty if the codec's own (`gvpipe.vertex_order`)
+``pixels``         [integers] x, then [integers] y of each vertex, vertices in the codec's order: the differences from
+                   the vertex before; y in the context of the magnitude of the difference in x
+``clusters``       [integers] cluster of each block that holds a vertex, in raster order, difference from the block before
+``transforms.N``   affine transforms of segment N (`transforms`)
+=================  ==========================================================================================
+
+Source: Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.3: base frame, partition, parametric
+coordinates, transforms, images. Here the partition follows from the pixels, since no block holds two charts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.mcgv.packing import Layout
+from gvpipe.binary import Cursor, varint
+from gvpipe.bitstream import Bitstream
+from gvpipe.entropy import decode_integers, encode_integers
+from gvpipe.errors import CorruptFile
+from gvpipe.quantize import Lattice
+from gvpipe.sequence import Int32
+from gvpipe.video import MAX_SIDE, PROFILES, Profile
+
+MAX_CLUSTERS = 1024
+MAX_SEGMENTS = 1 << 16
+CONTEXTS = 4  # of a pixel's y: 0, 1, 2..3 or more columns from the vertex before
+LARGE = 1e30  # no coordinate or step of a float32 model lies beyond
+
+Int64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a reader must know beside the sections; lengths in model units, sides in pixels.
+
+    Args:
+        profile: of the video; a picture holds the x, y and z planes, one below the other.
+        block: side of the blocks that hold one chart each.
+        width, height: of one plane.
+        clusters: K.
+        segments: how many; segment s starts at frame ``s * F // segments``.
+        base: lattice of the base frame.
+        transform_step, residual_step: quantisation steps.
+    """
+
+    profile: Profile
+    block: int
+    width: int
+    height: int
+    clusters: int
+    segments: int
+    base: Lattice
+    transform_step: float
+    residual_step: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the header as JSON values."""
+        values = asdict(self)
+        values["profile"] = self.profile.name
+        values["base"] = [*self.base.origin, self.base.step]
+        return values
+
+    @classmethod
+    def of(cls, bitstream: Bitstream) -> Header:
+        """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
+        profile = PROFILES.get(str(bitstream.header.get("profile")))
+        base = bitstream.header.get("base")
+        if profile is None:
+            raise CorruptFile(f"header: no profile {bitstream.header.get('profile')!r}; there are {', '.join(PROFILES)}")
+        if not (isinstance(base, list) and len(base) == 4 and all(isinstance(v, int | float) for v in base)):
+            raise CorruptFile(f"header: base is {base!r}; an origin and a step are needed")
+        if not (0 < base[3] < LARGE and max(map(abs, base[:3])) < LARGE):
+            raise CorruptFile(f"header: base is {base!r}, out of range")
+        header = cls(
+            profile=profile,
+            block=bitstream.integer("block", 2, 64),
+            width=bitstream.integer("width", 2, MAX_SIDE),
+            height=bitstream.integer("height", 2, MAX_SIDE // 3),
+            clusters=bitstream.integer("clusters", 1, MAX_CLUSTERS),
+            segments=bitstream.integer("segments", 1, min(MAX_SEGMENTS, bitstream.n_frames)),
+            base=Lattice((base[0], base[1], base[2]), base[3]),
+            transform_step=bitstream.number("transform_step", 1e-40, LARGE),
+            residual_step=bitstream.number("residual_step", 1e-40, LARGE),
+        )
+        if header.width % header.block or header.height % header.block:
+            raise CorruptFile(f"header: planes of {header.width}x{header.height} are not whole blocks of {header.block}")
+        return header
+
+
+def segment_starts(n_frames: int, segments: int) -> list[int]:
+    """First frame of every segment, and F at the end: even cuts."""
+    return [s * n_frames // segments for s in range(segments + 1)]
+
+
+def encode_pixels(layout: Layout, order: Int64) -> bytes:
+    """Return the section ``pixels``; ``order (V,)`` are the vertices in the codec's order."""
+    y, x = np.divmod(layout.pixel[order], layout.width)
+    dx, dy = np.diff(x, prepend=0), np.diff(y, prepend=0)
+    columns = encode_integers(dx)
+    return varint(len(columns)) + columns + encode_integers(dy, _context(dx))
+
+
+def decode_pixels(data: bytes, order: Int64, width: int, height: int) -> Layout:
+    """Mirror of `encode_pixels`; raises `CorruptFile` unless every vertex gets a pixel of its own inside the plane."""
+    cursor = Cursor(data, "pixels")
+    columns = cursor.bytes(cursor.varint(cursor.left, "a length"))
+    dx = decode_integers(columns, len(order), name="pixels")
+    dy = decode_integers(cursor.rest(), len(order), _context(dx), "pixels")
+    x, y = np.cumsum(dx), np.cumsum(dy)
+    if ((x < 0) | (x >= width) | (y < 0) | (y >= height)).any():
+        raise cursor.corrupt("a pixel lies outside the plane")
+    pixel = np.empty(len(order), np.int64)
+    pixel[order] = y * width + x
+    if len(np.unique(pixel)) != len(pixel):
+        raise cursor.corrupt("two vertices share a pixel")
+    return Layout(width, height, pixel)
+
+
+def encode_clusters(clusters: Int32, layout: Layout, block: int) -> bytes:
+    """Return the section ``clusters`` for ``clusters (V,)``, which must be constant inside each block."""
+    _, first = np.unique(_blocks(layout, block), return_index=True)
+    return encode_integers(np.diff(clusters[first].astype(np.int64), prepend=0))
+
+
+def decode_clusters(data: bytes, layout: Layout, block: int, n_clusters: int) -> Int32:
+    """Mirror of `encode_clusters`: ``(V,) int32``; raises `CorruptFile` for a cluster out of range."""
+    used, block_of = np.unique(_blocks(layout, block), return_inverse=True)
+    by_block = np.cumsum(decode_integers(data, len(used), name="clusters"))
+    if ((by_block < 0) | (by_block >= n_clusters)).any():
+        raise CorruptFile(f"section 'clusters' is corrupt: a cluster is not in 0..{n_clusters - 1}")
+    return by_block[block_of.ravel()].astype(np.int32)
+
+
+def _context(dx: Int64) -> Int64:
+    return np.minimum(np.abs(dx), CONTEXTS - 1)
+
+
+def _blocks(layout: Layout, block: int) -> Int64:
+    y, x = np.divmod(layout.pixel, layout.width)
+    return (y // block) * (layout.width // block) + x // block

@@ -1,0 +1,80 @@
+"""From an ``mcgv`` bitstream back to frames, any of them, in any order.
+
+A frame costs its group of pictures (H.264) or its one picture (JPEG), and the transforms of its segment.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.mcgv import format as sections
+from gvcodecs.mcgv.prediction import AffinePredictor
+from gvcodecs.mcgv.transforms import decode_transforms, dequantise
+from gvpipe.bitstream import Bitstream
+from gvpipe.connectivity import decode_base
+from gvpipe.errors import CorruptFile
+from gvpipe.sequence import Float32, Int32
+from gvpipe.video import VideoReader
+
+
+class McgvReader:
+    """Frames of an ``mcgv`` bitstream.
+
+    Raises:
+        CorruptFile: a section does not hold what it must.
+    """
+
+    def __init__(self, bitstream: Bitstream) -> None:
+        header = sections.Header.of(bitstream)
+        base = decode_base(bitstream.section("mesh"), bitstream.section("order"))
+        found = (len(base.points), len(base.faces))
+        if found != (bitstream.n_vertices, bitstream.n_triangles):
+            raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
+        order = np.argsort(base.visits)
+        layout = sections.decode_pixels(bitstream.section("pixels"), order, header.width, header.height)
+        clusters = sections.decode_clusters(bitstream.section("clusters"), layout, header.block, header.clusters)
+        self._header, self._bitstream, self._faces = header, bitstream, base.faces
+        self._predictor = AffinePredictor(header.base.place(base.points), clusters, header.clusters)
+        self._bounds = sections.segment_starts(bitstream.n_frames, header.segments)
+        self._video = VideoReader(bitstream.video, header.profile, header.width, 3 * header.height)
+        if self._video.n_frames != bitstream.n_frames:
+            raise CorruptFile(f"the video has {self._video.n_frames} frames, the header says {bitstream.n_frames}")
+        plane = header.width * header.height
+        self._samples = layout.pixel[:, None] + plane * np.arange(3)  # (V, 3) into a picture
+        self._segment: tuple[int, NDArray[np.float64]] = (-1, np.zeros((0, 0, 4, 3)))
+
+    @property
+    def n_frames(self) -> int:
+        """F, the number of frames."""
+        return self._bitstream.n_frames
+
+    @property
+    def faces(self) -> Int32:
+        """``(T, 3) int32`` triangles."""
+        return self._faces
+
+    def read(self, start: int, stop: int) -> Float32:
+        """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
+
+        Raises:
+            CorruptFile: the video or the transforms do not decode.
+        """
+        result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
+        for first, planes in self._video.read(start, stop):
+            for i, plane in enumerate(planes):
+                frame = first + i
+                levels = plane.ravel()[self._samples].astype(np.float64) - self._header.profile.middle
+                result[frame - start] = self._predictor.predict(self._transforms(frame))[0] + levels * self._header.residual_step
+        return result
+
+    def _transforms(self, frame: int) -> NDArray[np.float64]:
+        """The frame's transforms, ``(1, K, 4, 3)``; its segment is decoded once."""
+        s = int(np.searchsorted(self._bounds, frame, side="right")) - 1
+        if self._segment[0] != s:
+            name = f"transforms.{s}"
+            n_frames = self._bounds[s + 1] - self._bounds[s]
+            lattice = decode_transforms(self._bitstream.section(name), n_frames, self._header.clusters, name)
+            self._segment = (s, dequantise(lattice, self._predictor.rest, self._header.transform_step))
+        offset = frame - self._bounds[s]
+        return self._segment[1][offset : offset + 1]

@@ -1,0 +1,58 @@
+"""Animated triangle meshes as small MP4 geometry videos.
+
+>>> import gvpipe
+>>> report = gvpipe.encode("samples/creature.npz", "creature.mp4")  # doctest: +SKIP
+>>> with gvpipe.open("creature.mp4") as video:  # doctest: +SKIP
+...     positions = video[10]  # (V, 3) float32
+
+Everything named in ``__all__`` loads on first use, so that importing gvpipe costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gvpipe.api import Info, Report, decode, encode, info, open, read, write  # noqa: A004 - gvpipe.open, like gzip.open
+    from gvpipe.errors import GvpipeError
+    from gvpipe.metrics import Comparison, compare
+    from gvpipe.player import Player
+    from gvpipe.sequence import MeshSequence
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Comparison",
+    "GvpipeError",
+    "Info",
+    "MeshSequence",
+    "Player",
+    "Report",
+    "compare",
+    "decode",
+    "encode",
+    "info",
+    "open",
+    "read",
+    "write",
+]
+
+_HOMES = {
+    "gvpipe.api": ("Info", "Report", "decode", "encode", "info", "open", "read", "write"),
+    "gvpipe.errors": ("GvpipeError",),
+    "gvpipe.metrics": ("Comparison", "compare"),
+    "gvpipe.player": ("Player",),
+    "gvpipe.sequence": ("MeshSequence",),
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'gvpipe' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

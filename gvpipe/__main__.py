@@ -1,0 +1,5 @@
+"""``python -m gvpipe``."""
+
+from gvpipe.cli import main
+
+main()

@@ -1,0 +1,218 @@
+"""The functions behind ``gvpipe.encode``, ``decode``, ``open``, ``read``, ``write`` and ``info``, and behind the command line."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gvpipe.codec import Codec, Progress, codec_class
+from gvpipe.container import bytes_by_part, write_file
+from gvpipe.errors import InputError, OutputError
+from gvpipe.io import read as read_sequence
+from gvpipe.io import write as write_sequence
+from gvpipe.player import Player
+from gvpipe.sequence import MeshSequence
+
+VIDEO_SUFFIXES = (".mp4", ".m4v")
+
+StrPath = str | os.PathLike[str]
+
+
+@dataclass(frozen=True)
+class Report:
+    """What an encode did. ``seconds`` holds the whole as ``encode``, then each stage; ``not_carried`` names the attributes
+    of the sequence that the file does not hold."""
+
+    codec: str
+    settings: dict[str, Any]
+    vertices: int
+    triangles: int
+    frames: int
+    fps: float
+    bytes: int
+    bpvf: float
+    seconds: dict[str, float]
+    not_carried: list[str]
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as JSON values."""
+        return dataclasses.asdict(self)
+
+
+@dataclass(frozen=True)
+class Info:
+    """What a geometry video is: ``bounding_box`` is frame 0's corners, model units; ``sections`` the bytes of every part of
+    the file, which add up to ``bytes``."""
+
+    codec: str
+    version: int
+    vertices: int
+    triangles: int
+    frames: int
+    fps: float
+    bounding_box: dict[str, list[float]]
+    bytes: int
+    bpvf: float
+    sections: dict[str, int]
+    settings: dict[str, Any]
+
+    def to_json(self) -> dict[str, Any]:
+        """The information as JSON values."""
+        return dataclasses.asdict(self)
+
+
+@dataclass
+class _StageClock:
+    """Passes progress on and adds up the seconds of each stage."""
+
+    progress: Progress | None
+    seconds: dict[str, float] = field(default_factory=dict)
+    _stage: str = ""
+    _since: float = 0.0
+
+    def __call__(self, stage: str, done: float) -> None:
+        now = time.perf_counter()
+        if self._stage:
+            self.seconds[self._stage] = self.seconds.get(self._stage, 0.0) + now - self._since
+        self._stage, self._since = stage, now
+        if self.progress and stage:
+            self.progress(stage, done)
+
+
+def read(path: StrPath, fps: float | None = None) -> MeshSequence:
+    """Read a mesh sequence, or a geometry video as one.
+
+    Args:
+        path: an ``.npz``, an ``.mp4``, or frame files as a folder, a glob, a ``%04d`` pattern or one file.
+        fps: frames per second; overrides the file's. Frame files have 30 by default.
+
+    Raises:
+        InputError, FormatError: the path or what it holds cannot be used.
+    """
+    if Path(path).suffix.lower() not in VIDEO_SUFFIXES:
+        return read_sequence(path, fps)
+    sequence = Player(path).sequence()
+    return dataclasses.replace(sequence, fps=fps) if fps else sequence
+
+
+def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> None:
+    """Write a mesh sequence as ``.npz``, or as frame files named by a pattern (``out/%04d.obj``), numbered from ``start``.
+
+    Raises:
+        InputError: the path names no format that can be written.
+        OutputError: a file cannot be written; nothing half-written is left.
+    """
+    write_sequence(sequence, path, start)
+
+
+def encode(
+    source: MeshSequence | StrPath,
+    path: StrPath,
+    codec: str | Codec = "mcgv",
+    progress: Progress | None = None,
+    fps: float | None = None,
+    **settings: Any,
+) -> Report:
+    """Encode a sequence into a geometry video.
+
+    Args:
+        source: a sequence, or what `read` takes.
+        path: the ``.mp4`` to write; an older file is replaced once the new one is complete.
+        codec: its id, with ``settings`` by name, or its settings object.
+        progress: called with a stage's name and the part of it that is done.
+        fps: overrides the source's frames per second.
+
+    Raises:
+        InputError: the source, a setting or the path cannot be used.
+        OutputError: the file cannot be written; no part of it is left.
+    """
+    _check_target(Path(path))
+    chosen: Codec = codec_class(codec)(**settings) if isinstance(codec, str) else codec
+    started = time.perf_counter()
+    sequence = source if isinstance(source, MeshSequence) else read(source)
+    if fps is not None:
+        sequence = dataclasses.replace(sequence, fps=fps)
+    clock = _StageClock(progress)
+    bitstream = chosen.encode(sequence, clock)
+    clock("write", 0.0)
+    size = write_file(bitstream, path)
+    clock("", 1.0)
+    return Report(
+        codec=chosen.id,
+        settings=dataclasses.asdict(chosen),  # type: ignore[call-overload] - codecs are dataclasses
+        vertices=bitstream.n_vertices,
+        triangles=bitstream.n_triangles,
+        frames=bitstream.n_frames,
+        fps=bitstream.fps,
+        bytes=size,
+        bpvf=8 * size / (bitstream.n_vertices * bitstream.n_frames),
+        seconds={"encode": time.perf_counter() - started, **clock.seconds},
+        not_carried=sorted(sequence.attributes),
+    )
+
+
+def decode(path: StrPath, start: int = 0, stop: int | None = None) -> MeshSequence:
+    """Decode frames ``start`` to ``stop`` of a geometry video into memory.
+
+    Raises:
+        InputError: no such file, or the frames are not in it.
+        FormatError: not a geometry video, or a damaged one.
+    """
+    player = Player(path)
+    start, stop = frame_range(player, start, stop)
+    return MeshSequence(player[start:stop], player.faces, player.fps, name=player.path)
+
+
+def open(path: StrPath) -> Player:  # noqa: A001 - called as gvpipe.open, like gzip.open
+    """Open a geometry video for random access; see `Player`."""
+    return Player(path)
+
+
+def info(path: StrPath) -> Info:
+    """Tell what a geometry video is and where its bytes go.
+
+    Raises:
+        InputError: no such file.
+        FormatError: not a geometry video, or a damaged one.
+    """
+    player = Player(path)
+    bitstream = player.bitstream
+    first = player[0]
+    size = os.path.getsize(path)
+    return Info(
+        codec=bitstream.codec,
+        version=bitstream.version,
+        vertices=bitstream.n_vertices,
+        triangles=bitstream.n_triangles,
+        frames=bitstream.n_frames,
+        fps=bitstream.fps,
+        bounding_box={"min": first.min(axis=0).tolist(), "max": first.max(axis=0).tolist()},
+        bytes=size,
+        bpvf=8 * size / (bitstream.n_vertices * bitstream.n_frames),
+        sections=bytes_by_part(bitstream, size),
+        settings=dict(bitstream.header),
+    )
+
+
+def frame_range(player: Player, start: int, stop: int | None) -> tuple[int, int]:
+    """Return the range with its end filled in; raises `InputError` unless it holds frames of the video, and only those."""
+    stop = len(player) if stop is None else stop
+    if not 0 <= start < stop <= len(player):
+        raise InputError(f"{player.path}: frames {start} to {stop} asked for; 0 <= start < stop <= {len(player)} is needed")
+    return start, stop
+
+
+def _check_target(path: Path) -> None:
+    """Say what is wrong with the output before the work, not after it."""
+    if path.suffix.lower() not in VIDEO_SUFFIXES:
+        raise InputError(f"{path}: the output is an MP4 file; end its name in .mp4")
+    if path.is_dir():
+        raise OutputError(f"cannot write {path}: it is a folder; choose another name")
+    if not path.parent.is_dir():
+        raise OutputError(f"cannot write {path}: no folder {path.parent}; create it first")
+    if not os.access(path.parent, os.W_OK):
+        raise OutputError(f"cannot write {path}: the folder {path.parent} is read-only; choose another one")

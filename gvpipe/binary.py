@@ -1,0 +1,87 @@
+"""Bounds-checked reading, and the matching writing, of small binary sections.
+
+A number is either a field of a declared little-endian struct or a *varint*: seven bits a byte, least significant
+group first, top bit set on all bytes but the last (LEB128), at most 64 bits.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.errors import CorruptFile
+
+MAX_VARINT_BYTES = 10
+
+
+def varint(value: int) -> bytes:
+    """Return ``value`` (0..2**64-1) as a varint."""
+    if not 0 <= value < 1 << 64:
+        raise ValueError(f"varint of {value}: it must lie in 0..2**64-1")
+    result = bytearray()
+    while value >= 0x80:
+        result.append(value & 0x7F | 0x80)
+        value >>= 7
+    result.append(value)
+    return bytes(result)
+
+
+class Cursor:
+    """Reads one section from its start to its end; every read is checked against what is left.
+
+    Raises:
+        CorruptFile: a field reaches past the end, or is out of its range; the message names the section.
+    """
+
+    def __init__(self, data: bytes, name: str) -> None:
+        self._data = data
+        self._position = 0
+        self._name = name
+
+    @property
+    def left(self) -> int:
+        """Bytes not read yet."""
+        return len(self._data) - self._position
+
+    def bytes(self, count: int) -> bytes:
+        """Return the next ``count`` bytes."""
+        if count > self.left:
+            raise self.corrupt(f"needs {count} more bytes where {self.left} are left")
+        self._position += count
+        return self._data[self._position - count : self._position]
+
+    def rest(self) -> bytes:
+        """Return all bytes not read yet."""
+        return self.bytes(self.left)
+
+    def struct(self, layout: struct.Struct) -> tuple[Any, ...]:
+        """Return the fields of ``layout``."""
+        return layout.unpack(self.bytes(layout.size))
+
+    def array(self, dtype: str, count: int) -> NDArray[Any]:
+        """Return ``count`` items of a little-endian ``dtype``."""
+        return np.frombuffer(self.bytes(count * np.dtype(dtype).itemsize), dtype)
+
+    def varint(self, limit: int, what: str = "a number") -> int:
+        """Return a varint that must not exceed ``limit``; ``what`` names it in the message."""
+        value = 0
+        for k in range(MAX_VARINT_BYTES):
+            byte = self.bytes(1)[0]
+            value |= (byte & 0x7F) << (7 * k)
+            if byte < 0x80:
+                if value > limit:
+                    raise self.corrupt(f"{what} is {value}, above its limit of {limit}")
+                return value
+        raise self.corrupt(f"{what} is longer than {MAX_VARINT_BYTES} bytes")
+
+    def end(self) -> None:
+        """Check that nothing is left."""
+        if self.left:
+            raise self.corrupt(f"{self.left} bytes are left over")
+
+    def corrupt(self, what: str) -> CorruptFile:
+        """Return the error that says ``what`` is wrong in this section."""
+        return CorruptFile(f"section {self._name!r} is corrupt: {what}; get the file again from its source")

@@ -1,0 +1,180 @@
+"""What a codec makes of a sequence, and the bytes that keep it: a header, named sections and, for image codecs, a video.
+
+All fields are little-endian; varints are those of `gvpipe.binary`::
+
+    payload = magic, [u16] version, [u16] section count,
+              sections x ([u8] name length, name, [u64] length, [u32] CRC-32), [u32] CRC-32 of all before, section data
+    header  = the first section: a JSON object in UTF-8, deflated (zlib)
+
+`docs/format.md` describes every byte. The payload is small beside the sequence, so it is held in memory; every length is
+checked against what is left before anything is sliced from it.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from gvpipe.binary import Cursor
+from gvpipe.errors import CorruptFile, NewerVersion, TruncatedFile
+
+MAGIC = b"gvpipe\r\n"
+VERSION = 1
+MAX_SECTIONS = 4096
+MAX_NAME = 64
+MAX_HEADER = 1 << 20  # bytes, inflated
+HEADER = "header"
+
+PREFIX = struct.Struct("<HH")
+ENTRY = struct.Struct("<QI")
+CHECKSUM = struct.Struct("<I")
+
+MAX_FRAMES = 1 << 24
+MAX_VERTICES = 1 << 28
+
+
+@dataclass(frozen=True)
+class Bitstream:
+    """A coded sequence.
+
+    Args:
+        codec: id of the codec that wrote it and alone can read it.
+        version: of that codec's sections.
+        n_frames, n_vertices, n_triangles: F, V, T of the sequence.
+        fps: frames per second.
+        header: what else the codec's reader must know, as JSON values.
+        sections: the codec's binary data by name.
+        video: an MP4 file whose one track holds the codec's images.
+    """
+
+    codec: str
+    version: int
+    n_frames: int
+    n_vertices: int
+    n_triangles: int
+    fps: float
+    header: Mapping[str, Any] = field(default_factory=dict)
+    sections: Mapping[str, bytes] = field(default_factory=dict)
+    video: bytes = b""
+
+    def section(self, name: str) -> bytes:
+        """Return a section's bytes; raises `CorruptFile` if there is none of that name."""
+        if name not in self.sections:
+            raise CorruptFile(f"section {name!r} is missing; get the file again from its source")
+        return self.sections[name]
+
+    def number(self, key: str, low: float, high: float) -> float:
+        """Return a number of the header; raises `CorruptFile` unless it lies in ``low..high``."""
+        value = self.header.get(key)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+            raise CorruptFile(f"header: {key!r} is {value!r}; a number in {low}..{high} is needed")
+        return value
+
+    def integer(self, key: str, low: int, high: int) -> int:
+        """Return an integer of the header; raises `CorruptFile` unless it lies in ``low..high``."""
+        value = self.number(key, low, high)
+        if not isinstance(value, int):
+            raise CorruptFile(f"header: {key!r} is {value!r}; an integer is needed")
+        return value
+
+
+def pack_payload(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
+    """Return the payload of everything but the video; ``extra`` is the container's own part of the header."""
+    header = {
+        "codec": bitstream.codec,
+        "version": bitstream.version,
+        "frames": bitstream.n_frames,
+        "vertices": bitstream.n_vertices,
+        "triangles": bitstream.n_triangles,
+        "fps": bitstream.fps,
+        "container": dict(extra),
+        "settings": dict(bitstream.header),
+    }
+    text = json.dumps(header, separators=(",", ":"), allow_nan=False)
+    sections = {HEADER: zlib.compress(text.encode(), 9), **bitstream.sections}
+    head = [MAGIC, PREFIX.pack(VERSION, len(sections))]
+    for name, data in sections.items():
+        encoded = name.encode()
+        head.append(bytes([len(encoded)]) + encoded + ENTRY.pack(len(data), zlib.crc32(data)))
+    table = b"".join(head)
+    return b"".join([table, CHECKSUM.pack(zlib.crc32(table)), *sections.values()])
+
+
+def unpack_payload(payload: bytes) -> tuple[Bitstream, dict[str, Any]]:
+    """Mirror of `pack_payload`: the bitstream without its video, and the container's part of the header.
+
+    Raises:
+        NewerVersion: the payload's version is above `VERSION`.
+        TruncatedFile: it ends before its sections do.
+        CorruptFile: anything else is not as written.
+    """
+    if payload[: len(MAGIC)] != MAGIC:
+        raise CorruptFile("the payload does not start with gvpipe's magic; get the file again from its source")
+    cursor = Cursor(payload, "table")
+    cursor.bytes(len(MAGIC))
+    try:
+        version, count = cursor.struct(PREFIX)
+        if version > VERSION:
+            raise NewerVersion(f"the file has container version {version}, this gvpipe reads up to {VERSION}; upgrade gvpipe")
+        if version < 1 or not 1 <= count <= MAX_SECTIONS:
+            raise cursor.corrupt(f"version {version} with {count} sections")
+        entries = []
+        for _ in range(count):
+            name = cursor.bytes(min(cursor.bytes(1)[0], MAX_NAME))
+            entries.append((name.decode("ascii", "replace"), *cursor.struct(ENTRY)))
+        table = payload[: len(payload) - cursor.left]
+        (checksum,) = cursor.struct(CHECKSUM)
+    except CorruptFile as exc:
+        if cursor.left < 256:
+            raise TruncatedFile("the payload ends inside its section table; get the file again from its source") from exc
+        raise
+    if zlib.crc32(table) != checksum:
+        raise cursor.corrupt("its checksum does not match")
+    return _read_header(_read_sections(cursor, entries))
+
+
+def _read_sections(cursor: Cursor, entries: list[tuple[str, int, int]]) -> dict[str, bytes]:
+    wanted = sum(length for _, length, _ in entries)
+    if wanted > cursor.left:
+        raise TruncatedFile(f"the sections need {wanted} bytes, {cursor.left} are there; get the file again from its source")
+    sections: dict[str, bytes] = {}
+    for name, length, checksum in entries:
+        data = cursor.bytes(length)
+        if zlib.crc32(data) != checksum:
+            raise CorruptFile(f"section {name!r} is corrupt: its checksum does not match; get the file again from its source")
+        if name in sections:
+            raise cursor.corrupt(f"section {name!r} occurs twice")
+        sections[name] = data
+    cursor.end()
+    return sections
+
+
+def _read_header(sections: dict[str, bytes]) -> tuple[Bitstream, dict[str, Any]]:
+    try:
+        inflater = zlib.decompressobj()
+        header = json.loads(inflater.decompress(sections.pop(HEADER), MAX_HEADER))
+        bitstream = Bitstream(
+            codec=str(header["codec"]),
+            version=_count(header["version"], 1, 1 << 16),
+            n_frames=_count(header["frames"], 1, MAX_FRAMES),
+            n_vertices=_count(header["vertices"], 1, MAX_VERTICES),
+            n_triangles=_count(header["triangles"], 0, 2 * MAX_VERTICES),
+            fps=float(header["fps"]),
+            header=dict(header["settings"]),
+            sections=sections,
+        )
+        if not 0 < bitstream.fps <= 100_000:
+            raise ValueError(f"fps {bitstream.fps}")
+        return bitstream, dict(header["container"])
+    except (KeyError, TypeError, ValueError, RecursionError, zlib.error) as exc:
+        raise CorruptFile(f"the header is not as gvpipe writes it ({exc}); get the file again from its source") from exc
+
+
+def _count(value: object, low: int, high: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise ValueError(f"{value!r} is not an integer in {low}..{high}")
+    return value

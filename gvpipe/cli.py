@@ -1,0 +1,239 @@
+"""The command line: parse, call the library, print. Results go to standard output, everything else to standard error.
+
+Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gvpipe import __version__
+from gvpipe.errors import GvpipeError
+
+if TYPE_CHECKING:
+    from gvpipe.codec import Progress
+
+CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
+
+
+def main() -> None:
+    """Run the command line and exit."""
+    try:
+        status = cli(standalone_mode=False)
+    except GvpipeError as exc:
+        status = _fail(" ".join(str(exc).split()), 1)
+    except click.UsageError as exc:
+        exc.show()
+        status = 2
+    except click.ClickException as exc:
+        exc.show()
+        status = 1
+    except (click.Abort, KeyboardInterrupt):
+        status = _fail("interrupted; nothing was written", 130)
+    except MemoryError:
+        status = _fail("not enough memory; encode fewer frames or vertices at a time, or give the sequence as frame files", 1)
+    except BrokenPipeError:  # the reader of our output left, as `| head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = 1
+    sys.exit(status or 0)
+
+
+@click.group(context_settings=CONTEXT)
+@click.version_option(__version__, prog_name="gvpipe")
+def cli() -> None:
+    """Turn animated triangle meshes into small MP4 geometry videos, and back."""
+
+
+@cli.command()
+@click.argument("source", metavar="INPUT")
+@click.argument("target", metavar="OUTPUT.mp4")
+@click.option("--codec", default="mcgv", show_default=True, help="See `gvpipe codecs`.")
+@click.option("--quality", type=float, help="0-100, higher is better. [default: 75]")
+@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the codec; repeat for more.")
+@click.option("--segment", type=int, help="Most frames per segment. [default: 500]")
+@click.option("--fps", type=float, help="Frames per second, instead of the input's.")
+@click.option("--reorder", is_flag=True, help="Let the codec choose the vertex order: smaller.")
+@as_json
+def encode(
+    source: str,
+    target: str,
+    codec: str,
+    quality: float | None,
+    pairs: tuple[str, ...],
+    segment: int | None,
+    fps: float | None,
+    reorder: bool,
+    as_json: bool,
+) -> None:
+    """Encode a mesh sequence as a geometry video.
+
+    INPUT is an .npz (vertices (F,V,3), faces (T,3), fps), a folder of frame files (OBJ, PLY, STL, OFF, GLB), a glob
+    ('walk/*.obj'), a pattern (walk/%04d.obj) or a geometry video.
+    """
+    from gvpipe import api
+    from gvpipe.codec import codec_class
+
+    settings = _parse_pairs(pairs)
+    given = {"quality": quality, "segment": segment, "reorder": reorder or None}
+    settings.update({key: str(value) for key, value in given.items() if value is not None})
+    chosen = codec_class(codec).from_texts(settings)
+    with _progress() as progress:
+        report = api.encode(source, target, chosen, progress, fps)
+    if report.not_carried:
+        click.echo(f"Note: the file does not carry {', '.join(report.not_carried)}.", err=True)
+    if as_json:
+        return _print_json(report.to_json())
+    shape = f"{report.frames} frames, {report.vertices} vertices"
+    click.echo(f"{source} ({shape}) -> {target} ({_size(report.bytes)}, {report.bpvf:.3f} bits per vertex and frame)")
+    seconds = dict(report.seconds)
+    stages = ", ".join(f"{name} {value:.1f}" for name, value in seconds.items() if name != "encode" and value >= 0.05)
+    click.echo(f"{seconds['encode']:.1f} s: {stages}")
+    return None
+
+
+@cli.command()
+@click.argument("source", metavar="FILE.mp4")
+@click.argument("target", metavar="OUTPUT")
+@click.option("--start", type=int, default=0, show_default=True, help="First frame.")
+@click.option("--stop", type=int, help="Frame after the last. [default: the end]")
+def decode(source: str, target: str, start: int, stop: int | None) -> None:
+    """Decode a geometry video.
+
+    OUTPUT is an .npz, or a pattern of frame files such as out/%04d.obj (also .ply, .stl, .off, .glb).
+    """
+    from gvpipe import api
+    from gvpipe.sequence import MeshSequence
+
+    player = api.open(source)
+    start, stop = api.frame_range(player, start, stop)
+    part = _Part(player, start, stop)
+    with _progress() as progress:
+        part.progress = progress
+        api.write(MeshSequence(part, player.faces, player.fps, name=source), target, start)
+    click.echo(f"{source} -> {target} ({stop - start} frames, {part.shape[1]} vertices)")
+
+
+@cli.command()
+@click.argument("source", metavar="FILE.mp4")
+@as_json
+def info(source: str, as_json: bool) -> None:
+    """Tell what a geometry video holds and where its bytes go."""
+    from gvpipe import api
+
+    found = api.info(source)
+    if as_json:
+        return _print_json(found.to_json())
+    low, high = found.bounding_box["min"], found.bounding_box["max"]
+    click.echo(f"{source}: {found.codec} version {found.version}")
+    click.echo(f"{found.vertices} vertices, {found.triangles} triangles, {found.frames} frames at {found.fps:g} fps")
+    click.echo("frame 0 lies in " + " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True)))
+    click.echo(f"{_size(found.bytes)}, {found.bpvf:.3f} bits per vertex and frame:")
+    width = max(map(len, found.sections))
+    for name, count in found.sections.items():
+        bpvf = 8 * count / (found.vertices * found.frames)
+        bar = "#" * round(40 * count / found.bytes)
+        click.echo(f"  {name:<{width}} {count:>10} bytes {bpvf:8.4f} bpvf  {bar}".rstrip())
+    return None
+
+
+@cli.command()
+@click.argument("reference", metavar="REFERENCE")
+@click.argument("distorted", metavar="DISTORTED")
+@as_json
+def compare(reference: str, distorted: str, as_json: bool) -> None:
+    """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos."""
+    from gvpipe import api, metrics
+
+    with _progress() as progress:
+        result = metrics.compare(
+            api.read(reference), api.read(distorted), lambda done, of: progress("compare", done / of) if progress else None
+        )
+    values = result.to_json()
+    if as_json:
+        return _print_json(values)
+    for name, value in values.items():
+        if name != "frames":
+            click.echo(f"{name:<14} {'not defined' if value is None else format(value, '.6g')}")
+    return None
+
+
+@cli.command()
+def codecs() -> None:
+    """List the codecs and their settings."""
+    import dataclasses
+
+    from gvpipe.codec import codec_class, codec_ids
+
+    for name in codec_ids():
+        codec = codec_class(name)
+        defaults = " ".join(f"{field.name}={field.default}" for field in dataclasses.fields(codec))
+        click.echo(f"{name}: {codec.summary}; {defaults}")
+
+
+class _Part:
+    """Frames of a player, which tell how far they have been read."""
+
+    def __init__(self, player: Any, start: int, stop: int) -> None:
+        self._player, self._start = player, start
+        self.shape = (stop - start, *player.shape[1:])
+        self.progress: Progress | None = None
+
+    def __getitem__(self, key: slice, /) -> Any:
+        first, last, _ = key.indices(self.shape[0])
+        if self.progress:
+            self.progress("decode", last / self.shape[0])
+        return self._player[self._start + first : self._start + last]
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[Progress | None]:
+    """A bar per stage on standard error, where that is a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress as Bars
+
+    with Bars(console=Console(stderr=True), transient=True) as bars:
+        tasks: dict[str, Any] = {}
+
+        def show(stage: str, done: float) -> None:
+            for name, task in tasks.items():
+                if name != stage:
+                    bars.update(task, completed=1.0)
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=1.0)
+            bars.update(tasks[stage], completed=done)
+
+        yield show
+
+
+def _parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:
+    settings = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals:
+            raise click.UsageError(f"--set {pair}: KEY=VALUE is needed, such as --set clusters=30")
+        settings[key.strip()] = value.strip()
+    return settings
+
+
+def _print_json(values: dict[str, Any]) -> None:
+    click.echo(json.dumps(values, allow_nan=False))
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e6:.2f} MB" if count >= 1e6 else f"{count / 1e3:.1f} kB"
+
+
+def _fail(message: str, status: int) -> int:
+    click.echo(f"Error: {message}", err=True)
+    return status

@@ -1,0 +1,142 @@
+"""What a codec is, and how gvpipe finds them.
+
+A codec is a frozen dataclass of its settings with an ``id``, a ``summary``, ``encode`` and ``reader``. Packages register theirs as
+an entry point in the group ``gvpipe.codecs``; nothing is imported before it is asked for by id.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Mapping
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+
+from gvpipe.bitstream import Bitstream
+from gvpipe.errors import NewerVersion, SettingError
+from gvpipe.sequence import Float32, Int32, MeshSequence
+
+GROUP = "gvpipe.codecs"
+
+Progress = Callable[[str, float], None]
+"""Called with a stage's name and the part of it that is done, 0..1; stages come one after the other."""
+
+
+class FrameReader(Protocol):
+    """Frames of one bitstream; keeps no more than the last group of them."""
+
+    @property
+    def n_frames(self) -> int:
+        """F, the number of frames."""
+        ...
+
+    @property
+    def faces(self) -> Int32:
+        """``(T, 3) int32`` triangles, in the order of the vertices that `read` returns."""
+        ...
+
+    def read(self, start: int, stop: int) -> Float32:
+        """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units; decodes no more than it must."""
+        ...
+
+
+@runtime_checkable
+class Codec(Protocol):
+    """A codec's settings, and what it does with them."""
+
+    id: ClassVar[str]
+    version: ClassVar[int]
+    summary: ClassVar[str]
+
+    @property
+    def quality(self) -> float:
+        """0..100, higher is better; bytes and error follow it monotonically."""
+        ...
+
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> Bitstream:
+        """Code a sequence."""
+        ...
+
+    @classmethod
+    def reader(cls, bitstream: Bitstream) -> FrameReader:
+        """Open a bitstream that this codec wrote, by what it holds alone."""
+        ...
+
+
+class Settings:
+    """Base of codecs' dataclasses: turns texts into settings, and checks ranges."""
+
+    @classmethod
+    def from_texts(cls, texts: Mapping[str, str]) -> Self:
+        """Build the settings from ``KEY=VALUE`` texts; raises `SettingError` naming key, value and what is allowed."""
+        fields = {field.name: field for field in dataclasses.fields(cls)}  # type: ignore[arg-type] - subclasses are dataclasses
+        values: dict[str, Any] = {}
+        for key, text in texts.items():
+            if key not in fields:
+                raise SettingError(f"no setting {key!r}; there are {', '.join(fields)}")
+            values[key] = _parse(key, text, type(fields[key].default))
+        return cls(**values)
+
+    def check_range(self, low: float, high: float, *names: str) -> None:
+        """Raise `SettingError` unless the named settings lie in ``low..high``; integers must be integers."""
+        for name in names:
+            value = getattr(self, name)
+            default = getattr(type(self), name)
+            wrong = isinstance(value, bool) or not isinstance(value, int if isinstance(default, int) else int | float)
+            if wrong or not low <= value <= high:
+                kind = "an integer" if isinstance(default, int) else "a number"
+                raise SettingError(f"{name} is {value!r}; {kind} in {low}..{high} is needed")
+
+    def check_choice(self, name: str, choices: tuple[str, ...]) -> None:
+        """Raise `SettingError` unless the named setting is one of ``choices``."""
+        if getattr(self, name) not in choices:
+            raise SettingError(f"{name} is {getattr(self, name)!r}; one of {', '.join(choices)} is needed")
+
+
+def codec_ids() -> list[str]:
+    """Ids of the codecs that are installed, sorted."""
+    return sorted(_entries())
+
+
+@functools.cache
+def codec_class(codec: str) -> type[Any]:
+    """Return the class of the codec with that id; raises `SettingError` if there is none."""
+    if codec not in _entries():
+        raise SettingError(f"no codec {codec!r}; there are {', '.join(codec_ids())}")
+    loaded: type[Any] = _entries()[codec].load()
+    return loaded
+
+
+def open_reader(bitstream: Bitstream) -> FrameReader:
+    """Open a bitstream with the codec that wrote it.
+
+    Raises:
+        NewerVersion: no installed codec has that id, or only an older version of it.
+        CorruptFile: its sections are not what that codec writes.
+    """
+    if bitstream.codec not in _entries():
+        raise NewerVersion(f"it was made by codec {bitstream.codec!r}, which this gvpipe does not have; upgrade gvpipe")
+    codec = codec_class(bitstream.codec)
+    if bitstream.version > codec.version:
+        raise NewerVersion(
+            f"it was made by version {bitstream.version} of codec {bitstream.codec!r}, this gvpipe has version "
+            f"{codec.version}; upgrade gvpipe"
+        )
+    reader: FrameReader = codec.reader(bitstream)
+    return reader
+
+
+@functools.cache
+def _entries() -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=GROUP)}
+
+
+def _parse(key: str, text: str, kind: type) -> Any:
+    if kind is bool:
+        if text.lower() not in ("true", "false", "1", "0", "yes", "no"):
+            raise SettingError(f"{key} is {text!r}; true or false is needed")
+        return text.lower() in ("true", "1", "yes")
+    try:
+        return kind(text)
+    except ValueError as exc:
+        raise SettingError(f"{key} is {text!r}; {'an integer' if kind is int else 'a number'} is needed") from exc

@@ -1,0 +1,60 @@
+"""Every error that gvpipe raises on purpose.
+
+One tree, so that a caller can catch as much or as little as needed::
+
+    GvpipeError
+    ├── InputError           a sequence, a setting or a path that cannot be used (also a ValueError)
+    │   └── SettingError     a codec setting out of range or unknown
+    ├── OutputError          the result cannot be written (disk full, no such folder)
+    └── FormatError          a file that cannot be read as a geometry video
+        ├── NotGeometryVideo     not an MP4, or an MP4 that gvpipe did not write
+        ├── NewerVersion         written by a newer gvpipe
+        ├── StrippedFile         the payload box was removed, e.g. by remuxing
+        ├── TruncatedFile        the file ends early
+        └── CorruptFile          a checksum, a length or an index does not hold
+
+Third-party errors are wrapped where they arise (``raise ... from exc``); every message names the file, frame
+or value, the limit and what to do about it.
+"""
+
+from __future__ import annotations
+
+
+class GvpipeError(Exception):
+    """Base of all errors raised on purpose; its text is one line, fit to be shown to a user."""
+
+
+class InputError(GvpipeError, ValueError):
+    """The sequence, path or argument given cannot be used."""
+
+
+class SettingError(InputError):
+    """A codec setting is unknown or out of range."""
+
+
+class OutputError(GvpipeError):
+    """The result cannot be written."""
+
+
+class FormatError(GvpipeError):
+    """The file cannot be read as a geometry video."""
+
+
+class NotGeometryVideo(FormatError):
+    """Not an MP4 file, or an MP4 file that gvpipe did not write."""
+
+
+class NewerVersion(FormatError):
+    """The file, or the codec inside it, is newer than this gvpipe."""
+
+
+class StrippedFile(FormatError):
+    """The MP4 carries gvpipe's tag but not its payload, as after remuxing."""
+
+
+class TruncatedFile(FormatError):
+    """The file ends before its content does."""
+
+
+class CorruptFile(FormatError):
+    """A checksum, a length or an index in the file does not hold."""

@@ -1,0 +1,61 @@
+"""Mesh sequences from files and to files.
+
+A format that holds a whole sequence in one file is one module here and one entry in `READERS` and `WRITERS`; a format
+of single frames is one module and one entry in `formats.FRAME_FORMATS`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from gvpipe.errors import InputError
+from gvpipe.io.export import write_frames
+from gvpipe.io.frames import read_frames
+from gvpipe.io.npz import read_npz, write_npz
+from gvpipe.sequence import MeshSequence
+
+__all__ = ["READERS", "WRITERS", "read", "write"]
+
+READERS: dict[str, Callable[[Path, float | None], MeshSequence]] = {".npz": read_npz}
+WRITERS: dict[str, Callable[[MeshSequence, Path], None]] = {".npz": write_npz}
+
+
+def read(path: str | os.PathLike[str], fps: float | None = None) -> MeshSequence:
+    """Read a mesh sequence.
+
+    Args:
+        path: an ``.npz``, or frame files as a folder, a glob (``walk/*.obj``), a pattern (``walk/%04d.obj``) or one
+            file.
+        fps: frames per second; overrides the file's. Frame files, and archives without one, have 30 by default.
+
+    Raises:
+        InputError: the path or what it holds cannot be used. Frame files after the first are read, and may raise it,
+            when their positions are.
+    """
+    path = os.fspath(path)
+    reader = READERS.get(Path(path).suffix.lower())
+    if reader is not None and not os.path.isdir(path):
+        if not os.path.isfile(path):
+            raise InputError(f"{path}: no such file; check the path")
+        return reader(Path(path), fps)
+    return read_frames(path, fps)
+
+
+def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) -> None:
+    """Write a mesh sequence.
+
+    Args:
+        path: an ``.npz``, a pattern of frame files (``out/%04d.obj``) or a folder (existing, or ending in ``/``).
+        start: number of the first frame file.
+
+    Raises:
+        InputError: the path names no format that can be written.
+        OutputError: a file cannot be written; nothing half-written is left.
+    """
+    path = os.fspath(path)
+    writer = WRITERS.get(Path(path).suffix.lower())
+    if writer is not None and not os.path.isdir(path):
+        return writer(sequence, Path(path))
+    return write_frames(sequence, path, start)

@@ -1,0 +1,104 @@
+"""OFF frames (Object File Format, Geomview), the text form: ``OFF``, ``COFF``, ``NOFF``, ``STOFF`` and mixtures.
+
+Parsed here rather than by trimesh 5.2, whose reader accepts a file that ends early, moves polygons behind the
+triangles and drops colours. Vertex colours are kept; other per-vertex values are skipped.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.io.mesh import Attributes, Encoder, Int64, Mesh, as_color, as_faces, as_positions, fan
+from gvpipe.io.text import clean_lines, count_tokens, format_rows, line_spans, parse_floats, parse_integers
+from gvpipe.sequence import Float32, Int32
+
+HEADER = re.compile(rb"\s*(ST)?(C)?(N)?OFF\b")
+
+
+class OffLoader:
+    """Loads the frames of one sequence, remembering the face lines of the first."""
+
+    def __init__(self) -> None:
+        self._face_lines = b""
+        self._faces: Int32 | None = None
+
+    def __call__(self, path: Path) -> Mesh:
+        """Load one file.
+
+        Raises:
+            OSError, ValueError: the file cannot be read; the caller names it.
+        """
+        text = clean_lines(path.read_bytes())
+        header = HEADER.match(text)
+        if header is None:
+            raise ValueError("it does not start with OFF")
+        body = text[header.end() :].strip() + b"\n"
+        if b"\n\n" in body:
+            body = re.sub(rb"\n+", b"\n", body)
+        ends = line_spans(np.frombuffer(body, np.uint8))[1]
+        announced = parse_integers(body[: ends[0]])
+        n_vertices, n_faces = announced[:2].tolist() if len(announced) > 1 else (0, 0)
+        if n_vertices < 1 or n_faces < 1 or len(ends) < 1 + n_vertices + n_faces:
+            raise ValueError(f"it announces {n_vertices} vertices and {n_faces} faces on {len(ends) - 1} lines")
+
+        values, counts, first = _parse_rows(body[ends[0] : ends[n_vertices]])
+        if (counts < 3).any():
+            raise ValueError("a vertex has fewer than 3 coordinates")
+        positions = as_positions(values[first[:, None] + np.arange(3)])
+        face_lines = body[ends[n_vertices] : ends[n_vertices + n_faces]]
+        if self._faces is None or face_lines != self._face_lines or self._faces.max() >= n_vertices:
+            faces = _parse_faces(face_lines, n_vertices)
+        else:
+            faces = self._faces
+        if self._faces is None:
+            self._faces, self._face_lines = faces, face_lines
+        return Mesh(positions, faces, _colors(values, counts, first) if header[2] and not header[1] else {})
+
+
+def _parse_rows(text: bytes) -> tuple[NDArray[np.float64], Int64, Int64]:
+    """All numbers of some lines, how many each line has, and where each begins."""
+    array = np.frombuffer(text, np.uint8)
+    values, counts = parse_floats(text), count_tokens(array, line_spans(array)[0])
+    if len(values) != counts.sum():
+        raise ValueError("something in it is not a number")
+    return values, counts, np.cumsum(counts) - counts
+
+
+def _parse_faces(text: bytes, n_vertices: int) -> Int32:
+    """Polygons as triangles ``(T, 3)``; colours behind the corners are skipped."""
+    values, counts, first = _parse_rows(text)
+    n_corners = values[first].astype(np.int64)
+    if (n_corners >= counts).any():
+        raise ValueError("a face line ends before its last corner")
+    triangles = fan(n_corners)
+    # corner c of polygon p stands at first[p] + 1 + c, behind the number of corners
+    at = np.repeat(first + 1 - (np.cumsum(n_corners) - n_corners), n_corners) + np.arange(n_corners.sum())
+    return as_faces(values[at].astype(np.int64)[triangles], n_vertices)
+
+
+def _colors(values: NDArray[np.float64], counts: Int64, first: Int64) -> Attributes:
+    """The last four columns, or three where rows are too short for four."""
+    if (counts != counts[0]).any() or counts[0] < 6:
+        return {}
+    width = 4 if counts[0] in (7, 10) else 3  # x y z [nx ny nz] r g b a
+    return {"color": as_color(values[(first + counts[0] - width)[:, None] + np.arange(width)])}
+
+
+def encode_off(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder:
+    """A writer of frames with these faces, and with colours if there is one per vertex."""
+    color = attributes.get("color")
+    tail = format_rows("3 %d %d %d\n", faces)
+
+    def encode(positions: Float32) -> bytes:
+        if color is None or len(color) != n_vertices:
+            head = f"OFF\n{n_vertices} {len(faces)} 0\n" + format_rows("%.9g %.9g %.9g\n", positions)
+        else:
+            rows = np.concatenate([positions.astype(np.float64), color], axis=1)
+            head = f"COFF\n{n_vertices} {len(faces)} 0\n" + format_rows("%.9g %.9g %.9g %d %d %d %d\n", rows)
+        return (head + tail).encode("ascii")
+
+    return encode

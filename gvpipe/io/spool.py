@@ -1,0 +1,59 @@
+"""Frames kept in an unnamed temporary file, to be read again without parsing.
+
+Plain reads and writes rather than a memory map: mapped pages would count as the process's own memory.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+import threading
+import weakref
+from io import FileIO
+
+import numpy as np
+
+from gvpipe.sequence import Float32
+
+
+class Spool:
+    """Frames of equal size on disk; after any failure it holds nothing and takes nothing more.
+
+    Args:
+        n_frames: frames at most.
+        bytes_frame: bytes of one frame.
+    """
+
+    def __init__(self, n_frames: int, bytes_frame: int) -> None:
+        self._stored = np.zeros(n_frames, bool)
+        self._bytes_frame = bytes_frame
+        self._lock = threading.Lock()
+        self._file: FileIO | None = None
+        with contextlib.suppress(OSError):
+            self._file = tempfile.TemporaryFile(prefix="gvpipe-", buffering=0)  # noqa: SIM115 - lives as long as self
+            weakref.finalize(self, self._file.close)
+
+    def store(self, frame: int, positions: Float32) -> None:
+        """Keep a frame, if there is room on the disk."""
+        with self._lock:
+            self._stored[frame] = self._move(frame, positions, write=True)
+
+    def fetch(self, frame: int, positions: Float32) -> bool:
+        """Fill ``positions`` with a frame and return True, or return False if it is not held."""
+        with self._lock:
+            return bool(self._stored[frame]) and self._move(frame, positions, write=False)
+
+    def _move(self, frame: int, positions: Float32, write: bool) -> bool:
+        if self._file is None:
+            return False
+        try:
+            self._file.seek(frame * self._bytes_frame)
+            if (self._file.write if write else self._file.readinto)(positions.data) == self._bytes_frame:
+                return True
+        except OSError:
+            pass
+        # most likely a full disk: give the room back, the output may need it, and let the caller parse again
+        self._file.close()
+        self._file = None
+        self._stored[:] = False
+        return False

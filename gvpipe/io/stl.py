@@ -1,0 +1,95 @@
+"""STL frames, welded: STL stores three corners per triangle and no vertices.
+
+Corners at exactly equal places in the first frame become one vertex, numbered by first appearance, and the same map
+joins the corners of all other frames. Where corners that were one vertex part later, connectivity is not constant and
+the frame is refused. Reading is trimesh's; writing is one structured array.
+"""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gvpipe.errors import InputError
+from gvpipe.io.mesh import Attributes, Encoder, Int64, Mesh, as_faces, as_positions
+from gvpipe.sequence import Float32, Int32, check_finite
+
+RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+HEADER_BYTES = 80
+
+
+class StlLoader:
+    """Loads the frames of one sequence, remembering how the first was welded."""
+
+    def __init__(self) -> None:
+        self._first: Path | None = None
+        self._faces: Int32 = np.zeros((0, 3), np.int32)
+        self._corner_of: Int64 = np.zeros(0, np.int64)  # (V,), the first corner at each vertex
+
+    def __call__(self, path: Path) -> Mesh:
+        """Load one file.
+
+        Raises:
+            InputError: corners that were one vertex in the first file are apart in this one.
+            Exception: the file cannot be read; trimesh raises many kinds, and the caller names the file.
+        """
+        corners = _load_corners(path)
+        if self._first is None:
+            self._corner_of, corner_vertices = _weld(corners)
+            self._faces = as_faces(corner_vertices.reshape(-1, 3), len(self._corner_of))
+            self._first = path
+        if len(corners) != self._faces.size:
+            raise InputError(
+                f"{path.name} has {len(corners) // 3} triangles, {self._first.name} has {len(self._faces)}; "
+                "all frames need the same triangles"
+            )
+        positions = corners[self._corner_of]
+        apart = np.flatnonzero((positions[self._faces.reshape(-1)] != corners).any(axis=1))
+        if len(apart):
+            check_finite(corners[None], str(path))  # a NaN differs from itself
+            corner = int(apart[0])
+            raise InputError(
+                f"corner {corner % 3} of triangle {corner // 3} shares a vertex with another in {self._first.name} "
+                f"but not in {path.name}; STL has no vertices of its own: export OBJ, PLY or GLB"
+            )
+        return Mesh(positions, self._faces)
+
+
+def _load_corners(path: Path) -> Float32:
+    """All corners, ``(3 T, 3)``."""
+    import trimesh
+
+    scene: Any = trimesh.load_scene(path, file_type="stl", process=False)
+    solids = [as_positions(solid.vertices[solid.faces.reshape(-1)]) for solid in scene.geometry.values()]
+    if not solids:
+        raise ValueError("it has no triangles")
+    return np.concatenate(solids)
+
+
+def _weld(corners: Float32) -> tuple[Int64, Int64]:
+    """For ``(3 T, 3)`` corners: the first corner of each vertex ``(V,)`` and each corner's vertex ``(3 T,)``."""
+    rows = np.ascontiguousarray(corners + np.float32(0))  # makes -0 and 0 the same bytes
+    _, first, inverse = np.unique(rows.view("V12").reshape(-1), return_index=True, return_inverse=True)
+    by_appearance = np.argsort(first)
+    rank = np.empty_like(by_appearance)
+    rank[by_appearance] = np.arange(len(first))
+    return first[by_appearance], rank[inverse]
+
+
+def encode_stl(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder:
+    """A writer of frames with these faces; STL holds nothing but triangles."""
+    records = np.zeros(len(faces), RECORD)
+    header = b"gvpipe".ljust(HEADER_BYTES) + struct.pack("<I", len(faces))
+
+    def encode(positions: Float32) -> bytes:
+        corners = positions[faces]  # (T, 3, 3)
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        records["normal"] = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+        records["corners"] = corners
+        return header + bytes(records.tobytes())
+
+    return encode

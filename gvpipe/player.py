@@ -1,0 +1,93 @@
+"""Random access to the frames of a geometry video."""
+
+from __future__ import annotations
+
+import operator
+import os
+import threading
+from collections.abc import Iterator
+from types import TracebackType
+from typing import overload
+
+import numpy as np
+
+from gvpipe.bitstream import Bitstream
+from gvpipe.codec import open_reader
+from gvpipe.container import read_file
+from gvpipe.errors import FormatError
+from gvpipe.sequence import Float32, Int32, MeshSequence
+
+
+class Player:
+    """An open geometry video: a sequence of frames, each ``(V, 3) float32``, model units. A context manager; thread-safe.
+
+    ``video[k]`` decodes no more than the group of pictures that frame k lies in, and keeps that group for the next
+    frame; ``video[a:b]`` gives ``(b - a, V, 3)``.
+
+    Raises:
+        InputError: there is no such file.
+        FormatError: it is not a geometry video, or it is damaged; the kinds are in `gvpipe.errors`.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = os.fspath(path)
+        self.bitstream: Bitstream = read_file(path)
+        try:
+            self._reader = open_reader(self.bitstream)
+        except FormatError as exc:
+            raise type(exc)(f"{self.path}: {exc}") from exc
+        self._lock = threading.Lock()
+
+    @property
+    def faces(self) -> Int32:
+        """``(T, 3) int32`` triangles."""
+        return self._reader.faces
+
+    @property
+    def fps(self) -> float:
+        """Frames per second."""
+        return self.bitstream.fps
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """``(F, V, 3)``."""
+        return (self.bitstream.n_frames, self.bitstream.n_vertices, 3)
+
+    def sequence(self) -> MeshSequence:
+        """The video as a sequence whose frames are decoded when they are read."""
+        return MeshSequence(self, self.faces, self.fps, name=self.path)
+
+    def __len__(self) -> int:
+        return self.bitstream.n_frames
+
+    @overload
+    def __getitem__(self, key: int, /) -> Float32: ...
+    @overload
+    def __getitem__(self, key: slice, /) -> Float32: ...
+    def __getitem__(self, key: int | slice, /) -> Float32:
+        if isinstance(key, slice):
+            start, stop, step = key.indices(len(self))
+            if step != 1:
+                return np.stack([self[i] for i in range(start, stop, step)]) if range(start, stop, step) else self._read(0, 0)
+            return self._read(start, max(start, stop))
+        index = operator.index(key)
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"frame {index} of {self.path}: there are {len(self)}")
+        index %= len(self)
+        return np.asarray(self._read(index, index + 1)[0])
+
+    def __iter__(self) -> Iterator[Float32]:
+        return (self[i] for i in range(len(self)))
+
+    def __enter__(self) -> Player:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """Nothing stays open between reads."""
+
+    def _read(self, start: int, stop: int) -> Float32:
+        with self._lock:
+            try:
+                return self._reader.read(start, stop)
+            except FormatError as exc:
+                raise type(exc)(f"{self.path}: {exc}") from exc

@@ -1,0 +1,37 @@
+"""Uniform quantisation on a cubic lattice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Points ``origin + step * i`` for integer i, the same step along all axes.
+
+    Args:
+        origin: three coordinates, model units.
+        step: lattice constant, model units, > 0.
+    """
+
+    origin: tuple[float, float, float]
+    step: float
+
+    @classmethod
+    def over(cls, points: NDArray[np.floating], bits: int) -> Lattice:
+        """Return the lattice of ``2**bits`` steps along the longest side of the bounding box of ``points (V, 3)``."""
+        low = points.min(axis=0).astype(np.float64)
+        extent = float((points.max(axis=0).astype(np.float64) - low).max())
+        x, y, z = low.tolist()
+        return cls((x, y, z), extent / (2**bits - 1) if extent > 0 else 1.0)
+
+    def quantise(self, points: NDArray[np.floating]) -> NDArray[np.int32]:
+        """Return the nearest lattice indices, ``(V, 3) int32``."""
+        return np.rint((points.astype(np.float64) - self.origin) / self.step).astype(np.int32)
+
+    def place(self, indices: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Return the lattice points, ``(V, 3)``, model units."""
+        return np.asarray(self.origin) + indices * self.step

@@ -1,0 +1,251 @@
+"""Greyscale planes to a video track and back, by PyAV.
+
+Three profiles, each one luma picture per frame, chroma neutral:
+
+- ``h264-8``: H.264 High, yuv420p, limited range, samples 16..235: what a browser gives back bit by bit from a canvas;
+- ``h264-10``: H.264 High 10, yuv420p10, samples 64..940, for players in Python;
+- ``jpeg``: one greyscale JPEG per frame, samples 0..255, every frame a key frame.
+
+A video is an MP4 file in memory with this one track. H.264 is coded in closed groups of pictures (GOPs), so that any frame costs at
+most its group. x264 runs on one thread because its output depends on their number.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.errors import CorruptFile
+from gvpipe.images import decode_jpeg, encode_jpeg
+
+if TYPE_CHECKING:
+    import av
+
+MAX_SIDE = 16384  # pixels, of a picture that is read
+QP_RANGE = (1, 51)  # 0 would be lossless, which is another H.264 profile that browsers do not read
+DEPTH10_QP = 12  # x264 counts QP from 12 lower at 10 bits
+# measured on chicken, cow and samba (docs/benchmarks.md): psycho-visual choices and the deblocking filter only cost here, since
+# blocks are separate charts; long pyramids of B-frames suit residuals that change slowly
+X264 = {"no-psy": 1, "aq-mode": 0, "no-deblock": 1, "bframes": 8, "b-adapt": 2, "scenecut": 0, "threads": 1, "log-level": 0}
+
+Plane = NDArray[np.uint8] | NDArray[np.uint16]
+
+
+@dataclass(frozen=True)
+class Profile:
+    """How planes become pictures: sample depth and the levels that carry data."""
+
+    name: str
+    codec: str
+    pixel_format: str
+    depth: int
+    low: int
+    high: int
+
+    @property
+    def middle(self) -> int:
+        """The level of a zero."""
+        return (self.low + self.high + 1) // 2
+
+    @property
+    def amplitude(self) -> int:
+        """Levels on either side of the middle."""
+        return (self.high - self.low) // 2
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of a plane."""
+        return np.dtype(np.uint8 if self.depth == 8 else np.uint16)
+
+
+PROFILES = {
+    p.name: p
+    for p in (
+        Profile("h264-8", "h264", "yuv420p", 8, 16, 235),
+        Profile("h264-10", "h264", "yuv420p10le", 10, 64, 940),
+        Profile("jpeg", "mjpeg", "gray", 8, 0, 255),
+    )
+}
+
+
+class VideoWriter:
+    """Codes planes one after the other; a context manager.
+
+    Args:
+        profile: one of `PROFILES`.
+        width, height: of a plane, pixels, even.
+        fps: frames per second.
+        quality: H.264: the quantisation parameter, 1..51 (10 bit: 1..63); JPEG: its quality, 1..100.
+        gop: H.264: frames per group of pictures.
+        preset: x264's.
+    """
+
+    def __init__(
+        self, profile: Profile, width: int, height: int, fps: float, quality: int, gop: int = 32, preset: str = "slow"
+    ) -> None:
+        import av
+
+        self._profile, self._shape, self._quality = profile, (height, width), quality
+        self._count = 0
+        self._file = io.BytesIO()
+        self._container = av.open(self._file, "w", format="mp4", options={"fflags": "+bitexact"})
+        rate = Fraction(fps).limit_denominator(1001) or Fraction(1, 1001)
+        self._time_base = 1 / rate
+        if profile.codec == "mjpeg":
+            self._stream: Any = self._container.add_mux_stream("mjpeg", rate, width=width, height=height)
+            self._stream.time_base = self._time_base
+            return
+        self._stream = self._container.add_stream("libx264", rate, options=_x264_options(quality, gop, preset))
+        self._stream.width, self._stream.height = width, height
+        self._stream.pix_fmt = profile.pixel_format
+        context = self._stream.codec_context
+        context.time_base = self._time_base
+        context.color_range = 1  # limited
+        context.colorspace = context.color_primaries = context.color_trc = 1  # BT.709, so that no player guesses
+
+    def add(self, plane: Plane) -> None:
+        """Append one ``(height, width)`` plane of the profile's dtype."""
+        if plane.shape != self._shape or plane.dtype != self._profile.dtype:
+            raise ValueError(f"plane of shape {plane.shape} and type {plane.dtype}; {self._shape} {self._profile.dtype} is needed")
+        if self._profile.codec == "mjpeg":
+            self._container.mux(self._jpeg_packet(plane))
+        else:
+            self._container.mux(self._stream.encode(self._picture(plane)))
+        self._count += 1
+
+    def finish(self) -> bytes:
+        """Return the finished MP4 file."""
+        if self._profile.codec != "mjpeg":
+            self._container.mux(self._stream.encode(None))
+        self._container.close()
+        return self._file.getvalue()
+
+    def __enter__(self) -> VideoWriter:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._container.close()
+
+    def _jpeg_packet(self, plane: Plane) -> av.Packet:
+        import av
+
+        packet = av.Packet(encode_jpeg(np.ascontiguousarray(plane, np.uint8), self._quality))
+        packet.stream = self._stream
+        packet.time_base = self._time_base
+        packet.pts = packet.dts = self._count
+        packet.duration = 1
+        packet.is_keyframe = True
+        return packet
+
+    def _picture(self, plane: Plane) -> av.VideoFrame:
+        import av
+
+        height, width = self._shape
+        neutral = np.full((height // 2, width), 1 << (self._profile.depth - 1), plane.dtype)
+        picture = av.VideoFrame.from_ndarray(np.concatenate([plane, neutral]), format=self._profile.pixel_format)
+        picture.pts, picture.time_base = self._count, self._time_base
+        return picture
+
+
+class VideoReader:
+    """Random access to the planes of a video; decodes no more than the group of pictures that a frame lies in.
+
+    Args:
+        data: an MP4 file.
+        profile: that it was written with.
+        width, height: of a plane.
+
+    Raises:
+        CorruptFile: no such video track.
+    """
+
+    def __init__(self, data: bytes, profile: Profile, width: int, height: int) -> None:
+        self._profile, self._shape = profile, (height, width)
+        self._packets, self._extradata = _demux(data, profile, width, height)
+        starts = [i for i, packet in enumerate(self._packets) if packet.is_keyframe]
+        if not starts or starts[0] != 0:
+            raise CorruptFile("the video does not start with a key frame; get the file again from its source")
+        self._groups = list(zip(starts, [*starts[1:], len(self._packets)], strict=True))
+        self._cached: tuple[int, list[Plane]] = (-1, [])
+
+    @property
+    def n_frames(self) -> int:
+        """Frames in the track."""
+        return len(self._packets)
+
+    def read(self, start: int, stop: int) -> Iterator[tuple[int, list[Plane]]]:
+        """Yield ``(first frame, planes)`` for the frames ``start`` to ``stop``, one group of pictures at a time.
+
+        Raises:
+            CorruptFile: the group does not decode to its number of planes.
+        """
+        for group, (first, last) in enumerate(self._groups):
+            if first < stop and last > start:
+                planes = self._decode(group)
+                low, high = max(start, first), min(stop, last)
+                yield low, planes[low - first : high - first]
+
+    def _decode(self, group: int) -> list[Plane]:
+        number, planes = self._cached
+        if number != group:
+            first, last = self._groups[group]
+            packets = self._packets[first:last]
+            if self._profile.codec == "mjpeg":
+                planes = [decode_jpeg(bytes(packet), *self._shape) for packet in packets]
+            else:
+                planes = self._decode_h264(packets)
+            self._cached = (group, planes)
+        return planes
+
+    def _decode_h264(self, packets: list[av.Packet]) -> list[Plane]:
+        import av
+
+        decoder = av.CodecContext.create("h264", "r")
+        decoder.extradata = self._extradata
+        decoder.thread_count = 1
+        try:
+            pictures: list[Any] = []
+            for packet in packets:
+                pictures += decoder.decode(av.Packet(bytes(packet)))
+            pictures += decoder.decode(None)
+        except av.FFmpegError as exc:
+            raise CorruptFile(f"the video does not decode ({exc}); get the file again from its source") from exc
+        wanted = (self._profile.pixel_format, *self._shape)
+        if len(pictures) != len(packets) or any((p.format.name, p.height, p.width) != wanted for p in pictures):
+            raise CorruptFile("the video does not decode to the pictures that the header tells of; get the file again")
+        return [self._luma(picture) for picture in pictures]
+
+    def _luma(self, picture: Any) -> Plane:
+        height, width = self._shape
+        plane = picture.planes[0]
+        rows = np.frombuffer(plane, self._profile.dtype).reshape(-1, plane.line_size // self._profile.dtype.itemsize)
+        return np.array(rows[:height, :width])
+
+
+def _x264_options(quality: int, gop: int, preset: str) -> dict[str, str]:
+    settings = {"qp": quality, "keyint": gop, "min-keyint": gop, **X264}
+    return {"preset": preset, "x264-params": ":".join(f"{key}={value}" for key, value in settings.items())}
+
+
+def _demux(data: bytes, profile: Profile, width: int, height: int) -> tuple[list[av.Packet], bytes | None]:
+    import av
+
+    try:
+        with av.open(io.BytesIO(data), "r", format="mp4") as container:
+            if len(container.streams.video) != 1:
+                raise CorruptFile(f"the file has {len(container.streams.video)} video tracks; one is needed")
+            stream = container.streams.video[0]
+            context = stream.codec_context
+            found = (context.name, context.width, context.height)
+            if found != (profile.codec, width, height) or max(width, height) > MAX_SIDE:
+                raise CorruptFile(f"the video is {found}; {(profile.codec, width, height)} is needed")
+            return [packet for packet in container.demux(stream) if packet.size], context.extradata
+    except (av.FFmpegError, IndexError, ValueError) as exc:
+        raise CorruptFile(f"the video track cannot be read ({exc}); get the file again from its source") from exc

@@ -1,0 +1,229 @@
+"""Mesh streams: every awkward mesh comes back exactly, and no bytes do harm."""
+
+import DracoPy
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gvpipe import connectivity
+from gvpipe.connectivity import decode_base, encode_base
+from gvpipe.errors import CorruptFile, InputError
+
+TETRAHEDRON = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
+
+
+def random_points(n_vertices, top=4095, seed=0):
+    return np.random.default_rng(seed).integers(0, top + 1, (n_vertices, 3)).astype(np.int32)
+
+
+def grid(n):
+    i = np.arange((n - 1) * n).reshape(n - 1, n)[:, :-1].ravel()
+    faces = np.concatenate([np.c_[i, i + 1, i + n], np.c_[i + 1, i + n + 1, i + n]])
+    x, y = np.divmod(np.arange(n * n), n)
+    return np.c_[40 * x, 40 * y, (x * y) % 7].astype(np.int32), faces.astype(np.int32)
+
+
+def shuffled(mesh, seed=1):
+    points, faces = mesh
+    order = np.random.default_rng(seed).permutation(len(points))
+    return points[order], np.argsort(order)[faces].astype(np.int32)
+
+
+def soup(n):
+    random = np.random.default_rng(3)
+    corners = np.concatenate([random.permutation(60)[:3] for _ in range(n)])
+    return random_points(60)[corners], np.arange(3 * n).reshape(-1, 3)
+
+
+def faces_of(*rows):
+    return np.array(rows, np.int32).reshape(-1, 3)
+
+
+GRID_POINTS, GRID_FACES = grid(9)
+MESHES = {
+    "tetrahedron": (random_points(4), faces_of(*TETRAHEDRON)),
+    "single triangle": (random_points(3), faces_of((0, 1, 2))),
+    "two components": (random_points(8), np.r_[faces_of(*TETRAHEDRON), faces_of(*TETRAHEDRON) + 4]),
+    "many components": (
+        random_points(4 * 200),
+        (faces_of(*TETRAHEDRON) + 4 * np.arange(200)[:, None, None]).reshape(-1, 3),
+    ),
+    "open grid": grid(9),
+    "shuffled grid": shuffled(grid(40)),
+    "non-manifold edge": (random_points(5), faces_of((0, 1, 2), (1, 0, 3), (0, 1, 4))),
+    "bow-tie vertex": (random_points(5), faces_of((0, 1, 2), (0, 3, 4))),
+    "coinciding pair": (np.r_[random_points(3), random_points(3)], faces_of((0, 1, 2), (3, 5, 4))),
+    "coinciding pair, same winding": (np.r_[random_points(3), random_points(3)], faces_of((0, 1, 2), (3, 4, 5))),
+    "double-sided sheet": (np.r_[GRID_POINTS, GRID_POINTS], np.r_[GRID_FACES, GRID_FACES[:, ::-1] + 81]),
+    "one point": (np.full((81, 3), 7), GRID_FACES),
+    "coarse lattice": (GRID_POINTS // 100, GRID_FACES),
+    "flat": (GRID_POINTS * [1, 1, 0], GRID_FACES),
+    "triangle soup": soup(100),
+    "unreferenced at the start": (random_points(7), faces_of(*TETRAHEDRON) + 3),
+    "unreferenced at the end": (random_points(7), faces_of(*TETRAHEDRON)),
+    "unreferenced between": (random_points(7), faces_of(*TETRAHEDRON) * 2),
+    "unreferenced coinciding": (np.tile(random_points(4), (2, 1)), faces_of(*TETRAHEDRON) + 4),
+    "duplicated faces": (GRID_POINTS, np.r_[GRID_FACES, GRID_FACES[:40], GRID_FACES[:3, [1, 2, 0]]]),
+    "opposite duplicates": (GRID_POINTS, np.r_[GRID_FACES, GRID_FACES[:, ::-1]]),
+    "degenerate faces": (GRID_POINTS, np.r_[GRID_FACES, faces_of((0, 0, 1), (3, 2, 3), (5, 5, 5), (8, 4, 4))]),
+    "only degenerate faces": (random_points(3), faces_of((0, 0, 1), (2, 2, 2))),
+    "random faces": (random_points(30), np.random.default_rng(5).integers(0, 30, (300, 3))),
+    "random faces, few points": (random_points(30, top=1), np.random.default_rng(6).integers(0, 30, (300, 3))),
+    "no faces": (random_points(6), faces_of()),
+    "nothing": (random_points(0), faces_of()),
+    "one vertex": (random_points(1), faces_of()),
+    "large coordinates": (random_points(81, top=2**31 - 1), GRID_FACES),
+    "20 bits": (random_points(81, top=2**20), GRID_FACES),
+}
+each_mesh = pytest.mark.parametrize(("points", "faces"), MESHES.values(), ids=MESHES.keys())
+
+
+def sorted_faces(faces):
+    """Rows in one order, each rotated to its smallest rotation: equal if and only if set, count and winding are."""
+    rotations = [faces.tolist(), faces[:, [1, 2, 0]].tolist(), faces[:, [2, 0, 1]].tolist()]
+    return sorted(min(rows) for rows in zip(*rotations, strict=True))
+
+
+def check_round_trip(points, faces):
+    for reorder in (False, True):
+        encoded = encode_base(points, faces, reorder)
+        decoded = decode_base(encoded.mesh, encoded.order)
+        decoded_points, decoded_faces = decoded.points, decoded.faces
+        assert decoded_points.dtype == decoded_faces.dtype == np.int32
+        assert sorted(encoded.permutation) == list(range(len(points)))
+        assert np.array_equal(decoded_points, points[encoded.permutation])
+        assert sorted_faces(encoded.permutation[decoded_faces]) == sorted_faces(faces)
+        if reorder:
+            assert encoded.order == b""
+        else:
+            assert np.array_equal(encoded.permutation, np.arange(len(points)))
+    return encoded
+
+
+@each_mesh
+def test_round_trip(points, faces):
+    check_round_trip(points, faces)
+
+
+@each_mesh
+def test_deterministic(points, faces):
+    first, second = encode_base(points, faces, False), encode_base(points, faces, False)
+    assert (first.mesh, first.order) == (second.mesh, second.order)
+
+
+@given(st.integers(1, 12), st.integers(0, 30), st.integers(0, 5), st.integers(0, 2**32 - 1))
+@settings(max_examples=300, deadline=None)
+def test_round_trip_of_random_meshes(n_vertices, n_faces, top, seed):
+    random = np.random.default_rng(seed)
+    check_round_trip(random.integers(0, top + 1, (n_vertices, 3)), random.integers(0, n_vertices, (n_faces, 3)))
+
+
+def fail(*_args, **_kwargs):
+    raise DracoPy.EncodingFailedException("no")
+
+
+@each_mesh
+def test_round_trip_without_draco(points, faces, monkeypatch):
+    monkeypatch.setattr(DracoPy, "encode", fail)
+    check_round_trip(points, faces)
+
+
+def test_draco_result_that_differs_is_not_trusted(monkeypatch):
+    honest = DracoPy.encode
+    monkeypatch.setattr(DracoPy, "encode", lambda points, faces, **options: honest(points, faces[:, ::-1], **options))
+    check_round_trip(*grid(9))
+    monkeypatch.setattr(DracoPy, "encode", lambda points, faces, **options: honest(points + 1, faces, **options))
+    check_round_trip(*grid(9))
+
+
+@pytest.mark.parametrize("name", ["tetrahedron", "open grid", "triangle soup", "shuffled grid"])
+def test_draco_carries_whole_ordinary_meshes(name):
+    points, faces = MESHES[name]
+    _, n_loose_points, n_loose_faces, _ = connectivity.HEADER.unpack_from(encode_base(points, faces, True).mesh)
+    assert (n_loose_points, n_loose_faces) == (0, 0)
+
+
+def test_walks_cost_little_and_random_orders_no_more_than_plain_indices():
+    points, faces = grid(60)
+    assert 8 * len(encode_base(points, faces, False).order) < 1.5 * len(points)
+    points, faces = shuffled(grid(60))
+    assert 8 * len(encode_base(points, faces, False).order) < (np.log2(len(points)) + 0.2) * len(points)
+
+
+@pytest.mark.parametrize(
+    ("points", "faces"),
+    [
+        (random_points(4) - 5000, faces_of(*TETRAHEDRON)),
+        (random_points(4), faces_of((0, 1, 4))),
+        (random_points(4), faces_of((0, 1, -1))),
+        (np.zeros((4, 2)), faces_of()),
+        (random_points(4), np.zeros((1, 4), int)),
+    ],
+)
+def test_encode_refuses(points, faces):
+    with pytest.raises(InputError, match=r"lattice coordinates|faces index|three columns"):
+        encode_base(points, faces, False)
+
+
+@pytest.mark.parametrize(
+    "name", ["tetrahedron", "open grid", "triangle soup", "unreferenced between", "duplicated faces", "one vertex"]
+)
+def test_every_truncated_prefix_is_refused(name):
+    encoded = encode_base(*MESHES[name], False)
+    for n_bytes in range(len(encoded.mesh)):
+        with pytest.raises(CorruptFile, match="corrupt|truncated"):
+            decode_base(encoded.mesh[:n_bytes], b"")
+    for n_bytes in range(1, len(encoded.order)):
+        decode_or_refuse(encoded.mesh, encoded.order[:n_bytes])
+    with pytest.raises(CorruptFile, match="corrupt"):
+        decode_base(encoded.mesh + b"\0", b"")
+    with pytest.raises(CorruptFile, match="order"):
+        decode_base(encoded.mesh, encoded.order + b"\0")
+
+
+def decode_or_refuse(mesh, order):
+    """Anything is right for changed bytes (the container's checksums tell), but a valid mesh or a CorruptFile."""
+    try:
+        decoded = decode_base(mesh, order)
+        points, faces = decoded.points, decoded.faces
+    except CorruptFile:
+        return
+    assert points.shape[1:] == faces.shape[1:] == (3,)
+    assert points.size == 0 or points.min() >= 0
+    assert faces.size == 0 or (faces.min() >= 0 and faces.max() < len(points))
+
+
+@pytest.mark.parametrize(
+    "name", ["tetrahedron", "open grid", "triangle soup", "duplicated faces", "unreferenced between"]
+)
+def test_changed_bytes_do_no_harm(name):
+    encoded = encode_base(*MESHES[name], False)
+    random = np.random.default_rng(0)
+    for _ in range(400):
+        for mesh, order in ((True, False), (False, True)):
+            data = bytearray(encoded.mesh if mesh else encoded.order)
+            for at in random.integers(0, len(data), random.integers(1, 4)):
+                data[at] = random.integers(256)
+            decode_or_refuse(bytes(data) if mesh else encoded.mesh, bytes(data) if order else encoded.order)
+
+
+@given(st.binary(max_size=200), st.binary(max_size=200))
+def test_garbage_does_no_harm(mesh, order):
+    decode_or_refuse(mesh, order)
+    decode_or_refuse(connectivity.HEADER.pack(len(mesh) + 11, 0, 0, 0) + connectivity.DRACO_PREFIX + mesh, order)
+
+
+@pytest.mark.parametrize(
+    "counts", [(2**32 - 1, 0, 0, 0), (0, 2**32 - 1, 0, 8), (0, 0, 2**32 - 1, 0), (0, 0, 0, 2**32 - 1)]
+)
+def test_counts_are_refused_before_allocation(counts):
+    with pytest.raises(CorruptFile, match="corrupt|truncated"):
+        decode_base(connectivity.HEADER.pack(*counts) + bytes(8), b"")
+
+
+def test_draco_counts_are_refused_before_allocation():
+    many = b"\xff\xff\xff\xff\x07"
+    draco = connectivity.DRACO_PREFIX + b"\0" + many + many + bytes(40)
+    with pytest.raises(CorruptFile, match="elements in"):
+        decode_base(connectivity.HEADER.pack(len(draco), 0, 0, 0) + draco, b"")
