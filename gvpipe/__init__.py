@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gvpipe.api import Info, Report, decode, encode, info, open, read, write  # noqa: A004 - gvpipe.open, like gzip.open
+    from gvpipe.api import Info, Report, decode, encode, info, open, read, write
     from gvpipe.errors import GvpipeError
     from gvpipe.metrics import Comparison, compare
     from gvpipe.player import Player

@@ -1,4 +1,4 @@
-"""The functions behind ``gvpipe.encode``, ``decode``, ``open``, ``read``, ``write`` and ``info``, and behind the command line."""
+"""The functions behind ``gvpipe.encode``, ``decode``, ``open``, ``read``, ``write``, ``info``, and the command line."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 from gvpipe.codec import Codec, Progress, codec_class
 from gvpipe.container import bytes_by_part, write_file
@@ -18,6 +18,9 @@ from gvpipe.player import Player
 from gvpipe.sequence import MeshSequence
 
 VIDEO_SUFFIXES = (".mp4", ".m4v")
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 StrPath = str | os.PathLike[str]
 
@@ -143,7 +146,7 @@ def encode(
     clock("", 1.0)
     return Report(
         codec=chosen.id,
-        settings=dataclasses.asdict(chosen),  # type: ignore[call-overload] - codecs are dataclasses
+        settings=dataclasses.asdict(cast("DataclassInstance", chosen)),
         vertices=bitstream.n_vertices,
         triangles=bitstream.n_triangles,
         frames=bitstream.n_frames,
@@ -167,7 +170,7 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None) -> MeshSequen
     return MeshSequence(player[start:stop], player.faces, player.fps, name=player.path)
 
 
-def open(path: StrPath) -> Player:  # noqa: A001 - called as gvpipe.open, like gzip.open
+def open(path: StrPath) -> Player:
     """Open a geometry video for random access; see `Player`."""
     return Player(path)
 

@@ -46,7 +46,7 @@ class Cursor:
         """Bytes not read yet."""
         return len(self._data) - self._position
 
-    def bytes(self, count: int) -> bytes:
+    def take(self, count: int) -> bytes:
         """Return the next ``count`` bytes."""
         if count > self.left:
             raise self.corrupt(f"needs {count} more bytes where {self.left} are left")
@@ -55,21 +55,21 @@ class Cursor:
 
     def rest(self) -> bytes:
         """Return all bytes not read yet."""
-        return self.bytes(self.left)
+        return self.take(self.left)
 
     def struct(self, layout: struct.Struct) -> tuple[Any, ...]:
         """Return the fields of ``layout``."""
-        return layout.unpack(self.bytes(layout.size))
+        return layout.unpack(self.take(layout.size))
 
     def array(self, dtype: str, count: int) -> NDArray[Any]:
         """Return ``count`` items of a little-endian ``dtype``."""
-        return np.frombuffer(self.bytes(count * np.dtype(dtype).itemsize), dtype)
+        return np.frombuffer(self.take(count * np.dtype(dtype).itemsize), dtype)
 
     def varint(self, limit: int, what: str = "a number") -> int:
         """Return a varint that must not exceed ``limit``; ``what`` names it in the message."""
         value = 0
         for k in range(MAX_VARINT_BYTES):
-            byte = self.bytes(1)[0]
+            byte = self.take(1)[0]
             value |= (byte & 0x7F) << (7 * k)
             if byte < 0x80:
                 if value > limit:

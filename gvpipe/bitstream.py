@@ -115,7 +115,7 @@ def unpack_payload(payload: bytes) -> tuple[Bitstream, dict[str, Any]]:
     if payload[: len(MAGIC)] != MAGIC:
         raise CorruptFile("the payload does not start with gvpipe's magic; get the file again from its source")
     cursor = Cursor(payload, "table")
-    cursor.bytes(len(MAGIC))
+    cursor.take(len(MAGIC))
     try:
         version, count = cursor.struct(PREFIX)
         if version > VERSION:
@@ -124,7 +124,7 @@ def unpack_payload(payload: bytes) -> tuple[Bitstream, dict[str, Any]]:
             raise cursor.corrupt(f"version {version} with {count} sections")
         entries = []
         for _ in range(count):
-            name = cursor.bytes(min(cursor.bytes(1)[0], MAX_NAME))
+            name = cursor.take(min(cursor.take(1)[0], MAX_NAME))
             entries.append((name.decode("ascii", "replace"), *cursor.struct(ENTRY)))
         table = payload[: len(payload) - cursor.left]
         (checksum,) = cursor.struct(CHECKSUM)
@@ -143,7 +143,7 @@ def _read_sections(cursor: Cursor, entries: list[tuple[str, int, int]]) -> dict[
         raise TruncatedFile(f"the sections need {wanted} bytes, {cursor.left} are there; get the file again from its source")
     sections: dict[str, bytes] = {}
     for name, length, checksum in entries:
-        data = cursor.bytes(length)
+        data = cursor.take(length)
         if zlib.crc32(data) != checksum:
             raise CorruptFile(f"section {name!r} is corrupt: its checksum does not match; get the file again from its source")
         if name in sections:

@@ -1,7 +1,7 @@
 """What a codec is, and how gvpipe finds them.
 
-A codec is a frozen dataclass of its settings with an ``id``, a ``summary``, ``encode`` and ``reader``. Packages register theirs as
-an entry point in the group ``gvpipe.codecs``; nothing is imported before it is asked for by id.
+A codec is a frozen dataclass of its settings with an ``id``, a ``summary``, ``encode`` and ``reader``. Packages register
+theirs as an entry point in the group ``gvpipe.codecs``; nothing is imported before it is asked for by id.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Settings:
     @classmethod
     def from_texts(cls, texts: Mapping[str, str]) -> Self:
         """Build the settings from ``KEY=VALUE`` texts; raises `SettingError` naming key, value and what is allowed."""
-        fields = {field.name: field for field in dataclasses.fields(cls)}  # type: ignore[arg-type] - subclasses are dataclasses
+        fields = {field.name: field for field in dataclasses.fields(cls)}  # type: ignore[arg-type]  # subclasses are dataclasses
         values: dict[str, Any] = {}
         for key, text in texts.items():
             if key not in fields:

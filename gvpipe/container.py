@@ -1,8 +1,8 @@
 """Bitstream to MP4 file and back. Knows MP4 boxes, no codec.
 
 The file is the video as any player opens it, plus one ``uuid`` box with the payload after everything else, where
-players skip it and no sample offset moves, plus one short metadata tag. The tag survives remuxing and the box does not: so a file
-that lost its box says so. The payload repeats the tag's content id and holds a checksum of the video's samples, so
+players skip it and no sample offset moves, plus one short metadata tag. The tag survives remuxing and the box does not:
+so a file that lost its box says so. The payload repeats the tag's content id and holds a checksum of the video's samples, so
 that a box or a video from another file is noticed::
 
     tag     = "gvpipe" -> "<container version> <content id>"
@@ -102,7 +102,8 @@ def _read(file: IO[bytes], size: int) -> Bitstream:
 
 def _find_payload(file: IO[bytes], size: int) -> tuple[int, tuple[int, int] | None]:
     """Walk the top-level boxes: where the video ends, and the payload's range if there is one."""
-    position, found, kinds = 0, None, []
+    position, found = 0, None
+    kinds: list[bytes] = []
     while position < size:
         file.seek(position)
         head = file.read(BOX.size)

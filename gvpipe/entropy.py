@@ -54,9 +54,7 @@ def encode_integers(values: NDArray[np.integer], contexts: NDArray[np.integer] |
     return b"".join([*head, varint(len(words)), words.tobytes(), _pack_bits(tokens, extra, n_extra)])
 
 
-def decode_integers(
-    data: bytes, count: int, contexts: NDArray[np.integer] | None = None, name: str = "integers"
-) -> Int64:
+def decode_integers(data: bytes, count: int, contexts: NDArray[np.integer] | None = None, name: str = "integers") -> Int64:
     """Mirror of `encode_integers`: ``count`` integers, flat.
 
     Args:
@@ -130,7 +128,7 @@ def _untokenise(tokens: Int64, cursor: Cursor) -> Int64:
     bits = (tokens - DIRECT) // 2 + 5
     n_extra = np.where(tokens < DIRECT, 0, bits - 2)
     total = int(n_extra.sum())
-    packed = cursor.bytes((total + 7) // 8)
+    packed = cursor.take((total + 7) // 8)
     cursor.end()
     raw = np.unpackbits(np.frombuffer(packed, np.uint8))[:total]
     u = np.where(tokens < DIRECT, tokens, (2 + (tokens & 1)) << n_extra)

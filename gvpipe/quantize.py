@@ -34,4 +34,4 @@ class Lattice:
 
     def place(self, indices: NDArray[np.integer]) -> NDArray[np.float64]:
         """Return the lattice points, ``(V, 3)``, model units."""
-        return np.asarray(self.origin) + indices * self.step
+        return np.asarray(np.asarray(self.origin) + indices * self.step)

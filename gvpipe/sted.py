@@ -89,9 +89,7 @@ class Sted:
             before_a, before_b = self._last
             a, b = np.concatenate([before_a, a], axis=1), np.concatenate([before_b, b], axis=1)
         self._last = a[:, -1:].copy(), b[:, -1:].copy()
-        length, other = (
-            np.hypot(_lengths(np.diff(side, axis=1)) / self._diagonal, TIME_STEP) for side in (a, b)
-        )  # (V, n)
+        length, other = (np.hypot(_lengths(np.diff(side, axis=1)) / self._diagonal, TIME_STEP) for side in (a, b))  # (V, n)
         moments = np.concatenate([self._pending, np.stack(_moments(length, other))], axis=2)
         n_windows = moments.shape[2] - WINDOW + 1
         if n_windows > 0:

@@ -23,9 +23,7 @@ from gvpipe.errors import CorruptFile, InputError
 
 Ints = npt.NDArray[Any]
 
-REACH = (
-    1024  # most vertices that one search looks at; bounds the cost per vertex (4096: 0.1 bit per vertex less on samba)
-)
+REACH = 1024  # most vertices that one search looks at; bounds the cost per vertex (4096: 0.1 bit per vertex less on samba)
 EXACT_RANKS = 8  # ranks below this have a symbol of their own; above, two symbols per octave and the rest as plain bits
 ESCAPE = EXACT_RANKS + 2 * 7  # the last symbol, after seven octaves (8..1023): not found within REACH
 N_SYMBOLS = ESCAPE + 1

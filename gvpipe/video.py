@@ -6,8 +6,8 @@ Three profiles, each one luma picture per frame, chroma neutral:
 - ``h264-10``: H.264 High 10, yuv420p10, samples 64..940, for players in Python;
 - ``jpeg``: one greyscale JPEG per frame, samples 0..255, every frame a key frame.
 
-A video is an MP4 file in memory with this one track. H.264 is coded in closed groups of pictures (GOPs), so that any frame costs at
-most its group. x264 runs on one thread because its output depends on their number.
+A video is an MP4 file in memory with this one track. H.264 is coded in closed groups of pictures (GOPs), so that any frame
+costs at most its group. x264 runs on one thread because its output depends on their number.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ class VideoWriter:
     def add(self, plane: Plane) -> None:
         """Append one ``(height, width)`` plane of the profile's dtype."""
         if plane.shape != self._shape or plane.dtype != self._profile.dtype:
-            raise ValueError(f"plane of shape {plane.shape} and type {plane.dtype}; {self._shape} {self._profile.dtype} is needed")
+            raise ValueError(f"a plane of {plane.shape} {plane.dtype}; {self._shape} {self._profile.dtype} is needed")
         if self._profile.codec == "mjpeg":
             self._container.mux(self._jpeg_packet(plane))
         else:
@@ -133,7 +133,7 @@ class VideoWriter:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._container.close()
 
-    def _jpeg_packet(self, plane: Plane) -> av.Packet:
+    def _jpeg_packet(self, plane: Plane) -> av.Packet[Any]:
         import av
 
         packet = av.Packet(encode_jpeg(np.ascontiguousarray(plane, np.uint8), self._quality))
@@ -204,7 +204,7 @@ class VideoReader:
             self._cached = (group, planes)
         return planes
 
-    def _decode_h264(self, packets: list[av.Packet]) -> list[Plane]:
+    def _decode_h264(self, packets: list[av.Packet[Any]]) -> list[Plane]:
         import av
 
         decoder = av.CodecContext.create("h264", "r")
@@ -234,7 +234,7 @@ def _x264_options(quality: int, gop: int, preset: str) -> dict[str, str]:
     return {"preset": preset, "x264-params": ":".join(f"{key}={value}" for key, value in settings.items())}
 
 
-def _demux(data: bytes, profile: Profile, width: int, height: int) -> tuple[list[av.Packet], bytes | None]:
+def _demux(data: bytes, profile: Profile, width: int, height: int) -> tuple[list[av.Packet[Any]], bytes | None]:
     import av
 
     try:

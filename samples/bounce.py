@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import ConvexHull
-
 from animation import Animation
+from scipy.spatial import ConvexHull
 
 Floats = npt.NDArray[np.float64]
 

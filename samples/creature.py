@@ -14,13 +14,12 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
-
 from animation import Animation
 from fox import fox_parts
 from gait import FPS, Poses, pose_fox
 from implicit import RoundCone, distance_to_body, gradient_of_body, nearest_part, project_to_body
 from polygonise import neighbour_mean, relax, surface_nets
+from scipy.sparse.linalg import splu
 
 Floats = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int32]

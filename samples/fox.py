@@ -74,8 +74,7 @@ def fox_parts() -> list[RoundCone]:
         RoundCone("head", (0.0, 0.835, 0.53), (0.0, 0.805, 0.700), 0.055, 0.027, 0.05),
     ]
     parts += [
-        RoundCone(f"tail_{k}", TAIL[k], TAIL[k + 1], TAIL_RADII[k], TAIL_RADII[k + 1], 0.02)
-        for k in range(len(TAIL) - 1)
+        RoundCone(f"tail_{k}", TAIL[k], TAIL[k + 1], TAIL_RADII[k], TAIL_RADII[k + 1], 0.02) for k in range(len(TAIL) - 1)
     ]
     for name, x in (("ear_left", 1.0), ("ear_right", -1.0)):
         parts.append(RoundCone(name, (0.060 * x, 0.935, 0.42), (0.098 * x, 1.09, 0.40), 0.050, 0.016, 0.03))

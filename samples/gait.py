@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-
 from fox import LEGS, SPINE, Leg
 
 Floats = npt.NDArray[np.float64]

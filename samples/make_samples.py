@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-
 from animation import Animation
 from bounce import make_bounce
 from cloth import make_cloth

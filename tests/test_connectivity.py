@@ -194,9 +194,7 @@ def decode_or_refuse(mesh, order):
     assert faces.size == 0 or (faces.min() >= 0 and faces.max() < len(points))
 
 
-@pytest.mark.parametrize(
-    "name", ["tetrahedron", "open grid", "triangle soup", "duplicated faces", "unreferenced between"]
-)
+@pytest.mark.parametrize("name", ["tetrahedron", "open grid", "triangle soup", "duplicated faces", "unreferenced between"])
 def test_changed_bytes_do_no_harm(name):
     encoded = encode_base(*MESHES[name], False)
     random = np.random.default_rng(0)
@@ -214,9 +212,7 @@ def test_garbage_does_no_harm(mesh, order):
     decode_or_refuse(connectivity.HEADER.pack(len(mesh) + 11, 0, 0, 0) + connectivity.DRACO_PREFIX + mesh, order)
 
 
-@pytest.mark.parametrize(
-    "counts", [(2**32 - 1, 0, 0, 0), (0, 2**32 - 1, 0, 8), (0, 0, 2**32 - 1, 0), (0, 0, 0, 2**32 - 1)]
-)
+@pytest.mark.parametrize("counts", [(2**32 - 1, 0, 0, 0), (0, 2**32 - 1, 0, 8), (0, 0, 2**32 - 1, 0), (0, 0, 0, 2**32 - 1)])
 def test_counts_are_refused_before_allocation(counts):
     with pytest.raises(CorruptFile, match="corrupt|truncated"):
         decode_base(connectivity.HEADER.pack(*counts) + bytes(8), b"")

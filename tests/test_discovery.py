@@ -129,9 +129,7 @@ def test_the_suggested_choice_works(tmp_path: Path, chosen: list[str], others: l
 
 @given(st.lists(st.integers(0, 10**6), unique=True), st.text("ab_-", max_size=3))
 def test_natural_order_is_numeric_order(numbers: list[int], prefix: str) -> None:
-    assert sorted((f"{prefix}{n}.obj" for n in numbers), key=natural_key) == [
-        f"{prefix}{n}.obj" for n in sorted(numbers)
-    ]
+    assert sorted((f"{prefix}{n}.obj" for n in numbers), key=natural_key) == [f"{prefix}{n}.obj" for n in sorted(numbers)]
 
 
 @given(st.lists(st.text("aB1023_. ", max_size=6), max_size=8, unique=True))

@@ -242,9 +242,7 @@ def test_corner_texture_coordinates(tmp_path: Path, suffix: str) -> None:
 
 def test_obj_keeps_order_where_texture_indices_differ(tmp_path: Path) -> None:
     text = (
-        SQUARE
-        + "v 9 9 9\n"
-        + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt .5 .5\nvn 0 0 1\nf 1/5/1 2/2/1 3/3/1\nf 1/1/1 3/3/1 4/4/1\n"
+        SQUARE + "v 9 9 9\n" + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt .5 .5\nvn 0 0 1\nf 1/5/1 2/2/1 3/3/1\nf 1/1/1 3/3/1 4/4/1\n"
     )
     read = io.read(obj_file(tmp_path, text))
     assert read.read(0, 1)[0].tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [9, 9, 9]]
@@ -469,9 +467,8 @@ def test_frames_that_differ(tmp_path: Path, suffix: str) -> None:
     io.write(MeshSequence(sequence.read(1, 2), faces), tmp_path / f"w1.{suffix}")
     with pytest.raises(InputError) as error:
         io.read(tmp_path).read(0, 2)
-    assert (
-        f"triangle 31 is {faces[31].tolist()} in w1.{suffix}, but {sequence.faces[31].tolist()} in w0.{suffix}"
-        in str(error.value)
+    assert f"triangle 31 is {faces[31].tolist()} in w1.{suffix}, but {sequence.faces[31].tolist()} in w0.{suffix}" in str(
+        error.value
     )
     io.write(MeshSequence(sequence.read(1, 2), sequence.faces[:-1]), tmp_path / f"w1.{suffix}")
     with pytest.raises(InputError, match=f"w1.{suffix} has 49 triangles, w0.{suffix} has 50; all frames"):
@@ -585,7 +582,7 @@ def test_output_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_atomic_path(tmp_path: Path) -> None:
     target = tmp_path / "a.mp4"
     target.write_text("old")
-    with pytest.raises(KeyboardInterrupt), atomic_path(target) as temporary:  # noqa: PT012 - the block is the point
+    with pytest.raises(KeyboardInterrupt), atomic_path(target) as temporary:
         temporary.write_text("half")
         raise KeyboardInterrupt
     assert target.read_text() == "old"

@@ -71,9 +71,7 @@ def test_equals_brute_force(size: float) -> None:
 
 
 @pytest.mark.parametrize("pairs", [surface.MAX_PAIRS, 7])
-def test_equals_brute_force_where_vertices_slide_along_the_surface(
-    pairs: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_equals_brute_force_where_vertices_slide_along_the_surface(pairs: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Corresponding points are far apart but the surfaces are close: only the full search can tell."""
     monkeypatch.setattr(surface, "MAX_PAIRS", pairs)
     rest, faces = _sheet(24, 3)

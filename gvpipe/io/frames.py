@@ -90,9 +90,7 @@ def load_mesh(loader: Loader, path: Path, frame: int) -> Mesh:
         raise
     except Exception as exc:  # damaged files raise nearly anything inside NumPy, json and trimesh
         reason = getattr(exc, "strerror", None) or " ".join(str(exc).split())[:200] or type(exc).__name__
-        raise InputError(
-            f"{path} cannot be read as {path.suffix[1:].upper()}: {reason}; export this frame again"
-        ) from exc
+        raise InputError(f"{path} cannot be read as {path.suffix[1:].upper()}: {reason}; export this frame again") from exc
     check_finite(mesh.positions[None], str(path), frame)
     return mesh
 

@@ -106,11 +106,7 @@ def concatenate(meshes: Sequence[Mesh]) -> Mesh:
     if len(meshes) == 1:
         return meshes[0]
     first = np.cumsum([0] + [len(mesh.positions) for mesh in meshes[:-1]])
-    shared = [
-        name
-        for name in ATTRIBUTES
-        if all(len(mesh.attributes.get(name, ())) == len(mesh.positions) for mesh in meshes)
-    ]
+    shared = [name for name in ATTRIBUTES if all(len(mesh.attributes.get(name, ())) == len(mesh.positions) for mesh in meshes)]
     return Mesh(
         np.concatenate([mesh.positions for mesh in meshes]),
         np.concatenate([mesh.faces + offset for mesh, offset in zip(meshes, first, strict=True)]).astype(np.int32),

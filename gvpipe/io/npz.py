@@ -77,8 +77,7 @@ def read_npz(path: Path, fps: float | None = None) -> MeshSequence:
 def _as_vertices(vertices: NDArray[np.generic], path: Path) -> Float32:
     if vertices.ndim != 3 or vertices.shape[2] != 3 or vertices.dtype.kind not in "fiu":
         raise InputError(
-            f"{path}: 'vertices' has shape {vertices.shape} and type {vertices.dtype}; "
-            "(frames, vertices, 3) numbers are needed"
+            f"{path}: 'vertices' has shape {vertices.shape} and type {vertices.dtype}; (frames, vertices, 3) numbers are needed"
         )
     return as_positions(vertices)
 

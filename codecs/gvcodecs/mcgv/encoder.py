@@ -33,10 +33,11 @@ from gvpipe.errors import SettingError
 from gvpipe.quantize import Lattice
 from gvpipe.sequence import Int32, MeshSequence
 from gvpipe.topology import weld
-from gvpipe.video import PROFILES, Profile, VideoWriter
+from gvpipe.video import PROFILES, Plane, Profile, VideoWriter
 
 BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
 SIZE_AUTO = "auto"
+PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
 
 Float64 = NDArray[np.float64]
 
@@ -70,7 +71,7 @@ class Mcgv(Settings):
         self.check_range(0, 100, "quality")
         self.check_choice("image", ("h264", "jpeg"))
         self.check_choice("profile", ("web", "precise"))
-        self.check_choice("preset", ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"))
+        self.check_choice("preset", PRESETS)
         self.check_range(1, sections.MAX_CLUSTERS, "clusters")
         self.check_range(8, 24, "transform_bits")
         self.check_range(4, 20, "base_bits")
@@ -157,9 +158,7 @@ class Mcgv(Settings):
         """Open an ``mcgv`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         return McgvReader(bitstream)
 
-    def _layout(
-        self, sequence: MeshSequence, base: Float64, lattice_points: Int32, report: Progress
-    ) -> tuple[Layout, Int32]:
+    def _layout(self, sequence: MeshSequence, base: Float64, lattice_points: Int32, report: Progress) -> tuple[Layout, Int32]:
         """Return the vertices' pixels and clusters ``(V,)``; vertices at one base point count as one surface point."""
         report("segment", 0)
         members, point = weld(lattice_points)
@@ -198,7 +197,7 @@ def _residuals(
         yield first, block - predictor.predict(transforms)
 
 
-def _pictures(residual: Float64, padding: Padding, profile: Profile, step: float) -> Iterator[NDArray[np.generic]]:
+def _pictures(residual: Float64, padding: Padding, profile: Profile, step: float) -> Iterator[Plane]:
     """Yield one picture per frame: the padded x, y and z planes, one below the other."""
     values = residual.swapaxes(1, 2).reshape(3 * len(residual), -1)  # (n, V, 3) -> (3n, V)
     levels = np.rint(padding.fill(values / step, 0.0)) + profile.middle

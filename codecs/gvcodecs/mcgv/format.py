@@ -112,7 +112,7 @@ def encode_pixels(layout: Layout, order: Int64) -> bytes:
 def decode_pixels(data: bytes, order: Int64, width: int, height: int) -> Layout:
     """Mirror of `encode_pixels`; raises `CorruptFile` unless every vertex gets a pixel of its own inside the plane."""
     cursor = Cursor(data, "pixels")
-    columns = cursor.bytes(cursor.varint(cursor.left, "a length"))
+    columns = cursor.take(cursor.varint(cursor.left, "a length"))
     dx = decode_integers(columns, len(order), name="pixels")
     dy = decode_integers(cursor.rest(), len(order), _context(dx), "pixels")
     x, y = np.cumsum(dx), np.cumsum(dy)
@@ -128,7 +128,7 @@ def decode_pixels(data: bytes, order: Int64, width: int, height: int) -> Layout:
 def encode_clusters(clusters: Int32, layout: Layout, block: int) -> bytes:
     """Return the section ``clusters`` for ``clusters (V,)``, which must be constant inside each block."""
     _, first = np.unique(_blocks(layout, block), return_index=True)
-    return encode_integers(np.diff(clusters[first].astype(np.int64), prepend=0))
+    return encode_integers(np.diff(clusters[first], prepend=np.int32(0)))
 
 
 def decode_clusters(data: bytes, layout: Layout, block: int, n_clusters: int) -> Int32:
@@ -137,11 +137,11 @@ def decode_clusters(data: bytes, layout: Layout, block: int, n_clusters: int) ->
     by_block = np.cumsum(decode_integers(data, len(used), name="clusters"))
     if ((by_block < 0) | (by_block >= n_clusters)).any():
         raise CorruptFile(f"section 'clusters' is corrupt: a cluster is not in 0..{n_clusters - 1}")
-    return by_block[block_of.ravel()].astype(np.int32)
+    return np.asarray(by_block[block_of.ravel()], np.int32)
 
 
 def _context(dx: Int64) -> Int64:
-    return np.minimum(np.abs(dx), CONTEXTS - 1)
+    return np.asarray(np.minimum(np.abs(dx), CONTEXTS - 1))
 
 
 def _blocks(layout: Layout, block: int) -> Int64:

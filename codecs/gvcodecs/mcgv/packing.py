@@ -21,7 +21,6 @@ from scipy.sparse import csgraph
 
 from gvcodecs.mcgv.parameterization import Atlas
 from gvpipe.errors import InputError
-from gvpipe.sequence import Int32
 
 WINDOWS = (1, 2, 4, 8, 16)  # half-widths of the window of pixels that a vertex may take, tried in turn
 SLACK = 0.35  # part of a block that a chart gives up rather than open another row of blocks
@@ -74,10 +73,14 @@ def pack(atlas: Atlas, point: NDArray[np.intp], block: int, density: float, size
             layout = attempt(middle)
             low, high, best = (middle, high, layout) if layout else (low, middle, best)
     if best is None:
-        raise InputError(
-            f"the {atlas.n_charts} charts of {len(point)} vertices do not fit a plane of {size[0]}x{size[1]} pixels in blocks "
-            f"of {block}; leave the size out, or give a larger one, or fewer clusters"
-        ) if size else AssertionError("an automatic size always fits")
+        raise (
+            InputError(
+                f"the {atlas.n_charts} charts of {len(point)} vertices do not fit a plane of {size[0]}x{size[1]} pixels in blocks "
+                f"of {block}; leave the size out, or give a larger one, or fewer clusters"
+            )
+            if size
+            else AssertionError("an automatic size always fits")
+        )
     return best
 
 
@@ -103,7 +106,7 @@ def _place(uv: Float64, fill: float, block: int, density: float) -> Pixels:
 
 
 def _assign(wanted: Float64, size: Pixels, half: int) -> Pixels | None:
-    """Assign ``wanted (n, 2)`` to distinct pixels inside ``size``, each within ``half`` of its nearest; None if they are too crowded."""
+    """Assign ``wanted (n, 2)`` to distinct pixels inside ``size``, each within ``half`` of its nearest; None if too crowded."""
     nearest = np.rint(wanted).astype(np.int64)
     offsets = np.stack(np.meshgrid(np.arange(-half, half + 1), np.arange(-half, half + 1)), axis=-1).reshape(-1, 2)
     candidates = nearest[:, None] + offsets

@@ -4,8 +4,8 @@ Mamou, Zaharia and Preteux 2007, section 3.3, start from the motion partition an
 iso-charts (Zhou et al. 2004). Here xatlas does that step: each motion cluster is a mesh of its own to it, so charts never
 cross clusters. Only the base frame is parameterised.
 
-A cluster's mesh is all triangles that touch the cluster, so that each of its points has a triangle; foreign points at the rim are
-parameterised too and then dropped. Points that xatlas leaves out (no triangle, or only degenerate ones) share a
+A cluster's mesh is all triangles that touch the cluster, so that each of its points has a triangle; foreign points at the
+rim are parameterised too and then dropped. Points that xatlas leaves out (no triangle, or only degenerate ones) share a
 chart per cluster, on a square grid in the order of the vertices.
 """
 
@@ -57,14 +57,13 @@ def parameterize(base: Float64, faces: Int32, clusters: Int32) -> Atlas:
     """
     n_points, n_clusters = len(base), int(clusters.max()) + 1
     extent = max(float(np.ptp(base, axis=0).max()), 1e-30)
-    chart, uv = _xatlas((base - base.min(axis=0)) / extent, faces, clusters, n_clusters)
-    chart, uv = _absorb(chart, uv, adjacency(faces, n_points), clusters)
-    loose = np.flatnonzero(chart < 0)
+    raw, uv = _xatlas((base - base.min(axis=0)) / extent, faces, clusters, n_clusters)
+    raw, uv = _absorb(raw, uv, adjacency(faces, n_points), clusters)
+    loose = np.flatnonzero(raw < 0)
     if len(loose):
-        chart[loose] = int(chart.max()) + 1 + clusters[loose]
+        raw[loose] = int(raw.max()) + 1 + clusters[loose]
         uv[loose] = _grid(clusters[loose])
-    chart = np.unique(chart, return_inverse=True)[1].astype(np.int32).ravel()
-    assert len(chart) == n_points
+    chart = np.asarray(np.unique(raw, return_inverse=True)[1], np.int32).ravel()
     uv = _turn_upright(chart, uv)
     return Atlas(chart, uv, _fill(chart, uv, faces))
 
@@ -168,4 +167,4 @@ def _fill(chart: Int32, uv: Float64, faces: Int32) -> Float64:
     covered = np.bincount(chart[inside[:, 0]], doubled / 2, minlength=n_charts)
     sides = np.zeros((n_charts, 2))
     np.maximum.at(sides, chart, uv)
-    return np.clip(covered / np.maximum(sides.prod(axis=1), 1e-30), 0.25, 1.0)
+    return np.asarray(np.clip(covered / np.maximum(sides.prod(axis=1), 1e-30), 0.25, 1.0))

@@ -90,7 +90,7 @@ class AffinePredictor:
         for k, block in enumerate(np.split(rows, self.n_clusters)):
             local = self._local(k, self._base)
             errors[:, k] = ((local @ (block @ block.T) - 2 * products[:, k]) * local).sum(axis=1)
-        return np.maximum(errors + np.square(moved).sum(axis=1)[:, None], 0)
+        return np.asarray(np.maximum(errors + np.square(moved).sum(axis=1)[:, None], 0))
 
     def _local(self, k: int, points: Float64) -> Float64:
         """Homogeneous coordinates ``(m, 4)`` in the cluster's frame."""

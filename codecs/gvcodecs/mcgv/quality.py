@@ -18,7 +18,7 @@ from gvpipe.video import QP_RANGE, Profile
 
 DECADES = {"h264-8": 2.4, "h264-10": 3.0, "jpeg": 2.4}  # from quality 0 to 100: down to where each profile's levels end
 QP_STEP = 0.625  # H.264's quantiser step at QP 0, levels of an orthonormal transform; it doubles every 6 QP
-JPEG_TABLE = 14.0  # the low-frequency entries of JPEG's standard luma table, levels, at quality 50
+JPEG_TABLE = 20.0  # levels at quality 50: about where JPEG's luma table costs the error of a flat step
 EFFECTIVE_JPEG_RANGE = (2, 98)
 
 

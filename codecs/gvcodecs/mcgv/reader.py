@@ -62,19 +62,21 @@ class McgvReader:
         """
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
         for first, planes in self._video.read(start, stop):
-            for i, plane in enumerate(planes):
-                frame = first + i
-                levels = plane.ravel()[self._samples].astype(np.float64) - self._header.profile.middle
-                result[frame - start] = self._predictor.predict(self._transforms(frame))[0] + levels * self._header.residual_step
+            levels = np.stack([plane.ravel()[self._samples] for plane in planes]) - float(self._header.profile.middle)
+            predicted = self._predictor.predict(self._transforms(first, first + len(planes)))
+            result[first - start : first - start + len(planes)] = predicted + levels * self._header.residual_step
         return result
 
-    def _transforms(self, frame: int) -> NDArray[np.float64]:
-        """The frame's transforms, ``(1, K, 4, 3)``; its segment is decoded once."""
-        s = int(np.searchsorted(self._bounds, frame, side="right")) - 1
-        if self._segment[0] != s:
-            name = f"transforms.{s}"
-            n_frames = self._bounds[s + 1] - self._bounds[s]
-            lattice = decode_transforms(self._bitstream.section(name), n_frames, self._header.clusters, name)
-            self._segment = (s, dequantise(lattice, self._predictor.rest, self._header.transform_step))
-        offset = frame - self._bounds[s]
-        return self._segment[1][offset : offset + 1]
+    def _transforms(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Transforms ``(stop - start, K, 4, 3)`` of consecutive frames; the last segment is kept for the next ones."""
+        parts = []
+        first, last = np.searchsorted(self._bounds, [start, stop - 1], side="right") - 1
+        for s in range(int(first), int(last) + 1):
+            if self._segment[0] != s:
+                name = f"transforms.{s}"
+                n_frames = self._bounds[s + 1] - self._bounds[s]
+                lattice = decode_transforms(self._bitstream.section(name), n_frames, self._header.clusters, name)
+                self._segment = (s, dequantise(lattice, self._predictor.rest, self._header.transform_step))
+            begin = self._bounds[s]
+            parts.append(self._segment[1][max(start, begin) - begin : stop - begin])
+        return np.concatenate(parts)

@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from gvcodecs.mcgv.prediction import AffinePredictor
 from gvpipe.sequence import Int32, MeshSequence
 from gvpipe.topology import adjacency, k_ring
-from gvcodecs.mcgv.prediction import AffinePredictor
 
 RING = 3  # order of the neighbourhood, the paper's
 DIMENSIONS = 40  # principal coordinates of the motion vectors that k-means sees
@@ -62,9 +62,7 @@ def segment(sequence: MeshSequence, base: Float64, faces: Int32, members: NDArra
     return refine(sequence, base, k_ring(neighbours, 1), members, clusters)
 
 
-def motion_features(
-    sequence: MeshSequence, base: Float64, ring: sparse.csr_array, members: NDArray[np.intp]
-) -> Float64:
+def motion_features(sequence: MeshSequence, base: Float64, ring: sparse.csr_array, members: NDArray[np.intp]) -> Float64:
     """Return ``(P, <= DIMENSIONS)`` principal coordinates of the motion vectors (distances are kept, up to truncation)."""
     centre, scale = (base.min(axis=0) + base.max(axis=0)) / 2, max(float(np.ptp(base, axis=0).max()), 1e-30)
     unit = (base - centre) / scale
@@ -94,7 +92,10 @@ class LocalAffineFit:
         self._inverse = np.linalg.inv(spread + ridge[:, None, None] * np.eye(3))
 
     def motion(self, frames: Float64) -> Float64:
-        """Return ``(P, n, 4, 3)``: rows 0..2 the linear part less identity (as x A), row 3 the translation, for ``frames (n, P, 3)``."""
+        """Return ``(P, n, 4, 3)`` for ``frames (n, P, 3)``: rows 0..2 the linear part less identity, row 3 the translation.
+
+        Points are row vectors: ``x_i = x_0 + x_0 @ motion[:3] + motion[3]``.
+        """
         moved = np.moveaxis(frames, 0, 1)  # (n, P, 3) -> (P, n, 3)
         n_points, n = moved.shape[:2]
         mean = (self._ring @ moved.reshape(n_points, -1)).reshape(n_points, n, 3) / self._size[:, None, None]
@@ -109,9 +110,7 @@ class LocalAffineFit:
         return np.concatenate([linear, translation[:, :, None, :]], axis=2)
 
 
-def refine(
-    sequence: MeshSequence, base: Float64, ring: sparse.csr_array, members: NDArray[np.intp], clusters: Int32
-) -> Int32:
+def refine(sequence: MeshSequence, base: Float64, ring: sparse.csr_array, members: NDArray[np.intp], clusters: Int32) -> Int32:
     """Move points to the cluster that predicts their neighbourhood ``ring (P, P)`` with the least squared error."""
     picked = np.unique(np.linspace(0, sequence.n_frames - 1, REFINE_FRAMES).astype(int))
     frames = np.concatenate([sequence.read(i, i + 1)[:, members] for i in picked]).astype(np.float64)
@@ -128,19 +127,19 @@ def _principal_coordinates(rows: Float64) -> Float64:
     """Rotate ``rows (P, n)`` to its leading `DIMENSIONS` principal axes, by a randomised range finder with one power step."""
     if min(rows.shape) <= DIMENSIONS + OVERSAMPLING:
         u, s, _ = np.linalg.svd(rows, full_matrices=False)
-        return (u * s)[:, :DIMENSIONS]
+        return np.asarray((u * s)[:, :DIMENSIONS])
     probe = np.random.default_rng(SEED).standard_normal((rows.shape[1], DIMENSIONS + OVERSAMPLING))
     basis = np.linalg.qr(rows @ probe)[0]
     basis = np.linalg.qr(rows @ (rows.T @ basis))[0]
     u, s, _ = np.linalg.svd(basis.T @ rows, full_matrices=False)
-    return (basis @ (u * s))[:, :DIMENSIONS]
+    return np.asarray((basis @ (u * s))[:, :DIMENSIONS])
 
 
 def _k_means(features: Float64, n_clusters: int) -> Int32:
     from scipy.cluster.vq import kmeans2
 
     n_clusters = min(n_clusters, len(np.unique(np.round(features, 9), axis=0)))
-    best, best_cost = np.zeros(len(features), np.int64), np.inf
+    best, best_cost = np.zeros(len(features), np.int32), np.inf
     for restart in range(RESTARTS if n_clusters > 1 else 0):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a cluster may run empty: it is dropped below
@@ -153,4 +152,4 @@ def _k_means(features: Float64, n_clusters: int) -> Int32:
 
 def _relabel(labels: NDArray[np.integer]) -> Int32:
     """Number the labels that occur from 0."""
-    return np.unique(labels, return_inverse=True)[1].astype(np.int32).ravel()
+    return np.asarray(np.unique(labels, return_inverse=True)[1], np.int32).ravel()

@@ -43,7 +43,7 @@ def encode_transforms(lattice: Int64) -> bytes:
     left = np.take_along_axis(candidates, choice[None, None], axis=0)[0]
     classes = _magnitude_class(left)
     head = (np.array(ORDERS)[choice] << 6 | classes).astype(np.uint8)
-    return head.tobytes() + encode_integers(left, np.broadcast_to(classes, left.shape))
+    return bytes(head) + encode_integers(left, np.broadcast_to(classes, left.shape))
 
 
 def decode_transforms(data: bytes, n_frames: int, n_clusters: int, name: str) -> Int64:
@@ -75,4 +75,4 @@ def _difference(series: Int64, order: int) -> Int64:
 def _magnitude_class(series: Int64) -> NDArray[np.int64]:
     """Two classes an octave of the mean magnitude; ``(n, m) -> (m,)``."""
     mean = np.abs(series).mean(axis=0)
-    return np.clip(np.rint(2 * np.log2(mean + 0.5) + 2), 0, MAX_CLASS).astype(np.int64)
+    return np.asarray(np.clip(np.rint(2 * np.log2(mean + 0.5) + 2), 0, MAX_CLASS), np.int64)
