@@ -13,9 +13,12 @@ costs at most its group. x264 runs on one thread because its output depends on t
 from __future__ import annotations
 
 import io
+from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import zip_longest
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +31,7 @@ from gvpipe.images import decode_jpeg, encode_jpeg
 if TYPE_CHECKING:
     import av
 
+AHEAD = 2  # groups of pictures decoded ahead of the reader
 MAX_SIDE = 16384  # pixels, of a picture that is read
 QP_RANGE = (1, 51)  # 0 would be lossless, which is another H.264 profile that browsers do not read
 DEPTH10_QP = 12  # x264 counts QP from 12 lower at 10 bits
@@ -186,9 +190,14 @@ class VideoReader:
         Raises:
             CorruptFile: the group does not decode to its number of planes.
         """
-        for group, (first, last) in enumerate(self._groups):
-            if first < stop and last > start:
-                planes = self._decode(group)
+        wanted = [g for g, (first, last) in enumerate(self._groups) if first < stop and last > start]
+        with ThreadPoolExecutor(AHEAD) as pool:  # decodes the next groups while this one is used
+            pending = deque(pool.submit(self._decode, group) for group in wanted[:AHEAD])
+            for group, following in zip_longest(wanted, wanted[AHEAD:]):
+                planes = pending.popleft().result()
+                if following is not None:
+                    pending.append(pool.submit(self._decode, following))
+                first, last = self._groups[group]
                 low, high = max(start, first), min(stop, last)
                 yield low, planes[low - first : high - first]
 

@@ -146,4 +146,4 @@ def _context(dx: Int64) -> Int64:
 
 def _blocks(layout: Layout, block: int) -> Int64:
     y, x = np.divmod(layout.pixel, layout.width)
-    return (y // block) * (layout.width // block) + x // block
+    return np.asarray((y // block) * (layout.width // block) + x // block)

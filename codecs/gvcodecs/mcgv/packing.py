@@ -75,8 +75,8 @@ def pack(atlas: Atlas, point: NDArray[np.intp], block: int, density: float, size
     if best is None:
         raise (
             InputError(
-                f"the {atlas.n_charts} charts of {len(point)} vertices do not fit a plane of {size[0]}x{size[1]} pixels in blocks "
-                f"of {block}; leave the size out, or give a larger one, or fewer clusters"
+                f"the {atlas.n_charts} charts of {len(point)} vertices do not fit a plane of {size[0]}x{size[1]} pixels in "
+                f"blocks of {block}; leave the size out, or give a larger one, or fewer clusters"
             )
             if size
             else AssertionError("an automatic size always fits")

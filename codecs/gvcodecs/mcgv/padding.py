@@ -7,8 +7,8 @@ Mamou, Zaharia and Preteux 2007, section 3.3: a block's roughness sums the squar
     for every free p:  n_p B_p - sum over free neighbours q  B_q  =  sum over fixed neighbours h  B_h
 
 The paper writes 8 for n_p, the number of p's neighbours inside the block: it is 8 inside, 5 at an edge and 3 at a corner,
-where 8 would pull the border towards zero. The sparse matrix depends on the layout alone and falls apart into one small system per
-block; each is inverted once, and what is left per frame and axis is one product per block.
+where 8 would pull the border towards zero. The sparse matrix depends on the layout alone and falls apart into one small
+system per block; each is inverted once, and what is left per frame and axis is one product per block.
 """
 
 from __future__ import annotations

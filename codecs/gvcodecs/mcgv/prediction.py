@@ -50,8 +50,14 @@ class AffinePredictor:
                 self._frame[k] = *centre, radius
                 self._coordinates[part] = self._local(k, points)
                 self._rest[k, :3], self._rest[k, 3] = radius * np.eye(3), centre
+        self._columns = np.ascontiguousarray(self._coordinates.T)
         self._rank = np.empty(len(base), np.intp)
         self._rank[self._order] = np.arange(len(base))
+
+    @property
+    def by_cluster(self) -> NDArray[np.intp]:
+        """``(V,)`` the vertices, cluster after cluster."""
+        return self._order
 
     @property
     def rest(self) -> Float64:
@@ -71,12 +77,16 @@ class AffinePredictor:
 
     def predict(self, transforms: Float64) -> Float64:
         """Equation 3: ``(n, V, 3)`` predicted positions for ``transforms (n, K, 4, 3)``, model units."""
+        planes = self.predict_planes(transforms)
+        return np.asarray(planes.swapaxes(1, 2)[:, self._rank])
+
+    def predict_planes(self, transforms: Float64) -> Float64:
+        """The same as ``(n, 3, V)``, vertices in `by_cluster` order: what is fastest to compute."""
         n = len(transforms)
-        result = np.empty((n, 3, len(self._order)))
+        result = np.empty((3 * n, len(self._order)))
         for k, part in enumerate(self._slices):
-            rows = transforms[:, k].swapaxes(1, 2).reshape(3 * n, 4)
-            result[:, :, part] = (rows @ self._coordinates[part].T).reshape(n, 3, -1)
-        return result.swapaxes(1, 2)[:, self._rank]
+            np.matmul(transforms[:, k].swapaxes(1, 2).reshape(3 * n, 4), self._columns[:, part], out=result[:, part])
+        return result.reshape(n, 3, -1)
 
     def squared_errors(self, frames: Float64, transforms: Float64) -> Float64:
         """Return ``(V, K)``: each vertex's squared error over ``frames (n, V, 3)`` if it followed each cluster.

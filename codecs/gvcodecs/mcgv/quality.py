@@ -3,7 +3,7 @@
 Quality fixes the *effective step* that a transform coefficient of a residual sees, as a part of the base frame's bounding-box
 diagonal, so that equal quality means about equal error whatever the residuals' range::
 
-    effective step = diagonal * 10 ** -(1 + decades * quality / 100)
+    effective step = diagonal * 0.04 * 10 ** -(decades * quality / 100)
 
 The image coder's quantiser gives the coarse part of it, in whole steps; the residual step, model units per level, gives the
 rest. It is never finer than the levels allow, which is where quality stops helping.
@@ -16,7 +16,8 @@ from dataclasses import dataclass
 
 from gvpipe.video import QP_RANGE, Profile
 
-DECADES = {"h264-8": 2.4, "h264-10": 3.0, "jpeg": 2.4}  # from quality 0 to 100: down to where each profile's levels end
+COARSEST = 0.04  # effective step at quality 0, part of the diagonal: beyond, the prediction alone is as good
+DECADES = {"h264-8": 2.0, "h264-10": 2.6, "jpeg": 2.0}  # from quality 0 to 100: down to where each profile's levels end
 QP_STEP = 0.625  # H.264's quantiser step at QP 0, levels of an orthonormal transform; it doubles every 6 QP
 JPEG_TABLE = 20.0  # levels at quality 50: about where JPEG's luma table costs the error of a flat step
 EFFECTIVE_JPEG_RANGE = (2, 98)
@@ -33,12 +34,12 @@ class Quantiser:
 def choose_quantiser(quality: float, profile: Profile, largest: float, diagonal: float) -> Quantiser:
     """Choose for residuals of magnitude up to ``largest`` on a model of bounding-box ``diagonal``, model units."""
     finest = largest / profile.amplitude if largest > 0 else 1.0
-    wanted = diagonal * 10 ** -(1 + DECADES[profile.name] * quality / 100) / finest  # effective step, levels
+    wanted = diagonal * COARSEST * 10 ** -(DECADES[profile.name] * quality / 100) / finest  # effective step, levels
     if profile.codec == "mjpeg":
         level = next((q for q in range(EFFECTIVE_JPEG_RANGE[1], 0, -1) if _jpeg_step(q + 1) > wanted), 1)
         level = min(max(level + 1, EFFECTIVE_JPEG_RANGE[0]), EFFECTIVE_JPEG_RANGE[1])
         return Quantiser(level, finest * max(1.0, wanted / _jpeg_step(level)))
-    highest = QP_RANGE[1] + 6 * (profile.depth - 8) // 1
+    highest = QP_RANGE[1] + 6 * (profile.depth - 8)
     level = math.floor(6 * math.log2(max(wanted, 1e-9) / QP_STEP))
     level = min(max(level, QP_RANGE[0]), highest)
     return Quantiser(level, finest * max(1.0, wanted / (QP_STEP * 2 ** (level / 6))))

@@ -17,6 +17,8 @@ from gvpipe.errors import CorruptFile
 from gvpipe.sequence import Float32, Int32
 from gvpipe.video import VideoReader
 
+BATCH = 4  # frames rebuilt at a time: their positions stay in cache
+
 
 class McgvReader:
     """Frames of an ``mcgv`` bitstream.
@@ -40,8 +42,11 @@ class McgvReader:
         self._video = VideoReader(bitstream.video, header.profile, header.width, 3 * header.height)
         if self._video.n_frames != bitstream.n_frames:
             raise CorruptFile(f"the video has {self._video.n_frames} frames, the header says {bitstream.n_frames}")
-        plane = header.width * header.height
-        self._samples = layout.pixel[:, None] + plane * np.arange(3)  # (V, 3) into a picture
+        # samples of a picture that carry x, y and z of the vertices as the predictor orders them, (3 V,)
+        by_cluster = self._predictor.by_cluster
+        self._samples = (layout.pixel[by_cluster] + header.width * header.height * np.arange(3)[:, None]).ravel()
+        self._corners = np.argsort(by_cluster)[:, None] + len(by_cluster) * np.arange(3)  # (V, 3) into those
+        self._middle = float(header.profile.middle)
         self._segment: tuple[int, NDArray[np.float64]] = (-1, np.zeros((0, 0, 4, 3)))
 
     @property
@@ -61,10 +66,15 @@ class McgvReader:
             CorruptFile: the video or the transforms do not decode.
         """
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
-        for first, planes in self._video.read(start, stop):
-            levels = np.stack([plane.ravel()[self._samples] for plane in planes]) - float(self._header.profile.middle)
-            predicted = self._predictor.predict(self._transforms(first, first + len(planes)))
-            result[first - start : first - start + len(planes)] = predicted + levels * self._header.residual_step
+        for group, planes in self._video.read(start, stop):
+            for offset in range(0, len(planes), BATCH):
+                first = group + offset
+                batch = planes[offset : offset + BATCH]
+                moved = self._predictor.predict_planes(self._transforms(first, first + len(batch)))
+                for i, plane in enumerate(batch):
+                    residual = (plane.ravel().take(self._samples) - self._middle) * self._header.residual_step
+                    planar = (moved[i].ravel() + residual).astype(np.float32)  # (3 V,)
+                    planar.take(self._corners, out=result[first + i - start], mode="clip")  # every index is in range
         return result
 
     def _transforms(self, start: int, stop: int) -> NDArray[np.float64]:
