@@ -1,0 +1,38 @@
+"""Files of every released codec version decode for ever, to the same positions.
+
+Goldens are written only for the current version, by ``pytest tests/test_golden.py --write-golden``; a version that has been
+released is never written again.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sequences import waving
+
+import gvpipe
+from gvpipe.codec import codec_class
+
+GOLDEN = Path(__file__).parent / "golden"
+CURRENT: dict[str, tuple[str, dict[str, object]]] = {
+    "mcgv-1-h264": ("mcgv", {"clusters": 5, "gop": 5, "segment": 7}),
+    "mcgv-1-h264-10": ("mcgv", {"clusters": 5, "profile": "precise"}),
+    "mcgv-1-jpeg": ("mcgv", {"clusters": 5, "image": "jpeg", "reorder": True}),
+}
+
+
+@pytest.mark.parametrize("name", sorted({path.stem for path in GOLDEN.glob("*.mp4")} | set(CURRENT)))
+def test_golden_file_decodes_to_the_same_positions(name: str, request: pytest.FixtureRequest) -> None:
+    video, expected = GOLDEN / f"{name}.mp4", GOLDEN / f"{name}.npz"
+    if request.config.getoption("--write-golden") and name in CURRENT:
+        codec, settings = CURRENT[name]
+        assert name.startswith(f"{codec}-{codec_class(codec).version}-")
+        gvpipe.encode(waving(8, 12), video, codec, **settings)
+        gvpipe.write(gvpipe.decode(video), expected)
+    decoded, wanted = gvpipe.decode(video), gvpipe.read(expected)
+    assert np.array_equal(decoded.faces, wanted.faces)
+    assert decoded.fps == wanted.fps
+    # matrix products may round differently on another machine; nothing else may differ
+    assert np.allclose(np.asarray(decoded.positions), np.asarray(wanted.positions), rtol=0, atol=1e-6)

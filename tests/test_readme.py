@@ -1,0 +1,55 @@
+"""What the README shows runs as it stands."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from gvpipe.cli import cli
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
+
+
+@pytest.fixture
+def in_a_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory that holds the samples."""
+    (tmp_path / "samples").symlink_to(ROOT / "samples")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_python_example(in_a_copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (example,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    exec(compile(example, "README.md", "exec"), {})
+    assert "102 frames, (5332, 3) triangles, (2668, 3)" in capsys.readouterr().out
+    assert (in_a_copy / "creature.npz").exists()
+
+
+def test_set_up_line_ends_in_commands_that_run(in_a_copy: Path) -> None:
+    line = next(line for line in README.splitlines() if "gvpipe encode samples" in line)
+    commands = [shlex.split(part) for part in line.split("&&") if "bin/gvpipe " in part]
+    assert [command[1] for command in commands] == ["encode", "decode"]
+    for command in commands:
+        result = CliRunner().invoke(cli, command[1:])
+        assert result.exit_code == 0, result.output
+    assert (in_a_copy / "creature.npz").exists()
+
+
+def test_every_command_shown_exists() -> None:
+    shown = set(re.findall(r"^gvpipe (\w+)", README, re.MULTILINE))
+    assert shown == set(cli.commands)
+
+
+def test_links_lead_somewhere() -> None:
+    for target in re.findall(r"\]\(([^)#]+)\)", README):
+        assert (ROOT / target).exists(), target
+
+
+def test_codecs_is_not_a_package() -> None:
+    """An ``__init__.py`` in codecs/ would shadow Python's own ``codecs``."""
+    assert not (ROOT / "codecs" / "__init__.py").exists()
