@@ -38,8 +38,8 @@ def main() -> None:
         rows = [measure(path, options.codec, {**settings, "quality": q}) for q in options.qualities.split(",")]
         for quality, row in zip(options.qualities.split(","), rows, strict=True):
             print(
-                f"| {path.stem} | {quality} | {row['bpvf']:.3f} | {row['kg']:.3f} | {row['rmse_diag']:.2e} | {row['max_diag']:.2e} "
-                f"| {row['video']:.0%} | {row['encode']:.1f} | {row['fps']:.0f} |",
+                f"| {path.stem} | {quality} | {row['bpvf']:.3f} | {row['kg']:.3f} | {row['rmse_diag']:.2e} "
+                f"| {row['max_diag']:.2e} | {row['video']:.0%} | {row['encode']:.1f} | {row['fps']:.0f} |",
                 flush=True,
             )
         summary.append(f"| {path.stem} | " + " | ".join(at(rows, kg) for kg in targets) + " |")

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.errors import InputError
-from gvpipe.sequence import Int32, MeshSequence
+from gvpipe.matching import canonical_triangles, match_vertices
+from gvpipe.sequence import MeshSequence
 from gvpipe.sted import Sted
 from gvpipe.surface import Hausdorff
 from gvpipe.topology import unique_edges
@@ -66,7 +67,7 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: Progress
         InputError: the two differ in their number of frames or vertices or in their triangles, so that no vertex of
             one answers to a vertex of the other.
     """
-    _check_comparable(reference, distorted)
+    distorted = _aligned(reference, distorted)
     n_frames = reference.n_frames
     edges = unique_edges(reference.faces)
     diagonal = _diagonal(reference)
@@ -134,7 +135,8 @@ def _diagonal(reference: MeshSequence) -> float:
     return float(np.linalg.norm(np.ptp(frame, axis=0)))
 
 
-def _check_comparable(reference: MeshSequence, distorted: MeshSequence) -> None:
+def _aligned(reference: MeshSequence, distorted: MeshSequence) -> MeshSequence:
+    """Return ``distorted`` in the reference's vertex order, or raise `InputError` if the two do not belong together."""
     counts = (
         ("frames", reference.n_frames, distorted.n_frames),
         ("vertices", reference.n_vertices, distorted.n_vertices),
@@ -146,18 +148,13 @@ def _check_comparable(reference: MeshSequence, distorted: MeshSequence) -> None:
                 f"{reference.name} has {ours} {what}, {distorted.name} has {theirs}; equal numbers are needed, since "
                 "vertices are compared by index"
             )
-    ours_sorted, theirs_sorted = _canonical(reference.faces), _canonical(distorted.faces)
-    different = int((ours_sorted != theirs_sorted).any(axis=1).sum())
-    if different:
+    if np.array_equal(canonical_triangles(reference.faces), canonical_triangles(distorted.faces)):
+        return distorted
+    pairing = match_vertices(reference, distorted)
+    if pairing is None:
         raise InputError(
             f"{reference.name} and {distorted.name} both have {reference.n_vertices} vertices and "
-            f"{len(reference.faces)} triangles, but not the same triangles; the same ones (in any order) are needed, "
-            "since vertices are compared by index: was the file coded with another vertex order?"
+            f"{len(reference.faces)} triangles, but not the same triangles, in whatever vertex order; compare a sequence with "
+            "what was made from it"
         )
-
-
-def _canonical(faces: Int32) -> Int32:
-    """Triangles turned so that the smallest index leads (winding kept), in lexicographic order."""
-    turn = (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3
-    turned = np.take_along_axis(faces, turn, axis=1)
-    return turned[np.lexsort(turned.T[::-1])]
+    return distorted.reordered(np.argsort(pairing), reference.faces)

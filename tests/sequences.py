@@ -42,7 +42,7 @@ def awkward() -> dict[str, MeshSequence]:
     rng = np.random.default_rng(5)
     tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
-    many = np.concatenate([corners + [2 * i, 0, 0] for i in range(25)])
+    many = np.concatenate([corners + np.array([2 * i, 0, 0]) for i in range(25)])
     still = _moving(points, faces, "x").positions
     sequences = [
         _moving(corners[:3], [[0, 1, 2]], "one triangle"),

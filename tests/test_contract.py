@@ -163,7 +163,7 @@ def test_settings_are_checked(codec: str, settings: dict[str, object]) -> None:
 @each_file
 def test_every_truncated_prefix_is_refused(path: Path, tmp_path: Path) -> None:
     data = path.read_bytes()
-    cuts = {*range(0, 64), *range(len(data) - 64, len(data)), *np.linspace(64, len(data) - 1, 150, dtype=int).tolist()}
+    cuts = {*range(64), *range(len(data) - 64, len(data)), *np.linspace(64, len(data) - 1, 150, dtype=int).tolist()}
     for cut in sorted(cuts):
         (tmp_path / "cut.mp4").write_bytes(data[:cut])
         with pytest.raises((TruncatedFile, StrippedFile)) as caught:
