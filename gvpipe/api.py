@@ -134,6 +134,9 @@ def encode(
         OutputError: the file cannot be written; no part of it is left.
     """
     _check_target(Path(path))
+    given = None if isinstance(source, MeshSequence) else source
+    if given is not None and os.path.exists(path) and os.path.exists(given) and os.path.samefile(given, path):
+        raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
     chosen: Codec = codec_class(codec)(**settings) if isinstance(codec, str) else codec
     started = time.perf_counter()
     sequence = source if isinstance(source, MeshSequence) else read(source)
@@ -213,9 +216,9 @@ def _check_target(path: Path) -> None:
     """Say what is wrong with the output before the work, not after it."""
     if path.suffix.lower() not in VIDEO_SUFFIXES:
         raise InputError(f"{path}: the output is an MP4 file; end its name in .mp4")
-    if path.is_dir():
+    if os.path.isdir(path):  # unlike Path.is_dir, it takes any name, too long ones as well
         raise OutputError(f"cannot write {path}: it is a folder; choose another name")
-    if not path.parent.is_dir():
+    if not os.path.isdir(path.parent):
         raise OutputError(f"cannot write {path}: no folder {path.parent}; create it first")
     if not os.access(path.parent, os.W_OK):
         raise OutputError(f"cannot write {path}: the folder {path.parent} is read-only; choose another one")

@@ -40,7 +40,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         OutputError: the folder is missing or read-only, the disk is full, ``path`` is not an ordinary file.
     """
     target = Path(os.path.realpath(path))  # through a symbolic link, so that the link stays one
-    if target.exists() and not target.is_file():  # replacing a folder fails late; replacing /dev/null succeeds
+    if os.path.exists(target) and not os.path.isfile(target):  # replacing a folder fails late; replacing /dev/null succeeds
         raise OutputError(f"cannot write {path}: it exists and is not an ordinary file; choose another name")
     temporary = target.with_name(f".gvpipe-{secrets.token_hex(8)}{target.suffix}")
     try:

@@ -170,7 +170,7 @@ def _read_header(sections: dict[str, bytes]) -> tuple[Bitstream, dict[str, Any]]
         if not 0 < bitstream.fps <= 100_000:
             raise ValueError(f"fps {bitstream.fps}")
         return bitstream, dict(header["container"])
-    except (KeyError, TypeError, ValueError, RecursionError, zlib.error) as exc:
+    except (KeyError, TypeError, ValueError, OverflowError, RecursionError, zlib.error) as exc:
         raise CorruptFile(f"the header is not as gvpipe writes it ({exc}); get the file again from its source") from exc
 
 

@@ -43,6 +43,8 @@ def main() -> None:
     except BrokenPipeError:  # the reader of our output left, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1
+    except OSError as exc:  # files' own errors are GvpipeErrors already: what is left is our output, as on a full disk
+        status = _fail(f"cannot print the result: {exc.strerror or exc}; free some space or print elsewhere", 1)
     sys.exit(status or 0)
 
 

@@ -1,11 +1,12 @@
 """Bitstream to MP4 file and back. Knows MP4 boxes, no codec.
 
 The file is the video as any player opens it, plus one ``uuid`` box with the payload after everything else, where
-players skip it and no sample offset moves, plus one short metadata tag. The tag survives remuxing and the box does not:
-so a file that lost its box says so. The payload repeats the tag's content id and holds a checksum of the video's samples, so
-that a box or a video from another file is noticed::
+players skip it and no sample offset moves, plus one short metadata tag. The tag survives remuxing and the box does not: so
+a file that lost its box says so. The tag is a comment, because FFmpeg drops names that it does not know unless told to
+keep them. The payload repeats the tag's content id and holds a checksum of the video's samples, so that a box or a video
+from another file is noticed::
 
-    tag     = "gvpipe" -> "<container version> <content id>"
+    tag     = "comment" -> "gvpipe <container version> <content id>"
     box     = [u32 big-endian] size, "uuid", [16 bytes] UUID, payload     (64-bit size form above 4 GiB)
     content id = first 16 bytes, in hex, of the SHA-256 over the codec's sections in order
 """
@@ -27,7 +28,8 @@ from gvpipe.bitstream import VERSION, Bitstream, pack_payload, unpack_payload
 from gvpipe.errors import CorruptFile, InputError, NewerVersion, NotGeometryVideo, StrippedFile, TruncatedFile
 
 BOX_UUID = UUID("6a1f0c52-3d7b-4e0e-9c55-67e4f0a7d1b9")
-TAG = "gvpipe"
+TAG = "comment"
+TAG_PREFIX = "gvpipe "
 BOX = struct.Struct(">I4s")
 LARGE = struct.Struct(">Q")
 MAX_BOXES = 1 << 16
@@ -42,11 +44,11 @@ def write_file(bitstream: Bitstream, path: str | os.PathLike[str]) -> int:
     """
     identity = _content_id(bitstream)
     payload = pack_payload(bitstream, {"id": identity, "video_crc32": _inspect(io.BytesIO(bitstream.video)).checksum})
-    with atomic_path(path) as temporary:
-        _remux(bitstream.video, f"{VERSION} {identity}", temporary)
-        with open(temporary, "ab") as file:
-            file.write(_box(payload))
-            return file.tell()
+    video = _remux(bitstream.video, f"{VERSION} {identity}")
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:
+        file.write(video)
+        file.write(_box(payload))
+        return file.tell()
 
 
 def read_file(path: str | os.PathLike[str]) -> Bitstream:
@@ -88,8 +90,9 @@ def _read(file: IO[bytes], size: int) -> Bitstream:
         if tag:
             raise StrippedFile(f"its geometry was stripped, as remuxing or re-encoding does; {AGAIN}")
         raise NotGeometryVideo("an MP4 file, but not one that gvpipe wrote; encode a sequence to make one")
-    if tag and tag[0].isdigit() and int(tag.split()[0]) > VERSION:
-        raise NewerVersion(f"container version {tag.split()[0]}, this gvpipe reads up to {VERSION}; upgrade gvpipe")
+    version = tag.partition(" ")[0]
+    if version.isascii() and version.isdecimal() and len(version) < 10 and int(version) > VERSION:
+        raise NewerVersion(f"container version {version}, this gvpipe reads up to {VERSION}; upgrade gvpipe")
     file.seek(payload_range[0])
     bitstream, container = unpack_payload(file.read(payload_range[1] - payload_range[0]))
     identity = _content_id(bitstream)
@@ -123,7 +126,7 @@ def _find_payload(file: IO[bytes], size: int) -> tuple[int, tuple[int, int] | No
             length = size - position
         if position + length > size and kind.isalnum():
             raise TruncatedFile(f"its {kind.decode('ascii')} box ends {position + length - size} bytes past its end; {AGAIN}")
-        if length < start - position or position + length > size or len(kinds) > MAX_BOXES:
+        if not kind.isalnum() or length < start - position or position + length > size or len(kinds) > MAX_BOXES:
             raise CorruptFile(f"the box at byte {position} has an impossible size of {length}; {AGAIN}")
         if kind == b"uuid":
             file.seek(start)
@@ -154,22 +157,32 @@ def _content_id(bitstream: Bitstream) -> str:
     return digest.hexdigest()[:32]
 
 
-def _remux(video: bytes, tag: str, path: Path) -> None:
-    """Copy the video's one track, unchanged, into a file that carries the tag and whose index comes first."""
+def _remux(video: bytes, tag: str) -> bytes:
+    """Copy the video's one track, unchanged, into a file that carries the tag and whose index comes first.
+
+    In memory, where the video is already: a file that PyAV writes itself stays open, and its disk space taken, if the
+    last write to it fails.
+    """
     import av
 
     options = {"movflags": "+faststart+use_metadata_tags", "fflags": "+bitexact"}
+    result = io.BytesIO()
+
+    def reopen(name: str, flags: int, more: dict[str, str]) -> IO[bytes]:
+        return io.BytesIO(result.getvalue())  # FFmpeg reads the file again to move the index to the front
+
     with (
         av.open(io.BytesIO(video), "r", format="mp4") as source,
-        av.open(str(path), "w", format="mp4", options=options) as target,
+        av.open(result, "w", format="mp4", options=options, io_open=reopen) as target,
     ):
-        target.metadata[TAG] = tag
+        target.metadata[TAG] = TAG_PREFIX + tag
         track = source.streams.video[0]
         copy = target.add_stream_from_template(track)
         for packet in source.demux(track):
             if packet.size:
                 packet.stream = copy
                 target.mux(packet)
+    return result.getvalue()
 
 
 @dataclass(frozen=True)
@@ -187,7 +200,8 @@ def _inspect(video: IO[bytes]) -> _Track:
     checksum = n_bytes = 0
     try:
         with av.open(video, "r", format="mp4") as container:
-            tag = str(container.metadata.get(TAG, "")).strip()
+            comment = str(container.metadata.get(TAG, "")).strip()
+            tag = comment.removeprefix(TAG_PREFIX) if comment.startswith(TAG_PREFIX) else ""
             tracks: list[Any] = list(container.streams.video)
             for packet in container.demux(tracks) if tracks else ():
                 checksum = zlib.crc32(bytes(packet), checksum)

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from gvpipe.errors import CorruptFile
 
+END_OF_IMAGE = b"\xff\xd9"
+
 UInt8 = NDArray[np.uint8]
 
 
@@ -34,7 +36,8 @@ def decode_jpeg(data: bytes, height: int, width: int) -> UInt8:
     import cv2
 
     try:
-        plane = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+        # OpenCV fills up what a truncated image lacks
+        plane = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data.endswith(END_OF_IMAGE) else None
     except cv2.error as exc:
         raise CorruptFile("an image of the video is corrupt: OpenCV cannot read it as JPEG") from exc
     if plane is None or plane.shape != (height, width):

@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 AHEAD = 2  # groups of pictures decoded ahead of the reader
 MAX_SIDE = 16384  # pixels, of a picture that is read
 QP_RANGE = (1, 51)  # 0 would be lossless, which is another H.264 profile that browsers do not read
-DEPTH10_QP = 12  # x264 counts QP from 12 lower at 10 bits
 # measured on chicken, cow and samba (docs/benchmarks.md): psycho-visual choices and the deblocking filter only cost here, since
 # blocks are separate charts; long pyramids of B-frames suit residuals that change slowly
 X264 = {"no-psy": 1, "aq-mode": 0, "no-deblock": 1, "bframes": 8, "b-adapt": 2, "scenecut": 0, "threads": 1, "log-level": 0}
+X264["8x8dct"] = 1  # makes the profile High with every preset, ultrafast too
 
 Plane = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -55,13 +55,13 @@ class Profile:
 
     @property
     def middle(self) -> int:
-        """The level of a zero."""
-        return (self.low + self.high + 1) // 2
+        """The level of a zero: what H.264 predicts where it knows nothing, so that still blocks cost nothing."""
+        return 1 << (self.depth - 1)
 
     @property
     def amplitude(self) -> int:
         """Levels on either side of the middle."""
-        return (self.high - self.low) // 2
+        return min(self.high - self.middle, self.middle - self.low)
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -235,7 +235,9 @@ class VideoReader:
         height, width = self._shape
         plane = picture.planes[0]
         rows = np.frombuffer(plane, self._profile.dtype).reshape(-1, plane.line_size // self._profile.dtype.itemsize)
-        return np.array(rows[:height, :width])
+        # coarse quantisers overshoot; a browser's canvas clips to the limited range, and so does everyone
+        samples: Plane = np.clip(rows[:height, :width], self._profile.low, self._profile.high)
+        return samples
 
 
 def _x264_options(quality: int, gop: int, preset: str) -> dict[str, str]:
@@ -252,6 +254,8 @@ def _demux(data: bytes, profile: Profile, width: int, height: int) -> tuple[list
                 raise CorruptFile(f"the file has {len(container.streams.video)} video tracks; one is needed")
             stream = container.streams.video[0]
             context = stream.codec_context
+            if context is None:
+                raise CorruptFile("the video is of no known kind; get the file again from its source")
             found = (context.name, context.width, context.height)
             if found != (profile.codec, width, height) or max(width, height) > MAX_SIDE:
                 raise CorruptFile(f"the video is {found}; {(profile.codec, width, height)} is needed")

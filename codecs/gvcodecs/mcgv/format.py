@@ -33,7 +33,8 @@ from gvpipe.video import MAX_SIDE, PROFILES, Profile
 MAX_CLUSTERS = 1024
 MAX_SEGMENTS = 1 << 16
 CONTEXTS = 4  # of a pixel's y: 0, 1, 2..3 or more columns from the vertex before
-LARGE = 1e30  # no coordinate or step of a float32 model lies beyond
+LARGE = 1e39  # no coordinate or step of a float32 model lies beyond
+SMALL = 1e-60  # no step of a float32 model is smaller
 
 Int64 = NDArray[np.int64]
 
@@ -78,7 +79,7 @@ class Header:
             raise CorruptFile(f"header: no profile {bitstream.header.get('profile')!r}; there are {', '.join(PROFILES)}")
         if not (isinstance(base, list) and len(base) == 4 and all(isinstance(v, int | float) for v in base)):
             raise CorruptFile(f"header: base is {base!r}; an origin and a step are needed")
-        if not (0 < base[3] < LARGE and max(map(abs, base[:3])) < LARGE):
+        if not (base[3] > 0 and all(abs(v) < LARGE for v in base)):  # NaN neither
             raise CorruptFile(f"header: base is {base!r}, out of range")
         header = cls(
             profile=profile,
@@ -88,8 +89,8 @@ class Header:
             clusters=bitstream.integer("clusters", 1, MAX_CLUSTERS),
             segments=bitstream.integer("segments", 1, min(MAX_SEGMENTS, bitstream.n_frames)),
             base=Lattice((base[0], base[1], base[2]), base[3]),
-            transform_step=bitstream.number("transform_step", 1e-40, LARGE),
-            residual_step=bitstream.number("residual_step", 1e-40, LARGE),
+            transform_step=bitstream.number("transform_step", SMALL, LARGE),
+            residual_step=bitstream.number("residual_step", SMALL, LARGE),
         )
         if header.width % header.block or header.height % header.block:
             raise CorruptFile(f"header: planes of {header.width}x{header.height} are not whole blocks of {header.block}")

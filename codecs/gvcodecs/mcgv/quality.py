@@ -20,7 +20,7 @@ COARSEST = 0.04  # effective step at quality 0, part of the diagonal: beyond, th
 DECADES = {"h264-8": 2.0, "h264-10": 2.6, "jpeg": 2.0}  # from quality 0 to 100: down to where each profile's levels end
 QP_STEP = 0.625  # H.264's quantiser step at QP 0, levels of an orthonormal transform; it doubles every 6 QP
 JPEG_TABLE = 20.0  # levels at quality 50: about where JPEG's luma table costs the error of a flat step
-EFFECTIVE_JPEG_RANGE = (2, 98)
+JPEG_RANGE = (2, 98)
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ def choose_quantiser(quality: float, profile: Profile, largest: float, diagonal:
     finest = largest / profile.amplitude if largest > 0 else 1.0
     wanted = diagonal * COARSEST * 10 ** -(DECADES[profile.name] * quality / 100) / finest  # effective step, levels
     if profile.codec == "mjpeg":
-        level = next((q for q in range(EFFECTIVE_JPEG_RANGE[1], 0, -1) if _jpeg_step(q + 1) > wanted), 1)
-        level = min(max(level + 1, EFFECTIVE_JPEG_RANGE[0]), EFFECTIVE_JPEG_RANGE[1])
+        low, high = JPEG_RANGE
+        level = next((q for q in range(low, high) if _jpeg_step(q) <= wanted), high)  # the coarsest that is fine enough
         return Quantiser(level, finest * max(1.0, wanted / _jpeg_step(level)))
     highest = QP_RANGE[1] + 6 * (profile.depth - 8)
     level = math.floor(6 * math.log2(max(wanted, 1e-9) / QP_STEP))
