@@ -15,10 +15,9 @@ from __future__ import annotations
 import io
 from collections import deque
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import zip_longest
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -35,8 +34,20 @@ AHEAD = 2  # groups of pictures decoded ahead of the reader
 MAX_SIDE = 16384  # pixels, of a picture that is read
 QP_RANGE = (1, 51)  # 0 would be lossless, which is another H.264 profile that browsers do not read
 # measured on chicken, cow and samba (docs/benchmarks.md): psycho-visual choices and the deblocking filter only cost here, since
-# blocks are separate charts; long pyramids of B-frames suit residuals that change slowly
-X264 = {"no-psy": 1, "aq-mode": 0, "no-deblock": 1, "bframes": 8, "b-adapt": 2, "scenecut": 0, "threads": 1, "log-level": 0}
+# blocks are separate charts; long pyramids of B-frames suit residuals that change slowly; nothing moves in the pictures, so
+# neither partitions nor more references pay, and both cost decoding time
+X264 = {
+    "no-psy": 1,
+    "aq-mode": 0,
+    "no-deblock": 1,
+    "bframes": 8,
+    "partitions": "none",
+    "ref": 1,
+    "b-adapt": 2,
+    "scenecut": 0,
+    "threads": 1,
+    "log-level": 0,
+}
 X264["8x8dct"] = 1  # makes the profile High with every preset, ultrafast too
 
 Plane = NDArray[np.uint8] | NDArray[np.uint16]
@@ -178,6 +189,7 @@ class VideoReader:
             raise CorruptFile("the video does not start with a key frame; get the file again from its source")
         self._groups = list(zip(starts, [*starts[1:], len(self._packets)], strict=True))
         self._cached: tuple[int, list[Plane]] = (-1, [])
+        self._pool = ThreadPoolExecutor(AHEAD)
 
     @property
     def n_frames(self) -> int:
@@ -187,19 +199,27 @@ class VideoReader:
     def read(self, start: int, stop: int) -> Iterator[tuple[int, list[Plane]]]:
         """Yield ``(first frame, planes)`` for the frames ``start`` to ``stop``, one group of pictures at a time.
 
+        Where several groups are asked for, decoding starts with the call and runs ahead of the iteration, on other threads.
+
         Raises:
-            CorruptFile: the group does not decode to its number of planes.
+            CorruptFile: while iterating: a group does not decode to its number of planes.
         """
         wanted = [g for g, (first, last) in enumerate(self._groups) if first < stop and last > start]
-        with ThreadPoolExecutor(AHEAD) as pool:  # decodes the next groups while this one is used
-            pending = deque(pool.submit(self._decode, group) for group in wanted[:AHEAD])
-            for group, following in zip_longest(wanted, wanted[AHEAD:]):
-                planes = pending.popleft().result()
-                if following is not None:
-                    pending.append(pool.submit(self._decode, following))
-                first, last = self._groups[group]
-                low, high = max(start, first), min(stop, last)
-                yield low, planes[low - first : high - first]
+        ahead = AHEAD if len(wanted) > 1 else 0
+        pending = deque(self._pool.submit(self._decode, group) for group in wanted[:ahead])
+        return self._collect(start, stop, wanted, pending)
+
+    def _collect(
+        self, start: int, stop: int, wanted: list[int], pending: deque[Future[list[Plane]]]
+    ) -> Iterator[tuple[int, list[Plane]]]:
+        ahead = len(pending)
+        for i, group in enumerate(wanted):
+            planes = pending.popleft().result() if ahead else self._decode(group)
+            if ahead and i + ahead < len(wanted):
+                pending.append(self._pool.submit(self._decode, wanted[i + ahead]))
+            first, last = self._groups[group]
+            low, high = max(start, first), min(stop, last)
+            yield low, planes[low - first : high - first]
 
     def _decode(self, group: int) -> list[Plane]:
         number, planes = self._cached

@@ -358,7 +358,7 @@ def test_padding_of_full_and_single_blocks() -> None:
 def test_quality_is_monotone(name: str, largest: float) -> None:
     """The step that a coefficient sees falls with quality, is the one asked for until levels run out; residuals fit."""
     profile = PROFILES[name]
-    decades = {"h264-8": 2.0, "h264-10": 2.6, "jpeg": 2.0}[name]
+    decades = {"h264-8": 2.1, "h264-10": 2.7, "jpeg": 2.1}[name]
     effective = []
     for quality in np.linspace(0, 100, 201):
         chosen = choose_quantiser(float(quality), profile, largest, 2.0)
@@ -370,7 +370,7 @@ def test_quality_is_monotone(name: str, largest: float) -> None:
         else:
             assert 1 <= chosen.level <= (63 if profile.depth == 10 else 51)
             effective.append(chosen.step * QP_STEP * 2 ** (chosen.level / 6))
-            wanted = 2.0 * 0.04 * 10 ** -(decades * quality / 100)
+            wanted = 2.0 * 0.06 * 10 ** -(decades * quality / 100)
             finest = largest / profile.amplitude * QP_STEP * 2 ** (1 / 6)
             assert effective[-1] == pytest.approx(max(wanted, finest), rel=1e-9)
     assert np.all(np.diff(effective) <= np.array(effective[1:]) * 1e-9)
