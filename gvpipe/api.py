@@ -15,6 +15,7 @@ from gvpipe.errors import InputError, OutputError
 from gvpipe.io import read as read_sequence
 from gvpipe.io import write as write_sequence
 from gvpipe.player import Player
+from gvpipe.poster import make_poster
 from gvpipe.sequence import MeshSequence
 
 VIDEO_SUFFIXES = (".mp4", ".m4v")
@@ -49,7 +50,7 @@ class Report:
 @dataclass(frozen=True)
 class Info:
     """What a geometry video is: ``bounding_box`` is frame 0's corners, model units; ``sections`` the bytes of every part of
-    the file, which add up to ``bytes``."""
+    the file, which add up to ``bytes``; ``levels`` the vertex counts of its levels of detail."""
 
     codec: str
     version: int
@@ -61,6 +62,7 @@ class Info:
     bytes: int
     bpvf: float
     sections: dict[str, int]
+    levels: list[int]
     settings: dict[str, Any]
 
     def to_json(self) -> dict[str, Any]:
@@ -145,6 +147,9 @@ def encode(
     clock = _StageClock(progress)
     bitstream = chosen.encode(sequence, clock)
     clock("write", 0.0)
+    if not bitstream.video:
+        poster = make_poster(sequence.read(0, 1)[0], sequence.faces, bitstream.fps, bitstream.n_frames)
+        bitstream = dataclasses.replace(bitstream, video=poster)
     size = write_file(bitstream, path)
     clock("", 1.0)
     return Report(
@@ -161,16 +166,17 @@ def encode(
     )
 
 
-def decode(path: StrPath, start: int = 0, stop: int | None = None) -> MeshSequence:
-    """Decode frames ``start`` to ``stop`` of a geometry video into memory.
+def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0) -> MeshSequence:
+    """Decode frames ``start`` to ``stop`` of a geometry video into memory; ``lod`` above 0 asks for a coarser mesh.
 
     Raises:
-        InputError: no such file, or the frames are not in it.
+        InputError: no such file, or the frames or the level are not in it.
         FormatError: not a geometry video, or a damaged one.
     """
     player = Player(path)
     start, stop = frame_range(player, start, stop)
-    return MeshSequence(player[start:stop], player.faces, player.fps, name=player.path)
+    level = player.level(lod)
+    return MeshSequence(level.read(start, stop), level.faces, player.fps, name=player.path)
 
 
 def open(path: StrPath) -> Player:
@@ -200,6 +206,7 @@ def info(path: StrPath) -> Info:
         bytes=size,
         bpvf=8 * size / (bitstream.n_vertices * bitstream.n_frames),
         sections=bytes_by_part(bitstream, size),
+        levels=player.levels,
         settings=dict(bitstream.header),
     )
 

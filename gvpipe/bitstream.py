@@ -48,7 +48,8 @@ class Bitstream:
         fps: frames per second.
         header: what else the codec's reader must know, as JSON values.
         sections: the codec's binary data by name.
-        video: an MP4 file whose one track holds the codec's images.
+        video: an MP4 file whose one track holds the codec's images; empty for codecs that have none, whose files show a
+            poster (`gvpipe.poster`) instead.
     """
 
     codec: str

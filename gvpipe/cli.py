@@ -19,6 +19,7 @@ from gvpipe.errors import GvpipeError
 
 if TYPE_CHECKING:
     from gvpipe.codec import Progress
+    from gvpipe.sequence import MeshSequence
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
@@ -106,7 +107,8 @@ def encode(
 @click.argument("target", metavar="OUTPUT")
 @click.option("--start", type=int, default=0, show_default=True, help="First frame.")
 @click.option("--stop", type=int, help="Frame after the last. [default: the end]")
-def decode(source: str, target: str, start: int, stop: int | None) -> None:
+@click.option("--lod", type=int, default=0, show_default=True, help="Level of detail: 0 the mesh, higher is coarser.")
+def decode(source: str, target: str, start: int, stop: int | None, lod: int) -> None:
     """Decode a geometry video.
 
     OUTPUT is an .npz, or a pattern of frame files such as out/%04d.obj (also .ply, .stl, .off, .glb).
@@ -116,10 +118,11 @@ def decode(source: str, target: str, start: int, stop: int | None) -> None:
 
     player = api.open(source)
     start, stop = api.frame_range(player, start, stop)
-    part = _Part(player, start, stop)
+    level = player.level(lod)
+    part = _Part(level, start, stop)
     with _progress() as progress:
         part.progress = progress
-        api.write(MeshSequence(part, player.faces, player.fps, name=source), target, start)
+        api.write(MeshSequence(part, level.faces, player.fps, name=source), target, start)
     click.echo(f"{source} -> {target} ({stop - start} frames, {part.shape[1]} vertices)")
 
 
@@ -137,6 +140,8 @@ def info(source: str, as_json: bool) -> None:
     click.echo(f"{source}: {found.codec} version {found.version}")
     click.echo(f"{found.vertices} vertices, {found.triangles} triangles, {found.frames} frames at {found.fps:g} fps")
     click.echo("frame 0 lies in " + " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True)))
+    if len(found.levels) > 1:
+        click.echo("levels of detail, vertices: " + ", ".join(f"{lod}: {count}" for lod, count in enumerate(found.levels)))
     click.echo(f"{_size(found.bytes)}, {found.bpvf:.3f} bits per vertex and frame:")
     width = max(map(len, found.sections))
     for name, count in found.sections.items():
@@ -181,18 +186,18 @@ def codecs() -> None:
 
 
 class _Part:
-    """Frames of a player, which tell how far they have been read."""
+    """Some frames of a sequence, which tell how far they have been read."""
 
-    def __init__(self, player: Any, start: int, stop: int) -> None:
-        self._player, self._start = player, start
-        self.shape = (stop - start, *player.shape[1:])
+    def __init__(self, sequence: MeshSequence, start: int, stop: int) -> None:
+        self._sequence, self._start = sequence, start
+        self.shape = (stop - start, sequence.n_vertices, 3)
         self.progress: Progress | None = None
 
     def __getitem__(self, key: slice, /) -> Any:
         first, last, _ = key.indices(self.shape[0])
         if self.progress:
             self.progress("decode", last / self.shape[0])
-        return self._player[self._start + first : self._start + last]
+        return self._sequence.read(self._start + first, self._start + last)
 
 
 @contextlib.contextmanager

@@ -22,6 +22,24 @@ Progress = Callable[[str, float], None]
 """Called with a stage's name and the part of it that is done, 0..1; stages come one after the other."""
 
 
+@runtime_checkable
+class LevelReader(Protocol):
+    """What a frame reader offers beside if its codec has levels of detail: coarser meshes of the same motion."""
+
+    @property
+    def levels(self) -> list[int]:
+        """Vertex counts of the levels, level 0 (the mesh itself) first."""
+        ...
+
+    def level_faces(self, lod: int) -> Int32:
+        """``(n, 3) int32`` triangles of a level, in the order of the vertices that `read` returns for it."""
+        ...
+
+    def read(self, start: int, stop: int, lod: int = 0) -> Float32:
+        """Return frames of a level: ``(stop - start, its vertices, 3) float32``; decodes only what the level needs."""
+        ...
+
+
 class FrameReader(Protocol):
     """Frames of one bitstream; keeps no more than the last group of them."""
 

@@ -14,7 +14,6 @@ Codec order: Draco's vertices by first appearance after merging, then the loose 
 from __future__ import annotations
 
 import struct
-import zlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gvpipe.errors import CorruptFile, InputError
+from gvpipe.index_rows import decode_table, encode_table, row_ids, smallest_first, used_vertices
 from gvpipe.sequence import Int32
 from gvpipe.vertex_order import MAX_VERTICES, decode_order, encode_order
 
@@ -94,7 +94,7 @@ def _encode_draco(points: Ints, faces: Ints) -> bytes:
     # Draco visits components in the order of their first triangles. The vertex order is cheaper to code when
     # components follow it, backwards because Draco's decoder rebuilds the mesh from its end.
     faces = faces[np.argsort(-faces.max(axis=1, initial=0), kind="stable")]
-    used = _used(faces, len(points))
+    used = used_vertices(faces, len(points))
     if not len(used) or points.max() > MAX_DRACO_COORDINATE:
         return b""
     occurrence = _occurrences(points[used])
@@ -115,51 +115,41 @@ def _encode_draco(points: Ints, faces: Ints) -> bytes:
 def _encode_mesh(points: Ints, faces: Ints, draco: bytes) -> tuple[bytes, Ints]:
     """The mesh stream and its codec order: whatever the Draco stream does not give back is added as loose rows."""
     keys, draco_faces = _decode_draco(draco)
-    carried = _find_vertices(points, _used(_proper(points, faces), len(points)), keys)
+    carried = _find_vertices(points, used_vertices(_proper(points, faces), len(points)), keys)
     is_loose = np.ones(len(points), bool)
     is_loose[carried] = False
     permutation = np.concatenate([carried, np.flatnonzero(is_loose)])
     codec_index = np.argsort(permutation)
 
-    canonical = np.concatenate([_smallest_first(codec_index[faces]), _smallest_first(draco_faces)])
-    ids, representatives = _row_ids(canonical)
+    canonical = np.concatenate([smallest_first(codec_index[faces]), smallest_first(draco_faces)])
+    ids, representatives = row_ids(canonical)
     missing = np.bincount(ids[: len(faces)], minlength=len(representatives))
     missing -= np.bincount(ids[len(faces) :], minlength=len(representatives))
     if (missing < 0).any():
         raise ValueError("Draco returned triangles that the mesh does not have")
     loose_faces = canonical[np.repeat(representatives, missing)]
 
-    loose_points = _encode_table(points[is_loose])
+    loose_points = encode_table(points[is_loose])
     header = HEADER.pack(len(draco), int(is_loose.sum()), len(loose_faces), len(loose_points))
-    return header + draco + loose_points + _encode_table(loose_faces), permutation
+    return header + draco + loose_points + encode_table(loose_faces), permutation
 
 
 def _proper(points: Ints, faces: Ints) -> Ints:
     """The triangles with three different lattice positions; Draco drops the others, and prints if no triangle is left."""
-    place = _row_ids(points)[0][faces]
+    place = row_ids(points)[0][faces]
     proper: Ints = faces[(place != np.roll(place, 1, axis=1)).all(axis=1)]
     return proper
-
-
-def _used(faces: Ints, n_vertices: int) -> Ints:
-    return np.flatnonzero(np.bincount(faces.ravel(), minlength=n_vertices))
 
 
 def _find_vertices(points: Ints, used: Ints, keys: Ints) -> Ints:
     """The vertex that each key (position, occurrence), as decoded, stands for."""
     own_keys = np.c_[points[used], _occurrences(points[used])]
-    ids, representatives = _row_ids(np.concatenate([own_keys, keys]))
+    ids, representatives = row_ids(np.concatenate([own_keys, keys]))
     found = representatives[ids[len(used) :]]
     if (found >= len(used)).any():
         raise ValueError("Draco returned vertices that the mesh does not have")
     vertices: Ints = used[found]
     return vertices
-
-
-def _encode_table(rows: Ints) -> bytes:
-    differences = np.diff(rows, axis=0, prepend=0).astype("<i4")
-    planes = differences.view(np.uint8).reshape(len(rows), 12).T
-    return zlib.compress(planes.tobytes(), 9) if len(rows) else b""
 
 
 def _decode_draco(draco: bytes) -> tuple[Ints, Ints]:
@@ -168,7 +158,7 @@ def _decode_draco(draco: bytes) -> tuple[Ints, Ints]:
 
     if not draco:
         return np.zeros((0, 4), np.int64), np.zeros((0, 3), np.int64)
-    _check_draco_header(draco)
+    check_draco_header(draco)
     try:
         decoded = DracoPy.decode(draco)
         points, attributes = decoded.points, decoded.attributes
@@ -189,12 +179,12 @@ def _decode_draco(draco: bytes) -> tuple[Ints, Ints]:
     if keys.size and keys.max() >= 1 << 31:
         raise CorruptFile("section 'mesh' is corrupt: lattice coordinate out of range")
 
-    ids, representatives = _row_ids(keys)  # merge what Draco split
+    ids, representatives = row_ids(keys)  # merge what Draco split
     by_appearance = np.argsort(representatives)
     return keys[representatives[by_appearance]], np.argsort(by_appearance)[ids][faces]
 
 
-def _check_draco_header(draco: bytes) -> None:
+def check_draco_header(draco: bytes) -> None:
     """Refuse counts that the stream cannot hold before Draco allocates for them."""
     if not draco.startswith(DRACO_PREFIX):
         raise CorruptFile("section 'mesh' is corrupt: not the kind of Draco stream that is written here")
@@ -223,8 +213,8 @@ def _decode_mesh(mesh: bytes) -> tuple[Ints, Ints]:
     if end_points > len(mesh):
         raise CorruptFile(f"section 'mesh' of {len(mesh)} bytes, its header promises {end_points} and more: truncated")
     keys, draco_faces = _decode_draco(mesh[HEADER.size : end_draco])
-    points = np.concatenate([keys[:, :3], _decode_table(mesh[end_draco:end_points], n_loose_points)])
-    faces = np.concatenate([draco_faces, _decode_table(mesh[end_points:], n_loose_faces)])
+    points = np.concatenate([keys[:, :3], decode_table(mesh[end_draco:end_points], n_loose_points)])
+    faces = np.concatenate([draco_faces, decode_table(mesh[end_points:], n_loose_faces)])
     if len(points) > MAX_VERTICES:
         raise CorruptFile(f"section 'mesh' is corrupt: {len(points)} vertices, at most {MAX_VERTICES}")
     if points.size and points.min() < 0:
@@ -234,41 +224,12 @@ def _decode_mesh(mesh: bytes) -> tuple[Ints, Ints]:
     return points, faces
 
 
-def _decode_table(data: bytes, n_rows: int) -> Ints:
-    inflate = zlib.decompressobj()
-    try:
-        planes = inflate.decompress(data, 12 * n_rows + 1) if n_rows else b""
-    except zlib.error as exc:
-        raise CorruptFile("section 'mesh' is corrupt: loose rows do not inflate") from exc
-    if len(planes) != 12 * n_rows or inflate.unused_data or (data and not inflate.eof):
-        raise CorruptFile(f"section 'mesh' is corrupt: {len(planes)} bytes of loose rows, expected {12 * n_rows}")
-    differences = np.frombuffer(planes, np.uint8).reshape(12, n_rows).T.copy().view("<i4")  # (n, 12) -> (n, 3)
-    return differences.astype(np.int64).cumsum(axis=0)
-
-
 def _occurrences(rows: Ints) -> Ints:
     """For each row, how many equal rows come before it."""
-    ids, _ = _row_ids(rows)
+    ids, _ = row_ids(rows)
     order = np.argsort(ids, kind="stable")
     place = np.arange(len(rows))
     is_first = np.diff(ids[order], prepend=-1) > 0
     occurrences = np.empty(len(rows), np.int64)
     occurrences[order] = place - np.maximum.accumulate(np.where(is_first, place, 0))
     return occurrences
-
-
-def _row_ids(rows: Ints) -> tuple[Ints, Ints]:
-    """A number for each row, equal where rows are, and the first row that has each number."""
-    order = np.lexsort(rows.T)
-    ordered = rows[order]
-    is_new = np.ones(len(rows), bool)
-    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    ids = np.empty(len(rows), np.int64)
-    ids[order] = np.cumsum(is_new) - 1
-    return ids, order[is_new]  # lexsort is stable: the first of equals has the smallest index
-
-
-def _smallest_first(faces: Ints) -> Ints:
-    """Rotate each triangle so that its smallest index leads; winding stays."""
-    turns = faces.argmin(axis=1)[:, None] if len(faces) else np.zeros((0, 1), np.int64)
-    return np.take_along_axis(faces, (turns + np.arange(3)) % 3, axis=1)

@@ -138,8 +138,9 @@ def _find_payload(file: IO[bytes], size: int) -> tuple[int, tuple[int, int] | No
         position += length
     if not kinds:
         raise TruncatedFile(f"the file is empty; {AGAIN}")
-    if b"moov" not in kinds:
-        raise TruncatedFile(f"its index (moov) is missing; {AGAIN}")
+    for kind in (b"moov", b"mdat"):
+        if kind not in kinds:
+            raise TruncatedFile(f"its {kind.decode('ascii')} box is missing; {AGAIN}")
     return (found[0], found[1]) if found else (size, None)
 
 

@@ -12,9 +12,9 @@ from typing import overload
 import numpy as np
 
 from gvpipe.bitstream import Bitstream
-from gvpipe.codec import open_reader
+from gvpipe.codec import LevelReader, open_reader
 from gvpipe.container import read_file
-from gvpipe.errors import FormatError
+from gvpipe.errors import FormatError, InputError
 from gvpipe.sequence import Float32, Int32, MeshSequence
 
 
@@ -47,6 +47,23 @@ class Player:
     def fps(self) -> float:
         """Frames per second."""
         return self.bitstream.fps
+
+    @property
+    def levels(self) -> list[int]:
+        """Vertex counts of the levels of detail, the mesh itself first; one entry for codecs that have none."""
+        return self._reader.levels if isinstance(self._reader, LevelReader) else [self.bitstream.n_vertices]
+
+    def level(self, lod: int) -> MeshSequence:
+        """The video as a sequence of a coarser mesh with the same motion; level 0 is the mesh itself.
+
+        Raises:
+            InputError: there is no such level.
+        """
+        if lod == 0:
+            return self.sequence()
+        if not isinstance(self._reader, LevelReader) or not 0 < lod < len(self.levels):
+            raise InputError(f"{self.path}: no level of detail {lod}; there are levels 0..{len(self.levels) - 1}")
+        return MeshSequence(_Level(self, self._reader, lod), self._reader.level_faces(lod), self.fps, name=self.path)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -91,3 +108,15 @@ class Player:
                 return self._reader.read(start, stop)
             except FormatError as exc:
                 raise type(exc)(f"{self.path}: {exc}") from exc
+
+
+class _Level:
+    """Frames of one level of detail."""
+
+    def __init__(self, player: Player, reader: LevelReader, lod: int) -> None:
+        self._reader, self._lod = reader, lod
+        self.shape = (len(player), player.levels[lod], 3)
+
+    def __getitem__(self, key: slice, /) -> Float32:
+        start, stop, _ = key.indices(self.shape[0])
+        return self._reader.read(start, max(start, stop), lod=self._lod)

@@ -227,7 +227,6 @@ def _walk(starts: Ints, neighbours: Ints, reach: int, ranks: Ints, jumps: Ints, 
 
 @functools.cache
 def _compiled_walk() -> Callable[..., int]:
-    import numba
+    from gvpipe.compiled import compiled
 
-    compiled: Callable[..., int] = numba.njit(cache=True, nogil=True)(_walk)
-    return compiled
+    return compiled(_walk)

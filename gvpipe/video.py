@@ -117,7 +117,7 @@ class VideoWriter:
             self._stream: Any = self._container.add_mux_stream("mjpeg", rate, width=width, height=height)
             self._stream.time_base = self._time_base
             return
-        self._stream = self._container.add_stream("libx264", rate, options=_x264_options(quality, gop, preset))
+        self._stream = self._container.add_stream("libx264", rate, options=x264_options(quality, gop, preset))
         self._stream.width, self._stream.height = width, height
         self._stream.pix_fmt = profile.pixel_format
         context = self._stream.codec_context
@@ -260,7 +260,8 @@ class VideoReader:
         return samples
 
 
-def _x264_options(quality: int, gop: int, preset: str) -> dict[str, str]:
+def x264_options(quality: int, gop: int, preset: str) -> dict[str, str]:
+    """Options of PyAV's ``libx264`` for a quantisation parameter, frames per group of pictures and preset."""
     settings = {"qp": quality, "keyint": gop, "min-keyint": gop, **X264}
     return {"preset": preset, "x264-params": ":".join(f"{key}={value}" for key, value in settings.items())}
 

@@ -20,13 +20,17 @@ from gvpipe.metrics import compare
 from gvpipe.sequence import MeshSequence
 
 # the largest rmse, as a part of frame 0's diagonal, at the default quality: each codec's own statement
-BOUNDS = {"mcgv": 2e-3}
+BOUNDS = {"mcgv": 2e-3, "pca": 1e-3}
 AWKWARD = awkward()
 
+SETTINGS: dict[str, list[dict[str, object]]] = {
+    "mcgv": [{}, {"image": "jpeg"}, {"profile": "precise"}],
+    "pca": [{}, {"predictor": "rbf"}, {"predictor": "lsp"}, {"predictor": "navg"}],
+}
 VARIANTS = [
     pytest.param(codec, settings, id=" ".join([codec, *(f"{k}={v}" for k, v in settings.items())]))
     for codec in codec_ids()
-    for settings in ({"mcgv": [{}, {"image": "jpeg"}, {"profile": "precise"}]}.get(codec, [{}]))
+    for settings in SETTINGS.get(codec, [{}])
 ]
 each_codec = pytest.mark.parametrize(("codec", "settings"), VARIANTS)
 

@@ -19,6 +19,10 @@ GOLDEN = Path(__file__).parent / "golden"
 CURRENT: dict[str, tuple[str, dict[str, object]]] = {
     "mcgv-1-h264": ("mcgv", {"clusters": 5, "gop": 5, "segment": 7}),
     "mcgv-1-h264-10": ("mcgv", {"clusters": 5, "profile": "precise"}),
+    "pca-1-kalman": ("pca", {"segment": 7}),
+    "pca-1-lsp": ("pca", {"predictor": "lsp"}),
+    "pca-1-navg": ("pca", {"predictor": "navg"}),
+    "pca-1-rbf": ("pca", {"predictor": "rbf", "reorder": True}),
     "mcgv-1-jpeg": ("mcgv", {"clusters": 5, "image": "jpeg", "reorder": True}),
 }
 

@@ -1,0 +1,146 @@
+"""The trajectory PCA codec: settings, and the way from a sequence to a bitstream.
+
+Vasa and Skala, "Geometry-Driven Local Neighbourhood Based Predictors for Dynamic Mesh Compression", 2010. The steps, each a
+module of its own: connectivity (`gvpipe.bare_mesh`), principal trajectories and their coding (`gvpipe.trajectory_basis`),
+vertex hierarchy (`gvpipe.hierarchy`), closed-loop prediction (`gvpipe.row_prediction`) and range coding (`gvpipe.row_coding`)
+of feature vectors.
+
+Vertices that share one trajectory (seams, triangle soups) are one point, coded once. Frames are read twice: for size and
+points, then segment by segment.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.pca.format import MAX_SEGMENTS, Header, segment_starts
+from gvcodecs.pca.reader import PcaReader, ordered_rows
+from gvpipe.bare_mesh import decode_mesh, encode_mesh
+from gvpipe.bitstream import Bitstream
+from gvpipe.codec import FrameReader, Progress, Settings
+from gvpipe.hierarchy import build_hierarchy
+from gvpipe.row_coding import encode_rows
+from gvpipe.row_prediction import PREDICTORS
+from gvpipe.sequence import MeshSequence
+from gvpipe.trajectory_basis import (
+    MAX_COMPONENTS,
+    choose_step,
+    count_components,
+    encode_basis,
+    find_principal,
+    fit_coefficients,
+)
+
+COARSEST, DECADES = 10.0, 2 * 4 / 3  # aimed error at quality 0, percent of the spread, and decades down to quality 100
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pca(Settings):
+    """Settings of the trajectory PCA codec.
+
+    Quality aims at a Karni-Gotsman error of ``10 ** (1 - quality / 37.5)`` percent: 0.1 at 75, 0.02 at 100.
+
+    Raises:
+        SettingError: a value out of its range.
+    """
+
+    id: ClassVar[str] = "pca"
+    version: ClassVar[int] = 1
+    summary: ClassVar[str] = "trajectory PCA with geometric predictors: smallest files, levels of detail"
+
+    quality: float = 75.0  # 0..100, higher is better
+    predictor: str = "kalman"  # kalman, or the paper's rbf, lsp, navg
+    beta: float = 1.8  # exponent of rbf's radial function, 0.1..1.99
+    components: int = 0  # principal trajectories per segment, 1..16384; 0: as many as pay
+    segment: int = 500  # most frames per segment, 1..100000
+    reorder: bool = False  # true: the codec may choose the vertex order; smaller
+
+    def __post_init__(self) -> None:
+        self.check_range(0, 100, "quality")
+        self.check_choice("predictor", PREDICTORS)
+        self.check_range(0.1, 1.99, "beta")
+        self.check_range(0, MAX_COMPONENTS, "components")
+        self.check_range(1, 100_000, "segment")
+
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> Bitstream:
+        """Code a sequence.
+
+        Raises:
+            InputError: a frame cannot be read, or lies too far from the origin for the quality asked for.
+        """
+        report = progress or (lambda stage, done: None)
+        report("read", 0)
+        points, spread = _survey(sequence, report)
+        report("mesh", 0)
+        coded = encode_mesh(sequence.faces, points, self.reorder)
+        mesh = decode_mesh(coded.mesh, coded.order)
+        _, first = np.unique(mesh.points, return_index=True)
+        members = coded.permutation[first]  # a given vertex of each of the codec's points
+        rows = ordered_rows(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor)
+        n_segments = min(-(-sequence.n_frames // self.segment), MAX_SEGMENTS)
+        bounds = segment_starts(sequence.n_frames, n_segments)
+        wanted = spread * 10 ** (1 - DECADES * self.quality / 100) / 100  # root mean square error of a vertex, model units
+        steps, sections = [], {"mesh": coded.mesh, "order": coded.order}
+        for s in range(n_segments):
+            report("segments", s / n_segments)
+            trajectories = _trajectories(sequence, bounds[s], bounds[s + 1], members)
+            n_points = len(trajectories)
+            error = wanted**2 * n_points * (bounds[s + 1] - bounds[s])
+            principal = find_principal(trajectories, error)
+            step = choose_step(principal, n_points, error)
+            steps.append(step)
+            kept = min(self.components, len(principal.energies)) or count_components(principal, n_points, step)
+            sections[f"basis.{s}"], basis = encode_basis(principal, kept, n_points, step)
+            coefficients = fit_coefficients(trajectories, basis)
+            if self.predictor == "lsp":
+                coefficients = np.ascontiguousarray(coefficients[:, ::-1])  # section 3.4: the small ones first
+            sections[f"coefficients.{s}"], _ = encode_rows(coefficients, step, rows, self.predictor, self.beta)
+        report("segments", 1)
+        header = Header(self.predictor, float(self.beta), n_segments, tuple(steps))
+        return Bitstream(
+            codec=self.id,
+            version=self.version,
+            n_frames=sequence.n_frames,
+            n_vertices=sequence.n_vertices,
+            n_triangles=len(mesh.faces),
+            fps=float(sequence.fps),
+            header=header.to_json(),
+            sections=sections,
+        )
+
+    @classmethod
+    def reader(cls, bitstream: Bitstream) -> FrameReader:
+        """Open a ``pca`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
+        return PcaReader(bitstream)
+
+
+def _survey(sequence: MeshSequence, report: Progress) -> tuple[NDArray[np.int64], float]:
+    """Points ``(V,)`` of vertices, equal where trajectories are, and the root mean square distance from the frames' centres."""
+    points = np.zeros(sequence.n_vertices, np.int64)
+    squared, largest = 0.0, 0.0
+    for first, block in sequence.chunks():
+        frames = block.astype(np.float64)
+        squared += float(((frames - frames.mean(axis=1, keepdims=True)) ** 2).sum())
+        largest = max(largest, float(np.abs(block).max()))
+        rows = np.ascontiguousarray((block + np.float32(0)).swapaxes(0, 1)).reshape(sequence.n_vertices, -1)  # no minus zero
+        _, ids = np.unique(rows.view(np.dtype((np.void, rows.shape[1] * 4))).ravel(), return_inverse=True)
+        _, points = np.unique(points * sequence.n_vertices + ids, return_inverse=True)
+        report("read", (first + len(block)) / sequence.n_frames)
+    _, first_vertex = np.unique(points, return_index=True)
+    points = np.argsort(np.argsort(first_vertex))[points]  # numbered as their first vertices are
+    spread = np.sqrt(squared / (sequence.n_frames * sequence.n_vertices))
+    return points.astype(np.int64), float(spread) or largest * 1e-3 or 1.0
+
+
+def _trajectories(sequence: MeshSequence, start: int, stop: int, members: NDArray[np.int64]) -> Float64:
+    """Trajectories of points: ``(P, 3n)``, n frames."""
+    result = np.empty((len(members), stop - start, 3))
+    for first, block in sequence.chunks(start, stop):
+        result[:, first - start : first - start + len(block)] = block[:, members].swapaxes(0, 1)
+    return result.reshape(len(members), -1)  # (P, n, 3) -> (P, 3n)

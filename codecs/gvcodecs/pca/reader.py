@@ -1,0 +1,142 @@
+"""From a ``pca`` bitstream back to frames, any of them, at any level of detail.
+
+The first frame of a segment costs its whole decoding; each after that one product of a small matrix with the coefficients.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.pca.format import Header, segment_starts
+from gvpipe.bare_mesh import decode_mesh
+from gvpipe.bitstream import Bitstream
+from gvpipe.errors import CorruptFile, InputError
+from gvpipe.hierarchy import Hierarchy, build_hierarchy, level_faces
+from gvpipe.mesh_rows import OVERSHOOT, mesh_rows
+from gvpipe.row_coding import decode_rows
+from gvpipe.row_prediction import Rows
+from gvpipe.sequence import Float32, Int32
+from gvpipe.trajectory_basis import Basis, decode_basis
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A decoded segment: its basis, and the coefficients ``(R, P)`` of the points that its level has, others 0."""
+
+    number: int
+    lod: int
+    basis: Basis
+    coefficients: Float64
+
+
+class PcaReader:
+    """Frames of a ``pca`` bitstream.
+
+    Level 0 is the mesh as it was given. Level k > 0 has the points (not the copies of seams) that are known when the k finest
+    blocks of the hierarchy are left out.
+
+    Raises:
+        CorruptFile: a section does not hold what it must.
+    """
+
+    def __init__(self, bitstream: Bitstream) -> None:
+        self._header = Header.of(bitstream)
+        mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"))
+        found = (len(mesh.points), len(mesh.faces))
+        if found != (bitstream.n_vertices, bitstream.n_triangles):
+            raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
+        self._mesh, self._bitstream = mesh, bitstream
+        self._hierarchy = build_hierarchy(mesh.point_faces, mesh.n_points)
+        self._rows = ordered_rows(self._hierarchy, self._header.predictor)
+        self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
+        self._segment: Segment | None = None
+
+    @property
+    def n_frames(self) -> int:
+        """F, the number of frames."""
+        return self._bitstream.n_frames
+
+    @property
+    def faces(self) -> Int32:
+        """``(T, 3) int32`` triangles of level 0."""
+        return self._mesh.faces
+
+    @property
+    def levels(self) -> list[int]:
+        """Vertex counts of the levels of detail, level 0 first."""
+        return [self._bitstream.n_vertices, *(int(n) for n in self._hierarchy.blocks[-2:0:-1])]
+
+    def level_faces(self, lod: int) -> Int32:
+        """Return the triangles ``(n, 3) int32`` of a level, in the order of the vertices that `read` returns for it."""
+        self._check_level(lod)
+        if lod == 0:
+            return self._mesh.faces
+        waves_left = int(self._hierarchy.waves[-1 - lod])
+        numbers = np.zeros(self._mesh.n_points, np.int32)
+        alive = self._alive(lod)
+        numbers[alive] = np.arange(len(alive))
+        return numbers[level_faces(self._mesh.point_faces, self._mesh.n_points, waves_left)]
+
+    def read(self, start: int, stop: int, lod: int = 0) -> Float32:
+        """Return frames ``start`` to ``stop`` of a level: ``(stop - start, V, 3) float32``, model units.
+
+        Raises:
+            CorruptFile: a segment does not decode.
+            InputError: there is no such level.
+        """
+        self._check_level(lod)
+        vertices = self._mesh.points if lod == 0 else self._alive(lod)
+        result = np.empty((stop - start, len(vertices), 3), np.float32)
+        buffer = np.empty((3, len(vertices)))
+        for s in range(self._header.segments):
+            first, last = max(start, self._bounds[s]), min(stop, self._bounds[s + 1])
+            if first >= last:
+                continue
+            segment = self._decode(s, lod)
+            for frame in range(first, last):  # one by one, so that a frame's sums do not depend on what else is read
+                rows = slice(3 * (frame - self._bounds[s]), 3 * (frame - self._bounds[s] + 1))
+                placed = segment.basis.vectors[rows] @ segment.coefficients + segment.basis.mean[rows, None]  # (3, P)
+                np.take(placed, vertices, axis=1, out=buffer)
+                result[frame - start] = buffer.T
+        return result
+
+    def _decode(self, s: int, lod: int) -> Segment:
+        if self._segment is None or (self._segment.number, self._segment.lod) != (s, lod):
+            step = self._header.steps[s]
+            n_frames = self._bounds[s + 1] - self._bounds[s]
+            name = f"basis.{s}"
+            basis = decode_basis(self._bitstream.section(name), n_frames, self._mesh.n_points, step, name)
+            name = f"coefficients.{s}"
+            n_blocks = len(self._rows.blocks) - 1 - lod if lod else None
+            coefficients = decode_rows(
+                self._bitstream.section(name),
+                basis.vectors.shape[1],
+                step,
+                self._rows,
+                name,
+                n_blocks,
+                self._header.predictor,
+                self._header.beta,
+            )
+            if self._header.predictor == "lsp":
+                coefficients = coefficients[:, ::-1]
+            self._segment = Segment(s, lod, basis, np.ascontiguousarray(coefficients.T))
+        return self._segment
+
+    def _alive(self, lod: int) -> NDArray[np.int32]:
+        """Points of a level, ascending."""
+        return np.sort(self._hierarchy.order[: self._hierarchy.blocks[-1 - lod]])
+
+    def _check_level(self, lod: int) -> None:
+        if not 0 <= lod < len(self.levels):
+            raise InputError(f"level {lod}: there are levels 0..{len(self.levels) - 1}")
+
+
+def ordered_rows(hierarchy: Hierarchy, predictor: str) -> Rows:
+    """The rows of a mesh's points, as encoder and decoder go through them."""
+    return mesh_rows(hierarchy, OVERSHOOT if predictor == "kalman" else 0.0)

@@ -1,0 +1,186 @@
+"""Range coding of integers that come in blocks, each coded in the light of the blocks before it.
+
+What: one range-coded stream and one set of frequency tables for a sequence of blocks; a block's contexts may depend on anything
+decoded before, so the reader asks block by block and may stop early.
+Why: `gvpipe.entropy` needs all contexts before the first value. Values are folded to tokens as there; a token's low bits go
+through the range coder too, right after their block, so that a prefix decodes without the rest::
+
+    stream = [varint] context count C, C tables, then 32-bit words to the end
+    table  = [varint] kind: 0 the context is empty; 1 two bytes follow, zero and ratio (`gvpipe.magnitude_tables`);
+             N + 1: N x [varint] frequency (0..4096); whichever is shorter with what it codes
+    block  = tokens, context after context, each context's in order; then low bits in order, at most 16 at a time
+
+All models are tables of integers (DESIGN 6).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe import magnitude_tables
+from gvpipe.binary import Cursor, varint
+from gvpipe.entropy import DIRECT, MAX_BITS, MAX_TOKENS, TABLE_TOTAL
+
+CHUNK = 16  # low bits coded at a time
+PARAMETRIC = 1  # kind of a table told by two numbers
+
+Int64 = NDArray[np.int64]
+
+
+class BlockEncoder:
+    """Collects blocks; tables are known, and bytes made, when all are there."""
+
+    def __init__(self, n_contexts: int) -> None:
+        self._n_contexts = n_contexts
+        self._blocks: list[tuple[list[tuple[int, Int64]], Int64, Int64]] = []
+        self._counts = np.zeros((n_contexts, MAX_TOKENS), np.int64)
+
+    def add(self, values: NDArray[np.integer], contexts: NDArray[np.integer]) -> None:
+        """Append a block of ``values (n,)``, magnitude below 2**39, in ``contexts (n,)``, 0..C-1."""
+        tokens, low, n_low = _tokenise(values.astype(np.int64))
+        groups = []
+        for context, where in _groups(contexts):
+            groups.append((context, tokens[where]))
+            self._counts[context] += np.bincount(tokens[where], minlength=MAX_TOKENS)
+        has_low = n_low > 0
+        self._blocks.append((groups, low[has_low], n_low[has_low]))
+
+    def finish(self) -> bytes:
+        """Return the stream of all blocks."""
+        import constriction
+
+        head, models = [varint(self._n_contexts)], []
+        for counts in self._counts:
+            described, table = _describe(counts)
+            head.append(described)
+            models.append(_model(table))
+        coder = constriction.stream.queue.RangeEncoder()
+        for groups, low, n_low in self._blocks:
+            for context, tokens in groups:
+                if models[context] is not None:
+                    coder.encode(tokens.astype(np.int32), models[context])
+            for shift in range(0, MAX_BITS, CHUNK):
+                more = n_low > shift
+                if not more.any():
+                    break
+                sizes = 1 << np.minimum(n_low[more] - shift, CHUNK)
+                pieces = (low[more] >> shift) & (sizes - 1)
+                coder.encode(pieces.astype(np.int32), constriction.stream.model.Uniform(), sizes.astype(np.int32))
+        return b"".join([*head, coder.get_compressed().astype("<u4").tobytes()])
+
+
+class BlockDecoder:
+    """Mirror of `BlockEncoder`.
+
+    Raises:
+        CorruptFile: the stream's tables are not what the encoder writes.
+    """
+
+    def __init__(self, data: bytes, n_contexts: int, name: str) -> None:
+        import constriction
+
+        self._cursor = Cursor(data, name)
+        if self._cursor.varint(n_contexts, "the context count") != n_contexts:
+            raise self._cursor.corrupt("its context count does not fit its content")
+        self._models, self._is_empty = [], []
+        for _ in range(n_contexts):
+            table = self._table()
+            self._models.append(_model(table))
+            self._is_empty.append(not len(table))
+        if self._cursor.left % 4:
+            raise self._cursor.corrupt("its words are not whole")
+        words = self._cursor.array("<u4", self._cursor.left // 4)
+        self._coder: Any = constriction.stream.queue.RangeDecoder(words.astype(np.uint32))
+
+    def take(self, contexts: NDArray[np.integer]) -> Int64:
+        """Return the next block's values, ``(n,)``, for its ``contexts (n,)``; raises `CorruptFile` if they do not decode."""
+        import constriction
+
+        tokens = np.zeros(len(contexts), np.int64)
+        try:
+            for context, where in _groups(contexts):
+                if self._is_empty[context]:
+                    raise self._cursor.corrupt("a context is used that has no table")
+                if self._models[context] is not None:
+                    tokens[where] = self._coder.decode(self._models[context], len(where))
+            n_low = np.where(tokens < DIRECT, 0, (tokens - DIRECT) // 2 + 3)
+            low = np.zeros(len(tokens), np.int64)
+            for shift in range(0, MAX_BITS, CHUNK):
+                more = np.flatnonzero(n_low > shift)
+                if not len(more):
+                    break
+                sizes = 1 << np.minimum(n_low[more] - shift, CHUNK)
+                pieces = self._coder.decode(constriction.stream.model.Uniform(), sizes.astype(np.int32))
+                low[more] |= pieces.astype(np.int64) << shift
+        except (ValueError, AssertionError, RuntimeError) as exc:
+            raise self._cursor.corrupt("its range-coded data do not decode") from exc
+        u = np.where(tokens < DIRECT, tokens, (2 + (tokens & 1)) << n_low) | low
+        return np.where(u & 1, -((u + 1) >> 1), u >> 1)
+
+    def _table(self) -> Int64:
+        """The next context's frequencies; none if it is empty."""
+        kind = self._cursor.varint(MAX_TOKENS + 1, "a table's kind")
+        if kind == PARAMETRIC:
+            zero, ratio = self._cursor.take(2)
+            if ratio >= len(magnitude_tables.RATIOS):
+                raise self._cursor.corrupt(f"a table has ratio {ratio}")
+            return magnitude_tables.table(zero, ratio)
+        frequencies = [self._cursor.varint(TABLE_TOTAL, "a frequency") for _ in range(kind - 1)]
+        if frequencies and not frequencies[-1]:
+            raise self._cursor.corrupt("a frequency table ends in zero")
+        return np.array(frequencies, np.int64)
+
+    def end(self) -> None:
+        """Check that no word is left."""
+        if not self._coder.maybe_exhausted():
+            raise self._cursor.corrupt("range-coded data are left over")
+
+
+def _describe(counts: Int64) -> tuple[bytes, Int64]:
+    """Choose a context's table for tokens of these counts; return its bytes and its frequencies."""
+    if not counts.any():
+        return varint(0), np.zeros(0, np.int64)
+    size = int(np.flatnonzero(counts)[-1]) + 1
+    counts = counts[:size]
+    frequencies = np.where(counts > 0, np.maximum(1, counts * TABLE_TOTAL // int(counts.sum())), 0)
+    described = varint(size + 1) + b"".join(varint(int(f)) for f in frequencies)
+    if size < 2 or size > magnitude_tables.N_TOKENS:
+        return described, frequencies
+    used = counts > 0
+    bits = -(counts[used] * np.log2(frequencies[used] / frequencies.sum())).sum() + 8 * len(described)
+    zero, ratio, bits_parametric = magnitude_tables.best(np.pad(counts, (0, magnitude_tables.N_TOKENS - size)))
+    if bits_parametric + 8 * 3 < bits:
+        return varint(PARAMETRIC) + bytes([zero, ratio]), magnitude_tables.table(zero, ratio)
+    return described, frequencies
+
+
+def _groups(contexts: NDArray[np.integer]) -> list[tuple[int, NDArray[np.intp]]]:
+    """Contexts that occur, ascending, and the positions of each one's values, in order."""
+    order = np.argsort(contexts, kind="stable")
+    ordered = contexts[order]
+    bounds = np.flatnonzero(np.diff(ordered)) + 1
+    return [(int(contexts[part[0]]), part) for part in np.split(order, bounds)] if len(order) else []
+
+
+def _model(table: Int64) -> Any:
+    """The model of an integer table; None where there is nothing to tell."""
+    import constriction
+
+    if len(table) < 2:
+        return None
+    # integer / integer is one correctly rounded operation: the same on every machine
+    return constriction.stream.model.Categorical(table.astype(np.float64) / float(table.sum()), perfect=False)
+
+
+def _tokenise(values: Int64) -> tuple[Int64, Int64, Int64]:
+    """Tokens, low bits and their number, as `gvpipe.entropy` has them."""
+    u = np.where(values >= 0, 2 * values, -2 * values - 1)
+    if u.size and int(u.max()) >= 1 << MAX_BITS:
+        raise ValueError(f"a value of {int(np.abs(values).max())} does not fit the entropy coder ({MAX_BITS - 1} bits)")
+    bits = np.frexp(u.astype(np.float64))[1].astype(np.int64)  # exact: u < 2**53
+    n_low = np.where(u < DIRECT, 0, bits - 2)
+    tokens = np.where(u < DIRECT, u, DIRECT + 2 * (bits - 5) + ((u >> n_low) & 1))
+    return tokens, u & ((1 << n_low) - 1), n_low

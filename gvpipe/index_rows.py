@@ -1,0 +1,55 @@
+"""Rows of integers: which are equal, which vertices they use, and rows as bytes.
+
+A table of n rows of three is stored as deflated byte planes of row differences; see `docs/format.md`, section 4.
+"""
+
+from __future__ import annotations
+
+import zlib
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gvpipe.errors import CorruptFile
+
+Ints = npt.NDArray[Any]
+
+
+def used_vertices(faces: Ints, n_vertices: int) -> Ints:
+    return np.flatnonzero(np.bincount(faces.ravel(), minlength=n_vertices))
+
+
+def encode_table(rows: Ints) -> bytes:
+    differences = np.diff(rows, axis=0, prepend=0).astype("<i4")
+    planes = differences.view(np.uint8).reshape(len(rows), 12).T
+    return zlib.compress(planes.tobytes(), 9) if len(rows) else b""
+
+
+def decode_table(data: bytes, n_rows: int) -> Ints:
+    inflate = zlib.decompressobj()
+    try:
+        planes = inflate.decompress(data, 12 * n_rows + 1) if n_rows else b""
+    except zlib.error as exc:
+        raise CorruptFile("section 'mesh' is corrupt: loose rows do not inflate") from exc
+    if len(planes) != 12 * n_rows or inflate.unused_data or (data and not inflate.eof):
+        raise CorruptFile(f"section 'mesh' is corrupt: {len(planes)} bytes of loose rows, expected {12 * n_rows}")
+    differences = np.frombuffer(planes, np.uint8).reshape(12, n_rows).T.copy().view("<i4")  # (n, 12) -> (n, 3)
+    return differences.astype(np.int64).cumsum(axis=0)
+
+
+def row_ids(rows: Ints) -> tuple[Ints, Ints]:
+    """A number for each row, equal where rows are, and the first row that has each number."""
+    order = np.lexsort(rows.T)
+    ordered = rows[order]
+    is_new = np.ones(len(rows), bool)
+    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    ids = np.empty(len(rows), np.int64)
+    ids[order] = np.cumsum(is_new) - 1
+    return ids, order[is_new]  # lexsort is stable: the first of equals has the smallest index
+
+
+def smallest_first(faces: Ints) -> Ints:
+    """Rotate each triangle so that its smallest index leads; winding stays."""
+    turns = faces.argmin(axis=1)[:, None] if len(faces) else np.zeros((0, 1), np.int64)
+    return np.take_along_axis(faces, (turns + np.arange(3)) % 3, axis=1)

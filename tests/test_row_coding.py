@@ -1,0 +1,113 @@
+"""Shared pieces under the pca codec: bare meshes, hierarchy, block coding, tables told by two numbers, rows in time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gvpipe import magnitude_tables
+from gvpipe.bare_mesh import decode_mesh, encode_mesh
+from gvpipe.blocks import BlockDecoder, BlockEncoder
+from gvpipe.errors import CorruptFile
+from gvpipe.frame_rows import frame_rows
+from gvpipe.hierarchy import build_hierarchy
+from gvpipe.row_coding import decode_rows, encode_rows
+
+
+def random_mesh(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles over vertices, of which some are copies of one point; the worse the higher the seed."""
+    rng = np.random.default_rng(seed)
+    n_vertices = int(rng.integers(1, 60))
+    faces = rng.integers(0, n_vertices, (int(rng.integers(0, 90)), 3)).astype(np.int32)
+    points = np.unique(rng.integers(0, max(1, n_vertices - seed % 5 * 7), n_vertices), return_inverse=True)[1]
+    return faces, points
+
+
+def canonical(faces: np.ndarray) -> list[list[int]]:
+    return sorted(min(f[i:] + f[:i] for i in range(3)) for f in faces.tolist())
+
+
+@pytest.mark.parametrize("reorder", [False, True])
+@pytest.mark.parametrize("seed", range(25))
+def test_any_mesh_comes_back(seed: int, reorder: bool) -> None:
+    faces, points = random_mesh(seed)
+    coded = encode_mesh(faces, points, reorder)
+    mesh = decode_mesh(coded.mesh, coded.order)
+    assert canonical(coded.permutation[mesh.faces]) == canonical(faces)
+    assert np.array_equal(mesh.points[mesh.faces], mesh.point_faces)
+    pairs = np.unique(np.c_[points[coded.permutation], mesh.points], axis=0)
+    assert len(pairs) == mesh.n_points == points.max() + 1  # the same vertices are copies of one point
+    if not reorder:
+        assert np.array_equal(coded.permutation, np.arange(len(points)))
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_hierarchy_orders_every_vertex_after_what_predicts_it(seed: int) -> None:
+    faces, _ = random_mesh(seed)
+    n_vertices = 60
+    hierarchy = build_hierarchy(faces, n_vertices)
+    assert np.array_equal(np.sort(hierarchy.order), np.arange(n_vertices))
+    rank = np.argsort(hierarchy.order)
+    owner = np.repeat(np.arange(n_vertices), np.diff(hierarchy.starts))
+    assert (rank[hierarchy.near] < owner).all()
+    assert hierarchy.blocks[0] == 0 and hierarchy.blocks[-1] == n_vertices and (np.diff(hierarchy.blocks) > 0).all()
+
+
+def test_blocks_decode_one_by_one_and_any_prefix_of_them() -> None:
+    rng = np.random.default_rng(0)
+    scales = 10.0 ** rng.integers(-1, 7, 4)
+    blocks = [
+        (np.rint(rng.laplace(0, scale, n)).astype(int), rng.integers(0, 5, n))
+        for scale, n in zip(scales, (0, 1, 9, 800), strict=True)
+    ]
+    coder = BlockEncoder(6)
+    for values, contexts in blocks:
+        coder.add(values, contexts)
+    data = coder.finish()
+    for n_blocks in range(len(blocks) + 1):
+        decoder = BlockDecoder(data, 6, "x")
+        for values, contexts in blocks[:n_blocks]:
+            assert np.array_equal(decoder.take(contexts), values)
+    decoder.end()
+    with pytest.raises(CorruptFile):
+        BlockDecoder(data, 7, "x")
+    with pytest.raises(CorruptFile):
+        BlockDecoder(data[:-1], 6, "x")
+
+
+@pytest.mark.parametrize("mean", [0.15, 0.3, 1.0, 7.0, 60.0])
+def test_tables_told_by_two_numbers_fit_laplacian_residuals(mean: float) -> None:
+    values = np.rint(np.random.default_rng(1).laplace(0, mean, 20000)).astype(int)
+    magnitudes = np.bincount(np.where(values >= 0, 2 * values, -2 * values - 1))[:16]
+    counts = np.pad(magnitudes, (0, magnitude_tables.N_TOKENS - len(magnitudes)))
+    zero, ratio, bits = magnitude_tables.best(counts)
+    shares = counts[counts > 0] / counts.sum()
+    entropy = -(counts.sum() * shares * np.log2(shares)).sum()
+    if mean < 2:  # above, the counts cut at token 16 are not a Laplacian
+        assert bits < 1.03 * entropy + 100
+    table = magnitude_tables.table(zero, ratio)
+    assert (table > 0).all() and abs(table.sum() - magnitude_tables.TOTAL) < 0.01 * magnitude_tables.TOTAL
+
+
+@pytest.mark.parametrize("n_frames", [1, 2, 3, 4, 7, 16, 17, 100])
+def test_frame_rows_hold_every_row_after_what_predicts_it(n_frames: int) -> None:
+    rows = frame_rows(n_frames)
+    assert np.array_equal(np.sort(rows.order), np.arange(3 * n_frames))
+    rank, owner = np.argsort(rows.order), np.repeat(np.arange(3 * n_frames), np.diff(rows.starts))
+    assert (rank[rows.near] < owner).all() and (rows.near % 3 == rows.order[owner] % 3).all()
+    assert rows.blocks[-1] == 3 * n_frames
+
+
+def test_rows_come_back_within_a_step_and_a_prefix_of_blocks_alone() -> None:
+    rng = np.random.default_rng(2)
+    time = np.arange(50)[:, None]
+    target = np.repeat(np.sin(time / rng.uniform(3, 20, 12)) * 40 * 0.7 ** np.arange(12), 3, axis=0)
+    target *= np.tile([1, -2, 0.5], 50)[:, None]
+    rows = frame_rows(50)
+    data, decoded = encode_rows(target, 0.01, rows)
+    assert np.abs(target - decoded).max() < 0.0059  # ROUND_UP lets 0.58 of a step pass
+    assert np.allclose(decode_rows(data, 12, 0.01, rows, "x"), decoded, atol=1e-9)
+    part = decode_rows(data, 12, 0.01, rows, "x", n_blocks=1)
+    known = rows.order[: rows.blocks[1]]
+    assert np.allclose(part[known], decoded[known], atol=1e-9)
+    assert 8 * len(data) < 0.6 * target.size * np.log2(np.abs(target).mean() / 0.01)
