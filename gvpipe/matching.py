@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from gvpipe.sequence import Int32, MeshSequence
 
-FRAMES = 8  # evenly spaced frames whose positions make a vertex' path
+FRAMES = 24  # evenly spaced frames whose positions make a vertex' path
 ROUNDS = 50
 OWN_VOTE = 0.5  # of the present place, against one per triangle
 
