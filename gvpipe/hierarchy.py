@@ -54,7 +54,7 @@ class Hierarchy:
 
 def build_hierarchy(faces: Int32, n_vertices: int) -> Hierarchy:
     """Take the mesh ``faces (T, 3)`` apart."""
-    from gvpipe.decimation import walk_coarse
+    from gvpipe.coarse_walk import walk_coarse
 
     removed, bounds, starts, near, rings, left = _run(faces, n_vertices, MAX_WAVES)
     n_removed = len(removed)

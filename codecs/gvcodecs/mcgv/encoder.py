@@ -31,6 +31,7 @@ from gvpipe.codec import FrameReader, Progress, Settings
 from gvpipe.connectivity import decode_base, encode_base
 from gvpipe.errors import SettingError
 from gvpipe.quantize import Lattice
+from gvpipe.segments import count_segments, segment_starts
 from gvpipe.sequence import Int32, MeshSequence
 from gvpipe.topology import weld
 from gvpipe.video import PROFILES, Plane, Profile, VideoWriter
@@ -101,8 +102,8 @@ class Mcgv(Settings):
         report("transforms", 0)
         predictor = AffinePredictor(base, clusters, int(clusters.max()) + 1)
         transform_step = extent / 2**self.transform_bits
-        n_segments = -(-sequence.n_frames // self.segment)
-        bounds = sections.segment_starts(sequence.n_frames, n_segments)
+        n_segments = count_segments(sequence.n_frames, self.segment)
+        bounds = segment_starts(sequence.n_frames, n_segments)
         transforms, largest = [], 0.0
         for s in range(n_segments):
             fitted = np.concatenate([predictor.fit(block) for _, block in sequence.chunks(bounds[s], bounds[s + 1])])

@@ -97,11 +97,6 @@ class Header:
         return header
 
 
-def segment_starts(n_frames: int, segments: int) -> list[int]:
-    """First frame of every segment, and F at the end: even cuts."""
-    return [s * n_frames // segments for s in range(segments + 1)]
-
-
 def encode_pixels(layout: Layout, order: Int64) -> bytes:
     """Return the section ``pixels``; ``order (V,)`` are the vertices in the codec's order."""
     y, x = np.divmod(layout.pixel[order], layout.width)

@@ -17,6 +17,7 @@ from gvcodecs.mcgv.transforms import decode_transforms, dequantise
 from gvpipe.bitstream import Bitstream
 from gvpipe.connectivity import decode_base
 from gvpipe.errors import CorruptFile
+from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
 from gvpipe.video import VideoReader
 
@@ -49,7 +50,7 @@ class McgvReader:
 
     def __init__(self, bitstream: Bitstream) -> None:
         self._header, self._bitstream = sections.Header.of(bitstream), bitstream
-        self._bounds = sections.segment_starts(bitstream.n_frames, self._header.segments)
+        self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
         self._video = VideoReader(bitstream.video, self._header.profile, self._header.width, 3 * self._header.height)
         if self._video.n_frames != bitstream.n_frames:
             raise CorruptFile(f"the video has {self._video.n_frames} frames, the header says {bitstream.n_frames}")

@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gvcodecs.pca.format import MAX_SEGMENTS, Header, segment_starts
+from gvcodecs.pca.format import MAX_SEGMENTS, Header
 from gvcodecs.pca.reader import PcaReader, ordered_rows
 from gvpipe.bare_mesh import decode_mesh, encode_mesh
 from gvpipe.bitstream import Bitstream
@@ -25,6 +25,7 @@ from gvpipe.codec import FrameReader, Progress, Settings
 from gvpipe.hierarchy import build_hierarchy
 from gvpipe.row_coding import encode_rows
 from gvpipe.row_prediction import PREDICTORS
+from gvpipe.segments import count_segments, segment_starts
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory_basis import (
     MAX_COMPONENTS,
@@ -83,7 +84,7 @@ class Pca(Settings):
         _, first = np.unique(mesh.points, return_index=True)
         members = coded.permutation[first]  # a given vertex of each of the codec's points
         rows = ordered_rows(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor)
-        n_segments = min(-(-sequence.n_frames // self.segment), MAX_SEGMENTS)
+        n_segments = min(count_segments(sequence.n_frames, self.segment), MAX_SEGMENTS)
         bounds = segment_starts(sequence.n_frames, n_segments)
         wanted = spread * 10 ** (1 - DECADES * self.quality / 100) / 100  # root mean square error of a vertex, model units
         steps, sections = [], {"mesh": coded.mesh, "order": coded.order}

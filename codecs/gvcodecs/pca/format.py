@@ -55,8 +55,3 @@ class Header:
         ):
             raise CorruptFile(f"header: steps are {steps!r}; {segments} positive numbers are needed")
         return cls(predictor, bitstream.number("beta", 0.1, 1.99), segments, tuple(steps))
-
-
-def segment_starts(n_frames: int, segments: int) -> list[int]:
-    """First frame of every segment, and F at the end: even cuts."""
-    return [s * n_frames // segments for s in range(segments + 1)]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gvcodecs.pca.format import Header, segment_starts
+from gvcodecs.pca.format import Header
 from gvpipe.bare_mesh import decode_mesh
 from gvpipe.bitstream import Bitstream
 from gvpipe.errors import CorruptFile, InputError
@@ -18,6 +18,7 @@ from gvpipe.hierarchy import Hierarchy, build_hierarchy, level_faces
 from gvpipe.mesh_rows import OVERSHOOT, mesh_rows
 from gvpipe.row_coding import decode_rows
 from gvpipe.row_prediction import Rows
+from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
 from gvpipe.trajectory_basis import Basis, decode_basis
 
