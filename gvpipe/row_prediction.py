@@ -11,8 +11,7 @@ Predictors, after Vasa and Skala, "Geometry-Driven Local Neighbourhood Based Pre
 ``rbf``     interpolation by radial functions r**beta with a constant and its side condition (section 3.5), distances growing
             with every component; ``lsp`` in the coarse mesh.
 ``kalman``  the section's idea as Bayes has it, and the default: weights have a prior mean (``navg``'s) and covariance, which
-each
-            decoded component updates, at the price of one matrix-vector product. It never degenerates, so that it can use
+            each decoded component updates, at the price of one matrix-vector product. It never degenerates, so that it can use
             many more known rows than the ring, and it sends large components first without harm.
 
 One body predicts in encoder and decoder, so that the two cannot differ but by rounding; rounding moves a value by as little and
