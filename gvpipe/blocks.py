@@ -10,7 +10,7 @@ through the range coder too, right after their block, so that a prefix decodes w
              N + 1: N x [varint] frequency (0..4096); whichever is shorter with what it codes
     block  = tokens, context after context, each context's in order; then low bits in order, at most 16 at a time
 
-All models are tables of integers (DESIGN 6).
+All models are tables of integers.
 """
 
 from __future__ import annotations
