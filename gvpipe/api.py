@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from gvpipe.codec import Codec, Progress, codec_class
 from gvpipe.container import bytes_by_part, write_file
 from gvpipe.errors import InputError, OutputError
@@ -176,7 +178,7 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0)
     player = Player(path)
     start, stop = frame_range(player, start, stop)
     level = player.level(lod)
-    return MeshSequence(level.read(start, stop), level.faces, player.fps, name=player.path)
+    return MeshSequence(np.asarray(level.positions[start:stop]), level.faces, player.fps, name=player.path)
 
 
 def open(path: StrPath) -> Player:

@@ -370,7 +370,7 @@ def test_quality_is_monotone(name: str, largest: float) -> None:
         else:
             assert 1 <= chosen.level <= (63 if profile.depth == 10 else 51)
             effective.append(chosen.step * QP_STEP * 2 ** (chosen.level / 6))
-            wanted = 2.0 * 0.06 * 10 ** -(decades * quality / 100)
+            wanted = 2.0 * 0.08 * 10 ** -(decades * quality / 100)
             finest = largest / profile.amplitude * QP_STEP * 2 ** (1 / 6)
             assert effective[-1] == pytest.approx(max(wanted, finest), rel=1e-9)
     assert np.all(np.diff(effective) <= np.array(effective[1:]) * 1e-9)

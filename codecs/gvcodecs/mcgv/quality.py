@@ -3,7 +3,7 @@
 Quality fixes the *effective step* that a transform coefficient of a residual sees, as a part of the base frame's bounding-box
 diagonal, so that equal quality means about equal error whatever the residuals' range::
 
-    effective step = diagonal * 0.06 * 10 ** -(decades * quality / 100)
+    effective step = diagonal * 0.08 * 10 ** -(decades * quality / 100)
 
 The image coder's quantiser gives the coarse part of it, in whole steps; the residual step, model units per level, gives the
 rest. It is never finer than the levels allow, which is where quality stops helping.
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from gvpipe.video import QP_RANGE, Profile
 
-COARSEST = 0.06  # effective step at quality 0, part of the diagonal: beyond, the prediction alone is as good
+COARSEST = 0.08  # effective step at quality 0, part of the diagonal: beyond, the prediction alone is as good
 DECADES = {"h264-8": 2.1, "h264-10": 2.7, "jpeg": 2.1}  # from quality 0 to 100: down to where each profile's levels end
 QP_STEP = 0.625  # H.264's quantiser step at QP 0, levels of an orthonormal transform; it doubles every 6 QP
 JPEG_TABLE = 20.0  # levels at quality 50: about where JPEG's luma table costs the error of a flat step

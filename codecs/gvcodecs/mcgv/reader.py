@@ -89,18 +89,18 @@ class McgvReader:
             CorruptFile: a section or the video does not decode.
         """
         groups = self._video.read(start, stop)
-        surface, step = self._surface, self._header.residual_step
+        surface, step = self._surface, np.float32(self._header.residual_step)
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
         for group, planes in groups:
             for offset in range(0, len(planes), BATCH):
                 first = group + offset
                 batch = planes[offset : offset + BATCH]
                 transforms = self._transforms(first, first + len(batch)).copy()
-                transforms[:, :, 3] -= step * self._header.profile.middle  # once per cluster instead of once per vertex
+                transforms[:, :, 3] -= float(step) * self._header.profile.middle  # once per cluster instead of once per vertex
                 moved = surface.predictor.predict_planes(transforms)
                 for i, plane in enumerate(batch):
-                    moved[i] += (plane.ravel().take(surface.samples) * step).reshape(3, -1)
-                    planar = moved[i].astype(np.float32)  # (3, V)
+                    planar = moved[i].astype(np.float32).ravel()  # (3 V,)
+                    planar += plane.ravel().take(surface.samples) * step
                     planar.take(surface.corners, out=result[first + i - start], mode="clip")  # every index is in range
         return result
 
