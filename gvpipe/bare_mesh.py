@@ -89,11 +89,11 @@ def encode_mesh(faces: Int32, points: Ints, reorder: bool) -> EncodedMesh:
     return EncodedMesh(mesh, order, np.arange(len(points)))
 
 
-def decode_mesh(mesh: bytes, order: bytes) -> BareMesh:
-    """Mirror of `encode_mesh`. Raises CorruptFile for anything malformed."""
+def decode_mesh(mesh: bytes, order: bytes, n_vertices: int) -> BareMesh:
+    """Mirror of `encode_mesh`, for a mesh of at most ``n_vertices``. Raises CorruptFile for anything malformed."""
     cursor = Cursor(mesh, "mesh")
     bytes_draco, bytes_merges, bytes_loose, bytes_counts, n_loose, n_points = cursor.struct(HEADER)
-    if n_points > min(MAX_VERTICES, MAX_PER_BYTE * len(mesh)) or n_loose > MAX_PER_BYTE * len(mesh):
+    if n_points > min(MAX_VERTICES, n_vertices) or n_loose > MAX_PER_BYTE * len(mesh):
         raise cursor.corrupt(f"{n_points} points and {n_loose} loose triangles in {len(mesh)} bytes")
     draco, merges, loose = cursor.take(bytes_draco), cursor.take(bytes_merges), cursor.take(bytes_loose)
     point_faces = _point_faces(draco, merges, loose, n_loose)
@@ -164,8 +164,10 @@ def _point_faces(draco: bytes, merges: bytes, loose: bytes, n_loose: int) -> Int
         cursor = Cursor(merges, "mesh")
         n_merges = cursor.varint(n_vertices, "the number of merges")
         gaps, back = decode_integers(cursor.rest(), 2 * n_merges, name="mesh").reshape(2, -1)
+        if not n_merges or ((gaps < 0) | (gaps >= n_vertices)).any():
+            raise CorruptFile("section 'mesh' is corrupt: a merge names a vertex that does not exist")
         again = np.cumsum(gaps + 1) - 1
-        if (gaps < 0).any() or (back <= 0).any() or again[-1] >= n_vertices or (back > again).any():
+        if (back <= 0).any() or again[-1] >= n_vertices or (back > again).any():
             raise CorruptFile("section 'mesh' is corrupt: a merge names a vertex that does not exist")
         stands_for[again] = again - back
         is_new = np.ones(n_vertices, bool)

@@ -111,11 +111,12 @@ def decimate(
             n_far = size
             for j in range(min(size if closed else size - 1, MAX_NEAR - size)):  # across the ring's sides
                 a, b = ring[j], ring[(j + 1) % size]
-                c = head[a]
+                from_b = degree[b] < degree[a]  # the shorter list: a hub's would make this quadratic
+                c = head[b] if from_b else head[a]
                 while c >= 0:
                     t, k = c // 3, c % 3
-                    if tri[t, (k + 2) % 3] == b:
-                        far = tri[t, (k + 1) % 3]
+                    if tri[t, (k + 1) % 3] == a if from_b else tri[t, (k + 2) % 3] == b:
+                        far = tri[t, (k + 2) % 3] if from_b else tri[t, (k + 1) % 3]
                         known = False
                         for m in range(n_far):
                             if near[end + m] == far:

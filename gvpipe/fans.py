@@ -80,12 +80,19 @@ def find_ring(v: int, tri: Ints, head: Ints, after: Ints, ring: Ints, sides: Int
         return (size, True) if at == ring[0] else (0, False)
     if size == ring.shape[0]:
         return 0, False
+    for j in range(size):
+        if ring[j] == at:  # a point twice in the ring
+            return 0, False
     ring[size] = at
     return size + 1, False
 
 
 @compiled
-def has_edge(a: int, b: int, tri: Ints, head: Ints, after: Ints) -> bool:
+def has_edge(a: int, b: int, tri: Ints, head: Ints, after: Ints, degree: Ints) -> bool:
+    if min(degree[a], degree[b]) > 256:
+        return True
+    if degree[b] < degree[a]:
+        a, b = b, a
     c = head[a]
     while c >= 0:
         t, k = c // 3, c % 3
@@ -113,7 +120,7 @@ def fill_hole(
 
     Returns the number of new triangles in ``new``, -1 if there is no way, and the cost.
     """
-    if not closed and n >= 3 and has_edge(ring[0], ring[n - 1], tri, head, after):
+    if not closed and n >= 3 and has_edge(ring[0], ring[n - 1], tri, head, after, degree):
         return -1, 0
     cost = 0
     for i in range(n):
@@ -130,7 +137,7 @@ def fill_hole(
             rise = 2 * gain[a] + 2 * gain[c] - 2 * gain[b]
             if best >= 0 and rise >= best_cost:
                 continue
-            if has_edge(ring[a], ring[c], tri, head, after):
+            if has_edge(ring[a], ring[c], tri, head, after, degree):
                 continue
             best, best_cost = i, rise
         if best < 0:

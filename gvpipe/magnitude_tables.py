@@ -77,5 +77,7 @@ def _tail(ratio: int, twice: int) -> int:
 
 
 def _power(ratio: int, exponent: int) -> int:
+    if exponent * ((1 << RATIO_BITS) - ratio) >= 14 << RATIO_BITS:
+        return 0  # (1 - x)**e <= exp(-e x) <= exp(-14) < 2**-20
     power: int = ratio**exponent
     return (power * TOTAL) >> (RATIO_BITS * exponent)

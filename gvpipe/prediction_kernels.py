@@ -14,7 +14,7 @@ LSP, RBF, KALMAN = 1, 2, 3  # places in PREDICTORS
 ROUND_UP = 0.42  # added before a residual's magnitude is cut to whole steps: 0.5 would cost 1.5 % more at equal error
 DOUBT = 1e-4  # of kalman: part of a weight's variance that a component leaves at least, so that rounding cannot grow
 RIDGE, COARSE_RIDGE = 4.0, 64.0  # of lsp, in squared steps: draws weights that are left open to the prior ones
-NUGGET = 4  # of rbf, in units of step**beta: what quantisation adds to the radial function between two rows
+NUGGET = 16  # of rbf, in units of step**beta: what quantisation adds to the radial function between two rows
 EVERY = 4  # rbf's weights are solved for each of the first components, then for every fourth: distances hardly change
 FIRST = 12
 

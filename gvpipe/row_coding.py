@@ -38,6 +38,7 @@ LOWEST, HIGHEST = -10, 16  # contexts, half octaves above magnitude one
 N_CONTEXTS = HIGHEST - LOWEST + 1
 N_NEAR = 6  # rows near that count
 LARGEST = 1 << 36  # magnitude of a residual, in steps; sums of its forecasts stay below 2**58
+MAX_VALUES = 1 << 27  # of a section: rows times components
 
 Int64 = NDArray[np.int64]
 Float64 = NDArray[np.float64]
@@ -87,6 +88,8 @@ def decode_rows(
         CorruptFile: the bytes are not what the encoder writes.
     """
     cursor = Cursor(data, name)
+    if len(rows.order) * n_components > MAX_VALUES:  # zeros may cost no bits: believe no counts beyond this
+        raise cursor.corrupt(f"{len(rows.order)} rows of {n_components} components")
     head = cursor.take(cursor.varint(cursor.left, "a length"))
     levels = np.cumsum(decode_integers(head, n_components, name=name))
     if ((levels < 0) | (levels > MAX_LEVEL)).any():

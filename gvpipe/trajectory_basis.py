@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from gvpipe.binary import Cursor, varint
 from gvpipe.entropy import decode_integers, encode_integers
 from gvpipe.frame_rows import frame_rows
-from gvpipe.row_coding import decode_rows, encode_rows
+from gvpipe.row_coding import MAX_VALUES, decode_rows, encode_rows
 
 THRESHOLD = 0.2
 NEGLIGIBLE = 0.01  # part of the error that all components left out may add
@@ -90,7 +90,8 @@ def find_principal(trajectories: Float64, error: float) -> Principal:
 def count_components(principal: Principal, n_points: int, step: float) -> int:
     """How many components are worth coding at this step, for V points."""
     n_rows = len(principal.mean)
-    return int((principal.energies > THRESHOLD * (n_points + n_rows) * step * step).sum())
+    worth = int((principal.energies > THRESHOLD * (n_points + n_rows) * step * step).sum())
+    return min(worth, MAX_COMPONENTS, MAX_VALUES // max(n_points, n_rows) - 1)
 
 
 def expected_error(principal: Principal, n_points: int, step: float) -> float:
@@ -102,7 +103,7 @@ def expected_error(principal: Principal, n_points: int, step: float) -> float:
 
 def choose_step(principal: Principal, n_points: int, error: float) -> float:
     """Return the step, model units, that leaves about the squared ``error``; by bisection in whole 1/64 octaves."""
-    low, high = -64 * 100, 64 * 100
+    low, high = -64 * 130, 64 * 128  # float32 positions reach 2**128
     while high - low > 1:
         middle = (low + high) // 2
         if expected_error(principal, n_points, 2.0 ** (middle / 64)) > error:
@@ -132,6 +133,8 @@ def decode_basis(data: bytes, n_frames: int, n_points: int, step: float, name: s
     levels = np.cumsum(decode_integers(head, n_components, name=name))
     if (np.abs(levels) > MAX_SCALE).any():
         raise cursor.corrupt("a scale is out of range")
+    if 3 * n_frames * (n_components + 1) > MAX_VALUES:
+        raise cursor.corrupt(f"{n_components} components over {n_frames} frames")
     coarse_step = _basis_step(step, (3 * n_frames, n_components + 1))
     decoded = decode_rows(cursor.rest(), n_components + 1, coarse_step, frame_rows(n_frames), name)
     decoded /= _scales(levels, n_points, step)

@@ -253,3 +253,33 @@ def test_damage_is_noticed_or_harmless() -> None:
 
 def _with(bitstream: Bitstream, name: str, data: bytes) -> Bitstream:
     return dataclasses.replace(bitstream, sections={**bitstream.sections, name: data})
+
+
+def test_levels_of_non_manifold_meshes_hold_no_degenerate_triangle() -> None:
+    from gvpipe.hierarchy import build_hierarchy, level_faces
+
+    rng = np.random.default_rng(11)
+    for _ in range(150):
+        n_points = int(rng.integers(18, 40))
+        faces = rng.integers(0, n_points, (int(rng.integers(10, 90)), 3)).astype(np.int32)
+        faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+        hierarchy = build_hierarchy(faces, n_points)
+        for waves in range(len(hierarchy.waves)):
+            left = level_faces(faces, n_points, waves)
+            assert (left != np.roll(left, 1, axis=1)).all()
+
+
+def test_a_cloud_of_points_round_trips() -> None:
+    points = np.random.default_rng(2).random((4000, 3))
+    sequence = make(points, np.zeros((0, 3), np.int32), 3)
+    assert kg(np.asarray(sequence.positions), decode(Pca().encode(sequence))) < 0.2
+
+
+def test_counts_beyond_reason_are_refused_before_allocation() -> None:
+    bitstream = Pca().encode(make(*grid(5)))
+    huge = dataclasses.replace(bitstream, n_frames=1 << 24, header={**bitstream.header})
+    with pytest.raises(FormatError):
+        PcaReader(huge).read(0, 1)
+    hostile = b"\xff\x7f" + bitstream.sections["basis.0"][1:]
+    with pytest.raises(FormatError):
+        PcaReader(dataclasses.replace(bitstream, sections={**bitstream.sections, "basis.0": hostile})).read(0, 1)

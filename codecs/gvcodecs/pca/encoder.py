@@ -80,13 +80,15 @@ class Pca(Settings):
         points, spread = _survey(sequence, report)
         report("mesh", 0)
         coded = encode_mesh(sequence.faces, points, self.reorder)
-        mesh = decode_mesh(coded.mesh, coded.order)
+        mesh = decode_mesh(coded.mesh, coded.order, sequence.n_vertices)
         _, first = np.unique(mesh.points, return_index=True)
         members = coded.permutation[first]  # a given vertex of each of the codec's points
         rows = ordered_rows(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor)
         n_segments = min(count_segments(sequence.n_frames, self.segment), MAX_SEGMENTS)
         bounds = segment_starts(sequence.n_frames, n_segments)
-        wanted = spread * 10 ** (1 - DECADES * self.quality / 100) / 100  # root mean square error of a vertex, model units
+        wanted = (
+            spread * COARSEST * 10 ** -(DECADES * self.quality / 100) / 100
+        )  # root mean square error of a vertex, model units
         steps, sections = [], {"mesh": coded.mesh, "order": coded.order}
         for s in range(n_segments):
             report("segments", s / n_segments)

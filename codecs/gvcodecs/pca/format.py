@@ -15,9 +15,11 @@ from typing import Any
 from gvpipe.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
 from gvpipe.row_prediction import PREDICTORS
+from gvpipe.segments import count_longest
 
 MAX_SEGMENTS = 2000  # two sections each, of the 4096 that a bitstream may have
-LARGE = 1e30  # no step of a float32 model lies beyond
+SMALL, LARGE = 2.0**-131, 2.0**129  # no step of a float32 model lies beyond
+MAX_SEGMENT = 100_000  # frames
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,11 @@ class Header:
         if not (
             isinstance(steps, list)
             and len(steps) == segments
-            and all(isinstance(step, float) and 1e-40 < step < LARGE for step in steps)
+            and all(type(step) in (int, float) and SMALL < step < LARGE for step in steps)
         ):
-            raise CorruptFile(f"header: steps are {steps!r}; {segments} positive numbers are needed")
-        return cls(predictor, bitstream.number("beta", 0.1, 1.99), segments, tuple(steps))
+            raise CorruptFile(f"header: steps are not {segments} positive numbers; get the file again from its source")
+        if count_longest(bitstream.n_frames, segments) > MAX_SEGMENT:
+            raise CorruptFile(
+                f"header: {bitstream.n_frames} frames in {segments} segments; at most {MAX_SEGMENT} each are allowed"
+            )
+        return cls(predictor, float(bitstream.number("beta", 0.1, 1.99)), segments, tuple(map(float, steps)))

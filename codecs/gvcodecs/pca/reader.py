@@ -22,6 +22,8 @@ from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
 from gvpipe.trajectory_basis import Basis, decode_basis
 
+MAX_FLOAT32 = float(np.finfo(np.float32).max)
+
 Float64 = NDArray[np.float64]
 
 
@@ -47,7 +49,7 @@ class PcaReader:
 
     def __init__(self, bitstream: Bitstream) -> None:
         self._header = Header.of(bitstream)
-        mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"))
+        mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"), bitstream.n_vertices)
         found = (len(mesh.points), len(mesh.faces))
         if found != (bitstream.n_vertices, bitstream.n_triangles):
             raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
@@ -103,6 +105,8 @@ class PcaReader:
                 rows = slice(3 * (frame - self._bounds[s]), 3 * (frame - self._bounds[s] + 1))
                 placed = segment.basis.vectors[rows] @ segment.coefficients + segment.basis.mean[rows, None]  # (3, P)
                 np.take(placed, vertices, axis=1, out=buffer)
+                if not np.abs(buffer).max(initial=0) <= MAX_FLOAT32:
+                    raise CorruptFile(f"frame {frame} does not decode to finite positions; get the file again from its source")
                 result[frame - start] = buffer.T
         return result
 
