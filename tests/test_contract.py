@@ -20,12 +20,13 @@ from gvpipe.metrics import compare
 from gvpipe.sequence import MeshSequence
 
 # the largest rmse, as a part of frame 0's diagonal, at the default quality: each codec's own statement
-BOUNDS = {"mcgv": 2e-3, "pca": 1e-3}
+BOUNDS = {"mcgv": 2e-3, "pca": 1e-3, "pdct": 1e-3}
 AWKWARD = awkward()
 
 SETTINGS: dict[str, list[dict[str, object]]] = {
     "mcgv": [{}, {"image": "jpeg"}, {"profile": "precise"}],
     "pca": [{}, {"predictor": "rbf"}, {"predictor": "lsp"}, {"predictor": "navg"}],
+    "pdct": [{}, {"clusters": 3, "fineness": 2.0}],
 }
 VARIANTS = [
     pytest.param(codec, settings, id=" ".join([codec, *(f"{k}={v}" for k, v in settings.items())]))

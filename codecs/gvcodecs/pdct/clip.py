@@ -1,0 +1,215 @@
+"""A clip: consecutive frames coded from the shared base frame alone, in closed loop.
+
+Amjoun and Strasser 2008, sections 4.3 to 4.7. In its cluster's local coordinate frame a vertex hardly moves from frame to
+frame; what moves is the delta vectors, and each cluster's, axis by axis, are one signal over the cluster's vertices,
+transformed by an orthonormal DCT and quantised.
+
+The loop runs on integers. The DCT is linear, so the sum of all deltas is kept as decoded coefficients, S, in
+sixteenths of a step, and a frame is ``base + step / 16 * (B S_affine + inverse DCT of S)`` in the local frame: no rounding can
+grow from frame to frame, and no decision hangs on one. Departures from the paper:
+
+- every clip, the first too, starts from the base frame, whose difference to the clip's first frame is coded like any other;
+- a delta is predicted as the part ``w`` (sixteenths) of the delta before. Each group of coefficients (cluster, octave) learns
+  its w by least squares from decoded deltas: near 0 in noise, near 1 in smooth motion (`Momentum`);
+- before the DCT, four functions per cluster (1 and the three base coordinates) take the affine part of the motion, which a walk
+  over the vertices turns into high frequencies (`Dictionary`).
+
+A clip's bytes::
+
+    clip = [6 x float64] seed lattice (origin, step), step, fineness; [varint] K; three blocks and the deltas, each block
+           [varint] length, data: seed triangles [integers], clusters (`labels`), seed vertices (`seed_coding`); `delta_coding`
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.pdct.clustering import cluster, find_seeds, sample_frames
+from gvcodecs.pdct.delta_coding import DeltaDecoder, DeltaEncoder, tokenise
+from gvcodecs.pdct.dictionary import UNIT, Dictionary, Surface, place
+from gvcodecs.pdct.labels import decode_labels, encode_labels
+from gvcodecs.pdct.local_frames import local_frames
+from gvcodecs.pdct.momentum import Momentum
+from gvcodecs.pdct.seed_coding import decode_seeds, encode_seeds
+from gvpipe.binary import Cursor, varint
+from gvpipe.entropy import decode_integers, encode_integers
+from gvpipe.quantize import Lattice
+from gvpipe.sequence import Float32
+
+HEAD = struct.Struct("<6d")
+MAX_CLUSTERS = 1024
+LARGE = 1e39  # no coordinate or step of a float32 model lies beyond
+SMALL = 1e-60  # no step of a float32 model is smaller
+LARGEST = float(np.finfo(np.float32).max)
+RIDGE = 1e-6  # of the affine fit
+LAMBDA = 0.14  # squared steps that a bit is worth; 0.1155 by theory at a high rate
+
+Int64 = NDArray[np.int64]
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Quantiser:
+    """The step of the delta coefficients, model units; that of low frequencies is ``step / fineness``; ``kept`` 0: by cost."""
+
+    step: float
+    fineness: float
+    kept: float
+
+
+def encode_clip(frames: Float32, surface: Surface, quantiser: Quantiser, n_clusters: int, seed_bits: int) -> bytes:
+    """Code ``frames (n, V, 3)``, model units, in the order of vertices that ``surface`` has."""
+    lattice = Lattice.over(frames.reshape(-1, 3), seed_bits)
+    sampled = sample_frames(frames)
+    seeds = find_seeds(sampled, surface.faces, n_clusters)
+    labels = cluster(sampled, seeds)
+    dictionary = Dictionary(surface, seeds, labels, lattice, quantiser.fineness)
+    seed_points = np.rint((frames[:, seeds].astype(np.float64) - lattice.origin) / lattice.step).astype(np.int64)
+    origins, axes = local_frames(seed_points)
+    local = dictionary.to_local(frames[:, dictionary.members].astype(np.float64), place(lattice, origins), axes)
+    signals = dictionary.transform(local - dictionary.rest) / quantiser.step
+    blocks = [
+        encode_integers(np.diff(seeds.ravel(), prepend=0)),
+        encode_labels(labels[surface.walk], len(seeds)),
+        encode_seeds(seed_points, dictionary.base_seeds),
+    ]
+    return b"".join(
+        [
+            HEAD.pack(*lattice.origin, lattice.step, quantiser.step, quantiser.fineness),
+            varint(len(seeds)),
+            *(varint(len(block)) + block for block in blocks),
+            _encode_deltas(signals, dictionary, quantiser),
+        ]
+    )
+
+
+def decode_clip(data: bytes, n_frames: int, surface: Surface, name: str) -> Float32:
+    """Mirror of `encode_clip`: ``(n_frames, V, 3) float32``, model units.
+
+    Raises:
+        CorruptFile: the clip does not decode to that many frames.
+    """
+    cursor = Cursor(data, name)
+    *origin, seed_step, step, fineness = cursor.struct(HEAD)
+    wrong = not all(abs(v) < LARGE for v in origin) or not all(SMALL < v < LARGE for v in (seed_step, step))
+    if wrong or not 1 <= fineness <= 64:  # NaN neither
+        raise cursor.corrupt("a step or the lattice's origin is out of range")
+    lattice = Lattice((origin[0], origin[1], origin[2]), seed_step)
+    n_vertices = len(surface.base)
+    n_seeds = cursor.varint(min(MAX_CLUSTERS, n_vertices), "the number of clusters")
+    if n_seeds < 1:
+        raise cursor.corrupt("there is no cluster")
+    blocks = [cursor.take(cursor.varint(cursor.left, "a length")) for _ in range(3)]
+    seeds = np.cumsum(decode_integers(blocks[0], 3 * n_seeds, name=name)).reshape(-1, 3)
+    if seeds.min() < 0 or seeds.max() >= n_vertices:
+        raise cursor.corrupt("a seed vertex does not exist")
+    labels = np.empty(n_vertices, np.int64)
+    labels[surface.walk] = decode_labels(Cursor(blocks[1], name), n_vertices, n_seeds, name)
+    if np.abs((surface.base - origin) / seed_step).max() > 1 << 40:
+        raise cursor.corrupt("the base lies out of the seed lattice's range")
+    dictionary = Dictionary(surface, seeds, labels, lattice, fineness)
+    seed_points = decode_seeds(Cursor(blocks[2], name), n_frames, dictionary.base_seeds, name)
+    sums = _decode_deltas(cursor, n_frames, dictionary)
+    origins, axes = local_frames(seed_points)
+    result = np.empty((n_frames, n_vertices, 3))
+    result[:, dictionary.members] = dictionary.to_world(dictionary.rebuild(sums, step), place(lattice, origins), axes)
+    result[:, seeds.ravel()] = lattice.place(seed_points).reshape(n_frames, -1, 3)
+    if not np.abs(result).max() <= LARGEST:
+        raise cursor.corrupt("a position is larger than float32 can hold")
+    return result.astype(np.float32)
+
+
+def _encode_deltas(signals: Float64, dictionary: Dictionary, quantiser: Quantiser) -> bytes:
+    """Code ``signals (n, 3, N)``, coefficients in steps, by the loop that the decoder runs."""
+    coder, momentum = DeltaEncoder(dictionary.layout), Momentum(dictionary)
+    n_affine, scale = dictionary.n_affine, dictionary.scale
+    shapes = dictionary.transform(dictionary.functions)  # (4, N)
+    projections = np.concatenate([_projection(shapes[:, w]) for w in dictionary.slices] or [np.zeros((4, 0))], axis=1)
+    sizes = np.diff(dictionary.bounds)
+    sums = np.zeros((3, n_affine + len(scale)), np.int64)
+    for signal in signals:
+        predicted = momentum.predict()
+        known = (sums + predicted) / UNIT
+        left = signal - known[:, n_affine:] * scale - _expand(known[:, :n_affine], shapes, sizes)
+        wanted = np.empty_like(known)
+        wanted[:, :n_affine] = _project(left, projections, dictionary.bounds)
+        left -= _expand(np.rint(wanted[:, :n_affine]), shapes, sizes)
+        wanted[:, n_affine:] = left / scale
+        if quantiser.kept > 0:
+            _drop_small(wanted[:, n_affine:], dictionary, quantiser.kept)
+        values, contexts = np.zeros_like(sums), np.zeros_like(sums)
+        costs = coder.contexts.costs()
+        for axis in range(3):
+            contexts[axis] = coder.contexts.of(axis, values)
+            values[axis] = _choose(wanted[axis], contexts[axis], costs, n_affine)
+            coder.add_axis(contexts[axis], values[axis])
+        coder.contexts.learn(contexts, values)
+        delta = predicted + UNIT * values
+        momentum.learn(delta)
+        sums += delta
+    return coder.finish()
+
+
+def _decode_deltas(cursor: Cursor, n_frames: int, dictionary: Dictionary) -> Int64:
+    """Mirror of `_encode_deltas`: the coefficients' sums ``(n_frames, 3, C)``, in units."""
+    coder, momentum = DeltaDecoder(cursor, dictionary.layout), Momentum(dictionary)
+    sums = np.zeros((n_frames, 3, dictionary.n_affine + len(dictionary.members)), np.int64)
+    for frame in range(n_frames):
+        values, contexts = np.zeros_like(sums[0]), np.zeros_like(sums[0])
+        for axis in range(3):
+            contexts[axis] = coder.contexts.of(axis, values)
+            values[axis] = coder.take_axis(contexts[axis])
+        coder.contexts.learn(contexts, values)
+        delta = momentum.predict() + UNIT * values
+        momentum.learn(delta)
+        sums[frame] = delta if frame == 0 else sums[frame - 1] + delta
+    coder.finish()
+    return sums
+
+
+def _drop_small(wanted: Float64, dictionary: Dictionary, kept: float) -> None:
+    """Zero all but the largest part ``kept`` of each cluster's coefficients, axis by axis (section 4.5)."""
+    for where in dictionary.slices:
+        n_dropped = round((1 - kept) * (where.stop - where.start))
+        smallest = np.argsort(np.abs(wanted[:, where]), axis=1, kind="stable")[:, :n_dropped]
+        np.put_along_axis(wanted[:, where], smallest, 0.0, axis=1)
+
+
+def _choose(wanted: Float64, contexts: Int64, costs: Float64, n_affine: int) -> Int64:
+    """Round ``wanted (C,)`` to the nearest integer or the next one towards 0, whichever costs less in error and bits.
+
+    The affine values are rounded to the nearest: what is left of them has been carried into the DCT.
+    """
+    nearest = np.rint(wanted).astype(np.int64)
+    at = np.flatnonzero(nearest[n_affine:]) + n_affine
+    if len(at):
+        x, high = wanted[at], nearest[at]
+        low = high - np.sign(high)
+        rows = contexts[at]
+        gain = (x - low) ** 2 - (x - high) ** 2
+        bits = costs[rows, tokenise(high)[0]] - costs[rows, tokenise(low)[0]]
+        nearest[at] = np.where(gain < LAMBDA * bits, low, high)
+    return nearest
+
+
+def _projection(shapes: Float64) -> Float64:
+    """The matrix ``(4, n)`` that fits the functions ``shapes (4, n)``."""
+    return np.asarray(np.linalg.solve(shapes @ shapes.T + RIDGE * np.eye(4), shapes))
+
+
+def _project(signals: Float64, projections: Float64, bounds: Int64) -> Float64:
+    """Coefficients ``(3, 4 K)`` of ``signals (3, N)``."""
+    if not signals.shape[1]:
+        return np.zeros((3, 0))
+    products = signals[:, None] * projections  # (3, 4, N)
+    return np.add.reduceat(products, bounds[:-1], axis=2).swapaxes(1, 2).reshape(3, -1)
+
+
+def _expand(coefficients: Float64, shapes: Float64, sizes: Int64) -> Float64:
+    """Mirror of `_project`: ``(3, 4 K) -> (3, N)``."""
+    per_cluster = coefficients.reshape(3, len(sizes), 4)
+    return np.asarray(np.einsum("anj,jn->an", np.repeat(per_cluster, sizes, axis=1), shapes))

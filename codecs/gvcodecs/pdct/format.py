@@ -1,0 +1,63 @@
+"""The sections of a ``pdct`` bitstream, and the header that tells how to read them.
+
+============  ===========================================================================
+``mesh``      base frame (frame 0) on its lattice and connectivity (`gvpipe.connectivity`)
+``order``     vertex order, empty if the codec's own (`gvpipe.vertex_order`)
+``clip.N``    frames of clip N (`clip`); clip c starts at frame ``c * F // clips``
+============  ===========================================================================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gvcodecs.pdct.clip import LARGE
+from gvcodecs.pdct.dictionary import Surface
+from gvpipe.bitstream import Bitstream
+from gvpipe.connectivity import BaseMesh
+from gvpipe.errors import CorruptFile
+from gvpipe.quantize import Lattice
+
+MAX_CLIPS = 4000
+MAX_CLIP_FRAMES = 100_000
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a reader must know beside the sections.
+
+    Args:
+        clips: how many.
+        base: lattice of the base frame, model units.
+    """
+
+    clips: int
+    base: Lattice
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the header as JSON values."""
+        return {"clips": self.clips, "base": [*self.base.origin, self.base.step]}
+
+    @classmethod
+    def of(cls, bitstream: Bitstream) -> Header:
+        """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
+        clips = bitstream.integer("clips", 1, min(MAX_CLIPS, bitstream.n_frames))
+        if bitstream.n_frames > clips * MAX_CLIP_FRAMES:
+            raise CorruptFile(f"header: {bitstream.n_frames} frames in {clips} clips; at most {MAX_CLIP_FRAMES} each")
+        return cls(clips, check_lattice(bitstream.header.get("base")))
+
+
+def check_lattice(values: Any) -> Lattice:
+    """Return the lattice that ``values``, an origin and a step, name; raises `CorruptFile` for anything else."""
+    is_list = isinstance(values, list) and len(values) == 4
+    if not is_list or not all(isinstance(v, int | float) and abs(v) < LARGE for v in values) or not values[3] > 0:
+        raise CorruptFile(f"header: base is {values!r}; an origin and a step above 0 are needed")
+    return Lattice((values[0], values[1], values[2]), values[3])
+
+
+def surface_of(mesh: BaseMesh, lattice: Lattice) -> Surface:
+    """What all clips share, from the decoded base frame; signals follow the codec's order, a walk over the surface."""
+    return Surface(lattice.place(mesh.points), mesh.faces, np.argsort(mesh.visits))

@@ -1,0 +1,62 @@
+"""From a ``pdct`` bitstream back to frames. A frame costs its clip, of which the last is kept."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gvcodecs.pdct.clip import decode_clip
+from gvcodecs.pdct.format import Header, surface_of
+from gvpipe.bitstream import Bitstream
+from gvpipe.connectivity import decode_base
+from gvpipe.errors import CorruptFile
+from gvpipe.segments import segment_starts
+from gvpipe.sequence import Float32, Int32
+
+
+class PdctReader:
+    """Frames of a ``pdct`` bitstream.
+
+    Raises:
+        CorruptFile: here or later: a section does not hold what it must.
+    """
+
+    def __init__(self, bitstream: Bitstream) -> None:
+        header = Header.of(bitstream)
+        mesh = decode_base(bitstream.section("mesh"), bitstream.section("order"))
+        found = (len(mesh.points), len(mesh.faces))
+        if found != (bitstream.n_vertices, bitstream.n_triangles):
+            raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
+        self._bitstream, self._mesh = bitstream, mesh
+        self._surface = surface_of(mesh, header.base)
+        self._bounds = segment_starts(bitstream.n_frames, header.clips)
+        self._clip: tuple[int, Float32] = (-1, np.zeros((0, 0, 3), np.float32))
+
+    @property
+    def n_frames(self) -> int:
+        """F, the number of frames."""
+        return self._bitstream.n_frames
+
+    @property
+    def faces(self) -> Int32:
+        """``(T, 3) int32`` triangles."""
+        return self._mesh.faces
+
+    def read(self, start: int, stop: int) -> Float32:
+        """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
+
+        Raises:
+            CorruptFile: a clip does not decode.
+        """
+        result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
+        for c, (begin, end) in enumerate(zip(self._bounds[:-1], self._bounds[1:], strict=True)):
+            first, last = max(start, begin), min(stop, end)
+            if first < last:
+                result[first - start : last - start] = self._decode(c)[first - begin : last - begin]
+        return result
+
+    def _decode(self, c: int) -> Float32:
+        if self._clip[0] != c:
+            name = f"clip.{c}"
+            n_frames = self._bounds[c + 1] - self._bounds[c]
+            self._clip = (c, decode_clip(self._bitstream.section(name), n_frames, self._surface, name))
+        return self._clip[1]

@@ -1,0 +1,186 @@
+"""Frames in, bytes out, one clip at a time; and bytes in, frames out.
+
+For sources that have no end yet (simulations, capture) and sinks that cannot wait for it. Encoder and reader hold one clip. The
+clips are those of a file (`clip`), of exactly N frames each but for the last::
+
+    stream = "gvpdct\\r\\n", [u16] version, [u32 x 3] V, T, bytes of order, [u64] bytes of mesh, [5 x float64] frames per
+             second, lattice of the base frame (origin, step), mesh, order, clips, [u32] 0
+    clip   = [u32] frames, [u32] CRC-32 of the data, [u64] bytes, data
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.pdct.clip import decode_clip
+from gvcodecs.pdct.dictionary import Surface
+from gvcodecs.pdct.encoder import Pdct, SharedBase
+from gvcodecs.pdct.format import MAX_CLIP_FRAMES, check_lattice, surface_of
+from gvpipe.connectivity import BaseMesh, decode_base
+from gvpipe.errors import CorruptFile, InputError, NewerVersion, NotGeometryVideo, TruncatedFile
+from gvpipe.sequence import Float32, Int32, check_finite
+
+MAGIC = b"gvpdct\r\n"
+VERSION = 1
+HEAD = struct.Struct("<HIIIQ5d")
+CLIP = struct.Struct("<IIQ")
+END = struct.pack("<I", 0)
+
+
+class StreamEncoder:
+    """Codes frames that come one by one; each call returns the bytes that are complete, often none.
+
+    The first clip's bytes come with its last frame; the head, which tells the mesh, with the first frame.
+
+    Args:
+        faces: ``(T, 3)`` triangles.
+        settings: of the codec; ``clip`` (or ``segment``) is the frames per clip.
+        fps: frames per second.
+    """
+
+    def __init__(self, faces: NDArray[np.integer], settings: Pdct | None = None, fps: float = 30.0) -> None:
+        self._faces, self._fps = np.asarray(faces, np.int32).reshape(-1, 3), float(fps)
+        self._settings = settings or Pdct()
+        self._base: SharedBase | None = None
+        self._frames: list[Float32] = []
+        self._count = 0
+        self._is_closed = False
+
+    def add(self, frame: NDArray[np.floating]) -> bytes:
+        """Take the next frame, ``(V, 3)``, model units.
+
+        Raises:
+            InputError: the frame has another shape than those before, or a coordinate is not finite.
+        """
+        if self._is_closed:
+            raise InputError("the stream is finished; open another for more frames")
+        positions = np.array(frame, np.float32)
+        if positions.ndim != 2 or positions.shape[1] != 3 or not len(positions):
+            raise InputError(f"frame {self._count} has shape {positions.shape}; (vertices >= 1, 3) is needed")
+        check_finite(positions[None], "stream", self._count)
+        head = b""
+        if self._base is None:
+            if self._faces.size and not 0 <= self._faces.min() <= self._faces.max() < len(positions):
+                raise InputError(f"triangles name vertices up to {self._faces.max()}; there are {len(positions)}")
+            self._base = SharedBase(positions, self._faces, self._settings)
+            head = self._head(self._base, len(positions))
+        elif len(positions) != len(self._base.mesh.points):
+            raise InputError(f"frame {self._count} has {len(positions)} vertices, the first {len(self._base.mesh.points)}")
+        self._frames.append(positions)
+        self._count += 1
+        return head + (self._flush() if len(self._frames) == self._settings.clip_frames else b"")
+
+    def finish(self) -> bytes:
+        """Return what is left: the last, shorter clip and the end mark."""
+        if self._is_closed:
+            raise InputError("the stream is finished already")
+        if self._base is None:
+            raise InputError("a stream needs at least one frame")
+        self._is_closed = True
+        return (self._flush() if self._frames else b"") + END
+
+    def _head(self, base: SharedBase, n_vertices: int) -> bytes:
+        mesh, order = base.coded.mesh, base.coded.order
+        lattice = (*base.lattice.origin, base.lattice.step)
+        numbers = HEAD.pack(VERSION, n_vertices, len(self._faces), len(order), len(mesh), self._fps, *lattice)
+        return MAGIC + numbers + mesh + order
+
+    def _flush(self) -> bytes:
+        assert self._base is not None
+        data = self._base.encode(np.stack(self._frames))
+        head = CLIP.pack(len(self._frames), zlib.crc32(data), len(data))
+        self._frames = []
+        return head + data
+
+
+class StreamReader:
+    """Frames of a stream whose bytes come in pieces of any size.
+
+    `feed` the bytes, and iterate over what it returns: the frames that have become complete, ``(V, 3) float32``, model units.
+    """
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+        self._mesh: BaseMesh | None = None
+        self._surface: Surface | None = None
+        self._clips = 0
+        self.fps = 0.0  # frames per second, once the head is there
+        self.is_finished = False
+
+    @property
+    def faces(self) -> Int32 | None:
+        """``(T, 3) int32`` triangles; None until the head is there."""
+        return None if self._mesh is None else self._mesh.faces
+
+    def feed(self, data: bytes) -> Iterator[Float32]:
+        """Take the next bytes, and yield the frames that they complete; iterate to the end before feeding more.
+
+        Raises:
+            NotGeometryVideo: the stream does not start as one.
+            NewerVersion: this gvpipe is too old for it.
+            CorruptFile: a checksum differs or a part does not decode.
+        """
+        self._buffer += data
+        if self._surface is None and not self._read_head():
+            return
+        while not self.is_finished:
+            frames = self._read_clip()
+            if frames is None:
+                return
+            yield from frames
+        if self._buffer:
+            raise CorruptFile("the stream goes on after its end mark; get it again from its source")
+
+    def close(self) -> None:
+        """Raise `TruncatedFile` unless the stream came to its end."""
+        if not self.is_finished:
+            raise TruncatedFile(f"the stream ends within clip {self._clips}; get it again from its source")
+
+    def _read_head(self) -> bool:
+        if self._buffer[: len(MAGIC)] != MAGIC[: len(self._buffer)]:
+            raise NotGeometryVideo("the stream does not start as a pdct stream; check its source")
+        start = len(MAGIC) + HEAD.size
+        if len(self._buffer) < start:
+            return False
+        version, n_vertices, n_triangles, bytes_order, bytes_mesh, fps, *base = HEAD.unpack_from(self._buffer, len(MAGIC))
+        if version > VERSION:
+            raise NewerVersion(f"the stream has version {version}, this gvpipe reads up to {VERSION}; upgrade gvpipe")
+        lattice = check_lattice(base)
+        if not 0 < fps <= 100_000:
+            raise CorruptFile(f"the stream has {fps} frames per second; get it again from its source")
+        if len(self._buffer) < start + bytes_mesh + bytes_order:
+            return False
+        mesh = bytes(self._buffer[start : start + bytes_mesh])
+        order = bytes(self._buffer[start + bytes_mesh : start + bytes_mesh + bytes_order])
+        decoded = decode_base(mesh, order)
+        if (len(decoded.points), len(decoded.faces)) != (n_vertices, n_triangles):
+            raise CorruptFile("the mesh has other vertices and triangles than the head says; get the stream again")
+        del self._buffer[: start + bytes_mesh + bytes_order]
+        self._mesh, self._surface, self.fps = decoded, surface_of(decoded, lattice), fps
+        return True
+
+    def _read_clip(self) -> Float32 | None:
+        """The next clip's frames ``(n, V, 3)``, none at the end mark, None if the clip is not complete."""
+        assert self._surface is not None
+        if self._buffer[: len(END)] == END:
+            self.is_finished = True
+            del self._buffer[: len(END)]
+            return np.zeros((0, 0, 3), np.float32)
+        if len(self._buffer) < CLIP.size:
+            return None
+        n_frames, checksum, size = CLIP.unpack_from(self._buffer)
+        if n_frames > MAX_CLIP_FRAMES:
+            raise CorruptFile(f"clip {self._clips} of the stream has {n_frames} frames; get it again from its source")
+        if len(self._buffer) < CLIP.size + size:
+            return None
+        data = bytes(self._buffer[CLIP.size : CLIP.size + size])
+        if zlib.crc32(data) != checksum:
+            raise CorruptFile(f"clip {self._clips} of the stream has a wrong checksum; get it again from its source")
+        del self._buffer[: CLIP.size + size]
+        self._clips += 1
+        return decode_clip(data, n_frames, self._surface, f"clip.{self._clips - 1}")
