@@ -123,8 +123,8 @@ class _Permuted:
 def check_finite(block: Float32, name: str, first_frame: int = 0) -> None:
     """Raise `InputError` naming frame and vertex if ``block (n, V, 3)`` holds a NaN or an infinity."""
     with np.errstate(invalid="ignore"):
-        total = block.sum(dtype=np.float64)
-    if not np.isfinite(total):  # a NaN or an infinity shows in the sum, and finite float32 cannot add up to one
+        extremes = (block.min(initial=0), block.max(initial=0))  # a NaN shows in both, an infinity in one
+    if not np.isfinite(extremes).all():
         frame, vertex = np.argwhere(~np.isfinite(block).all(axis=2))[0]
         raise InputError(
             f"{name}: frame {first_frame + frame}, vertex {vertex} is {block[frame, vertex].tolist()}; every coordinate "

@@ -21,7 +21,7 @@ from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
 from gvpipe.video import VideoReader
 
-BATCH = 4  # frames rebuilt at a time: their positions stay in cache
+BATCH = 8  # frames rebuilt at a time: their positions stay in cache
 
 
 @dataclass(frozen=True)
