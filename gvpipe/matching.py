@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from gvpipe.index_rows import row_ids, smallest_first
 from gvpipe.sequence import Int32, MeshSequence
 
 FRAMES = 24  # evenly spaced frames whose positions make a vertex' path
@@ -41,7 +42,7 @@ def match_vertices(reference: MeshSequence, distorted: MeshSequence) -> Index | 
 
 def canonical_triangles(faces: NDArray[np.integer]) -> NDArray[np.integer]:
     """Triangles turned so that the smallest index leads (winding kept), in lexicographic order."""
-    turned = _turned(faces)[0]
+    turned: NDArray[np.integer] = smallest_first(faces)
     return turned[np.lexsort(turned.T[::-1])]
 
 
@@ -77,8 +78,7 @@ def _follow_votes(place: Index, ours: NDArray[np.integer], theirs: Int32, n_poin
 
 def _occurs_in(faces: NDArray[np.integer], others: NDArray[np.integer]) -> NDArray[np.bool_]:
     """Which triangles are among the others, ``(T,)``."""
-    rows = np.concatenate([_turned(others)[0], _turned(faces)[0]])
-    ids = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
+    ids = row_ids(np.concatenate([smallest_first(others), smallest_first(faces)]))[0]
     return np.isin(ids[len(others) :], ids[: len(others)])
 
 
