@@ -13,6 +13,7 @@ costs at most its group. x264 runs on one thread because its output depends on t
 from __future__ import annotations
 
 import io
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -195,6 +196,10 @@ class VideoReader:
     def n_frames(self) -> int:
         """Frames in the track."""
         return len(self._packets)
+
+    def group(self, frame: int) -> tuple[int, int]:
+        """``(first, last + 1)`` of the group of pictures that a frame lies in."""
+        return self._groups[bisect_right(self._groups, (frame, self.n_frames)) - 1]
 
     def read(self, start: int, stop: int) -> Iterator[tuple[int, list[Plane]]]:
         """Yield ``(first frame, planes)`` for the frames ``start`` to ``stop``, one group of pictures at a time.

@@ -86,6 +86,10 @@ class McgvReader:
             clusters=clusters[vertices],
         )
 
+    def group(self, frame: int) -> tuple[int, int]:
+        """``(start, stop)`` of the group of pictures that a frame lies in."""
+        return self._video.group(frame)
+
     def read(self, start: int, stop: int) -> Float32:
         """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
 
