@@ -18,16 +18,21 @@ if TYPE_CHECKING:
     from gvpipe.errors import GvpipeError
     from gvpipe.metrics import Comparison, compare
     from gvpipe.player import Player
+    from gvpipe.rendering.camera import Camera
+    from gvpipe.rendering.pictures import render
+    from gvpipe.rendering.renderer import Renderer
     from gvpipe.sequence import MeshSequence
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Camera",
     "Comparison",
     "GvpipeError",
     "Info",
     "MeshSequence",
     "Player",
+    "Renderer",
     "Report",
     "compare",
     "decode",
@@ -35,6 +40,7 @@ __all__ = [
     "info",
     "open",
     "read",
+    "render",
     "write",
 ]
 
@@ -43,6 +49,9 @@ _HOMES = {
     "gvpipe.errors": ("GvpipeError",),
     "gvpipe.metrics": ("Comparison", "compare"),
     "gvpipe.player": ("Player",),
+    "gvpipe.rendering.camera": ("Camera",),
+    "gvpipe.rendering.pictures": ("render",),
+    "gvpipe.rendering.renderer": ("Renderer",),
     "gvpipe.sequence": ("MeshSequence",),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

@@ -173,6 +173,29 @@ def compare(reference: str, distorted: str, as_json: bool) -> None:
 
 
 @cli.command()
+@click.argument("source", metavar="FILE.mp4|SEQUENCE")
+@click.argument("target", metavar="OUT.png|.gif|.mp4")
+@click.option("--frame", type=int, help="Only this frame; negative counts from the end. [default: 0 for .png, else all]")
+@click.option("--size", default="512", show_default=True, metavar="N|WxH", help="Pixels.")
+@click.option(
+    "--view", default="three-quarter", show_default=True, help="front, back, left, right, top, bottom or AZIMUTH,ELEVATION."
+)
+@click.option("--up", type=click.Choice(["x", "y", "z"]), default="y", show_default=True, help="The axis that is up.")
+@click.option("--turntable", is_flag=True, help="Let the camera go once around.")
+@click.option("--error-of", "error_of", metavar="REFERENCE", help="Colour each vertex by its distance from REFERENCE's.")
+@click.option("--error-max", type=float, metavar="PERCENT", help="Where the colours end. [default: the largest error drawn]")
+@click.option("--shading", type=click.Choice(["smooth", "flat"]), default="smooth", show_default=True)
+def render(source: str, target: str, size: str, **options: Any) -> None:
+    """Paint a geometry video or a sequence as a picture or a film; needs no display and no GPU."""
+    from gvpipe.rendering.pictures import parse_size, render
+
+    pixels = parse_size(size)
+    with _progress() as progress:
+        render(source, target, size=pixels, progress=progress, **options)
+    click.echo(f"{source} -> {target} ({pixels[0]}x{pixels[1]}, {_size(os.path.getsize(target))})")
+
+
+@cli.command()
 def codecs() -> None:
     """List the codecs and their settings."""
     import dataclasses
