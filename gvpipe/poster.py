@@ -31,4 +31,5 @@ def paint(positions: Float32, faces: Int32) -> NDArray[np.uint8]:
         return np.full((SIZE, SIZE), profile.high, np.uint8)
     camera = framing(MeshSequence(positions[None], faces))
     grey = Renderer(faces, positions, (SIZE, SIZE), samples=SAMPLES).draw(positions, camera) @ LUMA
-    return np.rint(profile.low + (profile.high - profile.low) / 255 * grey).astype(np.uint8)
+    plane: NDArray[np.uint8] = np.rint(profile.low + (profile.high - profile.low) / 255 * grey).astype(np.uint8)
+    return plane

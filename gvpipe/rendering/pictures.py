@@ -1,7 +1,7 @@
 """A sequence to a picture or a film: which frames, from where, in which file.
 
 PNG is one frame, three samples a pixel and axis. GIF and MP4 play the motion (two samples); a turntable lets the camera go once
-around meanwhile, repeating the motion until the turn lasts `TURN_SECONDS`, and ends one step before it started, so that it loops.
+around meanwhile, repeats the motion until the turn lasts `TURN_SECONDS`, and ends one step before its start, so that it loops.
 Frames are painted one at a time, and the file appears once it is complete.
 """
 
@@ -152,10 +152,7 @@ def _frames(sequence: MeshSequence, frame: int | None, suffix: str, turntable: b
     count = len(sequence)
     if frame is not None and not -count <= frame < count:
         raise InputError(f"{sequence.name}: frame {frame} asked for; there are {count}, 0 to {count - 1} or -{count} to -1")
-    if frame is not None or suffix == ".png":
-        frames = [(frame or 0) % count]
-    else:
-        frames = list(range(count))
+    frames = [(frame or 0) % count] if frame is not None or suffix == ".png" else list(range(count))
     return frames * max(1, math.ceil(TURN_SECONDS * sequence.fps / len(frames))) if turntable else frames
 
 

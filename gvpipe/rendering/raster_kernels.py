@@ -1,7 +1,7 @@
 """Which triangle every sample of the picture sees: projection, and a z-buffer filled triangle by triangle.
 
 Corners are snapped to 1/256 of a sample and edges are followed in integers, so that neighbours leave no crack and a picture
-never depends on rounding. Depth is ``distance / depth``, which is linear over the picture: 1 at the target, more towards the eye.
+never depends on rounding. Nearness is ``distance / depth``, linear over the picture: 1 at the target, more towards the eye.
 A triangle with a corner behind the eye, or a million samples outside the picture, is left out. Kernels only: they import numba.
 """
 

@@ -48,9 +48,7 @@ class Renderer:
         self, faces: Int32, base: Float32, size: tuple[int, int] = (512, 512), shading: str = "smooth", samples: int = 2
     ) -> None:
         if not all(SIZE_RANGE[0] <= side <= SIZE_RANGE[1] for side in size):
-            raise InputError(
-                f"a picture of {size[0]}x{size[1]}; sides of {SIZE_RANGE[0]} to {SIZE_RANGE[1]} pixels are possible"
-            )
+            raise InputError(f"a picture of {size[0]}x{size[1]}; sides of {SIZE_RANGE[0]} to {SIZE_RANGE[1]} pixels can be")
         if shading not in SHADINGS:
             raise InputError(f"shading {shading!r}; {' or '.join(SHADINGS)} is needed")
         if not SAMPLES_RANGE[0] <= samples <= SAMPLES_RANGE[1]:
@@ -67,7 +65,7 @@ class Renderer:
         self._depths = np.zeros((height * samples, width * samples), np.float32)
         self._triangles = np.zeros(self._depths.shape, np.int32)
         self._codes = srgb_codes()
-        self._materials = [to_linear(colour) for colour in (FRONT, BACK, BACKGROUND)]
+        self._front, self._back, self._background = to_linear(FRONT), to_linear(BACK), to_linear(BACKGROUND)
         self._ramp = to_linear(error_colours(np.linspace(0, 1, RAMP)))
         self._pool = ThreadPoolExecutor(THREADS)
 
@@ -97,7 +95,7 @@ class Renderer:
             shade(
                 self._triangles, samples, top, bottom, self._faces, self._points, self._seen, self._snapped,
                 self._nearness, camera.distance, self._of_faces, self._of_points, self._smooth, shown, self._ramp,
-                0.0 if len(shown) else GLOSS, *self._materials, self._codes, picture,
+                0.0 if len(shown) else GLOSS, self._front, self._back, self._background, self._codes, picture,
             )  # fmt: skip
 
         self._in_bands(paint)
@@ -124,8 +122,9 @@ class Renderer:
         width, height = (side * self._samples for side in self.size)
         focal = height / 2 / np.tan(np.radians(camera.field_of_view) / 2)
         project(
-            np.ascontiguousarray(positions, np.float32), np.ascontiguousarray(camera.rotation), np.array(camera.target, np.float64),
-            float(camera.distance), float(focal), width, height, self._seen, self._snapped, self._nearness,
+            np.ascontiguousarray(positions, np.float32), np.ascontiguousarray(camera.rotation),
+            np.array(camera.target, np.float64), float(camera.distance), float(focal), width, height,
+            self._seen, self._snapped, self._nearness,
         )  # fmt: skip
 
     def _in_bands(self, paint: Callable[[int, int], None]) -> None:
