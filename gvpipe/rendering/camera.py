@@ -107,7 +107,8 @@ def framing(
 ) -> Camera:
     """Return a camera that holds the motion in the picture with a small margin.
 
-    It looks at the boxes, in the camera's own axes, of the vertices that triangles use, in at most 64 frames.
+    Four planes bound what a camera sees; each is pushed out until the vertices that triangles use, in at most 64 frames, lie
+    inside. The planes' slopes are known beforehand, so that one pass over the frames finds target and distance.
 
     Args:
         frames: the frames that are to be seen; by default all.
@@ -121,19 +122,23 @@ def framing(
     azimuth, elevation = parse_view(view) if isinstance(view, str) else view
     turns = 360.0 / TURN_VIEWS * np.arange(TURN_VIEWS) if turntable else np.zeros(1)
     cameras = [Camera(azimuth=azimuth + turn, elevation=elevation, up=up) for turn in turns]
-    axes = np.concatenate([camera.rotation for camera in cameras])  # (3 A, 3), A azimuths
-    low, high = _extents(sequence, range(len(sequence)) if frames is None else frames, axes)
-    rotations, low, high = axes.reshape(-1, 3, 3), low.reshape(-1, 3), high.reshape(-1, 3)
-    # a turntable turns about one point: opposite views have opposite offsets, which the mean takes away
-    target = np.einsum("ai,aij->j", (low + high) / 2, rotations) / len(turns)
-    middle = np.einsum("aij,j->ai", rotations, target)
-    half = np.maximum(high - middle, middle - low)  # (A, 3)
-    tangent = np.tan(np.radians(cameras[0].field_of_view) / 2) * (1 - MARGIN)
-    distance = float((np.maximum(half[:, 0] / aspect, half[:, 1]) / tangent + (high - middle)[:, 2]).max())
-    smallest = 1e-6 * float(np.abs(target).max())  # all at one point: any distance will do
-    return Camera(
-        (float(target[0]), float(target[1]), float(target[2])), max(distance, smallest) or 1.0, azimuth, elevation, up
+    rotations = np.stack([camera.rotation for camera in cameras])  # (A, 3, 3), A azimuths
+    slope_y = np.tan(np.radians(cameras[0].field_of_view) / 2) * (1 - MARGIN)
+    slope_x = slope_y * aspect
+    # an eye at z sees what has |x| <= slope_x (z - z of the point): planes of equal x / slope_x + z, and so on
+    x, y, z = [1 / slope_x, 0, 0], [0, 1 / slope_y, 0], [0, 0, 1]
+    sides = np.add([x, np.negative(x), y, np.negative(y)], z)
+    normals = np.concatenate([sides, [z, np.negative(z)]]) @ rotations  # (A, 6, 3)
+    reach = _reach(sequence, range(len(sequence)) if frames is None else frames, normals.reshape(-1, 3)).reshape(-1, 6)
+    middle = np.stack(
+        [(reach[:, 0] - reach[:, 1]) * slope_x, (reach[:, 2] - reach[:, 3]) * slope_y, reach[:, 4] - reach[:, 5]], axis=1
     )
+    # a turntable turns about one point: opposite views err in opposite ways, which the mean takes away
+    target = np.einsum("ai,aij->j", middle / 2, rotations) / len(turns)
+    distance = float((reach[:, :4] - normals[:, :4] @ target).max())
+    smallest = 1e-6 * float(np.abs(target).max())  # all at one point: any distance will do
+    place = (float(target[0]), float(target[1]), float(target[2]))
+    return Camera(place, max(distance, smallest) or 1.0, azimuth, elevation, up)
 
 
 def sampled(frames: Sequence[int]) -> list[int]:
@@ -153,11 +158,11 @@ def used_vertices(sequence: MeshSequence) -> Int32:
     return np.unique(sequence.faces)
 
 
-def _extents(sequence: MeshSequence, frames: Sequence[int], axes: Float64) -> tuple[Float64, Float64]:
-    """Least and largest coordinate along each of ``axes (n, 3)``: two ``(n,)``."""
+def _reach(sequence: MeshSequence, frames: Sequence[int], normals: Float64) -> Float64:
+    """How far the vertices reach along each of ``normals (n, 3)``: ``(n,)``."""
     used = used_vertices(sequence)
-    low, high = np.full(len(axes), np.inf), np.full(len(axes), -np.inf)
+    reach = np.full(len(normals), -np.inf)
     for frame in sampled(frames):
-        points = sequence.read(frame, frame + 1)[0][used].astype(np.float64) @ axes.T
-        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
-    return low, high
+        points = sequence.read(frame, frame + 1)[0][used].astype(np.float64)
+        reach = np.maximum(reach, (points @ normals.T).max(axis=0))
+    return reach

@@ -14,7 +14,7 @@ Float64 = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
 LEVELS = 4096  # of linear light that are told apart: the darkest sRGB steps are 1/3295 wide
-BACKGROUND = (0.953, 0.953, 0.945)  # sRGB, 0..1, as all here
+BACKGROUND = (0.95, 0.95, 0.95)  # sRGB, 0..1, as all here
 FRONT = (0.62, 0.72, 0.83)
 BACK = (0.86, 0.71, 0.58)
 ERRORS = np.array(
