@@ -25,9 +25,8 @@ def main(path: str, size: int = 512) -> None:
             for positions in frames:
                 renderer.draw(positions, camera)
             best = min(best, time.perf_counter() - started)
-        print(
-            f"{samples}x{samples} samples a pixel: {len(frames) / best:.0f} frames/s, {1000 * best / len(frames):.1f} ms a frame"
-        )
+        seconds = best / len(frames)
+        print(f"{samples}x{samples} samples a pixel: {1 / seconds:.0f} frames/s, {1000 * seconds:.1f} ms a frame")
 
 
 if __name__ == "__main__":

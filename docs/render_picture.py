@@ -16,7 +16,8 @@ import gvpipe
 from gvpipe.rendering.camera import framing
 
 SAMPLES = Path(__file__).parents[1] / "samples"
-FRAME, SIZE, VIEW = 30, (430, 330), (62.0, 14.0)
+FRAME, SIZE, VIEW = 30, (400, 310), (62.0, 14.0)
+LEGEND = 110  # pixels, about: the picture with the colour bar is so much wider, to show the fox at the same size
 
 
 def main(target: str) -> None:
@@ -28,7 +29,7 @@ def main(target: str) -> None:
         parts = [Path(folder) / f"{name}.png" for name in ("source", "decoded", "error")]
         gvpipe.render(source, parts[0], frame=FRAME, size=SIZE, camera=camera)
         gvpipe.render(video, parts[1], frame=FRAME, size=SIZE, camera=camera)
-        gvpipe.render(video, parts[2], frame=FRAME, size=SIZE, camera=camera, error_of=source)
+        gvpipe.render(video, parts[2], frame=FRAME, size=(SIZE[0] + LEGEND, SIZE[1]), camera=camera, error_of=source)
         picture = Image.fromarray(np.concatenate([np.asarray(Image.open(part)) for part in parts], axis=1))
     picture.save(target, optimize=True)
     print(f"{target}: frame {FRAME}, {report.bytes} bytes of geometry video, {report.bpvf:.2f} bits per vertex and frame")

@@ -270,20 +270,22 @@ class VideoReader:
         return samples
 
 
-def write_film(path: Path, pictures: Iterable[NDArray[np.uint8]], width: int, height: int, fps: float) -> None:
+def write_film(path: Path, pictures: Iterable[NDArray[np.uint8]], fps: float) -> None:
     """Write an MP4 film of ``(height, width, 3)`` sRGB pictures with even sides; x264 codes them for the eye."""
     import av
 
     rate = Fraction(fps).limit_denominator(1001) or Fraction(1, 1001)
     with av.open(os.fspath(path), "w", format="mp4", options={"fflags": "+bitexact", "movflags": "+faststart"}) as container:
         stream = container.add_stream("libx264", rate, options={**FILM, "x264-params": "threads=1:log-level=0"})
-        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        stream.pix_fmt = "yuv420p"
         context = stream.codec_context
         context.time_base = 1 / rate
         context.color_range = 1  # limited
         context.colorspace = context.color_primaries = 1  # BT.709
         context.color_trc = 13  # sRGB
         for k, picture in enumerate(pictures):
+            if k == 0:
+                stream.height, stream.width = picture.shape[:2]
             frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
             frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
             frame.pts, frame.time_base = k, 1 / rate

@@ -126,9 +126,8 @@ def framing(
     slope_y = np.tan(np.radians(cameras[0].field_of_view) / 2) * (1 - MARGIN)
     slope_x = slope_y * aspect
     # an eye at z sees what has |x| <= slope_x (z - z of the point): planes of equal x / slope_x + z, and so on
-    x, y, z = [1 / slope_x, 0, 0], [0, 1 / slope_y, 0], [0, 0, 1]
-    sides = np.add([x, np.negative(x), y, np.negative(y)], z)
-    normals = np.concatenate([sides, [z, np.negative(z)]]) @ rotations  # (A, 6, 3)
+    x, y, z = np.diag([1 / slope_x, 1 / slope_y, 1.0])
+    normals = np.stack([x + z, z - x, y + z, z - y, z, -z]) @ rotations  # (A, 6, 3)
     reach = _reach(sequence, range(len(sequence)) if frames is None else frames, normals.reshape(-1, 3)).reshape(-1, 6)
     middle = np.stack(
         [(reach[:, 0] - reach[:, 1]) * slope_x, (reach[:, 2] - reach[:, 3]) * slope_y, reach[:, 4] - reach[:, 5]], axis=1

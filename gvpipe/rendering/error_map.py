@@ -11,10 +11,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.errors import InputError
 from gvpipe.metrics import aligned
 from gvpipe.rendering.camera import sampled, used_vertices
 from gvpipe.rendering.colours import BACKGROUND, error_colours
 from gvpipe.sequence import MeshSequence
+
+SMALLEST = (160, 120)  # pixels, of a picture with a legend
+INK = (60, 60, 60)
 
 Picture = NDArray[np.uint8]
 
@@ -51,26 +55,32 @@ class ErrorMap:
         """``(V,)`` errors as parts of the scale's end; where there is no error at all, zeros."""
         return self.errors(frame) / (self.largest or 1.0)
 
-    def legend(self, size: tuple[int, int]) -> tuple[Picture, tuple[int, int]]:
-        """Return a colour bar with its numbers for a picture of a size, and the row and column that it goes to."""
+    def legend(self, size: tuple[int, int]) -> Picture:
+        """Return a colour bar with its numbers, a strip for the left edge of a picture of ``size``.
+
+        Raises:
+            InputError: the picture is too small for it.
+        """
         from PIL import Image, ImageDraw, ImageFont
 
         width, height = size
-        text = max(9, min(height // 32, width // 26))  # pixels
+        if width < SMALLEST[0] or height < SMALLEST[1]:
+            raise InputError(f"a picture of {width}x{height}; with a legend, {SMALLEST[0]}x{SMALLEST[1]} pixels are the least")
+        text = max(9, min(height // 28, width // 38))  # pixels
         font = ImageFont.load_default(text)
-        edge, bar, length = text, text, min(height - 5 * text, 9 * text)
-        labels = [f"{self.largest * part:.3g}" for part in (1.0, 0.5, 0.0)]
-        title = f"vertex error, {self._unit_name}"
-        background = tuple(round(255 * channel) for channel in BACKGROUND)
-        columns = min(width, round(max(font.getlength(title), 1.6 * bar + max(map(font.getlength, labels)))) + 2 * edge)
-        image = Image.new("RGB", (columns, min(height, length + 4 * text)), background)
+        bar = 8 * text  # pixels, its length
+        top = height - 2 * text - bar
+        labels = {part: f"{self.largest * part:.3g}" for part in (1.0, 0.5, 0.0)}
+        titles = ["vertex error,", self._unit_name]
+        columns = (
+            round(max(max(map(font.getlength, titles)), 1.6 * text + max(map(font.getlength, labels.values())))) + 2 * text
+        )
+        image = Image.new("RGB", (columns, height), tuple(round(255 * channel) for channel in BACKGROUND))
         draw = ImageDraw.Draw(image)
-        draw.text((edge, edge // 2), title, fill=(60, 60, 60), font=font)
-        top = 2 * text + text // 2
-        ramp = np.rint(255 * error_colours(np.linspace(1, 0, max(length, 2))))
-        for row, colour in enumerate(ramp.astype(int).tolist()):
-            draw.line([(edge, top + row), (edge + bar - 1, top + row)], fill=tuple(colour))
-        for label, part in zip(labels, (0.0, 0.5, 1.0), strict=True):
-            middle = top + part * (len(ramp) - 1)
-            draw.text((edge + round(1.6 * bar), middle), label, fill=(60, 60, 60), font=font, anchor="lm")
-        return np.asarray(image), (height - image.height, 0)
+        for line, title in enumerate(titles):
+            draw.text((text, top + (1.3 * line - 3.4) * text), title, fill=INK, font=font)
+        for row, colour in enumerate(np.rint(255 * error_colours(np.linspace(1, 0, bar))).astype(int).tolist()):
+            draw.line([(text, top + row), (2 * text - 1, top + row)], fill=tuple(colour))
+        for part, label in labels.items():
+            draw.text((2.6 * text, top + (1 - part) * (bar - 1)), label, fill=INK, font=font, anchor="lm")
+        return np.asarray(image)

@@ -46,6 +46,7 @@ class Film:
     renderer: Renderer
     turntable: bool = False
     errors: ErrorMap | None = None
+    legend: Picture | None = None  # a strip at the left
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -58,10 +59,7 @@ class Film:
         frame = self.frames[k]
         values = self.errors.values(frame) if self.errors else None
         picture = self.renderer.draw(self.sequence.read(frame, frame + 1)[0], self.camera_of(k), values)
-        if self.errors:
-            legend, (row, column) = self.errors.legend(self.renderer.size)
-            picture[row : row + len(legend), column : column + legend.shape[1]] = legend
-        return picture
+        return picture if self.legend is None else np.concatenate([self.legend, picture], axis=1)
 
 
 def render(
@@ -114,15 +112,16 @@ def render(
         raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
     sequence = source if isinstance(source, MeshSequence) else api.read(source)
     frames = _frames(sequence, frame, suffix, turntable)
-    errors = None
+    errors, legend, across = None, None, width
     if error_of is not None:
         reference = error_of if isinstance(error_of, MeshSequence) else api.read(error_of)
         errors = ErrorMap(reference, sequence, frames, error_max)
-        sequence = errors.sequence
-    camera = camera or framing(sequence, None, view, up, width / height, turntable)
+        sequence, legend = errors.sequence, errors.legend((width, height))
+        across -= legend.shape[1]
+    camera = camera or framing(sequence, None, view, up, across / height, turntable)
     samples = STILL_SAMPLES if suffix == ".png" else FILM_SAMPLES
-    renderer = Renderer(sequence.faces, sequence.read(0, 1)[0], (width, height), shading, samples)
-    film = Film(sequence, frames, camera, renderer, turntable, errors)
+    renderer = Renderer(sequence.faces, sequence.read(0, 1)[0], (across, height), shading, samples)
+    film = Film(sequence, frames, camera, renderer, turntable, errors, legend)
     with atomic_path(path) as temporary:
         WRITERS[suffix](film, temporary, progress)
 
@@ -191,7 +190,7 @@ def _write_gif(film: Film, path: Path, progress: Progress | None) -> None:
 def _write_mp4(film: Film, path: Path, progress: Progress | None) -> None:
     from gvpipe.video import write_film
 
-    write_film(path, _painted(film, progress), *film.renderer.size, film.sequence.fps)
+    write_film(path, _painted(film, progress), film.sequence.fps)
 
 
 WRITERS: dict[str, Callable[[Film, Path, Progress | None], None]] = {
