@@ -22,7 +22,7 @@ Array = NDArray[Any]
 KEY = (-0.46, 0.62, 0.635)  # the light, from the upper left
 KEY_SHARE, SKY_SHARE, EYE_SHARE, AMBIENT = 0.80, 0.14, 0.12, 0.06  # of the light on a surface; full light is a little over 1
 WRAP = 0.25  # how far the key light reaches around the edge: soft shadows
-GLOSS, SHARPNESS = 0.05, 24.0
+GLOSS = 0.05
 
 
 @compiled
@@ -65,13 +65,18 @@ def shade(
         codes: sRGB bytes of linear light, from 0 to 1 in even steps.
     """
     colour = np.zeros(3)
+    empty = codes[(background * (len(codes) - 1) + 0.5).astype(np.int64)]
     for y in range(top, bottom):
         for x in range(picture.shape[1]):
             first = triangles[y * samples, x * samples]
-            alike = True
+            differ = np.int32(0)
             for i in range(samples):
                 for j in range(samples):
-                    alike = alike and triangles[y * samples + i, x * samples + j] == first
+                    differ |= triangles[y * samples + i, x * samples + j] ^ first
+            alike = differ == 0
+            if alike and first < 0:
+                picture[y, x, 0], picture[y, x, 1], picture[y, x, 2] = empty[0], empty[1], empty[2]
+                continue
             red = green = blue = 0.0
             n_shades = 1 if alike else samples * samples
             for s in range(n_shades):
@@ -117,7 +122,8 @@ def shade(
                 if gloss > 0.0:
                     # half way between light and eye, which is taken to be far away
                     half = (nx * KEY[0] + ny * KEY[1] + nz * (KEY[2] + 1.0)) / math.sqrt(2.0 + 2.0 * KEY[2])
-                    glint = gloss * max(0.0, half) ** SHARPNESS
+                    half8 = max(0.0, half) ** 8
+                    glint = gloss * half8 * half8 * half8
                 if len(values):
                     value = wa * values[a] + wb * values[b] + wc * values[c]
                     place = min(max(value, 0.0), 1.0) * (len(ramp) - 1)
