@@ -1,0 +1,174 @@
+/**
+ * The pictures of a geometry video, by the browser's own `<video>`; a canvas gives their luma back exactly.
+ *
+ * Luma 16..235 (limited range, neutral chroma) comes out of the canvas as a grey of 0..255; the steps are 1.16 apart, so a
+ * table undoes the expansion without doubt. Playback follows the video's clock: whoever draws late gets the picture of that
+ * moment, and none is queued. A frame is sought in the middle of its time, and checked by what the browser says it shows.
+ */
+
+import { GeometryVideoError } from "./format/errors.js";
+
+const LOW = 16;
+const HIGH = 235;
+const LEVELS = Uint8Array.from({ length: 256 }, (_, grey) => LOW + Math.round((grey * (HIGH - LOW)) / 255));
+const SHOWN_WITHIN = 300; // ms after `seeked` in which the browser says what it shows; in a hidden page it never does
+
+export class VideoPictures {
+  /**
+   * @param {Blob} file @param {number} fps @param {number} frames
+   * @param {[number, number]} size of a picture, pixels
+   * @returns {Promise<VideoPictures>}
+   */
+  static async open(file, fps, frames, size) {
+    const pictures = new VideoPictures(file, fps, frames, size);
+    try {
+      await pictures.#load();
+    } catch (error) {
+      pictures.close();
+      throw error;
+    }
+    return pictures;
+  }
+
+  constructor(file, fps, frames, [width, height]) {
+    this.fps = fps;
+    this.frames = frames;
+    this.width = width;
+    this.height = height;
+    /** The frame that the video shows; -1: not known. */
+    this.shown = -1;
+    this.url = URL.createObjectURL(file);
+    this.video = Object.assign(document.createElement("video"), { muted: true, playsInline: true, preload: "auto" });
+    const canvas = Object.assign(document.createElement("canvas"), { width, height });
+    this.context = canvas.getContext("2d", { willReadFrequently: true, alpha: false });
+  }
+
+  async #load() {
+    const { video } = this;
+    await new Promise((resolve, reject) => {
+      video.addEventListener("loadeddata", resolve, { once: true });
+      video.addEventListener("error", () => reject(this.#failure()), { once: true });
+      video.src = this.url;
+      video.load();
+    });
+    if (video.videoWidth !== this.width || video.videoHeight !== this.height) {
+      const found = `${video.videoWidth}x${video.videoHeight}`;
+      throw new GeometryVideoError("corrupt", `its video is ${found} pixels; ${this.width}x${this.height} are needed`);
+    }
+  }
+
+  #failure() {
+    const reason = this.video.error?.message || "H.264 in MP4 is needed";
+    return new GeometryVideoError("unsupported", `this browser cannot decode the video: ${reason}`);
+  }
+
+  /** Show a frame and wait until it is there. Pauses. */
+  async seek(frame) {
+    const { video } = this;
+    video.pause();
+    if (this.shown === frame) return;
+    const time = (frame + 0.5) / this.fps;
+    for (let attempt = 0; attempt < 3; attempt++) {
+      const found = await this.#seekTo(time + (attempt * 0.1) / this.fps);
+      if (found === frame) {
+        this.shown = frame;
+        return;
+      }
+    }
+    throw new GeometryVideoError("unsupported", `this browser does not show frame ${frame} when it is asked for`);
+  }
+
+  /** Seek, and return the frame that the browser then says it shows; or, where it cannot say, the one asked for. */
+  #seekTo(time) {
+    const { video } = this;
+    this.shown = -1;
+    return new Promise((resolve, reject) => {
+      let handle = 0;
+      let shown = -1;
+      let timer = 0;
+      const finish = (frame) => {
+        clearTimeout(timer);
+        if (handle) video.cancelVideoFrameCallback(handle);
+        video.removeEventListener("seeked", seeked);
+        video.removeEventListener("error", failed);
+        resolve(frame);
+      };
+      const failed = () => {
+        finish(-1);
+        reject(this.#failure());
+      };
+      const seeked = () => {
+        if (shown >= 0 || !video.requestVideoFrameCallback) finish(shown >= 0 ? shown : this.#frameAt(time));
+        else timer = setTimeout(() => finish(this.#frameAt(time)), SHOWN_WITHIN);
+      };
+      const presented = (_, { mediaTime }) => {
+        shown = Math.round(mediaTime * this.fps);
+        if (timer) finish(shown);
+        else handle = video.requestVideoFrameCallback(presented);
+      };
+      if (video.requestVideoFrameCallback) handle = video.requestVideoFrameCallback(presented);
+      video.addEventListener("seeked", seeked);
+      video.addEventListener("error", failed);
+      video.currentTime = time;
+    });
+  }
+
+  /**
+   * Play on from here, `rate` times as fast; `show(frame)` is called for each frame that the browser shows while it is there
+   * to be read, `ended()` at the end if it does not loop.
+   */
+  async play(show, ended, rate, loop) {
+    const { video } = this;
+    video.playbackRate = rate;
+    video.loop = loop;
+    this.shown = -1;
+    const playing = (this.playing = {});
+    const next = (_, metadata) => {
+      if (this.playing !== playing) return;
+      const time = metadata ? metadata.mediaTime : video.currentTime;
+      const frame = Math.min(this.frames - 1, metadata ? Math.round(time * this.fps) : Math.floor(time * this.fps));
+      if (frame !== this.shown) {
+        this.shown = frame;
+        show(frame);
+      }
+      if (!video.ended && !video.paused) this.#onNextPicture(next);
+    };
+    video.onended = () => {
+      if (this.playing !== playing) return;
+      this.playing = null;
+      ended();
+    };
+    this.#onNextPicture(next);
+    await video.play();
+  }
+
+  /** Stop playing; the frame shown last stays. */
+  pause() {
+    this.playing = null;
+    this.video.pause();
+    this.shown = -1; // the browser may have gone on to the next picture since
+  }
+
+  #onNextPicture(callback) {
+    if (this.video.requestVideoFrameCallback) this.video.requestVideoFrameCallback(callback);
+    else requestAnimationFrame(() => callback(0, null));
+  }
+
+  /** @param {Uint32Array} samples indices of a picture's samples @param {Uint8Array} levels filled with theirs, 16..235 */
+  gather(samples, levels) {
+    this.context.drawImage(this.video, 0, 0);
+    const { data } = this.context.getImageData(0, 0, this.width, this.height);
+    for (let i = 0; i < samples.length; i++) levels[i] = LEVELS[data[4 * samples[i]]];
+  }
+
+  close() {
+    this.playing = null;
+    this.video.removeAttribute("src");
+    this.video.load();
+    URL.revokeObjectURL(this.url);
+  }
+
+  #frameAt(time) {
+    return Math.floor(time * this.fps);
+  }
+}
