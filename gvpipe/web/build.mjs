@@ -8,7 +8,7 @@ const notice = readFileSync(here("LICENSES/NOTICE.txt"), "utf8").trim();
 
 await build({
   absWorkingDir: here("."),
-  entryPoints: { "geometry-video": "src/geometry_video.js" },
+  entryPoints: { "geometry-video": "src/geometry_video.js", player: "src/player.js" },
   outdir: process.argv[2] ?? "bundle",
   bundle: true,
   minify: true,
@@ -17,6 +17,6 @@ await build({
   charset: "utf8",
   legalComments: "none", // the notice holds them
   banner: { js: `/*!\n${notice}\n*/` },
-  loader: { ".wasm": "binary" },
+  loader: { ".wasm": "binary", ".css": "text" },
   external: ["node:fs", "fs", "path"], // asked for by Draco's wrapper in Node alone
 });

@@ -1,0 +1,253 @@
+/**
+ * The player as an element: `<geometry-video src="walk.mp4" autoplay loop></geometry-video>`.
+ *
+ * Attributes: `src` (an address, or `#id` of an element in the page that holds the file as base64 text), `autoplay` (not for
+ * those who prefer reduced motion), `loop`, `wireframe`, `speed` (1 is the video's own), `up` ("y", or "z").
+ * Events: `ready`, `frame` (detail: the frame's number), `ended`, `error` (detail: a `GeometryVideoError`).
+ */
+
+import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
+import { Bar } from "./bar.js";
+import { Stage } from "./stage.js";
+import style from "./style.css";
+
+const MARKUP = `<style>${style}</style>
+  <div class="stage"><canvas tabindex="0" role="img"></canvas><div class="message" role="status"></div></div>
+  <div class="bar" role="group" aria-label="Playback"></div>`;
+const TURN = Math.PI / 18;
+
+export class GeometryVideoElement extends HTMLElement {
+  static observedAttributes = ["src", "loop", "wireframe", "speed"];
+
+  #stage = null;
+  #bar;
+  #message;
+  #loading = 0; // counts loads, so that a late one does not replace its successor
+  #positions = null;
+  #wanted = null; // the frame that is to be sought next
+  #seeking = null;
+  #resume = false; // whether to play on when the slider is let go
+
+  /** The `GeometryVideo` that is shown, or null. */
+  video = null;
+  currentFrame = 0;
+  paused = true;
+
+  constructor() {
+    super();
+    const root = this.attachShadow({ mode: "open" });
+    root.innerHTML = MARKUP;
+    this.#message = root.querySelector(".message");
+    this.#bar = new Bar(root.querySelector(".bar"), {
+      act: (name) => this.#act(name),
+      seek: (frame, done) => this.#scrub(frame, done),
+      speed: (speed) => this.setAttribute("speed", speed),
+    });
+    this.#bar.setEnabled(false);
+    root.addEventListener("keydown", (event) => this.#onKey(event));
+  }
+
+  connectedCallback() {
+    if (this.hasAttribute("src") && !this.video) this.load(this.getAttribute("src"));
+  }
+
+  disconnectedCallback() {
+    this.#unload();
+    this.#stage?.close();
+    this.#stage = null;
+    const canvas = this.shadowRoot.querySelector("canvas");
+    canvas.replaceWith(canvas.cloneNode()); // its WebGL context is gone for good
+  }
+
+  attributeChangedCallback(name, before, value) {
+    if (name === "src" && before !== value && this.isConnected && value !== null) this.load(value);
+    if (name === "loop" || name === "wireframe") this.#bar.setPressed(name, value !== null);
+    if (name === "wireframe") this.#stage?.setWireframe(value !== null);
+    if (name === "speed") this.#bar.setSpeed(this.speed);
+    if ((name === "loop" || name === "speed") && !this.paused) this.play(); // with the new value
+  }
+
+  get speed() {
+    const speed = Number(this.getAttribute("speed") ?? 1);
+    return speed >= 0.0625 && speed <= 16 ? speed : 1; // what browsers play
+  }
+
+  /** Load and show a file: an address, `#id`, or the file itself. Errors are shown in the element. */
+  async load(source) {
+    this.#unload();
+    const loading = this.#loading;
+    this.#say("Loading …");
+    try {
+      const video = await GeometryVideo.load(typeof source === "string" && source[0] === "#" ? embedded(source) : source);
+      if (loading !== this.#loading) return video.close();
+      this.video = video;
+      this.#positions = await video.frame(0);
+      if (loading !== this.#loading) return undefined;
+      this.#stage ??= openStage(this.shadowRoot.querySelector("canvas"));
+      this.#stage.setMesh(video, this.#positions, this.getAttribute("up") ?? "y");
+      this.#stage.setWireframe(this.hasAttribute("wireframe"));
+    } catch (error) {
+      if (loading === this.#loading) this.#fail(error);
+      return undefined;
+    }
+    this.#say("");
+    this.#bar.setVideo(this.video);
+    this.#bar.setEnabled(true);
+    this.#show(0);
+    this.dispatchEvent(new CustomEvent("ready"));
+    if (this.hasAttribute("autoplay") && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.play();
+    return undefined;
+  }
+
+  /** Play on from the frame shown; from the start if that is the last. */
+  async play() {
+    const { video } = this;
+    if (!video) return;
+    try {
+      if (this.paused && this.currentFrame === video.frameCount - 1) await this.seek(0);
+      this.#setPaused(false);
+      const show = (positions, frame) => {
+        this.#stage.setPositions(positions);
+        this.#show(frame);
+      };
+      const ended = () => {
+        this.#setPaused(true);
+        this.dispatchEvent(new CustomEvent("ended"));
+      };
+      await video.play(show, { rate: this.speed, loop: this.hasAttribute("loop"), ended });
+    } catch (error) {
+      if (error.name === "AbortError") return; // paused before the browser had begun
+      if (error.name === "NotAllowedError") this.#setPaused(true);
+      else if (video === this.video) this.#fail(error);
+    }
+  }
+
+  pause() {
+    this.video?.pause();
+    this.#setPaused(true);
+  }
+
+  /** Show a frame, and pause. Of many calls in a row the last counts. */
+  seek(frame) {
+    if (!this.video) return Promise.resolve();
+    this.#setPaused(true);
+    this.#wanted = Math.max(0, Math.min(this.video.frameCount - 1, Math.round(frame)));
+    this.#seeking ??= this.#seekWanted().finally(() => (this.#seeking = null));
+    return this.#seeking;
+  }
+
+  async #seekWanted() {
+    while (this.#wanted !== null) {
+      const [video, frame] = [this.video, this.#wanted];
+      this.#wanted = null;
+      try {
+        await video.frame(frame, this.#positions);
+        if (video !== this.video) return;
+        this.#stage.setPositions(this.#positions);
+        this.#show(frame);
+      } catch (error) {
+        if (video === this.video) this.#fail(error);
+        return;
+      }
+    }
+  }
+
+  #scrub(frame, done) {
+    if (!done && !this.paused) this.#resume = true;
+    const sought = this.seek(frame);
+    if (!done || !this.#resume) return;
+    this.#resume = false;
+    sought.then(() => this.play());
+  }
+
+  #act(name) {
+    if (name === "play") return this.paused ? this.play() : this.pause();
+    if (name === "back") return this.seek(this.currentFrame - 1);
+    if (name === "forward") return this.seek(this.currentFrame + 1);
+    if (name === "view") return this.#stage.resetView();
+    return this.toggleAttribute(name); // loop, wireframe
+  }
+
+  #onKey(event) {
+    const onSlider = event.target.matches("input, select");
+    if (!this.video || event.ctrlKey || event.metaKey || event.altKey) return;
+    const { key, shiftKey } = event;
+    const last = this.video.frameCount - 1;
+    const turns = { ArrowLeft: [-TURN, 0], ArrowRight: [TURN, 0], ArrowUp: [0, TURN], ArrowDown: [0, -TURN] };
+    const keys = {
+      ArrowLeft: () => this.#act("back"),
+      ArrowRight: () => this.#act("forward"),
+      Home: () => this.seek(0),
+      End: () => this.seek(last),
+      " ": () => this.#act("play"),
+      "+": () => this.#stage.zoom(1 / 1.15),
+      "-": () => this.#stage.zoom(1.15),
+      "<": () => this.setAttribute("speed", Bar.nextSpeed(this.speed, -1)),
+      ">": () => this.setAttribute("speed", Bar.nextSpeed(this.speed, 1)),
+      l: () => this.#act("loop"),
+      w: () => this.#act("wireframe"),
+      r: () => this.#act("view"),
+    };
+    const own = key === " " && event.target.matches("button, select"); // space presses what has the focus
+    if (own || (onSlider && /^(Arrow|Home|End)/.test(key))) return;
+    const action = shiftKey && turns[key] ? () => this.#stage.orbit(...turns[key]) : (keys[key] ?? keys[key.toLowerCase()]);
+    if (!action) return;
+    event.preventDefault();
+    action();
+  }
+
+  #show(frame) {
+    this.currentFrame = frame;
+    this.#bar.setFrame(frame);
+    this.shadowRoot.querySelector("canvas").ariaLabel = "Animated mesh; shift and arrow keys turn it, + and - zoom";
+    this.dispatchEvent(new CustomEvent("frame", { detail: frame }));
+  }
+
+  #setPaused(paused) {
+    this.paused = paused;
+    this.#bar.setPlaying(!paused);
+  }
+
+  #fail(error) {
+    this.#unload();
+    const known = error instanceof GeometryVideoError;
+    this.#say(known ? `Cannot play this file: ${error.message}.` : `The player failed: ${error.message}`, "alert");
+    this.dispatchEvent(new CustomEvent("error", { detail: error }));
+  }
+
+  #say(text, role = "status") {
+    this.#message.setAttribute("role", role);
+    this.#message.textContent = text;
+  }
+
+  #unload() {
+    this.#loading++;
+    this.video?.close();
+    this.video = null;
+    this.#wanted = null;
+    this.#resume = false;
+    this.currentFrame = 0;
+    this.#stage?.clear();
+    this.#bar.setEnabled(false);
+    this.#setPaused(true);
+  }
+}
+
+function openStage(canvas) {
+  try {
+    return new Stage(canvas);
+  } catch {
+    throw new GeometryVideoError("unsupported", "this browser offers no WebGL to draw with");
+  }
+}
+
+/** The file that an element of the page holds as base64 text. */
+function embedded(selector) {
+  const holder = document.getElementById(selector.slice(1));
+  if (!holder) throw new GeometryVideoError("load", `the page has no element ${selector}`);
+  try {
+    return Uint8Array.from(atob(holder.textContent.trim()), (character) => character.charCodeAt(0));
+  } catch {
+    throw new GeometryVideoError("corrupt", `the element ${selector} does not hold base64 text`);
+  }
+}
