@@ -26,11 +26,15 @@ const MARGIN = 1.06; // around what is framed
 const AZIMUTH = Math.PI / 7; // of the first view: from the front, a little from the right and from above
 const ELEVATION = Math.PI / 12;
 const MAX_PIXEL_RATIO = 2;
+const SOFTWARE = /SwiftShader|llvmpipe|softpipe|software|Basic Render/i; // renderers that run on the processor
+const MAX_SOFTWARE_PIXELS = 512 * 768; // drawn without a GPU: larger pictures are scaled up, and play on smoothly
 
 export class Stage {
   /** @param {HTMLCanvasElement} canvas sized by its page */
   constructor(canvas) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.hasGpu = probeGpu();
+    // without a GPU smooth edges would cost more than all else together
+    this.renderer = new WebGLRenderer({ canvas, antialias: this.hasGpu, alpha: true });
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
     this.scene.add(this.camera);
@@ -172,7 +176,8 @@ export class Stage {
   #resize() {
     const { clientWidth: width, clientHeight: height } = this.renderer.domElement;
     if (!width || !height) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
+    const most = this.hasGpu ? MAX_PIXEL_RATIO : Math.min(1, Math.sqrt(MAX_SOFTWARE_PIXELS / (width * height)));
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, most));
     this.renderer.setSize(width, height, false);
     const aspect = width / height;
     this.camera.aspect = aspect;
@@ -181,4 +186,14 @@ export class Stage {
     this.camera.updateProjectionMatrix();
     this.requestRender();
   }
+}
+
+/** Whether WebGL is drawn by hardware, by the name that the browser gives its renderer. */
+function probeGpu() {
+  const context = document.createElement("canvas").getContext("webgl2");
+  if (!context) return false;
+  const named = context.getExtension("WEBGL_debug_renderer_info");
+  const name = context.getParameter(named ? named.UNMASKED_RENDERER_WEBGL : context.RENDERER);
+  context.getExtension("WEBGL_lose_context")?.loseContext();
+  return !SOFTWARE.test(name);
 }
