@@ -22,12 +22,14 @@ if TYPE_CHECKING:
     from gvpipe.rendering.pictures import render
     from gvpipe.rendering.renderer import Renderer
     from gvpipe.sequence import MeshSequence
+    from gvpipe.web import ExportReport, export_html
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Camera",
     "Comparison",
+    "ExportReport",
     "GvpipeError",
     "Info",
     "MeshSequence",
@@ -37,6 +39,7 @@ __all__ = [
     "compare",
     "decode",
     "encode",
+    "export_html",
     "info",
     "open",
     "read",
@@ -53,6 +56,7 @@ _HOMES = {
     "gvpipe.rendering.pictures": ("render",),
     "gvpipe.rendering.renderer": ("Renderer",),
     "gvpipe.sequence": ("MeshSequence",),
+    "gvpipe.web": ("ExportReport", "export_html"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -20,6 +20,7 @@ from gvpipe.errors import GvpipeError
 if TYPE_CHECKING:
     from gvpipe.codec import Progress
     from gvpipe.sequence import MeshSequence
+    from gvpipe.web import ExportReport
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
@@ -172,6 +173,46 @@ def compare(reference: str, distorted: str, as_json: bool) -> None:
     return None
 
 
+@cli.command("export-html")
+@click.argument("source", metavar="FILE.mp4")
+@click.argument("target", metavar="OUT.html")
+@click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="The axis that stands upright.")
+@click.option("--quality", type=float, help="0-100, where the file must be converted. [default: 75]")
+@as_json
+def export_html(source: str, target: str, up: str, quality: float | None, as_json: bool) -> None:
+    """Write a web page of one file that plays a geometry video, without a network.
+
+    Browsers read codec mcgv in its web profile; other files are converted, which adds an error that is told.
+    """
+    from gvpipe import web
+
+    with _progress() as progress:
+        report = web.export_html(source, target, up, quality, progress)
+    if as_json:
+        return _print_json(report.to_json())
+    click.echo(f"{source} -> {target} ({_size(report.bytes)}, {_size(report.video_bytes)} of which are the geometry video)")
+    _tell_conversion(report)
+    return None
+
+
+@cli.command()
+@click.argument("source", metavar="FILE.mp4")
+@click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="The axis that stands upright.")
+def play(source: str, up: str) -> None:
+    """Play a geometry video in your browser; print the path of the page where there is none."""
+    import tempfile
+    from pathlib import Path
+
+    from gvpipe import web
+    from gvpipe.web.browser import open_page
+
+    with _progress() as progress:
+        page = Path(tempfile.mkdtemp(prefix="gvpipe-")) / f"{Path(source).stem}.html"  # stays: the browser reads it later
+        report = web.export_html(source, page, up, None, progress)
+    _tell_conversion(report)
+    click.echo(f"{source} plays in your browser" if open_page(page) else page)
+
+
 @cli.command()
 @click.argument("source", metavar="FILE.mp4|SEQUENCE")
 @click.argument("target", metavar="OUT.png|.gif|.mp4")
@@ -254,6 +295,17 @@ def _parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:
             raise click.UsageError(f"--set {pair}: KEY=VALUE is needed, such as --set clusters=30")
         settings[key.strip()] = value.strip()
     return settings
+
+
+def _tell_conversion(report: ExportReport) -> None:
+    """Say on standard error what the page shows instead of the file's own frames."""
+    if report.converted:
+        rmse, largest = ("not defined" if v is None else f"{v:.1e}" for v in (report.rmse_diag, report.max_diag))
+        click.echo(
+            f"Note: browsers cannot read {report.converted}; converted to mcgv, web profile, which adds an error of rmse {rmse}, "
+            f"at most {largest}, of the diagonal.",
+            err=True,
+        )
 
 
 def _print_json(values: dict[str, Any]) -> None:

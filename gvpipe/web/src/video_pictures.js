@@ -11,7 +11,7 @@ import { GeometryVideoError } from "./format/errors.js";
 const LOW = 16;
 const HIGH = 235;
 const LEVELS = Uint8Array.from({ length: 256 }, (_, grey) => LOW + Math.round((grey * (HIGH - LOW)) / 255));
-const SHOWN_WITHIN = 300; // ms after `seeked` in which the browser says what it shows; in a hidden page it never does
+const SHOWN_WITHIN = 1000; // ms after `seeked` in which the browser says what it shows; in a hidden page it never does
 
 export class VideoPictures {
   /**
@@ -55,6 +55,7 @@ export class VideoPictures {
       const found = `${video.videoWidth}x${video.videoHeight}`;
       throw new GeometryVideoError("corrupt", `its video is ${found} pixels; ${this.width}x${this.height} are needed`);
     }
+    this.shown = 0;
   }
 
   #failure() {
@@ -69,8 +70,7 @@ export class VideoPictures {
     if (this.shown === frame) return;
     const time = (frame + 0.5) / this.fps;
     for (let attempt = 0; attempt < 3; attempt++) {
-      const found = await this.#seekTo(time + (attempt * 0.1) / this.fps);
-      if (found === frame) {
+      if ((await this.#seekTo(frame, time + (attempt * 0.1) / this.fps)) === frame) {
         this.shown = frame;
         return;
       }
@@ -79,34 +79,34 @@ export class VideoPictures {
   }
 
   /** Seek, and return the frame that the browser then says it shows; or, where it cannot say, the one asked for. */
-  #seekTo(time) {
+  #seekTo(frame, time) {
     const { video } = this;
+    const says = "requestVideoFrameCallback" in video;
     this.shown = -1;
     return new Promise((resolve, reject) => {
-      let handle = 0;
-      let shown = -1;
-      let timer = 0;
-      const finish = (frame) => {
+      let [handle, timer, shown, arrived] = [0, 0, -1, false];
+      const finish = (settle, value) => {
         clearTimeout(timer);
         if (handle) video.cancelVideoFrameCallback(handle);
         video.removeEventListener("seeked", seeked);
         video.removeEventListener("error", failed);
-        resolve(frame);
+        settle(value);
       };
-      const failed = () => {
-        finish(-1);
-        reject(this.#failure());
-      };
+      const failed = () => finish(reject, this.#failure());
       const seeked = () => {
-        if (shown >= 0 || !video.requestVideoFrameCallback) finish(shown >= 0 ? shown : this.#frameAt(time));
-        else timer = setTimeout(() => finish(this.#frameAt(time)), SHOWN_WITHIN);
+        arrived = true;
+        if (!says || shown === frame) return finish(resolve, frame);
+        const late = () => finish(resolve, shown < 0 || document.hidden ? frame : shown);
+        timer = setTimeout(late, SHOWN_WITHIN);
+        return undefined;
       };
       const presented = (_, { mediaTime }) => {
-        shown = Math.round(mediaTime * this.fps);
-        if (timer) finish(shown);
-        else handle = video.requestVideoFrameCallback(presented);
+        shown = Math.round(mediaTime * this.fps); // perhaps still the frame from before the seek
+        if (arrived && shown === frame) return finish(resolve, frame);
+        handle = video.requestVideoFrameCallback(presented);
+        return undefined;
       };
-      if (video.requestVideoFrameCallback) handle = video.requestVideoFrameCallback(presented);
+      if (says) handle = video.requestVideoFrameCallback(presented);
       video.addEventListener("seeked", seeked);
       video.addEventListener("error", failed);
       video.currentTime = time;
@@ -166,9 +166,5 @@ export class VideoPictures {
     this.video.removeAttribute("src");
     this.video.load();
     URL.revokeObjectURL(this.url);
-  }
-
-  #frameAt(time) {
-    return Math.floor(time * this.fps);
   }
 }

@@ -60,7 +60,9 @@ export class Bar {
       formatBytes(video.byteLength),
       `${formatRate(video.bitRate)}`,
       `${bits.toFixed(2)} bits per vertex and frame`,
-    ].join(" · ");
+    ]
+      .map((fact) => fact.replaceAll(" ", "\u00a0"))
+      .join(" · ");
     this.facts.title = this.facts.textContent;
   }
 

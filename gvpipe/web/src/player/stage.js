@@ -65,7 +65,7 @@ export class Stage {
       this.geometry.setIndex(new BufferAttribute(video.indices, 1));
       const offset = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
       this.objects.push(new Mesh(this.geometry, new MeshLambertMaterial({ color: 0xb9c4d0, side: DoubleSide, ...offset })));
-      this.wires = new Mesh(this.geometry, new MeshBasicMaterial({ color: 0x2b3a4a, wireframe: true, visible: false }));
+      this.wires = new Mesh(this.geometry, new MeshBasicMaterial({ color: 0x1d2a38, wireframe: true, visible: false, transparent: true, opacity: 0.35 }));
       this.objects.push(this.wires);
     } else {
       this.objects.push(new Points(this.geometry, new PointsMaterial({ color: 0x6f8296, size: 3, sizeAttenuation: false })));
