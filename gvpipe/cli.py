@@ -302,8 +302,8 @@ def _tell_conversion(report: ExportReport) -> None:
     if report.converted:
         rmse, largest = ("not defined" if v is None else f"{v:.1e}" for v in (report.rmse_diag, report.max_diag))
         click.echo(
-            f"Note: browsers cannot read {report.converted}; converted to mcgv, web profile, which adds an error of rmse {rmse}, "
-            f"at most {largest}, of the diagonal.",
+            f"Note: browsers cannot read {report.converted}; the page holds a conversion to mcgv, web profile, which adds an "
+            f"error of rmse {rmse}, at most {largest}, of the diagonal.",
             err=True,
         )
 

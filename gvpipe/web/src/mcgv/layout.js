@@ -1,4 +1,4 @@
-/** Where each vertex sits in the picture, and which cluster moves it. Mirrors `decode_pixels`, `decode_clusters` of the codec. */
+/** Where each vertex sits in the picture, and which cluster moves it. Mirrors `decode_pixels` and `decode_clusters`. */
 
 import { Cursor } from "../format/cursor.js";
 import { corrupt } from "../format/errors.js";
@@ -38,7 +38,7 @@ export function decodePixels(data, visits, { width, height }) {
  */
 export function decodeClusters(data, pixels, { width, height, block, clusters }) {
   const across = width / block;
-  const blocks = Uint32Array.from(pixels, (p) => Math.floor(Math.floor(p / width) / block) * across + Math.floor((p % width) / block));
+  const blocks = pixels.map((p) => Math.floor(p / width / block) * across + Math.floor((p % width) / block));
   const rank = new Int32Array(across * (height / block)).fill(-1);
   for (const b of blocks) rank[b] = 0;
   let used = 0;

@@ -46,21 +46,27 @@ export class AffinePredictor {
   }
 
   /**
-   * The box that the predictions of frames stay in, without a look at any vertex: a cluster lies in a ball about its centre.
+   * The box that the predictions of frames stay in, without a look at any vertex: a cluster lies in a ball and in a box about
+   * its centre, and each moves with it.
    *
    * @param {Float64Array} transforms (frames, K, 4, 3) flat
-   * @param {{min: number[], max: number[]}} box made larger where needed
+   * @param {{min: number[], max: number[]}} bounds made larger where needed
    */
-  extend(box, transforms) {
-    const used = new Uint8Array(this.rest.length / 12);
-    for (const k of this.clusters) used[k] = 1;
+  extend(bounds, transforms) {
+    const half = new Float64Array(this.rest.length / 4).fill(-1); // (K, 3) half sides of the clusters' boxes; -1: empty
+    this.clusters.forEach((k, v) => {
+      for (let j = 0; j < 3; j++) half[3 * k + j] = Math.max(half[3 * k + j], Math.abs(this.coordinates[3 * v + j]));
+    });
     for (let row = 0; row < transforms.length; row += 12) {
-      if (!used[(row / 12) % used.length]) continue;
+      const k = (row / 12) % (half.length / 3);
+      if (half[3 * k] < 0) continue;
       for (let axis = 0; axis < 3; axis++) {
-        const reach = Math.hypot(transforms[row + axis], transforms[row + 3 + axis], transforms[row + 6 + axis]);
+        const images = [0, 1, 2].map((j) => Math.abs(transforms[row + 3 * j + axis]));
+        const box = images.reduce((sum, image, j) => sum + image * half[3 * k + j], 0);
+        const reach = Math.min(Math.hypot(...images), box);
         const centre = transforms[row + 9 + axis];
-        box.min[axis] = Math.min(box.min[axis], centre - reach);
-        box.max[axis] = Math.max(box.max[axis], centre + reach);
+        bounds.min[axis] = Math.min(bounds.min[axis], centre - reach);
+        bounds.max[axis] = Math.max(bounds.max[axis], centre + reach);
       }
     }
   }

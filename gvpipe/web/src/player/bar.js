@@ -84,17 +84,16 @@ export class Bar {
   }
 
   setSpeed(speed) {
-    if (!SPEEDS.includes(speed) && ![...this.speeds.options].some((option) => Number(option.value) === speed)) {
-      this.speeds.add(new Option(`${speed}×`, speed));
-    }
+    const isOffered = [...this.speeds.options].some((option) => Number(option.value) === speed);
+    if (!isOffered) this.speeds.add(new Option(`${speed}×`, speed));
     this.speeds.value = speed;
   }
+}
 
-  /** The next speed up or down from `speed`. */
-  static nextSpeed(speed, direction) {
-    const sorted = direction > 0 ? SPEEDS : SPEEDS.toReversed();
-    return sorted.find((other) => direction * (other - speed) > 0) ?? speed;
-  }
+/** The next speed up (direction 1) or down (-1) from `speed`. */
+export function nextSpeed(speed, direction) {
+  const sorted = direction > 0 ? SPEEDS : SPEEDS.toReversed();
+  return sorted.find((other) => direction * (other - speed) > 0) ?? speed;
 }
 
 function formatBytes(count) {

@@ -7,14 +7,16 @@
  */
 
 import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
-import { Bar } from "./bar.js";
+import { Bar, nextSpeed } from "./bar.js";
+import { actionOf } from "./keys.js";
 import { Stage } from "./stage.js";
 import style from "./style.css";
 
 const MARKUP = `<style>${style}</style>
   <div class="stage"><canvas tabindex="0" role="img"></canvas><div class="message" role="status"></div></div>
   <div class="bar" role="group" aria-label="Playback"></div>`;
-const TURN = Math.PI / 18;
+const TURN = Math.PI / 18; // by one press of a key
+const ZOOM = 1.15;
 
 export class GeometryVideoElement extends HTMLElement {
   static observedAttributes = ["src", "loop", "wireframe", "speed"];
@@ -70,6 +72,11 @@ export class GeometryVideoElement extends HTMLElement {
   get speed() {
     const speed = Number(this.getAttribute("speed") ?? 1);
     return speed >= 0.0625 && speed <= 16 ? speed : 1; // what browsers play
+  }
+
+  /** 16 numbers, a (4, 4) matrix by columns: from model units to the picture's clip space, for those who draw over it. */
+  get projection() {
+    return this.video ? Array.from(this.#stage.projection) : null;
   }
 
   /** Load and show a file: an address, `#id`, or the file itself. Errors are shown in the element. */
@@ -161,39 +168,32 @@ export class GeometryVideoElement extends HTMLElement {
   }
 
   #act(name) {
-    if (name === "play") return this.paused ? this.play() : this.pause();
-    if (name === "back") return this.seek(this.currentFrame - 1);
-    if (name === "forward") return this.seek(this.currentFrame + 1);
-    if (name === "view") return this.#stage.resetView();
-    return this.toggleAttribute(name); // loop, wireframe
+    const actions = {
+      play: () => (this.paused ? this.play() : this.pause()),
+      back: () => this.seek(this.currentFrame - 1),
+      forward: () => this.seek(this.currentFrame + 1),
+      first: () => this.seek(0),
+      last: () => this.seek(this.video.frameCount - 1),
+      slower: () => this.setAttribute("speed", nextSpeed(this.speed, -1)),
+      faster: () => this.setAttribute("speed", nextSpeed(this.speed, 1)),
+      loop: () => this.toggleAttribute("loop"),
+      wireframe: () => this.toggleAttribute("wireframe"),
+      view: () => this.#stage.resetView(),
+      nearer: () => this.#stage.zoom(1 / ZOOM),
+      farther: () => this.#stage.zoom(ZOOM),
+      "turn-left": () => this.#stage.orbit(-TURN, 0),
+      "turn-right": () => this.#stage.orbit(TURN, 0),
+      "turn-up": () => this.#stage.orbit(0, TURN),
+      "turn-down": () => this.#stage.orbit(0, -TURN),
+    };
+    if (this.video && this.#stage) actions[name]();
   }
 
   #onKey(event) {
-    const onSlider = event.target.matches("input, select");
-    if (!this.video || event.ctrlKey || event.metaKey || event.altKey) return;
-    const { key, shiftKey } = event;
-    const last = this.video.frameCount - 1;
-    const turns = { ArrowLeft: [-TURN, 0], ArrowRight: [TURN, 0], ArrowUp: [0, TURN], ArrowDown: [0, -TURN] };
-    const keys = {
-      ArrowLeft: () => this.#act("back"),
-      ArrowRight: () => this.#act("forward"),
-      Home: () => this.seek(0),
-      End: () => this.seek(last),
-      " ": () => this.#act("play"),
-      "+": () => this.#stage.zoom(1 / 1.15),
-      "-": () => this.#stage.zoom(1.15),
-      "<": () => this.setAttribute("speed", Bar.nextSpeed(this.speed, -1)),
-      ">": () => this.setAttribute("speed", Bar.nextSpeed(this.speed, 1)),
-      l: () => this.#act("loop"),
-      w: () => this.#act("wireframe"),
-      r: () => this.#act("view"),
-    };
-    const own = key === " " && event.target.matches("button, select"); // space presses what has the focus
-    if (own || (onSlider && /^(Arrow|Home|End)/.test(key))) return;
-    const action = shiftKey && turns[key] ? () => this.#stage.orbit(...turns[key]) : (keys[key] ?? keys[key.toLowerCase()]);
+    const action = actionOf(event);
     if (!action) return;
     event.preventDefault();
-    action();
+    this.#act(action);
   }
 
   #show(frame) {

@@ -7,6 +7,7 @@ import {
   DoubleSide,
   DynamicDrawUsage,
   HemisphereLight,
+  Matrix4,
   Mesh,
   MeshBasicMaterial,
   MeshLambertMaterial,
@@ -44,6 +45,8 @@ export class Stage {
     this.scene.add(new HemisphereLight(0xffffff, 0x8c8a88, 1.4));
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener("change", () => this.requestRender());
+    this.controls.addEventListener("start", () => (this.isFramed = false));
+    this.isFramed = false; // whether the view is still the first one, which follows the picture's shape
     this.geometry = null;
     this.pending = 0;
     this.observer = new ResizeObserver(() => this.#resize());
@@ -65,7 +68,8 @@ export class Stage {
       this.geometry.setIndex(new BufferAttribute(video.indices, 1));
       const offset = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
       this.objects.push(new Mesh(this.geometry, new MeshLambertMaterial({ color: 0xb9c4d0, side: DoubleSide, ...offset })));
-      this.wires = new Mesh(this.geometry, new MeshBasicMaterial({ color: 0x1d2a38, wireframe: true, visible: false, transparent: true, opacity: 0.35 }));
+      const lines = { wireframe: true, visible: false, transparent: true, opacity: 0.35 };
+      this.wires = new Mesh(this.geometry, new MeshBasicMaterial({ color: 0x1d2a38, ...lines }));
       this.objects.push(this.wires);
     } else {
       this.objects.push(new Points(this.geometry, new PointsMaterial({ color: 0x6f8296, size: 3, sizeAttenuation: false })));
@@ -76,6 +80,7 @@ export class Stage {
     }
     this.camera.up.set(0, up === "z" ? 0 : 1, up === "z" ? 1 : 0);
     this.setPositions(positions);
+    this.#resize();
     this.resetView();
   }
 
@@ -93,6 +98,14 @@ export class Stage {
     this.requestRender();
   }
 
+  /** (4, 4) by columns: from model units to clip space. */
+  get projection() {
+    const { centre, scale, camera } = this;
+    camera.updateMatrixWorld();
+    const toBall = new Matrix4().makeScale(scale, scale, scale).setPosition(...centre.map((value) => -value * scale));
+    return new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).multiply(toBall).elements;
+  }
+
   setWireframe(visible) {
     if (this.wires) this.wires.material.visible = visible;
     this.requestRender();
@@ -108,6 +121,7 @@ export class Stage {
     this.camera.position.copy(direction).multiplyScalar(this.#distance(direction));
     this.controls.target.set(0, 0, 0);
     this.controls.update();
+    this.isFramed = true;
     this.requestRender();
   }
 
@@ -120,14 +134,12 @@ export class Stage {
     angles.theta += azimuth;
     angles.phi = Math.min(Math.PI - 0.01, Math.max(0.01, angles.phi - elevation));
     this.camera.position.copy(back(offset.setFromSpherical(angles)).add(this.controls.target));
-    this.controls.update();
-    this.requestRender();
+    this.#moved();
   }
 
   zoom(factor) {
     this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
-    this.controls.update();
-    this.requestRender();
+    this.#moved();
   }
 
   /** Draw before the browser's next repaint, once however often asked. */
@@ -145,6 +157,7 @@ export class Stage {
     }
     this.geometry?.dispose();
     this.objects = this.geometry = this.wires = null;
+    this.isFramed = false;
     this.requestRender();
   }
 
@@ -154,6 +167,12 @@ export class Stage {
     this.observer.disconnect();
     this.controls.dispose();
     this.renderer.dispose();
+  }
+
+  #moved() {
+    this.isFramed = false;
+    this.controls.update();
+    this.requestRender();
   }
 
   /** From where, looking along -direction, the box of the motion just fits. */
@@ -184,6 +203,7 @@ export class Stage {
     const shorter = Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
     this.camera.fov = (360 / Math.PI) * Math.atan(aspect < 1 ? shorter / aspect : shorter);
     this.camera.updateProjectionMatrix();
+    if (this.isFramed) this.resetView();
     this.requestRender();
   }
 }
