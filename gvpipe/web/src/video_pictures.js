@@ -45,6 +45,9 @@ export class VideoPictures {
 
   async #load() {
     const { video } = this;
+    if (!video.requestVideoFrameCallback) {
+      throw new GeometryVideoError("unsupported", "this browser does not tell which frame a video shows; a newer one is needed");
+    }
     await new Promise((resolve, reject) => {
       video.addEventListener("loadeddata", resolve, { once: true });
       video.addEventListener("error", () => reject(this.#failure()), { once: true });
@@ -65,8 +68,7 @@ export class VideoPictures {
 
   /** Show a frame and wait until it is there. Pauses. */
   async seek(frame) {
-    const { video } = this;
-    video.pause();
+    this.pause();
     if (this.shown === frame) return;
     const time = (frame + 0.5) / this.fps;
     for (let attempt = 0; attempt < 3; attempt++) {
@@ -78,16 +80,15 @@ export class VideoPictures {
     throw new GeometryVideoError("unsupported", `this browser does not show frame ${frame} when it is asked for`);
   }
 
-  /** Seek, and return the frame that the browser then says it shows; or, where it cannot say, the one asked for. */
+  /** Seek, and return the frame that the browser then says it shows; where it says nothing, the one asked for. */
   #seekTo(frame, time) {
     const { video } = this;
-    const says = "requestVideoFrameCallback" in video;
     this.shown = -1;
     return new Promise((resolve, reject) => {
       let [handle, timer, shown, arrived] = [0, 0, -1, false];
       const finish = (settle, value) => {
         clearTimeout(timer);
-        if (handle) video.cancelVideoFrameCallback(handle);
+        video.cancelVideoFrameCallback(handle);
         video.removeEventListener("seeked", seeked);
         video.removeEventListener("error", failed);
         settle(value);
@@ -95,18 +96,18 @@ export class VideoPictures {
       const failed = () => finish(reject, this.#failure());
       const seeked = () => {
         arrived = true;
-        if (!says || shown === frame) return finish(resolve, frame);
+        if (shown === frame) return finish(resolve, frame);
         const late = () => finish(resolve, shown < 0 || document.hidden ? frame : shown);
         timer = setTimeout(late, SHOWN_WITHIN);
         return undefined;
       };
       const presented = (_, { mediaTime }) => {
-        shown = Math.round(mediaTime * this.fps); // perhaps still the frame from before the seek
+        shown = this.#frameAt(mediaTime); // perhaps still the frame from before the seek
         if (arrived && shown === frame) return finish(resolve, frame);
         handle = video.requestVideoFrameCallback(presented);
         return undefined;
       };
-      if (says) handle = video.requestVideoFrameCallback(presented);
+      handle = video.requestVideoFrameCallback(presented);
       video.addEventListener("seeked", seeked);
       video.addEventListener("error", failed);
       video.currentTime = time;
@@ -123,35 +124,35 @@ export class VideoPictures {
     video.loop = loop;
     this.shown = -1;
     const playing = (this.playing = {});
-    const next = (_, metadata) => {
+    const next = (_, { mediaTime }) => {
       if (this.playing !== playing) return;
-      const time = metadata ? metadata.mediaTime : video.currentTime;
-      const frame = Math.min(this.frames - 1, metadata ? Math.round(time * this.fps) : Math.floor(time * this.fps));
+      const frame = Math.min(this.frames - 1, this.#frameAt(mediaTime));
       if (frame !== this.shown) {
         this.shown = frame;
         show(frame);
       }
-      if (!video.ended && !video.paused) this.#onNextPicture(next);
+      if (!video.ended && !video.paused) video.requestVideoFrameCallback(next);
     };
     video.onended = () => {
       if (this.playing !== playing) return;
-      this.playing = null;
+      this.pause();
       ended();
     };
-    this.#onNextPicture(next);
+    video.requestVideoFrameCallback(next);
     await video.play();
   }
 
   /** Stop playing; the frame shown last stays. */
   pause() {
+    if (!this.playing) return;
     this.playing = null;
     this.video.pause();
     this.shown = -1; // the browser may have gone on to the next picture since
   }
 
-  #onNextPicture(callback) {
-    if (this.video.requestVideoFrameCallback) this.video.requestVideoFrameCallback(callback);
-    else requestAnimationFrame(() => callback(0, null));
+  /** Browsers tell when the frame begins, rounded either way, or (Firefox) the time sought inside it. */
+  #frameAt(time) {
+    return Math.floor(time * this.fps + 0.25);
   }
 
   /** @param {Uint32Array} samples indices of a picture's samples @param {Uint8Array} levels filled with theirs, 16..235 */
