@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import dataclasses
 import io
+import re
 import shutil
 import struct
 from collections.abc import Callable, Iterator
@@ -26,6 +27,7 @@ pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missin
 
 BUNDLE = Path(gvpipe.__file__).parent / "web" / "bundle"
 GOLDEN = Path(__file__).parent / "golden"
+DOCS = (Path(__file__).parents[1] / "docs" / "player.md").read_text("utf-8")
 SAMBA = Path(__file__).parents[2] / "shared" / "data" / "samba.npz"
 MODULE_PAGE = """<!doctype html><link rel="icon" href="data:,"><script type="module">
 import { GeometryVideo, GeometryVideoError } from "./geometry-video.js";
@@ -498,3 +500,24 @@ def test_exported_page_opens_from_a_disk_and_plays(browser: Any, video: Path, tm
     assert set(frames) <= set(range(11))
     assert all(request.startswith(("blob:", "data:")) for request in requests), requests
     assert title == "tube"
+
+
+def test_the_element_as_the_docs_show_it(browser: Any, site: tuple[Path, str]) -> None:
+    _encode(site, waving(10, 24), "walk.mp4")
+    (page,) = re.findall(r"```html\n(.*?)```", DOCS, re.DOTALL)
+    (site[0] / "docs.html").write_text(page)
+    browser.get(f"{site[1]}/docs.html")
+    played = """const element = document.querySelector("geometry-video");
+        await new Promise((resolve) => element.addEventListener("frame", () => !element.paused && resolve()));
+        return element.video.frameCount;"""
+    assert _run(browser, played) == 24
+
+
+def test_the_module_as_the_docs_show_it(module: Callable[..., Any], browser: Any, site: tuple[Path, str]) -> None:
+    _encode(site, waving(10, 24), "walk.mp4")
+    (script,) = re.findall(r"```js\n(.*?)```", DOCS, re.DOTALL)
+    drawn = "window.draw = (positions, indices) => { window.drawn = [positions.length, indices.length] };"
+    (site[0] / "docs.html").write_text(f"<!doctype html><script>{drawn}</script><script type=module>{script}</script>")
+    browser.get(f"{site[1]}/docs.html")
+    wait = "while (!window.drawn) await new Promise((resolve) => setTimeout(resolve, 50)); return window.drawn;"
+    assert _run(browser, wait) == [300, 3 * 162]
