@@ -1,4 +1,4 @@
-"""Makes docs/picture-render.png from the samples: source, decoded, and where the decoded one is off, for one frame.
+"""Makes docs/picture.png from the samples: source, decoded, and where the decoded one is off, for one frame.
 
 python docs/render_picture.py [OUT.png]
 """
@@ -36,4 +36,4 @@ def main(target: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1] if len(sys.argv) > 1 else str(Path(__file__).with_name("picture-render.png")))
+    main(sys.argv[1] if len(sys.argv) > 1 else str(Path(__file__).with_name("picture.png")))
