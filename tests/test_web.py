@@ -16,7 +16,7 @@ import chromium
 import numpy as np
 import numpy.typing as npt
 import pytest
-from PIL import Image, ImageDraw
+from PIL import Image
 from sequences import awkward, waving
 
 import gvpipe
@@ -295,12 +295,14 @@ PAINTED = "await new Promise((resolve) => requestAnimationFrame(() => requestAni
 
 
 def silhouette(points: npt.NDArray[np.float64], faces: npt.NDArray[np.int32], size: tuple[int, int]) -> Mask:
-    """Which pixels of a picture triangles cover; ``points (V, 2)`` in pixels."""
-    picture = Image.new("1", size)
-    draw = ImageDraw.Draw(picture)
-    for corners in points[faces]:
-        draw.polygon([tuple(corner) for corner in corners.tolist()], fill=1, outline=1)
-    return np.asarray(picture)
+    """Which pixels of a picture triangles cover, by the CPU renderer; ``points (V, 2)`` in pixels."""
+    width, height = size
+    flat = np.column_stack([points[:, 0], height - points[:, 1], np.zeros(len(points))]).astype(np.float32)
+    field = 28.0  # degrees; at this distance a unit is a pixel
+    distance = height / 2 / np.tan(np.radians(field) / 2)
+    camera = gvpipe.Camera((width / 2, height / 2, 0.0), distance, azimuth=0.0, elevation=0.0, field_of_view=field)
+    mask: Mask = gvpipe.Renderer(faces, flat, size, samples=1).visible(flat, camera) >= 0
+    return mask
 
 
 @pytest.mark.parametrize("up", ["y", "z"])
