@@ -256,6 +256,35 @@ def test_files_not_for_browsers_say_so(settings: dict[str, str], module: Callabl
     assert "export-html" in message
 
 
+@pytest.mark.parametrize(("field", "value"), [("n_frames", 12), ("n_frames", 1 << 24), ("n_vertices", 71), ("n_triangles", 1)])
+def test_counts_that_do_not_fit_are_noticed(
+    field: str, value: int, module: Callable[..., Any], site: tuple[Path, str], video: Path
+) -> None:
+    write_file(dataclasses.replace(read_file(video), **{field: value}), site[0] / "counts.mp4")
+    assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", "counts.mp4") == "corrupt"
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"width": 16},
+        {"height": 0},
+        {"block": 7},
+        {"clusters": 2000},
+        {"segments": 99},
+        {"base": [0, 0, 1]},
+        {"residual_step": -1},
+    ],
+    ids=str,
+)
+def test_settings_out_of_range_are_noticed(
+    settings: dict[str, Any], module: Callable[..., Any], site: tuple[Path, str], video: Path
+) -> None:
+    bitstream = read_file(video)
+    write_file(dataclasses.replace(bitstream, header={**bitstream.header, **settings}), site[0] / "settings.mp4")
+    assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", "settings.mp4") == "corrupt"
+
+
 @pytest.mark.parametrize("section", ["mesh", "order", "pixels", "clusters", "transforms.0"])
 def test_hostile_sections_give_one_clear_error(
     section: str, module: Callable[..., Any], site: tuple[Path, str], video: Path
@@ -289,7 +318,6 @@ LOAD = """const ready = new Promise((resolve, reject) => {
       element.addEventListener("error", (event) => reject(event.detail), { once: true });
     });
     element.src = args[0];
-    element.setAttribute("src", args[0]);
     await ready;"""
 PAINTED = "await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(resolve, 50))));"
 
@@ -429,8 +457,8 @@ def test_controls_by_mouse_and_keyboard(player: Callable[..., Any], browser: Any
         return player("await new Promise((resolve) => setTimeout(resolve, 300));" + state)
 
     root.find_element("css selector", "[data-act=forward]").click()
-    root.find_element("css selector", "[data-act=forward]").click()
-    assert press() == [2, True]
+    player("for (let i = 0; i < 5; i++) element.shadowRoot.querySelector('[data-act=forward]').click()")
+    assert press() == [6, True]  # each counts, however fast they come
     root.find_element("css selector", "canvas").click()
     assert press(Keys.END) == [23, True]
     assert press(Keys.ARROW_LEFT) == [22, True]

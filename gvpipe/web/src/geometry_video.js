@@ -24,12 +24,18 @@ export class GeometryVideo {
    */
   static async load(source) {
     const file = await fetchBytes(source);
-    const payload = await readPayload(readContainer(file));
-    const reader = await McgvReader.open(payload);
-    const { fps, frames } = payload.header;
-    const blob = new Blob([file], { type: "video/mp4" });
-    const pictures = await VideoPictures.open(blob, fps, frames, reader.pictureSize);
-    return new GeometryVideo(payload.header, file.length, reader, pictures);
+    let pictures = null;
+    try {
+      const payload = await readPayload(readContainer(file));
+      const reader = await McgvReader.open(payload);
+      const { fps, frames } = payload.header;
+      pictures = await VideoPictures.open(new Blob([file], { type: "video/mp4" }), fps, frames, reader.pictureSize);
+      return new GeometryVideo(payload.header, file.length, reader, pictures);
+    } catch (error) {
+      pictures?.close();
+      if (!(error instanceof RangeError)) throw error; // an array that the browser cannot give
+      throw new GeometryVideoError("unsupported", "it needs more memory than this browser has for a page");
+    }
   }
 
   #reader;

@@ -46,7 +46,7 @@ export class VideoPictures {
   async #load() {
     const { video } = this;
     if (!video.requestVideoFrameCallback) {
-      throw new GeometryVideoError("unsupported", "this browser does not tell which frame a video shows; a newer one is needed");
+      throw new GeometryVideoError("unsupported", "this browser does not tell which frame it shows; a newer one is needed");
     }
     await new Promise((resolve, reject) => {
       video.addEventListener("loadeddata", resolve, { once: true });
@@ -57,6 +57,10 @@ export class VideoPictures {
     if (video.videoWidth !== this.width || video.videoHeight !== this.height) {
       const found = `${video.videoWidth}x${video.videoHeight}`;
       throw new GeometryVideoError("corrupt", `its video is ${found} pixels; ${this.width}x${this.height} are needed`);
+    }
+    const found = video.duration * this.fps; // in units of a thousandth of a second
+    if (!(Math.abs(found - this.frames) <= 1 + 0.002 * this.fps)) {
+      throw new GeometryVideoError("corrupt", `its video lasts ${found.toFixed(1)} frames, the header says ${this.frames}`);
     }
     this.shown = 0;
   }

@@ -8,6 +8,7 @@ import { AffinePredictor } from "./prediction.js";
 import { decodeTransforms } from "./transforms.js";
 
 const ZERO = 128; // the level of a zero residual
+const SEGMENTS_KEPT = 4; // whose transforms stay decoded
 
 export class McgvReader {
   /** @param {import("../format/payload.js").Payload} payload @returns {Promise<McgvReader>} */
@@ -32,10 +33,10 @@ export class McgvReader {
     const { origin, baseStep } = header;
     const points = Float64Array.from(base.points, (index, i) => origin[i % 3] + index * baseStep);
     this.predictor = new AffinePredictor(points, clusters, header.clusters);
-    this.segments = new Map(); // segment -> its transforms, once decoded
+    this.segments = new Map(); // segment -> its transforms, the latest decoded ones
     const plane = header.width * header.height;
     /** (V, 3) which sample of a picture carries each coordinate. */
-    this.samples = new Uint32Array(3 * vertices(base));
+    this.samples = new Uint32Array(base.points.length);
     pixels.forEach((pixel, v) => this.samples.set([pixel, pixel + plane, pixel + 2 * plane], 3 * v));
   }
 
@@ -55,7 +56,7 @@ export class McgvReader {
     this.predictor.addTo(positions, this.#transforms(frame));
   }
 
-  /** The box that the whole motion stays in, but for residuals; model units. */
+  /** The box that the whole motion stays in, but for residuals; model units. Decodes, and so checks, all transforms. */
   bounds() {
     const box = { min: [Infinity, Infinity, Infinity], max: [-Infinity, -Infinity, -Infinity] };
     for (let s = 0; s < this.header.segments; s++) this.predictor.extend(box, this.#segment(s));
@@ -75,6 +76,7 @@ export class McgvReader {
       const frames = this.#start(s + 1) - this.#start(s);
       const { rest } = this.predictor;
       this.segments.set(s, decodeTransforms(this.payload.section(name), frames, rest, this.header.transformStep, name));
+      if (this.segments.size > SEGMENTS_KEPT) this.segments.delete(this.segments.keys().next().value);
     }
     return this.segments.get(s);
   }
@@ -82,8 +84,4 @@ export class McgvReader {
   #start(segment) {
     return Math.floor((segment * this.frames) / this.header.segments);
   }
-}
-
-function vertices(base) {
-  return base.visits.length;
 }

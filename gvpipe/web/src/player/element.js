@@ -12,8 +12,12 @@ import { actionOf } from "./keys.js";
 import { Stage } from "./stage.js";
 import style from "./style.css";
 
+const LABEL = "Animated mesh; shift and arrow keys turn it, + and - zoom";
 const MARKUP = `<style>${style}</style>
-  <div class="stage"><canvas tabindex="0" role="img"></canvas><div class="message" role="status"></div></div>
+  <div class="stage">
+    <canvas tabindex="0" role="img" aria-label="${LABEL}"></canvas>
+    <div class="message" role="status"></div>
+  </div>
   <div class="bar" role="group" aria-label="Playback"></div>`;
 const TURN = Math.PI / 18; // by one press of a key
 const ZOOM = 1.15;
@@ -27,6 +31,7 @@ export class GeometryVideoElement extends HTMLElement {
   #loading = 0; // counts loads, so that a late one does not replace its successor
   #positions = null;
   #wanted = null; // the frame that is to be sought next
+  #aim = 0; // the frame that was wanted last
   #seeking = null;
   #resume = false; // whether to play on when the slider is let go
 
@@ -67,6 +72,14 @@ export class GeometryVideoElement extends HTMLElement {
     if (name === "wireframe") this.#stage?.setWireframe(value !== null);
     if (name === "speed") this.#bar.setSpeed(this.speed);
     if ((name === "loop" || name === "speed") && !this.paused) this.play(); // with the new value
+  }
+
+  get src() {
+    return this.getAttribute("src") ?? "";
+  }
+
+  set src(source) {
+    this.setAttribute("src", source);
   }
 
   get speed() {
@@ -138,7 +151,7 @@ export class GeometryVideoElement extends HTMLElement {
   seek(frame) {
     if (!this.video) return Promise.resolve();
     this.#setPaused(true);
-    this.#wanted = Math.max(0, Math.min(this.video.frameCount - 1, Math.round(frame)));
+    this.#aim = this.#wanted = Math.max(0, Math.min(this.video.frameCount - 1, Math.round(frame)));
     this.#seeking ??= this.#seekWanted().finally(() => (this.#seeking = null));
     return this.#seeking;
   }
@@ -159,6 +172,11 @@ export class GeometryVideoElement extends HTMLElement {
     }
   }
 
+  /** Steps in a row add up, however fast they come. */
+  #step(by) {
+    this.seek((this.#seeking ? this.#aim : this.currentFrame) + by);
+  }
+
   #scrub(frame, done) {
     if (!done && !this.paused) this.#resume = true;
     const sought = this.seek(frame);
@@ -170,8 +188,8 @@ export class GeometryVideoElement extends HTMLElement {
   #act(name) {
     const actions = {
       play: () => (this.paused ? this.play() : this.pause()),
-      back: () => this.seek(this.currentFrame - 1),
-      forward: () => this.seek(this.currentFrame + 1),
+      back: () => this.#step(-1),
+      forward: () => this.#step(1),
       first: () => this.seek(0),
       last: () => this.seek(this.video.frameCount - 1),
       slower: () => this.setAttribute("speed", nextSpeed(this.speed, -1)),
@@ -199,7 +217,6 @@ export class GeometryVideoElement extends HTMLElement {
   #show(frame) {
     this.currentFrame = frame;
     this.#bar.setFrame(frame);
-    this.shadowRoot.querySelector("canvas").ariaLabel = "Animated mesh; shift and arrow keys turn it, + and - zoom";
     this.dispatchEvent(new CustomEvent("frame", { detail: frame }));
   }
 
