@@ -1,0 +1,120 @@
+"""Vertex positions whose edge lengths and dihedral angles come closest to given ones.
+
+What is made small is the sum over edges of squared relative length errors, plus BENDING times the sum over hinges of squared
+angle errors, weighted with the trust in each angle. Levenberg-Marquardt: each step factorises the sparse normal equations anew
+(3 unknowns per vertex; faces that share an edge couple their vertices). The damping also holds what edge shapes leave open: the
+place and the turn of each component.
+
+Source: Froehlich and Botsch, "Example-driven deformations based on discrete shells", 2011, for the least squares; Winkler et al.
+2010 reach the same by levels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gvcodecs.laplacian.edge_shape import EdgeShape
+
+BENDING = 0.1  # squared relative length error that a squared radian weighs as much as
+SHORTEST = 1e-3  # least length that divides, in mean edge lengths
+FLATTEST = 1e-2  # least height over edge of a face that divides
+MAX_TRIALS = 7  # factorisations: each takes longer than all else
+GAIN = 0.02  # part of the error that a step must take away for another one to follow
+DAMPING, RELAX, TIGHTEN = 1e-3, 0.1, 10.0  # first damping, in diagonal entries, and its factors after a step taken or refused
+LEAST = 1e-9  # on the diagonal, for vertices without edges
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _State:
+    """Points ``(V, 3)`` in mean edge lengths, weighted errors of edges and hinges ``(E + H,)`` and their derivatives."""
+
+    points: Float64
+    errors: Float64
+    jacobian: sparse.csr_array
+
+    @property
+    def energy(self) -> float:
+        return float(self.errors @ self.errors)
+
+
+def fit_shape(shape: EdgeShape, start: Float64) -> Float64:
+    """Return points ``(V, 3)`` near ``start`` whose edge shape comes closest to ``shape``, model units."""
+    from scipy.sparse.linalg import splu
+
+    unit = float(shape.lengths.mean()) if len(shape.lengths) else 0.0
+    if not unit > 0:
+        return start
+    damping = DAMPING
+    state = _measure(shape, unit, start / unit)
+    normal, slope, energy = _normal_equations(state)
+    for _ in range(MAX_TRIALS):
+        damped = sparse.csc_array(normal + sparse.diags_array(damping * normal.diagonal() + LEAST))
+        factor = splu(damped, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        trial = _measure(shape, unit, state.points - factor.solve(slope).reshape(-1, 3))
+        if not trial.energy < energy:
+            damping *= TIGHTEN
+            continue
+        converged = trial.energy > (1 - GAIN) * energy
+        state = trial
+        if converged:
+            break
+        damping *= RELAX
+        normal, slope, energy = _normal_equations(state)
+    return state.points * unit
+
+
+def _normal_equations(state: _State) -> tuple[sparse.csr_array, Float64, float]:
+    transposed = state.jacobian.T.tocsr()
+    return sparse.csr_array(transposed @ state.jacobian), transposed @ state.errors, state.energy
+
+
+def _measure(shape: EdgeShape, unit: float, points: Float64) -> _State:
+    length_errors, along_edges = _length_errors(shape, unit, points)
+    angle_errors, along_hinges = _angle_errors(shape, points)
+    n_edges, n_hinges = len(length_errors), len(angle_errors)
+    vertices = np.concatenate([shape.edges.ravel(), shape.hinges.ravel()]).astype(np.int64)
+    starts = np.concatenate([6 * np.arange(n_edges), 6 * n_edges + 12 * np.arange(n_hinges + 1)])
+    values = np.concatenate([along_edges.ravel(), along_hinges.ravel()])
+    columns = (3 * vertices[:, None] + np.arange(3)).ravel()
+    jacobian = sparse.csr_array((values, columns, starts), shape=(n_edges + n_hinges, points.size))
+    return _State(points, np.concatenate([length_errors, angle_errors]), jacobian)
+
+
+def _length_errors(shape: EdgeShape, unit: float, points: Float64) -> tuple[Float64, Float64]:
+    """Relative errors ``(E,)`` of lengths, and their derivatives ``(E, 2, 3)`` by the edges' ends."""
+    i, j = shape.edges.T
+    side = points[j] - points[i]
+    length = np.sqrt(_dot(side, side))
+    wanted = shape.lengths / unit
+    weight = 1 / np.maximum(wanted, SHORTEST)
+    toward = side * (weight / np.maximum(length, SHORTEST))[:, None]
+    return (length - wanted) * weight, np.stack([-toward, toward], axis=1)
+
+
+def _angle_errors(shape: EdgeShape, points: Float64) -> tuple[Float64, Float64]:
+    """Weighted errors ``(H,)`` of dihedral angles, and their derivatives ``(H, 4, 3)`` by the hinges' vertices."""
+    i, j, k, l = shape.hinges.T  # noqa: E741 - vertices i j k l
+    edge, one, other = points[j] - points[i], points[k] - points[i], points[l] - points[i]
+    normal_one, normal_other = np.cross(edge, one), np.cross(other, edge)  # twice the area long
+    squared = np.maximum(_dot(edge, edge), SHORTEST**2)
+    length = np.sqrt(squared)
+    angle = np.arctan2(_dot(normal_one, other) * length, _dot(normal_one, normal_other))
+    weight = np.sqrt(BENDING) * shape.trust
+    error = np.remainder(angle - shape.angles + np.pi, 2 * np.pi) - np.pi
+    least = (FLATTEST * squared) ** 2
+    by_k = normal_one * (weight * length / np.maximum(_dot(normal_one, normal_one), least))[:, None]
+    by_l = normal_other * (weight * length / np.maximum(_dot(normal_other, normal_other), least))[:, None]
+    share_k, share_l = (_dot(one, edge) / squared)[:, None], (_dot(other, edge) / squared)[:, None]  # of j; of i the rest
+    by_i = -(1 - share_k) * by_k - (1 - share_l) * by_l
+    by_j = -share_k * by_k - share_l * by_l
+    return weight * error, np.stack([by_i, by_j, by_k, by_l], axis=1)
+
+
+def _dot(a: Float64, b: Float64) -> Float64:
+    return np.asarray(np.einsum("ni,ni->n", a, b))
