@@ -15,7 +15,14 @@ Float64 = NDArray[np.float64]
 
 
 def fill_frames(
-    result: Float32, start: int, first: int, last: int, begin: int, basis: Basis, coefficients: Float64, points: NDArray[np.integer]
+    result: Float32,
+    start: int,
+    first: int,
+    last: int,
+    begin: int,
+    basis: Basis,
+    coefficients: Float64,
+    points: NDArray[np.integer],
 ) -> None:
     """Fill frames ``first`` to ``last`` of ``result (n, V, 3)``, whose own first frame is ``start``.
 
