@@ -16,7 +16,8 @@ def encode_coefficients(coefficients: Float64, step: float, domain: Domain, head
     """Code ``coefficients (P, R)`` with the deltas' ``step``; return the bytes of anchors and of deltas."""
     anchored = coefficients[domain.anchors.points]
     anchors, _ = encode_rows(anchored, step * header.anchor_ratio, domain.anchors.rows)
-    deltas, _ = encode_rows(domain.system.deltas(coefficients), step, domain.deltas, _predictor(header))
+    wanted = domain.system.deltas(coefficients)[domain.delta_points]
+    deltas, _ = encode_rows(wanted, step, domain.deltas, _predictor(header))
     return anchors, deltas
 
 
@@ -26,7 +27,7 @@ def decode_coefficients(
     """Mirror of `encode_coefficients`: ``(P, R)``; raises `CorruptFile` if a section is not what it writes."""
     anchored = decode_rows(anchors, n_components, step * header.anchor_ratio, domain.anchors.rows, f"anchors.{number}")
     decoded = decode_rows(deltas, n_components, step, domain.deltas, f"deltas.{number}", predictor=_predictor(header))
-    return domain.system.solve(decoded, anchored)
+    return domain.system.solve(domain.delta_points, decoded, anchored)
 
 
 def _predictor(header: Header) -> str:

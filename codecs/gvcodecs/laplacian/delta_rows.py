@@ -41,7 +41,7 @@ def border_order(faces: Int32, n_points: int) -> Int32:
 
 
 def delta_rows(order: Int32, neighbours: sparse.csr_array, differential: Float64, prediction: str) -> Rows:
-    """Return the rows of points in ``order (n,)``.
+    """Return the rows of points in ``order (n,)``, numbered by their places in it.
 
     Args:
         neighbours: ``(P, P)`` adjacency.
@@ -55,10 +55,12 @@ def delta_rows(order: Int32, neighbours: sparse.csr_array, differential: Float64
     starts, near = known_around(order, graph.indptr.astype(np.int32), graph.indices.astype(np.int32), most, REACH)
     known = np.diff(starts)
     row = np.repeat(np.arange(len(order)), known)
+    place = np.zeros(len(differential), np.int32)
+    place[order] = np.arange(len(order))
     return Rows(
-        order=order,
+        order=np.arange(len(order), dtype=np.int32),
         starts=starts,
-        near=near,
+        near=place[near],
         weights=_rigid_weights(differential[order], differential[near], row),
         variances=np.full(len(near), VARIANCE),
         rings=known.astype(np.int32) if prediction == "rigid" else np.minimum(known, N_RING).astype(np.int32),

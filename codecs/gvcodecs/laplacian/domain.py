@@ -46,11 +46,13 @@ class Surface:
 class Domain:
     """Args:
     anchors: points coded themselves.
-    deltas: rows of the points that have deltas.
+    delta_points: ``(D,)`` points that have deltas, in the order of their rows.
+    deltas: their rows.
     system: the extended Laplacian.
     """
 
     anchors: Anchors
+    delta_points: Int32
     deltas: Rows
     system: ExtendedLaplacian
 
@@ -75,5 +77,6 @@ def build_domain(surface: Surface, average: Float64 | None, header: Header) -> D
     scale = np.ones(n_points) if average is None else fineness(average, surface.edges, header.edge_power)
     operator = sparse.diags_array(scale * has_deltas) @ laplacian(points, surface.faces, header.operator)
     operator = sparse.csr_array(operator)
-    rows = delta_rows(walk[has_deltas[walk]], surface.neighbours, operator @ points, header.delta_prediction)
-    return Domain(anchors, rows, ExtendedLaplacian(operator, anchors.points, 1 / header.anchor_ratio))
+    order = walk[has_deltas[walk]]
+    rows = delta_rows(order, surface.neighbours, operator @ points, header.delta_prediction)
+    return Domain(anchors, order, rows, ExtendedLaplacian(operator, anchors.points, 1 / header.anchor_ratio))

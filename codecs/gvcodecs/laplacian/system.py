@@ -42,8 +42,14 @@ class ExtendedLaplacian:
         """Deltas ``(P, R)`` of ``coefficients (P, R)``."""
         return np.asarray(self._operator @ coefficients)
 
-    def solve(self, deltas: Float64, anchored: Float64) -> Float64:
-        """Return the coefficients ``(P, R)`` that fit ``deltas (P, R)`` and the anchors' ``anchored (A, R)`` best."""
-        right = self._operator.T @ deltas
+    def solve(self, points: Int32, deltas: Float64, anchored: Float64) -> Float64:
+        """Return the coefficients ``(P, R)`` that fit best.
+
+        Args:
+            points: ``(D,)`` which have deltas.
+            deltas: ``(D, R)`` of these points.
+            anchored: ``(A, R)`` coefficients of the anchors.
+        """
+        right = self._operator[points].T @ deltas
         right[self._anchors] += self._weight**2 * anchored
-        return np.asarray(self._factors.solve(np.ascontiguousarray(right)))
+        return np.asarray(self._factors.solve(right)) if right.size else right
