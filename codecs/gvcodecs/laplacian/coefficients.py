@@ -22,11 +22,11 @@ def encode_coefficients(coefficients: Float64, step: float, domain: Domain, head
 
 
 def decode_coefficients(
-    anchors: bytes, deltas: bytes, n_components: int, step: float, domain: Domain, header: Header, number: int
+    anchors: bytes, deltas: bytes, n_components: int, step: float, domain: Domain, header: Header, names: tuple[str, str]
 ) -> Float64:
-    """Mirror of `encode_coefficients`: ``(P, R)``; raises `CorruptFile` if a section is not what it writes."""
-    anchored = decode_rows(anchors, n_components, step * header.anchor_ratio, domain.anchors.rows, f"anchors.{number}")
-    decoded = decode_rows(deltas, n_components, step, domain.deltas, f"deltas.{number}", predictor=_predictor(header))
+    """Mirror of `encode_coefficients`: ``(P, R)``; raises `CorruptFile` naming the section that is not what it writes."""
+    anchored = decode_rows(anchors, n_components, step * header.anchor_ratio, domain.anchors.rows, names[0])
+    decoded = decode_rows(deltas, n_components, step, domain.deltas, names[1], predictor=_predictor(header))
     return domain.system.solve(domain.delta_points, decoded, anchored)
 
 

@@ -1,14 +1,14 @@
 """The order in which delta trajectories are coded, and how each is predicted from known ones around it.
 
 What: vertices come in the order of a walk from triangle to triangle that expands the border of the known part. For each, a
-breadth-first search over the mesh finds up to `N_KNOWN` known ones. Where the surface moves almost rigidly, one linear map takes
-the average mesh's differential coordinates around a vertex to its delta trajectories; eliminating it leaves a weighted sum of
-known delta trajectories, with weights that follow from the average mesh alone: ``w = A (A^T A + r I)^-1 delta``.
+breadth-first search over the mesh finds up to `N_KNOWN` known ones. Where the surface moves almost rigidly, one linear map
+takes the average mesh's differential coordinates around a vertex to its delta trajectories; eliminating it leaves a weighted sum
+of known delta trajectories, with weights that follow from the average mesh alone: ``w = A (A^T A + r I)^-1 delta``.
 
 Predictions: ``rigid`` is that sum; ``kalman`` starts from it, and lets each decoded component correct the weights for the next
-one (`gvpipe.row_prediction`); ``none``.
+one (`gvpipe.row_prediction`); ``none``. Without an average mesh `kalman` starts from weights of zero.
 
-Source: Vasa, Marras, Hormann and Brunnett 2014, section 7. Departures: a ridge r, since flat regions define no map, and `kalman`.
+Source: Vasa, Marras, Hormann and Brunnett 2014, section 7. Departures: a ridge r, since flat regions define no map; `kalman`.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ DELTA_PREDICTIONS = ("kalman", "rigid", "none")
 N_KNOWN = 15  # the paper's k
 REACH = 80  # vertices that the search for them visits at most
 RIDGE = 0.01  # in traces of A^T A
-VARIANCE = 0.02  # prior variance of a weight
-BLOCK = 256  # rows that are entropy coded at once
+VARIANCE = 0.1  # prior variance of a weight
+BLOCK = 512  # rows that are entropy coded at once
 N_RING = 6  # known rows whose magnitudes count for a row's contexts
 TINY = 1e-30
 

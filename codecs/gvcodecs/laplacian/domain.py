@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from gvcodecs.laplacian.anchors import Anchors, choose_anchors
-from gvcodecs.laplacian.average_coding import fineness
+from gvcodecs.laplacian.mesh_scale import fineness
 from gvcodecs.laplacian.delta_rows import border_order, delta_rows
 from gvcodecs.laplacian.format import Header
 from gvcodecs.laplacian.operators import laplacian

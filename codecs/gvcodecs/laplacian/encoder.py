@@ -1,9 +1,9 @@
 """The geometric-Laplacian codec: settings, and the way from a sequence to a bitstream.
 
-Vasa, Marras, Hormann and Brunnett, "Compressing dynamic meshes with geometric Laplacians", 2014. The steps, each a module of its
-own: connectivity (`gvpipe.bare_mesh`), average mesh in edge shape space (`average`) and its coding (`average_coding`), principal
-trajectories (`gvpipe.trajectory_basis`), Laplacian (`operators`) with anchors (`anchors`) and its inverse (`system`), prediction of
-delta trajectories (`delta_rows`), range coding (`gvpipe.row_coding`).
+Vasa, Marras, Hormann and Brunnett, "Compressing dynamic meshes with geometric Laplacians", 2014. The steps, each a module of
+its own: connectivity (`gvpipe.bare_mesh`), average mesh in edge shape space (`average`) and its coding (`average_coding`),
+principal trajectories (`gvpipe.trajectory_basis`), Laplacian (`operators`) with anchors (`anchors`) and its inverse (`system`),
+prediction of delta trajectories (`delta_rows`), range coding (`gvpipe.row_coding`).
 
 Frames are read three times: for size and points, for the average, then segment by segment.
 """
@@ -49,11 +49,16 @@ from gvpipe.trajectory_basis import (
 )
 
 COARSE, DECADES = 10.0, 2 * 4 / 3  # as in `pca`: error that the step is chosen for at quality 0, percent of the spread
+POINT_COST, ROW_COST = 0.08, 6.0  # of a component: deltas cost little, so that components are paid for by their basis
 
 
 @dataclass(frozen=True)
 class Laplacian(Settings):
     """Settings of the geometric-Laplacian codec.
+
+    Quality gives the deltas the step that `pca` gives its coefficients at the same quality: one that aims at a Karni-Gotsman
+    error of ``10 ** (1 - quality / 37.5)`` percent where errors are white. Here they are small between neighbours and grow from
+    anchor to anchor, so that the error is larger, and the perceived one is what bits are spent on.
 
     Raises:
         SettingError: a value out of its range.
@@ -68,11 +73,11 @@ class Laplacian(Settings):
     delta_prediction: str = "kalman"  # kalman, the paper's rigid, or none
     anchors: int = 16  # points per anchor, 1..1048576; each component has one at least
     anchor_choice: str = "hierarchy"  # hierarchy: spread over the surface; walk: along the walk of the deltas
-    anchor_ratio: float = 1.5  # step of anchors, in steps of deltas, 1/1024..1024
-    basis_ratio: float = 2.0  # step of the basis, in steps of deltas, 1/1024..1024
+    anchor_ratio: float = 1.2  # step of anchors, in steps of deltas, 1/1024..1024
+    basis_ratio: float = 1.5  # step of the basis, in steps of deltas, 1/1024..1024
     components: int = 0  # principal trajectories per segment, 1..16384; 0: as many as pay
-    edge_power: float = 0.5  # deltas are finer where edges are shorter, by their lengths to this power, 0..2
-    average_step: float = 1 / 32  # quantisation step of the average mesh, mean edge lengths, 2**-20..1
+    edge_power: float = 0.75  # deltas are finer where edges are shorter, by their lengths to this power, 0..2
+    average_step: float = 1 / 16  # quantisation step of the average mesh, mean edge lengths, 2**-20..1
     segment: int = 500  # most frames per segment, 1..100000
     reorder: bool = False  # true: the codec may choose the vertex order; smaller
 
@@ -122,7 +127,7 @@ class Laplacian(Settings):
         if header.needs_average:
             report("average", 0)
             shape = average_mesh(sequence, members[surface.faces].astype(np.int32))[members]
-            sections[NAME], average = encode_average(shape, surface.edges, surface.rows, self.average_step)
+            sections[NAME], average = encode_average(shape, surface, header)
         domain = build_domain(surface, average, header)
         # root mean square error of a vertex, model units
         wanted = spread * COARSE * 10 ** -(DECADES * self.quality / 100) / 100
@@ -134,7 +139,9 @@ class Laplacian(Settings):
             error = wanted**2 * n_points * (bounds[s + 1] - bounds[s])
             principal = find_principal(trajectories, error)
             step = choose_step(principal, n_points, error)
-            kept = min(self.components, len(principal.energies)) or count_components(principal, n_points, step)
+            kept = min(self.components, len(principal.energies)) or count_components(
+                principal, n_points, step, POINT_COST, ROW_COST
+            )
             sections[f"basis.{s}"], basis = encode_basis(principal, kept, n_points, step * self.basis_ratio)
             coefficients = fit_coefficients(trajectories, basis)
             anchors, deltas = encode_coefficients(coefficients, step, domain, header)

@@ -59,8 +59,8 @@ class Header:
 
     @property
     def needs_average(self) -> bool:
-        """Whether there is an average mesh: the combinatorial operator without prediction does without."""
-        return self.operator != "tutte" or self.delta_prediction != "none"
+        """Whether there is an average mesh: the combinatorial operator needs none but for section 7's prediction."""
+        return self.operator != "tutte" or self.delta_prediction == "rigid"
 
     def to_json(self) -> dict[str, Any]:
         """Return the header as JSON values."""

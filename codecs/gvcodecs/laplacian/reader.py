@@ -52,7 +52,7 @@ class LaplacianReader:
         surface = build_surface(mesh.point_faces, mesh.n_points)
         average = None
         if self._header.needs_average:
-            average = decode_average(bitstream.section(NAME), surface.rows, self._header.average_step)
+            average = decode_average(bitstream.section(NAME), surface, self._header)
         self._domain = build_domain(surface, average, self._header)
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
         self._segment: Segment | None = None
@@ -88,14 +88,9 @@ class LaplacianReader:
             step, section = self._header.steps[s], self._bitstream.section
             name, n_frames = f"basis.{s}", self._bounds[s + 1] - self._bounds[s]
             basis = decode_basis(section(name), n_frames, self._mesh.n_points, step * self._header.basis_ratio, name)
-            coefficients = decode_coefficients(
-                section(f"anchors.{s}"),
-                section(f"deltas.{s}"),
-                basis.vectors.shape[1],
-                step,
-                self._domain,
-                self._header,
-                s,
-            )
+            names = (f"anchors.{s}", f"deltas.{s}")
+            anchors, deltas = (section(name) for name in names)
+            n_components = basis.vectors.shape[1]
+            coefficients = decode_coefficients(anchors, deltas, n_components, step, self._domain, self._header, names)
             self._segment = Segment(s, basis, np.ascontiguousarray(coefficients.T))
         return self._segment
