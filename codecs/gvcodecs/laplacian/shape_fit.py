@@ -43,7 +43,7 @@ class _State:
 def fit_shape(shape: EdgeShape, start: Float64, labels: NDArray[np.integer]) -> Float64:
     """Return points ``(V, 3)`` near ``start`` whose edge shape comes closest to ``shape``, model units.
 
-    Components ``labels (V,)`` share a factorisation and nothing else: each is damped, and its steps are taken or refused, alone.
+    Components ``labels (V,)`` share a factorisation and nothing else: each is damped, and its steps taken or refused, alone.
     """
     from scipy.sparse.linalg import splu
 
