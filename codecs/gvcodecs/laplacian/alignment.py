@@ -40,11 +40,12 @@ class Groups:
         turns = np.broadcast_to(np.eye(3), (len(frames), len(self.sizes), 3, 3)).copy()
         solid = self.sizes >= 3
         turns[:, solid] = rotations(self.total(offsets[..., :, None] * wanted[:, None, :])[:, solid])
-        return centres + np.asarray(np.einsum("nvi,nvij->nvj", offsets, turns[:, self.labels]))
+        turned: Float64 = np.einsum("nvi,nvij->nvj", offsets, turns[:, self.labels]) + centres
+        return turned
 
 
 def rotations(covariances: Float64) -> Float64:
     """The rotations ``(..., 3, 3)`` R that make ``x @ R`` closest to y, given sums of x outer y."""
     u, _, v = np.linalg.svd(covariances)
     u[..., :, 2] *= np.where(np.linalg.det(u @ v) < 0, -1.0, 1.0)[..., None]
-    return np.asarray(u @ v)
+    return np.asarray(u @ v, dtype=np.float64)

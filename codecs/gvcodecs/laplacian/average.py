@@ -1,15 +1,15 @@
 """The average mesh of a sequence in edge shape space.
 
-Averaging positions shrinks what turns: a mesh that walks in a circle ends as a needle. Averaging edge lengths and dihedral angles
-does not, and the mesh that comes closest to them is found by non-linear least squares:
+Averages of positions shrink what turns: a mesh that walks in a circle ends as a needle. Averages of edge lengths and dihedral
+angles do not, and the mesh that comes closest to them is found by non-linear least squares:
 
 1. one pass over the frames, a chunk at a time: average edge shape (`edge_shape`), mean positions, and the mean of frames turned
    and moved onto each other, each connected component by itself;
 2. from that aligned mean, Levenberg-Marquardt steps toward the average edge shape (`shape_fit`);
 3. each component is laid onto its aligned mean, then the whole so that a reference face agrees with its mean position.
 
-The Laplacian's weights depend on neither size nor place. Placement decides the extent over which the average is quantised, so
-components stay together as they are in the frames.
+The Laplacian's weights depend on neither size nor place: placement decides no more than the extent over which the average is
+quantised, so components stay together as they are in the frames.
 
 Source: Vasa, Marras, Hormann and Brunnett, "Compressing dynamic meshes with geometric Laplacians", 2014, section 5.
 """
@@ -57,7 +57,7 @@ def average_mesh(sequence: MeshSequence, faces: Int32, start: int = 0, stop: int
             aligned += parts.turned(whole.turned(frames, target), target).sum(axis=0)
             n_aligned += len(frames)
     mean, aligned = mean / (stop - start), aligned / n_aligned
-    fitted = fit_shape(edge_shape.average(), aligned)
+    fitted = fit_shape(edge_shape.average(), aligned, parts.labels)
     fitted += (parts.centres(aligned[None]) - parts.centres(fitted[None]))[0, parts.labels]
     return _place(parts.turned(fitted[None], aligned)[0], mean, faces)
 
@@ -65,9 +65,10 @@ def average_mesh(sequence: MeshSequence, faces: Int32, start: int = 0, stop: int
 def _place(points: Float64, mean: Float64, faces: Int32) -> Float64:
     """Move and turn points so that the face that is largest in the mean positions lies where it lies there."""
     if not len(faces):
-        return points + (mean - points).mean(axis=0)
+        return np.asarray(points + (mean - points).mean(axis=0))
     side_b, side_c = (mean[faces[:, i]] - mean[faces[:, 0]] for i in (1, 2))
     reference = faces[np.argmax(np.linalg.norm(np.cross(side_b, side_c), axis=1))]
     centre, wanted = points[reference].mean(axis=0), mean[reference].mean(axis=0)
     turn = rotations((points[reference] - centre).T @ (mean[reference] - wanted))
-    return np.asarray((points - centre) @ turn + wanted)
+    placed: Float64 = (points - centre) @ turn + wanted
+    return placed

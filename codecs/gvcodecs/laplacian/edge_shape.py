@@ -1,7 +1,7 @@
 """The edge shape of a mesh: its edge lengths, and the dihedral angles where two faces meet, averaged over frames.
 
-Neither changes when a mesh moves as a whole, nor much where a limb bends elsewhere: averages of them keep the size that averages
-of positions lose. Angles are averaged on the circle, where a frame's vote counts little if one of the two faces has collapsed:
+Neither changes when a mesh moves as a whole, nor where it bends elsewhere: their averages keep the size that averages of
+positions lose. Angles are averaged on the circle, where a frame's vote counts little if one of the two faces has collapsed:
 angles about pi, and faces that define no normal, do no harm.
 
 Source: Vasa, Marras, Hormann and Brunnett, "Compressing dynamic meshes with geometric Laplacians", 2014, section 5, after
