@@ -24,7 +24,11 @@ BOUNDS = {"laplacian": 1e-3, "mcgv": 2e-3, "pca": 1e-3, "pdct": 1e-3}
 AWKWARD = awkward()
 
 SETTINGS: dict[str, list[dict[str, object]]] = {
-    "laplacian": [{}, {"operator": "cotangent", "delta_prediction": "rigid"}, {"operator": "tutte", "delta_prediction": "none"}],
+    "laplacian": [
+        {},
+        {"operator": "cotangent", "delta_prediction": "rigid"},
+        {"operator": "tutte", "delta_prediction": "none"},
+    ],
     "mcgv": [{}, {"image": "jpeg"}, {"profile": "precise"}],
     "pca": [{}, {"predictor": "rbf"}, {"predictor": "lsp"}, {"predictor": "navg"}],
     "pdct": [{}, {"clusters": 3, "fineness": 2.0}],

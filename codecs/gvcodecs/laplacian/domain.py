@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from gvcodecs.laplacian.anchors import Anchors, choose_anchors
-from gvcodecs.laplacian.mesh_scale import fineness
-from gvcodecs.laplacian.delta_rows import border_order, delta_rows
+from gvcodecs.laplacian.delta_rows import border_order, delta_order, delta_rows
 from gvcodecs.laplacian.format import Header
+from gvcodecs.laplacian.mesh_scale import fineness
 from gvcodecs.laplacian.operators import laplacian
 from gvcodecs.laplacian.system import ExtendedLaplacian
 from gvpipe.hierarchy import Hierarchy, build_hierarchy
@@ -77,6 +77,6 @@ def build_domain(surface: Surface, average: Float64 | None, header: Header) -> D
     scale = np.ones(n_points) if average is None else fineness(average, surface.edges, header.edge_power)
     operator = sparse.diags_array(scale * has_deltas) @ laplacian(points, surface.faces, header.operator)
     operator = sparse.csr_array(operator)
-    order = walk[has_deltas[walk]]
-    rows = delta_rows(order, surface.neighbours, operator @ points, header.delta_prediction)
+    order, blocks, limits = delta_order(header.delta_prediction, surface.hierarchy, walk, has_deltas)
+    rows = delta_rows(header.delta_prediction, order, blocks, limits, surface.neighbours, operator @ points)
     return Domain(anchors, order, rows, ExtendedLaplacian(operator, anchors.points, 1 / header.anchor_ratio))

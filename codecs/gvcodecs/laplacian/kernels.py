@@ -13,11 +13,12 @@ Ints = NDArray[Any]
 
 
 @compiled
-def known_around(order: Ints, starts: Ints, neighbours: Ints, most: int, reach: int) -> tuple[Ints, Ints]:
-    """Bounds ``(n + 1,)`` and vertices: for each vertex of the order up to ``most`` that come before it, nearest first.
+def known_around(order: Ints, limits: Ints, starts: Ints, neighbours: Ints, most: int, reach: int) -> tuple[Ints, Ints]:
+    """Bounds ``(n + 1,)`` and vertices: for each vertex of the order up to ``most`` that are known, nearest first.
 
     Args:
         order: ``(n,)`` vertices; those of the graph that are not in it are never known.
+        limits: ``(n,)`` vertices at places before the limit are known.
         starts, neighbours: the graph, ``neighbours[starts[v]:starts[v + 1]]`` ascending.
         reach: vertices that a search visits at most.
     """
@@ -42,7 +43,7 @@ def known_around(order: Ints, starts: Ints, neighbours: Ints, most: int, reach: 
                 seen_by[v] = i
                 queue[tail] = v
                 tail += 1
-                if place[v] < i:
+                if place[v] < limits[i]:
                     near[end] = v
                     end += 1
                     found += 1
