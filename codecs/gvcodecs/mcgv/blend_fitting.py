@@ -31,12 +31,14 @@ RING = 3  # order of the neighbourhood whose motion is a point's, as in `segment
 FRAMES = 96  # frames, evenly spaced, that fitting looks at
 TRIAL_FRAMES = 32  # the same while the number of clusters is sought
 TRIAL_PASSES, PASSES = 4, 12  # turns of weights and transforms
-FEWEST, MOST = 8, 512  # clusters tried
+FEWEST, MOST = 8, 1024  # clusters tried
+LEAST_POINTS = 8  # per cluster, on average
 GROWTH = 2**0.5  # from one number tried to the next
 CLUSTER_WORTH = 4.0  # squared steps a frame that a cluster must save
 BIT_WORTH = 0.14  # squared steps that a bit of the weights must save
 SAMPLES = 4000  # points that k-means sees
-ROUNDS = 20  # of k-means
+ROUNDS = 15  # of k-means
+NEGLIGIBLE = 1e-12  # part of all squared motion: points closer than this to seeds are no seeds
 
 Float64 = NDArray[np.float64]
 
@@ -68,13 +70,12 @@ def fit_blend(sequence: MeshSequence, base: Float64, points: Points, step: float
         motions = _motions(sequence, base, points, n_frames)
         return _Problem(base, motions, neighbours, BIT_WORTH * price * motions.shape[1] / 3)
 
-    trial = problem(TRIAL_FRAMES)
-    if n_clusters:
-        best = _start(features, n_clusters)
-    else:
-        best, least, count = _start(features, 1), np.inf, float(FEWEST)
-        while count <= min(MOST, len(base) / 4):
-            fitted = _alternate(trial, _start(features, round(count)), TRIAL_PASSES)
+    clustering = _Clustering(features)
+    best = clustering.start(n_clusters or 1)
+    if not n_clusters:
+        trial, least, count = problem(TRIAL_FRAMES), np.inf, float(FEWEST)
+        while count <= min(MOST, len(base) / LEAST_POINTS):
+            fitted = _alternate(trial, clustering.start(round(count)), TRIAL_PASSES)
             error = trial.error(fitted) * 3 / trial.motions.shape[1]
             cost = error / step**2 + CLUSTER_WORTH * fitted.n_clusters
             if cost >= least:
@@ -138,21 +139,43 @@ def _alternate(problem: _Problem, fitted: Fitted, passes: int) -> Fitted:
     return fitted
 
 
-def _start(features: Float64, n_clusters: int) -> Fitted:
-    """Each point follows its own cluster alone: k-means of the motions."""
-    from scipy.cluster.vq import kmeans2, vq
+class _Clustering:
+    """K-means of the points' motions for any number of clusters: the first K of one sequence of seeds start it."""
 
-    clusters = np.zeros((len(features), INFLUENCES), np.int32)
-    parts = np.zeros((len(features), INFLUENCES), np.int32)
-    parts[:, 0] = TOTAL
-    sample = features[:: max(1, len(features) // SAMPLES)]
-    n_clusters = min(n_clusters, len(np.unique(np.round(sample, 9), axis=0)))
-    if n_clusters > 1:
+    def __init__(self, features: Float64) -> None:
+        self._features = features
+        self._sample = features[:: max(1, len(features) // SAMPLES)]
+        self._seeds = _seeds(self._sample, MOST)
+
+    def start(self, n_clusters: int) -> Fitted:
+        """Each point follows its own cluster alone, of at most ``n_clusters``."""
+        from scipy.cluster.vq import kmeans2, vq
+
+        clusters = np.zeros((len(self._features), INFLUENCES), np.int32)
+        parts = np.zeros((len(self._features), INFLUENCES), np.int32)
+        parts[:, 0] = TOTAL
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a cluster may run empty: it is dropped
-            centres, _ = kmeans2(sample, n_clusters, iter=ROUNDS, minit="++", rng=np.random.default_rng(SEED))
-        clusters[:, 0] = vq(features, centres)[0]
-    return _renumber(clusters, parts)
+            centres, _ = kmeans2(self._sample, self._seeds[:n_clusters], iter=ROUNDS, minit="matrix")
+        clusters[:, 0] = vq(self._features, centres)[0]
+        return _renumber(clusters, parts)
+
+
+def _seeds(sample: Float64, n: int) -> Float64:
+    """At most ``n`` rows of ``sample``, each drawn with the square of its distance from those before (k-means++)."""
+    draw = np.random.default_rng(SEED)
+    squares = np.square(sample).sum(axis=1)
+    seeds = [int(squares.argmax())]
+    distance = np.full(len(sample), np.inf)
+    while len(seeds) < n:
+        last = seeds[-1]
+        distance = np.minimum(distance, np.maximum(squares + squares[last] - 2 * (sample @ sample[last]), 0))
+        distance[seeds] = 0
+        total = np.cumsum(distance)
+        if not total[-1] > NEGLIGIBLE * squares.sum():
+            break
+        seeds.append(int(np.searchsorted(total, draw.random() * total[-1], side="right")))
+    return sample[seeds]
 
 
 def _renumber(clusters: Int32, parts: Int32) -> Fitted:

@@ -10,6 +10,7 @@ times (extent, motion, transforms and residual range together, images), never ke
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -35,11 +36,12 @@ from gvpipe.connectivity import decode_base, encode_base
 from gvpipe.errors import SettingError
 from gvpipe.quantize import Lattice
 from gvpipe.segments import count_segments, segment_starts
-from gvpipe.sequence import Int32, MeshSequence
+from gvpipe.sequence import Float32, Int32, MeshSequence
 from gvpipe.video import PROFILES, Plane, Profile, VideoWriter
 
 BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
-AFFINE_CLUSTERS = 20  # the paper's
+AFFINE_CLUSTERS, AFFINE_BASE_BITS = 20, 12  # the paper's
+BASE_BITS = 8, 16  # bits of a base frame that are chosen unasked
 SIZE_AUTO = "auto"
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
 
@@ -64,7 +66,7 @@ class Mcgv(Settings):
     prediction: str = "blended"  # blended: vertices follow up to four clusters; affine: one, as published
     clusters: int = 0  # K, 1..1024; 0: as many as pay (blended), 20 (affine)
     transform_bits: int = 17  # bits over the sequence's extent, 8..24 (affine)
-    base_bits: int = 12  # bits along the base frame's longest side, 4..20
+    base_bits: int = 0  # bits along the base frame's longest side, 4..20; 0: as many as pay (blended), 12 (affine)
     density: float = 1.5  # pixels per vertex inside charts, 1..16
     size: str = SIZE_AUTO  # of a plane, pixels: auto, or WIDTHxHEIGHT in whole blocks, such as 256x256
     gop: int = 32  # frames per group of pictures, 1..1000 (h264)
@@ -80,12 +82,14 @@ class Mcgv(Settings):
         self.check_choice("prediction", PREDICTIONS)
         self.check_range(0, sections.MAX_CLUSTERS, "clusters")
         self.check_range(8, 24, "transform_bits")
-        self.check_range(4, 20, "base_bits")
+        self.check_range(0, 20, "base_bits")
         self.check_range(1, 16, "density")
         self.check_range(1, 1000, "gop")
         self.check_range(1, 100_000, "segment")
         if self.image == "jpeg" and self.profile == "precise":
             raise SettingError("profile precise needs image h264: JPEG has 8 bits")
+        if 0 < self.base_bits < 4:
+            raise SettingError(f"base_bits is {self.base_bits}; 0 or an integer in 4..20 is needed")
         self._plane_size()
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> Bitstream:
@@ -98,14 +102,15 @@ class Mcgv(Settings):
         report("read", 0)
         extent = _extent(sequence, report)
         report("base", 0)
-        lattice = Lattice.over(sequence.read(0, 1)[0], self.base_bits)
-        coded = encode_base(lattice.quantise(sequence.read(0, 1)[0]), sequence.faces, self.reorder)
+        first = sequence.read(0, 1)[0]
+        profile = PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
+        effective = effective_step(self.quality, profile, float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0))))
+        lattice = Lattice.over(first, self._base_bits(first, effective / math.sqrt(sequence.n_frames)))
+        coded = encode_base(lattice.quantise(first), sequence.faces, self.reorder)
         decoded = decode_base(coded.mesh, coded.order)
         sequence = sequence.reordered(coded.permutation, decoded.faces)
         base = lattice.place(decoded.points)
         points = Points.of(decoded.points, decoded.faces, decoded.visits)
-        profile = PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
-        effective = effective_step(self.quality, profile, float(np.linalg.norm(np.ptp(base, axis=0))))
         n_segments = count_segments(sequence.n_frames, self.segment)
         bounds = segment_starts(sequence.n_frames, n_segments)
         if self.prediction == "blended":
@@ -165,6 +170,13 @@ class Mcgv(Settings):
     def reader(cls, bitstream: Bitstream) -> FrameReader:
         """Open an ``mcgv`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         return McgvReader(bitstream)
+
+    def _base_bits(self, first: Float32, step: float) -> int:
+        """Bits of the base frame; by default its lattice has about this step, since its errors stay for all frames."""
+        if self.base_bits or self.prediction == "affine":
+            return self.base_bits or AFFINE_BASE_BITS
+        extent = float(np.ptp(first.astype(np.float64), axis=0).max())
+        return min(max(math.ceil(math.log2(max(extent / step, 1.0))), BASE_BITS[0]), BASE_BITS[1])
 
     def _layout(self, base: Float64, points: Points, partition: Int32, report: Progress) -> Layout:
         """The vertices' pixels; no chart holds points of two parts of ``partition (P,)``."""
