@@ -42,6 +42,7 @@ from gvpipe.video import PROFILES, Plane, Profile, VideoWriter
 BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
 AFFINE_CLUSTERS, AFFINE_BASE_BITS = 20, 12  # the paper's
 BASE_BITS = 8, 16  # bits of a base frame that are chosen unasked
+DISTINCT = 0.995  # part of the places in a base frame that its lattice must tell apart
 SIZE_AUTO = "auto"
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
 
@@ -105,7 +106,7 @@ class Mcgv(Settings):
         first = sequence.read(0, 1)[0]
         profile = PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
         effective = effective_step(self.quality, profile, float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0))))
-        lattice = Lattice.over(first, self._base_bits(first, effective / math.sqrt(sequence.n_frames)))
+        lattice = self._lattice(first, effective / math.sqrt(sequence.n_frames))
         coded = encode_base(lattice.quantise(first), sequence.faces, self.reorder)
         decoded = decode_base(coded.mesh, coded.order)
         sequence = sequence.reordered(coded.permutation, decoded.faces)
@@ -171,12 +172,19 @@ class Mcgv(Settings):
         """Open an ``mcgv`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         return McgvReader(bitstream)
 
-    def _base_bits(self, first: Float32, step: float) -> int:
-        """Bits of the base frame; by default its lattice has about this step, since its errors stay for all frames."""
+    def _lattice(self, first: Float32, step: float) -> Lattice:
+        """The base frame's lattice: by default of about this step, since its errors stay for all frames; it tells vertices apart."""
         if self.base_bits or self.prediction == "affine":
-            return self.base_bits or AFFINE_BASE_BITS
+            return Lattice.over(first, self.base_bits or AFFINE_BASE_BITS)
         extent = float(np.ptp(first.astype(np.float64), axis=0).max())
-        return min(max(math.ceil(math.log2(max(extent / step, 1.0))), BASE_BITS[0]), BASE_BITS[1])
+        bits = min(max(math.ceil(math.log2(max(extent / step, 1.0))), BASE_BITS[0]), BASE_BITS[1])
+        n_places = len(np.unique(first, axis=0))
+        while bits < BASE_BITS[1]:
+            lattice = Lattice.over(first, bits)
+            if len(np.unique(lattice.quantise(first), axis=0)) >= DISTINCT * n_places:
+                break
+            bits += 1
+        return Lattice.over(first, bits)
 
     def _layout(self, base: Float64, points: Points, partition: Int32, report: Progress) -> Layout:
         """The vertices' pixels; no chart holds points of two parts of ``partition (P,)``."""

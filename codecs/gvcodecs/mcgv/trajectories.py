@@ -5,7 +5,7 @@ time, and alike from cluster to cluster. They are coded as such: a mean, the pri
 (`gvpipe.trajectory_basis`), and their coefficients. Both with one quantisation step, that of the residual's coefficients: an
 error of either kind is an error of positions, and costs the same::
 
-    section = [varint] length, basis, coefficients (rows of `gvpipe.row_coding`, none predicted from another)
+    section = [varint] length, basis, coefficients (rows of `gvpipe.row_coding`, one block, none predicted from another)
 """
 
 from __future__ import annotations
@@ -26,8 +26,6 @@ from gvpipe.trajectory_basis import (
     find_principal,
     fit_coefficients,
 )
-
-BLOCK = 48  # rows that are entropy coded at once
 
 Float64 = NDArray[np.float64]
 
@@ -78,6 +76,6 @@ def _lone_rows(n_rows: int) -> Rows:
         weights=nothing,
         variances=nothing,
         rings=np.zeros(n_rows, np.int32),
-        blocks=np.append(np.arange(0, n_rows, BLOCK), n_rows).astype(np.int32),
+        blocks=np.array([0, n_rows], np.int32),
         affine=False,
     )
