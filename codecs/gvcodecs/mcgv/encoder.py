@@ -173,7 +173,7 @@ class Mcgv(Settings):
         return McgvReader(bitstream)
 
     def _lattice(self, first: Float32, step: float) -> Lattice:
-        """The base frame's lattice: by default of about this step, since its errors stay for all frames; it tells vertices apart."""
+        """The base frame's lattice: by default of about this step, as its errors stay for all frames; it tells places apart."""
         if self.base_bits or self.prediction == "affine":
             return Lattice.over(first, self.base_bits or AFFINE_BASE_BITS)
         extent = float(np.ptp(first.astype(np.float64), axis=0).max())
