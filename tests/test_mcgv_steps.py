@@ -22,7 +22,7 @@ from gvcodecs.mcgv.packing import Layout, pack
 from gvcodecs.mcgv.padding import Padding
 from gvcodecs.mcgv.parameterization import Atlas, parameterize
 from gvcodecs.mcgv.prediction import AffinePredictor
-from gvcodecs.mcgv.quality import QP_STEP, choose_quantiser
+from gvcodecs.mcgv.quality import QP_STEP, choose_quantiser, effective_step
 from gvcodecs.mcgv.segmentation import LocalAffineFit, segment
 from gvcodecs.mcgv.transforms import decode_transforms, dequantise, encode_transforms, quantise
 from gvpipe.binary import Cursor, varint
@@ -361,7 +361,7 @@ def test_quality_is_monotone(name: str, largest: float) -> None:
     decades = {"h264-8": 2.1, "h264-10": 2.7, "jpeg": 2.1}[name]
     effective = []
     for quality in np.linspace(0, 100, 201):
-        chosen = choose_quantiser(float(quality), profile, largest, 2.0)
+        chosen = choose_quantiser(effective_step(float(quality), profile, 2.0), profile, largest)
         assert isinstance(chosen.level, int) and largest / chosen.step <= profile.amplitude * (1 + 1e-12)
         if name == "jpeg":
             assert 2 <= chosen.level <= 98

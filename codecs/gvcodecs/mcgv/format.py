@@ -5,9 +5,13 @@
 ``order``          vertex order, empty if the codec's own (`gvpipe.vertex_order`)
 ``pixels``         [integers] x, then [integers] y of each vertex, vertices in the codec's order: the differences from
                    the vertex before; y in the context of the magnitude of the difference in x
-``clusters``       [integers] cluster of each block that holds a vertex, in raster order, difference from the block before
-``transforms.N``   affine transforms of segment N (`transforms`)
+``clusters``       affine: [integers] cluster of each block that holds a vertex, in raster order, difference from the
+                   block before
+``weights``        blended: which clusters each point follows (`weight_coding`)
+``transforms.N``   transforms of segment N (affine: `transforms`, blended: `trajectories`)
 =================  ==========================================================================================
+
+Version 1 knows affine prediction alone; files of affine prediction are still written as version 1.
 
 Source: Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.3: base frame, partition, parametric
 coordinates, transforms, images. Here the partition follows from the pixels, since no block holds two charts.
@@ -30,6 +34,7 @@ from gvpipe.quantize import Lattice
 from gvpipe.sequence import Int32
 from gvpipe.video import MAX_SIDE, PROFILES, Profile
 
+VERSIONS = {"affine": 1, "blended": 2}
 MAX_CLUSTERS = 1024
 MAX_SEGMENTS = 1 << 16
 CONTEXTS = 4  # of a pixel's y: 0, 1, 2..3 or more columns from the vertex before
@@ -44,6 +49,7 @@ class Header:
     """What a reader must know beside the sections; lengths in model units, sides in pixels.
 
     Args:
+        prediction: ``affine`` (version 1) or ``blended`` (version 2).
         profile: of the video; a picture holds the x, y and z planes, one below the other.
         block: side of the blocks that hold one chart each.
         width, height: of one plane.
@@ -53,6 +59,7 @@ class Header:
         transform_step, residual_step: quantisation steps.
     """
 
+    prediction: str
     profile: Profile
     block: int
     width: int
@@ -63,9 +70,16 @@ class Header:
     transform_step: float
     residual_step: float
 
+    @property
+    def version(self) -> int:
+        """The first version of the codec that reads this."""
+        return VERSIONS[self.prediction]
+
     def to_json(self) -> dict[str, Any]:
         """Return the header as JSON values."""
         values = asdict(self)
+        if self.version == 1:
+            del values["prediction"]
         values["profile"] = self.profile.name
         values["base"] = [*self.base.origin, self.base.step]
         return values
@@ -73,6 +87,9 @@ class Header:
     @classmethod
     def of(cls, bitstream: Bitstream) -> Header:
         """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
+        prediction = "affine" if bitstream.version == 1 else bitstream.header.get("prediction")
+        if VERSIONS.get(str(prediction)) != bitstream.version:
+            raise CorruptFile(f"header: version {bitstream.version} has no prediction {prediction!r}")
         profile = PROFILES.get(str(bitstream.header.get("profile")))
         base = bitstream.header.get("base")
         if profile is None:
@@ -82,6 +99,7 @@ class Header:
         if not (base[3] > 0 and all(abs(v) < LARGE for v in base)):  # NaN neither
             raise CorruptFile(f"header: base is {base!r}, out of range")
         header = cls(
+            prediction=str(prediction),
             profile=profile,
             block=bitstream.integer("block", 2, 64),
             width=bitstream.integer("width", 2, MAX_SIDE),

@@ -31,10 +31,15 @@ class Quantiser:
     step: float
 
 
-def choose_quantiser(quality: float, profile: Profile, largest: float, diagonal: float) -> Quantiser:
-    """Choose for residuals of magnitude up to ``largest`` on a model of bounding-box ``diagonal``, model units."""
+def effective_step(quality: float, profile: Profile, diagonal: float) -> float:
+    """The step that quality asks for on a model of bounding-box ``diagonal``, model units; positive."""
+    return float((diagonal or 1.0) * COARSEST * 10 ** -(DECADES[profile.name] * quality / 100))
+
+
+def choose_quantiser(effective: float, profile: Profile, largest: float) -> Quantiser:
+    """Choose for an effective step and residuals of magnitude up to ``largest``, model units."""
     finest = largest / profile.amplitude if largest > 0 else 1.0
-    wanted = diagonal * COARSEST * 10 ** -(DECADES[profile.name] * quality / 100) / finest  # effective step, levels
+    wanted = effective / finest  # levels
     if profile.codec == "mjpeg":
         low, high = JPEG_RANGE
         level = next((q for q in range(low, high) if _jpeg_step(q) <= wanted), high)  # the coarsest that is fine enough
