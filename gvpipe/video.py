@@ -103,7 +103,7 @@ class VideoWriter:
         profile: one of `PROFILES`.
         width, height: of a plane, pixels, even.
         fps: frames per second.
-        quality: H.264: the quantisation parameter, 1..51 (10 bit: 1..63); JPEG: its quality, 1..100.
+        quality: H.264: the quantisation parameter, 1..51 (10 bit: 1..63); JPEG: the quantisation step, 1..255 levels.
         gop: H.264: frames per group of pictures.
         preset: x264's.
     """

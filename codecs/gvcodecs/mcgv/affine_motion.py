@@ -49,13 +49,15 @@ class AffineMotion:
     Args:
         bitstream, header: of the file.
         base: ``(V, 3)`` decoded base positions, model units.
+        clusters: ``(V,)`` cluster of each vertex.
         layout: the vertices' pixels.
         bounds: first frame of every segment, and F.
     """
 
-    def __init__(self, bitstream: Bitstream, header: sections.Header, base: Float64, layout: Layout, bounds: list[int]) -> None:
+    def __init__(
+        self, bitstream: Bitstream, header: sections.Header, base: Float64, clusters: Int32, layout: Layout, bounds: list[int]
+    ) -> None:
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
-        clusters = sections.decode_clusters(bitstream.section("clusters"), layout, header.block, header.clusters)
         predictor = AffinePredictor(base, clusters, header.clusters)
         self._rest = predictor.rest
         self._vertices = np.argsort(layout.pixel)

@@ -1,8 +1,8 @@
 """The multi-chart geometry video codec: settings, and the way from a sequence to a bitstream.
 
 Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video: A Compact Representation for 3D Animations", 2007. The steps, each a
-module of its own: base frame (`gvpipe.connectivity`), `segmentation`, `parameterization`, `packing`, `prediction` with
-`transforms`, `padding`, video (`gvpipe.video`).
+module of its own: base frame (`gvpipe.connectivity`), motion (`blended_motion` or, as published, `segmentation` and
+`affine_motion`), `placement` (or, as published, `parameterization` and `packing`), `padding`, video (`gvpipe.video`).
 
 All steps work from what the decoder will have: the decoded base frame and the decoded transforms. Frames are read three
 times (extent, motion, transforms and residual range together, images), never kept.
@@ -26,6 +26,7 @@ from gvcodecs.mcgv.motion import PREDICTIONS, CodedMotion
 from gvcodecs.mcgv.packing import Layout, pack
 from gvcodecs.mcgv.padding import Padding
 from gvcodecs.mcgv.parameterization import parameterize
+from gvcodecs.mcgv.placement import choose_size, place
 from gvcodecs.mcgv.points import Points
 from gvcodecs.mcgv.quality import choose_quantiser, effective_step
 from gvcodecs.mcgv.reader import McgvReader
@@ -43,7 +44,7 @@ BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
 AFFINE_CLUSTERS, AFFINE_BASE_BITS = 20, 12  # the paper's
 BASE_BITS = 8, 16  # bits of a base frame that are chosen unasked
 DISTINCT = 0.995  # part of the places in a base frame that its lattice must tell apart
-SIZE_AUTO = "auto"
+AUTO = "auto"
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
 
 Float64 = NDArray[np.float64]
@@ -64,12 +65,13 @@ class Mcgv(Settings):
     quality: float = 75.0  # 0..100, higher is better
     image: str = "h264"  # h264: predictive; jpeg: every frame decodes alone
     profile: str = "web"  # web: 8 bits, browsers read it; precise: 10 bits (h264 only)
-    prediction: str = "blended"  # blended: vertices follow up to four clusters; affine: one, as published
+    prediction: str = "affine"  # affine: vertices follow one cluster, as published; blended: up to four; smaller, opens later
     clusters: int = 0  # K, 1..1024; 0: as many as pay (blended), 20 (affine)
     transform_bits: int = 17  # bits over the sequence's extent, 8..24 (affine)
     base_bits: int = 0  # bits along the base frame's longest side, 4..20; 0: as many as pay (blended), 12 (affine)
-    density: float = 1.5  # pixels per vertex inside charts, 1..16
-    size: str = SIZE_AUTO  # of a plane, pixels: auto, or WIDTHxHEIGHT in whole blocks, such as 256x256
+    placement: str = AUTO  # charts: as published; halves: pixels follow from the base frame; auto: halves if blended h264
+    density: float = 1.5  # pixels per vertex inside charts, 1..16 (placement charts)
+    size: str = AUTO  # of a plane, pixels: auto, or WIDTHxHEIGHT in whole blocks, such as 256x256
     gop: int = 32  # frames per group of pictures, 1..1000 (h264)
     preset: str = "slow"  # x264's: slower ones are smaller
     segment: int = 500  # most frames per segment, 1..100000
@@ -81,6 +83,7 @@ class Mcgv(Settings):
         self.check_choice("profile", ("web", "precise"))
         self.check_choice("preset", PRESETS)
         self.check_choice("prediction", PREDICTIONS)
+        self.check_choice("placement", (AUTO, *sections.PLACEMENTS))
         self.check_range(0, sections.MAX_CLUSTERS, "clusters")
         self.check_range(8, 24, "transform_bits")
         self.check_range(0, 20, "base_bits")
@@ -117,19 +120,25 @@ class Mcgv(Settings):
         if self.prediction == "blended":
             motion = code_blended(sequence, base, points, bounds, effective, self.clusters, report)
             partition = np.zeros(len(points.members), np.int32)  # nothing ties charts to clusters: few, large ones are best
-            layout = self._layout(base, points, partition, report)
+            layout = self._layout(base, decoded.points, points, partition, points.pieces(), report)
         else:
             report("segment", 0)
             partition = segment(sequence, base[points.members], points.faces, points.members, self.clusters or AFFINE_CLUSTERS)
-            layout, clusters = self._layout(base, points, partition, report), partition[points.point]
+            clusters = partition[points.point]
+            layout = self._layout(base, decoded.points, points, partition, clusters, report)
             motion = code_affine(sequence, base, clusters, bounds, extent / 2**self.transform_bits, report)
-            motion.sections["clusters"] = sections.encode_clusters(clusters, layout, BLOCKS[self.image])
+            motion.sections["clusters"] = (
+                sections.encode_vertex_clusters(clusters, np.argsort(decoded.visits))
+                if self._placement == "halves"
+                else sections.encode_clusters(clusters, layout, BLOCKS[self.image])
+            )
         largest = 0.0
         for _, residual in _residuals(sequence, motion, bounds):
             largest = max(largest, float(np.abs(residual).max()))
         quantiser = choose_quantiser(effective, profile, largest)
         header = sections.Header(
             prediction=self.prediction,
+            placement=self._placement,
             profile=profile,
             block=BLOCKS[self.image],
             width=layout.width,
@@ -149,7 +158,7 @@ class Mcgv(Settings):
                     writer.add(picture)
                 report("video", (first + len(residual)) / sequence.n_frames)
             video = writer.finish()
-        order = np.argsort(decoded.visits)
+        pixels = {} if self._placement == "halves" else {"pixels": sections.encode_pixels(layout, np.argsort(decoded.visits))}
         return Bitstream(
             codec=self.id,
             version=header.version,
@@ -161,7 +170,7 @@ class Mcgv(Settings):
             sections={
                 "mesh": coded.mesh,
                 "order": coded.order,
-                "pixels": sections.encode_pixels(layout, order),
+                **pixels,
                 **motion.sections,
             },
             video=video,
@@ -186,14 +195,26 @@ class Mcgv(Settings):
             bits += 1
         return Lattice.over(first, bits)
 
-    def _layout(self, base: Float64, points: Points, partition: Int32, report: Progress) -> Layout:
-        """The vertices' pixels; no chart holds points of two parts of ``partition (P,)``."""
+    @property
+    def _placement(self) -> str:
+        """JPEG, which sees no other frame, codes the smoother images of charts for less; see docs/codecs/mcgv.md."""
+        if self.placement != AUTO:
+            return self.placement
+        return "halves" if self.prediction == "blended" and self.image == "h264" else "charts"
+
+    def _layout(
+        self, base: Float64, lattice: Int32, points: Points, partition: Int32, groups: Int32, report: Progress
+    ) -> Layout:
+        """The vertices' pixels: charts keep to the parts of ``partition (P,)``, halving parts ``groups (V,)`` first."""
+        block, size = BLOCKS[self.image], self._plane_size()
+        if self._placement == "halves":
+            return place(lattice, groups, *(size or choose_size(len(lattice), block)), block)
         report("parameterize", 0)
         atlas = parameterize(base[points.members], points.faces, partition)
-        return pack(atlas, points.point, BLOCKS[self.image], self.density, self._plane_size())
+        return pack(atlas, points.point, block, self.density, size)
 
     def _plane_size(self) -> tuple[int, int] | None:
-        if self.size == SIZE_AUTO:
+        if self.size == AUTO:
             return None
         block = BLOCKS[self.image]
         parts = self.size.lower().split("x")

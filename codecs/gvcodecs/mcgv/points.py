@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from gvpipe.sequence import Int32
-from gvpipe.topology import adjacency, weld
+from gvpipe.topology import adjacency, components, weld
 
 
 @dataclass(frozen=True)
@@ -43,3 +43,7 @@ class Points:
     def neighbours(self) -> sparse.csr_array:
         """The points' symmetric adjacency ``(P, P)``."""
         return adjacency(self.faces, len(self.members))
+
+    def pieces(self) -> Int32:
+        """``(V,)`` the connected piece of the surface that each vertex belongs to."""
+        return components(self.neighbours())[1][self.point]

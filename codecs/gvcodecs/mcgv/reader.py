@@ -13,6 +13,7 @@ from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import AffineMotion
 from gvcodecs.mcgv.blended_motion import BlendedMotion
 from gvcodecs.mcgv.motion import Motion
+from gvcodecs.mcgv.placement import place
 from gvcodecs.mcgv.points import Points
 from gvpipe.bitstream import Bitstream
 from gvpipe.connectivity import BaseMesh, decode_base
@@ -59,12 +60,20 @@ class McgvReader:
     def _motion(self) -> Motion:
         bitstream, header, base = self._bitstream, self._header, self._base
         order = np.argsort(base.visits)
-        layout = sections.decode_pixels(bitstream.section("pixels"), order, header.width, header.height)
         positions = header.base.place(base.points)
-        if header.prediction == "affine":
-            return AffineMotion(bitstream, header, positions, layout, self._bounds)
         points = Points.of(base.points, base.faces, base.visits)
-        return BlendedMotion(bitstream, header, positions, points, layout, self._bounds)
+        if header.placement == "charts":
+            layout = sections.decode_pixels(bitstream.section("pixels"), order, header.width, header.height)
+        if header.prediction == "blended":
+            if header.placement == "halves":
+                layout = place(base.points, points.pieces(), header.width, header.height, header.block)
+            return BlendedMotion(bitstream, header, positions, points, layout, self._bounds)
+        if header.placement == "halves":
+            clusters = sections.decode_vertex_clusters(bitstream.section("clusters"), order, header.clusters)
+            layout = place(base.points, clusters, header.width, header.height, header.block)
+        else:
+            clusters = sections.decode_clusters(bitstream.section("clusters"), layout, header.block, header.clusters)
+        return AffineMotion(bitstream, header, positions, clusters, layout, self._bounds)
 
     def read(self, start: int, stop: int) -> Float32:
         """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
