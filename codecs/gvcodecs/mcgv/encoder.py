@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -27,7 +28,7 @@ from gvcodecs.mcgv.reader import McgvReader
 from gvcodecs.mcgv.segmentation import segment
 from gvcodecs.mcgv.transforms import dequantise, encode_transforms, quantise
 from gvpipe.bitstream import Bitstream
-from gvpipe.codec import FrameReader, Progress, Settings
+from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.connectivity import decode_base, encode_base
 from gvpipe.errors import SettingError
 from gvpipe.quantize import Lattice
@@ -83,34 +84,31 @@ class Mcgv(Settings):
             raise SettingError("profile precise needs image h264: JPEG has 8 bits")
         self._plane_size()
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> Bitstream:
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
         """Code a sequence.
 
         Raises:
             InputError: a frame cannot be read, or the charts do not fit the size given.
         """
         report = progress or (lambda stage, done: None)
+        memo = memo or Memo()
+        given = sequence
         report("read", 0)
-        extent = _extent(sequence, report)
+        extent = memo("extent", lambda: _extent(given, report))
         report("base", 0)
-        lattice = Lattice.over(sequence.read(0, 1)[0], self.base_bits)
-        coded = encode_base(lattice.quantise(sequence.read(0, 1)[0]), sequence.faces, self.reorder)
+        lattice = Lattice.over(given.read(0, 1)[0], self.base_bits)
+        coded = memo("base", lambda: encode_base(lattice.quantise(given.read(0, 1)[0]), given.faces, self.reorder))
+        memo.permutation = coded.permutation
         decoded = decode_base(coded.mesh, coded.order)
-        sequence = sequence.reordered(coded.permutation, decoded.faces)
+        sequence = given.reordered(coded.permutation, decoded.faces)
         base = lattice.place(decoded.points)
-        layout, clusters = self._layout(sequence, base, decoded.points, report)
+        layout, clusters = memo("layout", lambda: self._layout(sequence, base, decoded.points, report))
         report("transforms", 0)
         predictor = AffinePredictor(base, clusters, int(clusters.max()) + 1)
         transform_step = extent / 2**self.transform_bits
         n_segments = count_segments(sequence.n_frames, self.segment)
         bounds = segment_starts(sequence.n_frames, n_segments)
-        transforms, largest = [], 0.0
-        for s in range(n_segments):
-            fitted = np.concatenate([predictor.fit(block) for _, block in sequence.chunks(bounds[s], bounds[s + 1])])
-            transforms.append(quantise(fitted, predictor.rest, transform_step))
-            for _, residual in _residuals(sequence, predictor, transforms[s], transform_step, bounds[s]):
-                largest = max(largest, float(np.abs(residual).max()))
-            report("transforms", (s + 1) / n_segments)
+        transforms, largest = memo("transforms", lambda: _fit(sequence, predictor, transform_step, bounds, report))
         profile = PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
         diagonal = float(np.linalg.norm(np.ptp(base, axis=0)))
         quantiser = choose_quantiser(self.quality, profile, largest, diagonal)
@@ -187,6 +185,20 @@ def _extent(sequence: MeshSequence, report: Progress) -> float:
         low, high = np.minimum(low, block.min(axis=(0, 1))), np.maximum(high, block.max(axis=(0, 1)))
         report("read", (first + len(block)) / sequence.n_frames)
     return float((high - low).max()) or 1.0
+
+
+def _fit(
+    sequence: MeshSequence, predictor: AffinePredictor, step: float, bounds: list[int], report: Progress
+) -> tuple[list[NDArray[np.int64]], float]:
+    """Quantised transforms of each segment, and the largest coordinate of a residual, model units."""
+    transforms, largest = [], 0.0
+    for s, (start, stop) in enumerate(pairwise(bounds)):
+        fitted = np.concatenate([predictor.fit(block) for _, block in sequence.chunks(start, stop)])
+        transforms.append(quantise(fitted, predictor.rest, step))
+        for _, residual in _residuals(sequence, predictor, transforms[s], step, start):
+            largest = max(largest, float(np.abs(residual).max()))
+        report("transforms", stop / sequence.n_frames)
+    return transforms, largest
 
 
 def _residuals(
