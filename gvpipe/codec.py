@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.bitstream import Bitstream
+from gvpipe.corrections import correct
 from gvpipe.errors import NewerVersion, SettingError
 from gvpipe.sequence import Float32, Int32, MeshSequence
 
@@ -33,8 +34,8 @@ class Memo:
     An encoder wraps the stages that do not look at quality: ``mesh = memo("mesh", lambda: ...)`` works it out once. What is
     kept should be small beside the sequence; frames are read again instead.
 
-    `permutation` ``(V,)`` is the encoder's to set: the sequence's vertex for each vertex that the reader will return. It saves
-    whoever measures the result from finding it out.
+    `permutation` ``(V,)`` is the encoder's to set: the sequence's vertex for each vertex that the reader will return, so that
+    the result can be measured against its source.
     """
 
     def __init__(self) -> None:
@@ -153,7 +154,7 @@ def codec_class(codec: str) -> type[Any]:
 
 
 def open_reader(bitstream: Bitstream) -> FrameReader:
-    """Open a bitstream with the codec that wrote it.
+    """Open a bitstream with the codec that wrote it; corrections to its frames (`gvpipe.corrections`) are applied.
 
     Raises:
         NewerVersion: no installed codec has that id, or only an older version of it.
@@ -168,7 +169,7 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
             f"{codec.version}; upgrade gvpipe"
         )
     reader: FrameReader = codec.reader(bitstream)
-    return reader
+    return correct(bitstream, reader)
 
 
 @functools.cache

@@ -11,7 +11,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.sequence import Float32, Int32
+from gvpipe.sequence import Float32, Int32, MeshSequence
 from gvpipe.video import PROFILES, x264_options
 
 SIZE = 160  # pixels, of both sides
@@ -20,6 +20,11 @@ AZIMUTH, ELEVATION = np.radians(35.0), np.radians(18.0)
 BACKGROUND, DARKEST, LIGHTEST = 235, 40, 215  # levels
 QP = 38  # 1-2 kB
 TRIANGLES_MAX = 200_000  # triangles painted at most
+
+
+def poster_of(sequence: MeshSequence) -> bytes:
+    """Return the poster of a sequence."""
+    return make_poster(sequence.read(0, 1)[0], sequence.faces, sequence.fps, sequence.n_frames)
 
 
 def make_poster(positions: Float32, faces: Int32, fps: float, n_frames: int) -> bytes:
