@@ -58,8 +58,12 @@ def cli() -> None:
 @cli.command()
 @click.argument("source", metavar="INPUT")
 @click.argument("target", metavar="OUTPUT.mp4")
-@click.option("--codec", default="mcgv", show_default=True, help="See `gvpipe codecs`.")
-@click.option("--quality", type=float, help="0-100, higher is better. [default: 75]")
+@click.option("--codec", default="mcgv", show_default=True, help="See `gvpipe codecs`; auto: the one with the smallest file.")
+@click.option("--quality", type=float, help="0-100, higher is better; with a target, where the search begins. [default: 75]")
+@click.option("--target-rmse", type=float, metavar="X", help="Largest rmse, as a part of the diagonal, such as 1e-4.")
+@click.option("--target-kg", type=float, metavar="X", help="Largest KG error, percent, such as 0.1.")
+@click.option("--target-bpvf", type=float, metavar="X", help="Most bits per vertex and frame.")
+@click.option("--max-error", metavar="E", help="Bound for every vertex: model units, or 0.05% of the diagonal.")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the codec; repeat for more.")
 @click.option("--segment", type=int, help="Most frames per segment. [default: 500]")
 @click.option("--fps", type=float, help="Frames per second, instead of the input's.")
@@ -70,6 +74,10 @@ def encode(
     target: str,
     codec: str,
     quality: float | None,
+    target_rmse: float | None,
+    target_kg: float | None,
+    target_bpvf: float | None,
+    max_error: str | None,
     pairs: tuple[str, ...],
     segment: int | None,
     fps: float | None,
@@ -82,14 +90,18 @@ def encode(
     ('walk/*.obj'), a pattern (walk/%04d.obj) or a geometry video.
     """
     from gvpipe import api
-    from gvpipe.codec import codec_class
+    from gvpipe.auto import AUTO
+    from gvpipe.codec import codec_class, codec_ids
 
+    targets = {"target_rmse": target_rmse, "target_kg": target_kg, "target_bpvf": target_bpvf, "max_error": max_error}
+    if sum(value is not None for value in targets.values()) > 1:
+        raise click.UsageError("give one of --target-rmse, --target-kg, --target-bpvf and --max-error")
     settings = _parse_pairs(pairs)
     given = {"quality": quality, "segment": segment, "reorder": reorder or None}
     settings.update({key: str(value) for key, value in given.items() if value is not None})
-    chosen = codec_class(codec).from_texts(settings)
+    chosen = [codec_class(name).from_texts(settings) for name in (codec_ids() if codec == AUTO else [codec])]
     with _progress() as progress:
-        report = api.encode(source, target, chosen, progress, fps)
+        report = api.encode(source, target, chosen if codec == AUTO else chosen[0], progress, fps, **targets)  # type: ignore[arg-type]  # by name
     if report.not_carried:
         click.echo(f"Note: the file does not carry {', '.join(report.not_carried)}.", err=True)
     if as_json:

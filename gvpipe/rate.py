@@ -1,4 +1,4 @@
-"""Which quality meets a target: rate control by error or size, and the smallest file within an error bound.
+"""Which quality meets a target: rate control by error or size, and the smallest file that keeps every vertex within a bound.
 
 Bytes and the logarithm of the error follow quality monotonically and nearly in a straight line, so a target is a root of a
 rising function of quality. `find_quality` takes steps of an assumed slope until the root lies between two qualities, then
@@ -14,19 +14,26 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from gvpipe.codec import Codec, Progress
 from gvpipe.errors import InputError, SettingError
 from gvpipe.sequence import MeshSequence
-from gvpipe.trials import Trial
+from gvpipe.trials import Trial, Trials
 from gvpipe.vertex_errors import frame_diagonal
 
 TOLERANCE = 0.03  # how far on its allowed side of the target a result may lie
 MOST_ENCODES = 8
 SLOPES = {"rmse": 0.055, "kg": 0.055, "bpvf": 0.025}  # assumed change of the logarithm per unit of quality
-NAMES = {"rmse": "rmse (parts of the diagonal)", "kg": "KG error (percent)", "bpvf": "bits per vertex and frame"}
+NAMES = {
+    "rmse": "an rmse (of the diagonal) of",
+    "kg": "a KG error (percent) of",
+    "bpvf": "a rate (bits per vertex and frame) of",
+    "max": "a largest error of",
+}
 BOUND_RATIO = 2.8  # bound by rmse where files are smallest, about
 FIRST_STEP = 8.0  # of quality, when looking for the smallest
 LEAST_STEP = 1.5
 WORTH = 0.003  # part of the size that one more encode must promise to save
+ROUGH_TOLERANCE, ROUGH_WORTH = 0.3, 0.03
 
 Attempt = Callable[[float], Trial]
 
@@ -36,7 +43,8 @@ class Target:
     """A number that the file must not exceed, and should come close to.
 
     Args:
-        measure: ``rmse`` (parts of frame 0's diagonal) or ``kg`` (percent) of the decoded frames, or ``bpvf`` of the file.
+        measure: ``rmse`` (parts of frame 0's diagonal) or ``kg`` (percent) of the decoded frames; ``bpvf`` of the file;
+            ``max``, a bound that every vertex of every frame keeps, model units.
         value: above 0.
 
     Raises:
@@ -47,14 +55,15 @@ class Target:
     value: float
 
     def __post_init__(self) -> None:
-        if self.measure not in SLOPES:
-            raise SettingError(f"target {self.measure!r}; one of {', '.join(SLOPES)} is needed")
+        if self.measure not in NAMES:
+            raise SettingError(f"target {self.measure!r}; one of {', '.join(NAMES)} is needed")
         if isinstance(self.value, bool) or not isinstance(self.value, int | float) or not 0 < self.value < math.inf:
             raise SettingError(f"target {self.measure} is {self.value!r}; a number above 0 is needed")
 
     def of(self, trial: Trial) -> float:
         """What the trial came to; raises `InputError` if the sequence has no such measure."""
-        found = {"rmse": trial.errors.rmse_diag, "kg": trial.errors.kg, "bpvf": trial.bpvf}[self.measure]
+        errors = trial.errors
+        found = {"rmse": errors.rmse_diag, "kg": errors.kg, "bpvf": trial.bpvf, "max": errors.max}[self.measure]
         if found is None:
             raise InputError(f"this sequence has no size to measure its {self.measure} by; give another target or a quality")
         return found
@@ -62,6 +71,40 @@ class Target:
     def is_met(self, trial: Trial) -> bool:
         """Whether the trial is on the allowed side."""
         return self.of(trial) <= self.value
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The encode that was chosen, how to check its file (`Trials.check`), all that were tried, in order, and why this one."""
+
+    trial: Trial
+    trials: Trials
+    tried: list[Trial]
+    reason: str
+
+
+def meet(
+    target: Target, codec: Codec, sequence: MeshSequence, progress: Progress | None = None, is_rough: bool = False
+) -> Choice:
+    """Encode at the quality that meets a target, within 3 % or, for estimates, roughly; starts at the codec's own quality.
+
+    Raises:
+        InputError: no quality meets it.
+    """
+    if target.measure == "max":
+        trials = Trials(codec, sequence, target.value, progress)
+        trial, tried = find_smallest(trials, target.value, codec.quality, ROUGH_WORTH if is_rough else WORTH)
+        reason = (
+            f"quality {trial.codec.quality:.4g} is the smallest of {len(tried)}, {trial.corrections} bytes of it corrections"
+        )
+        return Choice(trial, trials, tried, reason)
+    trials = Trials(codec, sequence, None, progress)
+    trial, tried = find_quality(trials, target, codec.quality, ROUGH_TOLERANCE if is_rough else TOLERANCE)
+    found = target.of(trial)
+    reason = f"quality {trial.codec.quality:.4g} gives {NAMES[target.measure]} {found:.4g} where {target.value:g} is allowed"
+    if found < (1 - TOLERANCE) * target.value:
+        reason += "; no quality comes closer" if trial.codec.quality in (0, 100) else f"; the closest of {len(tried)}"
+    return Choice(trial, trials, tried, reason)
 
 
 def parse_bound(bound: float | str, sequence: MeshSequence) -> float:
@@ -132,7 +175,7 @@ def find_quality(attempt: Attempt, target: Target, start: float, tolerance: floa
     if not allowed:
         best = min(tried, key=target.of)
         raise InputError(
-            f"no quality of codec {best.codec.id} reaches {NAMES[target.measure]} {target.value:g}; the best is "
+            f"no quality of codec {best.codec.id} gives {NAMES[target.measure]} {target.value:g}; the best is "
             f"{target.of(best):.4g} at quality {best.codec.quality:g}; allow more, or choose another codec or finer settings"
         )
     return max(allowed, key=target.of), tried

@@ -66,7 +66,7 @@ class Trials:
     """Tries a codec's settings at one quality after the other.
 
     Args:
-        codec: its settings.
+        codec: its settings; their quality counts for nothing.
         sequence: to encode.
         bound: largest distance of a vertex from where it was, model units; None: whatever the quality gives.
         progress: told of the stages of every encode.
@@ -101,10 +101,12 @@ class Trials:
         return Trial(codec, size, 8 * size / (bitstream.n_vertices * bitstream.n_frames), errors, bitstream)
 
     def check(self, bitstream: Bitstream) -> None:
-        """Decode what a finished file holds, and raise `InputError` if a vertex is out of bound."""
+        """Decode what a finished file holds, if there is a bound, and raise `InputError` if a vertex is out of it."""
+        if self._bound is None:
+            return
         reader = open_reader(bitstream)
         largest = measure_errors(self._in_reader_order(reader), reader.read).max
-        if self._bound is not None and not largest <= self._bound:
+        if not largest <= self._bound:
             raise InputError(
                 f"a vertex of the finished file is {largest:g} off, {self._bound:g} were allowed; nothing was written; "
                 "please report it, and allow more meanwhile"
