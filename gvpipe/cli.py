@@ -111,6 +111,13 @@ def encode(
     seconds = dict(report.seconds)
     stages = ", ".join(f"{name} {value:.1f}" for name, value in seconds.items() if name != "encode" and value >= 0.05)
     click.echo(f"{seconds['encode']:.1f} s: {stages}")
+    for tried in report.tried:
+        keys = [key for key in ("bpvf", "rmse_diag", "kg", "max_diag") if tried[key] is not None]
+        measures = ", ".join(f"{key} {tried[key]:.4g}" for key in keys)
+        click.echo(f"  {tried['codec']} at quality {tried['quality']:.4g}: {tried['bytes']} bytes, {measures}")
+    if report.reason:
+        click.echo(report.reason)
+    _print_sections(report.sections, report.vertices * report.frames)
     return None
 
 
@@ -155,11 +162,7 @@ def info(source: str, as_json: bool) -> None:
     if len(found.levels) > 1:
         click.echo("levels of detail, vertices: " + ", ".join(f"{lod}: {count}" for lod, count in enumerate(found.levels)))
     click.echo(f"{_size(found.bytes)}, {found.bpvf:.3f} bits per vertex and frame:")
-    width = max(map(len, found.sections))
-    for name, count in found.sections.items():
-        bpvf = 8 * count / (found.vertices * found.frames)
-        bar = "#" * round(40 * count / found.bytes)
-        click.echo(f"  {name:<{width}} {count:>10} bytes {bpvf:8.4f} bpvf  {bar}".rstrip())
+    _print_sections(found.sections, found.vertices * found.frames)
     return None
 
 
@@ -247,6 +250,19 @@ def _parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:
 
 def _print_json(values: dict[str, Any]) -> None:
     click.echo(json.dumps(values, allow_nan=False))
+
+
+def _print_sections(sections: dict[str, int], n_samples: int) -> None:
+    from rich.console import Console
+
+    from gvpipe.breakdown import section_table
+
+    console = Console(file=sys.stdout, width=100, color_system=None)
+    with console.capture() as captured:
+        console.print(section_table(sections, n_samples))
+    text = "\n".join(line.rstrip() for line in captured.get().splitlines())
+    encoding = sys.stdout.encoding or "utf-8"
+    click.echo(text.encode(encoding, "replace").decode(encoding))
 
 
 def _size(count: int) -> str:
