@@ -207,8 +207,11 @@ def find_smallest(attempt: Attempt, bound: float, start: float, tolerance: float
             wanted, gain = _vertex(*((q, size(q)) for q in known[at - 1 : at + 2]))
             if gain < tolerance:
                 break
+        elif len(known) > 1:  # at an end of the scale
+            neighbour = known[1] if at == 0 else known[-2]
+            wanted = best + math.copysign(min(step, abs(neighbour - best) / 2), neighbour - best)
         else:
-            break
+            wanted = best + math.copysign(step, 50 - best)
         if min(abs(wanted - q) for q in known) < LEAST_STEP:
             break
         size(wanted)
