@@ -188,6 +188,53 @@ def compare(reference: str, distorted: str, as_json: bool) -> None:
 
 
 @cli.command()
+@click.argument("sources", metavar="SEQUENCES...", nargs=-1, required=True)
+@click.option("--codecs", "codec_list", metavar="ID,ID...", help="Codecs to measure. [default: all]")
+@click.option("--qualities", metavar="Q,Q...", help="Qualities to measure. [default: 0,20,40,60,75,90,100]")
+@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting for all these codecs; repeat for more.")
+@click.option("--json", "target", metavar="OUT.json", help="Write all results to this file.")
+@click.option("--plot", "report", metavar="OUT.json", help="Measure nothing: draw these results into the folder given.")
+@click.option("--peers", metavar="RESULTS.csv", help="With --plot: other codecs' results to draw beside.")
+def bench(
+    sources: tuple[str, ...],
+    codec_list: str | None,
+    qualities: str | None,
+    pairs: tuple[str, ...],
+    target: str | None,
+    report: str | None,
+    peers: str | None,
+) -> None:
+    """Measure rate, distortion, times and memory of codecs, every round trip verified; or draw such results.
+
+    \b
+    gvpipe bench a.npz b.npz --json out.json
+    gvpipe bench --plot out.json plots/
+    """
+    from gvpipe import bench as benches
+    from gvpipe.codec import codec_ids
+    from gvpipe.curves import tables
+
+    if report is not None:
+        from gvpipe import plots
+
+        if len(sources) != 1:
+            raise click.UsageError("--plot OUT.json needs one folder to draw into")
+        drawn = plots.draw(benches.Report.read(report), sources[0], plots.read_peers(peers) if peers else None)
+        click.echo("\n".join(map(str, drawn)))
+        return
+    chosen = [name.strip() for name in codec_list.split(",")] if codec_list else codec_ids()
+    try:
+        wanted = [float(text) for text in qualities.split(",")] if qualities else list(benches.QUALITIES)
+    except ValueError as exc:
+        raise click.UsageError(f"--qualities {qualities}: numbers with commas between are needed") from exc
+    with _progress() as progress:
+        made = benches.run(sources, chosen, wanted, _parse_pairs(pairs), progress)
+    if target:
+        made.write(target)
+    click.echo(tables(made.curves))
+
+
+@cli.command()
 def codecs() -> None:
     """List the codecs and their settings."""
     import dataclasses
