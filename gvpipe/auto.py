@@ -35,11 +35,10 @@ def choose_codec(codecs: Sequence[Codec], sequence: MeshSequence, target: Target
     """
     ranking, estimates = codecs, ""
     if sequence.n_frames > SAMPLE and len(codecs) > FINALISTS:
-        costs = {codec.id: _estimate(codec, sequence, target, progress) for codec in codecs}
-        ranking = [codec for _, codec in sorted(costs.values(), key=lambda item: item[0])]
+        costs = sorted((_estimate(codec, sequence, target, progress) for codec in codecs), key=lambda item: item[0])
+        ranking = [codec for _, codec in costs]
         unit = "KG" if target.measure == "bpvf" else "bytes"
-        estimates = ", ".join(f"{codec.id} {cost:.4g}" for cost, codec in sorted(costs.values(), key=lambda item: item[0]))
-        estimates = f"; estimates ({unit}): {estimates}"
+        estimates = f"; estimates ({unit}): {', '.join(f'{codec.id} {cost:.4g}' for cost, codec in costs)}"
     n_finalists = FINALISTS if estimates else len(codecs)
     finalists: list[Choice] = []
     failures = []

