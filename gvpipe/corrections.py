@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -33,7 +34,7 @@ from gvpipe.vertex_errors import Errors, VertexErrors, frame_diagonal
 
 if TYPE_CHECKING:
     from gvpipe.bitstream import Bitstream
-    from gvpipe.codec import FrameReader, LevelReader
+    from gvpipe.codec import FrameReader
 
 SECTION = "corrections"
 HEAD = struct.Struct("<d")
@@ -145,13 +146,9 @@ def correct(bitstream: Bitstream, reader: FrameReader) -> FrameReader:
     Raises:
         CorruptFile: here or later: the section is not what `encode_corrections` writes.
     """
-    from gvpipe.codec import LevelReader
-
     if SECTION not in bitstream.sections:
         return reader
     section = _Section(bitstream)
-    if isinstance(reader, LevelReader):
-        return _CorrectedLevels(reader, reader, section)
     return _Corrected(reader, section)
 
 
@@ -181,10 +178,20 @@ class _Section:
 
 
 class _Corrected:
-    """A reader's frames, corrected."""
+    """A reader's frames, corrected; it offers what else the reader does."""
+
+    levels: list[int]
+    level_faces: Callable[[int], Int32]
+    group: Callable[[int], tuple[int, int]]
 
     def __init__(self, reader: FrameReader, section: _Section) -> None:
+        from gvpipe.codec import GroupReader, LevelReader
+
         self._reader, self._section = reader, section
+        if isinstance(reader, LevelReader):
+            self.levels, self.level_faces = reader.levels, reader.level_faces
+        if isinstance(reader, GroupReader):
+            self.group = reader.group
 
     @property
     def n_frames(self) -> int:
@@ -196,8 +203,12 @@ class _Corrected:
         """``(T, 3) int32`` triangles."""
         return self._reader.faces
 
-    def read(self, start: int, stop: int) -> Float32:
-        """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units."""
+    def read(self, start: int, stop: int, lod: int = 0) -> Float32:
+        """Return frames of a level: ``(stop - start, V, 3) float32``, model units; levels above 0 stay as they are."""
+        from gvpipe.codec import LevelReader
+
+        if lod and isinstance(self._reader, LevelReader):
+            return self._reader.read(start, stop, lod=lod)
         result, section = self._reader.read(start, stop), self._section
         for number in range(start // section.group, -(-stop // section.group) if stop > start else 0):
             found = section.read(number, result.shape[1])
@@ -208,27 +219,6 @@ class _Corrected:
             if not np.isfinite(result[at]).all():
                 raise CorruptFile(f"section {SECTION!r} is corrupt: a position is larger than float32 can hold")
         return result
-
-
-class _CorrectedLevels(_Corrected):
-    """The same for a reader with levels of detail."""
-
-    def __init__(self, reader: FrameReader, levels: LevelReader, section: _Section) -> None:
-        super().__init__(reader, section)
-        self._levels = levels
-
-    @property
-    def levels(self) -> list[int]:
-        """Vertex counts of the levels."""
-        return self._levels.levels
-
-    def level_faces(self, lod: int) -> Int32:
-        """``(n, 3) int32`` triangles of a level."""
-        return self._levels.level_faces(lod)
-
-    def read(self, start: int, stop: int, lod: int = 0) -> Float32:
-        """Return frames of a level; levels above 0 are not corrected."""
-        return super().read(start, stop) if lod == 0 else self._levels.read(start, stop, lod=lod)
 
 
 def _encode_group(found: Correction, n_frames: int) -> bytes:

@@ -56,6 +56,24 @@ class Rows:
     affine: bool
 
 
+def select_rows(rows: Rows, keep: NDArray[np.bool_]) -> Rows:
+    """The rows whose place in the order ``keep (n,)`` marks, renumbered by place; what they know must be marked, too."""
+    counts = np.diff(rows.starts)
+    wanted = np.repeat(keep, counts)
+    number = np.zeros(len(keep), np.int32)
+    number[rows.order[keep]] = np.arange(int(keep.sum()), dtype=np.int32)
+    return Rows(
+        order=np.arange(int(keep.sum()), dtype=np.int32),
+        starts=np.concatenate([[0], np.cumsum(counts[keep])]).astype(np.int32),
+        near=number[rows.near[wanted]],
+        weights=rows.weights[wanted],
+        variances=rows.variances[wanted],
+        rings=rows.rings[keep],
+        blocks=np.unique(np.concatenate([[0], np.cumsum(keep)])[rows.blocks]).astype(np.int32),
+        affine=rows.affine,
+    )
+
+
 def predict_rows(
     rows: Rows, step: float, residuals: Int64, decoded: Float64, target: Float64 | None, predictor: str, beta: float
 ) -> None:

@@ -87,10 +87,16 @@ def find_principal(trajectories: Float64, error: float) -> Principal:
     return Principal(mean, energies, np.ascontiguousarray(vectors), max(0.0, total - float(energies.sum())))
 
 
-def count_components(principal: Principal, n_points: int, step: float) -> int:
-    """How many components are worth coding at this step, for V points."""
+def count_components(
+    principal: Principal, n_points: int, step: float, point_cost: float = THRESHOLD, row_cost: float = THRESHOLD
+) -> int:
+    """How many components are worth coding at this step, for V points.
+
+    A component is worth it while its energy exceeds, in squared steps, what its V coefficients and 3F basis entries cost:
+    ``V * point_cost + 3F * row_cost``.
+    """
     n_rows = len(principal.mean)
-    worth = int((principal.energies > THRESHOLD * (n_points + n_rows) * step * step).sum())
+    worth = int((principal.energies > (point_cost * n_points + row_cost * n_rows) * step * step).sum())
     return min(worth, MAX_COMPONENTS, MAX_VALUES // max(n_points, n_rows) - 1)
 
 

@@ -24,9 +24,7 @@ from gvpipe.errors import GvpipeError, InputError, SettingError
 from gvpipe.plots import draw, read_peers
 
 Run = Callable[..., Finished]
-PEERS = (
-    "seq,codec,bpvf,kg,rmse_rel,note\nsheet,other,4.0,0.5,1e-3,a\nsheet,other,9.0,0.05,1e-4,b\nsheet,exact,96,0,0,c\n,,x,,,\n"
-)
+PEERS = "seq,codec,bpvf,kg,rmse_rel\nsheet,other,4.0,0.5,1e-3\nsheet,other,9.0,0.05,1e-4\nsheet,exact,96,0,0\n,,x,,\n"
 
 
 @pytest.fixture(scope="module")

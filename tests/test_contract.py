@@ -20,10 +20,15 @@ from gvpipe.metrics import compare
 from gvpipe.sequence import MeshSequence
 
 # the largest rmse, as a part of frame 0's diagonal, at the default quality: each codec's own statement
-BOUNDS = {"mcgv": 2e-3, "pca": 1e-3, "pdct": 1e-3}
+BOUNDS = {"laplacian": 1e-3, "mcgv": 2e-3, "pca": 1e-3, "pdct": 1e-3}
 AWKWARD = awkward()
 
 SETTINGS: dict[str, list[dict[str, object]]] = {
+    "laplacian": [
+        {},
+        {"operator": "cotangent", "delta_prediction": "rigid"},
+        {"operator": "tutte", "delta_prediction": "none"},
+    ],
     "mcgv": [{}, {"image": "jpeg"}, {"profile": "precise"}],
     "pca": [{}, {"predictor": "rbf"}, {"predictor": "lsp"}, {"predictor": "navg"}],
     "pdct": [{}, {"clusters": 3, "fineness": 2.0}],

@@ -17,6 +17,12 @@ from gvpipe.codec import codec_class
 
 GOLDEN = Path(__file__).parent / "golden"
 CURRENT: dict[str, tuple[str, dict[str, object]]] = {
+    "laplacian-1": ("laplacian", {"segment": 7}),
+    "laplacian-1-rigid": ("laplacian", {"operator": "cotangent", "delta_prediction": "rigid"}),
+    "laplacian-1-tutte": (
+        "laplacian",
+        {"operator": "tutte", "delta_prediction": "none", "anchor_choice": "walk", "anchors": 9, "reorder": True},
+    ),
     "mcgv-1-h264": ("mcgv", {"clusters": 5, "gop": 5, "segment": 7}),
     "mcgv-1-h264-10": ("mcgv", {"clusters": 5, "profile": "precise"}),
     "pca-1-kalman": ("pca", {"segment": 7}),

@@ -21,8 +21,6 @@ from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
 from gvpipe.video import VideoReader
 
-BATCH = 8  # frames rebuilt at a time: their positions stay in cache
-
 
 @dataclass(frozen=True)
 class _Surface:
@@ -30,15 +28,16 @@ class _Surface:
 
     Args:
         faces: ``(T, 3)`` triangles.
-        predictor: of the decoded base frame.
-        samples: ``(3 V,)`` which samples of a picture carry x, then y, then z of the vertices in the predictor's order.
-        corners: ``(V, 3)`` where the vertices' coordinates are among those.
+        rest: ``(K, 4, 3)`` transforms that leave the base frame as it is.
+        vertices, pixels, coordinates, clusters: what `rebuild` wants of each vertex.
     """
 
     faces: Int32
-    predictor: AffinePredictor
-    samples: NDArray[np.int64]
-    corners: NDArray[np.int64]
+    rest: NDArray[np.float64]
+    vertices: NDArray[np.int64]
+    pixels: NDArray[np.int64]
+    coordinates: NDArray[np.float64]
+    clusters: Int32
 
 
 class McgvReader:
@@ -77,10 +76,19 @@ class McgvReader:
         layout = sections.decode_pixels(bitstream.section("pixels"), order, header.width, header.height)
         clusters = sections.decode_clusters(bitstream.section("clusters"), layout, header.block, header.clusters)
         predictor = AffinePredictor(header.base.place(base.points), clusters, header.clusters)
-        planes = header.width * header.height * np.arange(3)
-        samples = (layout.pixel[predictor.by_cluster] + planes[:, None]).ravel()
-        corners = np.argsort(predictor.by_cluster)[:, None] + len(order) * np.arange(3)
-        return _Surface(base.faces, predictor, samples, corners)
+        vertices = np.argsort(layout.pixel)
+        return _Surface(
+            faces=base.faces,
+            rest=predictor.rest,
+            vertices=vertices,
+            pixels=layout.pixel[vertices],
+            coordinates=predictor.coordinates[vertices],
+            clusters=clusters[vertices],
+        )
+
+    def group(self, frame: int) -> tuple[int, int]:
+        """``(start, stop)`` of the group of pictures that a frame lies in."""
+        return self._video.group(frame)
 
     def read(self, start: int, stop: int) -> Float32:
         """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
@@ -88,20 +96,25 @@ class McgvReader:
         Raises:
             CorruptFile: a section or the video does not decode.
         """
+        from gvcodecs.mcgv.rebuilding import rebuild
+
         groups = self._video.read(start, stop)
-        surface, step = self._surface, np.float32(self._header.residual_step)
+        surface, step = self._surface, self._header.residual_step
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
-        for group, planes in groups:
-            for offset in range(0, len(planes), BATCH):
-                first = group + offset
-                batch = planes[offset : offset + BATCH]
-                transforms = self._transforms(first, first + len(batch)).copy()
-                transforms[:, :, 3] -= float(step) * self._header.profile.middle  # once per cluster instead of once per vertex
-                moved = surface.predictor.predict_planes(transforms)
-                for i, plane in enumerate(batch):
-                    planar = moved[i].astype(np.float32).ravel()  # (3 V,)
-                    planar += plane.ravel().take(surface.samples) * step
-                    planar.take(surface.corners, out=result[first + i - start], mode="clip")  # every index is in range
+        for first, planes in groups:
+            transforms = self._transforms(first, first + len(planes)).copy()
+            transforms[:, :, 3] -= step * self._header.profile.middle  # once per cluster instead of once per vertex
+            for i, plane in enumerate(planes):
+                rebuild(
+                    plane.reshape(3, -1),
+                    surface.vertices,
+                    surface.pixels,
+                    surface.coordinates,
+                    surface.clusters,
+                    transforms[i],
+                    step,
+                    result[first + i - start],
+                )
         return result
 
     def _transforms(self, start: int, stop: int) -> NDArray[np.float64]:
@@ -113,7 +126,7 @@ class McgvReader:
                 name = f"transforms.{s}"
                 n_frames = self._bounds[s + 1] - self._bounds[s]
                 lattice = decode_transforms(self._bitstream.section(name), n_frames, self._header.clusters, name)
-                self._segment = (s, dequantise(lattice, self._surface.predictor.rest, self._header.transform_step))
+                self._segment = (s, dequantise(lattice, self._surface.rest, self._header.transform_step))
             begin = self._bounds[s]
             parts.append(self._segment[1][max(start, begin) - begin : stop - begin])
         return np.concatenate(parts)

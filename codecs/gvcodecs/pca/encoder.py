@@ -27,6 +27,7 @@ from gvpipe.row_coding import encode_rows
 from gvpipe.row_prediction import PREDICTORS
 from gvpipe.segments import count_segments, segment_starts
 from gvpipe.sequence import MeshSequence
+from gvpipe.trajectories import read_trajectories, survey
 from gvpipe.trajectory_basis import (
     MAX_COMPONENTS,
     choose_step,
@@ -78,7 +79,7 @@ class Pca(Settings):
         report = progress or (lambda stage, done: None)
         memo = memo or Memo()
         report("read", 0)
-        points, spread = memo("survey", lambda: _survey(sequence, report))
+        points, spread = memo("survey", lambda: survey(sequence, report))
         report("mesh", 0)
         coded = memo("mesh", lambda: encode_mesh(sequence.faces, points, self.reorder))
         memo.permutation = coded.permutation
@@ -94,7 +95,7 @@ class Pca(Settings):
         steps, sections = [], {"mesh": coded.mesh, "order": coded.order}
         for s in range(n_segments):
             report("segments", s / n_segments)
-            trajectories = _trajectories(sequence, bounds[s], bounds[s + 1], members)
+            trajectories = read_trajectories(sequence, bounds[s], bounds[s + 1], members)
             n_points = len(trajectories)
             error = wanted**2 * n_points * (bounds[s + 1] - bounds[s])
             principal = find_principal(trajectories, error)
@@ -123,29 +124,3 @@ class Pca(Settings):
     def reader(cls, bitstream: Bitstream) -> FrameReader:
         """Open a ``pca`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         return PcaReader(bitstream)
-
-
-def _survey(sequence: MeshSequence, report: Progress) -> tuple[NDArray[np.int64], float]:
-    """Points ``(V,)`` of vertices, equal where trajectories are, and the root mean square distance from the frames' centres."""
-    points = np.zeros(sequence.n_vertices, np.int64)
-    squared, largest = 0.0, 0.0
-    for first, block in sequence.chunks():
-        frames = block.astype(np.float64)
-        squared += float(((frames - frames.mean(axis=1, keepdims=True)) ** 2).sum())
-        largest = max(largest, float(np.abs(block).max()))
-        rows = np.ascontiguousarray((block + np.float32(0)).swapaxes(0, 1)).reshape(sequence.n_vertices, -1)  # no minus zero
-        _, ids = np.unique(rows.view(np.dtype((np.void, rows.shape[1] * 4))).ravel(), return_inverse=True)
-        _, points = np.unique(points * sequence.n_vertices + ids, return_inverse=True)
-        report("read", (first + len(block)) / sequence.n_frames)
-    _, first_vertex = np.unique(points, return_index=True)
-    points = np.argsort(np.argsort(first_vertex))[points]  # numbered as their first vertices are
-    spread = np.sqrt(squared / (sequence.n_frames * sequence.n_vertices))
-    return points.astype(np.int64), float(spread) or largest * 1e-3 or 1.0
-
-
-def _trajectories(sequence: MeshSequence, start: int, stop: int, members: NDArray[np.int64]) -> Float64:
-    """Trajectories of points: ``(P, 3n)``, n frames."""
-    result = np.empty((len(members), stop - start, 3))
-    for first, block in sequence.chunks(start, stop):
-        result[:, first - start : first - start + len(block)] = block[:, members].swapaxes(0, 1)
-    return result.reshape(len(members), -1)  # (P, n, 3) -> (P, 3n)

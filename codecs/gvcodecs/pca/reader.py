@@ -21,8 +21,7 @@ from gvpipe.row_prediction import Rows
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
 from gvpipe.trajectory_basis import Basis, decode_basis
-
-MAX_FLOAT32 = float(np.finfo(np.float32).max)
+from gvpipe.trajectory_frames import fill_frames
 
 Float64 = NDArray[np.float64]
 
@@ -95,19 +94,13 @@ class PcaReader:
         self._check_level(lod)
         vertices = self._mesh.points if lod == 0 else self._alive(lod)
         result = np.empty((stop - start, len(vertices), 3), np.float32)
-        buffer = np.empty((3, len(vertices)))
         for s in range(self._header.segments):
             first, last = max(start, self._bounds[s]), min(stop, self._bounds[s + 1])
             if first >= last:
                 continue
             segment = self._decode(s, lod)
-            for frame in range(first, last):  # one by one, so that a frame's sums do not depend on what else is read
-                rows = slice(3 * (frame - self._bounds[s]), 3 * (frame - self._bounds[s] + 1))
-                placed = segment.basis.vectors[rows] @ segment.coefficients + segment.basis.mean[rows, None]  # (3, P)
-                np.take(placed, vertices, axis=1, out=buffer)
-                if not np.abs(buffer).max(initial=0) <= MAX_FLOAT32:
-                    raise CorruptFile(f"frame {frame} does not decode to finite positions; get the file again from its source")
-                result[frame - start] = buffer.T
+            begin = self._bounds[s]
+            fill_frames(result, start, first, last, begin, segment.basis, segment.coefficients, vertices)
         return result
 
     def _decode(self, s: int, lod: int) -> Segment:

@@ -1,0 +1,51 @@
+"""Rigid alignment of points that correspond: turning groups of them so that they come closest to given ones (Kabsch).
+
+W. Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float64 = NDArray[np.float64]
+
+
+class Groups:
+    """A partition of the vertices, say into connected components.
+
+    Args:
+        labels: ``(V,)`` the group of each vertex, 0..K-1, none empty.
+    """
+
+    def __init__(self, labels: NDArray[np.integer]) -> None:
+        self.labels = labels
+        self._order = np.argsort(labels, kind="stable")
+        self.sizes = np.bincount(labels)
+        self._starts = np.cumsum(self.sizes) - self.sizes
+
+    def total(self, values: Float64) -> Float64:
+        """Sums over the vertices of each group: ``(n, V, ...)`` to ``(n, K, ...)``."""
+        return np.asarray(np.add.reduceat(values[:, self._order], self._starts, axis=1))
+
+    def centres(self, frames: Float64) -> Float64:
+        """Mean points ``(n, K, 3)`` of groups."""
+        return np.asarray(self.total(frames) / self.sizes[:, None])
+
+    def turned(self, frames: Float64, target: Float64) -> Float64:
+        """Turn each group of ``frames (n, V, 3)`` about its centre, so that its shape comes closest to ``target (V, 3)``."""
+        centres = self.centres(frames)[:, self.labels]
+        offsets = frames - centres
+        wanted = target - self.centres(target[None])[0, self.labels]
+        turns = np.broadcast_to(np.eye(3), (len(frames), len(self.sizes), 3, 3)).copy()
+        solid = self.sizes >= 3
+        turns[:, solid] = rotations(self.total(offsets[..., :, None] * wanted[:, None, :])[:, solid])
+        turned: Float64 = np.einsum("nvi,nvij->nvj", offsets, turns[:, self.labels]) + centres
+        return turned
+
+
+def rotations(covariances: Float64) -> Float64:
+    """The rotations ``(..., 3, 3)`` R that make ``x @ R`` closest to y, given sums of x outer y."""
+    u, _, v = np.linalg.svd(covariances)
+    u[..., :, 2] *= np.where(np.linalg.det(u @ v) < 0, -1.0, 1.0)[..., None]
+    return np.asarray(u @ v, dtype=np.float64)

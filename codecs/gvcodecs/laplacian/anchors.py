@@ -1,0 +1,78 @@
+"""Anchors: the points whose trajectories are coded themselves, beside the deltas of all.
+
+What: the first points of the vertex hierarchy, which lie evenly over the surface, at least one on every component. They
+come in the hierarchy's order, so that each is interpolated from those before it as `pca` does it. A component of up to `SMALL`
+points is all anchors, and needs no deltas.
+Why: deltas tell little of where a point far from any anchor lies. With few anchors the surface drifts, with many their
+own bits grow; anchors are quantised as finely as the wanted drift is small.
+
+``walk`` takes evenly spaced points of the border-expansion walk instead, each predicted from the one before.
+
+Source: Sorkine, Cohen-Or and Toledo, "High-pass quantization for mesh encoding", 2003, for anchors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.hierarchy import Hierarchy
+from gvpipe.row_prediction import Rows, select_rows
+from gvpipe.sequence import Int32
+
+ANCHOR_CHOICES = ("hierarchy", "walk")
+SMALL = 4  # points of components that are all anchors
+MIN_BLOCK = 48  # rows coded at once, at least
+
+Int64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Anchors:
+    """Args:
+    points: ``(A,)`` anchors, in the order of their rows.
+    rows: of the anchors, numbered 0..A-1.
+    """
+
+    points: Int32
+    rows: Rows
+
+
+def choose_anchors(
+    choice: str, spacing: int, hierarchy: Hierarchy, rows: Rows, walk: Int32, component_of: NDArray[np.integer]
+) -> Anchors:
+    """Choose about one anchor per ``spacing`` points.
+
+    Args:
+        choice: one of `ANCHOR_CHOICES`.
+        rows: of all points along the hierarchy.
+        walk: all points in border-expansion order.
+        component_of: ``(P,)`` the component of each point.
+    """
+    is_small = (np.bincount(component_of, minlength=1) <= SMALL)[component_of]
+    n_points = len(component_of)
+    if choice == "hierarchy":
+        n_coarse = int((hierarchy.rings == 0).sum())
+        keep = np.arange(n_points) < max(n_coarse, -(-n_points // spacing))
+        keep |= is_small[hierarchy.order]
+        return Anchors(hierarchy.order[keep], select_rows(rows, keep))
+    keep = (np.arange(n_points) % spacing == 0) | is_small[walk]
+    keep[np.unique(component_of[walk], return_index=True)[1]] = True
+    points = walk[keep]
+    return Anchors(points, _chain(len(points)))
+
+
+def _chain(n: int) -> Rows:
+    """Rows of which each is predicted from the one before."""
+    return Rows(
+        order=np.arange(n, dtype=np.int32),
+        starts=np.maximum(np.arange(n + 1) - 1, 0).astype(np.int32),
+        near=np.arange(n - 1, dtype=np.int32),
+        weights=np.ones(n - 1),
+        variances=np.full(n - 1, 0.1),
+        rings=(np.arange(n) > 0).astype(np.int32),
+        blocks=np.unique(np.append(np.arange(0, n, MIN_BLOCK), n)).astype(np.int32),
+        affine=True,
+    )

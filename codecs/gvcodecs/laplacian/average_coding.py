@@ -1,0 +1,57 @@
+"""The average mesh as bytes: its coordinates coded as trajectories are, by the Laplacian of connectivity alone.
+
+Place and size do not matter to the operators, so that they are left out: the unit is the mean edge length. What precision the
+weights need is measured in docs/codecs/laplacian.md. They need local shape, which is what deltas keep; positions predicted
+along the vertex hierarchy took 3 bits per point more at equal worth.
+
+Source: Sorkine, Cohen-Or and Toledo, "High-pass quantization for mesh encoding", 2003.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.laplacian.coefficients import decode_coefficients, encode_coefficients
+from gvcodecs.laplacian.domain import Surface, build_domain
+from gvcodecs.laplacian.format import Header
+from gvcodecs.laplacian.mesh_scale import edge_lengths
+from gvpipe.binary import Cursor, varint
+from gvpipe.errors import CorruptFile
+
+NAME = "average"
+SPACING = 256  # points per anchor
+FARTHEST = 1e9  # mean edge lengths: what a decoded coordinate may have
+
+Float64 = NDArray[np.float64]
+
+
+def encode_average(points: Float64, surface: Surface, header: Header) -> tuple[bytes, Float64]:
+    """Code ``points (P, 3)``, model units; return the bytes and the decoded points in mean edge lengths."""
+    lengths = edge_lengths(points, surface.edges)
+    unit = float(lengths.mean()) if len(lengths) else 0.0
+    unit = unit or float(np.abs(points).max(initial=0)) or 1.0
+    own = _own_header(header)
+    domain = build_domain(surface, None, own)
+    anchors, deltas = encode_coefficients((points - points.mean(axis=0)) / unit, header.average_step, domain, own)
+    data = varint(len(anchors)) + anchors + deltas
+    return data, decode_average(data, surface, header)
+
+
+def decode_average(data: bytes, surface: Surface, header: Header) -> Float64:
+    """Mirror of `encode_average`; raises `CorruptFile` if the bytes are not what it writes."""
+    own = _own_header(header)
+    cursor = Cursor(data, NAME)
+    anchors = cursor.take(cursor.varint(cursor.left, "a length"))
+    domain = build_domain(surface, None, own)
+    points = decode_coefficients(anchors, cursor.rest(), 3, header.average_step, domain, own, (NAME, NAME))
+    if not np.abs(points).max(initial=0) < FARTHEST:
+        raise CorruptFile(f"section {NAME!r} is corrupt: a position is out of range; get the file again from its source")
+    return points
+
+
+def _own_header(header: Header) -> Header:
+    """How the average itself is coded."""
+    return dataclasses.replace(header, operator="tutte", delta_prediction="kalman", anchors=SPACING, anchor_ratio=1.0)

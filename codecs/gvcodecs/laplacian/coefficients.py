@@ -1,0 +1,35 @@
+"""Coefficients of a segment <-> the sections ``anchors`` and ``deltas``."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.laplacian.domain import Domain
+from gvcodecs.laplacian.format import Header
+from gvpipe.row_coding import decode_rows, encode_rows
+
+Float64 = NDArray[np.float64]
+
+
+def encode_coefficients(coefficients: Float64, step: float, domain: Domain, header: Header) -> tuple[bytes, bytes]:
+    """Code ``coefficients (P, R)`` with the deltas' ``step``; return the bytes of anchors and of deltas."""
+    anchored = coefficients[domain.anchors.points]
+    anchors, _ = encode_rows(anchored, step * header.anchor_ratio, domain.anchors.rows)
+    wanted = domain.system.deltas(coefficients)[domain.delta_points]
+    deltas, _ = encode_rows(wanted, step, domain.deltas, _predictor(header))
+    return anchors, deltas
+
+
+def decode_coefficients(
+    anchors: bytes, deltas: bytes, n_components: int, step: float, domain: Domain, header: Header, names: tuple[str, str]
+) -> Float64:
+    """Mirror of `encode_coefficients`: ``(P, R)``; raises `CorruptFile` naming the section that is not what it writes."""
+    anchored = decode_rows(anchors, n_components, step * header.anchor_ratio, domain.anchors.rows, names[0])
+    decoded = decode_rows(deltas, n_components, step, domain.deltas, names[1], predictor=_predictor(header))
+    return domain.system.solve(domain.delta_points, decoded, anchored)
+
+
+def _predictor(header: Header) -> str:
+    """Section 7's weights as they stand are those of a prediction by fixed weights."""
+    return "kalman" if header.delta_prediction == "kalman" else "navg"

@@ -1,0 +1,82 @@
+"""What encoder and decoder both derive from triangles and the decoded average mesh, before any trajectory is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gvcodecs.laplacian.anchors import Anchors, choose_anchors
+from gvcodecs.laplacian.delta_rows import border_order, delta_order, delta_rows
+from gvcodecs.laplacian.format import Header
+from gvcodecs.laplacian.mesh_scale import fineness
+from gvcodecs.laplacian.operators import laplacian
+from gvcodecs.laplacian.system import ExtendedLaplacian
+from gvpipe.hierarchy import Hierarchy, build_hierarchy
+from gvpipe.mesh_rows import mesh_rows
+from gvpipe.row_prediction import Rows
+from gvpipe.sequence import Int32
+from gvpipe.topology import adjacency, components, unique_edges
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """What follows from the triangles alone.
+
+    Args:
+        faces: ``(T, 3)`` triangles of three different points, over P points.
+        edges: ``(E, 2)``.
+        neighbours: ``(P, P)`` adjacency.
+        hierarchy: of the points.
+        rows: of all points along the hierarchy.
+    """
+
+    faces: Int32
+    edges: Int32
+    neighbours: sparse.csr_array
+    hierarchy: Hierarchy
+    rows: Rows
+
+
+@dataclass(frozen=True)
+class Domain:
+    """Args:
+    anchors: points coded themselves.
+    delta_points: ``(D,)`` points that have deltas, in the order of their rows.
+    deltas: their rows.
+    system: the extended Laplacian.
+    """
+
+    anchors: Anchors
+    delta_points: Int32
+    deltas: Rows
+    system: ExtendedLaplacian
+
+
+def build_surface(point_faces: Int32, n_points: int) -> Surface:
+    """Take in the mesh ``point_faces (T, 3)``."""
+    faces = point_faces[(point_faces != np.roll(point_faces, 1, axis=1)).all(axis=1)]
+    hierarchy = build_hierarchy(faces, n_points)
+    return Surface(faces, unique_edges(faces), adjacency(faces, n_points), hierarchy, mesh_rows(hierarchy))
+
+
+def build_domain(surface: Surface, average: Float64 | None, header: Header) -> Domain:
+    """Set up the coding of coefficients, given the decoded ``average (P, 3)`` in mean edge lengths, if there is one."""
+    n_points = len(surface.hierarchy.order)
+    points = np.zeros((n_points, 3)) if average is None else average
+    walk = border_order(surface.faces, n_points)
+    _, component_of = components(surface.neighbours)
+    anchors = choose_anchors(header.anchor_choice, header.anchors, surface.hierarchy, surface.rows, walk, component_of)
+    is_anchor = np.zeros(n_points, bool)
+    is_anchor[anchors.points] = True
+    has_deltas = (np.bincount(component_of[~is_anchor], minlength=int(component_of.max()) + 1) > 0)[component_of]
+    scale = np.ones(n_points) if average is None else fineness(average, surface.edges, header.edge_power)
+    operator = sparse.diags_array(scale * has_deltas) @ laplacian(points, surface.faces, header.operator)
+    operator = sparse.csr_array(operator)
+    order, blocks, limits = delta_order(header.delta_prediction, surface.hierarchy, walk, has_deltas)
+    rows = delta_rows(header.delta_prediction, order, blocks, limits, surface.neighbours, operator @ points)
+    return Domain(anchors, order, rows, ExtendedLaplacian(operator, anchors.points, 1 / header.anchor_ratio))

@@ -1,0 +1,168 @@
+"""The geometric-Laplacian codec: settings, and the way from a sequence to a bitstream.
+
+Vasa, Marras, Hormann and Brunnett, "Compressing dynamic meshes with geometric Laplacians", 2014. The steps, each a module of
+its own: connectivity (`gvpipe.bare_mesh`), average mesh in edge shape space (`average`) and its coding (`average_coding`),
+principal trajectories (`gvpipe.trajectory_basis`), Laplacian (`operators`) with anchors (`anchors`) and its inverse (`system`),
+prediction of delta trajectories (`delta_rows`), range coding (`gvpipe.row_coding`).
+
+Frames are read three times: for size and points, for the average, then segment by segment.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from gvcodecs.laplacian.anchors import ANCHOR_CHOICES
+from gvcodecs.laplacian.average import average_mesh
+from gvcodecs.laplacian.average_coding import NAME, encode_average
+from gvcodecs.laplacian.coefficients import encode_coefficients
+from gvcodecs.laplacian.delta_rows import DELTA_PREDICTIONS
+from gvcodecs.laplacian.domain import build_domain, build_surface
+from gvcodecs.laplacian.format import (
+    COARSEST,
+    FINEST,
+    LEAST_RATIO,
+    MAX_SEGMENTS,
+    MAX_SPACING,
+    MOST_POWER,
+    MOST_RATIO,
+    Header,
+)
+from gvcodecs.laplacian.operators import OPERATORS
+from gvcodecs.laplacian.reader import LaplacianReader
+from gvpipe.bare_mesh import decode_mesh, encode_mesh
+from gvpipe.bitstream import Bitstream
+from gvpipe.codec import FrameReader, Memo, Progress, Settings
+from gvpipe.segments import count_segments, segment_starts
+from gvpipe.sequence import MeshSequence
+from gvpipe.trajectories import read_trajectories, survey
+from gvpipe.trajectory_basis import (
+    MAX_COMPONENTS,
+    choose_step,
+    count_components,
+    encode_basis,
+    find_principal,
+    fit_coefficients,
+)
+
+COARSE, DECADES = 10.0, 2 * 4 / 3  # as in `pca`: error that the step is chosen for at quality 0, percent of the spread
+POINT_COST, ROW_COST = 0.08, 6.0  # of a component: deltas cost little, so that components are paid for by their basis
+
+
+@dataclass(frozen=True)
+class Laplacian(Settings):
+    """Settings of the geometric-Laplacian codec.
+
+    Quality gives the deltas the step that `pca` gives its coefficients at the same quality: one that aims at a Karni-Gotsman
+    error of ``10 ** (1 - quality / 37.5)`` percent where errors are white. Here they are small between neighbours and grow from
+    anchor to anchor, so that the error is larger, and the perceived one is what bits are spent on.
+
+    Raises:
+        SettingError: a value out of its range.
+    """
+
+    id: ClassVar[str] = "laplacian"
+    version: ClassVar[int] = 1
+    summary: ClassVar[str] = "trajectory PCA through geometric Laplacians: smallest files at equal perceived distortion"
+
+    quality: float = 75.0  # 0..100, higher is better
+    operator: str = "mean-value"  # mean-value, cotangent or tutte
+    delta_prediction: str = "kalman"  # kalman, the paper's rigid, or none
+    anchors: int = 16  # points per anchor, 1..1048576; each component has one at least
+    anchor_choice: str = "hierarchy"  # hierarchy: spread over the surface; walk: along the walk of the deltas
+    anchor_ratio: float = 1.2  # step of anchors, in steps of deltas, 1/1024..1024
+    basis_ratio: float = 1.5  # step of the basis, in steps of deltas, 1/1024..1024
+    components: int = 0  # principal trajectories per segment, 1..16384; 0: as many as pay
+    edge_power: float = 0.75  # deltas are finer where edges are shorter, by their lengths to this power, 0..2
+    average_step: float = 1 / 16  # quantisation step of the average mesh, mean edge lengths, 2**-20..1
+    segment: int = 500  # most frames per segment, 1..100000
+    reorder: bool = False  # true: the codec may choose the vertex order; smaller
+
+    def __post_init__(self) -> None:
+        self.check_range(0, 100, "quality")
+        self.check_choice("operator", OPERATORS)
+        self.check_choice("delta_prediction", DELTA_PREDICTIONS)
+        self.check_range(1, MAX_SPACING, "anchors")
+        self.check_choice("anchor_choice", ANCHOR_CHOICES)
+        self.check_range(LEAST_RATIO, MOST_RATIO, "anchor_ratio", "basis_ratio")
+        self.check_range(0, MAX_COMPONENTS, "components")
+        self.check_range(0, MOST_POWER, "edge_power")
+        self.check_range(FINEST, COARSEST, "average_step")
+        self.check_range(1, 100_000, "segment")
+
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
+        """Code a sequence.
+
+        Raises:
+            InputError: a frame cannot be read, or lies too far from the origin for the quality asked for.
+        """
+        report = progress or (lambda stage, done: None)
+        memo = memo or Memo()
+        report("read", 0)
+        points, spread = memo("survey", lambda: survey(sequence, report))
+        report("mesh", 0)
+        coded = memo("mesh", lambda: encode_mesh(sequence.faces, points, self.reorder))
+        memo.permutation = coded.permutation
+        mesh = decode_mesh(coded.mesh, coded.order, sequence.n_vertices)
+        _, first = np.unique(mesh.points, return_index=True)
+        members = coded.permutation[first]  # a given vertex of each of the codec's points
+        n_segments = min(count_segments(sequence.n_frames, self.segment), MAX_SEGMENTS)
+        bounds = segment_starts(sequence.n_frames, n_segments)
+        sections = {"mesh": coded.mesh, "order": coded.order}
+        header = Header(
+            self.operator,
+            self.delta_prediction,
+            self.anchors,
+            self.anchor_choice,
+            float(self.edge_power),
+            float(self.average_step),
+            float(self.anchor_ratio),
+            float(self.basis_ratio),
+            n_segments,
+            (),
+        )
+        surface = build_surface(mesh.point_faces, mesh.n_points)
+        average = None
+        if header.needs_average:
+            report("average", 0)
+            faces = members[surface.faces].astype(np.int32)
+            shape = memo("average", lambda: average_mesh(sequence, faces)[members])
+            sections[NAME], average = encode_average(shape, surface, header)
+        domain = memo("domain", lambda: build_domain(surface, average, header))
+        # root mean square error of a vertex, model units
+        wanted = spread * COARSE * 10 ** -(DECADES * self.quality / 100) / 100
+        steps = []
+        for s in range(n_segments):
+            report("segments", s / n_segments)
+            trajectories = read_trajectories(sequence, bounds[s], bounds[s + 1], members)
+            n_points = len(trajectories)
+            error = wanted**2 * n_points * (bounds[s + 1] - bounds[s])
+            principal = find_principal(trajectories, error)
+            step = choose_step(principal, n_points, error)
+            kept = min(self.components, len(principal.energies)) or count_components(
+                principal, n_points, step, POINT_COST, ROW_COST
+            )
+            sections[f"basis.{s}"], basis = encode_basis(principal, kept, n_points, step * self.basis_ratio)
+            coefficients = fit_coefficients(trajectories, basis)
+            anchors, deltas = encode_coefficients(coefficients, step, domain, header)
+            sections[f"anchors.{s}"], sections[f"deltas.{s}"] = anchors, deltas
+            steps.append(step)
+        report("segments", 1)
+        return Bitstream(
+            codec=self.id,
+            version=self.version,
+            n_frames=sequence.n_frames,
+            n_vertices=sequence.n_vertices,
+            n_triangles=len(mesh.faces),
+            fps=float(sequence.fps),
+            header={**header.to_json(), "steps": steps},
+            sections=sections,
+        )
+
+    @classmethod
+    def reader(cls, bitstream: Bitstream) -> FrameReader:
+        """Open a ``laplacian`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
+        return LaplacianReader(bitstream)

@@ -1,0 +1,52 @@
+"""Kernel of `gvcodecs.laplacian.delta_rows`: for every vertex of an order, the known ones that a breadth-first search meets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.compiled import compiled
+
+Ints = NDArray[Any]
+
+
+@compiled
+def known_around(order: Ints, limits: Ints, starts: Ints, neighbours: Ints, most: int, reach: int) -> tuple[Ints, Ints]:
+    """Bounds ``(n + 1,)`` and vertices: for each vertex of the order up to ``most`` that are known, nearest first.
+
+    Args:
+        order: ``(n,)`` vertices; those of the graph that are not in it are never known.
+        limits: ``(n,)`` vertices at places before the limit are known.
+        starts, neighbours: the graph, ``neighbours[starts[v]:starts[v + 1]]`` ascending.
+        reach: vertices that a search visits at most.
+    """
+    n_vertices = len(starts) - 1
+    place = np.full(n_vertices, len(order), np.int32)
+    for i in range(len(order)):
+        place[order[i]] = i
+    seen_by = np.full(n_vertices, -1, np.int32)
+    queue = np.empty(reach, np.int32)
+    bounds = np.zeros(len(order) + 1, np.int32)
+    near = np.empty(len(order) * most, np.int32)
+    end = 0
+    for i in range(len(order)):
+        queue[0] = order[i]
+        seen_by[order[i]] = i
+        head, tail, found = 0, 1, 0
+        while head < tail and found < most:
+            for k in range(starts[queue[head]], starts[queue[head] + 1]):
+                v = neighbours[k]
+                if seen_by[v] == i or tail == reach or found == most:
+                    continue
+                seen_by[v] = i
+                queue[tail] = v
+                tail += 1
+                if place[v] < limits[i]:
+                    near[end] = v
+                    end += 1
+                    found += 1
+            head += 1
+        bounds[i + 1] = end
+    return bounds, near[:end].copy()

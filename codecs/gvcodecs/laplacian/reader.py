@@ -1,0 +1,96 @@
+"""From a ``laplacian`` bitstream back to frames.
+
+Opening it factorises the extended Laplacian, the first frame of a segment costs the segment's decoding, and each after that one
+product of a small matrix with the coefficients.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.laplacian.average_coding import NAME, decode_average
+from gvcodecs.laplacian.coefficients import decode_coefficients
+from gvcodecs.laplacian.domain import build_domain, build_surface
+from gvcodecs.laplacian.format import Header
+from gvpipe.bare_mesh import decode_mesh
+from gvpipe.bitstream import Bitstream
+from gvpipe.errors import CorruptFile
+from gvpipe.segments import segment_starts
+from gvpipe.sequence import Float32, Int32
+from gvpipe.trajectory_basis import Basis, decode_basis
+from gvpipe.trajectory_frames import fill_frames
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A decoded segment: its basis, and the coefficients ``(R, P)`` of the points."""
+
+    number: int
+    basis: Basis
+    coefficients: Float64
+
+
+class LaplacianReader:
+    """Frames of a ``laplacian`` bitstream.
+
+    Raises:
+        CorruptFile: a section does not hold what it must.
+    """
+
+    def __init__(self, bitstream: Bitstream) -> None:
+        self._header = Header.of(bitstream)
+        mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"), bitstream.n_vertices)
+        found = (len(mesh.points), len(mesh.faces))
+        if found != (bitstream.n_vertices, bitstream.n_triangles):
+            raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
+        self._mesh, self._bitstream = mesh, bitstream
+        surface = build_surface(mesh.point_faces, mesh.n_points)
+        average = None
+        if self._header.needs_average:
+            average = decode_average(bitstream.section(NAME), surface, self._header)
+        self._domain = build_domain(surface, average, self._header)
+        self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
+        self._segment: Segment | None = None
+
+    @property
+    def n_frames(self) -> int:
+        """F, the number of frames."""
+        return self._bitstream.n_frames
+
+    @property
+    def faces(self) -> Int32:
+        """``(T, 3) int32`` triangles."""
+        return self._mesh.faces
+
+    def read(self, start: int, stop: int) -> Float32:
+        """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
+
+        Raises:
+            CorruptFile: a segment does not decode.
+        """
+        points = self._mesh.points
+        result = np.empty((stop - start, len(points), 3), np.float32)
+        for s in range(self._header.segments):
+            first, last = max(start, self._bounds[s]), min(stop, self._bounds[s + 1])
+            if first < last:
+                segment = self._decode(s)
+                begin = self._bounds[s]
+                fill_frames(result, start, first, last, begin, segment.basis, segment.coefficients, points)
+        return result
+
+    def _decode(self, s: int) -> Segment:
+        if self._segment is None or self._segment.number != s:
+            step, section = self._header.steps[s], self._bitstream.section
+            name, n_frames = f"basis.{s}", self._bounds[s + 1] - self._bounds[s]
+            basis = decode_basis(section(name), n_frames, self._mesh.n_points, step * self._header.basis_ratio, name)
+            names = (f"anchors.{s}", f"deltas.{s}")
+            anchors, deltas = (section(name) for name in names)
+            n_components = basis.vectors.shape[1]
+            coefficients = decode_coefficients(anchors, deltas, n_components, step, self._domain, self._header, names)
+            self._segment = Segment(s, basis, np.ascontiguousarray(coefficients.T))
+        return self._segment

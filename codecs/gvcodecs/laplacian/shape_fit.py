@@ -1,0 +1,119 @@
+"""Vertex positions whose edge lengths and dihedral angles come closest to given ones.
+
+What is made small is the sum over edges of squared relative length errors, plus BENDING times the sum over hinges of squared
+angle errors, weighted with the trust in each angle. Levenberg-Marquardt: each step factorises the sparse normal equations anew
+(3 unknowns per vertex; faces that share an edge couple their vertices). The damping also holds what edge shapes leave open: the
+place and the turn of each component.
+
+Source: Froehlich and Botsch, "Example-driven deformations based on discrete shells", 2011, for the least squares. The codec's
+paper projects by levels, after Winkler et al. 2010; started from aligned frames, a few plain steps reach the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gvcodecs.laplacian.edge_shape import EdgeShape
+
+BENDING = 0.1  # squared relative length error that a squared radian weighs as much as
+SHORTEST = 2e-2  # least length that divides, in mean edge lengths
+FLATTEST = 1e-2  # least height over edge of a face that divides
+MAX_STEPS = 4  # factorisations, which take nearly all of the time; more save the codec no bits
+GAIN = 0.02  # part of its squared error by which a component must still improve for another step to follow
+EXACT = 1e-12  # squared error of an edge that is none: a sequence that does not move starts there
+DAMPING, RELAX, TIGHTEN = 1e-3, 0.1, 10.0  # first damping, in diagonal entries, and its factors after a step taken or refused
+LEAST = 1e-9  # on the diagonal, for vertices without edges
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _State:
+    """Points ``(V, 3)`` in mean edge lengths, weighted errors of edges and hinges ``(E + H,)`` and their derivatives."""
+
+    points: Float64
+    errors: Float64
+    jacobian: sparse.csr_array
+
+
+def fit_shape(shape: EdgeShape, start: Float64, labels: NDArray[np.integer]) -> Float64:
+    """Return points ``(V, 3)`` near ``start`` whose edge shape comes closest to ``shape``, model units.
+
+    Components ``labels (V,)`` share a factorisation and nothing else: each is damped, and its steps taken or refused, alone.
+    """
+    from scipy.sparse.linalg import splu
+
+    unit = float(shape.lengths.mean()) if len(shape.lengths) else 0.0
+    if not unit > 0:
+        return start
+    label_of_error = labels[np.concatenate([shape.edges[:, 0], shape.hinges[:, 0]])]
+    n_components = int(labels.max()) + 1
+    damping = np.full(n_components, DAMPING)
+    state = _measure(shape, unit, start / unit)
+    energy = np.bincount(label_of_error, state.errors**2, n_components)
+    for _ in range(MAX_STEPS):
+        transposed = state.jacobian.T.tocsr()
+        normal = transposed @ state.jacobian
+        damped = normal + sparse.diags_array(np.repeat(damping[labels], 3) * normal.diagonal() + LEAST)
+        options = {"SymmetricMode": True}
+        factor = splu(sparse.csc_array(damped), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        moved = state.points - factor.solve(transposed @ state.errors).reshape(-1, 3)
+        tried = np.bincount(label_of_error, _measure(shape, unit, moved).errors ** 2, n_components)
+        better = tried < energy
+        unsettled = float(energy[~better | (tried < (1 - GAIN) * energy)].sum())
+        state = _measure(shape, unit, np.where(better[labels, None], moved, state.points))
+        energy = np.where(better, tried, energy)
+        damping *= np.where(better, RELAX, TIGHTEN)
+        if unsettled <= max(GAIN * energy.sum(), EXACT * len(state.errors)):
+            break
+    return state.points * unit
+
+
+def _measure(shape: EdgeShape, unit: float, points: Float64) -> _State:
+    length_errors, along_edges = _length_errors(shape, unit, points)
+    angle_errors, along_hinges = _angle_errors(shape, points)
+    n_edges, n_hinges = len(length_errors), len(angle_errors)
+    vertices = np.concatenate([shape.edges.ravel(), shape.hinges.ravel()]).astype(np.int64)
+    starts = np.concatenate([6 * np.arange(n_edges), 6 * n_edges + 12 * np.arange(n_hinges + 1)])
+    values = np.concatenate([along_edges.ravel(), along_hinges.ravel()])
+    columns = (3 * vertices[:, None] + np.arange(3)).ravel()
+    jacobian = sparse.csr_array((values, columns, starts), shape=(n_edges + n_hinges, points.size))
+    return _State(points, np.concatenate([length_errors, angle_errors]), jacobian)
+
+
+def _length_errors(shape: EdgeShape, unit: float, points: Float64) -> tuple[Float64, Float64]:
+    """Relative errors ``(E,)`` of lengths, and their derivatives ``(E, 2, 3)`` by the edges' ends."""
+    i, j = shape.edges.T
+    side = points[j] - points[i]
+    length = np.sqrt(_dot(side, side))
+    wanted = shape.lengths / unit
+    weight = 1 / np.maximum(wanted, SHORTEST)
+    toward = side * (weight / np.maximum(length, SHORTEST))[:, None]
+    return (length - wanted) * weight, np.stack([-toward, toward], axis=1)
+
+
+def _angle_errors(shape: EdgeShape, points: Float64) -> tuple[Float64, Float64]:
+    """Weighted errors ``(H,)`` of dihedral angles, and their derivatives ``(H, 4, 3)`` by the hinges' vertices."""
+    i, j, k, l = shape.hinges.T  # noqa: E741 - vertices i j k l
+    edge, one, other = points[j] - points[i], points[k] - points[i], points[l] - points[i]
+    normal_one, normal_other = np.cross(edge, one), np.cross(other, edge)  # twice the area long
+    squared = np.maximum(_dot(edge, edge), SHORTEST**2)
+    length = np.sqrt(squared)
+    angle = np.arctan2(_dot(normal_one, other) * length, _dot(normal_one, normal_other))
+    weight = np.sqrt(BENDING) * shape.trust
+    error = np.remainder(angle - shape.angles + np.pi, 2 * np.pi) - np.pi
+    least = (FLATTEST * squared) ** 2
+    by_k = normal_one * (weight * length / np.maximum(_dot(normal_one, normal_one), least))[:, None]
+    by_l = normal_other * (weight * length / np.maximum(_dot(normal_other, normal_other), least))[:, None]
+    share_k, share_l = (_dot(one, edge) / squared)[:, None], (_dot(other, edge) / squared)[:, None]  # of j; of i the rest
+    by_i = -(1 - share_k) * by_k - (1 - share_l) * by_l
+    by_j = -share_k * by_k - share_l * by_l
+    return weight * error, np.stack([by_i, by_j, by_k, by_l], axis=1)
+
+
+def _dot(a: Float64, b: Float64) -> Float64:
+    return np.asarray(np.einsum("ni,ni->n", a, b))

@@ -1,0 +1,40 @@
+"""Sequences as trajectories: points that vertices share, their spread, and blocks of trajectories.
+
+Vertices with one trajectory (seams, triangle soups) are one point, coded once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.codec import Progress
+from gvpipe.sequence import MeshSequence
+
+Float64 = NDArray[np.float64]
+
+
+def survey(sequence: MeshSequence, report: Progress) -> tuple[NDArray[np.int64], float]:
+    """Points ``(V,)`` of vertices, equal where trajectories are, and the root mean square distance from the frames' centres."""
+    points = np.zeros(sequence.n_vertices, np.int64)
+    squared, largest = 0.0, 0.0
+    for first, block in sequence.chunks():
+        frames = block.astype(np.float64)
+        squared += float(((frames - frames.mean(axis=1, keepdims=True)) ** 2).sum())
+        largest = max(largest, float(np.abs(block).max()))
+        rows = np.ascontiguousarray((block + np.float32(0)).swapaxes(0, 1)).reshape(sequence.n_vertices, -1)  # no minus zero
+        _, ids = np.unique(rows.view(np.dtype((np.void, rows.shape[1] * 4))).ravel(), return_inverse=True)
+        _, points = np.unique(points * sequence.n_vertices + ids, return_inverse=True)
+        report("read", (first + len(block)) / sequence.n_frames)
+    _, first_vertex = np.unique(points, return_index=True)
+    points = np.argsort(np.argsort(first_vertex))[points]  # numbered as their first vertices are
+    spread = np.sqrt(squared / (sequence.n_frames * sequence.n_vertices))
+    return points.astype(np.int64), float(spread) or largest * 1e-3 or 1.0
+
+
+def read_trajectories(sequence: MeshSequence, start: int, stop: int, members: NDArray[np.int64]) -> Float64:
+    """Trajectories of the vertices ``members (P,)`` from frame ``start`` to ``stop``: ``(P, 3n)``, n frames, model units."""
+    result = np.empty((len(members), stop - start, 3))
+    for first, block in sequence.chunks(start, stop):
+        result[:, first - start : first - start + len(block)] = block[:, members].swapaxes(0, 1)
+    return result.reshape(len(members), -1)  # (P, n, 3) -> (P, 3n)
