@@ -5,19 +5,22 @@ from __future__ import annotations
 import dataclasses
 import os
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from gvpipe.codec import Codec, Progress, codec_class
+from gvpipe.auto import AUTO, DEFAULT, choose_codec
+from gvpipe.codec import Codec, Progress, codec_class, codec_ids
 from gvpipe.container import bytes_by_part, write_file
-from gvpipe.errors import InputError, OutputError
+from gvpipe.errors import InputError, OutputError, SettingError
 from gvpipe.io import read as read_sequence
 from gvpipe.io import write as write_sequence
 from gvpipe.player import Player
-from gvpipe.poster import make_poster
+from gvpipe.poster import poster_of
+from gvpipe.rate import Target, meet, parse_bound
 from gvpipe.sequence import MeshSequence
 
 VIDEO_SUFFIXES = (".mp4", ".m4v")
@@ -30,8 +33,12 @@ StrPath = str | os.PathLike[str]
 
 @dataclass(frozen=True)
 class Report:
-    """What an encode did. ``seconds`` holds the whole as ``encode``, then each stage; ``not_carried`` names the attributes
-    of the sequence that the file does not hold."""
+    """What an encode did.
+
+    ``seconds`` holds the whole as ``encode``, then each stage; ``not_carried`` names the attributes of the sequence that the
+    file does not hold; ``sections`` are as in `Info`. Where a target was given, or codec ``auto``, ``tried`` holds every encode
+    that was measured (`gvpipe.trials.Trial`), and ``reason`` why the one in the file was chosen.
+    """
 
     codec: str
     settings: dict[str, Any]
@@ -43,6 +50,9 @@ class Report:
     bpvf: float
     seconds: dict[str, float]
     not_carried: list[str]
+    sections: dict[str, int]
+    tried: list[dict[str, Any]]
+    reason: str
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values."""
@@ -119,40 +129,62 @@ def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> None:
 def encode(
     source: MeshSequence | StrPath,
     path: StrPath,
-    codec: str | Codec = "mcgv",
+    codec: str | Codec | Sequence[Codec] = "mcgv",
     progress: Progress | None = None,
     fps: float | None = None,
+    *,
+    target_rmse: float | None = None,
+    target_kg: float | None = None,
+    target_bpvf: float | None = None,
+    max_error: float | str | None = None,
     **settings: Any,
 ) -> Report:
     """Encode a sequence into a geometry video.
 
+    At most one target may be given. Then the quality is searched, from the one in the settings on; see `gvpipe.rate`.
+
     Args:
         source: a sequence, or what `read` takes.
         path: the ``.mp4`` to write; an older file is replaced once the new one is complete.
-        codec: its id, with ``settings`` by name, or its settings object.
+        codec: its id, with ``settings`` by name, or its settings object. Several, or ``"auto"`` for all with settings that all
+            have: the one with the smallest file that meets the target, by default `gvpipe.auto.DEFAULT`.
         progress: called with a stage's name and the part of it that is done.
         fps: overrides the source's frames per second.
+        target_rmse: largest root mean square error, as a part of frame 0's diagonal.
+        target_kg: largest Karni-Gotsman error, percent.
+        target_bpvf: most bits per vertex and frame, of the whole file.
+        max_error: a bound that every vertex of every frame keeps: model units, or a part of the diagonal such as ``"0.05%"``.
 
     Raises:
-        InputError: the source, a setting or the path cannot be used.
+        InputError: the source, a setting or the path cannot be used, or no quality meets the target.
         OutputError: the file cannot be written; no part of it is left.
     """
     _check_target(Path(path))
     given = None if isinstance(source, MeshSequence) else source
     if given is not None and os.path.exists(path) and os.path.exists(given) and os.path.samefile(given, path):
         raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
-    chosen: Codec = codec_class(codec)(**settings) if isinstance(codec, str) else codec
+    wanted = _one_of({"rmse": target_rmse, "kg": target_kg, "bpvf": target_bpvf, "max": max_error})
+    candidates = _candidates(codec, settings)
     started = time.perf_counter()
     sequence = source if isinstance(source, MeshSequence) else read(source)
     if fps is not None:
         sequence = dataclasses.replace(sequence, fps=fps)
     clock = _StageClock(progress)
-    bitstream = chosen.encode(sequence, clock)
+    target = wanted and Target(wanted[0], parse_bound(wanted[1], sequence) if wanted[0] == "max" else cast("float", wanted[1]))
+    choice = None
+    if not isinstance(candidates, Codec):
+        choice = choose_codec(candidates, sequence, target or DEFAULT, clock)
+    elif target:
+        choice = meet(target, candidates, sequence, clock)
+    if choice:
+        chosen, bitstream = choice.trial.codec, choice.trial.bitstream
+    else:
+        chosen = cast("Codec", candidates)
+        bitstream = chosen.encode(sequence, clock)
     clock("write", 0.0)
     if not bitstream.video:
-        poster = make_poster(sequence.read(0, 1)[0], sequence.faces, bitstream.fps, bitstream.n_frames)
-        bitstream = dataclasses.replace(bitstream, video=poster)
-    size = write_file(bitstream, path)
+        bitstream = dataclasses.replace(bitstream, video=poster_of(sequence))
+    size = write_file(bitstream, path, choice.trials.check if choice else None)
     clock("", 1.0)
     return Report(
         codec=chosen.id,
@@ -165,6 +197,9 @@ def encode(
         bpvf=8 * size / (bitstream.n_vertices * bitstream.n_frames),
         seconds={"encode": time.perf_counter() - started, **clock.seconds},
         not_carried=sorted(sequence.attributes),
+        sections=bytes_by_part(bitstream, size),
+        tried=[trial.to_json() for trial in choice.tried] if choice else [],
+        reason=choice.reason if choice else "",
     )
 
 
@@ -219,6 +254,21 @@ def frame_range(player: Player, start: int, stop: int | None) -> tuple[int, int]
     if not 0 <= start < stop <= len(player):
         raise InputError(f"{player.path}: frames {start} to {stop} asked for; 0 <= start < stop <= {len(player)} is needed")
     return start, stop
+
+
+def _one_of(targets: dict[str, float | str | None]) -> tuple[str, float | str] | None:
+    """The measure and value of the one target that is given."""
+    given = [(measure, value) for measure, value in targets.items() if value is not None]
+    if len(given) > 1:
+        raise SettingError("more than one target is given; choose one of target_rmse, target_kg, target_bpvf and max_error")
+    return given[0] if given else None
+
+
+def _candidates(codec: str | Codec | Sequence[Codec], settings: dict[str, Any]) -> Codec | Sequence[Codec]:
+    """The settings object of the one codec that is asked for, or of all to choose from."""
+    if codec == AUTO:
+        return [codec_class(name)(**settings) for name in codec_ids()]
+    return cast("Codec", codec_class(codec)(**settings)) if isinstance(codec, str) else codec
 
 
 def _check_target(path: Path) -> None:

@@ -59,8 +59,12 @@ def cli() -> None:
 @cli.command()
 @click.argument("source", metavar="INPUT")
 @click.argument("target", metavar="OUTPUT.mp4")
-@click.option("--codec", default="mcgv", show_default=True, help="See `gvpipe codecs`.")
-@click.option("--quality", type=float, help="0-100, higher is better. [default: 75]")
+@click.option("--codec", default="mcgv", show_default=True, help="See `gvpipe codecs`; auto: the one with the smallest file.")
+@click.option("--quality", type=float, help="0-100, higher is better; with a target, where the search begins. [default: 75]")
+@click.option("--target-rmse", type=float, metavar="X", help="Largest rmse, as a part of the diagonal, such as 1e-4.")
+@click.option("--target-kg", type=float, metavar="X", help="Largest KG error, percent, such as 0.1.")
+@click.option("--target-bpvf", type=float, metavar="X", help="Most bits per vertex and frame.")
+@click.option("--max-error", metavar="E", help="Bound for every vertex: model units, or 0.05% of the diagonal.")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the codec; repeat for more.")
 @click.option("--segment", type=int, help="Most frames per segment. [default: 500]")
 @click.option("--fps", type=float, help="Frames per second, instead of the input's.")
@@ -71,6 +75,10 @@ def encode(
     target: str,
     codec: str,
     quality: float | None,
+    target_rmse: float | None,
+    target_kg: float | None,
+    target_bpvf: float | None,
+    max_error: str | None,
     pairs: tuple[str, ...],
     segment: int | None,
     fps: float | None,
@@ -83,14 +91,18 @@ def encode(
     ('walk/*.obj'), a pattern (walk/%04d.obj) or a geometry video.
     """
     from gvpipe import api
-    from gvpipe.codec import codec_class
+    from gvpipe.auto import AUTO
+    from gvpipe.codec import codec_class, codec_ids
 
+    targets = {"target_rmse": target_rmse, "target_kg": target_kg, "target_bpvf": target_bpvf, "max_error": max_error}
+    if sum(value is not None for value in targets.values()) > 1:
+        raise click.UsageError("give one of --target-rmse, --target-kg, --target-bpvf and --max-error")
     settings = _parse_pairs(pairs)
     given = {"quality": quality, "segment": segment, "reorder": reorder or None}
     settings.update({key: str(value) for key, value in given.items() if value is not None})
-    chosen = codec_class(codec).from_texts(settings)
+    chosen = [codec_class(name).from_texts(settings) for name in (codec_ids() if codec == AUTO else [codec])]
     with _progress() as progress:
-        report = api.encode(source, target, chosen, progress, fps)
+        report = api.encode(source, target, chosen if codec == AUTO else chosen[0], progress, fps, **targets)  # type: ignore[arg-type]  # by name
     if report.not_carried:
         click.echo(f"Note: the file does not carry {', '.join(report.not_carried)}.", err=True)
     if as_json:
@@ -100,6 +112,13 @@ def encode(
     seconds = dict(report.seconds)
     stages = ", ".join(f"{name} {value:.1f}" for name, value in seconds.items() if name != "encode" and value >= 0.05)
     click.echo(f"{seconds['encode']:.1f} s: {stages}")
+    for tried in report.tried:
+        keys = [key for key in ("bpvf", "rmse_diag", "kg", "max_diag") if tried[key] is not None]
+        measures = ", ".join(f"{key} {tried[key]:.4g}" for key in keys)
+        click.echo(f"  {tried['codec']} at quality {tried['quality']:.4g}: {tried['bytes']} bytes, {measures}")
+    if report.reason:
+        click.echo(report.reason)
+    _print_sections(report.sections, report.vertices * report.frames)
     return None
 
 
@@ -144,11 +163,7 @@ def info(source: str, as_json: bool) -> None:
     if len(found.levels) > 1:
         click.echo("levels of detail, vertices: " + ", ".join(f"{lod}: {count}" for lod, count in enumerate(found.levels)))
     click.echo(f"{_size(found.bytes)}, {found.bpvf:.3f} bits per vertex and frame:")
-    width = max(map(len, found.sections))
-    for name, count in found.sections.items():
-        bpvf = 8 * count / (found.vertices * found.frames)
-        bar = "#" * round(40 * count / found.bytes)
-        click.echo(f"  {name:<{width}} {count:>10} bytes {bpvf:8.4f} bpvf  {bar}".rstrip())
+    _print_sections(found.sections, found.vertices * found.frames)
     return None
 
 
@@ -237,6 +252,53 @@ def render(source: str, target: str, size: str, **options: Any) -> None:
 
 
 @cli.command()
+@click.argument("sources", metavar="SEQUENCES...", nargs=-1, required=True)
+@click.option("--codecs", "codec_list", metavar="ID,ID...", help="Codecs to measure. [default: all]")
+@click.option("--qualities", metavar="Q,Q...", help="Qualities to measure. [default: 0,20,40,60,75,90,100]")
+@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting for all these codecs; repeat for more.")
+@click.option("--json", "target", metavar="OUT.json", help="Write all results to this file.")
+@click.option("--plot", "report", metavar="OUT.json", help="Measure nothing: draw these results into the folder given.")
+@click.option("--peers", metavar="RESULTS.csv", help="With --plot: other codecs' results to draw beside.")
+def bench(
+    sources: tuple[str, ...],
+    codec_list: str | None,
+    qualities: str | None,
+    pairs: tuple[str, ...],
+    target: str | None,
+    report: str | None,
+    peers: str | None,
+) -> None:
+    """Measure rate, distortion, times and memory of codecs, every round trip verified; or draw such results.
+
+    \b
+    gvpipe bench a.npz b.npz --json out.json
+    gvpipe bench --plot out.json plots/
+    """
+    from gvpipe import bench as benches
+    from gvpipe.codec import codec_ids
+    from gvpipe.curves import tables
+
+    if report is not None:
+        from gvpipe import plots
+
+        if len(sources) != 1:
+            raise click.UsageError("--plot OUT.json needs one folder to draw into")
+        drawn = plots.draw(benches.Report.read(report), sources[0], plots.read_peers(peers) if peers else None)
+        click.echo("\n".join(map(str, drawn)))
+        return
+    chosen = [name.strip() for name in codec_list.split(",")] if codec_list else codec_ids()
+    try:
+        wanted = [float(text) for text in qualities.split(",")] if qualities else list(benches.QUALITIES)
+    except ValueError as exc:
+        raise click.UsageError(f"--qualities {qualities}: numbers with commas between are needed") from exc
+    with _progress() as progress:
+        made = benches.run(sources, chosen, wanted, _parse_pairs(pairs), progress)
+    if target:
+        made.write(target)
+    click.echo(tables(made.curves))
+
+
+@cli.command()
 def codecs() -> None:
     """List the codecs and their settings."""
     import dataclasses
@@ -310,6 +372,19 @@ def _tell_conversion(report: ExportReport) -> None:
 
 def _print_json(values: dict[str, Any]) -> None:
     click.echo(json.dumps(values, allow_nan=False))
+
+
+def _print_sections(sections: dict[str, int], n_samples: int) -> None:
+    from rich.console import Console
+
+    from gvpipe.breakdown import section_table
+
+    console = Console(file=sys.stdout, width=100, color_system=None)
+    with console.capture() as captured:
+        console.print(section_table(sections, n_samples))
+    text = "\n".join(line.rstrip() for line in captured.get().splitlines())
+    encoding = sys.stdout.encoding or "utf-8"
+    click.echo(text.encode(encoding, "replace").decode(encoding))
 
 
 def _size(count: int) -> str:

@@ -10,9 +10,13 @@ import dataclasses
 import functools
 from collections.abc import Callable, Mapping
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, Protocol, Self, TypeVar, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gvpipe.bitstream import Bitstream
+from gvpipe.corrections import correct
 from gvpipe.errors import NewerVersion, SettingError
 from gvpipe.sequence import Float32, Int32, MeshSequence
 
@@ -20,6 +24,30 @@ GROUP = "gvpipe.codecs"
 
 Progress = Callable[[str, float], None]
 """Called with a stage's name and the part of it that is done, 0..1; stages come one after the other."""
+
+Result = TypeVar("Result")
+
+
+class Memo:
+    """What encodes of one sequence share if their settings differ in quality alone.
+
+    An encoder wraps the stages that do not look at quality: ``mesh = memo("mesh", lambda: ...)`` works it out once. What is
+    kept should be small beside the sequence; frames are read again instead.
+
+    `permutation` ``(V,)`` is the encoder's to set: the sequence's vertex for each vertex that the reader will return, so that
+    the result can be measured against its source.
+    """
+
+    def __init__(self) -> None:
+        self._results: dict[str, Any] = {}
+        self.permutation: NDArray[np.integer] | None = None
+
+    def __call__(self, stage: str, work: Callable[[], Result]) -> Result:
+        """Return the stage's result, from before if there is one."""
+        if stage not in self._results:
+            self._results[stage] = work()
+        result: Result = self._results[stage]
+        return result
 
 
 @runtime_checkable
@@ -80,8 +108,8 @@ class Codec(Protocol):
         """0..100, higher is better; bytes and error follow it monotonically."""
         ...
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> Bitstream:
-        """Code a sequence."""
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
+        """Code a sequence; ``memo`` is shared with encodes of the same sequence at another quality."""
         ...
 
     @classmethod
@@ -135,7 +163,7 @@ def codec_class(codec: str) -> type[Any]:
 
 
 def open_reader(bitstream: Bitstream) -> FrameReader:
-    """Open a bitstream with the codec that wrote it.
+    """Open a bitstream with the codec that wrote it; corrections to its frames (`gvpipe.corrections`) are applied.
 
     Raises:
         NewerVersion: no installed codec has that id, or only an older version of it.
@@ -150,7 +178,7 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
             f"{codec.version}; upgrade gvpipe"
         )
     reader: FrameReader = codec.reader(bitstream)
-    return reader
+    return correct(bitstream, reader)
 
 
 @functools.cache

@@ -18,6 +18,7 @@ import io
 import os
 import struct
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any
@@ -36,19 +37,30 @@ MAX_BOXES = 1 << 16
 AGAIN = "get the file again from its source"
 
 
-def write_file(bitstream: Bitstream, path: str | os.PathLike[str]) -> int:
+def write_file(bitstream: Bitstream, path: str | os.PathLike[str], check: Callable[[Bitstream], None] | None = None) -> int:
     """Write ``bitstream`` as an MP4 file, all of it or nothing, and return its size in bytes.
+
+    Args:
+        bitstream: with its video.
+        path: of the file.
+        check: looks at what the finished file holds, before it takes its name; if it raises, nothing is left.
 
     Raises:
         OutputError: the file cannot be written; an older file of that name is left as it was.
     """
-    identity = _content_id(bitstream)
-    payload = pack_payload(bitstream, {"id": identity, "video_crc32": _inspect(io.BytesIO(bitstream.video)).checksum})
-    video = _remux(bitstream.video, f"{VERSION} {identity}")
-    with atomic_path(path) as temporary, open(temporary, "wb") as file:
-        file.write(video)
-        file.write(_box(payload))
-        return file.tell()
+    video, box = _pack(bitstream)
+    with atomic_path(path) as temporary:
+        with open(temporary, "wb") as file:
+            file.write(video)
+            file.write(box)
+        if check is not None:
+            check(read_file(temporary))
+    return len(video) + len(box)
+
+
+def file_size(bitstream: Bitstream) -> int:
+    """Bytes of the file that `write_file` would write."""
+    return sum(map(len, _pack(bitstream)))
 
 
 def read_file(path: str | os.PathLike[str]) -> Bitstream:
@@ -78,6 +90,13 @@ def bytes_by_part(bitstream: Bitstream, size: int) -> dict[str, int]:
     parts = {name: len(data) for name, data in bitstream.sections.items()}
     parts["video"] = _inspect(io.BytesIO(bitstream.video)).n_bytes
     return {**parts, "container": size - sum(parts.values())}
+
+
+def _pack(bitstream: Bitstream) -> tuple[bytes, bytes]:
+    """The two parts of a file: the video with its tag, the box with the payload."""
+    identity = _content_id(bitstream)
+    payload = pack_payload(bitstream, {"id": identity, "video_crc32": _inspect(io.BytesIO(bitstream.video)).checksum})
+    return _remux(bitstream.video, f"{VERSION} {identity}"), _box(payload)
 
 
 def _read(file: IO[bytes], size: int) -> Bitstream:

@@ -10,7 +10,6 @@ and R. Klein, Simple and efficient compression of animation sequences, 2005 (``d
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
@@ -23,8 +22,7 @@ from gvpipe.sequence import MeshSequence
 from gvpipe.sted import Sted
 from gvpipe.surface import Hausdorff
 from gvpipe.topology import unique_edges
-
-BLOCK_BYTES = 4 << 20  # float64 positions of one side worked on at a time: the temporaries of a block stay in cache
+from gvpipe.vertex_errors import BLOCK_BYTES, VertexErrors, frame_diagonal, ratio
 
 Float64 = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -70,10 +68,10 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: Progress
     distorted = aligned(reference, distorted)
     n_frames = reference.n_frames
     edges = unique_edges(reference.faces)
-    diagonal = _diagonal(reference)
+    diagonal = frame_diagonal(reference)
     sted = Sted(edges, reference.n_vertices, diagonal)
     hausdorff = Hausdorff(reference.faces, edges, reference.n_vertices)
-    errors = _VertexErrors()
+    errors = VertexErrors()
     step = max(1, BLOCK_BYTES // (24 * reference.n_vertices))
     for first, chunk in reference.chunks():
         other = distorted.read(first, first + len(chunk))
@@ -86,53 +84,17 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: Progress
             hausdorff.add(a, b, distance)
             if progress is not None:
                 progress(first + start + len(a), n_frames)
-    rmse, mean, largest = (np.concatenate(parts) for parts in (errors.rmse, errors.mean, errors.largest))
+    found = errors.result(diagonal)
     spatial, temporal = sted.spatial(), sted.temporal()
     return Comparison(
-        rmse=float(rmse.mean()),
-        rmse_diag=_ratio(rmse.mean(), diagonal),
-        max=float(largest.max()),
-        max_diag=_ratio(largest.max(), diagonal),
-        kg=_ratio(100 * math.sqrt(errors.squared_error), math.sqrt(errors.squared_spread)),
-        da=_ratio(100 * mean.mean(), diagonal),
+        **asdict(found),
+        da=ratio(100 * errors.mean.mean(), diagonal),
         sted=sted.combined(),
         sted_spatial=spatial,
         sted_temporal=temporal,
         hausdorff=hausdorff.result(),
-        frames=[{"rmse": float(r), "max": float(m)} for r, m in zip(rmse, largest, strict=True)],
+        frames=[{"rmse": float(r), "max": float(m)} for r, m in zip(errors.rmse, errors.largest, strict=True)],
     )
-
-
-class _VertexErrors:
-    """Sums over blocks of frames: per-frame values, and the two Frobenius norms of the Karni-Gotsman error."""
-
-    def __init__(self) -> None:
-        self.rmse: list[Float64] = []  # each (n,), model units
-        self.mean: list[Float64] = []
-        self.largest: list[Float64] = []
-        self.squared_error = 0.0
-        self.squared_spread = 0.0
-
-    def add(self, a: Float64, distance: Float64) -> None:
-        squared = np.einsum("fv,fv->f", distance, distance)
-        self.rmse.append(np.sqrt(squared / distance.shape[1]))
-        self.mean.append(distance.mean(axis=1))
-        self.largest.append(distance.max(axis=1))
-        self.squared_error += float(squared.sum())
-        centred = a - a.mean(axis=1, keepdims=True)
-        self.squared_spread += float(np.einsum("fvc,fvc->", centred, centred))
-
-
-def _ratio(value: float, size: float) -> float | None:
-    """``value / size``; against size 0 no error stays 0 and any other has no meaning."""
-    if size > 0:
-        return float(value / size)
-    return 0.0 if value == 0 else None
-
-
-def _diagonal(reference: MeshSequence) -> float:
-    frame = reference.read(0, 1)[0].astype(np.float64)
-    return float(np.linalg.norm(np.ptp(frame, axis=0)))
 
 
 def aligned(reference: MeshSequence, distorted: MeshSequence) -> MeshSequence:

@@ -19,6 +19,11 @@ QP = 38  # 1-2 kB
 LUMA = np.array([0.2126, 0.7152, 0.0722])  # BT.709, of sRGB bytes
 
 
+def poster_of(sequence: MeshSequence) -> bytes:
+    """Return the poster of a sequence."""
+    return make_poster(sequence.read(0, 1)[0], sequence.faces, sequence.fps, sequence.n_frames)
+
+
 def make_poster(positions: Float32, faces: Int32, fps: float, n_frames: int) -> bytes:
     """Return an MP4 file with one picture of ``positions (V, 3)`` that lasts ``n_frames``."""
     return hold_picture(paint(positions, faces), fps, n_frames, QP)

@@ -97,6 +97,10 @@ class MeshSequence:
         """Return the sequence whose vertex i is this one's vertex ``permutation[i]``; frames still load when read."""
         return MeshSequence(_Permuted(self, permutation), faces, self.fps, name=self.name)
 
+    def part(self, start: int, stop: int) -> MeshSequence:
+        """Return frames ``start`` to ``stop`` as a sequence; they still load when read."""
+        return MeshSequence(_Part(self, start, stop), self.faces, self.fps, name=self.name)
+
     def chunks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[int, Float32]]:
         """Yield ``(first frame, (n, V, 3) float32)`` over all frames, a bounded number of bytes at a time."""
         stop = self.n_frames if stop is None else stop
@@ -118,6 +122,18 @@ class _Permuted:
     def __getitem__(self, key: slice, /) -> Float32:
         start, stop, _ = key.indices(self._sequence.n_frames)
         return self._sequence.read(start, stop)[:, self._permutation]
+
+
+class _Part:
+    """Some frames of another sequence."""
+
+    def __init__(self, sequence: MeshSequence, start: int, stop: int) -> None:
+        self._sequence, self._start = sequence, start
+        self.shape: tuple[int, ...] = (stop - start, sequence.n_vertices, 3)
+
+    def __getitem__(self, key: slice, /) -> Float32:
+        start, stop, _ = key.indices(self.shape[0])
+        return self._sequence.read(self._start + start, self._start + stop)
 
 
 def check_finite(block: Float32, name: str, first_frame: int = 0) -> None:

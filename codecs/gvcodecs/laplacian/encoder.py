@@ -35,7 +35,7 @@ from gvcodecs.laplacian.operators import OPERATORS
 from gvcodecs.laplacian.reader import LaplacianReader
 from gvpipe.bare_mesh import decode_mesh, encode_mesh
 from gvpipe.bitstream import Bitstream
-from gvpipe.codec import FrameReader, Progress, Settings
+from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.segments import count_segments, segment_starts
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectories import read_trajectories, survey
@@ -93,17 +93,19 @@ class Laplacian(Settings):
         self.check_range(FINEST, COARSEST, "average_step")
         self.check_range(1, 100_000, "segment")
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> Bitstream:
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
         """Code a sequence.
 
         Raises:
             InputError: a frame cannot be read, or lies too far from the origin for the quality asked for.
         """
         report = progress or (lambda stage, done: None)
+        memo = memo or Memo()
         report("read", 0)
-        points, spread = survey(sequence, report)
+        points, spread = memo("survey", lambda: survey(sequence, report))
         report("mesh", 0)
-        coded = encode_mesh(sequence.faces, points, self.reorder)
+        coded = memo("mesh", lambda: encode_mesh(sequence.faces, points, self.reorder))
+        memo.permutation = coded.permutation
         mesh = decode_mesh(coded.mesh, coded.order, sequence.n_vertices)
         _, first = np.unique(mesh.points, return_index=True)
         members = coded.permutation[first]  # a given vertex of each of the codec's points
@@ -126,9 +128,10 @@ class Laplacian(Settings):
         average = None
         if header.needs_average:
             report("average", 0)
-            shape = average_mesh(sequence, members[surface.faces].astype(np.int32))[members]
+            faces = members[surface.faces].astype(np.int32)
+            shape = memo("average", lambda: average_mesh(sequence, faces)[members])
             sections[NAME], average = encode_average(shape, surface, header)
-        domain = build_domain(surface, average, header)
+        domain = memo("domain", lambda: build_domain(surface, average, header))
         # root mean square error of a vertex, model units
         wanted = spread * COARSE * 10 ** -(DECADES * self.quality / 100) / 100
         steps = []

@@ -32,8 +32,8 @@ from gvcodecs.mcgv.quality import choose_quantiser, effective_step
 from gvcodecs.mcgv.reader import McgvReader
 from gvcodecs.mcgv.segmentation import segment
 from gvpipe.bitstream import Bitstream
-from gvpipe.codec import FrameReader, Progress, Settings
-from gvpipe.connectivity import decode_base, encode_base
+from gvpipe.codec import FrameReader, Memo, Progress, Settings
+from gvpipe.connectivity import BaseMesh, decode_base, encode_base
 from gvpipe.errors import SettingError
 from gvpipe.quantize import Lattice
 from gvpipe.segments import count_segments, segment_starts
@@ -96,23 +96,26 @@ class Mcgv(Settings):
             raise SettingError(f"base_bits is {self.base_bits}; 0 or an integer in 4..20 is needed")
         self._plane_size()
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> Bitstream:
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
         """Code a sequence.
 
         Raises:
             InputError: a frame cannot be read, or the charts do not fit the size given.
         """
         report = progress or (lambda stage, done: None)
+        memo = memo or Memo()
+        given = sequence
         report("read", 0)
-        extent = _extent(sequence, report)
+        extent = memo("extent", lambda: _extent(given, report))
         report("base", 0)
-        first = sequence.read(0, 1)[0]
+        first = given.read(0, 1)[0]
         profile = PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
         effective = effective_step(self.quality, profile, float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0))))
-        lattice = self._lattice(first, effective / math.sqrt(sequence.n_frames))
-        coded = encode_base(lattice.quantise(first), sequence.faces, self.reorder)
+        lattice = self._lattice(first, effective / math.sqrt(given.n_frames))
+        coded = memo(f"base {lattice.step}", lambda: encode_base(lattice.quantise(first), given.faces, self.reorder))
+        memo.permutation = coded.permutation
         decoded = decode_base(coded.mesh, coded.order)
-        sequence = sequence.reordered(coded.permutation, decoded.faces)
+        sequence = given.reordered(coded.permutation, decoded.faces)
         base = lattice.place(decoded.points)
         points = Points.of(decoded.points, decoded.faces, decoded.visits)
         n_segments = count_segments(sequence.n_frames, self.segment)
@@ -120,21 +123,15 @@ class Mcgv(Settings):
         if self.prediction == "blended":
             motion = code_blended(sequence, base, points, bounds, effective, self.clusters, report)
             partition = np.zeros(len(points.members), np.int32)  # nothing ties charts to clusters: few, large ones are best
-            layout = self._layout(base, decoded.points, points, partition, points.pieces(), report)
-        else:
-            report("segment", 0)
-            partition = segment(sequence, base[points.members], points.faces, points.members, self.clusters or AFFINE_CLUSTERS)
-            clusters = partition[points.point]
-            layout = self._layout(base, decoded.points, points, partition, clusters, report)
-            motion = code_affine(sequence, base, clusters, bounds, extent / 2**self.transform_bits, report)
-            motion.sections["clusters"] = (
-                sections.encode_vertex_clusters(clusters, np.argsort(decoded.visits))
-                if self._placement == "halves"
-                else sections.encode_clusters(clusters, layout, BLOCKS[self.image])
+            groups = points.pieces()
+            layout = memo(
+                f"layout {lattice.step}", lambda: self._layout(base, decoded.points, points, partition, groups, report)
             )
-        largest = 0.0
-        for _, residual in _residuals(sequence, motion, bounds):
-            largest = max(largest, float(np.abs(residual).max()))
+            largest = _largest(sequence, motion, bounds)
+        else:
+            step = extent / 2**self.transform_bits
+            motion, layout = memo("motion", lambda: self._published(sequence, base, decoded, points, bounds, step, report))
+            largest = memo("largest", lambda: _largest(sequence, motion, bounds))
         quantiser = choose_quantiser(effective, profile, largest)
         header = sections.Header(
             prediction=self.prediction,
@@ -195,6 +192,29 @@ class Mcgv(Settings):
             bits += 1
         return Lattice.over(first, bits)
 
+    def _published(
+        self,
+        sequence: MeshSequence,
+        base: Float64,
+        mesh: BaseMesh,
+        points: Points,
+        bounds: list[int],
+        step: float,
+        report: Progress,
+    ) -> tuple[CodedMotion, Layout]:
+        """The paper's partition, layout and transforms, whose quantisation step, model units, quality does not touch."""
+        report("segment", 0)
+        partition = segment(sequence, base[points.members], points.faces, points.members, self.clusters or AFFINE_CLUSTERS)
+        clusters = partition[points.point]
+        layout = self._layout(base, mesh.points, points, partition, clusters, report)
+        motion = code_affine(sequence, base, clusters, bounds, step, report)
+        motion.sections["clusters"] = (
+            sections.encode_vertex_clusters(clusters, np.argsort(mesh.visits))
+            if self._placement == "halves"
+            else sections.encode_clusters(clusters, layout, BLOCKS[self.image])
+        )
+        return motion, layout
+
     @property
     def _placement(self) -> str:
         """JPEG, which sees no other frame, codes the smoother images of charts for less; see docs/codecs/mcgv.md."""
@@ -230,6 +250,11 @@ def _extent(sequence: MeshSequence, report: Progress) -> float:
         low, high = np.minimum(low, block.min(axis=(0, 1))), np.maximum(high, block.max(axis=(0, 1)))
         report("read", (first + len(block)) / sequence.n_frames)
     return float((high - low).max()) or 1.0
+
+
+def _largest(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> float:
+    """The largest coordinate of a residual, model units."""
+    return max(float(np.abs(residual).max(initial=0.0)) for _, residual in _residuals(sequence, motion, bounds))
 
 
 def _residuals(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> Iterator[tuple[int, Float64]]:

@@ -21,7 +21,7 @@ from gvcodecs.pca.format import MAX_SEGMENTS, Header
 from gvcodecs.pca.reader import PcaReader, ordered_rows
 from gvpipe.bare_mesh import decode_mesh, encode_mesh
 from gvpipe.bitstream import Bitstream
-from gvpipe.codec import FrameReader, Progress, Settings
+from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.hierarchy import build_hierarchy
 from gvpipe.row_coding import encode_rows
 from gvpipe.row_prediction import PREDICTORS
@@ -70,21 +70,23 @@ class Pca(Settings):
         self.check_range(0, MAX_COMPONENTS, "components")
         self.check_range(1, 100_000, "segment")
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> Bitstream:
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
         """Code a sequence.
 
         Raises:
             InputError: a frame cannot be read, or lies too far from the origin for the quality asked for.
         """
         report = progress or (lambda stage, done: None)
+        memo = memo or Memo()
         report("read", 0)
-        points, spread = survey(sequence, report)
+        points, spread = memo("survey", lambda: survey(sequence, report))
         report("mesh", 0)
-        coded = encode_mesh(sequence.faces, points, self.reorder)
+        coded = memo("mesh", lambda: encode_mesh(sequence.faces, points, self.reorder))
+        memo.permutation = coded.permutation
         mesh = decode_mesh(coded.mesh, coded.order, sequence.n_vertices)
         _, first = np.unique(mesh.points, return_index=True)
         members = coded.permutation[first]  # a given vertex of each of the codec's points
-        rows = ordered_rows(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor)
+        rows = memo("rows", lambda: ordered_rows(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor))
         n_segments = min(count_segments(sequence.n_frames, self.segment), MAX_SEGMENTS)
         bounds = segment_starts(sequence.n_frames, n_segments)
         wanted = (

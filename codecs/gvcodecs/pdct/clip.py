@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gvcodecs.pdct.clustering import cluster, find_seeds, sample_frames
+from gvcodecs.pdct.clustering import Clusters
 from gvcodecs.pdct.delta_coding import DeltaDecoder, DeltaEncoder, tokenise
 from gvcodecs.pdct.dictionary import UNIT, Dictionary, Surface, place
 from gvcodecs.pdct.labels import decode_labels, encode_labels
@@ -61,12 +61,10 @@ class Quantiser:
     kept: float
 
 
-def encode_clip(frames: Float32, surface: Surface, quantiser: Quantiser, n_clusters: int, seed_bits: int) -> bytes:
+def encode_clip(frames: Float32, surface: Surface, quantiser: Quantiser, clusters: Clusters, seed_bits: int) -> bytes:
     """Code ``frames (n, V, 3)``, model units, in the order of vertices that ``surface`` has."""
     lattice = Lattice.over(frames.reshape(-1, 3), seed_bits)
-    sampled = sample_frames(frames)
-    seeds = find_seeds(sampled, surface.faces, n_clusters)
-    labels = cluster(sampled, seeds)
+    seeds, labels = clusters.seeds, clusters.labels
     dictionary = Dictionary(surface, seeds, labels, lattice, quantiser.fineness)
     seed_points = np.rint((frames[:, seeds].astype(np.float64) - lattice.origin) / lattice.step).astype(np.int64)
     origins, axes = local_frames(seed_points)

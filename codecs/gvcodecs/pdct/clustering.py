@@ -10,6 +10,8 @@ The motion of a vertex in a frame, ``sum over f of |q_f - q_(f-1)|^2``, is summe
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +24,21 @@ BLOCK = 1 << 14  # vertices compared with all seeds at a time
 
 Int64 = NDArray[np.int64]
 Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Clusters:
+    """Seed triangles ``(K, 3)``, and the seed that each vertex follows ``(V,)``."""
+
+    seeds: Int64
+    labels: Int64
+
+
+def find_clusters(frames: Float32, faces: Int32, n_clusters: int) -> Clusters:
+    """Seeds and clusters, at most ``n_clusters``, of a clip, ``frames (n, V, 3)``."""
+    sampled = sample_frames(frames)
+    seeds = find_seeds(sampled, faces, n_clusters)
+    return Clusters(seeds, cluster(sampled, seeds))
 
 
 def sample_frames(frames: Float32) -> Float64:

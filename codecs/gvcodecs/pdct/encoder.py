@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.pdct.clip import MAX_CLUSTERS, Quantiser, encode_clip
+from gvcodecs.pdct.clustering import find_clusters
 from gvcodecs.pdct.dictionary import Surface
 from gvcodecs.pdct.format import MAX_CLIP_FRAMES, MAX_CLIPS, Header, surface_of
 from gvcodecs.pdct.reader import PdctReader
 from gvpipe.bitstream import Bitstream
-from gvpipe.codec import FrameReader, Progress, Settings
+from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.connectivity import BaseMesh, EncodedBase, decode_base, encode_base
 from gvpipe.quantize import Lattice
 from gvpipe.segments import count_segments, segment_starts
@@ -69,17 +70,19 @@ class Pdct(Settings):
         """Most frames per clip."""
         return self.clip or self.segment
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> Bitstream:
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
         """Code a sequence; raises `InputError` where a frame cannot be read."""
         report = progress or (lambda stage, done: None)
         report("base", 0)
-        base = SharedBase(sequence.read(0, 1)[0], sequence.faces, self)
+        memo = memo or Memo()
+        base = SharedBase(sequence.read(0, 1)[0], sequence.faces, self, memo)
+        memo.permutation = base.coded.permutation
         n_clips = min(count_segments(sequence.n_frames, self.clip_frames), MAX_CLIPS)
         bounds = segment_starts(sequence.n_frames, n_clips)
         sections = {"mesh": base.coded.mesh, "order": base.coded.order}
         for c in range(n_clips):
             report("clips", c / n_clips)
-            sections[f"clip.{c}"] = base.encode(sequence.read(bounds[c], bounds[c + 1]))
+            sections[f"clip.{c}"] = base.encode(sequence.read(bounds[c], bounds[c + 1]), memo, f"clip.{c}")
         report("clips", 1)
         return Bitstream(
             codec=self.id,
@@ -101,16 +104,16 @@ class Pdct(Settings):
 class SharedBase:
     """Frame 0 and connectivity, coded, and the coder of clips that start from them."""
 
-    def __init__(self, frame: Float32, faces: Int32, settings: Pdct) -> None:
-        self._settings = settings
+    def __init__(self, frame: Float32, faces: Int32, settings: Pdct, memo: Memo | None = None) -> None:
+        self._settings, memo = settings, memo or Memo()
         self.lattice = Lattice.over(frame, settings.base_bits)
-        self.coded: EncodedBase = encode_base(self.lattice.quantise(frame), faces, settings.reorder)
+        self.coded: EncodedBase = memo("base", lambda: encode_base(self.lattice.quantise(frame), faces, settings.reorder))
         self.mesh: BaseMesh = decode_base(self.coded.mesh, self.coded.order)
         self._surface: Surface = surface_of(self.mesh, self.lattice)
         self._diagonal = _diagonal(frame)
 
-    def encode(self, frames: Float32) -> bytes:
-        """Code a clip, ``(n, V, 3)`` in the given order of vertices, model units."""
+    def encode(self, frames: Float32, memo: Memo | None = None, name: str = "clip") -> bytes:
+        """Code a clip, ``(n, V, 3)`` in the given order of vertices, model units; ``memo`` keeps its clusters by its name."""
         settings = self._settings
         ordered = np.ascontiguousarray(frames[:, self.coded.permutation])
         own = _diagonal(frames.reshape(-1, 3))
@@ -118,7 +121,8 @@ class SharedBase:
         step = diagonal * COARSEST * 10 ** (-DECADES * settings.quality / 100)
         quantiser = Quantiser(step, float(settings.fineness), settings.kept)
         n_clusters = settings.clusters or min(max(len(self.mesh.points) // PER_CLUSTER, AUTO[0]), AUTO[1])
-        return encode_clip(ordered, self._surface, quantiser, n_clusters, settings.seed_bits)
+        clusters = (memo or Memo())(name, lambda: find_clusters(ordered, self._surface.faces, n_clusters))
+        return encode_clip(ordered, self._surface, quantiser, clusters, settings.seed_bits)
 
 
 def _diagonal(points: NDArray[np.floating]) -> float:

@@ -1,0 +1,247 @@
+"""Which quality meets a target: rate control by error or size, and the smallest file that keeps every vertex within a bound.
+
+Bytes and the logarithm of the error follow quality monotonically and nearly in a straight line, so a target is a root of a
+rising function of quality. `find_quality` takes steps of an assumed slope until the root lies between two qualities, then
+regula falsi; where one end would stay for ever, its value is halved (the Illinois rule: M. Dowell and P. Jarratt, A modified
+regula falsi method, 1971). `find_smallest` fits parabolas to the logarithm of the size.
+
+Encodes are what costs, so neither makes more than a few.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from gvpipe.codec import Codec, Progress
+from gvpipe.errors import InputError, SettingError
+from gvpipe.sequence import MeshSequence
+from gvpipe.trials import Trial, Trials
+from gvpipe.vertex_errors import frame_diagonal
+
+TOLERANCE = 0.03  # how far on its allowed side of the target a result may lie
+MOST_ENCODES = 8
+SLOPES = {"rmse": 0.055, "kg": 0.055, "bpvf": 0.025}  # assumed change of the logarithm per unit of quality
+NAMES = {
+    "rmse": "an rmse (of the diagonal) of",
+    "kg": "a KG error (percent) of",
+    "bpvf": "a rate (bits per vertex and frame) of",
+    "max": "a largest error of",
+}
+BOUND_RATIO = 2.8  # bound by rmse where files are smallest, about
+FIRST_STEP = 8.0  # of quality, when looking for the smallest
+LEAST_STEP = 1.5
+WORTH = 0.003  # part of the size that one more encode must promise to save
+ROUGH_TOLERANCE, ROUGH_WORTH = 0.3, 0.03
+
+Attempt = Callable[[float], Trial]
+
+
+@dataclass(frozen=True)
+class Target:
+    """A number that the file must not exceed, and should come close to.
+
+    Args:
+        measure: ``rmse`` (parts of frame 0's diagonal) or ``kg`` (percent) of the decoded frames; ``bpvf`` of the file;
+            ``max``, a bound that every vertex of every frame keeps, model units.
+        value: above 0.
+
+    Raises:
+        SettingError: a value that is not a positive number.
+    """
+
+    measure: str
+    value: float
+
+    def __post_init__(self) -> None:
+        if self.measure not in NAMES:
+            raise SettingError(f"target {self.measure!r}; one of {', '.join(NAMES)} is needed")
+        if isinstance(self.value, bool) or not isinstance(self.value, int | float) or not 0 < self.value < math.inf:
+            raise SettingError(f"target {self.measure} is {self.value!r}; a number above 0 is needed")
+
+    def of(self, trial: Trial) -> float:
+        """What the trial came to; raises `InputError` if the sequence has no such measure."""
+        errors = trial.errors
+        found = {"rmse": errors.rmse_diag, "kg": errors.kg, "bpvf": trial.bpvf, "max": errors.max}[self.measure]
+        if found is None:
+            raise InputError(f"this sequence has no size to measure its {self.measure} by; give another target or a quality")
+        return found
+
+    def is_met(self, trial: Trial) -> bool:
+        """Whether the trial is on the allowed side."""
+        return self.of(trial) <= self.value
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The encode that was chosen, how to check its file (`Trials.check`), all that were tried, in order, and why this one."""
+
+    trial: Trial
+    trials: Trials
+    tried: list[Trial]
+    reason: str
+
+
+def meet(
+    target: Target, codec: Codec, sequence: MeshSequence, progress: Progress | None = None, is_rough: bool = False
+) -> Choice:
+    """Encode at the quality that meets a target, within 3 % or, for estimates, roughly; starts at the codec's own quality.
+
+    Raises:
+        InputError: no quality meets it.
+    """
+    if target.measure == "max":
+        trials = Trials(codec, sequence, target.value, progress)
+        trial, tried = find_smallest(trials, target.value, codec.quality, ROUGH_WORTH if is_rough else WORTH)
+        reason = (
+            f"quality {trial.codec.quality:.4g} is the smallest of {len(tried)}, {trial.corrections} bytes of it corrections"
+        )
+        return Choice(trial, trials, tried, reason)
+    trials = Trials(codec, sequence, None, progress)
+    trial, tried = find_quality(trials, target, codec.quality, ROUGH_TOLERANCE if is_rough else TOLERANCE)
+    found = target.of(trial)
+    reason = f"quality {trial.codec.quality:.4g} gives {NAMES[target.measure]} {found:.4g} where {target.value:g} is allowed"
+    if found < (1 - TOLERANCE) * target.value:
+        reason += "; no quality comes closer" if trial.codec.quality in (0, 100) else f"; the closest of {len(tried)}"
+    return Choice(trial, trials, tried, reason)
+
+
+def parse_bound(bound: float | str, sequence: MeshSequence) -> float:
+    """A largest error in model units, from such a number or from a text: ``"0.01"``, or ``"0.05%"`` of frame 0's diagonal.
+
+    Raises:
+        SettingError: no positive number, or a part of a diagonal that is 0.
+    """
+    text = str(bound).strip()
+    try:
+        value = float(text.removesuffix("%"))
+    except ValueError as exc:
+        raise SettingError(f"max error is {bound!r}; a length such as 0.01, or a part of the diagonal such as 0.05%") from exc
+    if text.endswith("%"):
+        value *= frame_diagonal(sequence) / 100
+    if not 0 < value < math.inf:
+        raise SettingError(f"max error is {bound!r}, which is no length above 0 here; give one in model units")
+    return value
+
+
+def find_quality(attempt: Attempt, target: Target, start: float, tolerance: float = TOLERANCE) -> tuple[Trial, list[Trial]]:
+    """Search the quality that meets the target within the tolerance, from ``start`` on; return it and all trials, in order.
+
+    If the target is met even by quality 0 (by quality 100, for sizes), that is the result. If no quality within the
+    encodes allowed comes close enough, the closest on the allowed side is.
+
+    Raises:
+        InputError: no quality meets the target; the message tells the best.
+    """
+    aim = target.value * math.sqrt(1 - tolerance)
+    window = -math.log(1 - tolerance) / 2
+    sign = 1.0 if target.measure == "bpvf" else -1.0
+    slope = SLOPES[target.measure]
+    tried: list[Trial] = []
+    low: tuple[float, float] | None = None  # quality and value below the root
+    high: tuple[float, float] | None = None
+    quality, was_low = start, False
+    for _ in range(MOST_ENCODES):
+        trial = attempt(quality)
+        tried.append(trial)
+        found = target.of(trial)
+        value = sign * math.log(max(found, 1e-300) / aim)  # rises with quality
+        if abs(value) <= window:
+            break
+        if value < 0:
+            if quality >= 100:
+                break
+            if low and high and was_low:
+                high = (high[0], high[1] / 2)
+            slope = _slope(low, (quality, value), slope)
+            low = (quality, value)
+        else:
+            if quality <= 0:
+                break
+            if low and high and not was_low:
+                low = (low[0], low[1] / 2)
+            slope = _slope((quality, value), high, slope)
+            high = (quality, value)
+        was_low = value < 0
+        if low and high:
+            part = min(max(low[1] / (low[1] - high[1]), 0.02), 0.98)
+            quality = low[0] + part * (high[0] - low[0])
+        elif len(tried) > 2:
+            quality = 100.0 if low else 0.0
+        else:
+            quality = min(max(quality - value / slope, 0.0), 100.0)
+    allowed = [trial for trial in tried if target.is_met(trial)]
+    if not allowed:
+        best = min(tried, key=target.of)
+        raise InputError(
+            f"no quality of codec {best.codec.id} gives {NAMES[target.measure]} {target.value:g}; the best is "
+            f"{target.of(best):.4g} at quality {best.codec.quality:g}; allow more, or choose another codec or finer settings"
+        )
+    return max(allowed, key=target.of), tried
+
+
+def find_smallest(attempt: Attempt, bound: float, start: float, tolerance: float = WORTH) -> tuple[Trial, list[Trial]]:
+    """Search the quality whose file, corrections to ``bound`` included, is smallest; return it and all trials, in order."""
+    trials: dict[float, Trial] = {}
+
+    def size(quality: float) -> float:
+        if quality not in trials:
+            trials[quality] = attempt(quality)
+        return math.log(trials[quality].bytes)
+
+    size(start)
+    rmse = trials[start].errors.rmse
+    if rmse > 0:  # towards where rmse is a usual part of the bound
+        size(_within(start + _clip(math.log(BOUND_RATIO * rmse / bound) / SLOPES["rmse"], 30.0)))
+    step = FIRST_STEP
+    while len(trials) < MOST_ENCODES:
+        known = sorted(trials)
+        best = min(known, key=size)
+        at = known.index(best)
+        if best > 0 and at == 0:
+            wanted = _within(best - step)
+        elif best < 100 and at == len(known) - 1:
+            wanted = _within(best + step)
+        elif 0 < at < len(known) - 1:
+            wanted, gain = _vertex(*((q, size(q)) for q in known[at - 1 : at + 2]))
+            if gain < tolerance:
+                break
+        elif len(known) > 1:  # at an end of the scale
+            neighbour = known[1] if at == 0 else known[-2]
+            wanted = best + math.copysign(min(step, abs(neighbour - best) / 2), neighbour - best)
+        else:
+            wanted = best + math.copysign(step, 50 - best)
+        if min(abs(wanted - q) for q in known) < LEAST_STEP:
+            break
+        size(wanted)
+        step *= 1.5
+    tried = list(trials.values())
+    return min(tried, key=lambda trial: trial.bytes), tried
+
+
+def _slope(low: tuple[float, float] | None, high: tuple[float, float] | None, assumed: float) -> float:
+    """Slope through two points, if both are there and it is near enough to the assumed one to be believed."""
+    if low is None or high is None or low[0] == high[0]:
+        return assumed
+    return min(max((high[1] - low[1]) / (high[0] - low[0]), assumed / 4), assumed * 4)
+
+
+def _vertex(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> tuple[float, float]:
+    """Where the parabola through three points is lowest, kept off the outer two, and how far below the middle one that is."""
+    left, right = (b[1] - a[1]) / (b[0] - a[0]), (c[1] - b[1]) / (c[0] - b[0])
+    curvature = (right - left) / (c[0] - a[0])
+    if not curvature > 0:
+        return b[0], 0.0
+    x = (a[0] + b[0]) / 2 - left / (2 * curvature)
+    x = min(max(x, (a[0] + b[0]) / 2), (b[0] + c[0]) / 2)
+    y = b[1] + (left + curvature * (x - a[0])) * (x - b[0])
+    return x, b[1] - y
+
+
+def _within(quality: float) -> float:
+    return min(max(quality, 0.0), 100.0)
+
+
+def _clip(value: float, most: float) -> float:
+    return min(max(value, -most), most)

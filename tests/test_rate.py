@@ -1,0 +1,181 @@
+"""Rate control: the search on functions that are known, and whole files that must land on the allowed side of a target."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sequences import awkward, waving
+
+import gvpipe
+from gvpipe.bitstream import Bitstream
+from gvpipe.codec import Memo, codec_class, codec_ids, open_reader
+from gvpipe.errors import InputError, SettingError
+from gvpipe.rate import MOST_ENCODES, TOLERANCE, Target, find_quality, find_smallest, parse_bound
+from gvpipe.sequence import MeshSequence
+from gvpipe.trials import Trial
+from gvpipe.vertex_errors import Errors
+
+EMPTY = Bitstream("none", 1, 1, 1, 0, 30.0)
+each_codec = pytest.mark.parametrize("codec", codec_ids())
+
+
+@dataclasses.dataclass(frozen=True)
+class Pretended:
+    """Settings of a codec that is only a curve."""
+
+    quality: float
+    id: str = "pretended"
+
+
+def pretend(error: Callable[[float], float], bpvf: Callable[[float], float] = lambda q: 1.0) -> Callable[[float], Trial]:
+    """A codec with these curves over quality."""
+
+    def attempt(quality: float) -> Trial:
+        e = error(quality)
+        codec = Pretended(quality)
+        return Trial(codec, max(1, int(1e9 * bpvf(quality))), bpvf(quality), Errors(e, e, e, e, e), EMPTY)  # type: ignore[arg-type]
+
+    return attempt
+
+
+@given(
+    level=st.floats(-1, 3),
+    decades=st.floats(0.8, 4),
+    bend=st.floats(-0.4, 0.4),
+    at=st.floats(0, 100),
+    start=st.floats(0, 100),
+)
+def test_bent_curves_are_met_in_a_few_encodes(level: float, decades: float, bend: float, at: float, start: float) -> None:
+    """The logarithm of the error falls by ``decades``, with a slope that changes up to 2.3-fold on the way."""
+
+    def error(quality: float) -> float:
+        x = quality / 100
+        return 10 ** (level - decades * (x + bend * x * (1 - x)))
+
+    target = Target("kg", error(at))
+    best, tried = find_quality(pretend(error), target, start)
+    assert len(tried) <= MOST_ENCODES
+    assert best.errors.kg is not None and best.errors.kg <= target.value
+    assert best.errors.kg >= (1 - TOLERANCE) * target.value or best.codec.quality == 0
+
+
+def test_steps_too_coarse_give_the_closest_allowed() -> None:
+    best, tried = find_quality(pretend(lambda q: 10 ** (-math.floor(q / 20))), Target("rmse", 0.05), 75)
+    assert best.errors.rmse_diag == pytest.approx(0.01)
+    assert len(tried) <= MOST_ENCODES
+
+
+def test_sizes_land_below() -> None:
+    best, _ = find_quality(pretend(lambda q: 1.0, lambda q: 0.1 + (q / 60) ** 3), Target("bpvf", 2.0), 75)
+    assert 0.97 * 2 <= best.bpvf <= 2
+
+
+def test_ends_of_the_scale() -> None:
+    """What quality 0 meets is met by it; what quality 100 misses is an error that names the best."""
+    curve = pretend(lambda q: 10 ** (-1 - q / 50))
+    best, _ = find_quality(curve, Target("kg", 5.0), 75)
+    assert best.codec.quality == 0
+    with pytest.raises(InputError, match=r"the best is 0\.001 at quality 100"):
+        find_quality(curve, Target("kg", 1e-5), 75)
+    with pytest.raises(InputError, match=r"the best is 1 at quality 0"):
+        find_quality(pretend(lambda q: 1.0, lambda q: 1 + q), Target("bpvf", 0.5), 75)
+
+
+@given(lowest=st.floats(0, 100), start=st.floats(0, 100))
+def test_the_smallest_is_found(lowest: float, start: float) -> None:
+    """A basin with sides of different slopes, as coded frames and their corrections have."""
+
+    def bpvf(quality: float) -> float:
+        x = (quality - lowest) / 10
+        return math.exp(0.15 * x * x / (1 + 0.3 * abs(x)) + (0.05 * x if x > 0 else 0))
+
+    best, tried = find_smallest(pretend(lambda q: 10 ** (-q / 40), bpvf), 0.02, start)
+    assert best.bpvf <= 1.03
+    assert len(tried) <= MOST_ENCODES
+
+
+@pytest.mark.parametrize("value", [0, -1, math.nan, math.inf, True, "1"])
+def test_targets_are_checked(value: float) -> None:
+    with pytest.raises(SettingError, match="above 0"):
+        Target("kg", value)
+    with pytest.raises(SettingError, match="rmse"):
+        Target("psnr", 1.0)
+
+
+def test_bounds_are_lengths_or_parts_of_the_diagonal() -> None:
+    sequence = waving(6, 3)
+    assert parse_bound(0.25, sequence) == parse_bound("0.25", sequence) == 0.25
+    diagonal = gvpipe.compare(sequence, MeshSequence(sequence.positions[:] + 1, sequence.faces))
+    assert diagonal.max_diag is not None
+    assert parse_bound("50%", sequence) == pytest.approx(0.5 * diagonal.max / diagonal.max_diag)
+    for wrong in ("", "x", "0", "-1%", "nan", "inf"):
+        with pytest.raises(SettingError, match="max error"):
+            parse_bound(wrong, sequence)
+    with pytest.raises(SettingError, match="model units"):
+        parse_bound("1%", MeshSequence(sequence.positions[:] * 0, sequence.faces))
+
+
+@each_codec
+@pytest.mark.parametrize("reorder", [False, True], ids=["", "reorder"])
+@pytest.mark.parametrize("measure", ["rmse", "kg", "bpvf"])
+def test_files_meet_their_targets(codec: str, measure: str, reorder: bool, tmp_path: Path) -> None:
+    """Asked for what quality 60 came to, the file comes within 3 % of it, on the allowed side."""
+    sequence, path = waving(16, 24), tmp_path / "t.mp4"
+
+    def measured() -> float:
+        values = gvpipe.compare(sequence, gvpipe.decode(path))
+        found = {"rmse": values.rmse_diag, "kg": values.kg, "bpvf": 8 * path.stat().st_size / (24 * 256)}[measure]
+        assert found is not None
+        return found
+
+    gvpipe.encode(sequence, path, codec, quality=60, reorder=reorder)
+    wanted = measured()
+    report = gvpipe.encode(sequence, path, codec, reorder=reorder, **{f"target_{measure}": wanted})  # type: ignore[arg-type]
+    assert 0.97 * wanted <= measured() <= wanted
+    assert len(report.tried) <= MOST_ENCODES
+    chosen = next(tried for tried in report.tried if tried["quality"] == report.settings["quality"])
+    assert chosen["bytes"] == report.bytes == path.stat().st_size
+    key = {"rmse": "rmse_diag"}.get(measure, measure)
+    assert chosen[key] == pytest.approx(measured(), rel=1e-9)
+
+
+@each_codec
+def test_small_steps_of_quality_change_the_error(codec: str) -> None:
+    """Without that no search could come within 3 %."""
+    sequence, memo = waving(16, 12), Memo()
+    found = set()
+    for quality in (60.0, 60.25, 60.5, 60.75):
+        bitstream = codec_class(codec)(quality=quality).encode(sequence, memo=memo)
+        found.add(open_reader(bitstream).read(0, 12).tobytes())
+    assert len(found) >= 3  # pca's steps are 1/64 octaves: about a quarter
+
+
+@each_codec
+@pytest.mark.parametrize("reorder", [False, True], ids=["", "reorder"])
+def test_a_memo_changes_no_byte(codec: str, reorder: bool) -> None:
+    sequence, memo = waving(12, 20), Memo()
+    for quality in (40.0, 80.0):
+        settings = codec_class(codec)(quality=quality, reorder=reorder, segment=8)
+        assert settings.encode(sequence, memo=memo) == settings.encode(sequence)
+    assert memo.permutation is not None
+    assert sorted(memo.permutation) == list(range(sequence.n_vertices))
+
+
+def test_one_target_at_a_time(tmp_path: Path) -> None:
+    with pytest.raises(SettingError, match="more than one target"):
+        gvpipe.encode(waving(6, 3), tmp_path / "a.mp4", target_kg=1.0, max_error=0.1)
+    assert not (tmp_path / "a.mp4").exists()
+
+
+def test_what_cannot_be_reached_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="codec pca gives a KG error"):
+        gvpipe.encode(waving(8, 6), tmp_path / "a.mp4", "pca", target_kg=1e-9)
+    with pytest.raises(InputError, match="no size"):
+        gvpipe.encode(awkward()["one vertex"], tmp_path / "a.mp4", "pca", target_kg=0.1)
+    assert not list(tmp_path.iterdir())
