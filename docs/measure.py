@@ -1,6 +1,6 @@
 """The numbers in docs/benchmarks.md: rate and error over a sweep of qualities, log-interpolated at given errors.
 
-    python docs/measure.py SEQUENCE... [--set KEY=VALUE]... [--qualities 0,20,40,60,80,100] [--kg 1.0,0.3,0.1] [--sted 0.02,0.01]
+    python docs/measure.py SEQUENCE... [--set KEY=VALUE]... [--qualities 0,20,40,60,80,100] [--kg 1.0,0.3,0.1] [--sted 0.02]
 
 Prints Markdown. Every row is a whole file, decoded again and compared with its source.
 """
