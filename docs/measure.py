@@ -1,6 +1,6 @@
-"""The numbers in docs/benchmarks.md: rate and error over a sweep of qualities, log-interpolated at given KG errors.
+"""The numbers in docs/benchmarks.md: rate and error over a sweep of qualities, log-interpolated at given errors.
 
-    python docs/measure.py SEQUENCE... [--set KEY=VALUE]... [--qualities 0,20,40,60,80,100] [--kg 1.0,0.3,0.1]
+    python docs/measure.py SEQUENCE... [--set KEY=VALUE]... [--qualities 0,20,40,60,80,100] [--kg 1.0,0.3,0.1] [--sted 0.02]
 
 Prints Markdown. Every row is a whole file, decoded again and compared with its source.
 """
@@ -28,22 +28,25 @@ def main() -> None:
     parser.add_argument("--set", dest="pairs", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--qualities", default="0,20,40,60,80,100")
     parser.add_argument("--kg", default="1.0,0.3,0.1")
+    parser.add_argument("--sted", default="")
     options = parser.parse_args()
     settings = dict(pair.split("=", 1) for pair in options.pairs)
-    targets = [float(text) for text in options.kg.split(",")]
-    print("| sequence | quality | bpvf | KG | rmse_diag | max_diag | video share | encode s | decode fps |")
-    print("|---|---|---|---|---|---|---|---|---|")
+    targets = [
+        (name, float(text)) for name in ("kg", "sted") for text in getattr(options, name).split(",") if text
+    ]  # which error, and at which value
+    print("| sequence | quality | bpvf | KG | STED | rmse_diag | max_diag | video share | encode s | decode fps |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
     summary = []
     for path in options.sequences:
         rows = [measure(path, options.codec, {**settings, "quality": q}) for q in options.qualities.split(",")]
         for quality, row in zip(options.qualities.split(","), rows, strict=True):
             print(
-                f"| {path.stem} | {quality} | {row['bpvf']:.3f} | {row['kg']:.3f} | {row['rmse_diag']:.2e} "
+                f"| {path.stem} | {quality} | {row['bpvf']:.3f} | {row['kg']:.3f} | {row['sted']:.4f} | {row['rmse_diag']:.2e} "
                 f"| {row['max_diag']:.2e} | {row['video']:.0%} | {row['encode']:.1f} | {row['fps']:.0f} |",
                 flush=True,
             )
-        summary.append(f"| {path.stem} | " + " | ".join(at(rows, kg) for kg in targets) + " |")
-    print("\n| sequence | " + " | ".join(f"bpvf at KG {kg:g}" for kg in targets) + " |")
+        summary.append(f"| {path.stem} | " + " | ".join(at(rows, *target) for target in targets) + " |")
+    print("\n| sequence | " + " | ".join(f"bpvf at {name.upper()} {value:g}" for name, value in targets) + " |")
     print("|---" * (len(targets) + 1) + "|")
     print("\n".join(summary))
 
@@ -62,6 +65,7 @@ def measure(path: Path, codec: str, texts: dict[str, str]) -> Row:
     return {
         "bpvf": report.bpvf,
         "kg": values.kg or 0.0,
+        "sted": values.sted or 0.0,
         "rmse_diag": values.rmse_diag or 0.0,
         "max_diag": values.max_diag or 0.0,
         "video": share,
@@ -70,16 +74,16 @@ def measure(path: Path, codec: str, texts: dict[str, str]) -> Row:
     }
 
 
-def at(rows: list[Row], kg: float) -> str:
-    """Return the rate at an error, interpolated between the logarithms of both; nothing is extrapolated."""
-    ordered = sorted(rows, key=lambda row: row["kg"])
-    errors = np.array([row["kg"] for row in ordered])
-    if errors[0] > kg:
-        return f"not reached (best {errors[0]:.2f})"
-    if errors[-1] < kg:
-        return f"<= {ordered[-1]['bpvf']:.3f} (KG {errors[-1]:.2f})"
+def at(rows: list[Row], name: str, error: float) -> str:
+    """Return the rate at an error of that name, interpolated between the logarithms of both; nothing is extrapolated."""
+    ordered = sorted(rows, key=lambda row: row[name])
+    errors = np.array([row[name] for row in ordered])
+    if errors[0] > error:
+        return f"not reached (best {errors[0]:.2g})"
+    if errors[-1] < error:
+        return f"<= {ordered[-1]['bpvf']:.3f} ({errors[-1]:.2g})"
     rates = np.array([row["bpvf"] for row in ordered])
-    return f"{np.exp(np.interp(np.log(kg), np.log(errors), np.log(rates))):.3f}"
+    return f"{np.exp(np.interp(np.log(error), np.log(errors), np.log(rates))):.3f}"
 
 
 if __name__ == "__main__":

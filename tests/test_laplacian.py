@@ -17,7 +17,8 @@ from gvcodecs.laplacian.delta_rows import N_KNOWN, border_order, delta_order, de
 from gvcodecs.laplacian.domain import build_domain, build_surface
 from gvcodecs.laplacian.format import Header
 from gvcodecs.laplacian.mesh_scale import edge_lengths, fineness
-from gvcodecs.laplacian.system import ExtendedLaplacian
+from gvcodecs.laplacian.operators import laplacian
+from gvcodecs.laplacian.system import MAX_NEIGHBOURS, ExtendedLaplacian, thin_hubs
 from gvpipe.bitstream import Bitstream
 from gvpipe.errors import FormatError, SettingError
 from gvpipe.metrics import compare
@@ -205,6 +206,23 @@ def test_a_solution_is_the_least_squares_one() -> None:
     extended = np.concatenate([operator.toarray(), 2 * np.eye(6)[[0, 3]]])
     expected = np.linalg.lstsq(extended, np.concatenate([deltas, 2 * anchored]), rcond=None)[0]
     assert np.allclose(system.solve(np.arange(6, dtype=np.int32), deltas, anchored), expected)
+
+
+def test_hubs_keep_few_neighbours_and_their_sum() -> None:
+    n = 3000
+    spokes = np.arange(1, n)
+    faces = np.stack([np.zeros(n - 1, int), spokes, np.roll(spokes, -1)], axis=1).astype(np.int32)
+    angle = 2 * np.pi * spokes / (n - 1)
+    points = np.concatenate([np.zeros((1, 3)), np.stack([np.cos(angle), np.sin(angle), np.sin(9 * angle)], axis=1)])
+    whole = laplacian(points, faces)
+    thin = thin_hubs(whole)
+    assert np.diff(thin.indptr)[0] == MAX_NEIGHBOURS + 1
+    assert np.abs(thin.sum(axis=1)).max() < 1e-12
+    assert abs(thin - whole)[1:].max() == 0
+    kept = thin.indices[thin.indptr[0] : thin.indptr[1]]
+    assert np.diff(kept).max() <= n // MAX_NEIGHBOURS + 2
+    sequence = MeshSequence(np.stack([points, 1.1 * points + [0, 0, 0.1]]).astype(np.float32), faces)
+    assert compare(sequence, decoded(Laplacian().encode(sequence), sequence)).kg < 1  # type: ignore[operator]
 
 
 def test_the_average_comes_back_to_its_precision() -> None:

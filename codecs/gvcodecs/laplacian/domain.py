@@ -13,7 +13,7 @@ from gvcodecs.laplacian.delta_rows import border_order, delta_order, delta_rows
 from gvcodecs.laplacian.format import Header
 from gvcodecs.laplacian.mesh_scale import fineness
 from gvcodecs.laplacian.operators import laplacian
-from gvcodecs.laplacian.system import ExtendedLaplacian
+from gvcodecs.laplacian.system import ExtendedLaplacian, thin_hubs
 from gvpipe.hierarchy import Hierarchy, build_hierarchy
 from gvpipe.mesh_rows import mesh_rows
 from gvpipe.row_prediction import Rows
@@ -75,7 +75,7 @@ def build_domain(surface: Surface, average: Float64 | None, header: Header) -> D
     is_anchor[anchors.points] = True
     has_deltas = (np.bincount(component_of[~is_anchor], minlength=int(component_of.max()) + 1) > 0)[component_of]
     scale = np.ones(n_points) if average is None else fineness(average, surface.edges, header.edge_power)
-    operator = sparse.diags_array(scale * has_deltas) @ laplacian(points, surface.faces, header.operator)
+    operator = sparse.diags_array(scale * has_deltas) @ thin_hubs(laplacian(points, surface.faces, header.operator))
     operator = sparse.csr_array(operator)
     order, blocks, limits = delta_order(header.delta_prediction, surface.hierarchy, walk, has_deltas)
     rows = delta_rows(header.delta_prediction, order, blocks, limits, surface.neighbours, operator @ points)

@@ -49,7 +49,7 @@ from gvpipe.trajectory_basis import (
 )
 
 COARSE, DECADES = 10.0, 2 * 4 / 3  # as in `pca`: error that the step is chosen for at quality 0, percent of the spread
-POINT_COST, ROW_COST = 0.08, 6.0  # of a component: deltas cost little, so that components are paid for by their basis
+POINT_COST, ROW_COST = 0.1, 10.0  # of a component: deltas cost little, so that components are paid for by their basis
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Laplacian(Settings):
     anchors: int = 16  # points per anchor, 1..1048576; each component has one at least
     anchor_choice: str = "hierarchy"  # hierarchy: spread over the surface; walk: along the walk of the deltas
     anchor_ratio: float = 1.2  # step of anchors, in steps of deltas, 1/1024..1024
-    basis_ratio: float = 1.5  # step of the basis, in steps of deltas, 1/1024..1024
+    basis_ratio: float = 2.0  # step of the basis, in steps of deltas, 1/1024..1024
     components: int = 0  # principal trajectories per segment, 1..16384; 0: as many as pay
     edge_power: float = 0.75  # deltas are finer where edges are shorter, by their lengths to this power, 0..2
     average_step: float = 1 / 16  # quantisation step of the average mesh, mean edge lengths, 2**-20..1

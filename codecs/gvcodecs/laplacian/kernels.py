@@ -35,11 +35,13 @@ def known_around(order: Ints, limits: Ints, starts: Ints, neighbours: Ints, most
         queue[0] = order[i]
         seen_by[order[i]] = i
         head, tail, found = 0, 1, 0
-        while head < tail and found < most:
+        while head < tail and tail < reach and found < most:
             for k in range(starts[queue[head]], starts[queue[head] + 1]):
                 v = neighbours[k]
-                if seen_by[v] == i or tail == reach or found == most:
+                if seen_by[v] == i:
                     continue
+                if tail == reach or found == most:
+                    break
                 seen_by[v] = i
                 queue[tail] = v
                 tail += 1

@@ -33,6 +33,8 @@ OPERATORS = ("mean-value", "cotangent", "tutte")
 LEAST = 0.2  # least weight, in mean weights of its row; 0.01 needs up to 3 % more bits at equal errors of edges
 SHORTEST = 1e-3  # least length that divides, in root mean square edge lengths
 FLATTEST = 1e-3  # least sine that divides
+STRAIGHTEST = 1e-6  # least 1 + cosine that divides
+FAINTEST = 1e-6  # least mean weight of a row, in that of all rows: below it says nothing
 
 Float64 = NDArray[np.float64]
 
@@ -70,9 +72,7 @@ def _mean_value(to_b: Float64, to_c: Float64, scale: float, corners: tuple[Int32
     a, b, c = corners
     length_b, length_c = (np.maximum(_norm(side), SHORTEST * scale) for side in (to_b, to_c))
     product, dot, cross = length_b * length_c, _dot(to_b, to_c), _norm(np.cross(to_b, to_c))
-    acute = cross / (product + np.maximum(dot, 0))  # tan(angle / 2) in the form that does not cancel
-    obtuse = (product - np.minimum(dot, 0)) / np.maximum(cross, FLATTEST * product)
-    tangent = np.where(dot > 0, acute, obtuse)
+    tangent = cross / np.maximum(product + dot, STRAIGHTEST * product)  # of half the angle; continuous where sides collapse
     return _sum_pairs([(a, b, tangent / length_b), (a, c, tangent / length_c)], n_vertices)
 
 
@@ -85,11 +85,12 @@ def _cotangent(to_b: Float64, to_c: Float64, scale: float, corners: tuple[Int32,
 
 
 def _raise_to_least(weights: sparse.csr_array) -> None:
-    """Raise weights below `LEAST` of the mean of their row's positive part; rows without one become equal weights."""
+    """Raise weights below `LEAST` of the mean of their row's positive part; rows that hardly have one become equal weights."""
     n_neighbours = np.diff(weights.indptr)
     positive = sparse.csr_array((np.maximum(weights.data, 0), weights.indices, weights.indptr), shape=weights.shape)
     mean = positive.sum(axis=1) / np.maximum(n_neighbours, 1)
-    least = LEAST * np.where(mean > 0, mean, 1.0)
+    faintest = FAINTEST * float(mean.mean() if len(mean) else 0)
+    least = LEAST * np.maximum(mean, faintest or 1.0)
     weights.data = np.maximum(weights.data, np.repeat(least, n_neighbours))
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gvcodecs.laplacian.average_coding import NAME, decode_average
 from gvcodecs.laplacian.coefficients import decode_coefficients
-from gvcodecs.laplacian.domain import build_domain, build_surface
+from gvcodecs.laplacian.domain import Domain, Surface, build_domain, build_surface
 from gvcodecs.laplacian.format import Header
 from gvpipe.bare_mesh import decode_mesh
 from gvpipe.bitstream import Bitstream
@@ -50,10 +50,10 @@ class LaplacianReader:
             raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
         self._mesh, self._bitstream = mesh, bitstream
         surface = build_surface(mesh.point_faces, mesh.n_points)
-        average = None
-        if self._header.needs_average:
-            average = decode_average(bitstream.section(NAME), surface, self._header)
-        self._domain = build_domain(surface, average, self._header)
+        try:
+            self._domain = self._build_domain(surface)
+        except RuntimeError as exc:  # SuperLU: singular
+            raise CorruptFile("section 'average' is corrupt: its Laplacian cannot be inverted; get the file again") from exc
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
         self._segment: Segment | None = None
 
@@ -82,6 +82,12 @@ class LaplacianReader:
                 begin = self._bounds[s]
                 fill_frames(result, start, first, last, begin, segment.basis, segment.coefficients, points)
         return result
+
+    def _build_domain(self, surface: Surface) -> Domain:
+        average = None
+        if self._header.needs_average:
+            average = decode_average(self._bitstream.section(NAME), surface, self._header)
+        return build_domain(surface, average, self._header)
 
     def _decode(self, s: int) -> Segment:
         if self._segment is None or self._segment.number != s:

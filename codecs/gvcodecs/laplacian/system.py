@@ -4,6 +4,8 @@ The operator's rows give every point's difference from its neighbours' weighted 
 point's deltas are to have; below them stands one row per anchor, weighted by how much finer anchors are quantised than deltas.
 Coefficients solve the normal equations, factorised once for all components and segments.
 
+A row of n neighbours couples n^2 pairs of points in the normal equations. Hubs keep `MAX_NEIGHBOURS` of them, evenly spaced.
+
 Source: Vasa, Marras, Hormann and Brunnett 2014, section 6.
 """
 
@@ -17,7 +19,34 @@ from scipy import sparse
 
 from gvpipe.sequence import Int32
 
+MAX_NEIGHBOURS = 64  # of a row
+
 Float64 = NDArray[np.float64]
+
+
+def thin_hubs(operator: sparse.csr_array) -> sparse.csr_array:
+    """Leave rows with more than `MAX_NEIGHBOURS` neighbours only so many, whose shares grow to the same sum.
+
+    Args:
+        operator: ``(P, P)``, rows empty or with a diagonal entry and others that sum to its negative.
+    """
+    operator = operator.sorted_indices()
+    counts = np.diff(operator.indptr)
+    if counts.max(initial=0) <= MAX_NEIGHBOURS + 1:
+        return operator
+    row = np.repeat(np.arange(len(counts)), counts)
+    beside = operator.indices != row
+    n_beside = np.bincount(row, beside, len(counts)).astype(np.int64)
+    rank = np.cumsum(beside) - 1
+    rank = rank - np.concatenate([[0], np.cumsum(n_beside)])[row]  # place among the row's neighbours
+    n = n_beside[row]
+    kept = ~beside | (n <= MAX_NEIGHBOURS) | (rank * MAX_NEIGHBOURS // n != (rank - 1) * MAX_NEIGHBOURS // n)
+    before = np.bincount(row, np.where(beside, operator.data, 0.0), len(counts))
+    after = np.bincount(row, np.where(beside & kept, operator.data, 0.0), len(counts))
+    grown = np.where(beside, operator.data * (before / np.where(after < 0, after, 1.0))[row], operator.data)
+    data = np.where(n_beside[row] > MAX_NEIGHBOURS, grown, operator.data)
+    shape = operator.shape
+    return sparse.csr_array((data[kept], (row[kept], operator.indices[kept])), shape=shape)
 
 
 class ExtendedLaplacian:
