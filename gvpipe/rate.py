@@ -3,7 +3,8 @@
 Bytes and the logarithm of the error follow quality monotonically and nearly in a straight line, so a target is a root of a
 rising function of quality. `find_quality` takes steps of an assumed slope until the root lies between two qualities, then
 regula falsi; where one end would stay for ever, its value is halved (the Illinois rule: M. Dowell and P. Jarratt, A modified
-regula falsi method, 1971). `find_smallest` fits parabolas to the logarithm of the size.
+regula falsi method, 1971). Where errors scatter about their trend, as those of small meshes do, it tries the neighbours.
+`find_smallest` fits parabolas to the logarithm of the size.
 
 Encodes are what costs, so neither makes more than a few.
 """
@@ -29,6 +30,7 @@ NAMES = {
     "bpvf": "a rate (bits per vertex and frame) of",
     "max": "a largest error of",
 }
+SCATTER = 0.3  # of quality: where a root is known so closely and not met, errors do not follow quality any more
 BOUND_RATIO = 2.8  # bound by rmse where files are smallest, about
 FIRST_STEP = 8.0  # of quality, when looking for the smallest
 LEAST_STEP = 1.5
@@ -164,6 +166,9 @@ def find_quality(attempt: Attempt, target: Target, start: float, tolerance: floa
             slope = _slope((quality, value), high, slope)
             high = (quality, value)
         was_low = value < 0
+        if low and high and high[0] - low[0] < SCATTER:
+            tried += _look_around(attempt, target, (low[0] + high[0]) / 2, window, MOST_ENCODES - len(tried))
+            break
         if low and high:
             part = min(max(low[1] / (low[1] - high[1]), 0.02), 0.98)
             quality = low[0] + part * (high[0] - low[0])
@@ -179,6 +184,17 @@ def find_quality(attempt: Attempt, target: Target, start: float, tolerance: floa
             f"{target.of(best):.4g} at quality {best.codec.quality:g}; allow more, or choose another codec or finer settings"
         )
     return max(allowed, key=target.of), tried
+
+
+def _look_around(attempt: Attempt, target: Target, middle: float, window: float, most: int) -> list[Trial]:
+    """Trials on both sides of a quality, until one is close enough: errors of small meshes scatter about their trend."""
+    tried: list[Trial] = []
+    for i in range(most):
+        side = 1 if i % 2 == 0 else -1
+        tried.append(attempt(_within(middle + side * (i // 2 + 1) * SCATTER)))
+        if 0 <= math.log(target.value / max(target.of(tried[-1]), 1e-300)) <= 2 * window:
+            break
+    return tried
 
 
 def find_smallest(attempt: Attempt, bound: float, start: float, tolerance: float = WORTH) -> tuple[Trial, list[Trial]]:
@@ -199,19 +215,15 @@ def find_smallest(attempt: Attempt, bound: float, start: float, tolerance: float
         known = sorted(trials)
         best = min(known, key=size)
         at = known.index(best)
-        if best > 0 and at == 0:
-            wanted = _within(best - step)
-        elif best < 100 and at == len(known) - 1:
-            wanted = _within(best + step)
-        elif 0 < at < len(known) - 1:
+        if 0 < at < len(known) - 1:
             wanted, gain = _vertex(*((q, size(q)) for q in known[at - 1 : at + 2]))
             if gain < tolerance:
                 break
-        elif len(known) > 1:  # at an end of the scale
-            neighbour = known[1] if at == 0 else known[-2]
-            wanted = best + math.copysign(min(step, abs(neighbour - best) / 2), neighbour - best)
         else:
-            wanted = best + math.copysign(step, 50 - best)
+            outwards = -1.0 if at < len(known) - 1 else 1.0
+            wanted = _within(best + outwards * step)
+            if abs(wanted - best) < LEAST_STEP and len(known) > 1:  # at an end of the scale
+                wanted = best - outwards * min(step, abs(known[1 if at == 0 else -2] - best) / 2)
         if min(abs(wanted - q) for q in known) < LEAST_STEP:
             break
         size(wanted)
