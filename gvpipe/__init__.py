@@ -18,23 +18,32 @@ if TYPE_CHECKING:
     from gvpipe.errors import GvpipeError
     from gvpipe.metrics import Comparison, compare
     from gvpipe.player import Player
+    from gvpipe.rendering.camera import Camera
+    from gvpipe.rendering.pictures import render
+    from gvpipe.rendering.renderer import Renderer
     from gvpipe.sequence import MeshSequence
+    from gvpipe.web import ExportReport, export_html
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Camera",
     "Comparison",
+    "ExportReport",
     "GvpipeError",
     "Info",
     "MeshSequence",
     "Player",
+    "Renderer",
     "Report",
     "compare",
     "decode",
     "encode",
+    "export_html",
     "info",
     "open",
     "read",
+    "render",
     "write",
 ]
 
@@ -43,7 +52,11 @@ _HOMES = {
     "gvpipe.errors": ("GvpipeError",),
     "gvpipe.metrics": ("Comparison", "compare"),
     "gvpipe.player": ("Player",),
+    "gvpipe.rendering.camera": ("Camera",),
+    "gvpipe.rendering.pictures": ("render",),
+    "gvpipe.rendering.renderer": ("Renderer",),
     "gvpipe.sequence": ("MeshSequence",),
+    "gvpipe.web": ("ExportReport", "export_html"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 

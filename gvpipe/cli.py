@@ -20,6 +20,7 @@ from gvpipe.errors import GvpipeError
 if TYPE_CHECKING:
     from gvpipe.codec import Progress
     from gvpipe.sequence import MeshSequence
+    from gvpipe.web import ExportReport
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
@@ -172,6 +173,69 @@ def compare(reference: str, distorted: str, as_json: bool) -> None:
     return None
 
 
+@cli.command("export-html")
+@click.argument("source", metavar="FILE.mp4")
+@click.argument("target", metavar="OUT.html")
+@click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="The axis that stands upright.")
+@click.option("--quality", type=float, help="0-100, where the file must be converted. [default: 75]")
+@as_json
+def export_html(source: str, target: str, up: str, quality: float | None, as_json: bool) -> None:
+    """Write a web page of one file that plays a geometry video, without a network.
+
+    Browsers read codec mcgv in its web profile; other files are converted, which adds an error that is told.
+    """
+    from gvpipe import web
+
+    with _progress() as progress:
+        report = web.export_html(source, target, up, quality, progress)
+    if as_json:
+        return _print_json(report.to_json())
+    click.echo(f"{source} -> {target} ({_size(report.bytes)}, {_size(report.video_bytes)} of which are the geometry video)")
+    _tell_conversion(report)
+    return None
+
+
+@cli.command()
+@click.argument("source", metavar="FILE.mp4")
+@click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="The axis that stands upright.")
+def play(source: str, up: str) -> None:
+    """Play a geometry video in your browser; print the path of the page where there is none."""
+    import tempfile
+    from pathlib import Path
+
+    from gvpipe import web
+    from gvpipe.web.browser import open_page
+
+    with _progress() as progress:
+        page = Path(tempfile.mkdtemp(prefix="gvpipe-")) / f"{Path(source).stem}.html"  # stays: the browser reads it later
+        report = web.export_html(source, page, up, None, progress)
+    _tell_conversion(report)
+    click.echo(f"{source} plays in your browser" if open_page(page) else page)
+
+
+@cli.command()
+@click.argument("source", metavar="FILE.mp4|SEQUENCE")
+@click.argument("target", metavar="OUT.png|.gif|.mp4")
+@click.option("--frame", type=int, help="Only this frame; negative counts from the end. [default: 0 for .png, else all]")
+@click.option("--size", default="512", show_default=True, metavar="N|WxH", help="Pixels.")
+@click.option(
+    "--view", default="three-quarter", show_default=True, help="front, back, left, right, top, bottom or AZIMUTH,ELEVATION."
+)
+@click.option("--up", type=click.Choice(["x", "y", "z"]), default="y", show_default=True, help="The axis that is up.")
+@click.option("--turntable", is_flag=True, help="Let the camera go once around.")
+@click.option("--error-of", "error_of", metavar="REFERENCE", help="Colour each vertex by its distance from REFERENCE's.")
+@click.option("--error-max", type=float, metavar="PERCENT", help="Where the colours end. [default: the largest error drawn]")
+@click.option("--shading", type=click.Choice(["smooth", "flat"]), default="smooth", show_default=True)
+def render(source: str, target: str, size: str, **options: Any) -> None:
+    """Paint a geometry video or a sequence as a picture or a film; needs no display and no GPU."""
+    from gvpipe.rendering.pictures import parse_size, render
+
+    pixels = parse_size(size)
+    with _progress() as progress:
+        render(source, target, size=pixels, progress=progress, **options)
+    click.echo(f"{source} -> {target} ({pixels[0]}x{pixels[1]}, {_size(os.path.getsize(target))})")
+
+
 @cli.command()
 def codecs() -> None:
     """List the codecs and their settings."""
@@ -231,6 +295,17 @@ def _parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:
             raise click.UsageError(f"--set {pair}: KEY=VALUE is needed, such as --set clusters=30")
         settings[key.strip()] = value.strip()
     return settings
+
+
+def _tell_conversion(report: ExportReport) -> None:
+    """Say on standard error what the page shows instead of the file's own frames."""
+    if report.converted:
+        rmse, largest = ("not defined" if v is None else f"{v:.1e}" for v in (report.rmse_diag, report.max_diag))
+        click.echo(
+            f"Note: browsers cannot read {report.converted}; the page holds a conversion to mcgv, web profile, which adds an "
+            f"error of rmse {rmse}, at most {largest}, of the diagonal.",
+            err=True,
+        )
 
 
 def _print_json(values: dict[str, Any]) -> None:

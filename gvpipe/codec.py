@@ -40,6 +40,15 @@ class LevelReader(Protocol):
         ...
 
 
+@runtime_checkable
+class GroupReader(Protocol):
+    """What a frame reader offers beside if its codec decodes several frames at the price of one."""
+
+    def group(self, frame: int) -> tuple[int, int]:
+        """``(start, stop)`` of the frames that are best read together with a frame, itself among them."""
+        ...
+
+
 class FrameReader(Protocol):
     """Frames of one bitstream; keeps no more than the last group of them."""
 

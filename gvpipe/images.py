@@ -1,10 +1,13 @@
-"""Planes to JPEG and back, by OpenCV.
+"""Planes to JPEG and back.
 
-JPEG decoders differ by one level in places, so OpenCV's decoder is part of the format: what an encoder writes is what
-this module reads.
+Pillow writes, because it takes quantisation tables: all 64 entries are the same step. The standard tables, made for the eye,
+are several times coarser for fine detail, which costs 3 to 35 % more bits at equal squared error on residuals. JPEG decoders
+differ by one level in places, so OpenCV's decoder is part of the format: what an encoder writes is what this module reads.
 """
 
 from __future__ import annotations
+
+import io
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +19,15 @@ END_OF_IMAGE = b"\xff\xd9"
 UInt8 = NDArray[np.uint8]
 
 
-def encode_jpeg(plane: UInt8, quality: int) -> bytes:
-    """Return ``plane (H, W) uint8`` as a greyscale baseline JPEG with optimised Huffman tables; ``quality`` is 1..100."""
-    import cv2
+def encode_jpeg(plane: UInt8, step: int) -> bytes:
+    """Return ``plane (H, W) uint8`` as a greyscale baseline JPEG with optimised Huffman tables; ``step`` is 1..255 levels."""
+    from PIL import Image
 
-    options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_OPTIMIZE, 1]
-    done, data = cv2.imencode(".jpg", plane, options)
-    if not done:
-        raise ValueError(f"OpenCV cannot write a plane of shape {plane.shape} as JPEG")
-    return data.tobytes()
+    if plane.ndim != 2 or not plane.size:
+        raise ValueError(f"a plane of shape {plane.shape} cannot be a JPEG; rows and columns are needed")
+    file = io.BytesIO()
+    Image.fromarray(plane).save(file, "jpeg", qtables=[[step] * 64], optimize=True)
+    return file.getvalue()
 
 
 def decode_jpeg(data: bytes, height: int, width: int) -> UInt8:

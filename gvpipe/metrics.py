@@ -67,7 +67,7 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: Progress
         InputError: the two differ in their number of frames or vertices or in their triangles, so that no vertex of
             one answers to a vertex of the other.
     """
-    distorted = _aligned(reference, distorted)
+    distorted = aligned(reference, distorted)
     n_frames = reference.n_frames
     edges = unique_edges(reference.faces)
     diagonal = _diagonal(reference)
@@ -135,7 +135,7 @@ def _diagonal(reference: MeshSequence) -> float:
     return float(np.linalg.norm(np.ptp(frame, axis=0)))
 
 
-def _aligned(reference: MeshSequence, distorted: MeshSequence) -> MeshSequence:
+def aligned(reference: MeshSequence, distorted: MeshSequence) -> MeshSequence:
     """Return ``distorted`` in the reference's vertex order, or raise `InputError` if the two do not belong together."""
     counts = (
         ("frames", reference.n_frames, distorted.n_frames),

@@ -12,17 +12,18 @@ from typing import overload
 import numpy as np
 
 from gvpipe.bitstream import Bitstream
-from gvpipe.codec import LevelReader, open_reader
+from gvpipe.codec import GroupReader, LevelReader, open_reader
 from gvpipe.container import read_file
 from gvpipe.errors import FormatError, InputError
+from gvpipe.frame_cache import FrameCache
 from gvpipe.sequence import Float32, Int32, MeshSequence
 
 
 class Player:
     """An open geometry video: a sequence of frames, each ``(V, 3) float32``, model units. A context manager; thread-safe.
 
-    ``video[k]`` decodes no more than the group of pictures that frame k lies in, and keeps that group for the next
-    frame; ``video[a:b]`` gives ``(b - a, V, 3)``.
+    ``video[k]`` decodes no more than the group of frames that frame k lies in, and keeps the last groups; frames asked for
+    in a row, forwards or backwards, are decoded ahead on another thread. ``video[a:b]`` gives ``(b - a, V, 3)``.
 
     Raises:
         InputError: there is no such file.
@@ -37,6 +38,8 @@ class Player:
         except FormatError as exc:
             raise type(exc)(f"{self.path}: {exc}") from exc
         self._lock = threading.Lock()
+        group = self._reader.group if isinstance(self._reader, GroupReader) else _alone
+        self._cache = FrameCache(self._read, group, len(self), 12 * self.bitstream.n_vertices)
 
     @property
     def faces(self) -> Int32:
@@ -63,7 +66,7 @@ class Player:
             return self.sequence()
         if not isinstance(self._reader, LevelReader) or not 0 < lod < len(self.levels):
             raise InputError(f"{self.path}: no level of detail {lod}; there are levels 0..{len(self.levels) - 1}")
-        return MeshSequence(_Level(self, self._reader, lod), self._reader.level_faces(lod), self.fps, name=self.path)
+        return MeshSequence(_Level(self, lod), self._reader.level_faces(lod), self.fps, name=self.path)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -91,7 +94,7 @@ class Player:
         if not -len(self) <= index < len(self):
             raise IndexError(f"frame {index} of {self.path}: there are {len(self)}")
         index %= len(self)
-        return np.asarray(self._read(index, index + 1)[0])
+        return self._cache.frame(index)
 
     def __iter__(self) -> Iterator[Float32]:
         return (self[i] for i in range(len(self)))
@@ -100,23 +103,33 @@ class Player:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        """Nothing stays open between reads."""
+        self.close()
 
-    def _read(self, start: int, stop: int) -> Float32:
+    def close(self) -> None:
+        """Let go of decoded frames and of the thread that reads ahead. The video stays usable."""
+        self._cache.close()
+
+    def _read(self, start: int, stop: int, lod: int = 0) -> Float32:
         with self._lock:
             try:
+                if lod and isinstance(self._reader, LevelReader):
+                    return self._reader.read(start, stop, lod=lod)
                 return self._reader.read(start, stop)
             except FormatError as exc:
                 raise type(exc)(f"{self.path}: {exc}") from exc
 
 
+def _alone(frame: int) -> tuple[int, int]:
+    return frame, frame + 1
+
+
 class _Level:
     """Frames of one level of detail."""
 
-    def __init__(self, player: Player, reader: LevelReader, lod: int) -> None:
-        self._reader, self._lod = reader, lod
+    def __init__(self, player: Player, lod: int) -> None:
+        self._player, self._lod = player, lod
         self.shape = (len(player), player.levels[lod], 3)
 
     def __getitem__(self, key: slice, /) -> Float32:
         start, stop, _ = key.indices(self.shape[0])
-        return self._reader.read(start, max(start, stop), lod=self._lod)
+        return self._player._read(start, max(start, stop), lod=self._lod)

@@ -27,6 +27,7 @@ REACH = 256  # most vertices that one search looks at: 1024 saves 0.3 bit per ve
 EXACT_RANKS = 8  # ranks below this have a symbol of their own; above, two symbols per octave and the rest as plain bits
 ESCAPE = EXACT_RANKS + 2 * 5  # the last symbol, after five octaves (8..255): not found within REACH
 N_SYMBOLS = ESCAPE + 1
+SHORT_ROW = 64  # neighbours that are sorted in place
 MAX_VERTICES = (1 << 24) - 1  # constriction's largest uniform alphabet
 
 
@@ -131,27 +132,67 @@ def _weights(table: Ints) -> npt.NDArray[np.float64]:
 
 def _neighbours(points: Ints, faces: Ints) -> tuple[Ints, Ints]:
     """Rows of neighbours (starts (V + 1,), neighbours (E,)), nearest first: triangle edges, and vertices at one point."""
-    n_vertices = len(points)
-    rows = points.astype(np.int64)
-    by_point = np.lexsort(rows.T)
-    same = (rows[by_point[1:]] == rows[by_point[:-1]]).all(axis=1)
-    pairs = np.concatenate(
-        [faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]], np.c_[by_point[1:], by_point[:-1]][same]]
-    ).astype(np.int64)
-    apart = rows[pairs[:, 0]] - rows[pairs[:, 1]]
-    length = np.tile(np.einsum("ij,ij->i", apart, apart), 2)  # squared; may wrap round beyond 30 bits, at both ends alike
-    here, there = np.concatenate([pairs, pairs[:, ::-1]]).T
-    bits_vertex, bits_length = (int(values.max(initial=0)).bit_length() for values in (here, length))
-    if 2 * bits_vertex + bits_length < 64 and length.min(initial=0) >= 0:  # one sort of whole keys: four times as fast
-        keys = np.sort((here << bits_length | length) << bits_vertex | there)
-        keys = keys[np.diff(keys, prepend=-1) > 0]
-        here, there = keys >> (bits_vertex + bits_length), keys & ((1 << bits_vertex) - 1)
+    rows = np.ascontiguousarray(points, np.int64)
+    bits = int(rows.max(initial=0)).bit_length()
+    if 3 * bits < 64 and rows.min(initial=0) >= 0:  # one sort of whole keys: four times as fast
+        by_point = np.argsort((rows[:, 0] << 2 * bits) | (rows[:, 1] << bits) | rows[:, 2], kind="stable")
     else:
-        order = np.lexsort((there, length, here))
-        here, there = here[order], there[order]
-        first = (np.diff(here, prepend=-1) != 0) | (np.diff(there, prepend=-1) != 0)
-        here, there = here[first], there[first]
-    return np.searchsorted(here, np.arange(n_vertices + 1)), np.ascontiguousarray(there)
+        by_point = np.lexsort(rows.T)
+    same = (rows[by_point[1:]] == rows[by_point[:-1]]).all(axis=1)
+    twins = np.c_[by_point[1:], by_point[:-1]][same]
+    starts, neighbours = _compiled_rows()(rows, np.ascontiguousarray(faces, np.int64), twins)
+    return starts, neighbours
+
+
+def _rows(points: Ints, faces: Ints, twins: Ints) -> tuple[Ints, Ints]:
+    """The rows of `_neighbours`: each sorted by squared distance, then by number; nobody twice."""
+    n_vertices = len(points)
+    starts = np.zeros(n_vertices + 1, np.int64)
+    for t in range(len(faces)):
+        for k in range(3):
+            starts[faces[t, k] + 1] += 2
+    for t in range(len(twins)):
+        starts[twins[t, 0] + 1] += 1
+        starts[twins[t, 1] + 1] += 1
+    starts = np.cumsum(starts)
+    neighbours = np.empty(starts[-1], np.int64)
+    end = starts[:-1].copy()
+    for t in range(len(faces)):
+        for k in range(3):
+            here = faces[t, k]
+            neighbours[end[here]] = faces[t, (k + 1) % 3]
+            neighbours[end[here] + 1] = faces[t, (k + 2) % 3]
+            end[here] += 2
+    for t in range(len(twins)):
+        for k in range(2):
+            neighbours[end[twins[t, k]]] = twins[t, 1 - k]
+            end[twins[t, k]] += 1
+    kept = 0
+    distance = np.empty(SHORT_ROW, np.int64)
+    for v in range(n_vertices):
+        row = neighbours[starts[v] : end[v]]
+        n = len(row)
+        if n <= SHORT_ROW:  # insertion sort: no allocation
+            for i in range(n):
+                y = row[i]
+                dx, dy, dz = points[y, 0] - points[v, 0], points[y, 1] - points[v, 1], points[y, 2] - points[v, 2]
+                d = dx * dx + dy * dy + dz * dz  # may wrap round beyond 30 bits, at both ends alike
+                j = i
+                while j > 0 and (distance[j - 1] > d or (distance[j - 1] == d and row[j - 1] > y)):
+                    distance[j], row[j] = distance[j - 1], row[j - 1]
+                    j -= 1
+                distance[j], row[j] = d, y
+        else:
+            row = np.sort(row)
+            apart = points[row] - points[v]
+            row = row[np.argsort((apart * apart).sum(axis=1), kind="mergesort")]
+        starts[v] = kept
+        for i in range(n):
+            if i == 0 or row[i] != row[i - 1]:
+                neighbours[kept] = row[i]
+                kept += 1
+    starts[n_vertices] = kept
+    return starts, neighbours[:kept].copy()
 
 
 def _walk(starts: Ints, neighbours: Ints, reach: int, ranks: Ints, jumps: Ints, visits: Ints, decoding: bool) -> int:
@@ -223,6 +264,13 @@ def _walk(starts: Ints, neighbours: Ints, reach: int, ranks: Ints, jumps: Ints, 
         while first_left < n_vertices and visited[first_left]:
             first_left += 1
     return n_vertices
+
+
+@functools.cache
+def _compiled_rows() -> Callable[..., tuple[Ints, Ints]]:
+    from gvpipe.compiled import compiled
+
+    return compiled(_rows)
 
 
 @functools.cache

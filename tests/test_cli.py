@@ -423,7 +423,7 @@ from gvpipe.errors import OutputError
 from gvpipe.video import PROFILES, VideoWriter
 import numpy as np
 planes = np.random.default_rng(0).integers(0, 256, (12, 96, 96), dtype=np.uint8)
-with VideoWriter(PROFILES["jpeg"], 96, 96, 25, 95) as writer:
+with VideoWriter(PROFILES["jpeg"], 96, 96, 25, 4) as writer:
     for plane in planes:
         writer.add(plane)
     video = writer.finish()

@@ -23,15 +23,19 @@ CURRENT: dict[str, tuple[str, dict[str, object]]] = {
         "laplacian",
         {"operator": "tutte", "delta_prediction": "none", "anchor_choice": "walk", "anchors": 9, "reorder": True},
     ),
-    "mcgv-1-h264": ("mcgv", {"clusters": 5, "gop": 5, "segment": 7}),
-    "mcgv-1-h264-10": ("mcgv", {"clusters": 5, "profile": "precise"}),
+    "mcgv-2-h264": ("mcgv", {"prediction": "blended", "gop": 5, "segment": 7}),
+    "mcgv-2-affine": ("mcgv", {"clusters": 5, "prediction": "affine", "placement": "halves"}),
+    "mcgv-2-charts": ("mcgv", {"prediction": "blended", "clusters": 5, "profile": "precise", "placement": "charts"}),
+    "mcgv-2-jpeg": (
+        "mcgv",
+        {"prediction": "blended", "clusters": 5, "image": "jpeg", "reorder": True, "placement": "halves"},
+    ),
     "pca-1-kalman": ("pca", {"segment": 7}),
     "pca-1-lsp": ("pca", {"predictor": "lsp"}),
     "pca-1-navg": ("pca", {"predictor": "navg"}),
     "pca-1-rbf": ("pca", {"predictor": "rbf", "reorder": True}),
     "pdct-1": ("pdct", {"segment": 7}),
     "pdct-1-kept": ("pdct", {"clusters": 3, "kept": 0.5, "fineness": 2.0, "reorder": True}),
-    "mcgv-1-jpeg": ("mcgv", {"clusters": 5, "image": "jpeg", "reorder": True}),
 }
 
 

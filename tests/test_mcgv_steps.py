@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import json
+import math
 import zlib
 from typing import Any
 
@@ -21,8 +22,9 @@ from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.packing import Layout, pack
 from gvcodecs.mcgv.padding import Padding
 from gvcodecs.mcgv.parameterization import Atlas, parameterize
+from gvcodecs.mcgv.placement import choose_size, place
 from gvcodecs.mcgv.prediction import AffinePredictor
-from gvcodecs.mcgv.quality import QP_STEP, choose_quantiser
+from gvcodecs.mcgv.quality import QP_STEP, choose_quantiser, effective_step
 from gvcodecs.mcgv.segmentation import LocalAffineFit, segment
 from gvcodecs.mcgv.transforms import decode_transforms, dequantise, encode_transforms, quantise
 from gvpipe.binary import Cursor, varint
@@ -299,6 +301,131 @@ def test_points_of_many_vertices_get_neighbouring_pixels() -> None:
     check_layout(layout, np.zeros(42), 8)
 
 
+# placement by halving
+
+
+def halved(points: list[list[int]], groups: list[int] | None, width: int, height: int, block: int) -> list[int]:
+    """Pixels by section 5.1 of docs/format.md in Python's integers, one cell after the other."""
+    if groups is not None:
+        middle = [sum(c) // len(points) for c in zip(*points, strict=True)]
+        moves = {}
+        for g in set(groups):
+            own = [p for p, h in zip(points, groups, strict=True) if h == g]
+            moves[g] = [2 * (sum(c) // len(own) - m) for c, m in zip(zip(*own, strict=True), middle, strict=True)]
+        points = [[a + b for a, b in zip(p, moves[g], strict=True)] for p, g in zip(points, groups, strict=True)]
+    low = [min(c) for c in zip(*points, strict=True)]
+    points = [[a - b for a, b in zip(p, low, strict=True)] for p in points]
+    shift = max(0, max(max(p) for p in points).bit_length() - 10)
+    steps = range(-2, 3)
+    directions = [(a, b, c) for a in steps for b in steps for c in steps if (a, b, c) > (0, 0, 0) and math.gcd(a, b, c) == 1]
+    assert len(directions) == 49
+    pixels = [-1] * len(points)
+
+    def dot(a: tuple[int, ...], b: tuple[int, ...]) -> int:
+        return sum(i * j for i, j in zip(a, b, strict=True))
+
+    def weight(d: tuple[int, ...]) -> int:
+        return 90 // dot(d, d) if any(d) else 90
+
+    def along(d: tuple[int, ...], before: tuple[int, ...]) -> tuple[int, ...]:
+        return tuple(-i for i in d) if dot(d, before) < 0 else d
+
+    def scores(own: list[int]) -> list[int]:
+        mean = [sum(c) // len(own) for c in zip(*(points[v] for v in own), strict=True)]
+        left = [tuple((a - b) >> shift for a, b in zip(points[v], mean, strict=True)) for v in own]
+        return [weight(d) * sum(dot(d, e) ** 2 for e in left) for d in directions]
+
+    def cell(own: list[int], x: int, y: int, w: int, h: int, across: tuple[int, ...], down: tuple[int, ...]) -> None:
+        if not own:
+            return
+        if w == h == 1:
+            pixels[own[0]] = y * width + x
+            return
+        if max(w, h) > 4:
+            spread = scores(own)
+            best = directions[spread.index(max(spread))]
+            if w >= h:
+                across = along(best, across)
+            else:
+                down = along(best, down)
+        elif w == h == 4:
+            spread = scores(own)
+            one = directions[spread.index(max(spread))]
+            apart = [
+                s if 4 * dot(one, d) ** 2 <= dot(one, one) * dot(d, d) else -1 for s, d in zip(spread, directions, strict=True)
+            ]
+            two = directions[apart.index(max(apart))]
+
+            def like(d: tuple[int, ...], e: tuple[int, ...]) -> int:
+                return weight(d) * weight(e) * dot(d, e) ** 2
+
+            if like(two, across) + like(one, down) > like(one, across) + like(two, down):
+                one, two = two, one
+            across, down = along(one, across), along(two, down)
+        longer, direction = (w, across) if w >= h else (h, down)
+        first = longer // block // 2 * block if longer > block else longer // 2
+        own = sorted(own, key=lambda v: dot(tuple(points[v]), direction))
+        n = (2 * len(own) * first + longer) // (2 * longer)
+        if w >= h:
+            cell(own[:n], x, y, first, h, across, down)
+            cell(own[n:], x + first, y, w - first, h, across, down)
+        else:
+            cell(own[:n], x, y, w, first, across, down)
+            cell(own[n:], x, y + first, w, h - first, across, down)
+
+    cell(list(range(len(points))), 0, 0, width, height, (0, 0, 0), (0, 0, 0))
+    return pixels
+
+
+@pytest.mark.parametrize("name", awkward_surfaces())
+@pytest.mark.parametrize("block", [8, 16])
+def test_placement_follows_its_description(name: str, block: int) -> None:
+    """The same pixels as a recursion in Python's integers; one pixel each, also in the tightest plane and with groups."""
+    points = np.asarray(awkward_surfaces()[name][0])
+    groups = np.random.default_rng(9).integers(0, 5, len(points))
+    for bits, labels in ((4, None), (12, None), (12, groups), (20, groups)):
+        lattice = Lattice.over(points, bits).quantise(points)
+        width, height = choose_size(len(points), block)
+        for size in ((width, height), (width + 3 * block, height), (block, block * -(-len(points) // block**2))):
+            layout = place(lattice, labels, *size, block)
+            assert (layout.width, layout.height) == size
+            check_layout(layout, np.zeros(len(points), np.int32), block)
+            wanted = halved(lattice.tolist(), None if labels is None else labels.tolist(), *size, block)
+            assert layout.pixel.tolist() == wanted
+
+
+def test_placement_keeps_neighbours_together() -> None:
+    """A regular sheet comes out as it is; two sheets that overlap come apart as groups."""
+    x, y = np.meshgrid(np.arange(32), np.arange(32))
+    sheet = np.stack([10 * x.ravel(), 10 * y.ravel(), 0 * x.ravel()], axis=1)
+    shuffled = np.random.default_rng(0).permutation(len(sheet))
+    layout = place(sheet[shuffled], None, 32, 32, 16)
+    rows, columns = np.divmod(layout.pixel[np.argsort(shuffled)].reshape(32, 32), 32)
+    assert (np.abs(np.diff(rows, axis=0)) + np.abs(np.diff(columns, axis=0)) == 1).all()
+    assert (np.abs(np.diff(rows, axis=1)) + np.abs(np.diff(columns, axis=1)) == 1).all()
+    both, group = np.concatenate([sheet, sheet + np.array([160, 1, 1])]), np.repeat([0, 1], len(sheet))
+    apart = place(both, group, 64, 32, 16).pixel % 64 // 32
+    assert len(np.unique(np.c_[apart, group], axis=0)) == 2
+    mixed = place(both, None, 64, 32, 16).pixel % 64 // 32
+    assert len(np.unique(np.c_[mixed, group], axis=0)) == 4
+
+
+@given(st.integers(1, 5000), st.sampled_from([8, 16]))
+@calmly
+def test_automatic_planes_are_small_and_fair(n_vertices: int, block: int) -> None:
+    """Whole blocks, room for all, less than a row of blocks too many, sides within three to one (or all that there are)."""
+    width, height = choose_size(n_vertices, block)
+    assert width % block == height % block == 0
+    needed = -(-n_vertices // block**2)
+    assert needed <= (width // block) * (height // block) < needed + max(width, height) // block
+    assert max(width, height) <= 3 * min(width, height)
+
+
+def test_placement_refuses_planes_too_small() -> None:
+    with pytest.raises(InputError, match="16x16"):
+        place(np.zeros((257, 3), np.int64), None, 16, 16, 16)
+
+
 # padding (equations 5 and 6)
 
 
@@ -361,18 +488,17 @@ def test_quality_is_monotone(name: str, largest: float) -> None:
     decades = {"h264-8": 2.1, "h264-10": 2.7, "jpeg": 2.1}[name]
     effective = []
     for quality in np.linspace(0, 100, 201):
-        chosen = choose_quantiser(float(quality), profile, largest, 2.0)
+        chosen = choose_quantiser(effective_step(float(quality), profile, 2.0), profile, largest)
         assert isinstance(chosen.level, int) and largest / chosen.step <= profile.amplitude * (1 + 1e-12)
         if name == "jpeg":
-            assert 2 <= chosen.level <= 98
-            scale = 50 / chosen.level if chosen.level < 50 else 2 - chosen.level / 50
-            effective.append(chosen.step * scale)
+            assert 1 <= chosen.level <= 255
+            step, finest = float(chosen.level), largest / profile.amplitude
         else:
             assert 1 <= chosen.level <= (63 if profile.depth == 10 else 51)
-            effective.append(chosen.step * QP_STEP * 2 ** (chosen.level / 6))
-            wanted = 2.0 * 0.08 * 10 ** -(decades * quality / 100)
-            finest = largest / profile.amplitude * QP_STEP * 2 ** (1 / 6)
-            assert effective[-1] == pytest.approx(max(wanted, finest), rel=1e-9)
+            step, finest = QP_STEP * 2 ** (chosen.level / 6), largest / profile.amplitude * QP_STEP * 2 ** (1 / 6)
+        effective.append(chosen.step * step)
+        wanted = 2.0 * 0.08 * 10 ** -(decades * quality / 100)
+        assert effective[-1] == pytest.approx(max(wanted, finest), rel=1e-9)
     assert np.all(np.diff(effective) <= np.array(effective[1:]) * 1e-9)
 
 

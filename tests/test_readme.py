@@ -41,7 +41,7 @@ def test_set_up_line_ends_in_commands_that_run(in_a_copy: Path) -> None:
 
 
 def test_every_command_shown_exists() -> None:
-    shown = set(re.findall(r"^gvpipe (\w+)", README, re.MULTILINE))
+    shown = set(re.findall(r"^gvpipe ([\w-]+)", README, re.MULTILINE))
     assert shown == set(cli.commands)
 
 

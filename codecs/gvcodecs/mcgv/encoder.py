@@ -1,8 +1,8 @@
 """The multi-chart geometry video codec: settings, and the way from a sequence to a bitstream.
 
 Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video: A Compact Representation for 3D Animations", 2007. The steps, each a
-module of its own: base frame (`gvpipe.connectivity`), `segmentation`, `parameterization`, `packing`, `prediction` with
-`transforms`, `padding`, video (`gvpipe.video`).
+module of its own: base frame (`gvpipe.connectivity`), motion (`blended_motion` or, as published, `segmentation` and
+`affine_motion`), `placement` (or, as published, `parameterization` and `packing`), `padding`, video (`gvpipe.video`).
 
 All steps work from what the decoder will have: the decoded base frame and the decoded transforms. Frames are read three
 times (extent, motion, transforms and residual range together, images), never kept.
@@ -10,34 +10,41 @@ times (extent, motion, transforms and residual range together, images), never ke
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.mcgv import format as sections
+from gvcodecs.mcgv.affine_motion import code_affine
+from gvcodecs.mcgv.blended_motion import code_blended
+from gvcodecs.mcgv.motion import PREDICTIONS, CodedMotion
 from gvcodecs.mcgv.packing import Layout, pack
 from gvcodecs.mcgv.padding import Padding
 from gvcodecs.mcgv.parameterization import parameterize
-from gvcodecs.mcgv.prediction import AffinePredictor
-from gvcodecs.mcgv.quality import choose_quantiser
+from gvcodecs.mcgv.placement import choose_size, place
+from gvcodecs.mcgv.points import Points
+from gvcodecs.mcgv.quality import choose_quantiser, effective_step
 from gvcodecs.mcgv.reader import McgvReader
 from gvcodecs.mcgv.segmentation import segment
-from gvcodecs.mcgv.transforms import dequantise, encode_transforms, quantise
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Progress, Settings
 from gvpipe.connectivity import decode_base, encode_base
 from gvpipe.errors import SettingError
 from gvpipe.quantize import Lattice
 from gvpipe.segments import count_segments, segment_starts
-from gvpipe.sequence import Int32, MeshSequence
-from gvpipe.topology import weld
+from gvpipe.sequence import Float32, Int32, MeshSequence
 from gvpipe.video import PROFILES, Plane, Profile, VideoWriter
 
 BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
-SIZE_AUTO = "auto"
+AFFINE_CLUSTERS, AFFINE_BASE_BITS = 20, 12  # the paper's
+BASE_BITS = 8, 16  # bits of a base frame that are chosen unasked
+DISTINCT = 0.995  # part of the places in a base frame that its lattice must tell apart
+AUTO = "auto"
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
 
 Float64 = NDArray[np.float64]
@@ -52,17 +59,19 @@ class Mcgv(Settings):
     """
 
     id: ClassVar[str] = "mcgv"
-    version: ClassVar[int] = 1
-    summary: ClassVar[str] = "multi-chart geometry video: residual images of a piecewise affine prediction, as H.264 or JPEG"
+    version: ClassVar[int] = 2
+    summary: ClassVar[str] = "multi-chart geometry video: residual images of a blended affine prediction, as H.264 or JPEG"
 
     quality: float = 75.0  # 0..100, higher is better
     image: str = "h264"  # h264: predictive; jpeg: every frame decodes alone
     profile: str = "web"  # web: 8 bits, browsers read it; precise: 10 bits (h264 only)
-    clusters: int = 20  # K, 1..1024
-    transform_bits: int = 17  # bits over the sequence's extent, 8..24
-    base_bits: int = 12  # bits along the base frame's longest side, 4..20
-    density: float = 1.5  # pixels per vertex inside charts, 1..16
-    size: str = SIZE_AUTO  # of a plane, pixels: auto, or WIDTHxHEIGHT in whole blocks, such as 256x256
+    prediction: str = "affine"  # affine: vertices follow one cluster, as published; blended: up to four; smaller, opens later
+    clusters: int = 0  # K, 1..1024; 0: as many as pay (blended), 20 (affine)
+    transform_bits: int = 17  # bits over the sequence's extent, 8..24 (affine)
+    base_bits: int = 0  # bits along the base frame's longest side, 4..20; 0: as many as pay (blended), 12 (affine)
+    placement: str = AUTO  # charts: as published; halves: pixels follow from the base frame; auto: halves if blended h264
+    density: float = 1.5  # pixels per vertex inside charts, 1..16 (placement charts)
+    size: str = AUTO  # of a plane, pixels: auto, or WIDTHxHEIGHT in whole blocks, such as 256x256
     gop: int = 32  # frames per group of pictures, 1..1000 (h264)
     preset: str = "slow"  # x264's: slower ones are smaller
     segment: int = 500  # most frames per segment, 1..100000
@@ -73,14 +82,18 @@ class Mcgv(Settings):
         self.check_choice("image", ("h264", "jpeg"))
         self.check_choice("profile", ("web", "precise"))
         self.check_choice("preset", PRESETS)
-        self.check_range(1, sections.MAX_CLUSTERS, "clusters")
+        self.check_choice("prediction", PREDICTIONS)
+        self.check_choice("placement", (AUTO, *sections.PLACEMENTS))
+        self.check_range(0, sections.MAX_CLUSTERS, "clusters")
         self.check_range(8, 24, "transform_bits")
-        self.check_range(4, 20, "base_bits")
+        self.check_range(0, 20, "base_bits")
         self.check_range(1, 16, "density")
         self.check_range(1, 1000, "gop")
         self.check_range(1, 100_000, "segment")
         if self.image == "jpeg" and self.profile == "precise":
             raise SettingError("profile precise needs image h264: JPEG has 8 bits")
+        if 0 < self.base_bits < 4:
+            raise SettingError(f"base_bits is {self.base_bits}; 0 or an integer in 4..20 is needed")
         self._plane_size()
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> Bitstream:
@@ -93,52 +106,62 @@ class Mcgv(Settings):
         report("read", 0)
         extent = _extent(sequence, report)
         report("base", 0)
-        lattice = Lattice.over(sequence.read(0, 1)[0], self.base_bits)
-        coded = encode_base(lattice.quantise(sequence.read(0, 1)[0]), sequence.faces, self.reorder)
+        first = sequence.read(0, 1)[0]
+        profile = PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
+        effective = effective_step(self.quality, profile, float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0))))
+        lattice = self._lattice(first, effective / math.sqrt(sequence.n_frames))
+        coded = encode_base(lattice.quantise(first), sequence.faces, self.reorder)
         decoded = decode_base(coded.mesh, coded.order)
         sequence = sequence.reordered(coded.permutation, decoded.faces)
         base = lattice.place(decoded.points)
-        layout, clusters = self._layout(sequence, base, decoded.points, report)
-        report("transforms", 0)
-        predictor = AffinePredictor(base, clusters, int(clusters.max()) + 1)
-        transform_step = extent / 2**self.transform_bits
+        points = Points.of(decoded.points, decoded.faces, decoded.visits)
         n_segments = count_segments(sequence.n_frames, self.segment)
         bounds = segment_starts(sequence.n_frames, n_segments)
-        transforms, largest = [], 0.0
-        for s in range(n_segments):
-            fitted = np.concatenate([predictor.fit(block) for _, block in sequence.chunks(bounds[s], bounds[s + 1])])
-            transforms.append(quantise(fitted, predictor.rest, transform_step))
-            for _, residual in _residuals(sequence, predictor, transforms[s], transform_step, bounds[s]):
-                largest = max(largest, float(np.abs(residual).max()))
-            report("transforms", (s + 1) / n_segments)
-        profile = PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
-        diagonal = float(np.linalg.norm(np.ptp(base, axis=0)))
-        quantiser = choose_quantiser(self.quality, profile, largest, diagonal)
+        if self.prediction == "blended":
+            motion = code_blended(sequence, base, points, bounds, effective, self.clusters, report)
+            partition = np.zeros(len(points.members), np.int32)  # nothing ties charts to clusters: few, large ones are best
+            layout = self._layout(base, decoded.points, points, partition, points.pieces(), report)
+        else:
+            report("segment", 0)
+            partition = segment(sequence, base[points.members], points.faces, points.members, self.clusters or AFFINE_CLUSTERS)
+            clusters = partition[points.point]
+            layout = self._layout(base, decoded.points, points, partition, clusters, report)
+            motion = code_affine(sequence, base, clusters, bounds, extent / 2**self.transform_bits, report)
+            motion.sections["clusters"] = (
+                sections.encode_vertex_clusters(clusters, np.argsort(decoded.visits))
+                if self._placement == "halves"
+                else sections.encode_clusters(clusters, layout, BLOCKS[self.image])
+            )
+        largest = 0.0
+        for _, residual in _residuals(sequence, motion, bounds):
+            largest = max(largest, float(np.abs(residual).max()))
+        quantiser = choose_quantiser(effective, profile, largest)
         header = sections.Header(
+            prediction=self.prediction,
+            placement=self._placement,
             profile=profile,
             block=BLOCKS[self.image],
             width=layout.width,
             height=layout.height,
-            clusters=predictor.n_clusters,
+            clusters=motion.n_clusters,
             segments=n_segments,
             base=lattice,
-            transform_step=transform_step,
+            transform_step=motion.step,
             residual_step=quantiser.step,
         )
         report("video", 0)
         padding = Padding(layout, header.block)
         shape = (3 * layout.height, layout.width)
         with VideoWriter(profile, shape[1], shape[0], sequence.fps, quantiser.level, self.gop, self.preset) as writer:
-            for s in range(n_segments):
-                for first, residual in _residuals(sequence, predictor, transforms[s], transform_step, bounds[s]):
-                    for picture in _pictures(residual, padding, profile, quantiser.step):
-                        writer.add(picture)
-                    report("video", (first + len(residual)) / sequence.n_frames)
+            for first, residual in _residuals(sequence, motion, bounds):
+                for picture in _pictures(residual, padding, profile, quantiser.step):
+                    writer.add(picture)
+                report("video", (first + len(residual)) / sequence.n_frames)
             video = writer.finish()
-        order = np.argsort(decoded.visits)
+        pixels = {} if self._placement == "halves" else {"pixels": sections.encode_pixels(layout, np.argsort(decoded.visits))}
         return Bitstream(
             codec=self.id,
-            version=self.version,
+            version=header.version,
             n_frames=sequence.n_frames,
             n_vertices=sequence.n_vertices,
             n_triangles=len(decoded.faces),
@@ -147,9 +170,8 @@ class Mcgv(Settings):
             sections={
                 "mesh": coded.mesh,
                 "order": coded.order,
-                "pixels": sections.encode_pixels(layout, order),
-                "clusters": sections.encode_clusters(clusters, layout, header.block),
-                **{f"transforms.{s}": encode_transforms(lattice) for s, lattice in enumerate(transforms)},
+                **pixels,
+                **motion.sections,
             },
             video=video,
         )
@@ -159,19 +181,40 @@ class Mcgv(Settings):
         """Open an ``mcgv`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         return McgvReader(bitstream)
 
-    def _layout(self, sequence: MeshSequence, base: Float64, lattice_points: Int32, report: Progress) -> tuple[Layout, Int32]:
-        """Return the vertices' pixels and clusters ``(V,)``; vertices at one base point count as one surface point."""
-        report("segment", 0)
-        members, point = weld(lattice_points)
-        faces = point[sequence.faces].astype(np.int32)
-        clusters = segment(sequence, base[members], faces, members, self.clusters)
+    def _lattice(self, first: Float32, step: float) -> Lattice:
+        """The base frame's lattice: by default of about this step, as its errors stay for all frames; it tells places apart."""
+        if self.base_bits or self.prediction == "affine":
+            return Lattice.over(first, self.base_bits or AFFINE_BASE_BITS)
+        extent = float(np.ptp(first.astype(np.float64), axis=0).max())
+        bits = min(max(math.ceil(math.log2(max(extent / step, 1.0))), BASE_BITS[0]), BASE_BITS[1])
+        n_places = len(np.unique(first, axis=0))
+        while bits < BASE_BITS[1]:
+            lattice = Lattice.over(first, bits)
+            if len(np.unique(lattice.quantise(first), axis=0)) >= DISTINCT * n_places:
+                break
+            bits += 1
+        return Lattice.over(first, bits)
+
+    @property
+    def _placement(self) -> str:
+        """JPEG, which sees no other frame, codes the smoother images of charts for less; see docs/codecs/mcgv.md."""
+        if self.placement != AUTO:
+            return self.placement
+        return "halves" if self.prediction == "blended" and self.image == "h264" else "charts"
+
+    def _layout(
+        self, base: Float64, lattice: Int32, points: Points, partition: Int32, groups: Int32, report: Progress
+    ) -> Layout:
+        """The vertices' pixels: charts keep to the parts of ``partition (P,)``, halving parts ``groups (V,)`` first."""
+        block, size = BLOCKS[self.image], self._plane_size()
+        if self._placement == "halves":
+            return place(lattice, groups, *(size or choose_size(len(lattice), block)), block)
         report("parameterize", 0)
-        atlas = parameterize(base[members], faces, clusters)
-        layout = pack(atlas, point, BLOCKS[self.image], self.density, self._plane_size())
-        return layout, clusters[point]
+        atlas = parameterize(base[points.members], points.faces, partition)
+        return pack(atlas, points.point, block, self.density, size)
 
     def _plane_size(self) -> tuple[int, int] | None:
-        if self.size == SIZE_AUTO:
+        if self.size == AUTO:
             return None
         block = BLOCKS[self.image]
         parts = self.size.lower().split("x")
@@ -189,13 +232,11 @@ def _extent(sequence: MeshSequence, report: Progress) -> float:
     return float((high - low).max()) or 1.0
 
 
-def _residuals(
-    sequence: MeshSequence, predictor: AffinePredictor, lattice: NDArray[np.int64], step: float, start: int
-) -> Iterator[tuple[int, Float64]]:
-    """Yield ``(first frame, (n, V, 3) residuals)`` of a segment that starts at frame ``start`` (equation 4)."""
-    for first, block in sequence.chunks(start, start + len(lattice)):
-        transforms = dequantise(lattice[first - start : first - start + len(block)], predictor.rest, step)
-        yield first, block - predictor.predict(transforms)
+def _residuals(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> Iterator[tuple[int, Float64]]:
+    """Yield ``(first frame, (n, V, 3) residuals)`` of the whole sequence (equation 4)."""
+    for start, stop in pairwise(bounds):
+        for first, block in sequence.chunks(start, stop):
+            yield first, block - motion.predict(first, first + len(block))
 
 
 def _pictures(residual: Float64, padding: Padding, profile: Profile, step: float) -> Iterator[Plane]:

@@ -4,13 +4,18 @@
 ``mesh``           base frame on its lattice and connectivity (`gvpipe.connectivity`)
 ``order``          vertex order, empty if the codec's own (`gvpipe.vertex_order`)
 ``pixels``         [integers] x, then [integers] y of each vertex, vertices in the codec's order: the differences from
-                   the vertex before; y in the context of the magnitude of the difference in x
-``clusters``       [integers] cluster of each block that holds a vertex, in raster order, difference from the block before
-``transforms.N``   affine transforms of segment N (`transforms`)
+                   the vertex before; y in the context of the magnitude of the difference in x (placement charts)
+``clusters``       affine: [integers] placement charts: cluster of each block that holds a vertex, in raster order,
+                   difference from the block before; halves: of each vertex in the codec's order, from the vertex before
+``weights``        blended: which clusters each point follows (`weight_coding`)
+``transforms.N``   transforms of segment N (affine: `transforms`, blended: `trajectories`)
 =================  ==========================================================================================
 
+Version 1 knows affine prediction and charts alone; files with both are still written as version 1.
+
 Source: Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.3: base frame, partition, parametric
-coordinates, transforms, images. Here the partition follows from the pixels, since no block holds two charts.
+coordinates, transforms, images. With charts the affine partition follows from the pixels, since no block holds two of them;
+by halves the pixels follow from the base frame and the partition (`placement`).
 """
 
 from __future__ import annotations
@@ -21,6 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gvcodecs.mcgv.motion import PREDICTIONS
 from gvcodecs.mcgv.packing import Layout
 from gvpipe.binary import Cursor, varint
 from gvpipe.bitstream import Bitstream
@@ -30,6 +36,7 @@ from gvpipe.quantize import Lattice
 from gvpipe.sequence import Int32
 from gvpipe.video import MAX_SIDE, PROFILES, Profile
 
+PLACEMENTS = ("halves", "charts")
 MAX_CLUSTERS = 1024
 MAX_SEGMENTS = 1 << 16
 CONTEXTS = 4  # of a pixel's y: 0, 1, 2..3 or more columns from the vertex before
@@ -44,6 +51,8 @@ class Header:
     """What a reader must know beside the sections; lengths in model units, sides in pixels.
 
     Args:
+        prediction: of `PREDICTIONS`: how vertices move.
+        placement: of `PLACEMENTS`: how vertices get their pixels.
         profile: of the video; a picture holds the x, y and z planes, one below the other.
         block: side of the blocks that hold one chart each.
         width, height: of one plane.
@@ -53,6 +62,8 @@ class Header:
         transform_step, residual_step: quantisation steps.
     """
 
+    prediction: str
+    placement: str
     profile: Profile
     block: int
     width: int
@@ -63,9 +74,16 @@ class Header:
     transform_step: float
     residual_step: float
 
+    @property
+    def version(self) -> int:
+        """The first version of the codec that reads this."""
+        return 1 if (self.prediction, self.placement) == ("affine", "charts") else 2
+
     def to_json(self) -> dict[str, Any]:
         """Return the header as JSON values."""
         values = asdict(self)
+        if self.version == 1:
+            del values["prediction"], values["placement"]
         values["profile"] = self.profile.name
         values["base"] = [*self.base.origin, self.base.step]
         return values
@@ -73,6 +91,10 @@ class Header:
     @classmethod
     def of(cls, bitstream: Bitstream) -> Header:
         """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
+        words = {"prediction": "affine", "placement": "charts"} if bitstream.version == 1 else bitstream.header
+        prediction, placement = str(words.get("prediction")), str(words.get("placement"))
+        if prediction not in PREDICTIONS or placement not in PLACEMENTS:
+            raise CorruptFile(f"header: no prediction {prediction!r} with placement {placement!r}; one of them is unknown")
         profile = PROFILES.get(str(bitstream.header.get("profile")))
         base = bitstream.header.get("base")
         if profile is None:
@@ -82,6 +104,8 @@ class Header:
         if not (base[3] > 0 and all(abs(v) < LARGE for v in base)):  # NaN neither
             raise CorruptFile(f"header: base is {base!r}, out of range")
         header = cls(
+            prediction=prediction,
+            placement=placement,
             profile=profile,
             block=bitstream.integer("block", 2, 64),
             width=bitstream.integer("width", 2, MAX_SIDE),
@@ -94,6 +118,10 @@ class Header:
         )
         if header.width % header.block or header.height % header.block:
             raise CorruptFile(f"header: planes of {header.width}x{header.height} are not whole blocks of {header.block}")
+        if placement == "halves" and header.block not in (8, 16):
+            raise CorruptFile(f"header: blocks of {header.block}; vertices are placed in blocks of 8 or 16")
+        if header.width * header.height < bitstream.n_vertices:
+            raise CorruptFile(f"header: planes of {header.width}x{header.height} do not hold {bitstream.n_vertices} vertices")
         return header
 
 
@@ -134,6 +162,21 @@ def decode_clusters(data: bytes, layout: Layout, block: int, n_clusters: int) ->
     if ((by_block < 0) | (by_block >= n_clusters)).any():
         raise CorruptFile(f"section 'clusters' is corrupt: a cluster is not in 0..{n_clusters - 1}")
     return np.asarray(by_block[block_of.ravel()], np.int32)
+
+
+def encode_vertex_clusters(clusters: Int32, order: Int64) -> bytes:
+    """Return the section ``clusters`` of placement halves; ``order (V,)`` are the vertices in the codec's order."""
+    return encode_integers(np.diff(clusters[order], prepend=np.int32(0)))
+
+
+def decode_vertex_clusters(data: bytes, order: Int64, n_clusters: int) -> Int32:
+    """Mirror of `encode_vertex_clusters`: ``(V,) int32``; raises `CorruptFile` for a cluster out of range."""
+    ordered = np.cumsum(decode_integers(data, len(order), name="clusters"))
+    if ((ordered < 0) | (ordered >= n_clusters)).any():
+        raise CorruptFile(f"section 'clusters' is corrupt: a cluster is not in 0..{n_clusters - 1}")
+    clusters = np.empty(len(order), np.int32)
+    clusters[order] = ordered
+    return clusters
 
 
 def _context(dx: Int64) -> Int64:

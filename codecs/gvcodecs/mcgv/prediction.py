@@ -14,6 +14,8 @@ have the size of the motion that they cause, so that one quantisation step suits
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,10 +56,10 @@ class AffinePredictor:
         self._rank = np.empty(len(base), np.intp)
         self._rank[self._order] = np.arange(len(base))
 
-    @property
-    def by_cluster(self) -> NDArray[np.intp]:
-        """``(V,)`` the vertices, cluster after cluster."""
-        return self._order
+    @cached_property
+    def coordinates(self) -> Float64:
+        """``(V, 3)`` base points in their cluster's frame, in the given order."""
+        return np.ascontiguousarray(self._coordinates[self._rank, :3])
 
     @property
     def rest(self) -> Float64:
@@ -77,16 +79,11 @@ class AffinePredictor:
 
     def predict(self, transforms: Float64) -> Float64:
         """Equation 3: ``(n, V, 3)`` predicted positions for ``transforms (n, K, 4, 3)``, model units."""
-        planes = self.predict_planes(transforms)
-        return np.asarray(planes.swapaxes(1, 2)[:, self._rank])
-
-    def predict_planes(self, transforms: Float64) -> Float64:
-        """The same as ``(n, 3, V)``, vertices in `by_cluster` order: what is fastest to compute."""
         n = len(transforms)
-        result = np.empty((3 * n, len(self._order)))
+        planes = np.empty((3 * n, len(self._order)))  # vertices cluster after cluster
         for k, part in enumerate(self._slices):
-            np.matmul(transforms[:, k].swapaxes(1, 2).reshape(3 * n, 4), self._columns[:, part], out=result[:, part])
-        return result.reshape(n, 3, -1)
+            np.matmul(transforms[:, k].swapaxes(1, 2).reshape(3 * n, 4), self._columns[:, part], out=planes[:, part])
+        return np.asarray(planes.reshape(n, 3, -1).swapaxes(1, 2)[:, self._rank])
 
     def squared_errors(self, frames: Float64, transforms: Float64) -> Float64:
         """Return ``(V, K)``: each vertex's squared error over ``frames (n, V, 3)`` if it followed each cluster.

@@ -19,8 +19,7 @@ from gvpipe.video import QP_RANGE, Profile
 COARSEST = 0.08  # effective step at quality 0, part of the diagonal: beyond, the prediction alone is as good
 DECADES = {"h264-8": 2.1, "h264-10": 2.7, "jpeg": 2.1}  # from quality 0 to 100: down to where each profile's levels end
 QP_STEP = 0.625  # H.264's quantiser step at QP 0, levels of an orthonormal transform; it doubles every 6 QP
-JPEG_TABLE = 20.0  # levels at quality 50: about where JPEG's luma table costs the error of a flat step
-JPEG_RANGE = (2, 98)
+JPEG_STEPS = 255  # the coarsest step of a baseline JPEG, levels of an orthonormal transform; 1 is the finest
 
 
 @dataclass(frozen=True)
@@ -31,21 +30,19 @@ class Quantiser:
     step: float
 
 
-def choose_quantiser(quality: float, profile: Profile, largest: float, diagonal: float) -> Quantiser:
-    """Choose for residuals of magnitude up to ``largest`` on a model of bounding-box ``diagonal``, model units."""
+def effective_step(quality: float, profile: Profile, diagonal: float) -> float:
+    """The step that quality asks for on a model of bounding-box ``diagonal``, model units; positive."""
+    return float((diagonal or 1.0) * COARSEST * 10 ** -(DECADES[profile.name] * quality / 100))
+
+
+def choose_quantiser(effective: float, profile: Profile, largest: float) -> Quantiser:
+    """Choose for an effective step and residuals of magnitude up to ``largest``, model units."""
     finest = largest / profile.amplitude if largest > 0 else 1.0
-    wanted = diagonal * COARSEST * 10 ** -(DECADES[profile.name] * quality / 100) / finest  # effective step, levels
+    wanted = effective / finest  # levels
     if profile.codec == "mjpeg":
-        low, high = JPEG_RANGE
-        level = next((q for q in range(low, high) if _jpeg_step(q) <= wanted), high)  # the coarsest that is fine enough
-        return Quantiser(level, finest * max(1.0, wanted / _jpeg_step(level)))
+        level = min(max(math.floor(wanted), 1), JPEG_STEPS)
+        return Quantiser(level, finest * max(1.0, wanted / level))
     highest = QP_RANGE[1] + 6 * (profile.depth - 8)
     level = math.floor(6 * math.log2(max(wanted, 1e-9) / QP_STEP))
     level = min(max(level, QP_RANGE[0]), highest)
     return Quantiser(level, finest * max(1.0, wanted / (QP_STEP * 2 ** (level / 6))))
-
-
-def _jpeg_step(quality: int) -> float:
-    """The quantiser step, levels, of JPEG's low frequencies at a quality of 1..99, by the rule of the IJG library."""
-    scale = 50 / quality if quality < 50 else 2 - quality / 50
-    return max(1.0, JPEG_TABLE * scale)

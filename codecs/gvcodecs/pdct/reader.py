@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+
 import numpy as np
 
 from gvcodecs.pdct.clip import decode_clip
@@ -40,6 +42,11 @@ class PdctReader:
     def faces(self) -> Int32:
         """``(T, 3) int32`` triangles."""
         return self._mesh.faces
+
+    def group(self, frame: int) -> tuple[int, int]:
+        """``(start, stop)`` of the clip that a frame lies in."""
+        c = bisect_right(self._bounds, frame)
+        return self._bounds[c - 1], self._bounds[c]
 
     def read(self, start: int, stop: int) -> Float32:
         """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.

@@ -1,0 +1,81 @@
+"""The published prediction in a file: one affine transform per cluster and frame (`prediction`, `transforms`).
+
+Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.2. Every vertex follows the cluster of its block.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.mcgv import format as sections
+from gvcodecs.mcgv.motion import CodedMotion, locate
+from gvcodecs.mcgv.packing import Layout
+from gvcodecs.mcgv.prediction import AffinePredictor
+from gvcodecs.mcgv.transforms import decode_transforms, dequantise, encode_transforms, quantise
+from gvpipe.bitstream import Bitstream
+from gvpipe.codec import Progress
+from gvpipe.sequence import Float32, Int32, MeshSequence
+
+Float64 = NDArray[np.float64]
+
+
+def code_affine(
+    sequence: MeshSequence, base: Float64, clusters: Int32, bounds: list[int], step: float, report: Progress
+) -> CodedMotion:
+    """Fit and code the transforms of every segment, for clusters ``(V,)`` and a quantisation step, model units."""
+    predictor = AffinePredictor(base, clusters, int(clusters.max()) + 1)
+    segments = []
+    for s, (start, stop) in enumerate(pairwise(bounds)):
+        fitted = np.concatenate([predictor.fit(block) for _, block in sequence.chunks(start, stop)])
+        segments.append(quantise(fitted, predictor.rest, step))
+        report("transforms", (s + 1) / (len(bounds) - 1))
+
+    def predict(start: int, stop: int) -> Float64:
+        s = locate(bounds, start)
+        lattice = segments[s][start - bounds[s] : stop - bounds[s]]
+        return predictor.predict(dequantise(lattice, predictor.rest, step))
+
+    coded = {f"transforms.{s}": encode_transforms(lattice) for s, lattice in enumerate(segments)}
+    return CodedMotion(predictor.n_clusters, step, coded, predict)
+
+
+class AffineMotion:
+    """Mirror of `code_affine`: frames of a bitstream from its transforms and samples.
+
+    Args:
+        bitstream, header: of the file.
+        base: ``(V, 3)`` decoded base positions, model units.
+        clusters: ``(V,)`` cluster of each vertex.
+        layout: the vertices' pixels.
+        bounds: first frame of every segment, and F.
+    """
+
+    def __init__(
+        self, bitstream: Bitstream, header: sections.Header, base: Float64, clusters: Int32, layout: Layout, bounds: list[int]
+    ) -> None:
+        self._bitstream, self._header, self._bounds = bitstream, header, bounds
+        predictor = AffinePredictor(base, clusters, header.clusters)
+        self._rest = predictor.rest
+        self._vertices = np.argsort(layout.pixel)
+        self._pixels = layout.pixel[self._vertices]
+        self._coordinates = predictor.coordinates[self._vertices]
+        self._clusters = clusters[self._vertices]
+        self._segment: tuple[int, Float64] = (-1, np.zeros((0, 0, 4, 3)))
+
+    def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
+        """Fill ``positions (V, 3)`` of a frame from its ``samples (3, height * width)``; raises `CorruptFile`."""
+        from gvcodecs.mcgv.rebuilding import rebuild
+
+        s = locate(self._bounds, frame)
+        if self._segment[0] != s:
+            name, n_frames = f"transforms.{s}", self._bounds[s + 1] - self._bounds[s]
+            lattice = decode_transforms(self._bitstream.section(name), n_frames, self._header.clusters, name)
+            self._segment = (s, dequantise(lattice, self._rest, self._header.transform_step))
+        transforms = self._segment[1][frame - self._bounds[s]].copy()
+        step = self._header.residual_step
+        transforms[:, 3] -= step * self._header.profile.middle  # once per cluster instead of once per vertex
+        rebuild(samples, self._vertices, self._pixels, self._coordinates, self._clusters, transforms, step, positions)

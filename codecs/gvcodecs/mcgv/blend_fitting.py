@@ -1,0 +1,191 @@
+"""Fitting a blend: clusters of like motion first, then weights and transforms in turns; as many clusters as pay.
+
+Points are clustered by their local affine motions (`segmentation`), each follows its own cluster, and then weights are chosen
+for fixed transforms and transforms fitted to fixed weights, as in skinning decomposition (Le and Deng, "Smooth Skinning
+Decomposition with Rigid Bones", 2012). A point considers the clusters that it and its neighbours follow, so that the cost
+does not depend on how many there are. Weights are chosen closed loop, in the order in which they are coded, for the least of
+squared error and bits.
+
+A cluster costs twelve numbers a frame, and so should save a squared error: numbers of clusters are tried from the smallest up
+while error and cost together fall.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gvcodecs.mcgv.blending import INFLUENCES, TOTAL, Blend, BlendFit, Weights
+from gvcodecs.mcgv.points import Points
+from gvcodecs.mcgv.segmentation import SEED, motion_features
+from gvcodecs.mcgv.weight_coding import Prices, earlier_neighbours
+from gvpipe.codec import Progress
+from gvpipe.sequence import Int32, MeshSequence
+from gvpipe.topology import k_ring
+
+RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`
+FRAMES = 96  # frames, evenly spaced, that fitting looks at
+TRIAL_FRAMES = 32  # the same while the number of clusters is sought
+TRIAL_PASSES, PASSES = 4, 12  # turns of weights and transforms
+FEWEST, MOST = 8, 1024  # clusters tried
+LEAST_POINTS = 8  # per cluster, on average
+GROWTH = 2**0.5  # from one number tried to the next
+CLUSTER_WORTH = 4.0  # squared steps a frame that a cluster must save
+BIT_WORTH = 0.14  # squared steps that a bit of the weights must save
+SAMPLES = 4000  # points that k-means sees
+ROUNDS = 15  # of k-means
+NEGLIGIBLE = 1e-12  # part of all squared motion: points closer than this to seeds are no seeds
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A blend as far as the whole sequence shares it; every cluster has a point."""
+
+    weights: Weights
+    n_clusters: int
+
+
+def fit_blend(sequence: MeshSequence, base: Float64, points: Points, step: float, n_clusters: int, report: Progress) -> Fitted:
+    """Fit a blend.
+
+    Args:
+        sequence: the animation.
+        base: ``(P, 3)`` decoded base positions, model units.
+        points: of the base frame.
+        step: quantisation step wanted of positions, model units: what an error is worth.
+        n_clusters: K, about; 0: as many as pay.
+    """
+    report("segment", 0)
+    neighbours = points.neighbours()
+    features = motion_features(sequence, base, k_ring(neighbours, RING), points.members)
+    price = step**2 / sequence.n_frames  # of one squared step of one frame, as part of all frames
+
+    def problem(n_frames: int) -> _Problem:
+        motions = _motions(sequence, base, points, n_frames)
+        return _Problem(base, motions, neighbours, BIT_WORTH * price * motions.shape[1] / 3)
+
+    clustering = _Clustering(features)
+    best = clustering.start(n_clusters or 1)
+    if not n_clusters:
+        trial, least, count = problem(TRIAL_FRAMES), np.inf, float(FEWEST)
+        while count <= min(MOST, len(base) / LEAST_POINTS):
+            fitted = _alternate(trial, clustering.start(round(count)), TRIAL_PASSES)
+            error = trial.error(fitted) * 3 / trial.motions.shape[1]
+            cost = error / step**2 + CLUSTER_WORTH * fitted.n_clusters
+            if cost >= least:
+                break
+            best, least, count = fitted, cost, count * GROWTH
+    return _alternate(problem(FRAMES), best, PASSES)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """What is fitted.
+
+    Args:
+        base: ``(P, 3)``.
+        motions: ``(P, 3n)`` displacements over n frames.
+        neighbours: of the points.
+        price: of a bit, squared model units over these frames.
+    """
+
+    base: Float64
+    motions: Float64
+    neighbours: sparse.csr_array
+    price: float
+
+    def error(self, fitted: Fitted) -> float:
+        """Squared error that a blend leaves."""
+        fit = BlendFit(Blend(self.base, fitted.weights, fitted.n_clusters))
+        return float(np.square(self.motions - fit.matrix @ fit.fit(self.motions)).sum())
+
+
+def _alternate(problem: _Problem, fitted: Fitted, passes: int) -> Fitted:
+    """Fit transforms, then weights, several times over."""
+    from gvcodecs.mcgv.weight_choice import choose
+
+    known = earlier_neighbours(problem.neighbours)
+    ring = problem.neighbours
+    prices = Prices.guess()
+    errors = np.zeros(len(problem.base))
+    for _ in range(passes):
+        blend = Blend(problem.base, fitted.weights, fitted.n_clusters)
+        transforms = blend.transforms(BlendFit(blend).fit(problem.motions))
+        clusters, parts = fitted.weights.clusters.copy(), fitted.weights.weights.copy()
+        choose(
+            known.starts,
+            known.near,
+            ring.indptr.astype(np.int64),
+            ring.indices.astype(np.int64),
+            blend.homogeneous,
+            problem.motions,
+            transforms,
+            problem.price,
+            prices.count,
+            prices.gap,
+            prices.change,
+            clusters,
+            parts,
+            errors,
+        )
+        fitted = _renumber(clusters, parts)
+        prices = Prices.learnt(problem.neighbours, fitted.weights)
+    return fitted
+
+
+class _Clustering:
+    """K-means of the points' motions for any number of clusters: the first K of one sequence of seeds start it."""
+
+    def __init__(self, features: Float64) -> None:
+        self._features = features
+        self._sample = features[:: max(1, len(features) // SAMPLES)]
+        self._seeds = _seeds(self._sample, MOST)
+
+    def start(self, n_clusters: int) -> Fitted:
+        """Each point follows its own cluster alone, of at most ``n_clusters``."""
+        from scipy.cluster.vq import kmeans2, vq
+
+        clusters = np.zeros((len(self._features), INFLUENCES), np.int32)
+        parts = np.zeros((len(self._features), INFLUENCES), np.int32)
+        parts[:, 0] = TOTAL
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # a cluster may run empty: it is dropped
+            centres, _ = kmeans2(self._sample, self._seeds[:n_clusters], iter=ROUNDS, minit="matrix")
+        clusters[:, 0] = vq(self._features, centres)[0]
+        return _renumber(clusters, parts)
+
+
+def _seeds(sample: Float64, n: int) -> Float64:
+    """At most ``n`` rows of ``sample``, each drawn with the square of its distance from those before (k-means++)."""
+    draw = np.random.default_rng(SEED)
+    squares = np.square(sample).sum(axis=1)
+    seeds = [int(squares.argmax())]
+    distance = np.full(len(sample), np.inf)
+    while len(seeds) < n:
+        last = seeds[-1]
+        distance = np.minimum(distance, np.maximum(squares + squares[last] - 2 * (sample @ sample[last]), 0))
+        distance[seeds] = 0
+        total = np.cumsum(distance)
+        if not total[-1] > NEGLIGIBLE * squares.sum():
+            break
+        seeds.append(int(np.searchsorted(total, draw.random() * total[-1], side="right")))
+    return sample[seeds]
+
+
+def _renumber(clusters: Int32, parts: Int32) -> Fitted:
+    """Number the clusters that points follow from 0."""
+    used, number = np.unique(np.where(parts > 0, clusters, clusters[:, :1]), return_inverse=True)
+    return Fitted(Weights(np.where(parts > 0, number.reshape(clusters.shape), 0).astype(np.int32), parts), len(used))
+
+
+def _motions(sequence: MeshSequence, base: Float64, points: Points, n_frames: int) -> Float64:
+    """Displacements ``(P, 3n)`` of at most ``n_frames`` frames, evenly spaced."""
+    picked = np.unique(np.linspace(0, sequence.n_frames - 1, n_frames).astype(int))
+    frames = np.concatenate([sequence.read(i, i + 1)[:, points.members] for i in picked]).astype(np.float64)
+    return np.ascontiguousarray(np.moveaxis(frames - base, 0, 1).reshape(len(base), -1))

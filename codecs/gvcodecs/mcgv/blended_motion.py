@@ -1,0 +1,104 @@
+"""Blended prediction in a file: weights once, transforms as trajectories segment by segment (`blending`)."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.mcgv import format as sections
+from gvcodecs.mcgv.blend_fitting import fit_blend
+from gvcodecs.mcgv.blending import TOTAL, Blend, BlendFit
+from gvcodecs.mcgv.motion import CodedMotion, locate
+from gvcodecs.mcgv.packing import Layout
+from gvcodecs.mcgv.points import Points
+from gvcodecs.mcgv.trajectories import Trajectories, decode_trajectories, encode_trajectories
+from gvcodecs.mcgv.weight_coding import decode_weights, encode_weights
+from gvpipe.bitstream import Bitstream
+from gvpipe.codec import Progress
+from gvpipe.sequence import Float32, MeshSequence
+
+Float64 = NDArray[np.float64]
+
+
+def code_blended(
+    sequence: MeshSequence, base: Float64, points: Points, bounds: list[int], step: float, n_clusters: int, report: Progress
+) -> CodedMotion:
+    """Fit a blend, and code its weights and the transforms of every segment with a quantisation step, model units."""
+    fitted = fit_blend(sequence, base[points.members], points, step, n_clusters, report)
+    blend = Blend(base[points.members], fitted.weights, fitted.n_clusters)
+    fit = BlendFit(blend)
+    coded = {"weights": encode_weights(fitted.weights, points.neighbours())}
+    segments: list[Trajectories] = []
+    for s, (start, stop) in enumerate(pairwise(bounds)):
+        rows = [fit.fit(_columns(block[:, points.members] - base[points.members])) for _, block in sequence.chunks(start, stop)]
+        coded[f"transforms.{s}"], decoded = encode_trajectories(np.hstack(rows), step)
+        segments.append(decoded)
+        report("transforms", (s + 1) / (len(bounds) - 1))
+
+    def predict(start: int, stop: int) -> Float64:
+        s = locate(bounds, start)
+        moved = fit.matrix @ segments[s].rows(start - bounds[s], stop - bounds[s])  # (P, 3n)
+        return np.asarray(base + moved.reshape(len(moved), stop - start, 3)[points.point].swapaxes(0, 1))
+
+    return CodedMotion(fitted.n_clusters, step, coded, predict)
+
+
+class BlendedMotion:
+    """Mirror of `code_blended`: frames of a bitstream from its transforms and samples.
+
+    Args:
+        bitstream, header: of the file.
+        base: ``(V, 3)`` decoded base positions, model units.
+        points: of the base frame.
+        layout: the vertices' pixels.
+        bounds: first frame of every segment, and F.
+    """
+
+    def __init__(
+        self, bitstream: Bitstream, header: sections.Header, base: Float64, points: Points, layout: Layout, bounds: list[int]
+    ) -> None:
+        self._bitstream, self._header, self._bounds = bitstream, header, bounds
+        weights = decode_weights(bitstream.section("weights"), points.neighbours(), header.clusters)
+        self._blend = Blend(base[points.members], weights, header.clusters)
+        self._vertices = np.argsort(layout.pixel)
+        self._pixels = layout.pixel[self._vertices]
+        self._base = base[self._vertices]
+        point = points.point[self._vertices]
+        self._homogeneous = self._blend.homogeneous[point]
+        self._clusters, self._parts = weights.clusters[point], weights.weights[point] / TOTAL
+        self._segment: tuple[int, Trajectories | None] = (-1, None)
+
+    def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
+        """Fill ``positions (V, 3)`` of a frame from its ``samples (3, height * width)``; raises `CorruptFile`."""
+        from gvcodecs.mcgv.rebuilding import rebuild_blended
+
+        s = locate(self._bounds, frame)
+        kept, trajectories = self._segment
+        if kept != s or trajectories is None:
+            name, n_frames = f"transforms.{s}", self._bounds[s + 1] - self._bounds[s]
+            header = self._header
+            data = self._bitstream.section(name)
+            trajectories = decode_trajectories(data, header.clusters, n_frames, header.transform_step, name)
+            self._segment = (s, trajectories)
+        first = frame - self._bounds[s]
+        rebuild_blended(
+            samples,
+            self._vertices,
+            self._pixels,
+            self._base,
+            self._homogeneous,
+            self._clusters,
+            self._parts,
+            self._blend.transforms(trajectories.rows(first, first + 1)),
+            self._header.residual_step,
+            float(self._header.profile.middle),
+            positions,
+        )
+
+
+def _columns(frames: Float64) -> Float64:
+    """Displacements ``(n, P, 3)`` as ``(P, 3n)``."""
+    return np.ascontiguousarray(frames.swapaxes(0, 1).reshape(frames.shape[1], -1))

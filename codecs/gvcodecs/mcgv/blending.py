@@ -1,0 +1,106 @@
+"""Blended prediction: every point follows a weighted mean of up to four clusters' affine motions.
+
+With base position p, homogeneous coordinates ``y = ((p - centre) / extent, 1)`` of the base frame's bounding box, and
+weights w_k that add up to one, a point of frame i is predicted as::
+
+    p + sum over its clusters k  w_k  y @ T_i^k          T_i^k (4, 3), model units; zero where nothing moves
+
+This is skinning with affine motions in place of rigid ones (Le and Deng, "Smooth Skinning Decomposition with Rigid Bones",
+2012), where Mamou, Zaharia and Preteux ("Multi-Chart Geometry Video", 2007, section 3.2) give each point one cluster. The
+prediction is linear in the transforms: ``B T`` with a sparse matrix B, (P, 4K).
+
+Transforms are fitted and coded in coordinates of equal weight. ``E_k = sum over points  w_k^2 y^T y`` is the energy that
+cluster k's four rows cause; with its Cholesky factor, ``E_k = L_k L_k^T``, rows ``C = L_k^T T`` have the energy of the
+displacements that they cause, and one quantisation step suits all of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gvpipe.sequence import Int32
+
+INFLUENCES = 4  # most clusters that a point follows
+TOTAL = 64  # weights are integers that add up to this
+FLAT = 1e-6  # of a cluster's energy: what directions in which it has no extent count for
+LEAST_ENERGY = 1e-9  # of a cluster that no point follows
+RIDGE = 1e-6
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Which clusters the points follow.
+
+    Args:
+        clusters: ``(P, 4) int32``, 0..K-1; 0 where unused.
+        weights: ``(P, 4) int32`` in 1 / TOTAL, used ones first, each row's sum is TOTAL.
+    """
+
+    clusters: Int32
+    weights: Int32
+
+
+class Blend:
+    """The points' blends, prepared once: fits and predicts any number of frames.
+
+    Args:
+        base: ``(P, 3)`` decoded base positions, model units.
+        weights: theirs.
+        n_clusters: K.
+    """
+
+    def __init__(self, base: Float64, weights: Weights, n_clusters: int) -> None:
+        self.n_clusters, self.weights = n_clusters, weights
+        self.homogeneous = homogeneous(base)
+        parts = weights.weights / TOTAL  # (P, 4)
+        outer = self.homogeneous[:, :, None] * self.homogeneous[:, None, :]
+        energy = np.zeros((n_clusters, 4, 4))
+        np.add.at(energy, weights.clusters, parts[:, :, None, None] ** 2 * outer[:, None])
+        trace = np.trace(energy, axis1=1, axis2=2)
+        energy += (FLAT * trace + LEAST_ENERGY)[:, None, None] * np.eye(4)
+        self._inverse = np.linalg.inv(np.linalg.cholesky(energy))  # (K, 4, 4)
+
+    def matrix(self) -> sparse.csr_array:
+        """B in coordinates of equal weight: ``(P, 4K)``."""
+        n_points = len(self.homogeneous)
+        local = np.einsum("pjrc,pc->pjr", self._inverse[self.weights.clusters], self.homogeneous)  # (P, 4, 4)
+        values = (self.weights.weights / TOTAL)[:, :, None] * local
+        columns = 4 * self.weights.clusters[:, :, None] + np.arange(4)
+        rows = np.broadcast_to(np.arange(n_points)[:, None, None], values.shape)
+        used = np.broadcast_to((self.weights.weights > 0)[:, :, None], values.shape)
+        return sparse.csr_array((values[used], (rows[used], columns[used])), shape=(n_points, 4 * self.n_clusters))
+
+    def transforms(self, rows: Float64) -> Float64:
+        """``(K, 4, m)`` transforms in model units for ``rows (4K, m)`` of equal weight."""
+        return np.asarray(self._inverse.swapaxes(1, 2) @ rows.reshape(self.n_clusters, 4, -1))
+
+
+class BlendFit:
+    """Least squares for one blend: the normal matrix is factored once, then serves every frame."""
+
+    def __init__(self, blend: Blend) -> None:
+        from scipy.linalg import cho_factor
+
+        self.matrix = blend.matrix()
+        normal = (self.matrix.T @ self.matrix).toarray()
+        normal[np.diag_indices_from(normal)] += RIDGE
+        self._factor = cho_factor(normal)
+
+    def fit(self, motions: Float64) -> Float64:
+        """``(4K, m)`` rows of equal weight that carry displacements ``(P, m)`` best."""
+        from scipy.linalg import cho_solve
+
+        return np.asarray(cho_solve(self._factor, self.matrix.T @ motions))
+
+
+def homogeneous(base: Float64) -> Float64:
+    """``(P, 4)`` coordinates in the middle of the bounding box, in parts of its longest side, and 1."""
+    low, high = base.min(axis=0), base.max(axis=0)
+    extent = float((high - low).max()) or 1.0
+    return np.column_stack([(base - (low + high) / 2) / extent, np.ones(len(base))])

@@ -1,0 +1,88 @@
+"""The last step of decoding as one compiled pass: prediction plus residual, vertex by vertex.
+
+Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.2, equations 3 and 4, read backwards. A frame takes
+as long as its positions take to be written: no prediction, sample or coordinate is stored on the way.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.compiled import compiled
+
+Float64 = NDArray[np.float64]
+
+
+@compiled
+def rebuild(
+    samples: NDArray[Any],
+    vertices: NDArray[np.int64],
+    pixels: NDArray[np.int64],
+    coordinates: Float64,
+    clusters: NDArray[np.int32],
+    transforms: Float64,
+    step: float,
+    positions: NDArray[np.float32],
+) -> None:
+    """Fill ``positions (V, 3) float32``, model units, of one frame.
+
+    Args:
+        samples: ``(3, height * width) uint8 or uint16`` the frame's x, y and z planes.
+        vertices: ``(V,)`` the vertices in the order of their pixels: reading the planes from one end to the other takes
+            half the time.
+        pixels: ``(V,)`` their pixels.
+        coordinates: ``(V, 3)`` their base points in their cluster's frame.
+        clusters: ``(V,)`` theirs, 0..K-1.
+        transforms: ``(K, 4, 3)`` rows in model units; the last one carries the level that stands for zero as well.
+        step: model units per level.
+    """
+    for i in range(len(vertices)):
+        rows = transforms[clusters[i]]
+        x, y, z = coordinates[i, 0], coordinates[i, 1], coordinates[i, 2]
+        vertex, pixel = vertices[i], pixels[i]
+        for axis in range(3):
+            predicted = x * rows[0, axis] + y * rows[1, axis] + z * rows[2, axis] + rows[3, axis]
+            positions[vertex, axis] = predicted + step * samples[axis, pixel]
+
+
+@compiled
+def rebuild_blended(
+    samples: NDArray[Any],
+    vertices: NDArray[np.int64],
+    pixels: NDArray[np.int64],
+    base: Float64,
+    homogeneous: Float64,
+    clusters: NDArray[np.int32],
+    parts: Float64,
+    transforms: Float64,
+    step: float,
+    zero: float,
+    positions: NDArray[np.float32],
+) -> None:
+    """Fill ``positions (V, 3) float32``, model units, of one frame of blended motion (`blending`).
+
+    Args:
+        samples, vertices, pixels, step: as in `rebuild`.
+        base: ``(V, 3)`` their base positions; homogeneous: ``(V, 4)`` coordinates.
+        clusters, parts: ``(V, 4)`` theirs, and their weights, used ones first.
+        transforms: ``(K, 4, 3)`` rows in model units.
+        zero: level that stands for zero.
+    """
+    for i in range(len(vertices)):
+        vertex, pixel = vertices[i], pixels[i]
+        x, y, z = homogeneous[i, 0], homogeneous[i, 1], homogeneous[i, 2]
+        moved_x, moved_y, moved_z = base[i, 0], base[i, 1], base[i, 2]
+        for j in range(parts.shape[1]):
+            part = parts[i, j]
+            if part == 0.0:
+                break
+            rows = transforms[clusters[i, j]]
+            moved_x += part * (x * rows[0, 0] + y * rows[1, 0] + z * rows[2, 0] + rows[3, 0])
+            moved_y += part * (x * rows[0, 1] + y * rows[1, 1] + z * rows[2, 1] + rows[3, 1])
+            moved_z += part * (x * rows[0, 2] + y * rows[1, 2] + z * rows[2, 2] + rows[3, 2])
+        positions[vertex, 0] = moved_x + step * (samples[0, pixel] - zero)
+        positions[vertex, 1] = moved_y + step * (samples[1, pixel] - zero)
+        positions[vertex, 2] = moved_z + step * (samples[2, pixel] - zero)

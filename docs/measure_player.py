@@ -1,0 +1,70 @@
+"""How fast the web player is: ``python docs/measure_player.py FILE.mp4 [--size 512] [--seconds 5]``.
+
+Exports the file, opens the page in headless Chromium (no GPU: WebGL on the processor) and prints what docs/player.md tells:
+unique frames per second while playing, the longest time between two, milliseconds for a frame at random, and for loading.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import gvpipe
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from chromium import chromium
+
+MEASURE = """
+const [size, seconds, done] = arguments;
+const element = document.querySelector("geometry-video");
+const canvas = element.shadowRoot.querySelector("canvas");
+(async () => {
+  if (!element.video) await new Promise((resolve) => element.addEventListener("ready", resolve, { once: true }));
+  const loaded = performance.now();
+  element.style.cssText = `width: ${size}px; height: ${size}px`;
+  element.style.height = `${2 * size - canvas.clientHeight}px`; // the bar comes below the picture
+  if (element.paused) await element.play();
+  const times = [];
+  const record = () => times.push(performance.now());
+  element.addEventListener("frame", record);
+  await new Promise((resolve) => setTimeout(resolve, 1000 * seconds));
+  element.removeEventListener("frame", record);
+  const frames = element.video.frameCount;
+  let milliseconds = 0;
+  for (let i = 0; i < 40; i++) {
+    const start = performance.now();
+    await element.video.frame((i * 61) % frames);
+    milliseconds += performance.now() - start;
+  }
+  const gaps = times.slice(1).map((time, i) => time - times[i]);
+  done([canvas.clientWidth, canvas.clientHeight, times.length / seconds, Math.max(...gaps), milliseconds / 40, loaded]);
+})();
+"""
+
+
+def main() -> None:
+    """Measure, and print one line per number."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--size", type=int, default=512)
+    parser.add_argument("--seconds", type=float, default=5)
+    options = parser.parse_args()
+    folder = Path(tempfile.mkdtemp(prefix="gvpipe-"))
+    try:
+        report = gvpipe.export_html(options.file, folder / "page.html")
+        with chromium(folder / "profile", (options.size + 100, options.size + 300)) as browser:
+            browser.get((folder / "page.html").as_uri())
+            width, height, rate, gap, seek, load = browser.execute_async_script(MEASURE, options.size, options.seconds)
+    finally:
+        shutil.rmtree(folder)
+    size = options.file.stat().st_size
+    print(f"page: {report.bytes} bytes; 1.4 x file + 1.5 MB = {1.4 * size + 1.5e6:.0f}")
+    print(f"playing at {width}x{height}: {rate:.1f} unique frames/s, longest gap {gap:.0f} ms")
+    print(f"random frame: {seek:.1f} ms; page ready after {load:.0f} ms")
+
+
+if __name__ == "__main__":
+    main()

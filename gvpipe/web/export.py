@@ -1,0 +1,136 @@
+"""A geometry video and its player as one HTML file that needs no network.
+
+What: page = ``page.html`` with the player's bundle inline and the MP4 file as base64 text, so that it opens from a disk.
+Why: browsers load no modules and fetch no files for a page that is itself a file.
+
+Browsers give back the samples of the web profile alone (8-bit H.264), and the player reads codec ``mcgv``. Whatever else a
+file holds is decoded and encoded anew, and the error that this adds is measured and reported.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from gvpipe import api, metrics
+from gvpipe.atomic import atomic_path, output_error
+from gvpipe.bitstream import Bitstream
+from gvpipe.codec import Progress
+from gvpipe.errors import InputError, OutputError
+from gvpipe.player import Player
+
+READS = ("mcgv", 1, "h264-8")  # codec, its highest version, profile: what src/mcgv/header.js reads
+SUFFIXES = (".html", ".htm")
+AXES = ("y", "z")
+
+
+@dataclass(frozen=True)
+class ExportReport:
+    """What an export did.
+
+    Args:
+        bytes: of the page.
+        video_bytes: of the geometry video in it.
+        converted: what the file was if browsers cannot read that, else "".
+        rmse_diag, max_diag: error that the conversion adds, fractions of the frame-0 bounding-box diagonal; 0 without one,
+            None if the diagonal is 0.
+    """
+
+    bytes: int
+    video_bytes: int
+    converted: str = ""
+    rmse_diag: float | None = 0.0
+    max_diag: float | None = 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as JSON values."""
+        return asdict(self)
+
+
+def export_html(
+    source: str | os.PathLike[str],
+    target: str | os.PathLike[str],
+    up: str = "y",
+    quality: float | None = None,
+    progress: Progress | None = None,
+) -> ExportReport:
+    """Write a page of one file that plays a geometry video.
+
+    Args:
+        source: the geometry video, of any codec.
+        target: the ``.html`` to write; an older file is replaced once the new one is complete.
+        up: the axis that stands upright in the first view, ``y`` or ``z``.
+        quality: 0..100, of the conversion where there is one; the codec's default if None.
+        progress: called with a stage's name and the part of it that is done.
+
+    Raises:
+        InputError: there is no such file, or an argument cannot be used.
+        FormatError: not a geometry video, or a damaged one.
+        OutputError: the page cannot be written; no part of it is left.
+    """
+    target = Path(target)
+    if target.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{target}: the output is a web page; end its name in .html")
+    if up not in AXES:
+        raise InputError(f"up is {up!r}; one of {', '.join(AXES)} is needed")
+    if not os.path.isdir(target.parent):
+        raise OutputError(f"cannot write {target}: no folder {target.parent}; create it first")
+    player = Player(source)
+    if _is_readable(player.bitstream):
+        return _write_page(player.path, player.path, target, up)
+    with _scratch_file() as converted:
+        settings = {} if quality is None else {"quality": quality}
+        api.encode(player.sequence(), converted, READS[0], progress, **settings)
+        copy = Player(converted)
+        if not _is_readable(copy.bitstream):
+            raise InputError(f"the web player reads {READS[0]} up to version {READS[1]} only; use an older gvpipe to convert")
+        report = (lambda done, of: progress("compare", done / of)) if progress else None
+        added = metrics.compare(player.sequence(), copy.sequence(), report)
+        page = _write_page(player.path, converted, target, up)
+    return ExportReport(page.bytes, page.video_bytes, _kind(player.bitstream), added.rmse_diag, added.max_diag)
+
+
+def _is_readable(bitstream: Bitstream) -> bool:
+    codec, version, profile = READS
+    return bitstream.codec == codec and bitstream.version <= version and bitstream.header.get("profile") == profile
+
+
+def _kind(bitstream: Bitstream) -> str:
+    profile = bitstream.header.get("profile")
+    return f"{bitstream.codec}, profile {profile}" if profile else bitstream.codec
+
+
+def _write_page(name: str, video: str | os.PathLike[str], target: Path, up: str) -> ExportReport:
+    data = Path(video).read_bytes()
+    shipped = files("gvpipe.web")
+    page = (shipped / "page.html").read_text("utf-8")
+    values = {
+        "TITLE": html.escape(Path(name).stem),
+        "UP": up,
+        "PLAYER": (shipped / "bundle" / "player.js").read_text("utf-8"),
+        "VIDEO": base64.b64encode(data).decode("ascii"),
+    }
+    parts = page.split("$$")  # text, name, text, name, ..., text
+    text = "".join(values[part] if i % 2 else part for i, part in enumerate(parts)).encode()
+    with atomic_path(target) as temporary:
+        temporary.write_bytes(text)
+    return ExportReport(len(text), len(data))
+
+
+@contextmanager
+def _scratch_file() -> Iterator[str]:
+    """The path of a file to be, gone at the end."""
+    try:
+        folder = tempfile.TemporaryDirectory(prefix="gvpipe-")
+    except OSError as exc:
+        raise output_error(tempfile.gettempdir(), exc) from exc
+    with folder as name:
+        yield os.path.join(name, "converted.mp4")

@@ -1,0 +1,97 @@
+/**
+ * Triangles and base-frame lattice points. Mirrors `gvpipe.connectivity.decode_base`; `docs/format.md`, section 4: what Draco
+ * carries, then the loose vertices and triangles beside it, all in the user's vertex order in the end.
+ */
+
+import { Cursor } from "./cursor.js";
+import { decodeDraco } from "./draco.js";
+import { corrupt } from "./errors.js";
+import { inflate } from "./inflate.js";
+import { previousEqual } from "./points.js";
+import { decodeOrder } from "./vertex_order.js";
+
+const MAX_VERTICES = 2 ** 24 - 1;
+const MAX_COORDINATE = 2 ** 25; // squared distances between lattice points stay exact in doubles; gvpipe writes up to 2^22
+
+/**
+ * @typedef {object} BaseMesh
+ * @property {Int32Array} points (V, 3) lattice units, flat
+ * @property {Uint32Array} faces (T, 3) flat
+ * @property {Int32Array} visits (V) vertex v is the codec's vertex visits[v]
+ *
+ * @param {Uint8Array} mesh @param {Uint8Array} order sections
+ * @returns {Promise<BaseMesh>}
+ */
+export async function decodeBase(mesh, order) {
+  const { points, faces } = await decodeMesh(mesh);
+  const n = points.length / 3;
+  const visits = Int32Array.from({ length: n }, (_, v) => v);
+  if (order.length === 0) return { points, faces, visits };
+  decodeOrder(order, points, faces, visits);
+  const moved = new Int32Array(3 * n);
+  const rank = new Int32Array(n); // the user's vertex of each of the codec's
+  for (let v = 0; v < n; v++) {
+    rank[visits[v]] = v;
+    for (let axis = 0; axis < 3; axis++) moved[3 * v + axis] = points[3 * visits[v] + axis];
+  }
+  return { points: moved, faces: faces.map((vertex) => rank[vertex]), visits };
+}
+
+async function decodeMesh(mesh) {
+  const cursor = new Cursor(mesh, "mesh");
+  const [bytesDraco, looseVertices, looseFaces, bytesVertices] = [cursor.u32(), cursor.u32(), cursor.u32(), cursor.u32()];
+  const draco = cursor.take(bytesDraco);
+  const carried = bytesDraco ? merge(await decodeDraco(draco)) : { points: [], faces: [] };
+  const points = join(Int32Array, carried.points, await decodeTable(cursor.take(bytesVertices), looseVertices));
+  const faces = join(Uint32Array, carried.faces, await decodeTable(cursor.rest(), looseFaces));
+  const n = points.length / 3;
+  if (n > MAX_VERTICES) throw cursor.corrupt(`${n} vertices, at most ${MAX_VERTICES}`);
+  if (points.some((c) => c < 0 || c >= MAX_COORDINATE)) throw cursor.corrupt("lattice coordinate out of range");
+  if (faces.some((vertex) => vertex >= n)) throw cursor.corrupt("a triangle names a vertex that does not exist");
+  return { points, faces };
+}
+
+/** Draco splits vertices; those with equal keys are one, numbered by first appearance. */
+function merge({ keys, faces }) {
+  const previous = previousEqual(keys, 4);
+  const vertex = new Uint32Array(previous.length);
+  const points = [];
+  for (let i = 0; i < previous.length; i++) {
+    if (previous[i] >= 0) {
+      vertex[i] = vertex[previous[i]];
+    } else {
+      vertex[i] = points.length / 3;
+      points.push(keys[4 * i], keys[4 * i + 1], keys[4 * i + 2]);
+    }
+  }
+  return { points, faces: faces.map((i) => vertex[i]) };
+}
+
+/** Rows of three integers: deflated byte planes of row differences. */
+async function decodeTable(data, rows) {
+  if (rows === 0) {
+    if (data.length) throw corrupt("mesh", "bytes of loose rows where there are none");
+    return new Float64Array(0);
+  }
+  const planes = await inflate(data, 12 * rows, (what) => corrupt("mesh", `loose rows: ${what}`));
+  if (planes.length !== 12 * rows) {
+    throw corrupt("mesh", `${planes.length} bytes of loose rows, expected ${12 * rows}`);
+  }
+  const table = new Float64Array(3 * rows);
+  for (let axis = 0; axis < 3; axis++) {
+    const byte = (k, row) => planes[(4 * axis + k) * rows + row];
+    for (let row = 0, sum = 0; row < rows; row++) {
+      sum += byte(0, row) | (byte(1, row) << 8) | (byte(2, row) << 16) | (byte(3, row) << 24);
+      if (sum < 0 || sum >= 2 ** 31) throw corrupt("mesh", "a loose row is out of range");
+      table[3 * row + axis] = sum;
+    }
+  }
+  return table;
+}
+
+function join(Type, first, second) {
+  const joined = new Type(first.length + second.length);
+  joined.set(first);
+  joined.set(second, first.length);
+  return joined;
+}

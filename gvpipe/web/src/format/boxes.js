@@ -1,0 +1,83 @@
+/**
+ * The top-level boxes of an MP4 file: where the payload is, and the tag that tells a stripped file from a foreign one.
+ * Mirrors `gvpipe.container`; `docs/format.md`, section 1. The video itself is the browser's affair.
+ */
+
+import { crc32 } from "./checksum.js";
+import { AGAIN, GeometryVideoError } from "./errors.js";
+
+const UUID = [0x6a, 0x1f, 0x0c, 0x52, 0x3d, 0x7b, 0x4e, 0x0e, 0x9c, 0x55, 0x67, 0xe4, 0xf0, 0xa7, 0xd1, 0xb9];
+const TAG = /gvpipe (\d{1,9}) ([0-9a-f]{32})/;
+const MAX_BOXES = 1 << 16;
+export const CONTAINER_VERSION = 1;
+
+/**
+ * @typedef {object} Container
+ * @property {Uint8Array} payload
+ * @property {string} id the content id of the tag, "" if the file has none
+ * @property {number} videoChecksum CRC-32 over the samples: gvpipe's files hold nothing else in their `mdat` boxes
+ *
+ * @param {Uint8Array} file a whole MP4 file
+ * @returns {Container}
+ */
+export function readContainer(file) {
+  const boxes = listBoxes(file);
+  const payloads = boxes.filter((box) => box.kind === "uuid" && UUID.every((byte, i) => file[box.start + i] === byte));
+  for (const kind of ["moov", "mdat"]) {
+    if (!boxes.some((box) => box.kind === kind)) {
+      throw new GeometryVideoError("truncated", `its ${kind} box is missing; ${AGAIN}`);
+    }
+  }
+  const moov = boxes.find((box) => box.kind === "moov");
+  const tag = TAG.exec(new TextDecoder("latin1").decode(file.subarray(moov.start, moov.end)));
+  if (payloads.length === 0) {
+    if (tag) throw new GeometryVideoError("stripped", `its geometry was stripped, as remuxing or re-encoding does; ${AGAIN}`);
+    throw new GeometryVideoError("not-geometry-video", "an MP4 file, but not one that gvpipe wrote");
+  }
+  if (payloads.length > 1) throw new GeometryVideoError("corrupt", `it holds two geometries; ${AGAIN}`);
+  if (tag && Number(tag[1]) > CONTAINER_VERSION) throw newerContainer(tag[1]);
+  let videoChecksum = 0;
+  for (const box of boxes) {
+    if (box.kind === "mdat") videoChecksum = crc32(file.subarray(box.start, box.end), videoChecksum);
+  }
+  return { payload: file.subarray(payloads[0].start + 16, payloads[0].end), id: tag ? tag[2] : "", videoChecksum };
+}
+
+export function newerContainer(version) {
+  return new GeometryVideoError(
+    "newer",
+    `container version ${version}, this player reads up to ${CONTAINER_VERSION}; a newer player is needed`,
+  );
+}
+
+function listBoxes(file) {
+  const view = new DataView(file.buffer, file.byteOffset, file.byteLength);
+  const kindAt = (at) => String.fromCharCode(...file.subarray(at, at + 4));
+  if (file.length === 0) throw new GeometryVideoError("truncated", `the file is empty; ${AGAIN}`);
+  if (kindAt(4) !== "ftyp") throw new GeometryVideoError("not-geometry-video", "not an MP4 file");
+  const boxes = [];
+  for (let position = 0; position < file.length; ) {
+    if (position + 8 > file.length) {
+      throw new GeometryVideoError("truncated", `it ends inside a box header at byte ${position}; ${AGAIN}`);
+    }
+    let size = view.getUint32(position);
+    let start = position + 8;
+    const kind = kindAt(position + 4);
+    if (size === 1) {
+      size = start + 8 <= file.length ? view.getUint32(start) * 2 ** 32 + view.getUint32(start + 4) : Infinity;
+      start += 8;
+    } else if (size === 0) {
+      size = file.length - position;
+    }
+    const named = /^[0-9A-Za-z]{4}$/.test(kind);
+    if (named && position + size > file.length) {
+      throw new GeometryVideoError("truncated", `its ${kind} box ends past the file's end; ${AGAIN}`);
+    }
+    if (!named || position + size < start || boxes.length > MAX_BOXES) {
+      throw new GeometryVideoError("corrupt", `the box at byte ${position} has an impossible size of ${size}; ${AGAIN}`);
+    }
+    boxes.push({ kind, start, end: position + size });
+    position += size;
+  }
+  return boxes;
+}

@@ -1,0 +1,116 @@
+/** The payload: named sections with checksums, and a JSON header. Mirrors `gvpipe.bitstream`; `docs/format.md`, section 2. */
+
+import { CONTAINER_VERSION, newerContainer } from "./boxes.js";
+import { crc32 } from "./checksum.js";
+import { Cursor } from "./cursor.js";
+import { AGAIN, GeometryVideoError, corrupt } from "./errors.js";
+import { inflate } from "./inflate.js";
+
+const MAGIC = "gvpipe\r\n";
+const MAX_SECTIONS = 4096;
+const MAX_NAME = 64;
+const MAX_HEADER = 1 << 20;
+const LIMITS = { version: [1, 1 << 16], frames: [1, 1 << 24], vertices: [1, 1 << 28], triangles: [0, 1 << 29] };
+
+/** A geometry video's header and sections. */
+export class Payload {
+  constructor(header, sections) {
+    this.header = header;
+    this.sections = sections;
+  }
+
+  /** @returns {Uint8Array} */
+  section(name) {
+    const data = this.sections.get(name);
+    if (!data) throw new GeometryVideoError("corrupt", `section '${name}' is missing; ${AGAIN}`);
+    return data;
+  }
+}
+
+/** @param {import("./boxes.js").Container} container @returns {Promise<Payload>} */
+export async function readPayload(container) {
+  const cursor = new Cursor(container.payload, "table");
+  const sections = readSections(cursor, readTable(cursor));
+  const header = await readHeader(sections);
+  const { id, video_crc32: checksum } = header.container;
+  if (container.id && container.id !== id) {
+    throw new GeometryVideoError("corrupt", `its geometry belongs to another file; ${AGAIN}`);
+  }
+  if (checksum !== container.videoChecksum) {
+    throw new GeometryVideoError("corrupt", `its video is damaged, or was re-encoded; ${AGAIN}`);
+  }
+  return new Payload(header, sections);
+}
+
+function readTable(cursor) {
+  if (String.fromCharCode(...cursor.take(Math.min(cursor.left, MAGIC.length))) !== MAGIC) {
+    throw new GeometryVideoError("corrupt", `the payload does not start with gvpipe's magic; ${AGAIN}`);
+  }
+  const [version, count] = [cursor.u16(), cursor.u16()];
+  if (version > CONTAINER_VERSION) throw newerContainer(version);
+  if (version < 1 || count < 1 || count > MAX_SECTIONS) throw cursor.corrupt(`version ${version} with ${count} sections`);
+  const entries = [];
+  for (let i = 0; i < count; i++) {
+    const length = cursor.u8();
+    if (length < 1 || length > MAX_NAME) throw cursor.corrupt(`a name of ${length} bytes`);
+    const name = String.fromCharCode(...cursor.take(length));
+    entries.push({ name, length: cursor.u64(), checksum: cursor.u32() });
+  }
+  const table = cursor.data.subarray(0, cursor.position);
+  if (crc32(table) !== cursor.u32()) throw cursor.corrupt("its checksum does not match");
+  return entries;
+}
+
+function readSections(cursor, entries) {
+  const sections = new Map();
+  for (const { name, length, checksum } of entries) {
+    if (length > cursor.left) {
+      throw new GeometryVideoError("truncated", `section '${name}' needs ${length} bytes, ${cursor.left} are there; ${AGAIN}`);
+    }
+    const data = cursor.take(length);
+    if (crc32(data) !== checksum) throw corrupt(name, "its checksum does not match");
+    if (sections.has(name)) throw cursor.corrupt(`section '${name}' occurs twice`);
+    sections.set(name, data);
+  }
+  cursor.end();
+  return sections;
+}
+
+async function readHeader(sections) {
+  const wrong = (what) => corrupt("header", what);
+  if (!sections.has("header")) throw wrong("it is missing");
+  const text = await inflate(sections.get("header"), MAX_HEADER, wrong);
+  let header;
+  try {
+    header = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(text));
+  } catch {
+    throw wrong("it is not JSON");
+  }
+  for (const [key, [low, high]] of Object.entries(LIMITS)) checkInteger(header ?? {}, key, low, high);
+  checkNumber(header, "fps", Number.MIN_VALUE, 100_000);
+  if (typeof header.codec !== "string" || !isObject(header.settings) || !isObject(header.container)) {
+    throw wrong("it is not as gvpipe writes it");
+  }
+  return header;
+}
+
+/** Throw unless `object[key]` is a number in low..high. */
+export function checkNumber(object, key, low, high) {
+  const value = object[key];
+  if (typeof value !== "number" || !(value >= low && value <= high)) {
+    throw new GeometryVideoError("corrupt", `header: '${key}' is ${value}; a number in ${low}..${high} is needed; ${AGAIN}`);
+  }
+  return value;
+}
+
+/** Throw unless `object[key]` is an integer in low..high. */
+export function checkInteger(object, key, low, high) {
+  if (!Number.isInteger(checkNumber(object, key, low, high))) {
+    throw new GeometryVideoError("corrupt", `header: '${key}' is ${object[key]}; an integer is needed; ${AGAIN}`);
+  }
+  return object[key];
+}
+
+function isObject(value) {
+  return typeof value === "object" && value !== null && !Array.isArray(value);
+}

@@ -1,0 +1,130 @@
+/**
+ * Range decoding as the Rust and Python library constriction does it (`RangeDecoder`: 32-bit words, 64-bit state, 24-bit
+ * precision), which gvpipe's files are coded with. constriction exists for neither JavaScript nor npm, so the decoder's three
+ * rules are written out here; encoding, and all else that the library offers, stays with it.
+ *
+ * Of the decoder's state only the difference between point and lower end matters, so (difference, range) are kept, each as two
+ * halves of 32 bits in doubles: exact, and far faster than BigInt.
+ *
+ * Source: Bamler, Understanding Entropy Coding With Asymmetric Numeral Systems, 2022 (the library's paper); G. N. N. Martin,
+ * Range encoding, 1979.
+ */
+
+import { corrupt } from "./errors.js";
+
+const WORD = 2 ** 32;
+const PRECISION = 24;
+export const TOTAL = 2 ** PRECISION;
+
+export class RangeDecoder {
+  /** @param {Uint32Array} words @param {string} name of the section, for messages */
+  constructor(words, name) {
+    this.words = words;
+    this.name = name;
+    this.next = Math.min(2, words.length);
+    this.high = words[0] ?? 0; // of the difference
+    this.low = words[1] ?? 0;
+    this.rangeHigh = WORD - 1;
+    this.rangeLow = WORD - 1;
+  }
+
+  /** Decode `count` symbols of one categorical model: `edges` are its left cumulatives, then TOTAL. */
+  categorical(edges, count) {
+    const symbols = new Uint8Array(count);
+    for (let i = 0; i < count; i++) {
+      const quantile = this.#quantile();
+      let [first, last] = [0, edges.length - 2];
+      while (first < last) {
+        const middle = (first + last + 1) >> 1;
+        if (edges[middle] <= quantile) first = middle;
+        else last = middle - 1;
+      }
+      symbols[i] = first;
+      this.#advance(edges[first], edges[first + 1] - edges[first]);
+    }
+    return symbols;
+  }
+
+  /** Decode one symbol of 0..size-1 (size 2..2^24), all alike; the last takes what the division leaves. */
+  uniform(size) {
+    const share = Math.floor(TOTAL / size);
+    const symbol = Math.min(Math.floor(this.#quantile() / share), size - 1);
+    this.#advance(symbol * share, symbol < size - 1 ? share : TOTAL - symbol * share);
+    return symbol;
+  }
+
+  /** Whether all may have been read: no words left, and no more difference than the encoder's last words can leave. */
+  get exhausted() {
+    const untouched = this.rangeHigh === WORD - 1 && this.rangeLow === WORD - 1;
+    return this.next === this.words.length && (untouched || this.high < 1 || (this.high === 1 && this.low < WORD - 1));
+  }
+
+  get #scale() {
+    return this.rangeHigh * 2 ** (32 - PRECISION) + (this.rangeLow >>> PRECISION);
+  }
+
+  #quantile() {
+    const scale = this.#scale;
+    let quantile = Math.floor((this.high * WORD + this.low) / scale); // of a rounded double: at most one off
+    let left = this.#beyond(scale, quantile);
+    if (left < 0) left = this.#beyond(scale, --quantile);
+    else if (left >= scale) left = this.#beyond(scale, ++quantile);
+    if (quantile >= TOTAL) throw corrupt(this.name, "its range-coded data do not decode");
+    return quantile;
+  }
+
+  /** difference - scale * factor; exact where it is small beside 2^53. */
+  #beyond(scale, factor) {
+    multiply(scale, factor);
+    return (this.high - productHigh) * WORD + (this.low - productLow);
+  }
+
+  #advance(left, probability) {
+    const scale = this.#scale;
+    multiply(scale, left);
+    this.high -= productHigh;
+    this.low -= productLow;
+    if (this.low < 0) {
+      this.low += WORD;
+      this.high -= 1;
+    }
+    multiply(scale, probability);
+    this.rangeHigh = productHigh;
+    this.rangeLow = productLow;
+    if (this.rangeHigh === 0) {
+      this.rangeHigh = this.rangeLow;
+      this.rangeLow = 0;
+      this.high = this.low;
+      this.low = this.next < this.words.length ? this.words[this.next++] : 0;
+    }
+  }
+}
+
+/**
+ * The edges of constriction's `Categorical(weights, perfect=False)`: every symbol gets one share of 2^24, the rest is dealt out
+ * in proportion, rounded down at the edges. Sums, one quotient and one product per edge in doubles: the same on every machine.
+ */
+export function categoricalEdges(weights) {
+  let sum = 0;
+  for (const weight of weights) sum += weight;
+  const scale = (TOTAL - weights.length) / sum;
+  const edges = new Float64Array(weights.length + 1);
+  let before = 0;
+  weights.forEach((weight, i) => {
+    edges[i] = Math.floor(before * scale) + i;
+    before += weight;
+  });
+  edges[weights.length] = TOTAL;
+  return edges;
+}
+
+let productHigh = 0;
+let productLow = 0;
+
+/** a (below 2^40) times b (at most 2^24) as two halves of 32 bits. */
+function multiply(a, b) {
+  const upper = Math.floor(a / 2 ** 20) * b; // in units of 2^20; below 2^44
+  const lower = (a % 2 ** 20) * b + (upper % 2 ** 12) * 2 ** 20;
+  productHigh = Math.floor(upper / 2 ** 12) + Math.floor(lower / WORD);
+  productLow = lower % WORD;
+}

@@ -1,0 +1,135 @@
+/**
+ * A geometry video in a page: its mesh, and the positions of any frame.
+ *
+ *     const video = await GeometryVideo.load("walk.mp4");
+ *     const positions = await video.frame(10);             // Float32Array (V, 3), model units
+ *     video.play((positions, frame) => draw(positions));   // as the video plays
+ */
+
+import { readContainer } from "./format/boxes.js";
+import { GeometryVideoError } from "./format/errors.js";
+import { readPayload } from "./format/payload.js";
+import { McgvReader } from "./mcgv/reader.js";
+import { VideoPictures } from "./video_pictures.js";
+
+export { GeometryVideoError };
+
+export class GeometryVideo {
+  /**
+   * Load a geometry video of codec `mcgv` in its web profile, as `gvpipe encode` writes it.
+   *
+   * @param {string|URL|Blob|ArrayBuffer|Uint8Array} source an address, or the file itself
+   * @returns {Promise<GeometryVideo>}
+   * @throws {GeometryVideoError} it cannot be fetched, it is no geometry video, it is damaged, or not one for browsers
+   */
+  static async load(source) {
+    const file = await fetchBytes(source);
+    let pictures = null;
+    try {
+      const payload = await readPayload(readContainer(file));
+      const reader = await McgvReader.open(payload);
+      const { fps, frames } = payload.header;
+      pictures = await VideoPictures.open(new Blob([file], { type: "video/mp4" }), fps, frames, reader.pictureSize);
+      return new GeometryVideo(payload.header, file.length, reader, pictures);
+    } catch (error) {
+      pictures?.close();
+      if (!(error instanceof RangeError)) throw error; // an array that the browser cannot give
+      throw new GeometryVideoError("unsupported", "it needs more memory than this browser has for a page");
+    }
+  }
+
+  #reader;
+  #pictures;
+  #levels;
+  #queue = Promise.resolve();
+
+  constructor(header, byteLength, reader, pictures) {
+    this.frameCount = header.frames;
+    this.fps = header.fps;
+    this.vertexCount = header.vertices;
+    this.triangleCount = header.triangles;
+    /** Of the whole file. */
+    this.byteLength = byteLength;
+    /** `Uint32Array` (T, 3): triangles, counter-clockwise. */
+    this.indices = reader.faces;
+    /** `Int32Array` (V, 3): the first frame on the file's lattice; vertices with equal rows are one point of the surface. */
+    this.basePoints = reader.basePoints;
+    /** `{min, max}`: the box that the motion stays in, model units. */
+    this.bounds = reader.bounds();
+    this.#reader = reader;
+    this.#pictures = pictures;
+    this.#levels = new Uint8Array(3 * header.vertices);
+  }
+
+  /** Seconds. */
+  get duration() {
+    return this.frameCount / this.fps;
+  }
+
+  /** Bits of the file per second of playing. */
+  get bitRate() {
+    return (8 * this.byteLength) / this.duration;
+  }
+
+  /**
+   * The positions of frame k; ends `play`. Calls may overlap: they are answered in turn.
+   *
+   * @param {number} k 0..frameCount - 1
+   * @param {Float32Array} [positions] to fill, instead of a new array
+   * @returns {Promise<Float32Array>} (V, 3), model units
+   */
+  frame(k, positions = new Float32Array(3 * this.vertexCount)) {
+    if (!Number.isInteger(k) || k < 0 || k >= this.frameCount) {
+      return Promise.reject(new RangeError(`frame ${k}: there are ${this.frameCount}`));
+    }
+    const result = this.#queue.then(async () => {
+      this.pause();
+      await this.#pictures.seek(k);
+      return this.#read(k, positions);
+    });
+    this.#queue = result.catch(() => {});
+    return result;
+  }
+
+  /**
+   * Play on from the frame last shown. The video's clock leads: a page too slow for every frame gets those that are due.
+   *
+   * @param {(positions: Float32Array, k: number) => void} show called for each frame; the array is used again for the next
+   * @param {{rate?: number, loop?: boolean, ended?: () => void}} [options] `rate` 1 is the video's own speed
+   */
+  async play(show, { rate = 1, loop = false, ended = () => {} } = {}) {
+    await this.#queue;
+    const positions = new Float32Array(3 * this.vertexCount);
+    await this.#pictures.play((k) => show(this.#read(k, positions), k), ended, rate, loop);
+  }
+
+  /** Stop playing. */
+  pause() {
+    this.#pictures.pause();
+  }
+
+  /** Free the video; the object is of no use afterwards. */
+  close() {
+    this.#pictures.close();
+  }
+
+  #read(k, positions) {
+    this.#pictures.gather(this.#reader.samples, this.#levels);
+    this.#reader.rebuild(k, this.#levels, positions);
+    return positions;
+  }
+}
+
+async function fetchBytes(source) {
+  if (source instanceof Uint8Array) return source;
+  if (source instanceof ArrayBuffer) return new Uint8Array(source);
+  if (source instanceof Blob) return new Uint8Array(await source.arrayBuffer());
+  let response;
+  try {
+    response = await fetch(source);
+  } catch (error) {
+    throw new GeometryVideoError("load", `${source} cannot be fetched: ${error.message}`);
+  }
+  if (!response.ok) throw new GeometryVideoError("load", `${source} cannot be fetched: status ${response.status}`);
+  return new Uint8Array(await response.arrayBuffer());
+}

@@ -1,0 +1,57 @@
+/** What the reader of an `mcgv` bitstream must know beside its sections. Mirrors `gvcodecs.mcgv.format.Header`. */
+
+import { GeometryVideoError, corrupt } from "../format/errors.js";
+import { checkInteger, checkNumber } from "../format/payload.js";
+
+export const CODEC = "mcgv";
+export const VERSION = 1;
+export const PROFILE = "h264-8"; // the one that a browser gives back sample by sample
+const MAX_SIDE = 16384;
+const LARGE = 1e39;
+const SMALL = 1e-60;
+
+/**
+ * @typedef {object} Header
+ * @property {number} block side of the blocks that hold one chart each, pixels
+ * @property {number} width @property {number} height of one plane, pixels
+ * @property {number} clusters K @property {number} segments
+ * @property {number[]} origin @property {number} baseStep lattice of the base frame
+ * @property {number} transformStep @property {number} residualStep model units
+ *
+ * @param {object} header of the payload
+ * @returns {Header}
+ */
+export function readHeader(header) {
+  if (header.codec !== CODEC) {
+    throw new GeometryVideoError("unsupported", `it was coded by '${header.codec}'; gvpipe export-html converts it`);
+  }
+  if (header.version > VERSION) {
+    throw new GeometryVideoError(
+      "newer",
+      `version ${header.version} of codec ${CODEC}, this player has ${VERSION}; a newer player is needed`,
+    );
+  }
+  const settings = header.settings;
+  if (settings.profile !== PROFILE) {
+    throw new GeometryVideoError("unsupported", `its profile is '${settings.profile}'; gvpipe export-html converts it`);
+  }
+  const base = settings.base;
+  if (!Array.isArray(base) || base.length !== 4 || !base.every((v) => Math.abs(v) < LARGE) || !(base[3] > 0)) {
+    throw corrupt("header", `base is ${JSON.stringify(base)}`);
+  }
+  const result = {
+    block: checkInteger(settings, "block", 2, 64),
+    width: checkInteger(settings, "width", 2, MAX_SIDE),
+    height: checkInteger(settings, "height", 2, Math.floor(MAX_SIDE / 3)),
+    clusters: checkInteger(settings, "clusters", 1, 1024),
+    segments: checkInteger(settings, "segments", 1, Math.min(1 << 16, header.frames)),
+    origin: base.slice(0, 3),
+    baseStep: base[3],
+    transformStep: checkNumber(settings, "transform_step", SMALL, LARGE),
+    residualStep: checkNumber(settings, "residual_step", SMALL, LARGE),
+  };
+  if (result.width % result.block || result.height % result.block) {
+    throw corrupt("header", `planes of ${result.width}x${result.height} are not whole blocks of ${result.block}`);
+  }
+  return result;
+}

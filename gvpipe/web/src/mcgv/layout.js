@@ -1,0 +1,53 @@
+/** Where each vertex sits in the picture, and which cluster moves it. Mirrors `decode_pixels` and `decode_clusters`. */
+
+import { Cursor } from "../format/cursor.js";
+import { corrupt } from "../format/errors.js";
+import { decodeIntegers } from "../format/integers.js";
+
+const CONTEXTS = 4; // of a pixel's y: 0, 1, 2, 3 or more columns from the vertex before
+
+/**
+ * @param {Uint8Array} data section `pixels`
+ * @param {Int32Array} visits (V) the codec's vertex of each of the user's
+ * @param {import("./header.js").Header} header
+ * @returns {Uint32Array} (V) row-major index of each vertex' pixel in a plane, all distinct
+ */
+export function decodePixels(data, visits, { width, height }) {
+  const n = visits.length;
+  const cursor = new Cursor(data, "pixels");
+  const columns = cursor.take(cursor.varint(cursor.left, "a length"));
+  const dx = decodeIntegers(columns, n, null, "pixels");
+  const dy = decodeIntegers(cursor.rest(), n, Uint8Array.from(dx, (d) => Math.min(Math.abs(d), CONTEXTS - 1)), "pixels");
+  const taken = new Uint8Array(width * height);
+  const byCodec = new Uint32Array(n);
+  for (let i = 0, x = 0, y = 0; i < n; i++) {
+    x += dx[i];
+    y += dy[i];
+    if (x < 0 || x >= width || y < 0 || y >= height) throw cursor.corrupt("a pixel lies outside the plane");
+    byCodec[i] = y * width + x;
+    if (taken[byCodec[i]]++) throw cursor.corrupt("two vertices share a pixel");
+  }
+  return Uint32Array.from(visits, (v) => byCodec[v]);
+}
+
+/**
+ * @param {Uint8Array} data section `clusters`
+ * @param {Uint32Array} pixels of `decodePixels`
+ * @param {import("./header.js").Header} header
+ * @returns {Uint16Array} (V) cluster of each vertex, 0..K-1
+ */
+export function decodeClusters(data, pixels, { width, height, block, clusters }) {
+  const across = width / block;
+  const blocks = pixels.map((p) => Math.floor(p / width / block) * across + Math.floor((p % width) / block));
+  const rank = new Int32Array(across * (height / block)).fill(-1);
+  for (const b of blocks) rank[b] = 0;
+  let used = 0;
+  for (let b = 0; b < rank.length; b++) if (rank[b] === 0) rank[b] = used++;
+  const byBlock = decodeIntegers(data, used, null, "clusters");
+  for (let i = 0, cluster = 0; i < used; i++) {
+    cluster += byBlock[i];
+    if (cluster < 0 || cluster >= clusters) throw corrupt("clusters", `a cluster is not in 0..${clusters - 1}`);
+    byBlock[i] = cluster;
+  }
+  return Uint16Array.from(blocks, (b) => byBlock[rank[b]]);
+}

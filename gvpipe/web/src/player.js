@@ -1,0 +1,8 @@
+/** The player: defines the element `<geometry-video>`, and gives all that the module without it gives. */
+
+import { GeometryVideoElement } from "./player/element.js";
+
+export { GeometryVideo, GeometryVideoError } from "./geometry_video.js";
+export { GeometryVideoElement };
+
+customElements.define("geometry-video", GeometryVideoElement);

@@ -1,0 +1,105 @@
+/** The bar below the picture: markup, what its parts show, and what they ask for. It knows no video. */
+
+import { icon } from "./icons.js";
+
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
+
+const button = (name, label, symbol, more = "") =>
+  `<button type="button" data-act="${name}" aria-label="${label}" title="${label}" ${more}>${icon(symbol)}</button>`;
+
+const MARKUP = `
+  ${button("back", "Previous frame (←)", "back")}
+  ${button("play", "Play (space)", "play")}
+  ${button("forward", "Next frame (→)", "forward")}
+  <input type="range" min="0" step="1" value="0" aria-label="Frame">
+  <span class="count"></span>
+  <select aria-label="Speed" title="Speed (&lt; and &gt;)">
+    ${SPEEDS.map((speed) => `<option value="${speed}">${speed}×</option>`).join("")}
+  </select>
+  ${button("loop", "Loop (L)", "loop", 'aria-pressed="false"')}
+  ${button("wireframe", "Wireframe (W)", "wireframe", 'aria-pressed="false"')}
+  ${button("view", "Reset the view (R)", "view")}
+  <p class="facts"></p>`;
+
+export class Bar {
+  /**
+   * @param {HTMLElement} root filled with the bar
+   * @param {{act: (name: string) => void, seek: (frame: number, done: boolean) => void, speed: (speed: number) => void}} on
+   *   called for what the user asks for; `done` is false while the slider is still held
+   */
+  constructor(root, on) {
+    root.innerHTML = MARKUP;
+    this.root = root;
+    this.slider = root.querySelector("input");
+    this.count = root.querySelector(".count");
+    this.speeds = root.querySelector("select");
+    this.facts = root.querySelector(".facts");
+    root.addEventListener("click", (event) => {
+      const pressed = event.target.closest("[data-act]");
+      if (pressed) on.act(pressed.dataset.act);
+    });
+    this.slider.addEventListener("input", () => on.seek(this.slider.valueAsNumber, false));
+    this.slider.addEventListener("change", () => on.seek(this.slider.valueAsNumber, true));
+    this.speeds.addEventListener("change", () => on.speed(Number(this.speeds.value)));
+    this.setSpeed(1);
+  }
+
+  setEnabled(enabled) {
+    this.root.inert = !enabled;
+  }
+
+  /** @param {import("../geometry_video.js").GeometryVideo} video */
+  setVideo(video) {
+    this.frames = video.frameCount;
+    this.slider.max = video.frameCount - 1;
+    const bits = (8 * video.byteLength) / (video.vertexCount * video.frameCount);
+    this.facts.textContent = [
+      `${video.vertexCount.toLocaleString("en")} vertices`,
+      `${video.triangleCount.toLocaleString("en")} triangles`,
+      `${video.frameCount} frames at ${Number(video.fps.toPrecision(4))} fps`,
+      formatBytes(video.byteLength),
+      `${formatRate(video.bitRate)}`,
+      `${bits.toFixed(2)} bits per vertex and frame`,
+    ]
+      .map((fact) => fact.replaceAll(" ", "\u00a0"))
+      .join(" · ");
+    this.facts.title = this.facts.textContent;
+  }
+
+  setFrame(frame) {
+    this.slider.value = frame;
+    this.slider.ariaValueText = `frame ${frame} of ${this.frames}`;
+    this.count.textContent = `${frame} / ${this.frames - 1}`;
+  }
+
+  setPlaying(playing) {
+    const play = this.root.querySelector('[data-act="play"]');
+    play.innerHTML = icon(playing ? "pause" : "play");
+    play.ariaLabel = play.title = playing ? "Pause (space)" : "Play (space)";
+  }
+
+  /** @param {"loop"|"wireframe"} name @param {boolean} pressed */
+  setPressed(name, pressed) {
+    this.root.querySelector(`[data-act="${name}"]`).ariaPressed = String(pressed);
+  }
+
+  setSpeed(speed) {
+    const isOffered = [...this.speeds.options].some((option) => Number(option.value) === speed);
+    if (!isOffered) this.speeds.add(new Option(`${speed}×`, speed));
+    this.speeds.value = speed;
+  }
+}
+
+/** The next speed up (direction 1) or down (-1) from `speed`. */
+export function nextSpeed(speed, direction) {
+  const sorted = direction > 0 ? SPEEDS : SPEEDS.toReversed();
+  return sorted.find((other) => direction * (other - speed) > 0) ?? speed;
+}
+
+function formatBytes(count) {
+  return count >= 1e6 ? `${(count / 1e6).toFixed(2)} MB` : `${(count / 1e3).toFixed(1)} kB`;
+}
+
+function formatRate(bits) {
+  return bits >= 1e6 ? `${(bits / 1e6).toFixed(2)} Mbit/s` : `${Math.round(bits / 1e3)} kbit/s`;
+}

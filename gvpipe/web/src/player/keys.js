@@ -1,0 +1,26 @@
+/** What keys do: from a key to the name of an action of the player. */
+
+const KEYS = {
+  " ": "play",
+  ArrowLeft: "back",
+  ArrowRight: "forward",
+  Home: "first",
+  End: "last",
+  "+": "nearer",
+  "-": "farther",
+  "<": "slower",
+  ">": "faster",
+  l: "loop",
+  w: "wireframe",
+  r: "view",
+};
+const SHIFTED = { ArrowLeft: "turn-left", ArrowRight: "turn-right", ArrowUp: "turn-up", ArrowDown: "turn-down" };
+
+/** @param {KeyboardEvent} event @returns {string|undefined} an action; none where the key belongs to what has the focus */
+export function actionOf(event) {
+  const { key, target } = event;
+  if (event.ctrlKey || event.metaKey || event.altKey) return undefined;
+  if (key === " " && target.matches("button, select")) return undefined; // space presses it
+  if (/^(Arrow|Home|End)/.test(key) && target.matches("input, select")) return undefined; // its own steps
+  return event.shiftKey && SHIFTED[key] ? SHIFTED[key] : (KEYS[key] ?? KEYS[key.toLowerCase()]);
+}

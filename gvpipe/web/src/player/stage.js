@@ -1,0 +1,219 @@
+/** The picture: a mesh drawn by three.js, and a camera that frames the whole motion and orbits it. */
+
+import {
+  BufferAttribute,
+  BufferGeometry,
+  DirectionalLight,
+  DoubleSide,
+  DynamicDrawUsage,
+  HemisphereLight,
+  Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  PerspectiveCamera,
+  Points,
+  PointsMaterial,
+  Scene,
+  Spherical,
+  Vector3,
+  WebGLRenderer,
+} from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { Normals } from "./normals.js";
+
+const FIELD_OF_VIEW = 35; // degrees, of the shorter side
+const MARGIN = 1.06; // around what is framed
+const AZIMUTH = Math.PI / 7; // of the first view: from the front, a little from the right and from above
+const ELEVATION = Math.PI / 12;
+const MAX_PIXEL_RATIO = 2;
+const SOFTWARE = /SwiftShader|llvmpipe|softpipe|software|Basic Render/i; // renderers that run on the processor
+const MAX_SOFTWARE_PIXELS = 512 * 768; // drawn without a GPU: larger pictures are scaled up, and play on smoothly
+
+export class Stage {
+  /** @param {HTMLCanvasElement} canvas sized by its page */
+  constructor(canvas) {
+    this.hasGpu = probeGpu();
+    // without a GPU smooth edges would cost more than all else together
+    this.renderer = new WebGLRenderer({ canvas, antialias: this.hasGpu, alpha: true });
+    this.scene = new Scene();
+    this.camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
+    this.scene.add(this.camera);
+    const key = new DirectionalLight(0xffffff, 2.2);
+    key.position.set(-1.2, 1.6, 1); // light goes with the camera, so that nothing looked at is dark
+    this.camera.add(key, key.target);
+    this.scene.add(new HemisphereLight(0xffffff, 0x8c8a88, 1.4));
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.addEventListener("change", () => this.requestRender());
+    this.controls.addEventListener("start", () => (this.isFramed = false));
+    this.isFramed = false; // whether the view is still the first one, which follows the picture's shape
+    this.geometry = null;
+    this.pending = 0;
+    this.observer = new ResizeObserver(() => this.#resize());
+    this.observer.observe(canvas);
+  }
+
+  /** Take a video's mesh; `positions (V, 3)` are its first frame. `up` is the axis, "y" or "z", that stands upright. */
+  setMesh(video, positions, up) {
+    this.clear();
+    const { min, max } = video.bounds;
+    this.centre = min.map((low, axis) => (low + max[axis]) / 2);
+    this.scale = 1 / (Math.hypot(...max.map((high, axis) => high - min[axis])) / 2 || 1); // the scene is a unit ball
+    this.halfBox = max.map((high, axis) => ((high - min[axis]) / 2) * this.scale);
+    const dynamic = () => new BufferAttribute(new Float32Array(positions.length), 3).setUsage(DynamicDrawUsage);
+    this.geometry = new BufferGeometry().setAttribute("position", dynamic()).setAttribute("normal", dynamic());
+    this.normals = new Normals(video.indices, video.basePoints, positions);
+    this.objects = [];
+    if (video.triangleCount) {
+      this.geometry.setIndex(new BufferAttribute(video.indices, 1));
+      const offset = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
+      this.objects.push(new Mesh(this.geometry, new MeshLambertMaterial({ color: 0xb9c4d0, side: DoubleSide, ...offset })));
+      const lines = { wireframe: true, visible: false, transparent: true, opacity: 0.35 };
+      this.wires = new Mesh(this.geometry, new MeshBasicMaterial({ color: 0x1d2a38, ...lines }));
+      this.objects.push(this.wires);
+    } else {
+      this.objects.push(new Points(this.geometry, new PointsMaterial({ color: 0x6f8296, size: 3, sizeAttenuation: false })));
+    }
+    for (const object of this.objects) {
+      object.frustumCulled = false; // its bounds change with every frame
+      this.scene.add(object);
+    }
+    this.camera.up.set(0, up === "z" ? 0 : 1, up === "z" ? 1 : 0);
+    this.setPositions(positions);
+    this.#resize();
+    this.resetView();
+  }
+
+  /** Show `positions (V, 3)`, model units. */
+  setPositions(positions) {
+    const { position, normal } = this.geometry.attributes;
+    const { centre, scale } = this;
+    for (let i = 0; i < positions.length; i += 3) {
+      position.array[i] = (positions[i] - centre[0]) * scale;
+      position.array[i + 1] = (positions[i + 1] - centre[1]) * scale;
+      position.array[i + 2] = (positions[i + 2] - centre[2]) * scale;
+    }
+    this.normals.compute(position.array, normal.array);
+    position.needsUpdate = normal.needsUpdate = true;
+    this.requestRender();
+  }
+
+  /** (4, 4) by columns: from model units to clip space. */
+  get projection() {
+    const { centre, scale, camera } = this;
+    camera.updateMatrixWorld();
+    const toBall = new Matrix4().makeScale(scale, scale, scale).setPosition(...centre.map((value) => -value * scale));
+    return new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).multiply(toBall).elements;
+  }
+
+  setWireframe(visible) {
+    if (this.wires) this.wires.material.visible = visible;
+    this.requestRender();
+  }
+
+  /** Look at the whole motion from the front. */
+  resetView() {
+    const upright = this.camera.up.z ? [0, -1, 0, 0, 0, 1] : [0, 0, 1, 0, 1, 0];
+    const front = new Vector3(...upright.slice(0, 3));
+    const up = new Vector3(...upright.slice(3));
+    const direction = front.multiplyScalar(Math.cos(ELEVATION)).addScaledVector(up, Math.sin(ELEVATION));
+    direction.applyAxisAngle(up, AZIMUTH);
+    this.camera.position.copy(direction).multiplyScalar(this.#distance(direction));
+    this.controls.target.set(0, 0, 0);
+    this.controls.update();
+    this.isFramed = true;
+    this.requestRender();
+  }
+
+  /** Turn about the target by angles in radians, for those who orbit by keyboard. */
+  orbit(azimuth, elevation) {
+    const turn = this.camera.up.z ? (v) => v.set(v.x, v.z, -v.y) : (v) => v;
+    const back = this.camera.up.z ? (v) => v.set(v.x, -v.z, v.y) : (v) => v;
+    const offset = turn(this.camera.position.clone().sub(this.controls.target));
+    const angles = new Spherical().setFromVector3(offset);
+    angles.theta += azimuth;
+    angles.phi = Math.min(Math.PI - 0.01, Math.max(0.01, angles.phi - elevation));
+    this.camera.position.copy(back(offset.setFromSpherical(angles)).add(this.controls.target));
+    this.#moved();
+  }
+
+  zoom(factor) {
+    this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
+    this.#moved();
+  }
+
+  /** Draw before the browser's next repaint, once however often asked. */
+  requestRender() {
+    this.pending ||= requestAnimationFrame(() => {
+      this.pending = 0;
+      this.renderer.render(this.scene, this.camera);
+    });
+  }
+
+  clear() {
+    for (const object of this.objects ?? []) {
+      this.scene.remove(object);
+      object.material.dispose();
+    }
+    this.geometry?.dispose();
+    this.objects = this.geometry = this.wires = null;
+    this.isFramed = false;
+    this.requestRender();
+  }
+
+  close() {
+    this.clear();
+    cancelAnimationFrame(this.pending);
+    this.observer.disconnect();
+    this.controls.dispose();
+    this.renderer.dispose();
+  }
+
+  #moved() {
+    this.isFramed = false;
+    this.controls.update();
+    this.requestRender();
+  }
+
+  /** From where, looking along -direction, the box of the motion just fits. */
+  #distance(direction) {
+    const view = this.camera.clone();
+    view.position.copy(direction);
+    view.lookAt(0, 0, 0);
+    view.updateMatrixWorld();
+    const axes = [0, 1, 2].map((column) => new Vector3().setFromMatrixColumn(view.matrixWorld, column));
+    const vertical = Math.tan((view.fov * Math.PI) / 360);
+    let distance = 0;
+    for (let corner = 0; corner < 8; corner++) {
+      const point = new Vector3(...this.halfBox.map((half, axis) => (corner & (1 << axis) ? half : -half)));
+      const [x, y, z] = axes.map((axis) => axis.dot(point));
+      distance = Math.max(distance, z + Math.abs(y) / vertical, z + Math.abs(x) / (vertical * view.aspect));
+    }
+    return Math.max(MARGIN * distance, 0.1);
+  }
+
+  #resize() {
+    const { clientWidth: width, clientHeight: height } = this.renderer.domElement;
+    if (!width || !height) return;
+    const most = this.hasGpu ? MAX_PIXEL_RATIO : Math.min(1, Math.sqrt(MAX_SOFTWARE_PIXELS / (width * height)));
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, most));
+    this.renderer.setSize(width, height, false);
+    const aspect = width / height;
+    this.camera.aspect = aspect;
+    const shorter = Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
+    this.camera.fov = (360 / Math.PI) * Math.atan(aspect < 1 ? shorter / aspect : shorter);
+    this.camera.updateProjectionMatrix();
+    if (this.isFramed) this.resetView();
+    this.requestRender();
+  }
+}
+
+/** Whether WebGL is drawn by hardware, by the name that the browser gives its renderer. */
+function probeGpu() {
+  const context = document.createElement("canvas").getContext("webgl2");
+  if (!context) return false;
+  const named = context.getExtension("WEBGL_debug_renderer_info");
+  const name = context.getParameter(named ? named.UNMASKED_RENDERER_WEBGL : context.RENDERER);
+  context.getExtension("WEBGL_lose_context")?.loseContext();
+  return !SOFTWARE.test(name);
+}

@@ -1,0 +1,154 @@
+"""The web player's files and pages, as far as no browser is needed; `test_web` has the rest."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import shutil
+import subprocess
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import Finished
+from sequences import waving
+
+import gvpipe
+from gvpipe.codec import codec_class
+from gvpipe.errors import CorruptFile, InputError, OutputError
+from gvpipe.web.export import READS
+
+WEB = Path(gvpipe.__file__).parent / "web"
+PLAYER_BYTES = 1.5e6  # what a page may hold beside 1.4 times its file
+
+Run = Callable[..., Finished]
+
+
+def _embedded(page: Path) -> bytes:
+    (text,) = re.findall(r'<script type="text/plain" id="video">(.*?)</script>', page.read_text("utf-8"))
+    return base64.b64decode(text, validate=True)
+
+
+def test_page_holds_the_file_unchanged(video: Path, tmp_path: Path) -> None:
+    report = gvpipe.export_html(video, tmp_path / "page.html")
+    page = tmp_path / "page.html"
+    assert _embedded(page) == video.read_bytes()
+    assert report == gvpipe.ExportReport(page.stat().st_size, video.stat().st_size)
+    assert report.bytes <= 1.4 * video.stat().st_size + PLAYER_BYTES
+
+
+def test_page_asks_for_nothing_else(video: Path, tmp_path: Path) -> None:
+    gvpipe.export_html(video, tmp_path / "page.html", up="z")
+    text = (tmp_path / "page.html").read_text("utf-8")
+    assert text.count("<script") == text.count("</script") == 2
+    assert re.findall(r'(?:src|href)="([^"]*)"', text.split("<script")[0]) == ["data:,", "#video"]
+    assert "default-src 'none'" in text  # the browser refuses what the player might ask for
+    assert 'up="z"' in text
+    assert "$$" not in text.split("<script")[0]
+
+
+def test_title_is_text(video: Path, tmp_path: Path) -> None:
+    named = video.rename(tmp_path / "<b>&.mp4")
+    gvpipe.export_html(named, tmp_path / "page.html")
+    assert "<title>&lt;b&gt;&amp;</title>" in (tmp_path / "page.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("settings", "kind"),
+    [
+        ({"codec": "pca"}, "pca"),
+        ({"profile": "precise"}, "mcgv, profile h264-10"),
+        ({"image": "jpeg"}, "mcgv, profile jpeg"),
+    ],
+    ids=str,
+)
+def test_conversion_is_measured(settings: dict[str, Any], kind: str, tmp_path: Path) -> None:
+    gvpipe.encode(waving(10, 12), tmp_path / "other.mp4", **settings)
+    report = gvpipe.export_html(tmp_path / "other.mp4", tmp_path / "page.html", quality=90)
+    (tmp_path / "inside.mp4").write_bytes(_embedded(tmp_path / "page.html"))
+    added = gvpipe.compare(gvpipe.decode(tmp_path / "other.mp4"), gvpipe.decode(tmp_path / "inside.mp4"))
+    assert (report.converted, report.rmse_diag, report.max_diag) == (kind, added.rmse_diag, added.max_diag)
+    assert 0 < (report.rmse_diag or 0) < 1e-3
+    assert gvpipe.open(tmp_path / "inside.mp4").bitstream.header["profile"] == "h264-8"
+
+
+def test_command_says_what_it_did(run: Run, video: Path, tmp_path: Path) -> None:
+    gvpipe.encode(waving(8, 6), tmp_path / "other.mp4", "pca")
+    plain = run("export-html", video, tmp_path / "a.html")
+    assert plain.status == 0 and plain.err == "" and "MB" in plain.out
+    converted = run("export-html", tmp_path / "other.mp4", tmp_path / "b.html")
+    assert converted.status == 0
+    assert re.search(r"browsers cannot read pca.*rmse \d\.\de-\d\d, at most \d\.\de-\d\d", converted.err)
+    values = json.loads(run("export-html", video, tmp_path / "a.html", "--json").out)
+    assert values == gvpipe.export_html(video, tmp_path / "a.html").to_json()
+
+
+def test_play_prints_the_page_where_there_is_no_browser(run: Run, video: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+    done = run("play", video)
+    page = Path(done.out.strip())
+    assert done.status == 0
+    assert _embedded(page) == video.read_bytes()
+    shutil.rmtree(page.parent)
+
+
+def test_play_opens_the_page_in_the_browser(run: Run, video: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setenv("BROWSER", "any")
+    monkeypatch.setattr(webbrowser, "open", lambda address: opened.append(address) or True)
+    done = run("play", video)
+    assert done.out == f"{video} plays in your browser\n"
+    (address,) = opened
+    page = Path(address.removeprefix("file://"))
+    assert _embedded(page) == video.read_bytes()
+    shutil.rmtree(page.parent)
+
+
+def test_what_cannot_be_exported(run: Run, video: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"end its name in \.html"):
+        gvpipe.export_html(video, tmp_path / "page.mp4")
+    with pytest.raises(InputError, match="up is 'x'"):
+        gvpipe.export_html(video, tmp_path / "page.html", up="x")
+    with pytest.raises(OutputError, match="no folder"):
+        gvpipe.export_html(video, tmp_path / "nowhere" / "page.html")
+    video.write_bytes(video.read_bytes()[:-9] + bytes(9))
+    with pytest.raises(CorruptFile):
+        gvpipe.export_html(video, tmp_path / "page.html")
+    assert not list(tmp_path.glob("*.html"))
+    assert run("play", tmp_path / "none.mp4").status == 1
+
+
+def test_player_reads_what_encode_writes() -> None:
+    """When this fails, a new version of the codec is waiting for src/mcgv/ to read it."""
+    codec, version, profile = READS
+    header = (WEB / "src" / "mcgv" / "header.js").read_text()
+    assert re.findall(r'^export const \w+ = "?([\w-]+)"?;', header, re.MULTILINE) == [codec, str(version), profile]
+    assert codec_class(codec).version <= version
+
+
+def test_licences_are_beside_the_bundles() -> None:
+    packages = json.loads((WEB / "package.json").read_text())["devDependencies"]
+    for bundle, names in {"player.js": ("three.js", "Draco"), "geometry-video.js": ("Draco",)}.items():
+        notice = (WEB / "bundle" / bundle).read_text("utf-8")[:3000]
+        assert all(name in notice for name in names)
+    assert {path.stem for path in (WEB / "LICENSES").iterdir()} == {"NOTICE", "three", "draco"}
+    assert set(packages) == {"three", "draco3d", "esbuild"}  # esbuild only builds
+
+
+def test_lock_file_names_no_registry() -> None:
+    lock = json.loads((WEB / "package-lock.json").read_text())
+    packages = {name: package for name, package in lock["packages"].items() if name}
+    assert all("resolved" not in package and package["integrity"].startswith("sha512-") for package in packages.values())
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node")
+@pytest.mark.skipif(not (WEB / "node_modules").exists(), reason="no packages; npm ci in gvpipe/web")
+def test_bundles_are_what_the_sources_build(tmp_path: Path) -> None:
+    subprocess.run(["node", "build.mjs", tmp_path], cwd=WEB, check=True, capture_output=True)
+    built = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert built == {path.name: path.read_bytes() for path in (WEB / "bundle").iterdir()}

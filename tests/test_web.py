@@ -1,0 +1,553 @@
+"""What browsers make of geometry videos: the module's positions, the player's picture and manners, and its errors."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import io
+import re
+import shutil
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import chromium
+import numpy as np
+import numpy.typing as npt
+import pytest
+from PIL import Image
+from sequences import awkward, waving
+
+import gvpipe
+from gvpipe.container import read_file, write_file
+from gvpipe.sequence import MeshSequence
+
+pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
+
+BUNDLE = Path(gvpipe.__file__).parent / "web" / "bundle"
+GOLDEN = Path(__file__).parent / "golden"
+DOCS = (Path(__file__).parents[1] / "docs" / "player.md").read_text("utf-8")
+SAMBA = Path(__file__).parents[2] / "shared" / "data" / "samba.npz"
+MODULE_PAGE = """<!doctype html><link rel="icon" href="data:,"><script type="module">
+import { GeometryVideo, GeometryVideoError } from "./geometry-video.js";
+Object.assign(window, { GeometryVideo, GeometryVideoError });
+</script>"""
+PLAYER_PAGE = """<!doctype html><link rel="icon" href="data:,">
+<style>html, body { margin: 0; height: 100% } geometry-video { height: 100%; --backdrop: #ff00ff }</style>
+<script type="module" src="player.js"></script><geometry-video></geometry-video>"""
+FAST = {"preset": "ultrafast", "clusters": 3, "gop": 4}
+
+Mask = npt.NDArray[np.bool_]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
+    """A folder with both pages and both bundles, and its address."""
+    folder = tmp_path_factory.mktemp("site")
+    for bundle in BUNDLE.glob("*.js"):
+        shutil.copy(bundle, folder)
+    (folder / "module.html").write_text(MODULE_PAGE)
+    (folder / "player.html").write_text(PLAYER_PAGE)
+    with chromium.served(folder) as address:
+        yield folder, address
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    with chromium.chromium(tmp_path_factory.mktemp("profile")) as driver:
+        yield driver
+
+
+@pytest.fixture
+def module(browser: Any, site: tuple[Path, str]) -> Callable[..., Any]:
+    """``module(body, *arguments)`` runs an asynchronous function's body in a page that has imported the module."""
+    browser.get(f"{site[1]}/module.html")
+    return lambda body, *arguments: _run(browser, body, *arguments)
+
+
+@pytest.fixture
+def player(browser: Any, site: tuple[Path, str]) -> Callable[..., Any]:
+    """The same in a page with a player, which is `element` there."""
+    browser.get(f"{site[1]}/player.html")
+    return lambda body, *arguments: _run(
+        browser, "const element = document.querySelector('geometry-video');" + body, *arguments
+    )
+
+
+def _run(browser: Any, body: str, *arguments: Any) -> Any:
+    script = f"""const [args, done] = [[...arguments].slice(0, -1), arguments[arguments.length - 1]];
+        (async () => {{ {body} }})().then((value) => done({{ value }}), (error) => done({{ error: String(error.stack) }}))"""
+    result = browser.execute_async_script(script, *arguments)
+    assert "error" not in result, result["error"]
+    return result.get("value")
+
+
+def _encode(site: tuple[Path, str], sequence: MeshSequence, name: str = "x.mp4", **settings: Any) -> Path:
+    gvpipe.encode(sequence, site[0] / name, **{**FAST, **settings})
+    return site[0] / name
+
+
+FRAMES = """const video = await GeometryVideo.load(args[0]);
+    const frames = [];
+    for (const k of args[1]) frames.push(await video.frame(k));
+    const text = (array) => {
+      let binary = "";
+      for (const byte of new Uint8Array(array.buffer)) binary += String.fromCharCode(byte);
+      return btoa(binary);
+    };
+    const { indices, bounds, fps, frameCount, vertexCount, triangleCount, byteLength } = video;
+    video.close();
+    return { frames: frames.map(text), indices: text(indices), bounds, fps, counts: [frameCount, vertexCount, triangleCount],
+      byteLength };"""
+
+
+def _check_frames(module: Callable[..., Any], path: Path, reference: MeshSequence | None = None, count: int = 12) -> None:
+    """Positions that JavaScript rebuilds equal Python's, frames visited in random order, frame 0 and the last among them."""
+    with gvpipe.open(path) as video:
+        reference = reference or video.sequence()
+        order = np.random.default_rng(7).permutation(len(video))
+        visited = [*order[:count].tolist(), len(video) - 1, 0]
+        result = module(FRAMES, path.name, visited)
+        assert result["counts"] == [len(video), video.shape[1], len(video.faces)]
+        assert result["fps"] == video.fps
+        assert result["byteLength"] == path.stat().st_size
+    indices = np.frombuffer(base64.b64decode(result["indices"]), "<u4").reshape(-1, 3)
+    assert np.array_equal(indices, reference.faces)
+    first = reference.read(0, 1)[0].astype(np.float64)
+    rounding = 4 * np.spacing(np.abs(np.asarray(reference.positions[:])).max())  # of float32, far from the origin
+    tolerance = 1e-5 * np.linalg.norm(np.ptp(first, axis=0)) + rounding
+    for k, text in zip(visited, result["frames"], strict=True):
+        found = np.frombuffer(base64.b64decode(text), "<f4").reshape(-1, 3)
+        assert np.abs(found - reference.read(k, k + 1)[0]).max() <= tolerance, f"frame {k}"
+
+
+def test_frames_of_a_sample_equal_pythons(module: Callable[..., Any], site: tuple[Path, str], samples: Path) -> None:
+    gvpipe.encode(samples / "creature.npz", site[0] / "creature.mp4", preset="fast")
+    _check_frames(module, site[0] / "creature.mp4")
+
+
+@pytest.mark.skipif(not SAMBA.exists(), reason="no ../shared/data")
+def test_frames_of_samba_equal_pythons(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    gvpipe.encode(SAMBA, site[0] / "samba.mp4", preset="veryfast")
+    _check_frames(module, site[0] / "samba.mp4")
+
+
+@pytest.mark.parametrize("sequence", awkward().values(), ids=lambda sequence: sequence.name)
+def test_frames_of_awkward_inputs_equal_pythons(
+    sequence: MeshSequence, module: Callable[..., Any], site: tuple[Path, str]
+) -> None:
+    _check_frames(module, _encode(site, sequence))
+
+
+@pytest.mark.parametrize("fps", [0.5, 12.0, 29.97, 59.94, 240.0])
+def test_frames_at_any_rate(fps: float, module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    _check_frames(module, _encode(site, dataclasses.replace(waving(8, 30), fps=fps)))
+
+
+def test_frames_of_several_segments_in_the_codecs_order(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    _check_frames(module, _encode(site, waving(10, 50), segment=11, reorder=True, quality=95))
+
+
+def test_frames_of_the_golden_file(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    shutil.copy(GOLDEN / "mcgv-1-h264.mp4", site[0])
+    _check_frames(module, site[0] / "mcgv-1-h264.mp4", gvpipe.read(GOLDEN / "mcgv-1-h264.npz"))
+
+
+def test_bounds_hold_the_motion(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    path = _encode(site, waving(), quality=95, clusters=12)
+    bounds = module(FRAMES, path.name, [0])["bounds"]
+    positions = np.asarray(gvpipe.decode(path).positions[:])
+    low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
+    slack = 0.2 * np.linalg.norm(high - low)
+    assert (bounds["min"] <= low + 0.02).all() and (bounds["min"] >= low - slack).all()
+    assert (bounds["max"] >= high - 0.02).all() and (bounds["max"] <= high + slack).all()
+
+
+def test_module_plays_every_frame_that_is_due(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    path = _encode(site, waving(10, 24))
+    frames, matches = module(
+        """const video = await GeometryVideo.load(args[0]);
+        const played = new Map();
+        await new Promise((resolve, reject) =>
+          video.play((positions, k) => played.set(k, positions.slice()), { rate: 0.5, ended: resolve }).catch(reject));
+        let matches = 0;
+        for (const [k, positions] of played) if ((await video.frame(k)).every((x, i) => x === positions[i])) matches++;
+        return [[...played.keys()], matches];""",
+        path.name,
+    )
+    assert frames == sorted(set(frames))
+    assert len(frames) >= 8  # of 24; on an idle machine all
+    assert matches == len(frames)
+
+
+def test_overlapping_requests_are_answered_in_turn(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    path = _encode(site, waving(10, 24))
+    same = module(
+        """const video = await GeometryVideo.load(args[0]);
+        const together = await Promise.all([20, 3, 11, 0].map((k) => video.frame(k)));
+        const outside = await video.frame(24).catch((error) => error.name);
+        const alone = [];
+        for (const k of [20, 3, 11, 0]) alone.push(await video.frame(k));
+        return [alone.every((frame, i) => frame.every((x, j) => x === together[i][j])), outside];""",
+        path.name,
+    )
+    assert same == [True, "RangeError"]
+
+
+# --- files that cannot be played ---------------------------------------------------------------------------------------------
+
+
+def _flipped(data: bytes, position: int) -> bytes:
+    return data[:position] + bytes([data[position] ^ 0x55]) + data[position + 1 :]
+
+
+def _remuxed(data: bytes) -> bytes:
+    """The video and its tags without gvpipe's box."""
+    size = 0
+    while data[size + 4 : size + 8] != b"uuid":
+        size += struct.unpack_from(">I", data, size)[0]
+    return data[:size]
+
+
+BROKEN: dict[str, tuple[str, Callable[[bytes], bytes]]] = {
+    "empty": ("truncated", lambda data: b""),
+    "half": ("truncated", lambda data: data[: len(data) // 2]),
+    "one byte short": ("truncated", lambda data: data[:-1]),
+    "no MP4": ("not-geometry-video", lambda data: b"<!doctype html><p>Not found</p>"),
+    "stripped": ("stripped", _remuxed),
+    "foreign": ("not-geometry-video", lambda data: _remuxed(data).replace(b"gvpipe 1 ", b"someone 1")),
+    "newer": ("newer", lambda data: data.replace(b"gvpipe\r\n\x01\x00", b"gvpipe\r\n\x02\x00")),
+    "stray bytes": ("corrupt", lambda data: data + bytes(16)),
+    "last section": ("corrupt", lambda data: _flipped(data, len(data) - 5)),
+    "magic": ("corrupt", lambda data: _flipped(data, data.index(b"gvpipe\r\n"))),
+    "table": ("corrupt", lambda data: _flipped(data, data.index(b"gvpipe\r\n") + 14)),
+    "picture": ("corrupt", lambda data: _flipped(data, data.index(b"mdat") + 900)),
+    "other file's id": (
+        "corrupt",
+        lambda data: data.replace(data[(i := data.index(b"gvpipe 1 ")) : i + 41], b"gvpipe 1 " + b"0" * 32),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_broken_files_are_told_apart(case: str, module: Callable[..., Any], site: tuple[Path, str], video_bytes: bytes) -> None:
+    kind, damage = BROKEN[case]
+    (site[0] / "broken.mp4").write_bytes(damage(video_bytes))
+    found = module(
+        """const load = GeometryVideo.load(args[0]);
+        return load.then(() => "loaded", (e) => [e instanceof GeometryVideoError, e.kind, e.message])""",
+        "broken.mp4",
+    )
+    assert found[:2] == [True, kind], found
+    assert "\n" not in found[2]
+
+
+def test_a_file_that_is_not_there(module: Callable[..., Any]) -> None:
+    for address in ("nothing.mp4", "http://127.0.0.1:9/x.mp4"):
+        assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", address) == "load"
+
+
+@pytest.mark.parametrize("settings", [{"codec": "pca"}, {"profile": "precise"}, {"image": "jpeg"}], ids=str)
+def test_files_not_for_browsers_say_so(settings: dict[str, str], module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    gvpipe.encode(waving(6, 5), site[0] / "other.mp4", **settings)
+    kind, message = module("return GeometryVideo.load(args[0]).catch((error) => [error.kind, error.message])", "other.mp4")
+    assert kind == "unsupported"
+    assert "export-html" in message
+
+
+@pytest.mark.parametrize(("field", "value"), [("n_frames", 12), ("n_frames", 1 << 24), ("n_vertices", 71), ("n_triangles", 1)])
+def test_counts_that_do_not_fit_are_noticed(
+    field: str, value: int, module: Callable[..., Any], site: tuple[Path, str], video: Path
+) -> None:
+    write_file(dataclasses.replace(read_file(video), **{field: value}), site[0] / "counts.mp4")
+    assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", "counts.mp4") == "corrupt"
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"width": 16},
+        {"height": 0},
+        {"block": 7},
+        {"clusters": 2000},
+        {"segments": 99},
+        {"base": [0, 0, 1]},
+        {"residual_step": -1},
+    ],
+    ids=str,
+)
+def test_settings_out_of_range_are_noticed(
+    settings: dict[str, Any], module: Callable[..., Any], site: tuple[Path, str], video: Path
+) -> None:
+    bitstream = read_file(video)
+    write_file(dataclasses.replace(bitstream, header={**bitstream.header, **settings}), site[0] / "settings.mp4")
+    assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", "settings.mp4") == "corrupt"
+
+
+@pytest.mark.parametrize("section", ["mesh", "order", "pixels", "clusters", "transforms.0"])
+def test_hostile_sections_give_one_clear_error(
+    section: str, module: Callable[..., Any], site: tuple[Path, str], video: Path
+) -> None:
+    """Sections changed, cut or lengthened under right checksums: JavaScript's own checks, and no other error ever."""
+    bitstream = read_file(video)
+    data = bitstream.sections[section]
+    rng = np.random.default_rng(11)
+    variants = [b"", data[: len(data) // 2], data[:-1], data + b"\0", bytes(len(data)), b"\xff" * len(data)]
+    variants += [_flipped(data, int(position)) for position in rng.integers(0, len(data), 24)]
+    for i, variant in enumerate(variants):
+        write_file(dataclasses.replace(bitstream, sections={**bitstream.sections, section: variant}), site[0] / f"h{i}.mp4")
+    outcomes = module(
+        """const outcomes = [];
+        for (let i = 0; i < args[0]; i++) {
+          const outcome = await GeometryVideo.load(`h${i}.mp4`).then((video) => (video.close(), "loaded"),
+            (error) => (error instanceof GeometryVideoError ? error.kind : String(error.stack)));
+          outcomes.push(outcome);
+        }
+        return outcomes;""",
+        len(variants),
+    )
+    assert set(outcomes) <= {"loaded", "corrupt"}, [outcome for outcome in outcomes if outcome not in ("loaded", "corrupt")]
+    assert outcomes[1:3] == ["corrupt", "corrupt"]  # cut short
+
+
+# --- the player --------------------------------------------------------------------------------------------------------------
+
+LOAD = """const ready = new Promise((resolve, reject) => {
+      element.addEventListener("ready", resolve, { once: true });
+      element.addEventListener("error", (event) => reject(event.detail), { once: true });
+    });
+    element.src = args[0];
+    await ready;"""
+PAINTED = "await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(resolve, 50))));"
+
+
+def silhouette(points: npt.NDArray[np.float64], faces: npt.NDArray[np.int32], size: tuple[int, int]) -> Mask:
+    """Which pixels of a picture triangles cover, by the CPU renderer; ``points (V, 2)`` in pixels."""
+    width, height = size
+    flat = np.column_stack([points[:, 0], height - points[:, 1], np.zeros(len(points))]).astype(np.float32)
+    field = 28.0  # degrees; at this distance a unit is a pixel
+    distance = height / 2 / np.tan(np.radians(field) / 2)
+    camera = gvpipe.Camera((width / 2, height / 2, 0.0), distance, azimuth=0.0, elevation=0.0, field_of_view=field)
+    mask: Mask = gvpipe.Renderer(faces, flat, size, samples=1).visible(flat, camera) >= 0
+    return mask
+
+
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_the_picture_shows_the_mesh(
+    up: str, player: Callable[..., Any], browser: Any, site: tuple[Path, str], samples: Path
+) -> None:
+    if not (site[0] / "creature.mp4").exists():
+        gvpipe.encode(samples / "creature.npz", site[0] / "creature.mp4", preset="fast")
+    projection, box = player(
+        f"""element.setAttribute("up", args[1]); {LOAD}
+        await element.seek(70); {PAINTED}
+        const {{ x, y, width, height }} = element.shadowRoot.querySelector("canvas").getBoundingClientRect();
+        return [element.projection, [x, y, width, height]];""",
+        "creature.mp4",
+        up,
+    )
+    x, y, width, height = (round(value) for value in box)
+    shown = np.asarray(Image.open(io.BytesIO(browser.get_screenshot_as_png())).convert("RGB"), int)[
+        y : y + height, x : x + width
+    ]
+    drawn = np.abs(shown - [255, 0, 255]).max(axis=2) > 30
+    with gvpipe.open(site[0] / "creature.mp4") as video:
+        homogeneous = np.column_stack([video[70], np.ones(video.shape[1])]) @ np.reshape(projection, (4, 4))
+        points = (homogeneous[:, :2] / homogeneous[:, 3:] * [0.5, -0.5] + 0.5) * [width, height]
+        expected = silhouette(points, video.faces, (width, height))
+    assert expected.sum() > 2000
+    assert (drawn & expected).sum() / (drawn | expected).sum() > 0.93
+    inside = shown[drawn & expected]
+    assert inside.std(axis=0).max() > 10  # shaded, not one flat colour
+
+
+def test_seek_pause_and_end(player: Callable[..., Any], site: tuple[Path, str]) -> None:
+    path = _encode(site, waving(10, 36))
+    result = player(
+        f"""{LOAD}
+        const result = {{ start: [element.currentFrame, element.paused] }};
+        await element.seek(20);
+        result.sought = [element.currentFrame, element.paused];
+        await Promise.all([30, 2, 17, 9].map((k) => element.seek(k)));
+        result.last = element.currentFrame;
+        const frames = [];
+        element.addEventListener("frame", (event) => frames.push(event.detail));
+        const until = (test) => new Promise((resolve) => element.addEventListener("frame", () => test() && resolve()));
+        element.play();
+        await until(() => frames.length >= 3);
+        element.pause();
+        result.paused = [element.currentFrame, element.paused];
+        await new Promise((resolve) => setTimeout(resolve, 300));
+        result.still = [element.currentFrame, frames.length];
+        result.played = frames.slice();
+        const ended = new Promise((resolve) => element.addEventListener("ended", resolve, {{ once: true }}));
+        element.play();
+        await ended;
+        result.end = [element.currentFrame, element.paused];
+        frames.length = 0;
+        element.play();
+        await until(() => frames.length >= 3);
+        result.again = [frames[0], element.paused];
+        element.pause();
+        return result;""",
+        path.name,
+    )
+    assert result["start"] == [0, True]
+    assert result["sought"] == [20, True]
+    assert result["last"] == 9  # of many calls in a row the last counts
+    assert result["played"] == sorted(set(result["played"])) and result["played"][0] >= 9
+    assert result["paused"] == [result["played"][-1], True]
+    assert result["still"] == [result["played"][-1], len(result["played"])]
+    assert result["end"][0] >= 34 and result["end"][1] is True
+    assert result["again"] == [0, False]  # from the start
+
+
+def test_loop_and_speed(player: Callable[..., Any], site: tuple[Path, str]) -> None:
+    path = _encode(site, waving(10, 24))  # one second long
+    frames = player(
+        f"""element.setAttribute("loop", ""); {LOAD}
+        element.setAttribute("speed", "2");
+        const frames = [];
+        element.addEventListener("frame", (event) => frames.push(event.detail));
+        element.play();
+        await new Promise((resolve) => setTimeout(resolve, 3000));
+        const paused = element.paused;
+        element.pause();
+        return paused ? null : frames;""",
+        path.name,
+    )
+    assert frames is not None
+    turns = int((np.diff(frames) < 0).sum())
+    assert 2 <= turns <= 7  # 6 on an idle machine
+
+
+def test_late_frames_are_dropped_not_queued(player: Callable[..., Any], site: tuple[Path, str]) -> None:
+    """A page that needs 100 ms for each frame of 24 a second still plays a second in about a second."""
+    path = _encode(site, waving(10, 48))
+    seconds, frames = player(
+        f"""{LOAD}
+        const frames = [];
+        element.addEventListener("frame", (event) => {{
+          frames.push(event.detail);
+          for (const end = performance.now() + 100; performance.now() < end; );
+        }});
+        const ended = new Promise((resolve) => element.addEventListener("ended", resolve));
+        const start = performance.now();
+        element.play();
+        await ended;
+        return [(performance.now() - start) / 1000, frames];""",
+        path.name,
+    )
+    assert seconds < 4  # queued, it would be 4.8 and more
+    assert frames == sorted(set(frames)) and 4 <= len(frames) <= 24
+
+
+def test_controls_by_mouse_and_keyboard(player: Callable[..., Any], browser: Any, site: tuple[Path, str]) -> None:
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    path = _encode(site, waving(10, 24))
+    player(LOAD, path.name)
+    root = browser.find_element("css selector", "geometry-video").shadow_root
+    state = "await element.seek(element.currentFrame); return [element.currentFrame, element.paused]"
+
+    def press(*keys: str) -> Any:
+        ActionChains(browser).send_keys(*keys).perform()
+        return player("await new Promise((resolve) => setTimeout(resolve, 300));" + state)
+
+    root.find_element("css selector", "[data-act=forward]").click()
+    player("for (let i = 0; i < 5; i++) element.shadowRoot.querySelector('[data-act=forward]').click()")
+    assert press() == [6, True]  # each counts, however fast they come
+    root.find_element("css selector", "canvas").click()
+    assert press(Keys.END) == [23, True]
+    assert press(Keys.ARROW_LEFT) == [22, True]
+    assert press(Keys.HOME) == [0, True]
+    before = player("return element.projection")
+    ActionChains(browser).key_down(Keys.SHIFT).send_keys(Keys.ARROW_RIGHT).key_up(Keys.SHIFT).perform()
+    turned = player("return element.projection")
+    assert not np.allclose(before, turned)
+    ActionChains(browser).send_keys("r").perform()
+    assert np.allclose(player("return element.projection"), before)
+    ActionChains(browser).drag_and_drop_by_offset(root.find_element("css selector", "canvas"), 80, 10).perform()
+    assert not np.allclose(before, player("return element.projection"))
+    ActionChains(browser).send_keys("wl>").perform()
+    attributes = "return ['wireframe', 'loop', 'speed'].map((name) => element.getAttribute(name))"
+    assert player(attributes) == ["", "", "2"]
+    ActionChains(browser).send_keys(" ").perform()
+    assert player("return element.paused") is False
+
+
+def test_size_and_bit_rate_are_shown(player: Callable[..., Any], site: tuple[Path, str]) -> None:
+    path = _encode(site, waving(10, 48))
+    facts = player(f"{LOAD} return element.shadowRoot.querySelector('.facts').textContent", path.name).replace("\xa0", " ")
+    size = path.stat().st_size
+    for fact in (
+        "100 vertices",
+        "162 triangles",
+        "48 frames at 24 fps",
+        f"{size / 1e3:.1f} kB",
+        f"{8 * size / 2e3:.0f} kbit/s",
+    ):
+        assert fact in facts
+
+
+def test_a_corrupt_file_shows_an_error_in_the_page(
+    player: Callable[..., Any], site: tuple[Path, str], video_bytes: bytes
+) -> None:
+    (site[0] / "broken.mp4").write_bytes(_flipped(video_bytes, len(video_bytes) - 5))
+    shown = player(
+        """const failed = new Promise((resolve) => element.addEventListener("error", resolve, { once: true }));
+        element.setAttribute("src", "broken.mp4");
+        await failed;
+        const message = element.shadowRoot.querySelector("[role=alert]");
+        return [message.textContent, message.checkVisibility(), element.shadowRoot.querySelector(".bar").inert];"""
+    )
+    assert "is corrupt: its checksum does not match" in shown[0]
+    assert shown[1:] == [True, True]
+    recovered = player(f"{LOAD} return element.shadowRoot.querySelector('.message').textContent", _encode(site, waving()).name)
+    assert recovered == ""
+
+
+# --- the page of one file ----------------------------------------------------------------------------------------------------
+
+
+def test_exported_page_opens_from_a_disk_and_plays(browser: Any, video: Path, tmp_path: Path) -> None:
+    gvpipe.export_html(video, tmp_path / "page.html")
+    browser.get((tmp_path / "page.html").as_uri())
+    frames, requests, title = _run(
+        browser,
+        """const element = document.querySelector("geometry-video");
+        const frames = new Set();
+        await new Promise((resolve, reject) => {
+          element.addEventListener("frame", (event) => frames.add(event.detail) && frames.size > 5 && resolve());
+          element.addEventListener("error", (event) => reject(event.detail));
+          setTimeout(() => reject(new Error(`only frames ${[...frames]}`)), 20000);
+        });
+        const requests = performance.getEntriesByType("resource").map((entry) => entry.name);
+        return [[...frames], requests, document.title];""",
+    )
+    assert set(frames) <= set(range(11))
+    assert all(request.startswith(("blob:", "data:")) for request in requests), requests
+    assert title == "tube"
+
+
+def test_the_element_as_the_docs_show_it(browser: Any, site: tuple[Path, str]) -> None:
+    _encode(site, waving(10, 24), "walk.mp4")
+    (page,) = re.findall(r"```html\n(.*?)```", DOCS, re.DOTALL)
+    (site[0] / "docs.html").write_text(page)
+    browser.get(f"{site[1]}/docs.html")
+    played = """const element = document.querySelector("geometry-video");
+        await new Promise((resolve) => element.addEventListener("frame", () => !element.paused && resolve()));
+        return element.video.frameCount;"""
+    assert _run(browser, played) == 24
+
+
+def test_the_module_as_the_docs_show_it(module: Callable[..., Any], browser: Any, site: tuple[Path, str]) -> None:
+    _encode(site, waving(10, 24), "walk.mp4")
+    (script,) = re.findall(r"```js\n(.*?)```", DOCS, re.DOTALL)
+    drawn = "window.draw = (positions, indices) => { window.drawn = [positions.length, indices.length] };"
+    (site[0] / "docs.html").write_text(f"<!doctype html><script>{drawn}</script><script type=module>{script}</script>")
+    browser.get(f"{site[1]}/docs.html")
+    wait = "while (!window.drawn) await new Promise((resolve) => setTimeout(resolve, 50)); return window.drawn;"
+    assert _run(browser, wait) == [300, 3 * 162]
