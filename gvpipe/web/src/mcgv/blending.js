@@ -60,10 +60,16 @@ export class Blend {
   predict(transforms, positions) {
     const { base, clusters, parts, coordinates } = this;
     for (let i = 0, slot = 0; i < base.length; i += 3, slot += INFLUENCES) {
-      const [x, y, z] = [coordinates[i], coordinates[i + 1], coordinates[i + 2]];
-      let [atX, atY, atZ] = [base[i], base[i + 1], base[i + 2]];
-      for (let j = slot; j < slot + INFLUENCES && parts[j] > 0; j++) {
-        const [t, part] = [12 * clusters[j], parts[j]];
+      const x = coordinates[i];
+      const y = coordinates[i + 1];
+      const z = coordinates[i + 2];
+      let atX = base[i];
+      let atY = base[i + 1];
+      let atZ = base[i + 2];
+      for (let j = slot; j < slot + INFLUENCES; j++) {
+        const part = parts[j];
+        if (part === 0) break;
+        const t = 12 * clusters[j];
         atX += part * (x * transforms[t] + y * transforms[t + 3] + z * transforms[t + 6] + transforms[t + 9]);
         atY += part * (x * transforms[t + 1] + y * transforms[t + 4] + z * transforms[t + 7] + transforms[t + 10]);
         atZ += part * (x * transforms[t + 2] + y * transforms[t + 5] + z * transforms[t + 8] + transforms[t + 11]);
@@ -71,16 +77,6 @@ export class Blend {
       positions[i] = atX;
       positions[i + 1] = atY;
       positions[i + 2] = atZ;
-    }
-  }
-
-  extend(box, transforms) {
-    const positions = (this.buffer ??= new Float64Array(this.base.length));
-    this.predict(transforms, positions);
-    for (let i = 0; i < positions.length; i++) {
-      const axis = i % 3;
-      if (positions[i] < box.min[axis]) box.min[axis] = positions[i];
-      if (positions[i] > box.max[axis]) box.max[axis] = positions[i];
     }
   }
 }

@@ -13,7 +13,7 @@ export class Points {
     const order = new Int32Array(n); // vertices in the codec's order
     visits.forEach((place, v) => (order[place] = v));
     const ordered = new Int32Array(3 * n);
-    order.forEach((v, place) => ordered.set(lattice.subarray(3 * v, 3 * v + 3), 3 * place));
+    for (let i = 0; i < ordered.length; i++) ordered[i] = lattice[3 * order[Math.floor(i / 3)] + (i % 3)];
     const previous = previousEqual(ordered, 3);
     const members = [];
     /** (V) the point of each vertex: points are numbered as their first vertices come in the codec's order. */
@@ -63,5 +63,21 @@ export class Points {
     const filled = starts.slice();
     eachEdge((low, high) => (near[filled[high]++] = low));
     return { starts, near };
+  }
+
+  /** (V) the connected part of the surface that each vertex lies in. */
+  components() {
+    const { faces, point } = this;
+    const parent = Int32Array.from(this.members, (_, p) => p); // each a point of its part, of lower number or itself
+    const root = (p) => {
+      while (parent[p] !== p) p = parent[p] = parent[parent[p]];
+      return p;
+    };
+    for (let i = 0; i < faces.length; i++) {
+      if (i % 3 === 2) continue; // two sides join three points
+      const [a, b] = [root(faces[i]), root(faces[i + 1])];
+      parent[Math.max(a, b)] = Math.min(a, b);
+    }
+    return point.map((p) => root(p));
   }
 }

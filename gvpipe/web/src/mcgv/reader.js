@@ -7,6 +7,7 @@ import { BlendedMotion } from "./blended_motion.js";
 import { readHeader } from "./header.js";
 import { decodeClusters, decodePixels, decodeVertexClusters } from "./layout.js";
 import { place } from "./placement.js";
+import { Points } from "./points.js";
 
 const ZERO = 128; // the level of a zero residual
 
@@ -28,11 +29,12 @@ export class McgvReader {
     this.basePoints = base.points;
     const { origin, baseStep, width, height } = header;
     const positions = Float64Array.from(base.points, (index, i) => origin[i % 3] + index * baseStep);
-    const { pixels, clusters } = layOut(payload, header, base);
+    const points = new Points(base.points, base.faces, base.visits);
+    const { pixels, clusters } = layOut(payload, header, base, points);
     this.motion =
       header.prediction === "affine"
         ? new AffineMotion(payload, header, positions, clusters)
-        : new BlendedMotion(payload, header, base, positions);
+        : new BlendedMotion(payload, header, positions, points);
     const plane = width * height;
     /** (V, 3) which sample of a picture carries each coordinate. */
     this.samples = new Uint32Array(base.points.length);
@@ -67,12 +69,12 @@ export class McgvReader {
 }
 
 /** The vertices' pixels, and their clusters where they follow one each. */
-function layOut(payload, header, { points, visits }) {
+function layOut(payload, header, base, points) {
   const isAffine = header.prediction === "affine";
   if (header.placement === "halves") {
-    const clusters = isAffine ? decodeVertexClusters(payload.section("clusters"), visits, header) : null;
-    return { pixels: place(points, clusters, header), clusters };
+    const clusters = isAffine ? decodeVertexClusters(payload.section("clusters"), base.visits, header) : null;
+    return { pixels: place(base.points, clusters ?? points.components(), header), clusters };
   }
-  const pixels = decodePixels(payload.section("pixels"), visits, header);
+  const pixels = decodePixels(payload.section("pixels"), base.visits, header);
   return { pixels, clusters: isAffine ? decodeClusters(payload.section("clusters"), pixels, header) : null };
 }

@@ -24,19 +24,21 @@ export class Trajectories {
     const { coefficients, n } = this;
     const { columns, components } = this.basis;
     const rows = new Float64Array(3 * n);
-    const at = 3 * frame * (components + 1);
-    const [x, y, z] = [0, 1, 2].map((axis) => columns.subarray(at + axis * (components + 1), at + (axis + 1) * (components + 1)));
-    for (let i = 0, row = 0; i < n; i++, row += components) {
-      let [sumX, sumY, sumZ] = [x[0], y[0], z[0]];
-      for (let c = 0; c < components; c++) {
-        const coefficient = coefficients[row + c];
-        sumX += coefficient * x[c + 1];
-        sumY += coefficient * y[c + 1];
-        sumZ += coefficient * z[c + 1];
+    const width = components + 1;
+    const at = 3 * frame * width;
+    for (let i = 0, row = 0; i < n; i++) {
+      let x = columns[at];
+      let y = columns[at + width];
+      let z = columns[at + 2 * width];
+      for (let c = at + 1; c < at + width; c++) {
+        const coefficient = coefficients[row++];
+        x += coefficient * columns[c];
+        y += coefficient * columns[c + width];
+        z += coefficient * columns[c + 2 * width];
       }
-      rows[3 * i] = sumX;
-      rows[3 * i + 1] = sumY;
-      rows[3 * i + 2] = sumZ;
+      rows[3 * i] = x;
+      rows[3 * i + 1] = y;
+      rows[3 * i + 2] = z;
     }
     return rows;
   }
