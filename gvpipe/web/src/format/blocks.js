@@ -23,15 +23,25 @@ export class BlockDecoder {
 
   /** @param {Uint8Array} contexts of the next block's values @param {Float64Array} values filled; magnitudes below 2^39 */
   take(contexts, values) {
-    const groups = [];
-    contexts.forEach((context, i) => (groups[context] ??= []).push(i));
-    groups.forEach((group, context) => {
-      if (!this.edges[context].length) throw this.cursor.corrupt("a context is used that has no table");
-      const tokens = this.edges[context].length > 2 ? this.coder.categorical(this.edges[context], group.length) : null;
-      group.forEach((i, place) => (values[i] = tokens ? tokens[place] : 0));
-    });
-    this.#addLowBits(values);
-    for (let i = 0; i < values.length; i++) values[i] = unfold(values[i]);
+    const n = contexts.length;
+    const counts = new Int32Array(this.edges.length);
+    for (let i = 0; i < n; i++) counts[contexts[i]]++;
+    const symbols = this.edges.map((edges, context) => this.#tokens(edges, counts[context]));
+    const next = new Int32Array(this.edges.length);
+    let hasLarge = false;
+    for (let i = 0; i < n; i++) {
+      const token = symbols[contexts[i]]?.[next[contexts[i]]++] ?? 0;
+      hasLarge ||= token >= DIRECT;
+      values[i] = token;
+    }
+    if (hasLarge) this.#addLowBits(values);
+    for (let i = 0; i < n; i++) values[i] = unfold(values[i]);
+  }
+
+  /** The next `count` tokens of a context; null: all of them are 0. */
+  #tokens(edges, count) {
+    if (count && !edges.length) throw this.cursor.corrupt("a context is used that has no table");
+    return count && edges.length > 2 ? this.coder.categorical(edges, count) : null;
   }
 
   /** Tokens become folded values. */

@@ -10,7 +10,8 @@ export function powersOfTwo() {
     for (let half = FRACTIONS; half > 1; half /= 2) root = squareRoot(root);
     return root; // of the last octave: earlier ones are its halves
   });
-  return Array.from({ length: FRACTIONS * OCTAVES }, (_, i) => top[i % FRACTIONS] >> BigInt(OCTAVES - Math.floor(i / FRACTIONS)));
+  const halvings = (i) => BigInt(OCTAVES - Math.floor(i / FRACTIONS));
+  return Array.from({ length: FRACTIONS * OCTAVES }, (_, i) => top[i % FRACTIONS] >> halvings(i));
 }
 
 /** Rounded down; Newton's method from above. */

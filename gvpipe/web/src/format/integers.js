@@ -83,7 +83,7 @@ function untokenise(tokens, cursor) {
 
 /** 0, 1, 2, 3, ... to 0, -1, 1, -2, ... */
 export function unfold(u) {
-  return u % 2 ? -(u + 1) / 2 : u / 2;
+  return u % 2 ? (u + 1) / -2 : u / 2;
 }
 
 /** Numbers of up to 38 bits, most significant bit first. */

@@ -16,7 +16,8 @@ const shapes = []; // of the ratios used so far
 
 /** @param {number} zero 0..255 @param {number} ratio its index @returns {number[]} a frequency for each token */
 export function magnitudeTable(zero, ratio) {
-  const frequencies = (shapes[ratio] ??= shape(RATIOS[ratio])).map((f) => Math.max(1, Math.floor((f * (ZEROS - zero)) / ZEROS)));
+  shapes[ratio] ??= shape(RATIOS[ratio]);
+  const frequencies = shapes[ratio].map((frequency) => Math.max(1, Math.floor((frequency * (ZEROS - zero)) / ZEROS)));
   frequencies[0] = Math.max(1, Math.floor((TOTAL * zero) / ZEROS));
   return frequencies;
 }

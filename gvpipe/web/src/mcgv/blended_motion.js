@@ -17,10 +17,11 @@ export class BlendedMotion {
    */
   constructor(payload, header, base, points) {
     const weights = decodeWeights(payload.section("weights"), points.earlierNeighbours(), header.clusters);
-    const own = Float64Array.from({ length: 3 * points.members.length }, (_, i) => base[3 * points.members[Math.floor(i / 3)] + (i % 3)]);
+    const { members } = points;
+    const own = Float64Array.from({ length: 3 * members.length }, (_, i) => base[3 * members[Math.floor(i / 3)] + (i % 3)]);
     this.blend = new Blend(own, weights, header.clusters);
     this.point = points.point;
-    this.predicted = new Float64Array(own.length);
+    this.predicted = new Float64Array(own.length); // (P, 3) of the frame last asked for
     this.segments = new Segments(payload.header.frames, header.segments, (name, frames) =>
       new Trajectories(payload.section(name), header.clusters, frames, header.transformStep, name),
     );

@@ -1,6 +1,6 @@
 /**
- * Placement by halving: each vertex' pixel, from the base frame's integers alone. Mirrors `gvcodecs.mcgv.placement`, cell by cell
- * in place of level by level; `docs/format.md`, section 5.1. All sums stay below 2^53.
+ * Placement by halving: each vertex' pixel, from the base frame's integers alone. Mirrors `gvcodecs.mcgv.placement`, but cell by
+ * cell, not level by level; `docs/format.md`, section 5.1. All sums stay below 2^53.
  */
 
 import { corrupt } from "../format/errors.js";
@@ -70,7 +70,7 @@ function spreadGroups(points, groups) {
   return spread;
 }
 
-/** Cut a cell of more than one pixel across its longer side; return the halves that hold vertices. Sorts its part of `order`. */
+/** Cut a cell across its longer side; return the halves that hold vertices. Sorts its part of `order`. */
 function halve(cell, order, points, shift, block) {
   const isWide = cell.width >= cell.height;
   const longer = isWide ? cell.width : cell.height;

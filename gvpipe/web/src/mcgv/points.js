@@ -65,10 +65,10 @@ export class Points {
     return { starts, near };
   }
 
-  /** (V) the connected part of the surface that each vertex lies in. */
-  components() {
+  /** (V) the connected piece of the surface that each vertex belongs to. */
+  pieces() {
     const { faces, point } = this;
-    const parent = Int32Array.from(this.members, (_, p) => p); // each a point of its part, of lower number or itself
+    const parent = Int32Array.from(this.members, (_, p) => p); // each a point of its piece: itself, or one of lower number
     const root = (p) => {
       while (parent[p] !== p) p = parent[p] = parent[parent[p]];
       return p;

@@ -27,15 +27,9 @@ export class McgvReader {
     this.header = header;
     this.faces = base.faces;
     this.basePoints = base.points;
-    const { origin, baseStep, width, height } = header;
-    const positions = Float64Array.from(base.points, (index, i) => origin[i % 3] + index * baseStep);
-    const points = new Points(base.points, base.faces, base.visits);
-    const { pixels, clusters } = layOut(payload, header, base, points);
-    this.motion =
-      header.prediction === "affine"
-        ? new AffineMotion(payload, header, positions, clusters)
-        : new BlendedMotion(payload, header, positions, points);
-    const plane = width * height;
+    const { pixels, motion } = decodeMotion(payload, header, base);
+    this.motion = motion;
+    const plane = header.width * header.height;
     /** (V, 3) which sample of a picture carries each coordinate. */
     this.samples = new Uint32Array(base.points.length);
     pixels.forEach((pixel, v) => this.samples.set([pixel, pixel + plane, pixel + 2 * plane], 3 * v));
@@ -68,13 +62,18 @@ export class McgvReader {
   }
 }
 
-/** The vertices' pixels, and their clusters where they follow one each. */
-function layOut(payload, header, base, points) {
-  const isAffine = header.prediction === "affine";
-  if (header.placement === "halves") {
-    const clusters = isAffine ? decodeVertexClusters(payload.section("clusters"), base.visits, header) : null;
-    return { pixels: place(base.points, clusters ?? points.components(), header), clusters };
+/** The vertices' pixels, and how they move: clusters or pixels, whichever follows from the other, come second. */
+function decodeMotion(payload, header, base) {
+  const { origin, baseStep } = header;
+  const positions = Float64Array.from(base.points, (index, i) => origin[i % 3] + index * baseStep);
+  const charts = header.placement === "charts" ? decodePixels(payload.section("pixels"), base.visits, header) : null;
+  if (header.prediction === "blended") {
+    const points = new Points(base.points, base.faces, base.visits);
+    const pixels = charts ?? place(base.points, points.pieces(), header);
+    return { pixels, motion: new BlendedMotion(payload, header, positions, points) };
   }
-  const pixels = decodePixels(payload.section("pixels"), base.visits, header);
-  return { pixels, clusters: isAffine ? decodeClusters(payload.section("clusters"), pixels, header) : null };
+  const data = payload.section("clusters");
+  const clusters = charts ? decodeClusters(data, charts, header) : decodeVertexClusters(data, base.visits, header);
+  const pixels = charts ?? place(base.points, clusters, header);
+  return { pixels, motion: new AffineMotion(payload, header, positions, clusters) };
 }

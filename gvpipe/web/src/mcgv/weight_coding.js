@@ -19,12 +19,12 @@ const COUNT_CONTEXTS = 4;
 export function decodeWeights(data, known, nClusters) {
   const cursor = new Cursor(data, "weights");
   const n = known.starts.length - 1;
-  const contexts = Uint8Array.from({ length: n }, (_, p) => Math.min(known.starts[p + 1] - known.starts[p], COUNT_CONTEXTS - 1));
+  const context = (p) => Math.min(known.starts[p + 1] - known.starts[p], COUNT_CONTEXTS - 1);
+  const contexts = Uint8Array.from({ length: n }, (_, p) => context(p));
   const counts = decodeIntegers(cursor.take(cursor.varint(cursor.left, "a length")), n, contexts, "weights");
   if (counts.some((count) => count < 0 || count > INFLUENCES)) throw cursor.corrupt("a point follows more than four clusters");
-  const data2 = cursor.take(cursor.varint(cursor.left, "a length"));
   const ranked = slots(counts, 0);
-  const gaps = decodeIntegers(data2, ranked.length, ranked, "weights");
+  const gaps = decodeIntegers(cursor.take(cursor.varint(cursor.left, "a length")), ranked.length, ranked, "weights");
   const weighted = slots(counts, 1);
   const changes = decodeIntegers(cursor.rest(), weighted.length, weighted, "weights");
   if (gaps.some((gap) => gap < 0 || gap >= nClusters) || changes.some((change) => Math.abs(change) >= TOTAL)) {

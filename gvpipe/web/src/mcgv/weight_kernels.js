@@ -41,7 +41,8 @@ export function restore(known, nClusters, { counts, gaps, changes }, result) {
     const total = sumOf(ranks, n, sums, nListed);
     let left = TOTAL;
     for (let j = 0; j < n - 1; j++) {
-      const expected = total ? Math.max(1, Math.floor((TOTAL * sumAt(ranks[j], sums, nListed)) / total)) : Math.floor(TOTAL / n);
+      const share = (TOTAL * sumAt(ranks[j], sums, nListed)) / total;
+      const expected = total ? Math.max(1, Math.floor(share)) : Math.floor(TOTAL / n);
       const weight = expected + changes[nextChange++];
       left -= weight;
       if (weight < 1 || left < 1) return point;
