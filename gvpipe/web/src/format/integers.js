@@ -3,10 +3,10 @@
 import { Cursor } from "./cursor.js";
 import { RangeDecoder, categoricalEdges } from "./range_decoder.js";
 
-const DIRECT = 16; // folded values that are tokens of their own
-const MAX_TOKENS = DIRECT + 2 * (40 - 4);
+export const DIRECT = 16; // folded values that are tokens of their own
+export const MAX_TOKENS = DIRECT + 2 * (40 - 4);
 const MAX_CONTEXTS = 1 << 16;
-const TABLE_TOTAL = 4096;
+export const TABLE_TOTAL = 4096;
 
 /**
  * @param {Uint8Array} data one whole block
@@ -41,7 +41,8 @@ function readTable(cursor, isUsed) {
   return table;
 }
 
-function normalised(table) {
+/** Frequencies as weights: integer by integer, one correctly rounded quotient each. */
+export function normalised(table) {
   const sum = table.reduce((a, b) => a + b, 0);
   return table.map((frequency) => frequency / sum);
 }
@@ -80,8 +81,9 @@ function untokenise(tokens, cursor) {
   return values;
 }
 
-function unfold(u) {
-  return u % 2 ? -(u + 1) / 2 : u / 2;
+/** 0, 1, 2, 3, ... to 0, -1, 1, -2, ... */
+export function unfold(u) {
+  return u % 2 ? (u + 1) / -2 : u / 2;
 }
 
 /** Numbers of up to 38 bits, most significant bit first. */

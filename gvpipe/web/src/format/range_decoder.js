@@ -26,6 +26,8 @@ export class RangeDecoder {
     this.low = words[1] ?? 0;
     this.rangeHigh = WORD - 1;
     this.rangeLow = WORD - 1;
+    this.productHigh = 0; // of the last product
+    this.productLow = 0;
   }
 
   /** Decode `count` symbols of one categorical model: `edges` are its left cumulatives, then TOTAL. */
@@ -33,7 +35,8 @@ export class RangeDecoder {
     const symbols = new Uint8Array(count);
     for (let i = 0; i < count; i++) {
       const quantile = this.#quantile();
-      let [first, last] = [0, edges.length - 2];
+      let first = 0;
+      let last = edges.length - 2;
       while (first < last) {
         const middle = (first + last + 1) >> 1;
         if (edges[middle] <= quantile) first = middle;
@@ -75,28 +78,36 @@ export class RangeDecoder {
 
   /** difference - scale * factor; exact where it is small beside 2^53. */
   #beyond(scale, factor) {
-    multiply(scale, factor);
-    return (this.high - productHigh) * WORD + (this.low - productLow);
+    this.#multiply(scale, factor);
+    return (this.high - this.productHigh) * WORD + (this.low - this.productLow);
   }
 
   #advance(left, probability) {
     const scale = this.#scale;
-    multiply(scale, left);
-    this.high -= productHigh;
-    this.low -= productLow;
+    this.#multiply(scale, left);
+    this.high -= this.productHigh;
+    this.low -= this.productLow;
     if (this.low < 0) {
       this.low += WORD;
       this.high -= 1;
     }
-    multiply(scale, probability);
-    this.rangeHigh = productHigh;
-    this.rangeLow = productLow;
+    this.#multiply(scale, probability);
+    this.rangeHigh = this.productHigh;
+    this.rangeLow = this.productLow;
     if (this.rangeHigh === 0) {
       this.rangeHigh = this.rangeLow;
       this.rangeLow = 0;
       this.high = this.low;
       this.low = this.next < this.words.length ? this.words[this.next++] : 0;
     }
+  }
+
+  /** a (below 2^40) times b (at most 2^24) as two halves of 32 bits. */
+  #multiply(a, b) {
+    const upper = Math.floor(a / 2 ** 20) * b; // in units of 2^20; below 2^44
+    const lower = (a % 2 ** 20) * b + (upper % 2 ** 12) * 2 ** 20;
+    this.productHigh = Math.floor(upper / 2 ** 12) + Math.floor(lower / WORD);
+    this.productLow = lower % WORD;
   }
 }
 
@@ -116,15 +127,4 @@ export function categoricalEdges(weights) {
   });
   edges[weights.length] = TOTAL;
   return edges;
-}
-
-let productHigh = 0;
-let productLow = 0;
-
-/** a (below 2^40) times b (at most 2^24) as two halves of 32 bits. */
-function multiply(a, b) {
-  const upper = Math.floor(a / 2 ** 20) * b; // in units of 2^20; below 2^44
-  const lower = (a % 2 ** 20) * b + (upper % 2 ** 12) * 2 ** 20;
-  productHigh = Math.floor(upper / 2 ** 12) + Math.floor(lower / WORD);
-  productLow = lower % WORD;
 }

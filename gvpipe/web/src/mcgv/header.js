@@ -4,15 +4,19 @@ import { GeometryVideoError, corrupt } from "../format/errors.js";
 import { checkInteger, checkNumber } from "../format/payload.js";
 
 export const CODEC = "mcgv";
-export const VERSION = 1;
+export const VERSION = 2;
 export const PROFILE = "h264-8"; // the one that a browser gives back sample by sample
+const PREDICTIONS = ["blended", "affine"];
+const PLACEMENTS = ["halves", "charts"];
 const MAX_SIDE = 16384;
 const LARGE = 1e39;
 const SMALL = 1e-60;
 
 /**
  * @typedef {object} Header
- * @property {number} block side of the blocks that hold one chart each, pixels
+ * @property {"blended"|"affine"} prediction how the clusters move the vertices
+ * @property {"halves"|"charts"} placement how the vertices get their pixels
+ * @property {number} block side of the blocks of the image coder, pixels
  * @property {number} width @property {number} height of one plane, pixels
  * @property {number} clusters K @property {number} segments
  * @property {number[]} origin @property {number} baseStep lattice of the base frame
@@ -39,7 +43,12 @@ export function readHeader(header) {
   if (!Array.isArray(base) || base.length !== 4 || !base.every((v) => Math.abs(v) < LARGE) || !(base[3] > 0)) {
     throw corrupt("header", `base is ${JSON.stringify(base)}`);
   }
+  const [prediction, placement] = header.version === 1 ? ["affine", "charts"] : [settings.prediction, settings.placement];
+  if (!PREDICTIONS.includes(prediction)) throw corrupt("header", `prediction is ${JSON.stringify(prediction)}`);
+  if (!PLACEMENTS.includes(placement)) throw corrupt("header", `placement is ${JSON.stringify(placement)}`);
   const result = {
+    prediction,
+    placement,
     block: checkInteger(settings, "block", 2, 64),
     width: checkInteger(settings, "width", 2, MAX_SIDE),
     height: checkInteger(settings, "height", 2, Math.floor(MAX_SIDE / 3)),
@@ -52,6 +61,10 @@ export function readHeader(header) {
   };
   if (result.width % result.block || result.height % result.block) {
     throw corrupt("header", `planes of ${result.width}x${result.height} are not whole blocks of ${result.block}`);
+  }
+  if (placement === "halves" && ![8, 16].includes(result.block)) throw corrupt("header", `blocks of ${result.block} pixels`);
+  if (result.width * result.height < header.vertices) {
+    throw corrupt("header", `planes of ${result.width}x${result.height} do not hold ${header.vertices} vertices`);
   }
   return result;
 }

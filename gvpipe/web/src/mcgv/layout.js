@@ -1,4 +1,7 @@
-/** Where each vertex sits in the picture, and which cluster moves it. Mirrors `decode_pixels` and `decode_clusters`. */
+/**
+ * Where each vertex sits in the picture, and which cluster moves it. Mirrors `decode_pixels`, `decode_clusters` and
+ * `decode_vertex_clusters` of `gvcodecs.mcgv.format`; `docs/format.md`, section 5.
+ */
 
 import { Cursor } from "../format/cursor.js";
 import { corrupt } from "../format/errors.js";
@@ -43,11 +46,28 @@ export function decodeClusters(data, pixels, { width, height, block, clusters })
   for (const b of blocks) rank[b] = 0;
   let used = 0;
   for (let b = 0; b < rank.length; b++) if (rank[b] === 0) rank[b] = used++;
-  const byBlock = decodeIntegers(data, used, null, "clusters");
-  for (let i = 0, cluster = 0; i < used; i++) {
-    cluster += byBlock[i];
-    if (cluster < 0 || cluster >= clusters) throw corrupt("clusters", `a cluster is not in 0..${clusters - 1}`);
-    byBlock[i] = cluster;
-  }
+  const byBlock = decodeRunning(data, used, clusters);
   return Uint16Array.from(blocks, (b) => byBlock[rank[b]]);
+}
+
+/**
+ * @param {Uint8Array} data section `clusters` of placement halves
+ * @param {Int32Array} visits (V) the codec's vertex of each of the user's
+ * @param {import("./header.js").Header} header
+ * @returns {Uint16Array} (V) cluster of each vertex, 0..K-1
+ */
+export function decodeVertexClusters(data, visits, { clusters }) {
+  const byCodec = decodeRunning(data, visits.length, clusters);
+  return Uint16Array.from(visits, (v) => byCodec[v]);
+}
+
+/** Clusters, each told by its difference from the one before. */
+function decodeRunning(data, count, clusters) {
+  const values = decodeIntegers(data, count, null, "clusters");
+  for (let i = 0, cluster = 0; i < count; i++) {
+    cluster += values[i];
+    if (cluster < 0 || cluster >= clusters) throw corrupt("clusters", `a cluster is not in 0..${clusters - 1}`);
+    values[i] = cluster;
+  }
+  return values;
 }

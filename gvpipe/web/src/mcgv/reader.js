@@ -2,13 +2,14 @@
 
 import { decodeBase } from "../format/base_mesh.js";
 import { AGAIN, GeometryVideoError } from "../format/errors.js";
+import { AffineMotion } from "./affine_motion.js";
+import { BlendedMotion } from "./blended_motion.js";
 import { readHeader } from "./header.js";
-import { decodeClusters, decodePixels } from "./layout.js";
-import { AffinePredictor } from "./prediction.js";
-import { decodeTransforms } from "./transforms.js";
+import { decodeClusters, decodePixels, decodeVertexClusters } from "./layout.js";
+import { place } from "./placement.js";
+import { Points } from "./points.js";
 
 const ZERO = 128; // the level of a zero residual
-const SEGMENTS_KEPT = 4; // whose transforms stay decoded
 
 export class McgvReader {
   /** @param {import("../format/payload.js").Payload} payload @returns {Promise<McgvReader>} */
@@ -23,17 +24,11 @@ export class McgvReader {
   }
 
   constructor(payload, header, base) {
-    this.payload = payload;
     this.header = header;
     this.faces = base.faces;
     this.basePoints = base.points;
-    this.frames = payload.header.frames;
-    const pixels = decodePixels(payload.section("pixels"), base.visits, header);
-    const clusters = decodeClusters(payload.section("clusters"), pixels, header);
-    const { origin, baseStep } = header;
-    const points = Float64Array.from(base.points, (index, i) => origin[i % 3] + index * baseStep);
-    this.predictor = new AffinePredictor(points, clusters, header.clusters);
-    this.segments = new Map(); // segment -> its transforms, the latest decoded ones
+    const { pixels, motion } = decodeMotion(payload, header, base);
+    this.motion = motion;
     const plane = header.width * header.height;
     /** (V, 3) which sample of a picture carries each coordinate. */
     this.samples = new Uint32Array(base.points.length);
@@ -53,35 +48,32 @@ export class McgvReader {
   rebuild(frame, levels, positions) {
     const step = this.header.residualStep;
     for (let i = 0; i < positions.length; i++) positions[i] = step * (levels[i] - ZERO);
-    this.predictor.addTo(positions, this.#transforms(frame));
+    this.motion.addTo(frame, positions);
   }
 
   /** The box that the whole motion stays in, but for residuals; model units. Decodes, and so checks, all transforms. */
   bounds() {
     const box = { min: [Infinity, Infinity, Infinity], max: [-Infinity, -Infinity, -Infinity] };
-    for (let s = 0; s < this.header.segments; s++) this.predictor.extend(box, this.#segment(s));
+    this.motion.extend(box);
+    if (![...box.min, ...box.max].every(Number.isFinite)) {
+      throw new GeometryVideoError("corrupt", `its motion leaves all bounds; ${AGAIN}`);
+    }
     return box;
   }
+}
 
-  #transforms(frame) {
-    const s = Math.floor(((frame + 1) * this.header.segments - 1) / this.frames);
-    const size = this.predictor.rest.length;
-    const first = (frame - this.#start(s)) * size;
-    return this.#segment(s).subarray(first, first + size);
+/** The vertices' pixels, and how they move: clusters or pixels, whichever follows from the other, come second. */
+function decodeMotion(payload, header, base) {
+  const { origin, baseStep } = header;
+  const positions = Float64Array.from(base.points, (index, i) => origin[i % 3] + index * baseStep);
+  const charts = header.placement === "charts" ? decodePixels(payload.section("pixels"), base.visits, header) : null;
+  if (header.prediction === "blended") {
+    const points = new Points(base.points, base.faces, base.visits);
+    const pixels = charts ?? place(base.points, points.pieces(), header);
+    return { pixels, motion: new BlendedMotion(payload, header, positions, points) };
   }
-
-  #segment(s) {
-    if (!this.segments.has(s)) {
-      const name = `transforms.${s}`;
-      const frames = this.#start(s + 1) - this.#start(s);
-      const { rest } = this.predictor;
-      this.segments.set(s, decodeTransforms(this.payload.section(name), frames, rest, this.header.transformStep, name));
-      if (this.segments.size > SEGMENTS_KEPT) this.segments.delete(this.segments.keys().next().value);
-    }
-    return this.segments.get(s);
-  }
-
-  #start(segment) {
-    return Math.floor((segment * this.frames) / this.header.segments);
-  }
+  const data = payload.section("clusters");
+  const clusters = charts ? decodeClusters(data, charts, header) : decodeVertexClusters(data, base.visits, header);
+  const pixels = charts ?? place(base.points, clusters, header);
+  return { pixels, motion: new AffineMotion(payload, header, positions, clusters) };
 }

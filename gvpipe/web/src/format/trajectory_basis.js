@@ -1,0 +1,41 @@
+/** Principal trajectories of a segment. Mirrors `gvpipe.trajectory_basis.decode_basis`; `docs/format.md`, section 6. */
+
+import { Cursor } from "./cursor.js";
+import { frameRows } from "./frame_rows.js";
+import { decodeIntegers } from "./integers.js";
+import { MAX_VALUES, decodeRows } from "./row_coding.js";
+
+const MAX_COMPONENTS = 1 << 14;
+const MAX_SCALE = 8 * 64;
+const PER_OCTAVE = 8;
+const LEAST_OUTSIDE = 0.2;
+
+/**
+ * @typedef {object} Basis
+ * @property {number} components R
+ * @property {Float64Array} columns (3F, 1 + R) flat: the mean trajectory, then the principal ones
+ *
+ * @param {Uint8Array} data
+ * @param {number} frames of the segment @param {number} points whose trajectories these are
+ * @param {number} step quantisation step, model units
+ * @param {string} name of the section, for messages
+ * @returns {Basis}
+ */
+export function decodeBasis(data, frames, points, step, name) {
+  const cursor = new Cursor(data, name);
+  const components = cursor.varint(Math.min(MAX_COMPONENTS, 3 * frames), "the number of components");
+  const levels = decodeIntegers(cursor.take(cursor.varint(cursor.left, "a length")), components, null, name);
+  const scales = [Math.sqrt(points)];
+  let level = 0;
+  for (const difference of levels) {
+    level += difference;
+    if (Math.abs(level) > MAX_SCALE) throw cursor.corrupt("a scale is out of range");
+    scales.push(step * 2 ** (level / PER_OCTAVE));
+  }
+  const width = components + 1;
+  if (3 * frames * width > MAX_VALUES) throw cursor.corrupt(`${components} components over ${frames} frames`);
+  const coarse = step / Math.sqrt(Math.max(LEAST_OUTSIDE, 1 - width / (3 * frames)));
+  const columns = decodeRows(cursor.rest(), width, coarse, frameRows(frames), name);
+  for (let i = 0; i < columns.length; i++) columns[i] /= scales[i % width];
+  return { components, columns };
+}

@@ -1,0 +1,32 @@
+/** The published prediction: one affine transform per cluster and frame. Mirrors `gvcodecs.mcgv.affine_motion`. */
+
+import { Segments } from "./motion.js";
+import { AffinePredictor } from "./prediction.js";
+import { decodeTransforms } from "./transforms.js";
+
+/** @implements {import("./motion.js").Motion} */
+export class AffineMotion {
+  /**
+   * @param {import("../format/payload.js").Payload} payload
+   * @param {import("./header.js").Header} header
+   * @param {Float64Array} base (V, 3) model units, flat
+   * @param {Uint16Array} clusters (V)
+   */
+  constructor(payload, header, base, clusters) {
+    this.predictor = new AffinePredictor(base, clusters, header.clusters);
+    const { rest } = this.predictor;
+    this.segments = new Segments(payload.header.frames, header.segments, (name, frames) =>
+      decodeTransforms(payload.section(name), frames, rest, header.transformStep, name),
+    );
+  }
+
+  addTo(frame, levels) {
+    const [transforms, place] = this.segments.locate(frame);
+    const size = this.predictor.rest.length;
+    this.predictor.addTo(levels, transforms.subarray(place * size, (place + 1) * size));
+  }
+
+  extend(box) {
+    for (let s = 0; s < this.segments.count; s++) this.predictor.extend(box, this.segments.get(s));
+  }
+}
