@@ -30,3 +30,11 @@ def test_frames_decode_no_more_than_their_group(
         for k in (17, 18, 20, 3, 39):
             assert video[k].shape == (64, 3)
     assert decoded == wanted
+
+
+@pytest.mark.parametrize("prediction", ["affine", "blended"])
+def test_the_player_fetches_whole_groups_of_pictures(prediction: str, tmp_path: Path) -> None:
+    gvpipe.encode(waving(8, 40), tmp_path / "a.mp4", gop=8, prediction=prediction)
+    with gvpipe.open(tmp_path / "a.mp4") as video:
+        video[17]
+        assert list(video._cache._groups) == [(16, 24)]

@@ -75,6 +75,10 @@ class McgvReader:
             clusters = sections.decode_clusters(bitstream.section("clusters"), layout, header.block, header.clusters)
         return AffineMotion(bitstream, header, positions, clusters, layout, self._bounds)
 
+    def group(self, frame: int) -> tuple[int, int]:
+        """``(start, stop)`` of the group of pictures that a frame lies in."""
+        return self._video.group(frame)
+
     def read(self, start: int, stop: int) -> Float32:
         """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
 
