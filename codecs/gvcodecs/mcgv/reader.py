@@ -61,10 +61,10 @@ class McgvReader:
         bitstream, header, base = self._bitstream, self._header, self._base
         order = np.argsort(base.visits)
         positions = header.base.place(base.points)
-        points = Points.of(base.points, base.faces, base.visits)
         if header.placement == "charts":
             layout = sections.decode_pixels(bitstream.section("pixels"), order, header.width, header.height)
         if header.prediction == "blended":
+            points = Points.of(base.points, base.faces, base.visits)
             if header.placement == "halves":
                 layout = place(base.points, points.pieces(), header.width, header.height, header.block)
             return BlendedMotion(bitstream, header, positions, points, layout, self._bounds)
