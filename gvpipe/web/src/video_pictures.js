@@ -35,7 +35,7 @@ export class VideoPictures {
     this.frames = frames;
     this.width = width;
     this.height = height;
-    /** The frame that the video shows; -1: not known. */
+    /** The frame that the video shows; -1: not known. A video that has loaded may have nothing to draw yet. */
     this.shown = -1;
     this.url = URL.createObjectURL(file);
     this.video = Object.assign(document.createElement("video"), { muted: true, playsInline: true, preload: "auto" });
@@ -62,7 +62,6 @@ export class VideoPictures {
     if (!(Math.abs(found - this.frames) <= 1 + 0.002 * this.fps)) {
       throw new GeometryVideoError("corrupt", `its video lasts ${found.toFixed(1)} frames, the header says ${this.frames}`);
     }
-    this.shown = 0;
   }
 
   #failure() {
