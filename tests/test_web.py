@@ -47,7 +47,7 @@ KINDS: dict[str, dict[str, Any]] = {  # how vertices move, and where their pixel
     "blended": {"prediction": "blended", "placement": "halves"},
     "blended-charts": {"prediction": "blended", "placement": "charts"},
 }
-LARGEST_ERROR = 0.004  # model units, of the file with corrections
+LARGEST_ERROR = 0.001  # model units, of the file with corrections
 
 Mask = npt.NDArray[np.bool_]
 
