@@ -21,7 +21,9 @@ from sequences import awkward, waving
 
 import gvpipe
 from gvpipe.bitstream import Bitstream
+from gvpipe.codec import open_reader
 from gvpipe.container import read_file, write_file
+from gvpipe.corrections import Bound, encode_corrections
 from gvpipe.errors import CorruptFile
 from gvpipe.sequence import MeshSequence
 
@@ -45,6 +47,7 @@ KINDS: dict[str, dict[str, Any]] = {  # how vertices move, and where their pixel
     "blended": {"prediction": "blended", "placement": "halves"},
     "blended-charts": {"prediction": "blended", "placement": "charts"},
 }
+LARGEST_ERROR = 0.001  # model units, of the file with corrections
 
 Mask = npt.NDArray[np.bool_]
 
@@ -166,6 +169,18 @@ def test_frames_of_several_segments_in_the_codecs_order(kind: str, module: Calla
 def test_frames_on_the_finest_lattice(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     """Where integers are largest: sums that decide pixels and contexts must be exact still."""
     _check_frames(module, _encode(site, waving(20, 12), base_bits=20, quality=100, **KINDS[kind]))
+
+
+def test_frames_are_corrected(module: Callable[..., Any], site: tuple[Path, str], kinds: dict[str, Bitstream]) -> None:
+    """Files with a bound on every vertex keep it in the browser: all frames, over several groups of corrections."""
+    sequence, bitstream = waving(9, 12), kinds["corrected"]
+    write_file(bitstream, site[0] / "corrected.mp4")
+    _check_frames(module, site[0] / "corrected.mp4")
+    frames = module(FRAMES, "corrected.mp4", [*range(12)])["frames"]
+    found = np.stack([np.frombuffer(base64.b64decode(text), "<f4").reshape(-1, 3) for text in frames])
+    plain = open_reader(kinds["blended"]).read(0, 12)
+    before, after = (np.linalg.norm(sequence.positions - p, axis=2).max() for p in (plain, found))
+    assert after <= LARGEST_ERROR < before
 
 
 def test_frames_of_golden_files(module: Callable[..., Any], site: tuple[Path, str]) -> None:
@@ -298,6 +313,10 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Bitstream]:
     for kind, settings in KINDS.items():
         gvpipe.encode(waving(9, 12), path, **{**FAST, **settings})
         found[kind] = read_file(path)
+    sequence, plain = waving(9, 12), found["blended"]
+    bound = Bound.of(LARGEST_ERROR, float(np.abs(sequence.positions).max()))
+    section, _ = encode_corrections(sequence, open_reader(plain), bound)
+    found["corrected"] = dataclasses.replace(plain, sections={**plain.sections, "corrections": section})
     return found
 
 
@@ -343,6 +362,7 @@ def test_settings_out_of_range_are_noticed(
         ("blended", "mesh"),
         ("blended", "weights"),
         ("blended", "transforms.0"),
+        ("corrected", "corrections"),
     ],
 )
 def test_hostile_sections_give_one_clear_error(
@@ -377,7 +397,8 @@ def test_hostile_sections_give_one_clear_error(
 
 def _outcome(path: Path) -> str:
     try:
-        gvpipe.decode(path).read(0, 1)
+        sequence = gvpipe.decode(path)
+        sequence.read(0, sequence.n_frames)
     except CorruptFile:
         return "corrupt"
     return "loaded"

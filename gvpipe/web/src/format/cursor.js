@@ -50,6 +50,11 @@ export class Cursor {
     return this.u32() * 2 ** 32 + low;
   }
 
+  f64() {
+    this.take(8);
+    return this.view.getFloat64(this.position - 8, true);
+  }
+
   /** The next `count` 32-bit words, copied: sections are not aligned. Browsers run on little-endian machines alone. */
   words(count) {
     return new Uint32Array(this.take(4 * count).slice().buffer);

@@ -33,17 +33,14 @@ export class RangeDecoder {
   /** Decode `count` symbols of one categorical model: `edges` are its left cumulatives, then TOTAL. */
   categorical(edges, count) {
     const symbols = new Uint8Array(count);
+    const top = edges.length - 2;
     for (let i = 0; i < count; i++) {
-      const quantile = this.#quantile();
-      let first = 0;
-      let last = edges.length - 2;
-      while (first < last) {
-        const middle = (first + last + 1) >> 1;
-        if (edges[middle] <= quantile) first = middle;
-        else last = middle - 1;
-      }
+      const scale = this.#scale;
+      const near = Math.floor((this.high * WORD + this.low) / scale); // of a rounded double: at most one off
+      let first = search(edges, top, near);
+      if (near - 1 < edges[first] || near + 1 >= edges[first + 1]) first = search(edges, top, this.#quantile());
       symbols[i] = first;
-      this.#advance(edges[first], edges[first + 1] - edges[first]);
+      this.#advance(scale, edges[first], edges[first + 1] - edges[first]);
     }
     return symbols;
   }
@@ -52,7 +49,7 @@ export class RangeDecoder {
   uniform(size) {
     const share = Math.floor(TOTAL / size);
     const symbol = Math.min(Math.floor(this.#quantile() / share), size - 1);
-    this.#advance(symbol * share, symbol < size - 1 ? share : TOTAL - symbol * share);
+    this.#advance(this.#scale, symbol * share, symbol < size - 1 ? share : TOTAL - symbol * share);
     return symbol;
   }
 
@@ -63,7 +60,7 @@ export class RangeDecoder {
   }
 
   get #scale() {
-    return this.rangeHigh * 2 ** (32 - PRECISION) + (this.rangeLow >>> PRECISION);
+    return this.rangeHigh * 2 ** (32 - PRECISION) + Math.floor(this.rangeLow / TOTAL);
   }
 
   #quantile() {
@@ -82,8 +79,7 @@ export class RangeDecoder {
     return (this.high - this.productHigh) * WORD + (this.low - this.productLow);
   }
 
-  #advance(left, probability) {
-    const scale = this.#scale;
+  #advance(scale, left, probability) {
     this.#multiply(scale, left);
     this.high -= this.productHigh;
     this.low -= this.productLow;
@@ -127,4 +123,16 @@ export function categoricalEdges(weights) {
   });
   edges[weights.length] = TOTAL;
   return edges;
+}
+
+/** The last of symbols 0..top whose left edge does not lie beyond a quantile. */
+function search(edges, top, quantile) {
+  let first = 0;
+  let last = top;
+  while (first < last) {
+    const middle = (first + last + 1) >> 1;
+    if (edges[middle] <= quantile) first = middle;
+    else last = middle - 1;
+  }
+  return first;
 }

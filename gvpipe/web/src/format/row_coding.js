@@ -29,6 +29,7 @@ const ROUNDED = powersOfTwo();
 const LEVEL_BOUNDS = Float64Array.from({ length: MAX_LEVEL + 1 }, (_, level) => Number(ROUNDED[4 * level]));
 /** The least integers v with 64 v + 1 >= 2 ** (i / 16) rounded down. */
 const LOG_BOUNDS = Float64Array.from(ROUNDED, (power) => Number((power - 1n + 63n) >> 6n));
+const SMALL_LOGS = Int16Array.from({ length: 1 << 14 }, (_, value) => searchLog(value)); // of most that are asked for
 
 /**
  * @param {Uint8Array} data
@@ -102,17 +103,24 @@ function decodeResiduals(rows, usual, coder) {
 
 /** What a row's components before c say: logarithms of weighted sums of their magnitudes, which are `one` times the row's. */
 function spans(row, start, c, one) {
-  const sum = (taps) => {
-    let total = 0;
-    for (let t = Math.min(taps.length, c) - 1; t >= 0; t--) total += one * Math.abs(row[start + c - 1 - t]) * taps[t];
-    return total;
-  };
-  return POWERS[3] * log(sum(SHORT) + FLOOR_SPAN) + POWERS[4] * log(sum(LONG) + FLOOR_SPAN);
+  let short = 0;
+  let long = 0;
+  for (let t = Math.min(c, LONG.length) - 1; t >= 0; t--) {
+    const magnitude = Math.abs(row[start + c - 1 - t]);
+    long += magnitude * LONG[t];
+    if (t < SHORT.length) short += magnitude * SHORT[t];
+  }
+  return POWERS[3] * log(one * short + FLOOR_SPAN) + POWERS[4] * log(one * long + FLOOR_SPAN);
 }
 
 /** Logarithm of an integer to base two, in 1 / PER_OCTAVE, rounded down; of 0 as of 1/64. */
 function log(value) {
-  let [low, high] = [0, LOG_BOUNDS.length];
+  return value < SMALL_LOGS.length ? SMALL_LOGS[value] : searchLog(value);
+}
+
+function searchLog(value) {
+  let low = 0;
+  let high = LOG_BOUNDS.length;
   while (low < high) {
     const middle = (low + high) >> 1;
     if (LOG_BOUNDS[middle] <= value) low = middle + 1;

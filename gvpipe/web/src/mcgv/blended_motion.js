@@ -5,7 +5,7 @@ import { Segments } from "./motion.js";
 import { Trajectories } from "./trajectories.js";
 import { decodeWeights } from "./weight_coding.js";
 
-const LOOKS = 2 ** 25; // products that a look at the whole motion may take: some hundredths of a second
+const LOOKS = 2 ** 24; // products that a look at the whole motion may take: some hundredths of a second
 
 /** @implements {import("./motion.js").Motion} */
 export class BlendedMotion {

@@ -1,6 +1,6 @@
 /** What the reader knows of a prediction, whichever it is. Mirrors `gvcodecs.mcgv.motion` and `gvpipe.segments`. */
 
-const KEPT = 4; // segments that stay decoded
+import { Recent } from "../format/recent.js";
 
 /**
  * @typedef {object} Motion
@@ -17,8 +17,7 @@ export class Segments {
   constructor(frames, count, decode) {
     this.frames = frames;
     this.count = count;
-    this.decode = decode;
-    this.kept = new Map();
+    this.recent = new Recent((s) => decode(`transforms.${s}`, this.start(s + 1) - this.start(s)));
   }
 
   /** First frame of a segment; F for the one after the last. */
@@ -33,10 +32,6 @@ export class Segments {
   }
 
   get(s) {
-    if (!this.kept.has(s)) {
-      this.kept.set(s, this.decode(`transforms.${s}`, this.start(s + 1) - this.start(s)));
-      if (this.kept.size > KEPT) this.kept.delete(this.kept.keys().next().value);
-    }
-    return this.kept.get(s);
+    return this.recent.get(s);
   }
 }

@@ -1,6 +1,7 @@
 /** From an `mcgv` bitstream and the levels of its pictures to positions, any frame in any order. Mirrors the codec's reader. */
 
 import { decodeBase } from "../format/base_mesh.js";
+import { Corrections, SECTION } from "../format/corrections.js";
 import { AGAIN, GeometryVideoError } from "../format/errors.js";
 import { AffineMotion } from "./affine_motion.js";
 import { BlendedMotion } from "./blended_motion.js";
@@ -29,6 +30,8 @@ export class McgvReader {
     this.basePoints = base.points;
     const { pixels, motion } = decodeMotion(payload, header, base);
     this.motion = motion;
+    const corrections = payload.sections.get(SECTION);
+    this.corrections = corrections ? new Corrections(corrections, payload.header.frames, base.visits.length) : null;
     const plane = header.width * header.height;
     /** (V, 3) which sample of a picture carries each coordinate. */
     this.samples = new Uint32Array(base.points.length);
@@ -49,10 +52,15 @@ export class McgvReader {
     const step = this.header.residualStep;
     for (let i = 0; i < positions.length; i++) positions[i] = step * (levels[i] - ZERO);
     this.motion.addTo(frame, positions);
+    this.corrections?.apply(frame, positions);
   }
 
-  /** The box that the whole motion stays in, but for residuals; model units. Decodes, and so checks, all transforms. */
+  /**
+   * The box that the whole motion stays in, but for residuals; model units. Decodes, and so checks, all transforms and
+   * corrections.
+   */
   bounds() {
+    this.corrections?.check();
     const box = { min: [Infinity, Infinity, Infinity], max: [-Infinity, -Infinity, -Infinity] };
     this.motion.extend(box);
     if (![...box.min, ...box.max].every(Number.isFinite)) {
