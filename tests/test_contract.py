@@ -29,7 +29,14 @@ SETTINGS: dict[str, list[dict[str, object]]] = {
         {"operator": "cotangent", "delta_prediction": "rigid"},
         {"operator": "tutte", "delta_prediction": "none"},
     ],
-    "mcgv": [{}, {"image": "jpeg"}, {"profile": "precise"}, {"prediction": "blended"}, {"placement": "halves"}],
+    "mcgv": [
+        {},
+        {"image": "jpeg"},
+        {"profile": "precise"},
+        {"prediction": "blended"},
+        {"placement": "halves"},
+        {"prediction": "blended", "transform": "klt"},
+    ],
     "pca": [{}, {"predictor": "rbf"}, {"predictor": "lsp"}, {"predictor": "navg"}],
     "pdct": [{}, {"clusters": 3, "fineness": 2.0}],
 }

@@ -30,6 +30,11 @@ CURRENT: dict[str, tuple[str, dict[str, object]]] = {
         "mcgv",
         {"prediction": "blended", "clusters": 5, "image": "jpeg", "reorder": True, "placement": "halves"},
     ),
+    "mcgv-2-klt": ("mcgv", {"prediction": "blended", "transform": "klt", "segment": 7}),
+    "mcgv-2-klt-10": (
+        "mcgv",
+        {"prediction": "blended", "transform": "klt", "profile": "precise", "placement": "charts", "reorder": True},
+    ),
     "pca-1-kalman": ("pca", {"segment": 7}),
     "pca-1-lsp": ("pca", {"predictor": "lsp"}),
     "pca-1-navg": ("pca", {"predictor": "navg"}),

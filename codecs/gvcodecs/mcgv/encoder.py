@@ -14,7 +14,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,12 @@ from gvcodecs.mcgv.padding import Padding
 from gvcodecs.mcgv.parameterization import parameterize
 from gvcodecs.mcgv.placement import choose_size, place
 from gvcodecs.mcgv.points import Points
-from gvcodecs.mcgv.quality import choose_quantiser, effective_step
+from gvcodecs.mcgv.quality import Quantiser, choose_quantiser, effective_step
 from gvcodecs.mcgv.reader import McgvReader
 from gvcodecs.mcgv.segmentation import segment
+from gvcodecs.mcgv.trajectory_encoder import code_trajectories
+from gvcodecs.mcgv.trajectory_header import TRANSFORMS
+from gvcodecs.mcgv.trajectory_reader import TrajectoryReader
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.connectivity import BaseMesh, decode_base, encode_base
@@ -65,6 +68,7 @@ class Mcgv(Settings):
     quality: float = 75.0  # 0..100, higher is better
     image: str = "h264"  # h264: predictive; jpeg: every frame decodes alone
     profile: str = "web"  # web: 8 bits, browsers read it; precise: 10 bits (h264 only)
+    transform: str = "none"  # none: pictures are frames; klt: coefficients of trajectories (blended h264 only), smaller
     prediction: str = "affine"  # affine: vertices follow one cluster, as published; blended: up to four; smaller, opens later
     clusters: int = 0  # K, 1..1024; 0: as many as pay (blended), 20 (affine)
     transform_bits: int = 17  # bits over the sequence's extent, 8..24 (affine)
@@ -83,6 +87,7 @@ class Mcgv(Settings):
         self.check_choice("profile", ("web", "precise"))
         self.check_choice("preset", PRESETS)
         self.check_choice("prediction", PREDICTIONS)
+        self.check_choice("transform", TRANSFORMS)
         self.check_choice("placement", (AUTO, *sections.PLACEMENTS))
         self.check_range(0, sections.MAX_CLUSTERS, "clusters")
         self.check_range(8, 24, "transform_bits")
@@ -92,6 +97,8 @@ class Mcgv(Settings):
         self.check_range(1, 100_000, "segment")
         if self.image == "jpeg" and self.profile == "precise":
             raise SettingError("profile precise needs image h264: JPEG has 8 bits")
+        if self.transform == "klt" and (self.image != "h264" or self.prediction != "blended"):
+            raise SettingError("transform klt needs image h264 and prediction blended")
         if 0 < self.base_bits < 4:
             raise SettingError(f"base_bits is {self.base_bits}; 0 or an integer in 4..20 is needed")
         self._plane_size()
@@ -110,7 +117,8 @@ class Mcgv(Settings):
         report("base", 0)
         first = given.read(0, 1)[0]
         profile = PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
-        effective = effective_step(self.quality, profile, float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0))))
+        scale = PROFILES["h264-10"] if self.transform == "klt" else profile  # no range ends the qualities of trajectory images
+        effective = effective_step(self.quality, scale, float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0))))
         lattice = self._lattice(first, effective / math.sqrt(given.n_frames))
         coded = memo(f"base {lattice.step}", lambda: encode_base(lattice.quantise(first), given.faces, self.reorder))
         memo.permutation = coded.permutation
@@ -120,19 +128,28 @@ class Mcgv(Settings):
         points = Points.of(decoded.points, decoded.faces, decoded.visits)
         n_segments = count_segments(sequence.n_frames, self.segment)
         bounds = segment_starts(sequence.n_frames, n_segments)
+        own: dict[str, Any]
         if self.prediction == "blended":
-            motion = code_blended(sequence, base, points, bounds, effective, self.clusters, report)
-            partition = np.zeros(len(points.members), np.int32)  # nothing ties charts to clusters: few, large ones are best
+            whole = np.zeros(len(points.members), np.int32)  # nothing ties charts to clusters: few, large ones are best
             groups = points.pieces()
-            layout = memo(
-                f"layout {lattice.step}", lambda: self._layout(base, decoded.points, points, partition, groups, report)
+            layout = memo(f"layout {lattice.step}", lambda: self._layout(base, decoded.points, points, whole, groups, report))
+        if self.transform == "klt":
+            block, clusters = BLOCKS[self.image], self.clusters
+            images = code_trajectories(
+                sequence, base, points, layout, block, bounds, effective, clusters, profile, self.preset, report
             )
-            largest = _largest(sequence, motion, bounds)
+            own, coded_sections, video = {"clusters": images.n_clusters, "images": images.header}, images.sections, images.video
         else:
-            step = extent / 2**self.transform_bits
-            motion, layout = memo("motion", lambda: self._published(sequence, base, decoded, points, bounds, step, report))
-            largest = memo("largest", lambda: _largest(sequence, motion, bounds))
-        quantiser = choose_quantiser(effective, profile, largest)
+            if self.prediction == "blended":
+                motion = code_blended(sequence, base, points, bounds, effective, self.clusters, report)
+                largest = _largest(sequence, motion, bounds)
+            else:
+                step = extent / 2**self.transform_bits
+                motion, layout = memo("motion", lambda: self._published(sequence, base, decoded, points, bounds, step, report))
+                largest = memo("largest", lambda: _largest(sequence, motion, bounds))
+            quantiser = choose_quantiser(effective, profile, largest)
+            own = {"clusters": motion.n_clusters, "transform_step": motion.step, "residual_step": quantiser.step}
+            coded_sections, video = motion.sections, self._frames(sequence, motion, bounds, layout, profile, quantiser, report)
         header = sections.Header(
             prediction=self.prediction,
             placement=self._placement,
@@ -140,21 +157,10 @@ class Mcgv(Settings):
             block=BLOCKS[self.image],
             width=layout.width,
             height=layout.height,
-            clusters=motion.n_clusters,
             segments=n_segments,
             base=lattice,
-            transform_step=motion.step,
-            residual_step=quantiser.step,
+            **own,
         )
-        report("video", 0)
-        padding = Padding(layout, header.block)
-        shape = (3 * layout.height, layout.width)
-        with VideoWriter(profile, shape[1], shape[0], sequence.fps, quantiser.level, self.gop, self.preset) as writer:
-            for first, residual in _residuals(sequence, motion, bounds):
-                for picture in _pictures(residual, padding, profile, quantiser.step):
-                    writer.add(picture)
-                report("video", (first + len(residual)) / sequence.n_frames)
-            video = writer.finish()
         pixels = {} if self._placement == "halves" else {"pixels": sections.encode_pixels(layout, np.argsort(decoded.visits))}
         return Bitstream(
             codec=self.id,
@@ -168,7 +174,7 @@ class Mcgv(Settings):
                 "mesh": coded.mesh,
                 "order": coded.order,
                 **pixels,
-                **motion.sections,
+                **coded_sections,
             },
             video=video,
         )
@@ -176,7 +182,29 @@ class Mcgv(Settings):
     @classmethod
     def reader(cls, bitstream: Bitstream) -> FrameReader:
         """Open an ``mcgv`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
-        return McgvReader(bitstream)
+        header = sections.Header.of(bitstream)
+        return TrajectoryReader(bitstream, header, header.images) if header.images else McgvReader(bitstream)
+
+    def _frames(
+        self,
+        sequence: MeshSequence,
+        motion: CodedMotion,
+        bounds: list[int],
+        layout: Layout,
+        profile: Profile,
+        quantiser: Quantiser,
+        report: Progress,
+    ) -> bytes:
+        """The video whose pictures are the frames' residuals."""
+        report("video", 0)
+        padding = Padding(layout, BLOCKS[self.image])
+        shape = (3 * layout.height, layout.width)
+        with VideoWriter(profile, shape[1], shape[0], sequence.fps, quantiser.level, self.gop, self.preset) as writer:
+            for first, residual in _residuals(sequence, motion, bounds):
+                for picture in _pictures(residual, padding, profile, quantiser.step):
+                    writer.add(picture)
+                report("video", (first + len(residual)) / sequence.n_frames)
+            return writer.finish()
 
     def _lattice(self, first: Float32, step: float) -> Lattice:
         """The base frame's lattice: by default of about this step, as its errors stay for all frames; it tells places apart."""

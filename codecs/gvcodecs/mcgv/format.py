@@ -9,6 +9,7 @@
                    difference from the block before; halves: of each vertex in the codec's order, from the vertex before
 ``weights``        blended: which clusters each point follows (`weight_coding`)
 ``transforms.N``   transforms of segment N (affine: `transforms`, blended: `trajectories`)
+``trajectories.N`` klt, in place of ``transforms.N``: principal trajectories of segment N (`trajectory_images`)
 =================  ==========================================================================================
 
 Version 1 knows affine prediction and charts alone; files with both are still written as version 1.
@@ -28,8 +29,10 @@ from numpy.typing import NDArray
 
 from gvcodecs.mcgv.motion import PREDICTIONS
 from gvcodecs.mcgv.packing import Layout
+from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvpipe.binary import Cursor, varint
 from gvpipe.bitstream import Bitstream
+from gvpipe.connectivity import BaseMesh, decode_base
 from gvpipe.entropy import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile
 from gvpipe.quantize import Lattice
@@ -59,7 +62,8 @@ class Header:
         clusters: K.
         segments: how many; segment s starts at frame ``s * F // segments``.
         base: lattice of the base frame.
-        transform_step, residual_step: quantisation steps.
+        transform_step, residual_step: quantisation steps where pictures are frames.
+        images: where pictures are coefficients of trajectories.
     """
 
     prediction: str
@@ -71,8 +75,9 @@ class Header:
     clusters: int
     segments: int
     base: Lattice
-    transform_step: float
-    residual_step: float
+    transform_step: float = 1.0
+    residual_step: float = 1.0
+    images: TrajectoryHeader | None = None
 
     @property
     def version(self) -> int:
@@ -82,6 +87,10 @@ class Header:
     def to_json(self) -> dict[str, Any]:
         """Return the header as JSON values."""
         values = asdict(self)
+        del values["images"]
+        if self.images:
+            del values["transform_step"], values["residual_step"]
+            values |= self.images.to_json()
         if self.version == 1:
             del values["prediction"], values["placement"]
         values["profile"] = self.profile.name
@@ -103,6 +112,8 @@ class Header:
             raise CorruptFile(f"header: base is {base!r}; an origin and a step are needed")
         if not (base[3] > 0 and all(abs(v) < LARGE for v in base)):  # NaN neither
             raise CorruptFile(f"header: base is {base!r}, out of range")
+        segments = bitstream.integer("segments", 1, min(MAX_SEGMENTS, bitstream.n_frames))
+        images = TrajectoryHeader.of(bitstream, segments)
         header = cls(
             prediction=prediction,
             placement=placement,
@@ -111,11 +122,14 @@ class Header:
             width=bitstream.integer("width", 2, MAX_SIDE),
             height=bitstream.integer("height", 2, MAX_SIDE // 3),
             clusters=bitstream.integer("clusters", 1, MAX_CLUSTERS),
-            segments=bitstream.integer("segments", 1, min(MAX_SEGMENTS, bitstream.n_frames)),
+            segments=segments,
             base=Lattice((base[0], base[1], base[2]), base[3]),
-            transform_step=bitstream.number("transform_step", SMALL, LARGE),
-            residual_step=bitstream.number("residual_step", SMALL, LARGE),
+            transform_step=1.0 if images else bitstream.number("transform_step", SMALL, LARGE),
+            residual_step=1.0 if images else bitstream.number("residual_step", SMALL, LARGE),
+            images=images,
         )
+        if images and (prediction != "blended" or profile.codec != "h264"):
+            raise CorruptFile(f"header: no trajectory images with prediction {prediction!r} and profile {profile.name!r}")
         if header.width % header.block or header.height % header.block:
             raise CorruptFile(f"header: planes of {header.width}x{header.height} are not whole blocks of {header.block}")
         if placement == "halves" and header.block not in (8, 16):
@@ -123,6 +137,15 @@ class Header:
         if header.width * header.height < bitstream.n_vertices:
             raise CorruptFile(f"header: planes of {header.width}x{header.height} do not hold {bitstream.n_vertices} vertices")
         return header
+
+
+def decode_surface(bitstream: Bitstream) -> BaseMesh:
+    """The base frame of the sections ``mesh`` and ``order``; raises `CorruptFile` if it is not what the header says."""
+    base = decode_base(bitstream.section("mesh"), bitstream.section("order"))
+    found = (len(base.points), len(base.faces))
+    if found != (bitstream.n_vertices, bitstream.n_triangles):
+        raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
+    return base
 
 
 def encode_pixels(layout: Layout, order: Int64) -> bytes:

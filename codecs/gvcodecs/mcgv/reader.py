@@ -13,10 +13,11 @@ from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import AffineMotion
 from gvcodecs.mcgv.blended_motion import BlendedMotion
 from gvcodecs.mcgv.motion import Motion
+from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.placement import place
 from gvcodecs.mcgv.points import Points
 from gvpipe.bitstream import Bitstream
-from gvpipe.connectivity import BaseMesh, decode_base
+from gvpipe.connectivity import BaseMesh
 from gvpipe.errors import CorruptFile
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
@@ -49,29 +50,22 @@ class McgvReader:
 
     @cached_property
     def _base(self) -> BaseMesh:
-        bitstream = self._bitstream
-        base = decode_base(bitstream.section("mesh"), bitstream.section("order"))
-        found = (len(base.points), len(base.faces))
-        if found != (bitstream.n_vertices, bitstream.n_triangles):
-            raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
-        return base
+        return sections.decode_surface(self._bitstream)
 
     @cached_property
     def _motion(self) -> Motion:
         bitstream, header, base = self._bitstream, self._header, self._base
-        order = np.argsort(base.visits)
         positions = header.base.place(base.points)
-        if header.placement == "charts":
-            layout = sections.decode_pixels(bitstream.section("pixels"), order, header.width, header.height)
         if header.prediction == "blended":
             points = Points.of(base.points, base.faces, base.visits)
-            if header.placement == "halves":
-                layout = place(base.points, points.pieces(), header.width, header.height, header.block)
+            layout = blended_layout(bitstream, header, base, points)
             return BlendedMotion(bitstream, header, positions, points, layout, self._bounds)
+        order = np.argsort(base.visits)
         if header.placement == "halves":
             clusters = sections.decode_vertex_clusters(bitstream.section("clusters"), order, header.clusters)
             layout = place(base.points, clusters, header.width, header.height, header.block)
         else:
+            layout = sections.decode_pixels(bitstream.section("pixels"), order, header.width, header.height)
             clusters = sections.decode_clusters(bitstream.section("clusters"), layout, header.block, header.clusters)
         return AffineMotion(bitstream, header, positions, clusters, layout, self._bounds)
 
@@ -91,3 +85,10 @@ class McgvReader:
             for frame, plane in enumerate(planes, first):
                 self._motion.rebuild(frame, plane.reshape(3, -1), result[frame - start])
         return result
+
+
+def blended_layout(bitstream: Bitstream, header: sections.Header, base: BaseMesh, points: Points) -> Layout:
+    """The vertices' pixels in a file of blended prediction; raises `CorruptFile`."""
+    if header.placement == "halves":
+        return place(base.points, points.pieces(), header.width, header.height, header.block)
+    return sections.decode_pixels(bitstream.section("pixels"), np.argsort(base.visits), header.width, header.height)

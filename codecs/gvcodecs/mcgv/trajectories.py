@@ -53,8 +53,8 @@ def encode_trajectories(rows: Float64, step: float) -> tuple[bytes, Trajectories
     principal = find_principal(rows, rows.size * step * step / 12)
     n_components = count_components(principal, len(rows), step)
     head, basis = encode_basis(principal, n_components, len(rows), step)
-    coefficients, decoded = encode_rows(fit_coefficients(rows, basis), step, _lone_rows(len(rows)))
-    return varint(len(head)) + head + coefficients, Trajectories(basis, decoded)
+    data, decoded = encode_coefficients(fit_coefficients(rows, basis), step)
+    return varint(len(head)) + head + data, Trajectories(basis, decoded)
 
 
 def decode_trajectories(data: bytes, n_clusters: int, n_frames: int, step: float, name: str) -> Trajectories:
@@ -62,8 +62,18 @@ def decode_trajectories(data: bytes, n_clusters: int, n_frames: int, step: float
     cursor = Cursor(data, name)
     head = cursor.take(cursor.varint(cursor.left, "a length"))
     basis = decode_basis(head, n_frames, 4 * n_clusters, step, name)
-    rows = _lone_rows(4 * n_clusters)
-    return Trajectories(basis, decode_rows(cursor.rest(), basis.vectors.shape[1], step, rows, name))
+    coefficients = decode_coefficients(cursor.rest(), n_clusters, basis.vectors.shape[1], step, name)
+    return Trajectories(basis, coefficients)
+
+
+def encode_coefficients(coefficients: Float64, step: float) -> tuple[bytes, Float64]:
+    """Code the transforms' ``coefficients (4K, R)``; return the bytes and what the decoder will have."""
+    return encode_rows(coefficients, step, _lone_rows(len(coefficients)))
+
+
+def decode_coefficients(data: bytes, n_clusters: int, n_components: int, step: float, name: str) -> Float64:
+    """Mirror of `encode_coefficients`; raises `CorruptFile` if the bytes are not what it writes."""
+    return decode_rows(data, n_components, step, _lone_rows(4 * n_clusters), name)
 
 
 def _lone_rows(n_rows: int) -> Rows:

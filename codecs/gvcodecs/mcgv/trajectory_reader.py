@@ -1,0 +1,142 @@
+"""From trajectory images back to frames, any of them, in any order.
+
+The first frame of a segment costs the segment's pictures; each after that one product of a small matrix with the coefficients.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gvcodecs.mcgv import format as sections
+from gvcodecs.mcgv.blending import Blend
+from gvcodecs.mcgv.motion import locate
+from gvcodecs.mcgv.packing import Layout
+from gvcodecs.mcgv.points import Points
+from gvcodecs.mcgv.reader import blended_layout
+from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
+from gvcodecs.mcgv.trajectory_images import PLANES, count_pictures, decode_segment
+from gvcodecs.mcgv.weight_coding import decode_weights
+from gvpipe.bitstream import Bitstream
+from gvpipe.errors import CorruptFile
+from gvpipe.segments import segment_starts
+from gvpipe.sequence import Float32, Int32
+from gvpipe.trajectory_basis import Basis
+from gvpipe.video import VideoReader
+
+MAX_FLOAT32 = float(np.finfo(np.float32).max)
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """What all segments share.
+
+    Args:
+        faces: ``(T, 3)`` triangles.
+        base: ``(3, V)`` decoded base positions, model units.
+        point: ``(V,)`` the point of each vertex.
+        layout: the vertices' pixels.
+        matrix: ``(P, 4K)`` of the blend.
+    """
+
+    faces: Int32
+    base: Float64
+    point: NDArray[np.int64]
+    layout: Layout
+    matrix: sparse.csr_array
+
+
+@dataclass(frozen=True)
+class _Segment:
+    """A decoded segment: its number, its basis, and its vertices' coefficients ``(R, V)``."""
+
+    number: int
+    basis: Basis
+    coefficients: Float64
+
+
+class TrajectoryReader:
+    """Frames of an ``mcgv`` bitstream of trajectory images.
+
+    Raises:
+        CorruptFile: here or later: a section does not hold what it must.
+    """
+
+    def __init__(self, bitstream: Bitstream, header: sections.Header, images: TrajectoryHeader) -> None:
+        self._bitstream, self._header, self._images = bitstream, header, images
+        self._bounds = segment_starts(bitstream.n_frames, header.segments)
+        counts = [count_pictures(n) for n in images.components]
+        self._pictures = np.concatenate([[0], np.cumsum(counts)])  # first picture of every segment, and their number
+        self._video = VideoReader(bitstream.video, header.profile, header.width, PLANES * header.height)
+        if self._video.n_frames != sum(counts):
+            raise CorruptFile(f"the video has {self._video.n_frames} pictures, the header tells of {sum(counts)}")
+        self._segment: _Segment | None = None
+
+    @property
+    def n_frames(self) -> int:
+        """F, the number of frames."""
+        return self._bitstream.n_frames
+
+    @property
+    def faces(self) -> Int32:
+        """``(T, 3) int32`` triangles."""
+        return self._surface.faces
+
+    @cached_property
+    def _surface(self) -> _Surface:
+        base = sections.decode_surface(self._bitstream)
+        header = self._header
+        positions = header.base.place(base.points)
+        points = Points.of(base.points, base.faces, base.visits)
+        layout = blended_layout(self._bitstream, header, base, points)
+        weights = decode_weights(self._bitstream.section("weights"), points.neighbours(), header.clusters)
+        matrix = Blend(positions[points.members], weights, header.clusters).matrix()
+        return _Surface(base.faces, np.ascontiguousarray(positions.T), points.point, layout, matrix)
+
+    def read(self, start: int, stop: int) -> Float32:
+        """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
+
+        Raises:
+            CorruptFile: a section or the video does not decode.
+        """
+        base = self._surface.base
+        result = np.empty((stop - start, base.shape[1], 3), np.float32)
+        for frame in range(start, stop):  # one by one, so that a frame's sums do not depend on what else is read
+            s = locate(self._bounds, frame)
+            segment = self._decode(s)
+            rows = slice(3 * (frame - self._bounds[s]), 3 * (frame - self._bounds[s] + 1))
+            placed = segment.basis.vectors[rows] @ segment.coefficients  # (3, V)
+            placed += segment.basis.mean[rows, None]
+            placed += base
+            if not np.abs(placed).max(initial=0) <= MAX_FLOAT32:
+                raise CorruptFile(f"frame {frame} does not decode to finite positions; get the file again from its source")
+            result[frame - start] = placed.T
+        return result
+
+    def _decode(self, s: int) -> _Segment:
+        if self._segment is None or self._segment.number != s:
+            surface, name = self._surface, f"trajectories.{s}"
+            n_frames = self._bounds[s + 1] - self._bounds[s]
+            data = self._bitstream.section(name)
+            samples, step = self._samples(s), self._images.steps[s]
+            basis, coefficients = decode_segment(data, samples, step, surface.matrix, surface.point, n_frames, name)
+            self._segment = _Segment(s, basis, coefficients)
+        return self._segment
+
+    def _samples(self, s: int) -> Float64:
+        """What a segment's planes hold at the vertices' pixels: ``(R, V)``, steps."""
+        pixel = self._surface.layout.pixel
+        first, last = int(self._pictures[s]), int(self._pictures[s + 1])
+        result = np.empty((PLANES * (last - first), len(pixel)))
+        for start, pictures in self._video.read(first, last):
+            for k, picture in enumerate(pictures, start - first):
+                result[PLANES * k : PLANES * (k + 1)] = picture.reshape(PLANES, -1)[:, pixel]
+        result -= self._header.profile.middle
+        result /= self._images.fineness
+        return result[: self._images.components[s]]
