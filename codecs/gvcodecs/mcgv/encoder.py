@@ -23,12 +23,13 @@ from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import code_affine
 from gvcodecs.mcgv.blended_motion import code_blended
 from gvcodecs.mcgv.motion import PREDICTIONS, CodedMotion
+from gvcodecs.mcgv.outliers import SECTION, OutlierWriter
 from gvcodecs.mcgv.packing import Layout, pack
 from gvcodecs.mcgv.padding import Padding
 from gvcodecs.mcgv.parameterization import parameterize
 from gvcodecs.mcgv.placement import choose_size, place
 from gvcodecs.mcgv.points import Points
-from gvcodecs.mcgv.quality import Quantiser, choose_quantiser, effective_step
+from gvcodecs.mcgv.quality import Magnitudes, Quantiser, choose_quantiser, effective_step
 from gvcodecs.mcgv.reader import McgvReader
 from gvcodecs.mcgv.segmentation import segment
 from gvcodecs.mcgv.trajectory_encoder import code_trajectories
@@ -142,14 +143,18 @@ class Mcgv(Settings):
         else:
             if self.prediction == "blended":
                 motion = code_blended(sequence, base, points, bounds, effective, self.clusters, report)
-                largest = _largest(sequence, motion, bounds)
+                magnitudes = _magnitudes(sequence, motion, bounds)
             else:
                 step = extent / 2**self.transform_bits
                 motion, layout = memo("motion", lambda: self._published(sequence, base, decoded, points, bounds, step, report))
-                largest = memo("largest", lambda: _largest(sequence, motion, bounds))
-            quantiser = choose_quantiser(effective, profile, largest)
+                magnitudes = memo("magnitudes", lambda: _magnitudes(sequence, motion, bounds))
+            quantiser = choose_quantiser(effective, profile, magnitudes)
+            outliers = OutlierWriter(profile, quantiser.step, effective, self.gop, sequence.n_vertices)
+            video = self._frames(sequence, motion, bounds, layout, profile, quantiser, outliers, report)
             own = {"clusters": motion.n_clusters, "transform_step": motion.step, "residual_step": quantiser.step}
-            coded_sections, video = motion.sections, self._frames(sequence, motion, bounds, layout, profile, quantiser, report)
+            coded_sections, apart = motion.sections, outliers.finish()
+            if apart:
+                own["outliers"], coded_sections = True, {**coded_sections, SECTION: apart}
         header = sections.Header(
             prediction=self.prediction,
             placement=self._placement,
@@ -193,14 +198,16 @@ class Mcgv(Settings):
         layout: Layout,
         profile: Profile,
         quantiser: Quantiser,
+        outliers: OutlierWriter,
         report: Progress,
     ) -> bytes:
-        """The video whose pictures are the frames' residuals."""
+        """The video whose pictures are the frames' residuals; what they cannot hold goes to ``outliers``."""
         report("video", 0)
         padding = Padding(layout, BLOCKS[self.image])
         shape = (3 * layout.height, layout.width)
         with VideoWriter(profile, shape[1], shape[0], sequence.fps, quantiser.level, self.gop, self.preset) as writer:
             for first, residual in _residuals(sequence, motion, bounds):
+                outliers.add(residual)
                 for picture in _pictures(residual, padding, profile, quantiser.step):
                     writer.add(picture)
                 report("video", (first + len(residual)) / sequence.n_frames)
@@ -280,9 +287,12 @@ def _extent(sequence: MeshSequence, report: Progress) -> float:
     return float((high - low).max()) or 1.0
 
 
-def _largest(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> float:
-    """The largest coordinate of a residual, model units."""
-    return max(float(np.abs(residual).max(initial=0.0)) for _, residual in _residuals(sequence, motion, bounds))
+def _magnitudes(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> Magnitudes:
+    """Of all residuals."""
+    magnitudes = Magnitudes()
+    for _, residual in _residuals(sequence, motion, bounds):
+        magnitudes.add(residual)
+    return magnitudes
 
 
 def _residuals(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> Iterator[tuple[int, Float64]]:
