@@ -47,6 +47,7 @@ def stream() -> Bitstream:
         {"quality": 85, "placement": "halves"},
         {"quality": 100, "prediction": "blended"},
         {"quality": 100, "profile": "precise"},
+        {"quality": 85, "image": "jpeg"},
     ],
     ids=str,
 )

@@ -483,33 +483,31 @@ def test_padding_of_full_and_single_blocks() -> None:
 @pytest.mark.parametrize("name", PROFILES)
 @pytest.mark.parametrize("largest", [1e-9, 1e-3, 0.05, 0.5, 20.0])
 def test_quality_is_monotone(name: str, largest: float) -> None:
-    """The step that a coefficient sees falls with quality, is the one asked for unless JPEG's levels run out; residuals fit
-    those, and nearly all do those of H.264."""
+    """The step that a coefficient sees is the one asked for and falls with quality; levels are finer; nearly all residuals fit."""
     profile = PROFILES[name]
-    fine = 2.1 if name == "jpeg" else 2.7  # decades at quality 100
-    usual = 2.7 if name == "h264-10" else 2.1  # and by this slope up to 75
+    usual = 2.7 if name == "h264-10" else 2.1  # decades to 100 by the slope up to 75
     magnitudes = Magnitudes()
     magnitudes.add(largest * np.linspace(-1, 1, 30_001) ** 9)
     effective = []
     for quality in np.linspace(0, 100, 201):
-        wanted = 2.0 * 0.08 * 10 ** -np.interp(quality, [0, 75, 100], [0, 0.75 * usual, fine])
+        wanted = 2.0 * 0.08 * 10 ** -np.interp(quality, [0, 75, 100], [0, 0.75 * usual, 2.7])
         assert effective_step(float(quality), profile, 2.0) == pytest.approx(wanted, rel=1e-9)
         chosen = choose_quantiser(wanted, profile, magnitudes)
         reach = chosen.step * profile.amplitude * (1 + 1e-9)
         assert isinstance(chosen.level, int)
+        levels = wanted / chosen.step
         if name == "jpeg":
-            assert 1 <= chosen.level <= 255 and largest <= reach
-            step, finest = float(chosen.level), largest / profile.amplitude
+            assert 1 <= chosen.level <= 255 and levels >= LEVELS[0] * (1 - 1e-9)
+            step = float(chosen.level)
         else:
             assert 1 <= chosen.level <= (63 if profile.depth == 10 else 51)
-            step, finest = QP_STEP * 2 ** (chosen.level / 6), 0.0
-            levels = wanted / chosen.step
+            step = QP_STEP * 2 ** (chosen.level / 6)
             assert levels >= LEVELS[0] * 2 ** (-1 / 6)  # quantisers come in sixths of an octave
-            if largest > reach:
-                assert levels <= LEVELS[1] * 1.0001
-                assert levels < LEVELS[0] * 1.13 or (magnitudes.common <= reach)
+        if largest > reach:
+            assert levels <= LEVELS[1] * (1 + 1e-9)
+            assert levels <= LEVELS[0] * (1 + 1e-9) or magnitudes.common <= reach
         effective.append(chosen.step * step)
-        assert effective[-1] == pytest.approx(max(wanted, finest), rel=1e-9)
+        assert effective[-1] == pytest.approx(wanted, rel=1e-9)
     assert np.all(np.diff(effective) <= np.array(effective[1:]) * 1e-9)
 
 

@@ -188,7 +188,7 @@ def test_frames_of_golden_files(module: Callable[..., Any], site: tuple[Path, st
     versions = set()
     for path in sorted(GOLDEN.glob("mcgv-*.mp4")):
         bitstream = read_file(path)
-        if bitstream.header["profile"] == "h264-8":
+        if bitstream.header["profile"] == "h264-8" and "transform" not in bitstream.header:
             versions.add(bitstream.version)
             shutil.copy(path, site[0])
             _check_frames(module, site[0] / path.name, gvpipe.read(path.with_suffix(".npz")))

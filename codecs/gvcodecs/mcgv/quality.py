@@ -6,10 +6,9 @@ diagonal, so that equal quality means about equal error whatever the residuals' 
     effective step = diagonal * 0.08 * 10 ** -decades(quality)
 
 The image coder's quantiser gives the coarse part of it, in whole steps; the residual step, model units per level, gives the
-rest. Levels must be finer than the step, or rounding to them costs more bits than the quantiser saves: H.264's pictures get
-four levels to a step, whatever the largest residual, and send what exceeds their range apart (`outliers`). They
-get fewer, down to two, where more than one coordinate in fifty would. JPEG's pictures hold all residuals, which is
-where quality stops helping.
+rest. Levels must be finer than the step, or rounding to them adds errors that cost more bits to make up for than they save:
+pictures get four levels to a step, whatever the largest residual, and what exceeds their range is sent apart
+(`outliers`). They get fewer, down to two, where more than one coordinate in fifty would exceed it.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from gvpipe.video import QP_RANGE, Profile
 
 COARSEST = 0.08  # effective step at quality 0, part of the diagonal: beyond, the prediction alone is as good
 DECADES = {"h264-8": 2.1, "h264-10": 2.7, "jpeg": 2.1}  # from quality 0 to 100
-FINER = {"h264-8": 0.6, "h264-10": 0.0, "jpeg": 0.0}  # more decades from quality 75 to 100, so that both of H.264's end alike
+FINER = {"h264-8": 0.6, "h264-10": 0.0, "jpeg": 0.6}  # more from quality 75 to 100, so that all profiles end alike
 QP_STEP = 0.625  # H.264's quantiser step at QP 0, levels of an orthonormal transform; it doubles every 6 QP
 JPEG_STEPS = 255  # the coarsest step of a baseline JPEG, levels of an orthonormal transform; 1 is the finest
 LEVELS = 2.0, 4.0  # to an effective step, least and most (docs/codecs/mcgv.md)
@@ -71,13 +70,13 @@ def choose_quantiser(effective: float, profile: Profile, magnitudes: Magnitudes)
     """Choose for an effective step, model units, and residuals of such magnitudes."""
     largest = magnitudes.largest
     reach = largest
-    if profile.codec == "h264" and largest < MOST_STEPS * effective:
+    if largest < MOST_STEPS * effective:
         wide, narrow = (effective / levels * profile.amplitude for levels in LEVELS)
         reach = min(largest, max(narrow, min(wide, magnitudes.common)))
     finest = reach / profile.amplitude if largest > 0 else 1.0
     wanted = effective / finest  # levels
     if profile.codec == "mjpeg":
-        level = min(max(math.floor(wanted), 1), JPEG_STEPS)
+        level = min(max(math.floor(wanted * (1 + 1e-9)), 1), JPEG_STEPS)
         return Quantiser(level, finest * max(1.0, wanted / level))
     highest = QP_RANGE[1] + 6 * (profile.depth - 8)
     level = math.floor(6 * math.log2(max(wanted, 1e-9) / QP_STEP))
