@@ -483,7 +483,7 @@ def test_padding_of_full_and_single_blocks() -> None:
 @pytest.mark.parametrize("name", PROFILES)
 @pytest.mark.parametrize("largest", [1e-9, 1e-3, 0.05, 0.5, 20.0])
 def test_quality_is_monotone(name: str, largest: float) -> None:
-    """The step that a coefficient sees is the one asked for and falls with quality; levels are finer; nearly all residuals fit."""
+    """The step that a coefficient sees is the one asked for; levels are finer; nearly all residuals fit."""
     profile = PROFILES[name]
     usual = 2.7 if name == "h264-10" else 2.1  # decades to 100 by the slope up to 75
     magnitudes = Magnitudes()

@@ -7,8 +7,8 @@ diagonal, so that equal quality means about equal error whatever the residuals' 
 
 The image coder's quantiser gives the coarse part of it, in whole steps; the residual step, model units per level, gives the
 rest. Levels must be finer than the step, or rounding to them adds errors that cost more bits to make up for than they save:
-pictures get four levels to a step, whatever the largest residual, and what exceeds their range is sent apart
-(`outliers`). They get fewer, down to two, where more than one coordinate in fifty would exceed it.
+pictures get eight levels to a step, whatever the largest residual, and what exceeds their range is sent apart
+(`outliers`). They get fewer, down to two, where more than one coordinate in a hundred would exceed it.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ DECADES = {"h264-8": 2.1, "h264-10": 2.7, "jpeg": 2.1}  # from quality 0 to 100
 FINER = {"h264-8": 0.6, "h264-10": 0.0, "jpeg": 0.6}  # more from quality 75 to 100, so that all profiles end alike
 QP_STEP = 0.625  # H.264's quantiser step at QP 0, levels of an orthonormal transform; it doubles every 6 QP
 JPEG_STEPS = 255  # the coarsest step of a baseline JPEG, levels of an orthonormal transform; 1 is the finest
-LEVELS = 2.0, 4.0  # to an effective step, least and most (docs/codecs/mcgv.md)
-OUTLIERS = 0.02  # part of the coordinates that may exceed the range for the sake of finer levels
+LEVELS = 2.0, 8.0  # to an effective step, least and most (docs/codecs/mcgv.md)
+OUTLIERS = 0.01  # part of the coordinates that may exceed the range for the sake of finer levels
 MOST_STEPS = 2.0**30  # beyond, the pictures hold all residuals
 BINS = 49  # low bits of a float64 that a magnitude's bin leaves out: eight bins to the octave
 
