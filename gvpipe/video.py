@@ -85,6 +85,16 @@ class Profile:
         """Of a plane."""
         return np.dtype(np.uint8 if self.depth == 8 else np.uint16)
 
+    def clip(self, samples: NDArray[np.integer]) -> NDArray[np.integer]:
+        """Samples as everyone takes them: coarse quantisers overshoot, and a browser's canvas clips to the limited range."""
+        clipped: NDArray[np.integer] = np.clip(samples, self.low, self.high)
+        return clipped
+
+    @property
+    def offsets(self) -> NDArray[np.float64]:
+        """Levels above the middle of every value that a sample's dtype can hold, clipped."""
+        return self.clip(np.arange(np.iinfo(self.dtype).max + 1)).astype(np.float64) - self.middle
+
 
 PROFILES = {
     p.name: p
@@ -188,7 +198,7 @@ class VideoReader:
     """
 
     def __init__(self, data: bytes, profile: Profile, width: int, height: int) -> None:
-        self._profile, self._shape = profile, (height, width)
+        self.profile, self.shape = profile, (height, width)
         self._packets, self._extradata = _demux(data, profile, width, height)
         starts = [i for i, packet in enumerate(self._packets) if packet.is_keyframe]
         if not starts or starts[0] != 0:
@@ -209,6 +219,8 @@ class VideoReader:
     def read(self, start: int, stop: int) -> Iterator[tuple[int, list[Plane]]]:
         """Yield ``(first frame, planes)`` for the frames ``start`` to ``stop``, one group of pictures at a time.
 
+        Planes are read-only and as the decoder left them: samples are yet to be clipped (`Profile.clip`), and lines may go on
+        beyond the plane's width.
         Where several groups are asked for, decoding starts with the call and runs ahead of the iteration, on other threads.
 
         Raises:
@@ -236,8 +248,8 @@ class VideoReader:
         if number != group:
             first, last = self._groups[group]
             packets = self._packets[first:last]
-            if self._profile.codec == "mjpeg":
-                planes = [decode_jpeg(bytes(packet), *self._shape) for packet in packets]
+            if self.profile.codec == "mjpeg":
+                planes = [decode_jpeg(bytes(packet), *self.shape) for packet in packets]
             else:
                 planes = self._decode_h264(packets)
             self._cached = (group, planes)
@@ -256,18 +268,16 @@ class VideoReader:
             pictures += decoder.decode(None)
         except av.FFmpegError as exc:
             raise CorruptFile(f"the video does not decode ({exc}); get the file again from its source") from exc
-        wanted = (self._profile.pixel_format, *self._shape)
+        wanted = (self.profile.pixel_format, *self.shape)
         if len(pictures) != len(packets) or any((p.format.name, p.height, p.width) != wanted for p in pictures):
             raise CorruptFile("the video does not decode to the pictures that the header tells of; get the file again")
         return [self._luma(picture) for picture in pictures]
 
     def _luma(self, picture: Any) -> Plane:
-        height, width = self._shape
+        height = self.shape[0]
         plane = picture.planes[0]
-        rows = np.frombuffer(plane, self._profile.dtype).reshape(-1, plane.line_size // self._profile.dtype.itemsize)
-        # coarse quantisers overshoot; a browser's canvas clips to the limited range, and so does everyone
-        samples: Plane = np.clip(rows[:height, :width], self._profile.low, self._profile.high)
-        return samples
+        rows = np.frombuffer(plane, self.profile.dtype).reshape(-1, plane.line_size // self.profile.dtype.itemsize)
+        return rows[:height]  # the decoder's own memory: a copy costs half as much as decoding
 
 
 def write_film(path: Path, pictures: Iterable[NDArray[np.uint8]], fps: float) -> None:

@@ -56,7 +56,8 @@ def read(reader: VideoReader, start: int = 0, stop: int | None = None) -> NDArra
     for first, planes in blocks:
         assert first == position and planes
         position += len(planes)
-    return np.array([plane for _, planes in blocks for plane in planes])
+    width = reader.shape[1]
+    return reader.profile.clip(np.array([plane[:, :width] for _, planes in blocks for plane in planes]))
 
 
 @pytest.mark.parametrize("profile", H264, ids=lambda p: p.name)

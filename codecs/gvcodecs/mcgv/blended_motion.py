@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.blend_fitting import fit_blend
 from gvcodecs.mcgv.blending import TOTAL, Blend, BlendFit
-from gvcodecs.mcgv.motion import CodedMotion, locate
+from gvcodecs.mcgv.motion import CodedMotion, Samples, locate
 from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.points import Points
 from gvcodecs.mcgv.trajectories import Trajectories, decode_trajectories, encode_trajectories
@@ -63,38 +63,36 @@ class BlendedMotion:
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
         weights = decode_weights(bitstream.section("weights"), points.neighbours(), header.clusters)
         self._blend = Blend(base[points.members], weights, header.clusters)
-        self._vertices = np.argsort(layout.pixel)
-        self._pixels = layout.pixel[self._vertices]
-        self._base = base[self._vertices]
-        point = points.point[self._vertices]
+        self._samples = Samples(layout)
+        self._base = base[self._samples.vertices]
+        point = points.point[self._samples.vertices]
         self._homogeneous = self._blend.homogeneous[point]
         self._clusters, self._parts = weights.clusters[point], weights.weights[point] / TOTAL
+        self._residuals = header.residual_step * header.profile.offsets
         self._segment: tuple[int, Trajectories | None] = (-1, None)
 
     def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
-        """Fill ``positions (V, 3)`` of a frame from its ``samples (3, height * width)``; raises `CorruptFile`."""
+        """Fill ``positions (V, 3)`` of a frame from its ``samples (3 height, line)``; raises `CorruptFile`."""
         from gvcodecs.mcgv.rebuilding import rebuild_blended
 
-        s = locate(self._bounds, frame)
+        header, s = self._header, locate(self._bounds, frame)
         kept, trajectories = self._segment
         if kept != s or trajectories is None:
             name, n_frames = f"transforms.{s}", self._bounds[s + 1] - self._bounds[s]
-            header = self._header
             data = self._bitstream.section(name)
             trajectories = decode_trajectories(data, header.clusters, n_frames, header.transform_step, name)
             self._segment = (s, trajectories)
         first = frame - self._bounds[s]
         rebuild_blended(
-            samples,
-            self._vertices,
-            self._pixels,
+            samples.reshape(3, -1),
+            self._samples.vertices,
+            self._samples.pixels(samples.shape[1]),
             self._base,
             self._homogeneous,
             self._clusters,
             self._parts,
             self._blend.transforms(trajectories.rows(first, first + 1)),
-            self._header.residual_step,
-            float(self._header.profile.middle),
+            self._residuals,
             positions,
         )
 

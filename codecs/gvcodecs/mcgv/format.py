@@ -167,7 +167,7 @@ def decode_pixels(data: bytes, order: Int64, width: int, height: int) -> Layout:
         raise cursor.corrupt("a pixel lies outside the plane")
     pixel = np.empty(len(order), np.int64)
     pixel[order] = y * width + x
-    if len(np.unique(pixel)) != len(pixel):
+    if np.bincount(pixel).max(initial=0) > 1:
         raise cursor.corrupt("two vertices share a pixel")
     return Layout(width, height, pixel)
 

@@ -83,7 +83,7 @@ class McgvReader:
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
         for first, planes in groups:
             for frame, plane in enumerate(planes, first):
-                self._motion.rebuild(frame, plane.reshape(3, -1), result[frame - start])
+                self._motion.rebuild(frame, plane, result[frame - start])
         return result
 
 

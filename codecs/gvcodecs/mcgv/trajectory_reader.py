@@ -131,12 +131,12 @@ class TrajectoryReader:
 
     def _samples(self, s: int) -> Float64:
         """What a segment's planes hold at the vertices' pixels: ``(R, V)``, steps."""
-        pixel = self._surface.layout.pixel
+        pixel, profile, width = self._surface.layout.pixel, self._header.profile, self._header.width
         first, last = int(self._pictures[s]), int(self._pictures[s + 1])
         result = np.empty((PLANES * (last - first), len(pixel)))
         for start, pictures in self._video.read(first, last):
             for k, picture in enumerate(pictures, start - first):
-                result[PLANES * k : PLANES * (k + 1)] = picture.reshape(PLANES, -1)[:, pixel]
-        result -= self._header.profile.middle
+                result[PLANES * k : PLANES * (k + 1)] = profile.clip(picture[:, :width]).reshape(PLANES, -1)[:, pixel]
+        result -= profile.middle
         result /= self._images.fineness
         return result[: self._images.components[s]]
