@@ -253,7 +253,7 @@ def render(source: str, target: str, size: str, **options: Any) -> None:
 
 @cli.command()
 @click.argument("sources", metavar="SEQUENCES...", nargs=-1, required=True)
-@click.option("--codecs", "codec_list", metavar="ID,ID...", help="Codecs to measure. [default: all]")
+@click.option("--codecs", "codec_list", metavar="ID,ID...", help="Codecs to measure, ID or ID:KEY=VALUE. [default: all]")
 @click.option("--qualities", metavar="Q,Q...", help="Qualities to measure. [default: 0,20,40,60,75,90,100]")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting for all these codecs; repeat for more.")
 @click.option("--json", "target", metavar="OUT.json", help="Write all results to this file.")
@@ -272,6 +272,7 @@ def bench(
 
     \b
     gvpipe bench a.npz b.npz --json out.json
+    gvpipe bench a.npz --codecs mcgv,mcgv:prediction=blended,pca
     gvpipe bench --plot out.json plots/
     """
     from gvpipe import bench as benches

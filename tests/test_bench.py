@@ -164,6 +164,15 @@ def test_command_line(run: Run, sheet: Path, tmp_path: Path) -> None:
     assert run("bench", sheet, "--codecs", "mp3").status == 1
 
 
+def test_one_codec_with_several_settings(sheet: Path) -> None:
+    made = bench.run([str(sheet)], ["pca", "pca:segment=4"], [50.0])
+    assert [(curve.codec, curve.settings["segment"] == 4) for curve in made.curves] == [("pca", False), ("pca:segment=4", True)]
+    assert made.curves[0].points[0]["bytes"] != made.curves[1].points[0]["bytes"]
+    for codec, missing in (("pca:segment", "ID:KEY=VALUE"), ("pca:segments=4", "segments"), ("pca:segment=0", "segment")):
+        with pytest.raises(InputError, match=missing):
+            bench.run([str(sheet)], [codec])
+
+
 def test_sections_of_segments_are_one_bar() -> None:
     sections = {"mesh": 5, "basis.0": 1, "coefficients.0": 7, "basis.1": 2, "video": 3, "clip.0": 4}
     assert group_sections(sections) == {"mesh": 5, "basis x 2": 3, "coefficients.0": 7, "video": 3, "clip.0": 4}
