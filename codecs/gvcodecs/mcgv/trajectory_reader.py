@@ -95,7 +95,7 @@ class TrajectoryReader:
         positions = header.base.place(base.points)
         points = Points.of(base.points, base.faces, base.visits)
         layout = blended_layout(self._bitstream, header, base, points)
-        weights = decode_weights(self._bitstream.section("weights"), points.neighbours(), header.clusters)
+        weights = decode_weights(self._bitstream.section("weights"), points.neighbours, header.clusters)
         matrix = Blend(positions[points.members], weights, header.clusters).matrix()
         return _Surface(base.faces, np.ascontiguousarray(positions.T), points.point, layout, matrix)
 
