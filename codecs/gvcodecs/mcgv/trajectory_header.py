@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from gvpipe.bitstream import Bitstream
@@ -32,7 +32,7 @@ class TrajectoryHeader:
 
     def to_json(self) -> dict[str, Any]:
         """Return the fields as JSON values."""
-        return {"transform": "klt", **asdict(self)}
+        return {"transform": "klt", "fineness": self.fineness, "components": list(self.components), "steps": list(self.steps)}
 
     @classmethod
     def of(cls, bitstream: Bitstream, segments: int) -> TrajectoryHeader | None:
