@@ -36,7 +36,7 @@ from gvcodecs.laplacian.reader import LaplacianReader
 from gvpipe.bare_mesh import decode_mesh, encode_mesh
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
-from gvpipe.segments import count_segments, segment_starts
+from gvpipe.segments import MAX_SEGMENT, count_segments, segment_starts
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectories import read_trajectories, survey
 from gvpipe.trajectory_basis import (
@@ -91,7 +91,7 @@ class Laplacian(Settings):
         self.check_range(0, MAX_COMPONENTS, "components")
         self.check_range(0, MOST_POWER, "edge_power")
         self.check_range(FINEST, COARSEST, "average_step")
-        self.check_range(1, 100_000, "segment")
+        self.check_range(1, MAX_SEGMENT, "segment")
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
         """Code a sequence.

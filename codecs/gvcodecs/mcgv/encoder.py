@@ -39,7 +39,7 @@ from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.connectivity import BaseMesh, decode_base, encode_base
 from gvpipe.errors import SettingError
 from gvpipe.quantize import Lattice
-from gvpipe.segments import count_segments, segment_starts
+from gvpipe.segments import MAX_SEGMENT, count_segments, segment_starts
 from gvpipe.sequence import Float32, Int32, MeshSequence
 from gvpipe.video import PROFILES, Plane, Profile, VideoWriter
 
@@ -94,7 +94,7 @@ class Mcgv(Settings):
         self.check_range(0, 20, "base_bits")
         self.check_range(1, 16, "density")
         self.check_range(1, 1000, "gop")
-        self.check_range(1, 100_000, "segment")
+        self.check_range(1, MAX_SEGMENT, "segment")
         if self.image == "jpeg" and self.profile == "precise":
             raise SettingError("profile precise needs image h264: JPEG has 8 bits")
         if self.transform == "klt" and (self.image != "h264" or self.prediction != "blended"):

@@ -25,7 +25,7 @@ from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.hierarchy import build_hierarchy
 from gvpipe.row_coding import encode_rows
 from gvpipe.row_prediction import PREDICTORS
-from gvpipe.segments import count_segments, segment_starts
+from gvpipe.segments import MAX_SEGMENT, count_segments, segment_starts
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectories import read_trajectories, survey
 from gvpipe.trajectory_basis import (
@@ -68,7 +68,7 @@ class Pca(Settings):
         self.check_choice("predictor", PREDICTORS)
         self.check_range(0.1, 1.99, "beta")
         self.check_range(0, MAX_COMPONENTS, "components")
-        self.check_range(1, 100_000, "segment")
+        self.check_range(1, MAX_SEGMENT, "segment")
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
         """Code a sequence.
