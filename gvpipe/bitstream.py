@@ -68,6 +68,14 @@ class Bitstream:
             raise CorruptFile(f"section {name!r} is missing; get the file again from its source")
         return self.sections[name]
 
+    def check_size(self, n_vertices: int, n_triangles: int) -> None:
+        """Raise `CorruptFile` unless that is the size that the header gives the mesh."""
+        if (n_vertices, n_triangles) != (self.n_vertices, self.n_triangles):
+            raise CorruptFile(
+                f"the mesh has {n_vertices} vertices and {n_triangles} triangles, the header says {self.n_vertices} and "
+                f"{self.n_triangles}; get the file again from its source"
+            )
+
     def number(self, key: str, low: float, high: float) -> float:
         """Return a number of the header; raises `CorruptFile` unless it lies in ``low..high``."""
         value: float | None = self.header.get(key)

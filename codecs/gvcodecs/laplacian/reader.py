@@ -15,7 +15,7 @@ from gvcodecs.laplacian.average_coding import NAME, decode_average
 from gvcodecs.laplacian.coefficients import decode_coefficients
 from gvcodecs.laplacian.domain import Domain, Surface, build_domain, build_surface
 from gvcodecs.laplacian.format import Header
-from gvpipe.bare_mesh import decode_mesh
+from gvpipe.bare_mesh import read_mesh
 from gvpipe.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
 from gvpipe.segments import segment_starts
@@ -44,12 +44,8 @@ class LaplacianReader:
 
     def __init__(self, bitstream: Bitstream) -> None:
         self._header = Header.of(bitstream)
-        mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"), bitstream.n_vertices)
-        found = (len(mesh.points), len(mesh.faces))
-        if found != (bitstream.n_vertices, bitstream.n_triangles):
-            raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
-        self._mesh, self._bitstream = mesh, bitstream
-        surface = build_surface(mesh.point_faces, mesh.n_points)
+        self._mesh, self._bitstream = read_mesh(bitstream), bitstream
+        surface = build_surface(self._mesh.point_faces, self._mesh.n_points)
         try:
             self._domain = self._build_domain(surface)
         except RuntimeError as exc:  # SuperLU: singular

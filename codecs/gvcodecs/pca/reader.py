@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.pca.format import Header
-from gvpipe.bare_mesh import decode_mesh
+from gvpipe.bare_mesh import read_mesh
 from gvpipe.bitstream import Bitstream
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.errors import InputError
 from gvpipe.hierarchy import Hierarchy, build_hierarchy, level_faces
 from gvpipe.mesh_rows import OVERSHOOT, mesh_rows
 from gvpipe.row_coding import decode_rows
@@ -48,12 +48,8 @@ class PcaReader:
 
     def __init__(self, bitstream: Bitstream) -> None:
         self._header = Header.of(bitstream)
-        mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"), bitstream.n_vertices)
-        found = (len(mesh.points), len(mesh.faces))
-        if found != (bitstream.n_vertices, bitstream.n_triangles):
-            raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
-        self._mesh, self._bitstream = mesh, bitstream
-        self._hierarchy = build_hierarchy(mesh.point_faces, mesh.n_points)
+        self._mesh, self._bitstream = read_mesh(bitstream), bitstream
+        self._hierarchy = build_hierarchy(self._mesh.point_faces, self._mesh.n_points)
         self._rows = ordered_rows(self._hierarchy, self._header.predictor)
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
         self._segment: Segment | None = None

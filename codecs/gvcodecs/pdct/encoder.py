@@ -21,7 +21,7 @@ from gvcodecs.pdct.format import MAX_CLIPS, Header, surface_of
 from gvcodecs.pdct.reader import PdctReader
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
-from gvpipe.connectivity import BaseMesh, EncodedBase, decode_base, encode_base
+from gvpipe.connectivity import BaseMesh, EncodedMesh, decode_base, encode_base
 from gvpipe.quantize import Lattice
 from gvpipe.segments import MAX_SEGMENT, count_segments, segment_starts
 from gvpipe.sequence import Float32, Int32, MeshSequence
@@ -107,7 +107,7 @@ class SharedBase:
     def __init__(self, frame: Float32, faces: Int32, settings: Pdct, memo: Memo | None = None) -> None:
         self._settings, memo = settings, memo or Memo()
         self.lattice = Lattice.over(frame, settings.base_bits)
-        self.coded: EncodedBase = memo("base", lambda: encode_base(self.lattice.quantise(frame), faces, settings.reorder))
+        self.coded: EncodedMesh = memo("base", lambda: encode_base(self.lattice.quantise(frame), faces, settings.reorder))
         self.mesh: BaseMesh = decode_base(self.coded.mesh, self.coded.order)
         self._surface: Surface = surface_of(self.mesh, self.lattice)
         self._diagonal = _diagonal(frame)
