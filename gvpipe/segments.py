@@ -28,6 +28,11 @@ def segment_starts(n_frames: int, segments: int) -> list[int]:
     return [s * n_frames // segments for s in range(segments + 1)]
 
 
+def cut(n_frames: int, longest: int, most: int) -> list[int]:
+    """First frame of every segment, and F: of at most ``longest`` frames, unless that takes more than ``most`` segments."""
+    return segment_starts(n_frames, min(count_segments(n_frames, longest), most))
+
+
 def read_segments(bitstream: Bitstream, most: int, key: str = "segments") -> int:
     """How many segments a header tells of; raises `CorruptFile` if above ``most``, or if one is empty or too long."""
     segments = bitstream.integer(key, 1, min(most, bitstream.n_frames))

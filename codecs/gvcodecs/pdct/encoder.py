@@ -23,7 +23,7 @@ from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.connectivity import BaseMesh, EncodedMesh, decode_base, encode_base
 from gvpipe.quantize import Lattice
-from gvpipe.segments import MAX_SEGMENT, count_segments, segment_starts
+from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import Float32, Int32, MeshSequence
 
 COARSEST, DECADES = 0.03, 2.4  # step at quality 0, part of frame 0's diagonal, and decades down to quality 100
@@ -77,8 +77,8 @@ class Pdct(Settings):
         memo = memo or Memo()
         base = SharedBase(sequence.read(0, 1)[0], sequence.faces, self, memo)
         memo.permutation = base.coded.permutation
-        n_clips = min(count_segments(sequence.n_frames, self.clip_frames), MAX_CLIPS)
-        bounds = segment_starts(sequence.n_frames, n_clips)
+        bounds = cut(sequence.n_frames, self.clip_frames, MAX_CLIPS)
+        n_clips = len(bounds) - 1
         sections = {"mesh": base.coded.mesh, "order": base.coded.order}
         for c in range(n_clips):
             report("clips", c / n_clips)
