@@ -111,13 +111,9 @@ class Mcgv(Settings):
         report = progress or (lambda stage, done: None)
         memo = memo or Memo()
         start = self._start(sequence, memo, report)
-        route = (
-            self._trajectory_images
-            if self.transform == "klt"
-            else self._blended
-            if self.prediction == "blended"
-            else self._affine
-        )
+        route = self._blended if self.prediction == "blended" else self._affine
+        if self.transform == "klt":
+            route = self._trajectory_images
         coded = route(start, memo, report)
         header = sections.Header(
             prediction=self.prediction,
