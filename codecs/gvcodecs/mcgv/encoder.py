@@ -38,12 +38,13 @@ from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.connectivity import BaseMesh, EncodedMesh, decode_base, encode_base
 from gvpipe.errors import SettingError
 from gvpipe.quantize import Lattice
-from gvpipe.segments import MAX_SEGMENT, count_segments, segment_starts
+from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import Float32, Int32, MeshSequence
 from gvpipe.video import PROFILES, Profile
 
 BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
 AFFINE_CLUSTERS, AFFINE_BASE_BITS = 20, 12  # the paper's
+MOST_SEGMENTS = 4000  # one section each, of the 4096 that a bitstream may have
 BASE_BITS = 8, 16  # bits of a base frame that are chosen unasked
 DISTINCT = 0.995  # part of the places in a base frame that its lattice must tell apart
 AUTO = "auto"
@@ -159,7 +160,7 @@ class Mcgv(Settings):
         mesh = decode_base(coded.mesh, coded.order)
         sequence = given.reordered(coded.permutation, mesh.faces)
         points = Points.of(mesh.points, mesh.faces, mesh.visits)
-        bounds = segment_starts(sequence.n_frames, count_segments(sequence.n_frames, self.segment))
+        bounds = cut(sequence.n_frames, self.segment, MOST_SEGMENTS)
         return _Start(sequence, coded, mesh, lattice, lattice.place(mesh.points), points, bounds, step)
 
     def _affine(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
