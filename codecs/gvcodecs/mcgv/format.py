@@ -32,7 +32,6 @@ from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvpipe.binary import Cursor, varint
 from gvpipe.bitstream import Bitstream
-from gvpipe.connectivity import BaseMesh, decode_base
 from gvpipe.entropy import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile
 from gvpipe.quantize import Lattice
@@ -137,15 +136,6 @@ class Header:
         if header.width * header.height < bitstream.n_vertices:
             raise CorruptFile(f"header: planes of {header.width}x{header.height} do not hold {bitstream.n_vertices} vertices")
         return header
-
-
-def decode_surface(bitstream: Bitstream) -> BaseMesh:
-    """The base frame of the sections ``mesh`` and ``order``; raises `CorruptFile` if it is not what the header says."""
-    base = decode_base(bitstream.section("mesh"), bitstream.section("order"))
-    found = (len(base.points), len(base.faces))
-    if found != (bitstream.n_vertices, bitstream.n_triangles):
-        raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
-    return base
 
 
 def encode_pixels(layout: Layout, order: Int64) -> bytes:

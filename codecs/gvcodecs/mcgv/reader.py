@@ -17,7 +17,7 @@ from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.placement import place
 from gvcodecs.mcgv.points import Points
 from gvpipe.bitstream import Bitstream
-from gvpipe.connectivity import BaseMesh
+from gvpipe.connectivity import BaseMesh, read_base
 from gvpipe.errors import CorruptFile
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
@@ -50,7 +50,7 @@ class McgvReader:
 
     @cached_property
     def _base(self) -> BaseMesh:
-        return sections.decode_surface(self._bitstream)
+        return read_base(self._bitstream)
 
     @cached_property
     def _motion(self) -> Motion:

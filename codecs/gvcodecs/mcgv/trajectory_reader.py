@@ -22,6 +22,7 @@ from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvcodecs.mcgv.trajectory_images import PLANES, count_pictures, decode_segment
 from gvcodecs.mcgv.weight_coding import decode_weights
 from gvpipe.bitstream import Bitstream
+from gvpipe.connectivity import read_base
 from gvpipe.errors import CorruptFile
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
@@ -90,7 +91,7 @@ class TrajectoryReader:
 
     @cached_property
     def _surface(self) -> _Surface:
-        base = sections.decode_surface(self._bitstream)
+        base = read_base(self._bitstream)
         header = self._header
         positions = header.base.place(base.points)
         points = Points.of(base.points, base.faces, base.visits)

@@ -1,0 +1,73 @@
+"""Pictures that are frames: the residuals of a predicted sequence, padded, as the planes of a video (equation 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.mcgv.motion import CodedMotion
+from gvcodecs.mcgv.packing import Layout
+from gvcodecs.mcgv.padding import Padding
+from gvcodecs.mcgv.quality import Quantiser
+from gvpipe.codec import Progress
+from gvpipe.sequence import MeshSequence
+from gvpipe.video import Plane, Profile, VideoWriter
+
+Float64 = NDArray[np.float64]
+
+
+def largest_residual(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> float:
+    """The largest coordinate of a residual, model units."""
+    return max(float(np.abs(residual).max(initial=0.0)) for _, residual in _residuals(sequence, motion, bounds))
+
+
+def code_frames(
+    sequence: MeshSequence,
+    motion: CodedMotion,
+    bounds: list[int],
+    layout: Layout,
+    block: int,
+    profile: Profile,
+    quantiser: Quantiser,
+    gop: int,
+    preset: str,
+    report: Progress,
+) -> bytes:
+    """Code the residuals of a sequence as a video, one picture per frame.
+
+    Args:
+        sequence: the animation.
+        motion: its prediction.
+        bounds: first frame of every segment, and F.
+        layout: the vertices' pixels, in blocks of side ``block``.
+        profile, gop, preset: of the video; gop is its frames per group of pictures.
+        quantiser: of the image coder, and the residuals' step.
+        report: told of the part that is done.
+    """
+    report("video", 0)
+    padding = Padding(layout, block)
+    shape = (3 * layout.height, layout.width)
+    with VideoWriter(profile, shape[1], shape[0], sequence.fps, quantiser.level, gop, preset) as writer:
+        for first, residual in _residuals(sequence, motion, bounds):
+            for picture in _pictures(residual, padding, profile, quantiser.step):
+                writer.add(picture)
+            report("video", (first + len(residual)) / sequence.n_frames)
+        return writer.finish()
+
+
+def _residuals(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> Iterator[tuple[int, Float64]]:
+    """Yield ``(first frame, (n, V, 3) residuals)`` of the whole sequence (equation 4)."""
+    for start, stop in pairwise(bounds):
+        for first, block in sequence.chunks(start, stop):
+            yield first, block - motion.predict(first, first + len(block))
+
+
+def _pictures(residual: Float64, padding: Padding, profile: Profile, step: float) -> Iterator[Plane]:
+    """Yield one picture per frame: the padded x, y and z planes, one below the other."""
+    values = residual.swapaxes(1, 2).reshape(3 * len(residual), -1)  # (n, V, 3) -> (3n, V)
+    levels = np.rint(padding.fill(values / step, 0.0)) + profile.middle
+    planes = np.clip(levels, profile.low, profile.high).astype(profile.dtype)
+    yield from planes.reshape(len(residual), -1, planes.shape[2])
