@@ -212,8 +212,9 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0)
     """
     player = Player(path)
     start, stop = frame_range(player, start, stop)
-    level = player.level(lod)
-    return MeshSequence(np.asarray(level.positions[start:stop]), level.faces, player.fps, name=player.path)
+    # positions before faces: the video decodes on other threads while the mesh does on this one
+    positions = np.asarray(player.level(lod).positions[start:stop]) if lod else player[start:stop]
+    return MeshSequence(positions, player.level(lod).faces, player.fps, name=player.path)
 
 
 def open(path: StrPath) -> Player:

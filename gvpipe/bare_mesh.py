@@ -25,7 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.binary import Cursor, varint
-from gvpipe.connectivity import COMPRESSION_LEVEL, MAX_PER_BYTE, check_draco_header
+from gvpipe.bitstream import Bitstream
+from gvpipe.connectivity import COMPRESSION_LEVEL, MAX_PER_BYTE, EncodedMesh, check_draco_header
 from gvpipe.entropy import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile
 from gvpipe.index_rows import decode_table, encode_table, row_ids, smallest_first, used_vertices
@@ -36,13 +37,6 @@ HEADER = struct.Struct("<6I")
 MAX_COPIES = 7  # copies of a point that have contexts of their own
 
 Ints = NDArray[Any]
-
-
-@dataclass(frozen=True)
-class EncodedMesh:
-    mesh: bytes
-    order: bytes  # empty: decode in the codec's order
-    permutation: Ints  # (V,) int64: decoded vertex i is the given vertex permutation[i]
 
 
 @dataclass(frozen=True)
@@ -104,6 +98,13 @@ def decode_mesh(mesh: bytes, order: bytes, n_vertices: int) -> BareMesh:
         visits = decode_order(order, _as_lattice(points), faces)
         points, faces = points[visits], np.argsort(visits)[faces]
     return BareMesh(faces.astype(np.int32), points, point_faces.astype(np.int32), n_points)
+
+
+def read_mesh(bitstream: Bitstream) -> BareMesh:
+    """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
+    mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"), bitstream.n_vertices)
+    bitstream.check_size(len(mesh.points), len(mesh.faces))
+    return mesh
 
 
 def _encode_draco(faces: Ints) -> tuple[bytes, Ints]:

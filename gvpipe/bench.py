@@ -98,7 +98,7 @@ def run(
 
     Args:
         sources: what `gvpipe.read` takes.
-        codecs: ids.
+        codecs: ids; one with settings of its own is ``id:key=value:key=value``, and is told apart by that text.
         qualities: of every curve.
         texts: settings for all codecs, as on the command line.
         report: told before each curve which it is and what part of all is done.
@@ -108,8 +108,7 @@ def run(
     """
     texts = dict(texts or {})
     for codec in codecs:  # before hours of work, not after
-        for quality in qualities:
-            codec_class(codec).from_texts({**texts, "quality": str(quality)})
+        _settings(codec, qualities, texts)
     curves: list[Curve] = []
     for source in sources:
         for codec in codecs:
@@ -122,7 +121,7 @@ def run(
 def measure_curve(source: str, codec: str, qualities: list[float], texts: dict[str, str]) -> Curve:
     """Measure one codec on one sequence, in this process."""
     sequence = api.read(source)
-    settings = [codec_class(codec).from_texts({**texts, "quality": str(quality)}) for quality in sorted(qualities)]
+    settings = _settings(codec, sorted(qualities), texts)
     points = []
     with tempfile.TemporaryDirectory() as folder:
         warm = Path(folder) / "warm.mp4"
@@ -153,6 +152,15 @@ def describe_machine() -> dict[str, Any]:
 def name_of(source: str) -> str:
     """A sequence's name in tables: its file's, without folder and extension."""
     return Path(source).stem or source
+
+
+def _settings(codec: str, qualities: Sequence[float], texts: Mapping[str, str]) -> list[Any]:
+    """A codec's settings at each quality; raises `InputError` for what it does not have."""
+    name, *pairs = codec.split(":")
+    if any("=" not in pair for pair in pairs):
+        raise InputError(f"codec {codec!r}: ID or ID:KEY=VALUE is needed, such as mcgv:prediction=blended")
+    own = dict(pair.split("=", 1) for pair in pairs)
+    return [codec_class(name).from_texts({**texts, **own, "quality": str(quality)}) for quality in qualities]
 
 
 def _in_own_process(source: str, codec: str, qualities: list[float], texts: dict[str, str]) -> Curve:

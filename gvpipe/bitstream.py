@@ -68,10 +68,18 @@ class Bitstream:
             raise CorruptFile(f"section {name!r} is missing; get the file again from its source")
         return self.sections[name]
 
+    def check_size(self, n_vertices: int, n_triangles: int) -> None:
+        """Raise `CorruptFile` unless that is the size that the header gives the mesh."""
+        if (n_vertices, n_triangles) != (self.n_vertices, self.n_triangles):
+            raise CorruptFile(
+                f"the mesh has {n_vertices} vertices and {n_triangles} triangles, the header says {self.n_vertices} and "
+                f"{self.n_triangles}; get the file again from its source"
+            )
+
     def number(self, key: str, low: float, high: float) -> float:
         """Return a number of the header; raises `CorruptFile` unless it lies in ``low..high``."""
-        value = self.header.get(key)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+        value: float | None = self.header.get(key)
+        if value is None or not _is_number(value, low, high):
             raise CorruptFile(f"header: {key!r} is {value!r}; a number in {low}..{high} is needed")
         return value
 
@@ -81,6 +89,27 @@ class Bitstream:
         if not isinstance(value, int):
             raise CorruptFile(f"header: {key!r} is {value!r}; an integer is needed")
         return value
+
+    def numbers(self, key: str, count: int, low: float, high: float) -> tuple[float, ...]:
+        """Return a list of ``count`` numbers of the header; raises `CorruptFile` unless each lies in ``low..high``."""
+        values = self.header.get(key)
+        if not (isinstance(values, list) and len(values) == count and all(_is_number(value, low, high) for value in values)):
+            raise CorruptFile(f"header: {key!r} is not {count} numbers in {low}..{high}; get the file again from its source")
+        return tuple(values)
+
+    def integers(self, key: str, count: int, low: int, high: int) -> tuple[int, ...]:
+        """Return a list of ``count`` integers of the header; raises `CorruptFile` unless each lies in ``low..high``."""
+        values = tuple(value for value in self.numbers(key, count, low, high) if isinstance(value, int))
+        if len(values) != count:
+            raise CorruptFile(f"header: {key!r} is not {count} integers; get the file again from its source")
+        return values
+
+    def choice(self, key: str, choices: tuple[str, ...]) -> str:
+        """Return a word of the header; raises `CorruptFile` unless it is one of ``choices``."""
+        value = self.header.get(key)
+        if value not in choices:
+            raise CorruptFile(f"header: no {key} {value!r}; there are {', '.join(choices)}")
+        return str(value)
 
 
 def pack_payload(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
@@ -173,6 +202,10 @@ def _read_header(sections: dict[str, bytes]) -> tuple[Bitstream, dict[str, Any]]
         return bitstream, dict(header["container"])
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError, zlib.error) as exc:
         raise CorruptFile(f"the header is not as gvpipe writes it ({exc}); get the file again from its source") from exc
+
+
+def _is_number(value: object, low: float, high: float) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
 
 
 def _count(value: object, low: int, high: int) -> int:

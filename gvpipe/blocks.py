@@ -73,52 +73,47 @@ class BlockEncoder:
 
 
 class BlockDecoder:
-    """Mirror of `BlockEncoder`.
+    """Mirror of `BlockEncoder`, as compiled loops: most blocks are small.
+
+    Attributes:
+        state, words, edges, sizes: what kernels need (`gvpipe.block_kernels`).
 
     Raises:
         CorruptFile: the stream's tables are not what the encoder writes.
     """
 
     def __init__(self, data: bytes, n_contexts: int, name: str) -> None:
-        import constriction
+        from gvpipe import range_kernels
 
         self._cursor = Cursor(data, name)
         if self._cursor.varint(n_contexts, "the context count") != n_contexts:
             raise self._cursor.corrupt("its context count does not fit its content")
-        self._models, self._is_empty = [], []
-        for _ in range(n_contexts):
-            table = self._table()
-            self._models.append(_model(table))
-            self._is_empty.append(not len(table))
+        tables = [self._table() for _ in range(n_contexts)]
+        self.sizes = np.array([len(table) for table in tables], np.int64)
+        self.edges = np.zeros((n_contexts, int(self.sizes.max(initial=0)) + 1), np.uint64)
+        for edges, table in zip(self.edges, tables, strict=True):
+            edges[: len(table) + 1] = range_kernels.edges_of(table)
         if self._cursor.left % 4:
             raise self._cursor.corrupt("its words are not whole")
-        words = self._cursor.array("<u4", self._cursor.left // 4)
-        self._coder: Any = constriction.stream.queue.RangeDecoder(words.astype(np.uint32))
+        self.words = self._cursor.array("<u4", self._cursor.left // 4).astype(np.uint32)
+        self.state = range_kernels.start(self.words)
 
     def take(self, contexts: NDArray[np.integer]) -> Int64:
         """Return the next block's values, ``(n,)``, for its ``contexts (n,)``; raises `CorruptFile` if they do not decode."""
-        import constriction
+        from gvpipe.block_kernels import take_block
 
-        tokens = np.zeros(len(contexts), np.int64)
-        try:
-            for context, where in _groups(contexts):
-                if self._is_empty[context]:
-                    raise self._cursor.corrupt("a context is used that has no table")
-                if self._models[context] is not None:
-                    tokens[where] = self._coder.decode(self._models[context], len(where))
-            n_low = np.where(tokens < DIRECT, 0, (tokens - DIRECT) // 2 + 3)
-            low = np.zeros(len(tokens), np.int64)
-            for shift in range(0, MAX_BITS, CHUNK):
-                more = np.flatnonzero(n_low > shift)
-                if not len(more):
-                    break
-                sizes = 1 << np.minimum(n_low[more] - shift, CHUNK)
-                pieces = self._coder.decode(constriction.stream.model.Uniform(), sizes.astype(np.int32))
-                low[more] |= pieces.astype(np.int64) << shift
-        except (ValueError, AssertionError, RuntimeError) as exc:
-            raise self._cursor.corrupt("its range-coded data do not decode") from exc
-        u = np.where(tokens < DIRECT, tokens, (2 + (tokens & 1)) << n_low) | low
-        return np.where(u & 1, -((u + 1) >> 1), u >> 1)
+        values = np.zeros(len(contexts), np.int64)
+        self.check(take_block(self.state, self.words, self.edges, self.sizes, contexts.astype(np.int64), values))
+        return values
+
+    def check(self, status: int) -> None:
+        """Raise `CorruptFile` if a kernel's status tells of an error."""
+        from gvpipe.block_kernels import NO_TABLE
+
+        if status == NO_TABLE:
+            raise self._cursor.corrupt("a context is used that has no table")
+        if status:
+            raise self._cursor.corrupt("its range-coded data do not decode")
 
     def _table(self) -> Int64:
         """The next context's frequencies; none if it is empty."""
@@ -135,7 +130,9 @@ class BlockDecoder:
 
     def end(self) -> None:
         """Check that no word is left."""
-        if not self._coder.maybe_exhausted():
+        from gvpipe import range_kernels
+
+        if not range_kernels.may_be_exhausted(self.state, self.words):
             raise self._cursor.corrupt("range-coded data are left over")
 
 

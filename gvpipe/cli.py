@@ -253,9 +253,11 @@ def render(source: str, target: str, size: str, **options: Any) -> None:
 
 @cli.command()
 @click.argument("sources", metavar="SEQUENCES...", nargs=-1, required=True)
-@click.option("--codecs", "codec_list", metavar="ID,ID...", help="Codecs to measure. [default: all]")
+@click.option("--codecs", "codec_list", metavar="ID,ID...", help="Codecs to measure, ID or ID:KEY=VALUE. [default: all]")
 @click.option("--qualities", metavar="Q,Q...", help="Qualities to measure. [default: 0,20,40,60,75,90,100]")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting for all these codecs; repeat for more.")
+@click.option("--kg", default="1,0.3,0.1", show_default=True, metavar="KG,KG...", help="Errors at which to tell rates.")
+@click.option("--sted", metavar="STED,STED...", help="The same for this measure.")
 @click.option("--json", "target", metavar="OUT.json", help="Write all results to this file.")
 @click.option("--plot", "report", metavar="OUT.json", help="Measure nothing: draw these results into the folder given.")
 @click.option("--peers", metavar="RESULTS.csv", help="With --plot: other codecs' results to draw beside.")
@@ -264,6 +266,8 @@ def bench(
     codec_list: str | None,
     qualities: str | None,
     pairs: tuple[str, ...],
+    kg: str,
+    sted: str | None,
     target: str | None,
     report: str | None,
     peers: str | None,
@@ -272,6 +276,7 @@ def bench(
 
     \b
     gvpipe bench a.npz b.npz --json out.json
+    gvpipe bench a.npz --codecs mcgv,mcgv:prediction=blended,pca
     gvpipe bench --plot out.json plots/
     """
     from gvpipe import bench as benches
@@ -287,15 +292,13 @@ def bench(
         click.echo("\n".join(map(str, drawn)))
         return
     chosen = [name.strip() for name in codec_list.split(",")] if codec_list else codec_ids()
-    try:
-        wanted = [float(text) for text in qualities.split(",")] if qualities else list(benches.QUALITIES)
-    except ValueError as exc:
-        raise click.UsageError(f"--qualities {qualities}: numbers with commas between are needed") from exc
+    wanted = _parse_numbers("--qualities", qualities) if qualities else list(benches.QUALITIES)
+    levels = {"kg": _parse_numbers("--kg", kg), **({"sted": _parse_numbers("--sted", sted)} if sted else {})}
     with _progress() as progress:
         made = benches.run(sources, chosen, wanted, _parse_pairs(pairs), progress)
     if target:
         made.write(target)
-    click.echo(tables(made.curves))
+    click.echo(tables(made.curves, levels))
 
 
 @cli.command()
@@ -347,6 +350,13 @@ def _progress() -> Iterator[Progress | None]:
             bars.update(tasks[stage], completed=done)
 
         yield show
+
+
+def _parse_numbers(option: str, text: str) -> list[float]:
+    try:
+        return [float(number) for number in text.split(",")]
+    except ValueError as exc:
+        raise click.UsageError(f"{option} {text}: numbers with commas between are needed") from exc
 
 
 def _parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:

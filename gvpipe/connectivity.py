@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gvpipe.bitstream import Bitstream
 from gvpipe.errors import CorruptFile, InputError
 from gvpipe.index_rows import decode_table, encode_table, row_ids, smallest_first, used_vertices
 from gvpipe.sequence import Int32
@@ -36,7 +37,7 @@ GENERIC = 4  # draco::GeometryAttribute::GENERIC
 
 
 @dataclass(frozen=True)
-class EncodedBase:
+class EncodedMesh:
     mesh: bytes
     order: bytes  # empty: decode in the codec's order
     permutation: Ints  # (V,) int64: decoded vertex i is the given vertex permutation[i]
@@ -49,7 +50,7 @@ class BaseMesh:
     visits: Ints  # (V,) int64: vertex v is the codec's vertex visits[v]; the codec's order walks over the surface
 
 
-def encode_base(points: Ints, faces: Ints, reorder: bool) -> EncodedBase:
+def encode_base(points: Ints, faces: Ints, reorder: bool) -> EncodedMesh:
     """Code lattice points (V, 3) int in [0, 2^31) and triangles (T, 3) int.
 
     `reorder` lets the decoder see the codec's vertex order. Triangles may come back in another order, and rotated.
@@ -71,10 +72,10 @@ def encode_base(points: Ints, faces: Ints, reorder: bool) -> EncodedBase:
     except (ValueError, CorruptFile):
         mesh, permutation = _encode_mesh(points, faces, b"")
     if reorder:
-        return EncodedBase(mesh, b"", permutation)
+        return EncodedMesh(mesh, b"", permutation)
     codec_points, codec_faces = _decode_mesh(mesh)
     order = encode_order(np.argsort(permutation), codec_points, codec_faces)
-    return EncodedBase(mesh, order, np.arange(n_vertices))
+    return EncodedMesh(mesh, order, np.arange(n_vertices))
 
 
 def decode_base(mesh: bytes, order: bytes) -> BaseMesh:
@@ -85,6 +86,13 @@ def decode_base(mesh: bytes, order: bytes) -> BaseMesh:
         visits = decode_order(order, points, faces)
         points, faces = points[visits], np.argsort(visits)[faces]
     return BaseMesh(points.astype(np.int32), faces.astype(np.int32), visits)
+
+
+def read_base(bitstream: Bitstream) -> BaseMesh:
+    """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
+    base = decode_base(bitstream.section("mesh"), bitstream.section("order"))
+    bitstream.check_size(len(base.points), len(base.faces))
+    return base
 
 
 def _encode_draco(points: Ints, faces: Ints) -> bytes:

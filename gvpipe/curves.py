@@ -8,7 +8,7 @@ in place of PSNR, and straight pieces in place of its cubic, which swings betwee
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,7 @@ def logarithms(points: Iterable[dict[str, Any]], measure: str) -> tuple[Float64,
 def rate_at(points: Sequence[dict[str, Any]], measure: str, error: float) -> float | None:
     """The rate at an error, bits per vertex and frame; None where the curve does not reach."""
     errors, rates = logarithms(points, measure)
-    if not len(errors) or not errors[0] <= math.log(error) <= errors[-1]:
+    if not len(errors) or not error > 0 or not errors[0] <= math.log(error) <= errors[-1]:
         return None
     return float(np.exp(np.interp(math.log(error), errors, rates)))
 
@@ -55,9 +55,10 @@ def average_rate_difference(anchor: Sequence[dict[str, Any]], points: Sequence[d
     return 100 * math.expm1(area / (high - low))
 
 
-def tables(curves: Sequence[Curve]) -> str:
-    """Three tables in Markdown: every point; rates at KG errors; average rate differences to the first codec."""
-    return "\n\n".join(["\n".join(lines) for lines in (_points(curves), _levels(curves), _differences(curves)) if lines])
+def tables(curves: Sequence[Curve], levels: Mapping[str, Sequence[float]] | None = None) -> str:
+    """Three tables in Markdown: every point; rates at levels of measures; average rate differences to the first codec."""
+    made = (_points(curves), _levels(curves, levels or {"kg": KG_LEVELS}), _differences(curves))
+    return "\n\n".join(["\n".join(lines) for lines in made if lines])
 
 
 def _points(curves: Sequence[Curve]) -> list[str]:
@@ -80,10 +81,12 @@ def _points(curves: Sequence[Curve]) -> list[str]:
     return lines
 
 
-def _levels(curves: Sequence[Curve]) -> list[str]:
-    lines = _head(("sequence", "codec", *(f"bpvf at KG {kg:g}" for kg in KG_LEVELS)))
+def _levels(curves: Sequence[Curve], levels: Mapping[str, Sequence[float]]) -> list[str]:
+    columns = [(measure, level) for measure, values in levels.items() for level in values]
+    lines = _head(("sequence", "codec", *(f"bpvf at {measure.upper()} {level:g}" for measure, level in columns)))
     for curve in curves:
-        lines.append(_row((curve.sequence, curve.codec, *(_text(rate_at(curve.points, "kg", kg), ".3f") for kg in KG_LEVELS))))
+        rates = (_text(rate_at(curve.points, measure, level), ".3f") for measure, level in columns)
+        lines.append(_row((curve.sequence, curve.codec, *rates)))
     return lines
 
 

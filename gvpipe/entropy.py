@@ -130,15 +130,15 @@ def _untokenise(tokens: Int64, cursor: Cursor) -> Int64:
     total = int(n_extra.sum())
     packed = cursor.take((total + 7) // 8)
     cursor.end()
-    raw = np.unpackbits(np.frombuffer(packed, np.uint8))[:total]
     u = np.where(tokens < DIRECT, tokens, (2 + (tokens & 1)) << n_extra)
-    start = 0
-    for token in np.unique(tokens[tokens >= DIRECT]):
-        where = np.flatnonzero(tokens == token)
-        width = int(n_extra[where[0]])
-        block = raw[start : start + width * len(where)].reshape(len(where), width).astype(np.int64)
-        u[where] |= block @ (1 << np.arange(width - 1, -1, -1, dtype=np.int64))
-        start += width * len(where)
+    large = np.flatnonzero(tokens >= DIRECT)
+    large = large[np.argsort(tokens[large].astype(np.uint8), kind="stable")]
+    width = n_extra[large]
+    start = np.cumsum(width) - width
+    raw = np.frombuffer(packed + bytes(8), np.uint8)
+    eight = raw[(start >> 3)[:, None] + np.arange(8)].view(">u8")[:, 0].astype(np.uint64)  # from each value's first byte on
+    bits_left = (64 - (start & 7) - width).astype(np.uint64)
+    u[large] |= (eight >> bits_left).astype(np.int64) & ((1 << width) - 1)
     return np.where(u & 1, -((u + 1) >> 1), u >> 1)
 
 

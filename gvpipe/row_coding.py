@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +27,8 @@ from gvpipe.entropy import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile, InputError
 from gvpipe.row_prediction import Rows, predict_rows
 
-SHORT = np.array([16, 10, 6, 4], np.int64)  # weights of a row's earlier components, the latest first
-LONG = np.array([16, 14, 13, 12, 11, 10, 9, 8, 7, 6, 6, 5, 5, 4, 4, 3], np.int64)
+SHORT = (16, 10, 6, 4)  # weights of a row's earlier components, the latest first
+LONG = (16, 14, 13, 12, 11, 10, 9, 8, 7, 6, 6, 5, 5, 4, 4, 3)
 ONE = 64  # fixed point of magnitudes
 PER_OCTAVE = 16  # of integer logarithms
 MAX_LEVEL = 160
@@ -42,7 +43,28 @@ MAX_VALUES = 1 << 27  # of a section: rows times components
 
 Int64 = NDArray[np.int64]
 Float64 = NDArray[np.float64]
-Take = Callable[[slice, int, Int64], Int64]
+
+
+class Surroundings(NamedTuple):
+    """What contexts depend on beside residuals, for kernels.
+
+    Args:
+        blocks: ``(B + 1,)`` bounds of the blocks that are coded.
+        place: ``(n,)`` of each row in the order.
+        starts, near, rings: of `Rows`.
+        usual: ``(R,)`` magnitudes of the components, in 1 / ONE.
+        roots: ``2 ** (i / 16)`` rounded down.
+        logs: of the smallest numbers, in 1 / PER_OCTAVE: looked up, not searched for.
+    """
+
+    blocks: Int64
+    place: Int64
+    starts: Int64
+    near: Int64
+    rings: Int64
+    usual: Int64
+    roots: Int64
+    logs: Int64
 
 
 def encode_rows(
@@ -53,6 +75,8 @@ def encode_rows(
     Raises:
         InputError: a value is too large for the step.
     """
+    from gvpipe.row_kernels import find_all_contexts
+
     residuals = np.zeros(target.shape, np.int64)
     decoded = np.zeros(target.shape)
     predict_rows(rows, step, residuals, decoded, target, predictor, beta)
@@ -61,13 +85,11 @@ def encode_rows(
         raise InputError(f"a residual has {largest} quantisation steps, at most {LARGEST} fit; ask for a lower quality")
     means = np.abs(residuals).sum(axis=0) * ONE // max(1, len(residuals))
     levels = np.searchsorted(_level_bounds(), means + 1, side="right") - 1
+    contexts = find_all_contexts(residuals, _surroundings(rows, levels, len(rows.blocks) - 1))
     coder = BlockEncoder(N_CONTEXTS)
-
-    def add(block: slice, component: int, contexts: Int64) -> Int64:
-        coder.add(residuals[block, component], contexts)
-        return residuals[block, component]
-
-    _visit(rows, levels, len(rows.blocks) - 1, add)
+    for first, end in pairwise(rows.blocks.tolist()):
+        for c in range(target.shape[1]):
+            coder.add(residuals[first:end, c], contexts[first:end, c])
     head = encode_integers(np.diff(levels, prepend=0))
     return varint(len(head)) + head + coder.finish(), decoded
 
@@ -87,6 +109,8 @@ def decode_rows(
     Raises:
         CorruptFile: the bytes are not what the encoder writes.
     """
+    from gvpipe.row_kernels import decode_residuals
+
     cursor = Cursor(data, name)
     if len(rows.order) * n_components > MAX_VALUES:  # zeros may cost no bits: believe no counts beyond this
         raise cursor.corrupt(f"{len(rows.order)} rows of {n_components} components")
@@ -96,7 +120,9 @@ def decode_rows(
         raise cursor.corrupt("a magnitude level is out of range")
     coder = BlockDecoder(cursor.rest(), N_CONTEXTS, name)
     wanted = len(rows.blocks) - 1 if n_blocks is None else n_blocks
-    residuals = _visit(rows, levels, wanted, lambda _block, _component, contexts: coder.take(contexts))
+    residuals = np.zeros((int(rows.blocks[wanted]), n_components), np.int64)
+    around = _surroundings(rows, levels, wanted)
+    coder.check(decode_residuals(residuals, around, coder.state, coder.words, coder.edges, coder.sizes))
     if n_blocks is None:
         coder.end()
     if np.abs(residuals).max(initial=0) >= LARGEST:
@@ -106,58 +132,34 @@ def decode_rows(
     return decoded
 
 
-def _visit(rows: Rows, levels: Int64, n_blocks: int, take: Take) -> Int64:
-    """Walk over blocks and components, work out contexts and take the residuals: ``(m, R)`` of all rows visited."""
-    n_components = len(levels)
-    end = int(rows.blocks[n_blocks])
-    usual = _level_bounds()[levels]  # magnitude of each component, in 1 / ONE
-    residuals = np.zeros((end, n_components), np.int64)
-    magnitudes = np.zeros((len(rows.order) + 1, n_components), np.int64)  # by row, in 1 / ONE; the last row stands for "none"
-    before = usual
-    for b in range(n_blocks):
-        block = slice(int(rows.blocks[b]), int(rows.blocks[b + 1]))
-        around, count = _around(rows, block)
-        now = np.zeros((block.stop - block.start, n_components), np.int64)
-        for c in range(n_components):
-            near = magnitudes[around, c].sum(axis=1) // count if b else usual[c]
-            forecast = POWERS[0] * _log(usual[c]) + POWERS[1] * _log(before[c]) + POWERS[2] * _log(near + FLOOR_NEAR)
-            for taps, power in ((SHORT, POWERS[3]), (LONG, POWERS[4])):
-                first = max(0, c - len(taps))
-                weights = taps[: c - first][::-1]
-                found, expected = now[:, first:c] @ weights, usual[first:c] @ weights
-                forecast = forecast + power * (_log(found + FLOOR_SPAN) - _log(expected + FLOOR_SPAN))
-            octaves = forecast // POWER_ONE - PER_OCTAVE * (ONE.bit_length() - 1)
-            contexts = np.clip(octaves // (PER_OCTAVE // 2), LOWEST, HIGHEST) - LOWEST
-            residuals[block, c] = take(block, c, np.broadcast_to(contexts, len(now)))
-            now[:, c] = ONE * np.abs(residuals[block, c])
-        magnitudes[rows.order[block]] = now
-        before = now.sum(axis=0) // len(now) + 1
-    return residuals
-
-
-def _around(rows: Rows, block: slice) -> tuple[Int64, Int64]:
-    """Rows whose magnitudes count for each row of a block ``(n, N_NEAR)``, padded with "none"; how many there are, at least
-    1."""
-    starts = rows.starts[block].astype(np.int64)
-    known = rows.starts[block.start + 1 : block.stop + 1] - starts
-    counts = np.minimum(np.minimum(rows.rings[block], known), N_NEAR)
-    place = np.arange(N_NEAR)
-    padded = np.append(rows.near, len(rows.order)).astype(np.int64)
-    around = padded[np.where(place < counts[:, None], starts[:, None] + place, len(rows.near))]
-    return around, np.maximum(counts, 1).astype(np.int64)
-
-
-def _log(values: Int64) -> Int64:
-    """Logarithms of integers to base two, in 1 / PER_OCTAVE, rounded down; of 0 as of 1/64."""
-    logs: Int64 = np.searchsorted(_powers(), 64 * np.maximum(values, 0) + 1, side="right") - 1 - 6 * PER_OCTAVE
-    return logs
+def _surroundings(rows: Rows, levels: Int64, n_blocks: int) -> Surroundings:
+    place = np.zeros(len(rows.order), np.int64)
+    place[rows.order] = np.arange(len(rows.order))
+    arrays = (
+        rows.blocks[: n_blocks + 1],
+        place,
+        rows.starts,
+        rows.near,
+        rows.rings,
+        _level_bounds()[levels],
+        _roots(),
+        _logs(),
+    )
+    return Surroundings(*(np.ascontiguousarray(array, np.int64) for array in arrays))
 
 
 @functools.cache
-def _powers() -> Int64:
+def _roots() -> Int64:
     """2 ** (i / 16) rounded down, exactly: four nested integer square roots."""
-    roots = [math.isqrt(math.isqrt(math.isqrt(math.isqrt(1 << i)))) for i in range(PER_OCTAVE * 58)]
+    roots = [math.isqrt(math.isqrt(math.isqrt(math.isqrt(1 << i)))) for i in range(PER_OCTAVE * 62)]
     return np.array(roots, np.int64)
+
+
+@functools.cache
+def _logs() -> Int64:
+    """Logarithms of 0 to 2**14 to base two, in 1 / PER_OCTAVE, rounded down; of 0 as of 1/64."""
+    logs: Int64 = np.searchsorted(_roots(), 64 * np.arange(1 << 14) + 1, side="right") - 1 - 6 * PER_OCTAVE
+    return logs
 
 
 @functools.cache

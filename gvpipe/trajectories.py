@@ -1,17 +1,56 @@
-"""Sequences as trajectories: points that vertices share, their spread, and blocks of trajectories.
+"""Sequences as trajectories: points that vertices share, their mesh and spread, and blocks of trajectories.
 
 Vertices with one trajectory (seams, triangle soups) are one point, coded once.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.codec import Progress
+from gvpipe.bare_mesh import BareMesh, decode_mesh, encode_mesh
+from gvpipe.codec import Memo, Progress
+from gvpipe.connectivity import EncodedMesh
 from gvpipe.sequence import MeshSequence
 
+COARSEST, DECADES = 10.0, 2 * 4 / 3  # aimed error at quality 0, percent of the spread, and decades down to quality 100
+
 Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CodedPoints:
+    """A sequence's mesh as it is coded, and the points whose trajectories are still to be.
+
+    Args:
+        coded: the mesh's sections.
+        mesh: as the decoder will have it.
+        members: ``(P,)`` a given vertex of each of the mesh's points.
+        spread: root mean square distance of vertices from their frame's centre, model units.
+    """
+
+    coded: EncodedMesh
+    mesh: BareMesh
+    members: NDArray[np.int64]
+    spread: float
+
+    def aimed_error(self, quality: float) -> float:
+        """Root mean square error of a vertex, model units: a Karni-Gotsman error of ``10 ** (1 - quality / 37.5)`` percent."""
+        return self.spread * COARSEST * 10 ** -(DECADES * quality / 100) / 100
+
+
+def code_points(sequence: MeshSequence, reorder: bool, memo: Memo, report: Progress) -> CodedPoints:
+    """Find a sequence's points and code its mesh; ``reorder`` lets the decoder see the codec's vertex order."""
+    report("read", 0)
+    points, spread = memo("survey", lambda: survey(sequence, report))
+    report("mesh", 0)
+    coded = memo("mesh", lambda: encode_mesh(sequence.faces, points, reorder))
+    memo.permutation = coded.permutation
+    mesh = decode_mesh(coded.mesh, coded.order, sequence.n_vertices)
+    _, first = np.unique(mesh.points, return_index=True)
+    return CodedPoints(coded, mesh, coded.permutation[first], spread)
 
 
 def survey(sequence: MeshSequence, report: Progress) -> tuple[NDArray[np.int64], float]:

@@ -64,6 +64,46 @@ class Basis:
     vectors: Float64
 
 
+@dataclass(frozen=True)
+class Reduced:
+    """Trajectories in the space of a coded basis.
+
+    Args:
+        step: D, model units.
+        basis: its bytes.
+        coefficients: ``(V, R)``, still to be coded, model units.
+    """
+
+    step: float
+    basis: bytes
+    coefficients: Float64
+
+
+def reduce_trajectories(
+    trajectories: Float64,
+    error: float,
+    n_components: int = 0,
+    basis_ratio: float = 1.0,
+    point_cost: float = THRESHOLD,
+    row_cost: float = THRESHOLD,
+) -> Reduced:
+    """Choose the step and the components of ``trajectories (V, 3F)``, and code their basis.
+
+    Args:
+        trajectories: model units.
+        error: squared error to leave, about, summed over all coordinates, model units squared.
+        n_components: most components; 0: as many as pay.
+        basis_ratio: step of the basis, in steps of the coefficients.
+        point_cost, row_cost: of a component (`count_components`).
+    """
+    n_points = len(trajectories)
+    principal = find_principal(trajectories, error)
+    step = choose_step(principal, n_points, error)
+    kept = min(n_components, len(principal.energies)) or count_components(principal, n_points, step, point_cost, row_cost)
+    data, basis = encode_basis(principal, kept, n_points, step * basis_ratio)
+    return Reduced(step, data, fit_coefficients(trajectories, basis))
+
+
 def find_principal(trajectories: Float64, error: float) -> Principal:
     """Return the principal trajectories of ``(V, 3F)`` that matter where a squared ``error``, model units, is left anyway.
 

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gvpipe.errors import CorruptFile, InputError
+from gvpipe.index_rows import sort_rows
 
 Ints = npt.NDArray[Any]
 
@@ -133,11 +134,7 @@ def _weights(table: Ints) -> npt.NDArray[np.float64]:
 def _neighbours(points: Ints, faces: Ints) -> tuple[Ints, Ints]:
     """Rows of neighbours (starts (V + 1,), neighbours (E,)), nearest first: triangle edges, and vertices at one point."""
     rows = np.ascontiguousarray(points, np.int64)
-    bits = int(rows.max(initial=0)).bit_length()
-    if 3 * bits < 64 and rows.min(initial=0) >= 0:  # one sort of whole keys: four times as fast
-        by_point = np.argsort((rows[:, 0] << 2 * bits) | (rows[:, 1] << bits) | rows[:, 2], kind="stable")
-    else:
-        by_point = np.lexsort(rows.T)
+    by_point = sort_rows(rows)
     same = (rows[by_point[1:]] == rows[by_point[:-1]]).all(axis=1)
     twins = np.c_[by_point[1:], by_point[:-1]][same]
     starts, neighbours = _compiled_rows()(rows, np.ascontiguousarray(faces, np.int64), twins)

@@ -127,6 +127,8 @@ def test_tables_name_every_curve(report: bench.Report) -> None:
     parts = tables(report.curves).split("\n\n")
     assert [len(part.splitlines()) for part in parts] == [2 + 4, 2 + 2, 2 + 2]
     assert all(len({line.count("|") for line in part.splitlines()}) == 1 for part in parts)
+    levels = tables(report.curves, {"kg": [0.5], "sted": [0.02, 0.01]}).split("\n\n")[1]
+    assert levels.startswith("| sequence | codec | bpvf at KG 0.5 | bpvf at STED 0.02 | bpvf at STED 0.01 |")
     difference = average_rate_difference(report.curves[0].points, report.curves[1].points, "kg")
     assert f"| sheet | {difference:+.1f} % |" in parts[2] and f"| mean | {difference:+.1f} % |" in parts[2]
 
@@ -159,9 +161,19 @@ def test_command_line(run: Run, sheet: Path, tmp_path: Path) -> None:
     drawn = run("bench", "--plot", target, tmp_path / "plots")
     assert drawn.out.split() == [str(tmp_path / "plots" / "sheet.png")]
     assert run("bench", "--plot", target, "a", "b").status == 2
-    assert run("bench", sheet, "--qualities", "high").status == 2
+    for option in ("--qualities", "--kg", "--sted"):
+        assert run("bench", sheet, option, "high").status == 2
     assert run("bench").status == 2
     assert run("bench", sheet, "--codecs", "mp3").status == 1
+
+
+def test_one_codec_with_several_settings(sheet: Path) -> None:
+    made = bench.run([str(sheet)], ["pca", "pca:segment=4"], [50.0])
+    assert [(curve.codec, curve.settings["segment"] == 4) for curve in made.curves] == [("pca", False), ("pca:segment=4", True)]
+    assert made.curves[0].points[0]["bytes"] != made.curves[1].points[0]["bytes"]
+    for codec, missing in (("pca:segment", "ID:KEY=VALUE"), ("pca:segments=4", "segments"), ("pca:segment=0", "segment")):
+        with pytest.raises(InputError, match=missing):
+            bench.run([str(sheet)], [codec])
 
 
 def test_sections_of_segments_are_one_bar() -> None:

@@ -62,6 +62,7 @@ def test_title_is_text(video: Path, tmp_path: Path) -> None:
         ({"codec": "pca"}, "pca"),
         ({"profile": "precise"}, "mcgv, profile h264-10"),
         ({"image": "jpeg"}, "mcgv, profile jpeg"),
+        ({"prediction": "blended", "transform": "klt"}, "mcgv, transform klt, profile h264-8"),
     ],
     ids=str,
 )

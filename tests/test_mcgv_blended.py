@@ -80,7 +80,7 @@ def test_points_are_numbered_along_the_codecs_order() -> None:
     assert points.members.tolist() == [1, 4, 5, 0]
     assert points.point.tolist() == [3, 0, 1, 0, 1, 2]
     assert points.faces.tolist() == [[3, 0, 1], [0, 2, 1]]
-    assert points.neighbours().toarray().tolist() == [[0, 1, 1, 1], [1, 0, 1, 1], [1, 1, 0, 0], [1, 1, 0, 0]]
+    assert points.neighbours.toarray().tolist() == [[0, 1, 1, 1], [1, 0, 1, 1], [1, 1, 0, 0], [1, 1, 0, 0]]
 
 
 # weights
@@ -182,7 +182,7 @@ def test_dearer_bits_make_smaller_sections() -> None:
     for step in (1e-4, 1e-2):
         fitted = fit_blend(sequence, base, points, step, 6, lambda stage, done: None)
         check_weights(fitted.weights, fitted.n_clusters)
-        sizes.append(len(encode_weights(fitted.weights, points.neighbours())))
+        sizes.append(len(encode_weights(fitted.weights, points.neighbours)))
     assert sizes[1] < sizes[0]
 
 
@@ -239,7 +239,8 @@ def test_rebuilding_is_base_blend_and_residual() -> None:
     points = homogeneous(base)
     result = np.zeros((n, 3), np.float32)
     order = (base[vertices], points[vertices], weights.clusters[vertices], weights.weights[vertices] / TOTAL)
-    rebuild_blended(samples, vertices, pixels, *order, transforms, 0.01, 128.0, result)
+    residuals = 0.01 * (np.arange(256.0) - 128)
+    rebuild_blended(samples, vertices, pixels, *order, transforms, residuals, result)
     wanted = base + _applied(points, weights, transforms)
     wanted[vertices] += 0.01 * (samples[:, pixels].T.astype(float) - 128)
     assert np.allclose(result, wanted, atol=1e-5)

@@ -7,6 +7,7 @@ import dataclasses
 import json
 import math
 import zlib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
+import gvpipe
 from gvcodecs.mcgv import Mcgv
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.packing import Layout, pack
@@ -800,3 +802,12 @@ def test_weld() -> None:
     first, point = weld(points)
     assert np.array_equal(points[first][point], points) and len(first) == len(set(map(tuple, points.tolist())))
     assert all(f == np.flatnonzero((points == points[f]).all(axis=1))[0] for f in first)
+
+
+def test_more_segments_than_sections_are_not_written(tmp_path: Path) -> None:
+    """A bitstream has 4096 sections at most; segments then get longer than was asked for."""
+    away = np.linspace(0, 1, 4200, dtype=np.float32)[:, None, None]
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+    sequence = MeshSequence(square + away, np.array([[0, 1, 2], [0, 2, 3]], np.int32), 30.0)
+    gvpipe.encode(sequence, tmp_path / "a.mp4", segment=1, clusters=1, preset="ultrafast")
+    assert gvpipe.decode(tmp_path / "a.mp4").n_frames == 4200

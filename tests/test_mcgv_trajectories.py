@@ -121,6 +121,14 @@ def test_a_frame_costs_its_segment_once(tmp_path: Path, monkeypatch: pytest.Monk
     assert sorted(decoded) == list(range(counts[0], counts[0] + counts[1]))
 
 
+def test_targets_are_met(tmp_path: Path) -> None:
+    """A search opens bitstreams that were never written: their headers must hold what JSON gives back, lists for one."""
+    sequence = waving(8, 12)
+    gvpipe.encode(sequence, tmp_path / "a.mp4", target_kg=1.0, prediction="blended", transform="klt")
+    kg = gvpipe.compare(sequence, gvpipe.decode(tmp_path / "a.mp4")).kg
+    assert kg is not None and kg <= 1.0
+
+
 def test_info_tells_of_frames_not_of_pictures(tmp_path: Path) -> None:
     gvpipe.encode(waving(8, 40), tmp_path / "a.mp4", prediction="blended", transform="klt")
     info = gvpipe.info(tmp_path / "a.mp4")

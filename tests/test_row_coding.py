@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gvpipe import magnitude_tables
+from gvpipe import magnitude_tables, range_kernels
 from gvpipe.bare_mesh import decode_mesh, encode_mesh
 from gvpipe.blocks import BlockDecoder, BlockEncoder
 from gvpipe.errors import CorruptFile
@@ -73,6 +73,45 @@ def test_blocks_decode_one_by_one_and_any_prefix_of_them() -> None:
         BlockDecoder(data, 7, "x")
     with pytest.raises(CorruptFile):
         BlockDecoder(data[:-1], 6, "x")
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_compiled_range_decoder_reads_what_the_library_writes(seed: int) -> None:
+    """Symbols of any tables and raw bits in any mixture; then nothing is left."""
+    constriction = pytest.importorskip("constriction")
+    rng = np.random.default_rng(seed)
+    coder = constriction.stream.queue.RangeEncoder()
+    written: list[tuple[np.ndarray | None, int, int]] = []
+    for _ in range(int(rng.integers(0, 600))):
+        if rng.random() < 0.3:
+            width = int(rng.integers(1, 17))
+            written.append((None, width, int(rng.integers(0, 1 << width))))
+            coder.encode(
+                np.array([written[-1][2]], np.int32), constriction.stream.model.Uniform(), np.array([1 << width], np.int32)
+            )
+        else:
+            table = rng.integers(0, 4097, int(rng.integers(2, 88))) * (rng.random() < 0.9)
+            table[rng.integers(0, len(table))] += 1
+            written.append((table, 0, int(rng.integers(0, len(table)))))
+            model = constriction.stream.model.Categorical(table.astype(float) / float(table.sum()), perfect=False)
+            coder.encode(written[-1][2], model)
+    words = coder.get_compressed().astype(np.uint32)
+    state = range_kernels.start(words)
+    for table, width, value in written:
+        if table is None:
+            assert range_kernels.decode_bits(state, words, width) == value
+        else:
+            assert range_kernels.decode_symbol(state, words, range_kernels.edges_of(table)) == value
+    assert range_kernels.may_be_exhausted(state, words)
+    assert len(words) < 3 or not range_kernels.may_be_exhausted(range_kernels.start(words), words)
+
+
+def test_a_context_without_a_table_is_corrupt() -> None:
+    coder = BlockEncoder(3)
+    coder.add(np.arange(40), np.arange(40) % 2)
+    decoder = BlockDecoder(coder.finish(), 3, "x")
+    with pytest.raises(CorruptFile, match="no table"):
+        decoder.take(np.array([2]))
 
 
 @pytest.mark.parametrize("mean", [0.15, 0.3, 1.0, 7.0, 60.0])

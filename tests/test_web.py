@@ -290,7 +290,10 @@ def test_a_file_that_is_not_there(module: Callable[..., Any]) -> None:
         assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", address) == "load"
 
 
-@pytest.mark.parametrize("settings", [{"codec": "pca"}, {"profile": "precise"}, {"image": "jpeg"}], ids=str)
+KLT = {"prediction": "blended", "transform": "klt"}
+
+
+@pytest.mark.parametrize("settings", [{"codec": "pca"}, {"profile": "precise"}, {"image": "jpeg"}, KLT], ids=str)
 def test_files_not_for_browsers_say_so(settings: dict[str, str], module: Callable[..., Any], site: tuple[Path, str]) -> None:
     gvpipe.encode(waving(6, 5), site[0] / "other.mp4", **settings)
     kind, message = module("return GeometryVideo.load(args[0]).catch((error) => [error.kind, error.message])", "other.mp4")

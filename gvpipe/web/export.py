@@ -100,12 +100,14 @@ def export_html(
 
 def _is_readable(bitstream: Bitstream) -> bool:
     codec, version, profile = READS
-    return bitstream.codec == codec and bitstream.version <= version and bitstream.header.get("profile") == profile
+    header = bitstream.header
+    frames = "transform" not in header  # not trajectory images
+    return bitstream.codec == codec and bitstream.version <= version and header.get("profile") == profile and frames
 
 
 def _kind(bitstream: Bitstream) -> str:
-    profile = bitstream.header.get("profile")
-    return f"{bitstream.codec}, profile {profile}" if profile else bitstream.codec
+    parts = [f"{key} {bitstream.header[key]}" for key in ("transform", "profile") if key in bitstream.header]
+    return ", ".join([bitstream.codec, *parts])
 
 
 def _write_page(name: str, video: str | os.PathLike[str], target: Path, up: str) -> ExportReport:

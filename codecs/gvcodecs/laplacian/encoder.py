@@ -11,6 +11,7 @@ Frames are read three times: for size and points, for the average, then segment 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -33,22 +34,13 @@ from gvcodecs.laplacian.format import (
 )
 from gvcodecs.laplacian.operators import OPERATORS
 from gvcodecs.laplacian.reader import LaplacianReader
-from gvpipe.bare_mesh import decode_mesh, encode_mesh
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
-from gvpipe.segments import count_segments, segment_starts
+from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import MeshSequence
-from gvpipe.trajectories import read_trajectories, survey
-from gvpipe.trajectory_basis import (
-    MAX_COMPONENTS,
-    choose_step,
-    count_components,
-    encode_basis,
-    find_principal,
-    fit_coefficients,
-)
+from gvpipe.trajectories import code_points, read_trajectories
+from gvpipe.trajectory_basis import MAX_COMPONENTS, reduce_trajectories
 
-COARSE, DECADES = 10.0, 2 * 4 / 3  # as in `pca`: error that the step is chosen for at quality 0, percent of the spread
 POINT_COST, ROW_COST = 0.1, 10.0  # of a component: deltas cost little, so that components are paid for by their basis
 
 
@@ -91,7 +83,7 @@ class Laplacian(Settings):
         self.check_range(0, MAX_COMPONENTS, "components")
         self.check_range(0, MOST_POWER, "edge_power")
         self.check_range(FINEST, COARSEST, "average_step")
-        self.check_range(1, 100_000, "segment")
+        self.check_range(1, MAX_SEGMENT, "segment")
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
         """Code a sequence.
@@ -101,17 +93,11 @@ class Laplacian(Settings):
         """
         report = progress or (lambda stage, done: None)
         memo = memo or Memo()
-        report("read", 0)
-        points, spread = memo("survey", lambda: survey(sequence, report))
-        report("mesh", 0)
-        coded = memo("mesh", lambda: encode_mesh(sequence.faces, points, self.reorder))
-        memo.permutation = coded.permutation
-        mesh = decode_mesh(coded.mesh, coded.order, sequence.n_vertices)
-        _, first = np.unique(mesh.points, return_index=True)
-        members = coded.permutation[first]  # a given vertex of each of the codec's points
-        n_segments = min(count_segments(sequence.n_frames, self.segment), MAX_SEGMENTS)
-        bounds = segment_starts(sequence.n_frames, n_segments)
-        sections = {"mesh": coded.mesh, "order": coded.order}
+        shared = code_points(sequence, self.reorder, memo, report)
+        mesh, wanted = shared.mesh, shared.aimed_error(self.quality)
+        bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
+        n_segments = len(bounds) - 1
+        sections = {"mesh": shared.coded.mesh, "order": shared.coded.order}
         header = Header(
             self.operator,
             self.delta_prediction,
@@ -128,28 +114,20 @@ class Laplacian(Settings):
         average = None
         if header.needs_average:
             report("average", 0)
-            faces = members[surface.faces].astype(np.int32)
-            shape = memo("average", lambda: average_mesh(sequence, faces)[members])
+            faces = shared.members[surface.faces].astype(np.int32)
+            shape = memo("average", lambda: average_mesh(sequence, faces)[shared.members])
             sections[NAME], average = encode_average(shape, surface, header)
         domain = memo("domain", lambda: build_domain(surface, average, header))
-        # root mean square error of a vertex, model units
-        wanted = spread * COARSE * 10 ** -(DECADES * self.quality / 100) / 100
         steps = []
-        for s in range(n_segments):
+        for s, (start, stop) in enumerate(pairwise(bounds)):
             report("segments", s / n_segments)
-            trajectories = read_trajectories(sequence, bounds[s], bounds[s + 1], members)
-            n_points = len(trajectories)
-            error = wanted**2 * n_points * (bounds[s + 1] - bounds[s])
-            principal = find_principal(trajectories, error)
-            step = choose_step(principal, n_points, error)
-            kept = min(self.components, len(principal.energies)) or count_components(
-                principal, n_points, step, POINT_COST, ROW_COST
-            )
-            sections[f"basis.{s}"], basis = encode_basis(principal, kept, n_points, step * self.basis_ratio)
-            coefficients = fit_coefficients(trajectories, basis)
-            anchors, deltas = encode_coefficients(coefficients, step, domain, header)
+            trajectories = read_trajectories(sequence, start, stop, shared.members)
+            error = wanted**2 * mesh.n_points * (stop - start)
+            reduced = reduce_trajectories(trajectories, error, self.components, self.basis_ratio, POINT_COST, ROW_COST)
+            sections[f"basis.{s}"] = reduced.basis
+            anchors, deltas = encode_coefficients(reduced.coefficients, reduced.step, domain, header)
             sections[f"anchors.{s}"], sections[f"deltas.{s}"] = anchors, deltas
-            steps.append(step)
+            steps.append(reduced.step)
         report("segments", 1)
         return Bitstream(
             codec=self.id,

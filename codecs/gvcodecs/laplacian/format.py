@@ -18,13 +18,10 @@ from gvcodecs.laplacian.anchors import ANCHOR_CHOICES
 from gvcodecs.laplacian.delta_rows import DELTA_PREDICTIONS
 from gvcodecs.laplacian.operators import OPERATORS
 from gvpipe.bitstream import Bitstream
-from gvpipe.errors import CorruptFile
-from gvpipe.segments import count_longest
+from gvpipe.segments import read_segments, read_steps
 
 MAX_SEGMENTS = 1300  # three sections each, of the 4096 that a bitstream may have
-MAX_SEGMENT = 100_000  # frames
 MAX_SPACING = 1 << 20  # points per anchor
-SMALL, LARGE = 2.0**-131, 2.0**129  # no step of a float32 model lies beyond
 LEAST_RATIO, MOST_RATIO = 2.0**-10, 2.0**10  # of steps
 FINEST, COARSEST = 2.0**-20, 1.0  # step of the average, mean edge lengths
 MOST_POWER = 2.0
@@ -69,34 +66,16 @@ class Header:
     @classmethod
     def of(cls, bitstream: Bitstream) -> Header:
         """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
-        segments = bitstream.integer("segments", 1, min(MAX_SEGMENTS, bitstream.n_frames))
-        steps = bitstream.header.get("steps")
-        if not (
-            isinstance(steps, list)
-            and len(steps) == segments
-            and all(type(step) in (int, float) and SMALL < step < LARGE for step in steps)
-        ):
-            raise CorruptFile(f"header: steps are not {segments} positive numbers; get the file again from its source")
-        if count_longest(bitstream.n_frames, segments) > MAX_SEGMENT:
-            raise CorruptFile(
-                f"header: {bitstream.n_frames} frames in {segments} segments; at most {MAX_SEGMENT} each are allowed"
-            )
+        segments = read_segments(bitstream, MAX_SEGMENTS)
         return cls(
-            _choice(bitstream, "operator", OPERATORS),
-            _choice(bitstream, "delta_prediction", DELTA_PREDICTIONS),
+            bitstream.choice("operator", OPERATORS),
+            bitstream.choice("delta_prediction", DELTA_PREDICTIONS),
             bitstream.integer("anchors", 1, MAX_SPACING),
-            _choice(bitstream, "anchor_choice", ANCHOR_CHOICES),
+            bitstream.choice("anchor_choice", ANCHOR_CHOICES),
             float(bitstream.number("edge_power", 0, MOST_POWER)),
             float(bitstream.number("average_step", FINEST, COARSEST)),
             float(bitstream.number("anchor_ratio", LEAST_RATIO, MOST_RATIO)),
             float(bitstream.number("basis_ratio", LEAST_RATIO, MOST_RATIO)),
             segments,
-            tuple(map(float, steps)),
+            read_steps(bitstream, segments),
         )
-
-
-def _choice(bitstream: Bitstream, key: str, choices: tuple[str, ...]) -> str:
-    value = bitstream.header.get(key)
-    if value not in choices:
-        raise CorruptFile(f"header: no {key} {value!r}; there are {', '.join(choices)}")
-    return str(value)

@@ -6,33 +6,19 @@ product of a small matrix with the coefficients.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.laplacian.average_coding import NAME, decode_average
 from gvcodecs.laplacian.coefficients import decode_coefficients
 from gvcodecs.laplacian.domain import Domain, Surface, build_domain, build_surface
 from gvcodecs.laplacian.format import Header
-from gvpipe.bare_mesh import decode_mesh
+from gvpipe.bare_mesh import read_mesh
 from gvpipe.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
-from gvpipe.trajectory_basis import Basis, decode_basis
-from gvpipe.trajectory_frames import fill_frames
-
-Float64 = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Segment:
-    """A decoded segment: its basis, and the coefficients ``(R, P)`` of the points."""
-
-    number: int
-    basis: Basis
-    coefficients: Float64
+from gvpipe.trajectory_basis import decode_basis
+from gvpipe.trajectory_frames import Segment, read_frames
 
 
 class LaplacianReader:
@@ -44,18 +30,14 @@ class LaplacianReader:
 
     def __init__(self, bitstream: Bitstream) -> None:
         self._header = Header.of(bitstream)
-        mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"), bitstream.n_vertices)
-        found = (len(mesh.points), len(mesh.faces))
-        if found != (bitstream.n_vertices, bitstream.n_triangles):
-            raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
-        self._mesh, self._bitstream = mesh, bitstream
-        surface = build_surface(mesh.point_faces, mesh.n_points)
+        self._mesh, self._bitstream = read_mesh(bitstream), bitstream
+        surface = build_surface(self._mesh.point_faces, self._mesh.n_points)
         try:
             self._domain = self._build_domain(surface)
         except RuntimeError as exc:  # SuperLU: singular
             raise CorruptFile("section 'average' is corrupt: its Laplacian cannot be inverted; get the file again") from exc
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
-        self._segment: Segment | None = None
+        self._kept: tuple[int, Segment] | None = None
 
     @property
     def n_frames(self) -> int:
@@ -73,15 +55,7 @@ class LaplacianReader:
         Raises:
             CorruptFile: a segment does not decode.
         """
-        points = self._mesh.points
-        result = np.empty((stop - start, len(points), 3), np.float32)
-        for s in range(self._header.segments):
-            first, last = max(start, self._bounds[s]), min(stop, self._bounds[s + 1])
-            if first < last:
-                segment = self._decode(s)
-                begin = self._bounds[s]
-                fill_frames(result, start, first, last, begin, segment.basis, segment.coefficients, points)
-        return result
+        return read_frames(start, stop, self._bounds, self._mesh.points, self._decode)
 
     def _build_domain(self, surface: Surface) -> Domain:
         average = None
@@ -90,7 +64,7 @@ class LaplacianReader:
         return build_domain(surface, average, self._header)
 
     def _decode(self, s: int) -> Segment:
-        if self._segment is None or self._segment.number != s:
+        if self._kept is None or self._kept[0] != s:
             step, section = self._header.steps[s], self._bitstream.section
             name, n_frames = f"basis.{s}", self._bounds[s + 1] - self._bounds[s]
             basis = decode_basis(section(name), n_frames, self._mesh.n_points, step * self._header.basis_ratio, name)
@@ -98,5 +72,5 @@ class LaplacianReader:
             anchors, deltas = (section(name) for name in names)
             n_components = basis.vectors.shape[1]
             coefficients = decode_coefficients(anchors, deltas, n_components, step, self._domain, self._header, names)
-            self._segment = Segment(s, basis, np.ascontiguousarray(coefficients.T))
-        return self._segment
+            self._kept = s, Segment(basis, np.ascontiguousarray(coefficients.T))
+        return self._kept[1]

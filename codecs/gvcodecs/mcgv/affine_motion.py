@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.mcgv import format as sections
-from gvcodecs.mcgv.motion import CodedMotion, locate
+from gvcodecs.mcgv.motion import CodedMotion, Samples, locate
 from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.prediction import AffinePredictor
 from gvcodecs.mcgv.transforms import decode_transforms, dequantise, encode_transforms, quantise
@@ -60,14 +60,14 @@ class AffineMotion:
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
         predictor = AffinePredictor(base, clusters, header.clusters)
         self._rest = predictor.rest
-        self._vertices = np.argsort(layout.pixel)
-        self._pixels = layout.pixel[self._vertices]
-        self._coordinates = predictor.coordinates[self._vertices]
-        self._clusters = clusters[self._vertices]
+        self._samples = Samples(layout)
+        self._coordinates = predictor.coordinates[self._samples.vertices]
+        self._clusters = clusters[self._samples.vertices]
+        self._residuals = header.residual_step * header.profile.offsets
         self._segment: tuple[int, Float64] = (-1, np.zeros((0, 0, 4, 3)))
 
     def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
-        """Fill ``positions (V, 3)`` of a frame from its ``samples (3, height * width)``; raises `CorruptFile`."""
+        """Fill ``positions (V, 3)`` of a frame from its ``samples (3 height, line)``; raises `CorruptFile`."""
         from gvcodecs.mcgv.rebuilding import rebuild
 
         s = locate(self._bounds, frame)
@@ -75,7 +75,13 @@ class AffineMotion:
             name, n_frames = f"transforms.{s}", self._bounds[s + 1] - self._bounds[s]
             lattice = decode_transforms(self._bitstream.section(name), n_frames, self._header.clusters, name)
             self._segment = (s, dequantise(lattice, self._rest, self._header.transform_step))
-        transforms = self._segment[1][frame - self._bounds[s]].copy()
-        step = self._header.residual_step
-        transforms[:, 3] -= step * self._header.profile.middle  # once per cluster instead of once per vertex
-        rebuild(samples, self._vertices, self._pixels, self._coordinates, self._clusters, transforms, step, positions)
+        rebuild(
+            samples.reshape(3, -1),
+            self._samples.vertices,
+            self._samples.pixels(samples.shape[1]),
+            self._coordinates,
+            self._clusters,
+            self._segment[1][frame - self._bounds[s]],
+            self._residuals,
+            positions,
+        )

@@ -62,7 +62,7 @@ def fit_blend(sequence: MeshSequence, base: Float64, points: Points, step: float
         n_clusters: K, about; 0: as many as pay.
     """
     report("segment", 0)
-    neighbours = points.neighbours()
+    neighbours = points.neighbours
     features = motion_features(sequence, base, k_ring(neighbours, RING), points.members)
     price = step**2 / sequence.n_frames  # of one squared step of one frame, as part of all frames
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.blend_fitting import fit_blend
 from gvcodecs.mcgv.blending import TOTAL, Blend, BlendFit
-from gvcodecs.mcgv.motion import CodedMotion, locate
+from gvcodecs.mcgv.motion import CodedMotion, Samples, locate
 from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.points import Points
 from gvcodecs.mcgv.trajectories import Trajectories, decode_trajectories, encode_trajectories
@@ -19,6 +19,8 @@ from gvcodecs.mcgv.weight_coding import decode_weights, encode_weights
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import Progress
 from gvpipe.sequence import Float32, MeshSequence
+
+CHUNK = 16  # frames whose transforms are made at a time
 
 Float64 = NDArray[np.float64]
 
@@ -30,7 +32,7 @@ def code_blended(
     fitted = fit_blend(sequence, base[points.members], points, step, n_clusters, report)
     blend = Blend(base[points.members], fitted.weights, fitted.n_clusters)
     fit = BlendFit(blend)
-    coded = {"weights": encode_weights(fitted.weights, points.neighbours())}
+    coded = {"weights": encode_weights(fitted.weights, points.neighbours)}
     segments: list[Trajectories] = []
     for s, (start, stop) in enumerate(pairwise(bounds)):
         rows = [fit.fit(_columns(block[:, points.members] - base[points.members])) for _, block in sequence.chunks(start, stop)]
@@ -61,42 +63,49 @@ class BlendedMotion:
         self, bitstream: Bitstream, header: sections.Header, base: Float64, points: Points, layout: Layout, bounds: list[int]
     ) -> None:
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
-        weights = decode_weights(bitstream.section("weights"), points.neighbours(), header.clusters)
+        weights = decode_weights(bitstream.section("weights"), points.neighbours, header.clusters)
         self._blend = Blend(base[points.members], weights, header.clusters)
-        self._vertices = np.argsort(layout.pixel)
-        self._pixels = layout.pixel[self._vertices]
-        self._base = base[self._vertices]
-        point = points.point[self._vertices]
+        self._samples = Samples(layout)
+        self._base = base[self._samples.vertices]
+        point = points.point[self._samples.vertices]
         self._homogeneous = self._blend.homogeneous[point]
         self._clusters, self._parts = weights.clusters[point], weights.weights[point] / TOTAL
+        self._residuals = header.residual_step * header.profile.offsets
         self._segment: tuple[int, Trajectories | None] = (-1, None)
+        self._chunk: tuple[int, int, Float64] = (-1, -1, np.zeros((0, 0, 4, 3)))
 
     def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
-        """Fill ``positions (V, 3)`` of a frame from its ``samples (3, height * width)``; raises `CorruptFile`."""
+        """Fill ``positions (V, 3)`` of a frame from its ``samples (3 height, line)``; raises `CorruptFile`."""
         from gvcodecs.mcgv.rebuilding import rebuild_blended
 
         s = locate(self._bounds, frame)
-        kept, trajectories = self._segment
-        if kept != s or trajectories is None:
-            name, n_frames = f"transforms.{s}", self._bounds[s + 1] - self._bounds[s]
-            header = self._header
-            data = self._bitstream.section(name)
-            trajectories = decode_trajectories(data, header.clusters, n_frames, header.transform_step, name)
-            self._segment = (s, trajectories)
-        first = frame - self._bounds[s]
+        chunk, place = divmod(frame - self._bounds[s], CHUNK)
+        if self._chunk[:2] != (s, chunk):
+            self._chunk = (s, chunk, self._transforms(s, chunk))
         rebuild_blended(
-            samples,
-            self._vertices,
-            self._pixels,
+            samples.reshape(3, -1),
+            self._samples.vertices,
+            self._samples.pixels(samples.shape[1]),
             self._base,
             self._homogeneous,
             self._clusters,
             self._parts,
-            self._blend.transforms(trajectories.rows(first, first + 1)),
-            self._header.residual_step,
-            float(self._header.profile.middle),
+            self._chunk[2][place],
+            self._residuals,
             positions,
         )
+
+    def _transforms(self, s: int, chunk: int) -> Float64:
+        """``(n, K, 4, 3)`` of a chunk of a segment's frames: always whole, so that sums do not depend on what else is read."""
+        kept, trajectories = self._segment
+        n_frames = self._bounds[s + 1] - self._bounds[s]
+        if kept != s or trajectories is None:
+            header, name = self._header, f"transforms.{s}"
+            data = self._bitstream.section(name)
+            trajectories = decode_trajectories(data, header.clusters, n_frames, header.transform_step, name)
+            self._segment = (s, trajectories)
+        transforms = self._blend.transforms(trajectories.rows(chunk * CHUNK, min((chunk + 1) * CHUNK, n_frames)))
+        return np.ascontiguousarray(transforms.reshape(*transforms.shape[:2], -1, 3).transpose(2, 0, 1, 3))
 
 
 def _columns(frames: Float64) -> Float64:

@@ -60,8 +60,9 @@ class Blend:
         self.homogeneous = homogeneous(base)
         parts = weights.weights / TOTAL  # (P, 4)
         outer = self.homogeneous[:, :, None] * self.homogeneous[:, None, :]
-        energy = np.zeros((n_clusters, 4, 4))
-        np.add.at(energy, weights.clusters, parts[:, :, None, None] ** 2 * outer[:, None])
+        rows, columns = weights.clusters.ravel(), np.repeat(np.arange(len(base)), parts.shape[1])
+        squares = sparse.csr_array((np.square(parts).ravel(), (rows, columns)), shape=(n_clusters, len(base)))
+        energy = (squares @ outer.reshape(-1, 16)).reshape(n_clusters, 4, 4)
         trace = np.trace(energy, axis1=1, axis2=2)
         energy += (FLAT * trace + LEAST_ENERGY)[:, None, None] * np.eye(4)
         self._inverse = np.linalg.inv(np.linalg.cholesky(energy))  # (K, 4, 4)

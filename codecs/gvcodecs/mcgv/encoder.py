@@ -2,18 +2,17 @@
 
 Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video: A Compact Representation for 3D Animations", 2007. The steps, each a
 module of its own: base frame (`gvpipe.connectivity`), motion (`blended_motion` or, as published, `segmentation` and
-`affine_motion`), `placement` (or, as published, `parameterization` and `packing`), `padding`, video (`gvpipe.video`).
+`affine_motion`), `placement` (or, as published, `parameterization` and `packing`), and pictures of frames (`frame_images`) or
+of trajectories (`trajectory_encoder`). What they begin with is `_Start`; a route from there ends with `_Coded`.
 
-All steps work from what the decoder will have: the decoded base frame and the decoded transforms. Frames are read three
-times (extent, motion, transforms and residual range together, images), never kept.
+All steps work from what the decoder will have: the decoded base frame and the decoded transforms. Frames are read again by each
+that looks at them (the extent, which affine transforms need, motion, transforms, residual range, images), never kept.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,14 +21,14 @@ from numpy.typing import NDArray
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import code_affine
 from gvcodecs.mcgv.blended_motion import code_blended
+from gvcodecs.mcgv.frame_images import code_frames, measure_residuals
 from gvcodecs.mcgv.motion import PREDICTIONS, CodedMotion
 from gvcodecs.mcgv.outliers import SECTION, OutlierWriter
 from gvcodecs.mcgv.packing import Layout, pack
-from gvcodecs.mcgv.padding import Padding
 from gvcodecs.mcgv.parameterization import parameterize
 from gvcodecs.mcgv.placement import choose_size, place
 from gvcodecs.mcgv.points import Points
-from gvcodecs.mcgv.quality import Magnitudes, Quantiser, choose_quantiser, effective_step
+from gvcodecs.mcgv.quality import Magnitudes, choose_quantiser, effective_step
 from gvcodecs.mcgv.reader import McgvReader
 from gvcodecs.mcgv.segmentation import segment
 from gvcodecs.mcgv.trajectory_encoder import code_trajectories
@@ -37,15 +36,16 @@ from gvcodecs.mcgv.trajectory_header import TRANSFORMS
 from gvcodecs.mcgv.trajectory_reader import TrajectoryReader
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
-from gvpipe.connectivity import BaseMesh, decode_base, encode_base
+from gvpipe.connectivity import BaseMesh, EncodedMesh, decode_base, encode_base
 from gvpipe.errors import SettingError
 from gvpipe.quantize import Lattice
-from gvpipe.segments import count_segments, segment_starts
+from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import Float32, Int32, MeshSequence
-from gvpipe.video import PROFILES, Plane, Profile, VideoWriter
+from gvpipe.video import PROFILES, Profile
 
 BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
 AFFINE_CLUSTERS, AFFINE_BASE_BITS = 20, 12  # the paper's
+MOST_SEGMENTS = 4000  # one section each, of the 4096 that a bitstream may have
 BASE_BITS = 8, 16  # bits of a base frame that are chosen unasked
 DISTINCT = 0.995  # part of the places in a base frame that its lattice must tell apart
 AUTO = "auto"
@@ -95,7 +95,7 @@ class Mcgv(Settings):
         self.check_range(0, 20, "base_bits")
         self.check_range(1, 16, "density")
         self.check_range(1, 1000, "gop")
-        self.check_range(1, 100_000, "segment")
+        self.check_range(1, MAX_SEGMENT, "segment")
         if self.image == "jpeg" and self.profile == "precise":
             raise SettingError("profile precise needs image h264: JPEG has 8 bits")
         if self.transform == "klt" and (self.image != "h264" or self.prediction != "blended"):
@@ -112,76 +112,34 @@ class Mcgv(Settings):
         """
         report = progress or (lambda stage, done: None)
         memo = memo or Memo()
-        given = sequence
-        report("read", 0)
-        extent = memo("extent", lambda: _extent(given, report))
-        report("base", 0)
-        first = given.read(0, 1)[0]
-        profile = PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
-        scale = PROFILES["h264-10"] if self.transform == "klt" else profile  # no range ends the qualities of trajectory images
-        effective = effective_step(self.quality, scale, float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0))))
-        lattice = self._lattice(first, effective / math.sqrt(given.n_frames))
-        coded = memo(f"base {lattice.step}", lambda: encode_base(lattice.quantise(first), given.faces, self.reorder))
-        memo.permutation = coded.permutation
-        decoded = decode_base(coded.mesh, coded.order)
-        sequence = given.reordered(coded.permutation, decoded.faces)
-        base = lattice.place(decoded.points)
-        points = Points.of(decoded.points, decoded.faces, decoded.visits)
-        n_segments = count_segments(sequence.n_frames, self.segment)
-        bounds = segment_starts(sequence.n_frames, n_segments)
-        own: dict[str, Any]
-        if self.prediction == "blended":
-            whole = np.zeros(len(points.members), np.int32)  # nothing ties charts to clusters: few, large ones are best
-            groups = points.pieces()
-            layout = memo(f"layout {lattice.step}", lambda: self._layout(base, decoded.points, points, whole, groups, report))
+        start = self._start(sequence, memo, report)
+        route = self._blended if self.prediction == "blended" else self._affine
         if self.transform == "klt":
-            block, clusters = BLOCKS[self.image], self.clusters
-            images = code_trajectories(
-                sequence, base, points, layout, block, bounds, effective, clusters, profile, self.preset, report
-            )
-            own, coded_sections, video = {"clusters": images.n_clusters, "images": images.header}, images.sections, images.video
-        else:
-            if self.prediction == "blended":
-                motion = code_blended(sequence, base, points, bounds, effective, self.clusters, report)
-                magnitudes = _magnitudes(sequence, motion, bounds)
-            else:
-                step = extent / 2**self.transform_bits
-                motion, layout = memo("motion", lambda: self._published(sequence, base, decoded, points, bounds, step, report))
-                magnitudes = memo("magnitudes", lambda: _magnitudes(sequence, motion, bounds))
-            quantiser = choose_quantiser(effective, profile, magnitudes)
-            outliers = OutlierWriter(profile, quantiser.step, effective, self.gop, sequence.n_vertices)
-            video = self._frames(sequence, motion, bounds, layout, profile, quantiser, outliers, report)
-            own = {"clusters": motion.n_clusters, "transform_step": motion.step, "residual_step": quantiser.step}
-            coded_sections, apart = motion.sections, outliers.finish()
-            if apart:
-                own["outliers"], coded_sections = True, {**coded_sections, SECTION: apart}
+            route = self._trajectory_images
+        coded = route(start, memo, report)
         header = sections.Header(
             prediction=self.prediction,
             placement=self._placement,
-            profile=profile,
+            profile=self._video_profile,
             block=BLOCKS[self.image],
-            width=layout.width,
-            height=layout.height,
-            segments=n_segments,
-            base=lattice,
-            **own,
+            width=coded.layout.width,
+            height=coded.layout.height,
+            segments=len(start.bounds) - 1,
+            base=start.lattice,
+            **coded.own,
         )
-        pixels = {} if self._placement == "halves" else {"pixels": sections.encode_pixels(layout, np.argsort(decoded.visits))}
+        order = np.argsort(start.mesh.visits)
+        pixels = {} if self._placement == "halves" else {"pixels": sections.encode_pixels(coded.layout, order)}
         return Bitstream(
             codec=self.id,
             version=header.version,
             n_frames=sequence.n_frames,
             n_vertices=sequence.n_vertices,
-            n_triangles=len(decoded.faces),
+            n_triangles=len(start.mesh.faces),
             fps=float(sequence.fps),
             header=header.to_json(),
-            sections={
-                "mesh": coded.mesh,
-                "order": coded.order,
-                **pixels,
-                **coded_sections,
-            },
-            video=video,
+            sections={"mesh": start.coded.mesh, "order": start.coded.order, **pixels, **coded.sections},
+            video=coded.video,
         )
 
     @classmethod
@@ -190,28 +148,65 @@ class Mcgv(Settings):
         header = sections.Header.of(bitstream)
         return TrajectoryReader(bitstream, header, header.images) if header.images else McgvReader(bitstream)
 
-    def _frames(
-        self,
-        sequence: MeshSequence,
-        motion: CodedMotion,
-        bounds: list[int],
-        layout: Layout,
-        profile: Profile,
-        quantiser: Quantiser,
-        outliers: OutlierWriter,
-        report: Progress,
-    ) -> bytes:
-        """The video whose pictures are the frames' residuals; what they cannot hold goes to ``outliers``."""
-        report("video", 0)
-        padding = Padding(layout, BLOCKS[self.image])
-        shape = (3 * layout.height, layout.width)
-        with VideoWriter(profile, shape[1], shape[0], sequence.fps, quantiser.level, self.gop, self.preset) as writer:
-            for first, residual in _residuals(sequence, motion, bounds):
-                outliers.add(residual)
-                for picture in _pictures(residual, padding, profile, quantiser.step):
-                    writer.add(picture)
-                report("video", (first + len(residual)) / sequence.n_frames)
-            return writer.finish()
+    def _start(self, given: MeshSequence, memo: Memo, report: Progress) -> _Start:
+        """Code the base frame, and see the sequence as the decoder will."""
+        report("base", 0)
+        first = given.read(0, 1)[0]
+        # no range ends the qualities of trajectory images
+        scale = PROFILES["h264-10"] if self.transform == "klt" else self._video_profile
+        step = effective_step(self.quality, scale, float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0))))
+        lattice = self._lattice(first, step / math.sqrt(given.n_frames))
+        coded = memo(f"base {lattice.step}", lambda: encode_base(lattice.quantise(first), given.faces, self.reorder))
+        memo.permutation = coded.permutation
+        mesh = decode_base(coded.mesh, coded.order)
+        sequence = given.reordered(coded.permutation, mesh.faces)
+        points = Points.of(mesh.points, mesh.faces, mesh.visits)
+        bounds = cut(sequence.n_frames, self.segment, MOST_SEGMENTS)
+        return _Start(sequence, coded, mesh, lattice, lattice.place(mesh.points), points, bounds, step)
+
+    def _affine(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
+        """Pictures are frames, predicted as published; quality touches neither layout nor transforms."""
+        motion, layout = memo("motion", lambda: self._published(start, report))
+        magnitudes = memo("magnitudes", lambda: measure_residuals(start.sequence, motion, start.bounds))
+        return self._frames(start, motion, layout, magnitudes, report)
+
+    def _blended(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
+        """Pictures are frames, predicted by a blend."""
+        layout = self._blended_layout(start, memo, report)
+        motion = code_blended(start.sequence, start.base, start.points, start.bounds, start.step, self.clusters, report)
+        return self._frames(start, motion, layout, measure_residuals(start.sequence, motion, start.bounds), report)
+
+    def _trajectory_images(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
+        """Pictures are coefficients of trajectories, predicted by a blend."""
+        layout = self._blended_layout(start, memo, report)
+        images = code_trajectories(
+            start.sequence,
+            start.base,
+            start.points,
+            layout,
+            BLOCKS[self.image],
+            start.bounds,
+            start.step,
+            self.clusters,
+            self._video_profile,
+            self.preset,
+            report,
+        )
+        return _Coded(layout, {"clusters": images.n_clusters, "images": images.header}, images.sections, images.video)
+
+    def _frames(self, start: _Start, motion: CodedMotion, layout: Layout, magnitudes: Magnitudes, report: Progress) -> _Coded:
+        """Code what a prediction leaves, of such magnitudes, as one picture per frame and outliers."""
+        profile, block = self._video_profile, BLOCKS[self.image]
+        quantiser = choose_quantiser(start.step, profile, magnitudes)
+        outliers = OutlierWriter(profile, quantiser.step, start.step, self.gop, start.sequence.n_vertices)
+        video = code_frames(
+            start.sequence, motion, start.bounds, layout, block, profile, quantiser, outliers, self.gop, self.preset, report
+        )
+        own = {"clusters": motion.n_clusters, "transform_step": motion.step, "residual_step": quantiser.step}
+        apart = outliers.finish()
+        if not apart:
+            return _Coded(layout, own, motion.sections, video)
+        return _Coded(layout, {**own, "outliers": True}, {**motion.sections, SECTION: apart}, video)
 
     def _lattice(self, first: Float32, step: float) -> Lattice:
         """The base frame's lattice: by default of about this step, as its errors stay for all frames; it tells places apart."""
@@ -227,28 +222,31 @@ class Mcgv(Settings):
             bits += 1
         return Lattice.over(first, bits)
 
-    def _published(
-        self,
-        sequence: MeshSequence,
-        base: Float64,
-        mesh: BaseMesh,
-        points: Points,
-        bounds: list[int],
-        step: float,
-        report: Progress,
-    ) -> tuple[CodedMotion, Layout]:
-        """The paper's partition, layout and transforms, whose quantisation step, model units, quality does not touch."""
+    def _published(self, start: _Start, report: Progress) -> tuple[CodedMotion, Layout]:
+        """The paper's partition, layout and transforms."""
+        sequence, mesh, points = start.sequence, start.mesh, start.points
+        step = _extent(sequence, report) / 2**self.transform_bits
         report("segment", 0)
-        partition = segment(sequence, base[points.members], points.faces, points.members, self.clusters or AFFINE_CLUSTERS)
+        n_clusters = self.clusters or AFFINE_CLUSTERS
+        partition = segment(sequence, start.base[points.members], points.faces, points.members, n_clusters)
         clusters = partition[points.point]
-        layout = self._layout(base, mesh.points, points, partition, clusters, report)
-        motion = code_affine(sequence, base, clusters, bounds, step, report)
+        layout = self._layout(start, partition, clusters, report)
+        motion = code_affine(sequence, start.base, clusters, start.bounds, step, report)
         motion.sections["clusters"] = (
             sections.encode_vertex_clusters(clusters, np.argsort(mesh.visits))
             if self._placement == "halves"
             else sections.encode_clusters(clusters, layout, BLOCKS[self.image])
         )
         return motion, layout
+
+    def _blended_layout(self, start: _Start, memo: Memo, report: Progress) -> Layout:
+        """Nothing ties a blend's charts to clusters: few, large ones are best."""
+        whole, groups = np.zeros(len(start.points.members), np.int32), start.points.pieces()
+        return memo(f"layout {start.lattice.step}", lambda: self._layout(start, whole, groups, report))
+
+    @property
+    def _video_profile(self) -> Profile:
+        return PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
 
     @property
     def _placement(self) -> str:
@@ -257,15 +255,14 @@ class Mcgv(Settings):
             return self.placement
         return "halves" if self.prediction == "blended" and self.image == "h264" else "charts"
 
-    def _layout(
-        self, base: Float64, lattice: Int32, points: Points, partition: Int32, groups: Int32, report: Progress
-    ) -> Layout:
+    def _layout(self, start: _Start, partition: Int32, groups: Int32, report: Progress) -> Layout:
         """The vertices' pixels: charts keep to the parts of ``partition (P,)``, halving parts ``groups (V,)`` first."""
-        block, size = BLOCKS[self.image], self._plane_size()
+        block, size, points = BLOCKS[self.image], self._plane_size(), start.points
         if self._placement == "halves":
+            lattice = start.mesh.points
             return place(lattice, groups, *(size or choose_size(len(lattice), block)), block)
         report("parameterize", 0)
-        atlas = parameterize(base[points.members], points.faces, partition)
+        atlas = parameterize(start.base[points.members], points.faces, partition)
         return pack(atlas, points.point, block, self.density, size)
 
     def _plane_size(self) -> tuple[int, int] | None:
@@ -278,6 +275,39 @@ class Mcgv(Settings):
         raise SettingError(f"size is {self.size!r}; auto or WIDTHxHEIGHT, multiples of {block} up to 4096, is needed")
 
 
+@dataclass(frozen=True)
+class _Start:
+    """What every route starts from.
+
+    Args:
+        sequence: the animation, its vertices and triangles in the decoder's order.
+        coded, mesh: the base frame's sections, and what they decode to.
+        lattice: of the base frame; base: ``(V, 3)`` its decoded positions, model units.
+        points: of the base frame.
+        bounds: first frame of every segment, and F.
+        step: that the quality asks for (`quality`), model units.
+    """
+
+    sequence: MeshSequence
+    coded: EncodedMesh
+    mesh: BaseMesh
+    lattice: Lattice
+    base: Float64
+    points: Points
+    bounds: list[int]
+    step: float
+
+
+@dataclass(frozen=True)
+class _Coded:
+    """What a route ends with: the vertices' pixels, its own fields of the header, its sections, and the video."""
+
+    layout: Layout
+    own: dict[str, Any]
+    sections: dict[str, bytes]
+    video: bytes
+
+
 def _extent(sequence: MeshSequence, report: Progress) -> float:
     """The longest side of the bounding box of all frames, model units; 1 if all is one point."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -285,26 +315,3 @@ def _extent(sequence: MeshSequence, report: Progress) -> float:
         low, high = np.minimum(low, block.min(axis=(0, 1))), np.maximum(high, block.max(axis=(0, 1)))
         report("read", (first + len(block)) / sequence.n_frames)
     return float((high - low).max()) or 1.0
-
-
-def _magnitudes(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> Magnitudes:
-    """Of all residuals."""
-    magnitudes = Magnitudes()
-    for _, residual in _residuals(sequence, motion, bounds):
-        magnitudes.add(residual)
-    return magnitudes
-
-
-def _residuals(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> Iterator[tuple[int, Float64]]:
-    """Yield ``(first frame, (n, V, 3) residuals)`` of the whole sequence (equation 4)."""
-    for start, stop in pairwise(bounds):
-        for first, block in sequence.chunks(start, stop):
-            yield first, block - motion.predict(first, first + len(block))
-
-
-def _pictures(residual: Float64, padding: Padding, profile: Profile, step: float) -> Iterator[Plane]:
-    """Yield one picture per frame: the padded x, y and z planes, one below the other."""
-    values = residual.swapaxes(1, 2).reshape(3 * len(residual), -1)  # (n, V, 3) -> (3n, V)
-    levels = np.rint(padding.fill(values / step, 0.0)) + profile.middle
-    planes = np.clip(levels, profile.low, profile.high).astype(profile.dtype)
-    yield from planes.reshape(len(residual), -1, planes.shape[2])

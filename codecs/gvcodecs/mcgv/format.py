@@ -33,7 +33,6 @@ from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvpipe.binary import Cursor, varint
 from gvpipe.bitstream import Bitstream
-from gvpipe.connectivity import BaseMesh, decode_base
 from gvpipe.entropy import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile
 from gvpipe.quantize import Lattice
@@ -147,15 +146,6 @@ class Header:
         return header
 
 
-def decode_surface(bitstream: Bitstream) -> BaseMesh:
-    """The base frame of the sections ``mesh`` and ``order``; raises `CorruptFile` if it is not what the header says."""
-    base = decode_base(bitstream.section("mesh"), bitstream.section("order"))
-    found = (len(base.points), len(base.faces))
-    if found != (bitstream.n_vertices, bitstream.n_triangles):
-        raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
-    return base
-
-
 def encode_pixels(layout: Layout, order: Int64) -> bytes:
     """Return the section ``pixels``; ``order (V,)`` are the vertices in the codec's order."""
     y, x = np.divmod(layout.pixel[order], layout.width)
@@ -175,7 +165,7 @@ def decode_pixels(data: bytes, order: Int64, width: int, height: int) -> Layout:
         raise cursor.corrupt("a pixel lies outside the plane")
     pixel = np.empty(len(order), np.int64)
     pixel[order] = y * width + x
-    if len(np.unique(pixel)) != len(pixel):
+    if np.bincount(pixel).max(initial=0) > 1:
         raise cursor.corrupt("two vertices share a pixel")
     return Layout(width, height, pixel)
 

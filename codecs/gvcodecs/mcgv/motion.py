@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gvcodecs.mcgv.packing import Layout
 from gvpipe.sequence import Float32
 
 PREDICTIONS = ("blended", "affine")
@@ -37,8 +38,31 @@ class Motion(Protocol):
     """A prediction as it is decoded; keeps the transforms of the last segment for the next frame."""
 
     def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
-        """Fill ``positions (V, 3)`` of a frame from its ``samples (3, height * width)``; raises `CorruptFile`."""
+        """Fill ``positions (V, 3)`` of a frame from its ``samples (3 height, line)``; raises `CorruptFile`."""
         ...
+
+
+class Samples:
+    """Where the vertices' samples are in a picture.
+
+    Args:
+        layout: the vertices' pixels.
+
+    Attributes:
+        vertices: ``(V,)`` the vertices in the order of their pixels: going through a picture from one end to the other takes
+            half the time.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        self.vertices = np.argsort(layout.pixel)
+        self._row, self._column = np.divmod(layout.pixel[self.vertices], layout.width)
+        self._line, self._pixels = 0, self._row
+
+    def pixels(self, line: int) -> NDArray[np.int64]:
+        """``(V,)`` where they are in a plane whose lines take ``line`` samples, the plane's width or more."""
+        if line != self._line:
+            self._line, self._pixels = line, self._row * line + self._column
+        return self._pixels
 
 
 def locate(bounds: list[int], frame: int) -> int:

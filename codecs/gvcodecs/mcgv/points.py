@@ -6,6 +6,7 @@ Points are numbered in the codec's order of their first vertices, which is a wal
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,10 +41,11 @@ class Points:
         point[order] = number[found]
         return cls(point, order[members], point[faces].astype(np.int32))
 
+    @cached_property
     def neighbours(self) -> sparse.csr_array:
         """The points' symmetric adjacency ``(P, P)``."""
         return adjacency(self.faces, len(self.members))
 
     def pieces(self) -> Int32:
         """``(V,)`` the connected piece of the surface that each vertex belongs to."""
-        return components(self.neighbours())[1][self.point]
+        return components(self.neighbours)[1][self.point]

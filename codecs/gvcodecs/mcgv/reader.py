@@ -18,7 +18,7 @@ from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.placement import place
 from gvcodecs.mcgv.points import Points
 from gvpipe.bitstream import Bitstream
-from gvpipe.connectivity import BaseMesh
+from gvpipe.connectivity import BaseMesh, read_base
 from gvpipe.errors import CorruptFile
 from gvpipe.moves import MovesReader
 from gvpipe.segments import segment_starts
@@ -55,7 +55,7 @@ class McgvReader:
 
     @cached_property
     def _base(self) -> BaseMesh:
-        return sections.decode_surface(self._bitstream)
+        return read_base(self._bitstream)
 
     @cached_property
     def _motion(self) -> Motion:
@@ -88,7 +88,7 @@ class McgvReader:
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
         for first, planes in groups:
             for frame, plane in enumerate(planes, first):
-                self._motion.rebuild(frame, plane.reshape(3, -1), result[frame - start])
+                self._motion.rebuild(frame, plane, result[frame - start])
         if self._outliers:
             self._outliers.apply(start, result)
         return result

@@ -24,20 +24,18 @@ def rebuild(
     coordinates: Float64,
     clusters: NDArray[np.int32],
     transforms: Float64,
-    step: float,
+    residuals: Float64,
     positions: NDArray[np.float32],
 ) -> None:
     """Fill ``positions (V, 3) float32``, model units, of one frame.
 
     Args:
-        samples: ``(3, height * width) uint8 or uint16`` the frame's x, y and z planes.
-        vertices: ``(V,)`` the vertices in the order of their pixels: reading the planes from one end to the other takes
-            half the time.
-        pixels: ``(V,)`` their pixels.
+        samples: ``(3, N) uint8 or uint16`` the frame's x, y and z planes.
+        vertices, pixels: ``(V,)`` the vertices, and where each has its samples in a plane (`motion.Samples`).
         coordinates: ``(V, 3)`` their base points in their cluster's frame.
         clusters: ``(V,)`` theirs, 0..K-1.
-        transforms: ``(K, 4, 3)`` rows in model units; the last one carries the level that stands for zero as well.
-        step: model units per level.
+        transforms: ``(K, 4, 3)`` rows in model units.
+        residuals: what every value of a sample stands for, model units.
     """
     for i in range(len(vertices)):
         rows = transforms[clusters[i]]
@@ -45,7 +43,7 @@ def rebuild(
         vertex, pixel = vertices[i], pixels[i]
         for axis in range(3):
             predicted = x * rows[0, axis] + y * rows[1, axis] + z * rows[2, axis] + rows[3, axis]
-            positions[vertex, axis] = predicted + step * samples[axis, pixel]
+            positions[vertex, axis] = predicted + residuals[samples[axis, pixel]]
 
 
 @compiled
@@ -58,18 +56,16 @@ def rebuild_blended(
     clusters: NDArray[np.int32],
     parts: Float64,
     transforms: Float64,
-    step: float,
-    zero: float,
+    residuals: Float64,
     positions: NDArray[np.float32],
 ) -> None:
     """Fill ``positions (V, 3) float32``, model units, of one frame of blended motion (`blending`).
 
     Args:
-        samples, vertices, pixels, step: as in `rebuild`.
+        samples, vertices, pixels, residuals: as in `rebuild`.
         base: ``(V, 3)`` their base positions; homogeneous: ``(V, 4)`` coordinates.
         clusters, parts: ``(V, 4)`` theirs, and their weights, used ones first.
         transforms: ``(K, 4, 3)`` rows in model units.
-        zero: level that stands for zero.
     """
     for i in range(len(vertices)):
         vertex, pixel = vertices[i], pixels[i]
@@ -83,6 +79,6 @@ def rebuild_blended(
             moved_x += part * (x * rows[0, 0] + y * rows[1, 0] + z * rows[2, 0] + rows[3, 0])
             moved_y += part * (x * rows[0, 1] + y * rows[1, 1] + z * rows[2, 1] + rows[3, 1])
             moved_z += part * (x * rows[0, 2] + y * rows[1, 2] + z * rows[2, 2] + rows[3, 2])
-        positions[vertex, 0] = moved_x + step * (samples[0, pixel] - zero)
-        positions[vertex, 1] = moved_y + step * (samples[1, pixel] - zero)
-        positions[vertex, 2] = moved_z + step * (samples[2, pixel] - zero)
+        positions[vertex, 0] = moved_x + residuals[samples[0, pixel]]
+        positions[vertex, 1] = moved_y + residuals[samples[1, pixel]]
+        positions[vertex, 2] = moved_z + residuals[samples[2, pixel]]

@@ -69,7 +69,7 @@ def code_trajectories(
     """
     fitted = fit_blend(sequence, base[points.members], points, FIT_STEP * step, n_clusters, report)
     fit = BlendFit(Blend(base[points.members], fitted.weights, fitted.n_clusters))
-    sections = {"weights": encode_weights(fitted.weights, points.neighbours())}
+    sections = {"weights": encode_weights(fitted.weights, points.neighbours)}
     fineness = FINENESS[profile.name]
     largest = profile.amplitude / fineness
     padding = Padding(layout, block)

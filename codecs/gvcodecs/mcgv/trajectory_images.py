@@ -34,15 +34,7 @@ from gvcodecs.mcgv.trajectories import decode_coefficients, encode_coefficients
 from gvpipe.binary import Cursor, varint
 from gvpipe.entropy import decode_integers, encode_integers
 from gvpipe.errors import InputError
-from gvpipe.trajectory_basis import (
-    Basis,
-    choose_step,
-    count_components,
-    decode_basis,
-    encode_basis,
-    find_principal,
-    fit_coefficients,
-)
+from gvpipe.trajectory_basis import Basis, decode_basis, reduce_trajectories
 
 PLANES = 3  # to a picture
 MAX_OUTLIER = 1 << 38  # steps
@@ -82,11 +74,8 @@ def encode_segment(
         largest: magnitude that planes hold, steps.
         error: squared error to leave, about, summed over all coordinates, model units squared.
     """
-    principal = find_principal(trajectories, error)
-    step = choose_step(principal, len(trajectories), error)
-    n_components = count_components(principal, len(trajectories), step)
-    head, basis = encode_basis(principal, n_components, len(trajectories), step)
-    coefficients = fit_coefficients(trajectories, basis)  # (V, R)
+    reduced = reduce_trajectories(trajectories, error)
+    step, head, coefficients = reduced.step, reduced.basis, reduced.coefficients
     rows, transforms = encode_coefficients(fit.fit(coefficients[members]), step)
     left = (coefficients - (fit.matrix @ transforms)[point]) / step
     section = varint(len(head)) + head + varint(len(rows)) + rows + _encode_outliers(left, largest)

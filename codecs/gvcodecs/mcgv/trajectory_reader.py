@@ -22,6 +22,7 @@ from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvcodecs.mcgv.trajectory_images import PLANES, count_pictures, decode_segment
 from gvcodecs.mcgv.weight_coding import decode_weights
 from gvpipe.bitstream import Bitstream
+from gvpipe.connectivity import read_base
 from gvpipe.errors import CorruptFile
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
@@ -90,12 +91,12 @@ class TrajectoryReader:
 
     @cached_property
     def _surface(self) -> _Surface:
-        base = sections.decode_surface(self._bitstream)
+        base = read_base(self._bitstream)
         header = self._header
         positions = header.base.place(base.points)
         points = Points.of(base.points, base.faces, base.visits)
         layout = blended_layout(self._bitstream, header, base, points)
-        weights = decode_weights(self._bitstream.section("weights"), points.neighbours(), header.clusters)
+        weights = decode_weights(self._bitstream.section("weights"), points.neighbours, header.clusters)
         matrix = Blend(positions[points.members], weights, header.clusters).matrix()
         return _Surface(base.faces, np.ascontiguousarray(positions.T), points.point, layout, matrix)
 
@@ -131,12 +132,12 @@ class TrajectoryReader:
 
     def _samples(self, s: int) -> Float64:
         """What a segment's planes hold at the vertices' pixels: ``(R, V)``, steps."""
-        pixel = self._surface.layout.pixel
+        pixel, profile, width = self._surface.layout.pixel, self._header.profile, self._header.width
         first, last = int(self._pictures[s]), int(self._pictures[s + 1])
         result = np.empty((PLANES * (last - first), len(pixel)))
         for start, pictures in self._video.read(first, last):
             for k, picture in enumerate(pictures, start - first):
-                result[PLANES * k : PLANES * (k + 1)] = picture.reshape(PLANES, -1)[:, pixel]
-        result -= self._header.profile.middle
+                result[PLANES * k : PLANES * (k + 1)] = profile.clip(picture[:, :width]).reshape(PLANES, -1)[:, pixel]
+        result -= profile.middle
         result /= self._images.fineness
         return result[: self._images.components[s]]

@@ -12,34 +12,22 @@ points, then segment by segment.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.pca.format import MAX_SEGMENTS, Header
 from gvcodecs.pca.reader import PcaReader, ordered_rows
-from gvpipe.bare_mesh import decode_mesh, encode_mesh
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.hierarchy import build_hierarchy
 from gvpipe.row_coding import encode_rows
 from gvpipe.row_prediction import PREDICTORS
-from gvpipe.segments import count_segments, segment_starts
+from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import MeshSequence
-from gvpipe.trajectories import read_trajectories, survey
-from gvpipe.trajectory_basis import (
-    MAX_COMPONENTS,
-    choose_step,
-    count_components,
-    encode_basis,
-    find_principal,
-    fit_coefficients,
-)
-
-COARSEST, DECADES = 10.0, 2 * 4 / 3  # aimed error at quality 0, percent of the spread, and decades down to quality 100
-
-Float64 = NDArray[np.float64]
+from gvpipe.trajectories import code_points, read_trajectories
+from gvpipe.trajectory_basis import MAX_COMPONENTS, reduce_trajectories
 
 
 @dataclass(frozen=True)
@@ -68,7 +56,7 @@ class Pca(Settings):
         self.check_choice("predictor", PREDICTORS)
         self.check_range(0.1, 1.99, "beta")
         self.check_range(0, MAX_COMPONENTS, "components")
-        self.check_range(1, 100_000, "segment")
+        self.check_range(1, MAX_SEGMENT, "segment")
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
         """Code a sequence.
@@ -78,32 +66,20 @@ class Pca(Settings):
         """
         report = progress or (lambda stage, done: None)
         memo = memo or Memo()
-        report("read", 0)
-        points, spread = memo("survey", lambda: survey(sequence, report))
-        report("mesh", 0)
-        coded = memo("mesh", lambda: encode_mesh(sequence.faces, points, self.reorder))
-        memo.permutation = coded.permutation
-        mesh = decode_mesh(coded.mesh, coded.order, sequence.n_vertices)
-        _, first = np.unique(mesh.points, return_index=True)
-        members = coded.permutation[first]  # a given vertex of each of the codec's points
+        shared = code_points(sequence, self.reorder, memo, report)
+        mesh, wanted = shared.mesh, shared.aimed_error(self.quality)
         rows = memo("rows", lambda: ordered_rows(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor))
-        n_segments = min(count_segments(sequence.n_frames, self.segment), MAX_SEGMENTS)
-        bounds = segment_starts(sequence.n_frames, n_segments)
-        wanted = (
-            spread * COARSEST * 10 ** -(DECADES * self.quality / 100) / 100
-        )  # root mean square error of a vertex, model units
-        steps, sections = [], {"mesh": coded.mesh, "order": coded.order}
-        for s in range(n_segments):
+        bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
+        n_segments = len(bounds) - 1
+        steps, sections = [], {"mesh": shared.coded.mesh, "order": shared.coded.order}
+        for s, (start, stop) in enumerate(pairwise(bounds)):
             report("segments", s / n_segments)
-            trajectories = read_trajectories(sequence, bounds[s], bounds[s + 1], members)
-            n_points = len(trajectories)
-            error = wanted**2 * n_points * (bounds[s + 1] - bounds[s])
-            principal = find_principal(trajectories, error)
-            step = choose_step(principal, n_points, error)
+            trajectories = read_trajectories(sequence, start, stop, shared.members)
+            error = wanted**2 * mesh.n_points * (stop - start)
+            reduced = reduce_trajectories(trajectories, error, self.components)
+            step, coefficients = reduced.step, reduced.coefficients
             steps.append(step)
-            kept = min(self.components, len(principal.energies)) or count_components(principal, n_points, step)
-            sections[f"basis.{s}"], basis = encode_basis(principal, kept, n_points, step)
-            coefficients = fit_coefficients(trajectories, basis)
+            sections[f"basis.{s}"] = reduced.basis
             if self.predictor == "lsp":
                 coefficients = np.ascontiguousarray(coefficients[:, ::-1])  # section 3.4: the small ones first
             sections[f"coefficients.{s}"], _ = encode_rows(coefficients, step, rows, self.predictor, self.beta)

@@ -13,13 +13,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from gvpipe.bitstream import Bitstream
-from gvpipe.errors import CorruptFile
 from gvpipe.row_prediction import PREDICTORS
-from gvpipe.segments import count_longest
+from gvpipe.segments import read_segments, read_steps
 
 MAX_SEGMENTS = 2000  # two sections each, of the 4096 that a bitstream may have
-SMALL, LARGE = 2.0**-131, 2.0**129  # no step of a float32 model lies beyond
-MAX_SEGMENT = 100_000  # frames
 
 
 @dataclass(frozen=True)
@@ -45,19 +42,5 @@ class Header:
     @classmethod
     def of(cls, bitstream: Bitstream) -> Header:
         """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
-        predictor = bitstream.header.get("predictor")
-        if predictor not in PREDICTORS:
-            raise CorruptFile(f"header: no predictor {predictor!r}; there are {', '.join(PREDICTORS)}")
-        segments = bitstream.integer("segments", 1, min(MAX_SEGMENTS, bitstream.n_frames))
-        steps = bitstream.header.get("steps")
-        if not (
-            isinstance(steps, list)
-            and len(steps) == segments
-            and all(type(step) in (int, float) and SMALL < step < LARGE for step in steps)
-        ):
-            raise CorruptFile(f"header: steps are not {segments} positive numbers; get the file again from its source")
-        if count_longest(bitstream.n_frames, segments) > MAX_SEGMENT:
-            raise CorruptFile(
-                f"header: {bitstream.n_frames} frames in {segments} segments; at most {MAX_SEGMENT} each are allowed"
-            )
-        return cls(predictor, float(bitstream.number("beta", 0.1, 1.99)), segments, tuple(map(float, steps)))
+        predictor, segments = bitstream.choice("predictor", PREDICTORS), read_segments(bitstream, MAX_SEGMENTS)
+        return cls(predictor, float(bitstream.number("beta", 0.1, 1.99)), segments, read_steps(bitstream, segments))

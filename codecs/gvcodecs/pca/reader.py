@@ -5,35 +5,21 @@ The first frame of a segment costs its whole decoding; each after that one produ
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.pca.format import Header
-from gvpipe.bare_mesh import decode_mesh
+from gvpipe.bare_mesh import read_mesh
 from gvpipe.bitstream import Bitstream
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.errors import InputError
 from gvpipe.hierarchy import Hierarchy, build_hierarchy, level_faces
 from gvpipe.mesh_rows import OVERSHOOT, mesh_rows
 from gvpipe.row_coding import decode_rows
 from gvpipe.row_prediction import Rows
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
-from gvpipe.trajectory_basis import Basis, decode_basis
-from gvpipe.trajectory_frames import fill_frames
-
-Float64 = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Segment:
-    """A decoded segment: its basis, and the coefficients ``(R, P)`` of the points that its level has, others 0."""
-
-    number: int
-    lod: int
-    basis: Basis
-    coefficients: Float64
+from gvpipe.trajectory_basis import decode_basis
+from gvpipe.trajectory_frames import Segment, read_frames
 
 
 class PcaReader:
@@ -48,15 +34,11 @@ class PcaReader:
 
     def __init__(self, bitstream: Bitstream) -> None:
         self._header = Header.of(bitstream)
-        mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"), bitstream.n_vertices)
-        found = (len(mesh.points), len(mesh.faces))
-        if found != (bitstream.n_vertices, bitstream.n_triangles):
-            raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
-        self._mesh, self._bitstream = mesh, bitstream
-        self._hierarchy = build_hierarchy(mesh.point_faces, mesh.n_points)
+        self._mesh, self._bitstream = read_mesh(bitstream), bitstream
+        self._hierarchy = build_hierarchy(self._mesh.point_faces, self._mesh.n_points)
         self._rows = ordered_rows(self._hierarchy, self._header.predictor)
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
-        self._segment: Segment | None = None
+        self._kept: tuple[tuple[int, int], Segment] | None = None  # segment and level; points that the level lacks are 0
 
     @property
     def n_frames(self) -> int:
@@ -93,18 +75,10 @@ class PcaReader:
         """
         self._check_level(lod)
         vertices = self._mesh.points if lod == 0 else self._alive(lod)
-        result = np.empty((stop - start, len(vertices), 3), np.float32)
-        for s in range(self._header.segments):
-            first, last = max(start, self._bounds[s]), min(stop, self._bounds[s + 1])
-            if first >= last:
-                continue
-            segment = self._decode(s, lod)
-            begin = self._bounds[s]
-            fill_frames(result, start, first, last, begin, segment.basis, segment.coefficients, vertices)
-        return result
+        return read_frames(start, stop, self._bounds, vertices, lambda s: self._decode(s, lod))
 
     def _decode(self, s: int, lod: int) -> Segment:
-        if self._segment is None or (self._segment.number, self._segment.lod) != (s, lod):
+        if self._kept is None or self._kept[0] != (s, lod):
             step = self._header.steps[s]
             n_frames = self._bounds[s + 1] - self._bounds[s]
             name = f"basis.{s}"
@@ -123,8 +97,8 @@ class PcaReader:
             )
             if self._header.predictor == "lsp":
                 coefficients = coefficients[:, ::-1]
-            self._segment = Segment(s, lod, basis, np.ascontiguousarray(coefficients.T))
-        return self._segment
+            self._kept = (s, lod), Segment(basis, np.ascontiguousarray(coefficients.T))
+        return self._kept[1]
 
     def _alive(self, lod: int) -> NDArray[np.int32]:
         """Points of a level, ascending."""

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from gvcodecs.pdct.clip import MAX_CLUSTERS, Quantiser, encode_clip
 from gvcodecs.pdct.clustering import find_clusters
 from gvcodecs.pdct.dictionary import Surface
-from gvcodecs.pdct.format import MAX_CLIP_FRAMES, MAX_CLIPS, Header, surface_of
+from gvcodecs.pdct.format import MAX_CLIPS, Header, surface_of
 from gvcodecs.pdct.reader import PdctReader
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
-from gvpipe.connectivity import BaseMesh, EncodedBase, decode_base, encode_base
+from gvpipe.connectivity import BaseMesh, EncodedMesh, decode_base, encode_base
 from gvpipe.quantize import Lattice
-from gvpipe.segments import count_segments, segment_starts
+from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import Float32, Int32, MeshSequence
 
 COARSEST, DECADES = 0.03, 2.4  # step at quality 0, part of frame 0's diagonal, and decades down to quality 100
@@ -62,8 +62,8 @@ class Pdct(Settings):
         self.check_range(1, 64, "fineness")
         self.check_range(8, 24, "seed_bits")
         self.check_range(4, 20, "base_bits")
-        self.check_range(1, MAX_CLIP_FRAMES, "segment")
-        self.check_range(0, MAX_CLIP_FRAMES, "clip")
+        self.check_range(1, MAX_SEGMENT, "segment")
+        self.check_range(0, MAX_SEGMENT, "clip")
 
     @property
     def clip_frames(self) -> int:
@@ -77,8 +77,8 @@ class Pdct(Settings):
         memo = memo or Memo()
         base = SharedBase(sequence.read(0, 1)[0], sequence.faces, self, memo)
         memo.permutation = base.coded.permutation
-        n_clips = min(count_segments(sequence.n_frames, self.clip_frames), MAX_CLIPS)
-        bounds = segment_starts(sequence.n_frames, n_clips)
+        bounds = cut(sequence.n_frames, self.clip_frames, MAX_CLIPS)
+        n_clips = len(bounds) - 1
         sections = {"mesh": base.coded.mesh, "order": base.coded.order}
         for c in range(n_clips):
             report("clips", c / n_clips)
@@ -107,7 +107,7 @@ class SharedBase:
     def __init__(self, frame: Float32, faces: Int32, settings: Pdct, memo: Memo | None = None) -> None:
         self._settings, memo = settings, memo or Memo()
         self.lattice = Lattice.over(frame, settings.base_bits)
-        self.coded: EncodedBase = memo("base", lambda: encode_base(self.lattice.quantise(frame), faces, settings.reorder))
+        self.coded: EncodedMesh = memo("base", lambda: encode_base(self.lattice.quantise(frame), faces, settings.reorder))
         self.mesh: BaseMesh = decode_base(self.coded.mesh, self.coded.order)
         self._surface: Surface = surface_of(self.mesh, self.lattice)
         self._diagonal = _diagonal(frame)

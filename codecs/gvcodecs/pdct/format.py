@@ -20,9 +20,9 @@ from gvpipe.bitstream import Bitstream
 from gvpipe.connectivity import BaseMesh
 from gvpipe.errors import CorruptFile
 from gvpipe.quantize import Lattice
+from gvpipe.segments import read_segments
 
 MAX_CLIPS = 4000
-MAX_CLIP_FRAMES = 100_000
 
 
 @dataclass(frozen=True)
@@ -44,10 +44,7 @@ class Header:
     @classmethod
     def of(cls, bitstream: Bitstream) -> Header:
         """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
-        clips = bitstream.integer("clips", 1, min(MAX_CLIPS, bitstream.n_frames))
-        if bitstream.n_frames > clips * MAX_CLIP_FRAMES:
-            raise CorruptFile(f"header: {bitstream.n_frames} frames in {clips} clips; at most {MAX_CLIP_FRAMES} each")
-        return cls(clips, check_lattice(bitstream.header.get("base")))
+        return cls(read_segments(bitstream, MAX_CLIPS, "clips"), check_lattice(bitstream.header.get("base")))
 
 
 def check_lattice(values: Any) -> Lattice:

@@ -9,8 +9,7 @@ import numpy as np
 from gvcodecs.pdct.clip import decode_clip
 from gvcodecs.pdct.format import Header, surface_of
 from gvpipe.bitstream import Bitstream
-from gvpipe.connectivity import decode_base
-from gvpipe.errors import CorruptFile
+from gvpipe.connectivity import read_base
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
 
@@ -24,12 +23,8 @@ class PdctReader:
 
     def __init__(self, bitstream: Bitstream) -> None:
         header = Header.of(bitstream)
-        mesh = decode_base(bitstream.section("mesh"), bitstream.section("order"))
-        found = (len(mesh.points), len(mesh.faces))
-        if found != (bitstream.n_vertices, bitstream.n_triangles):
-            raise CorruptFile(f"the mesh has {found} vertices and triangles, the header says otherwise; get the file again")
-        self._bitstream, self._mesh = bitstream, mesh
-        self._surface = surface_of(mesh, header.base)
+        self._bitstream, self._mesh = bitstream, read_base(bitstream)
+        self._surface = surface_of(self._mesh, header.base)
         self._bounds = segment_starts(bitstream.n_frames, header.clips)
         self._clip: tuple[int, Float32] = (-1, np.zeros((0, 0, 3), np.float32))
 

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 from gvcodecs.pdct.clip import decode_clip
 from gvcodecs.pdct.dictionary import Surface
 from gvcodecs.pdct.encoder import Pdct, SharedBase
-from gvcodecs.pdct.format import MAX_CLIP_FRAMES, check_lattice, surface_of
+from gvcodecs.pdct.format import check_lattice, surface_of
 from gvpipe.connectivity import BaseMesh, decode_base
 from gvpipe.errors import CorruptFile, InputError, NewerVersion, NotGeometryVideo, TruncatedFile
+from gvpipe.segments import MAX_SEGMENT
 from gvpipe.sequence import Float32, Int32, check_finite
 
 MAGIC = b"gvpdct\r\n"
@@ -174,7 +175,7 @@ class StreamReader:
         if len(self._buffer) < CLIP.size:
             return None
         n_frames, checksum, size = CLIP.unpack_from(self._buffer)
-        if n_frames > MAX_CLIP_FRAMES:
+        if n_frames > MAX_SEGMENT:
             raise CorruptFile(f"clip {self._clips} of the stream has {n_frames} frames; get it again from its source")
         if len(self._buffer) < CLIP.size + size:
             return None

@@ -37,6 +37,9 @@ export function readHeader(header) {
     );
   }
   const settings = header.settings;
+  if (settings.transform !== undefined) {
+    throw new GeometryVideoError("unsupported", "it holds trajectory images; gvpipe export-html converts it");
+  }
   if (settings.profile !== PROFILE) {
     throw new GeometryVideoError("unsupported", `its profile is '${settings.profile}'; gvpipe export-html converts it`);
   }
