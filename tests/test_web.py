@@ -345,7 +345,6 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Bitstream]:
         ("blended-charts", {"placement": ["charts"]}),
         ("outliers", {"outliers": 1}),
         ("blended", {"outliers": True}),
-        ("affine", {"outliers": True}),
     ],
     ids=str,
 )
