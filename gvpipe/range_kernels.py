@@ -69,14 +69,14 @@ def decode_symbol(state: UInt64, words: UInt32, edges: UInt64) -> int:
 
 
 @compiled
-def decode_bits(state: UInt64, words: UInt32, width: int) -> int:
+def decode_bits(state: UInt64, words: UInt32, width: int) -> int | np.int64:
     """The next ``width`` bits, 1..16, all values alike; -1 as for `decode_symbol`."""
     scale = state[1] >> SHIFT
     quantile = state[0] // scale
     if quantile >= np.uint64(TOTAL):
         return -1
     share = np.uint64(PRECISION - width)
-    value = int(quantile >> share)
+    value = np.int64(quantile >> share)  # signed as the -1 is: numba makes floats of both kinds together
     _advance(state, words, scale, np.uint64(value) << share, ONE << share)
     return value
 

@@ -17,19 +17,14 @@ from gvpipe.binary import varint
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import LevelReader, codec_class, codec_ids, open_reader
 from gvpipe.corrections import (
-    HEAD,
-    MAX_POSITIONS,
     SECTION,
     Bound,
-    Correction,
-    _decode_group,
-    _encode_group,
     correct,
     encode_corrections,
     find_corrections,
-    move,
 )
 from gvpipe.errors import CorruptFile, FormatError, InputError
+from gvpipe.moves import HEAD, MAX_POSITIONS, Moves, decode_group, encode_group, move
 from gvpipe.sequence import Float32, Int32, MeshSequence
 from gvpipe.vertex_errors import frame_diagonal, measure_errors
 
@@ -157,8 +152,8 @@ def test_one_correction_is_enough(largest: float, offset: float, off: float, see
 def test_groups_round_trip(n_frames: int, n_vertices: int, share: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     vertices, frames = np.nonzero(rng.random((n_vertices, n_frames)) < share)
-    found = Correction(frames, vertices, rng.integers(-40, 40, (len(frames), 3)) ** 3)
-    back = _decode_group(_encode_group(found, n_frames), n_frames, n_vertices)
+    found = Moves(frames, vertices, rng.integers(-40, 40, (len(frames), 3)) ** 3)
+    back = decode_group(encode_group(found, n_frames), n_frames, n_vertices, SECTION)
     for name in ("frames", "vertices", "steps"):
         assert np.array_equal(getattr(found, name), getattr(back, name))
 
@@ -216,11 +211,11 @@ def test_hostile_numbers_are_refused() -> None:
         correct(stream_of(HEAD.pack(1.0) + b"\xff\xff\x7f\x00", sequence), held)
     assert MAX_POSITIONS // 81 < 0x1FFFFF
     for frames, vertices in (([0, 1], [0, 81]), ([0], [500])):  # runs past the last vertex
-        beyond = Correction(np.array(frames), np.array(vertices), np.ones((len(frames), 3), np.int64))
-        data = _encode_group(beyond, 10)
+        beyond = Moves(np.array(frames), np.array(vertices), np.ones((len(frames), 3), np.int64))
+        data = encode_group(beyond, 10)
         with pytest.raises(CorruptFile, match="range|fit"):
             correct(stream_of(HEAD.pack(1.0) + b"\x0a" + varint(len(data)) + data, sequence), held).read(0, 10)
-    far = Correction(np.array([0]), np.array([0]), np.array([[1 << 37, 0, 0]]))
-    data = _encode_group(far, 10)
+    far = Moves(np.array([0]), np.array([0]), np.array([[1 << 37, 0, 0]]))
+    data = encode_group(far, 10)
     with pytest.raises(CorruptFile, match="float32"):
         correct(stream_of(HEAD.pack(1e38) + b"\x0a" + varint(len(data)) + data, sequence), held).read(0, 10)

@@ -25,6 +25,7 @@ CURRENT: dict[str, tuple[str, dict[str, object]]] = {
     ),
     "mcgv-2-h264": ("mcgv", {"prediction": "blended", "gop": 5, "segment": 7}),
     "mcgv-2-affine": ("mcgv", {"clusters": 5, "prediction": "affine", "placement": "halves"}),
+    "mcgv-2-outliers": ("mcgv", {"clusters": 1, "quality": 95, "gop": 5}),
     "mcgv-2-charts": ("mcgv", {"prediction": "blended", "clusters": 5, "profile": "precise", "placement": "charts"}),
     "mcgv-2-jpeg": (
         "mcgv",

@@ -46,6 +46,7 @@ KINDS: dict[str, dict[str, Any]] = {  # how vertices move, and where their pixel
     "affine-halves": {"prediction": "affine", "placement": "halves"},
     "blended": {"prediction": "blended", "placement": "halves"},
     "blended-charts": {"prediction": "blended", "placement": "charts"},
+    "outliers": {"prediction": "affine", "clusters": 1, "quality": 100},
 }
 LARGEST_ERROR = 0.001  # model units, of the file with corrections
 
@@ -342,6 +343,8 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Bitstream]:
         ("blended", {"clusters": 1}),
         ("affine-halves", {"prediction": "blended"}),
         ("blended-charts", {"placement": ["charts"]}),
+        ("outliers", {"outliers": 1}),
+        ("blended", {"outliers": True}),
     ],
     ids=str,
 )
@@ -366,6 +369,7 @@ def test_settings_out_of_range_are_noticed(
         ("blended", "weights"),
         ("blended", "transforms.0"),
         ("corrected", "corrections"),
+        ("outliers", "outliers"),
     ],
 )
 def test_hostile_sections_give_one_clear_error(

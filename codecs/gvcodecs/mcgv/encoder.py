@@ -21,13 +21,14 @@ from numpy.typing import NDArray
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import code_affine
 from gvcodecs.mcgv.blended_motion import code_blended
-from gvcodecs.mcgv.frame_images import code_frames, largest_residual
+from gvcodecs.mcgv.frame_images import code_frames, measure_residuals
 from gvcodecs.mcgv.motion import PREDICTIONS, CodedMotion
+from gvcodecs.mcgv.outliers import SECTION, OutlierWriter
 from gvcodecs.mcgv.packing import Layout, pack
 from gvcodecs.mcgv.parameterization import parameterize
 from gvcodecs.mcgv.placement import choose_size, place
 from gvcodecs.mcgv.points import Points
-from gvcodecs.mcgv.quality import choose_quantiser, effective_step
+from gvcodecs.mcgv.quality import Magnitudes, choose_quantiser, effective_step
 from gvcodecs.mcgv.reader import McgvReader
 from gvcodecs.mcgv.segmentation import segment
 from gvcodecs.mcgv.trajectory_encoder import code_trajectories
@@ -166,14 +167,14 @@ class Mcgv(Settings):
     def _affine(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
         """Pictures are frames, predicted as published; quality touches neither layout nor transforms."""
         motion, layout = memo("motion", lambda: self._published(start, report))
-        largest = memo("largest", lambda: largest_residual(start.sequence, motion, start.bounds))
-        return self._frames(start, motion, layout, largest, report)
+        magnitudes = memo("magnitudes", lambda: measure_residuals(start.sequence, motion, start.bounds))
+        return self._frames(start, motion, layout, magnitudes, report)
 
     def _blended(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
         """Pictures are frames, predicted by a blend."""
         layout = self._blended_layout(start, memo, report)
         motion = code_blended(start.sequence, start.base, start.points, start.bounds, start.step, self.clusters, report)
-        return self._frames(start, motion, layout, largest_residual(start.sequence, motion, start.bounds), report)
+        return self._frames(start, motion, layout, measure_residuals(start.sequence, motion, start.bounds), report)
 
     def _trajectory_images(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
         """Pictures are coefficients of trajectories, predicted by a blend."""
@@ -193,15 +194,19 @@ class Mcgv(Settings):
         )
         return _Coded(layout, {"clusters": images.n_clusters, "images": images.header}, images.sections, images.video)
 
-    def _frames(self, start: _Start, motion: CodedMotion, layout: Layout, largest: float, report: Progress) -> _Coded:
-        """Code what a prediction leaves, of magnitude up to ``largest``, model units, as one picture per frame."""
+    def _frames(self, start: _Start, motion: CodedMotion, layout: Layout, magnitudes: Magnitudes, report: Progress) -> _Coded:
+        """Code what a prediction leaves, of such magnitudes, as one picture per frame and outliers."""
         profile, block = self._video_profile, BLOCKS[self.image]
-        quantiser = choose_quantiser(start.step, profile, largest)
+        quantiser = choose_quantiser(start.step, profile, magnitudes)
+        outliers = OutlierWriter(profile, quantiser.step, start.step, self.gop, start.sequence.n_vertices)
         video = code_frames(
-            start.sequence, motion, start.bounds, layout, block, profile, quantiser, self.gop, self.preset, report
+            start.sequence, motion, start.bounds, layout, block, profile, quantiser, outliers, self.gop, self.preset, report
         )
         own = {"clusters": motion.n_clusters, "transform_step": motion.step, "residual_step": quantiser.step}
-        return _Coded(layout, own, motion.sections, video)
+        apart = outliers.finish()
+        if not apart:
+            return _Coded(layout, own, motion.sections, video)
+        return _Coded(layout, {**own, "outliers": True}, {**motion.sections, SECTION: apart}, video)
 
     def _lattice(self, first: Float32, step: float) -> Lattice:
         """The base frame's lattice: by default of about this step, as its errors stay for all frames; it tells places apart."""

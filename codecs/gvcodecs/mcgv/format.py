@@ -9,10 +9,11 @@
                    difference from the block before; halves: of each vertex in the codec's order, from the vertex before
 ``weights``        blended: which clusters each point follows (`weight_coding`)
 ``transforms.N``   transforms of segment N (affine: `transforms`, blended: `trajectories`)
+``outliers``       what residuals exceed the pictures' levels by (`outliers`); absent if nothing
 ``trajectories.N`` klt, in place of ``transforms.N``: principal trajectories of segment N (`trajectory_images`)
 =================  ==========================================================================================
 
-Version 1 knows affine prediction and charts alone; files with both are still written as version 1.
+Version 1 knows affine prediction and charts alone; files with both, and no outliers, are still written as version 1.
 
 Source: Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.3: base frame, partition, parametric
 coordinates, transforms, images. With charts the affine partition follows from the pixels, since no block holds two of them;
@@ -62,6 +63,7 @@ class Header:
         segments: how many; segment s starts at frame ``s * F // segments``.
         base: lattice of the base frame.
         transform_step, residual_step: quantisation steps where pictures are frames.
+        outliers: whether residuals exceed the pictures' levels.
         images: where pictures are coefficients of trajectories.
     """
 
@@ -76,17 +78,20 @@ class Header:
     base: Lattice
     transform_step: float = 1.0
     residual_step: float = 1.0
+    outliers: bool = False
     images: TrajectoryHeader | None = None
 
     @property
     def version(self) -> int:
         """The first version of the codec that reads this."""
-        return 1 if (self.prediction, self.placement) == ("affine", "charts") else 2
+        return 1 if (self.prediction, self.placement, self.outliers) == ("affine", "charts", False) else 2
 
     def to_json(self) -> dict[str, Any]:
         """Return the header as JSON values."""
         values = asdict(self)
         del values["images"]
+        if not self.outliers:
+            del values["outliers"]
         if self.images:
             del values["transform_step"], values["residual_step"]
             values |= self.images.to_json()
@@ -125,8 +130,11 @@ class Header:
             base=Lattice((base[0], base[1], base[2]), base[3]),
             transform_step=1.0 if images else bitstream.number("transform_step", SMALL, LARGE),
             residual_step=1.0 if images else bitstream.number("residual_step", SMALL, LARGE),
+            outliers="outliers" in bitstream.header,
             images=images,
         )
+        if header.outliers and (bitstream.header["outliers"] is not True or bitstream.version == 1 or images):
+            raise CorruptFile(f"header: no outliers {bitstream.header['outliers']!r} in such a file; get the file again")
         if images and (prediction != "blended" or profile.codec != "h264"):
             raise CorruptFile(f"header: no trajectory images with prediction {prediction!r} and profile {profile.name!r}")
         if header.width % header.block or header.height % header.block:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.mcgv.motion import CodedMotion
+from gvcodecs.mcgv.outliers import OutlierWriter
 from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.padding import Padding
-from gvcodecs.mcgv.quality import Quantiser
+from gvcodecs.mcgv.quality import Magnitudes, Quantiser
 from gvpipe.codec import Progress
 from gvpipe.sequence import MeshSequence
 from gvpipe.video import Plane, Profile, VideoWriter
@@ -19,9 +20,12 @@ from gvpipe.video import Plane, Profile, VideoWriter
 Float64 = NDArray[np.float64]
 
 
-def largest_residual(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> float:
-    """The largest coordinate of a residual, model units."""
-    return max(float(np.abs(residual).max(initial=0.0)) for _, residual in _residuals(sequence, motion, bounds))
+def measure_residuals(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> Magnitudes:
+    """The magnitudes of all residuals, model units."""
+    magnitudes = Magnitudes()
+    for _, residual in _residuals(sequence, motion, bounds):
+        magnitudes.add(residual)
+    return magnitudes
 
 
 def code_frames(
@@ -32,6 +36,7 @@ def code_frames(
     block: int,
     profile: Profile,
     quantiser: Quantiser,
+    outliers: OutlierWriter,
     gop: int,
     preset: str,
     report: Progress,
@@ -45,6 +50,7 @@ def code_frames(
         layout: the vertices' pixels, in blocks of side ``block``.
         profile, gop, preset: of the video; gop is its frames per group of pictures.
         quantiser: of the image coder, and the residuals' step.
+        outliers: told of all residuals, for what pictures cannot hold.
         report: told of the part that is done.
     """
     report("video", 0)
@@ -52,6 +58,7 @@ def code_frames(
     shape = (3 * layout.height, layout.width)
     with VideoWriter(profile, shape[1], shape[0], sequence.fps, quantiser.level, gop, preset) as writer:
         for first, residual in _residuals(sequence, motion, bounds):
+            outliers.add(residual)
             for picture in _pictures(residual, padding, profile, quantiser.step):
                 writer.add(picture)
             report("video", (first + len(residual)) / sequence.n_frames)

@@ -13,12 +13,14 @@ from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import AffineMotion
 from gvcodecs.mcgv.blended_motion import BlendedMotion
 from gvcodecs.mcgv.motion import Motion
+from gvcodecs.mcgv.outliers import SECTION
 from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.placement import place
 from gvcodecs.mcgv.points import Points
 from gvpipe.bitstream import Bitstream
 from gvpipe.connectivity import BaseMesh, read_base
 from gvpipe.errors import CorruptFile
+from gvpipe.moves import MovesReader
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
 from gvpipe.video import VideoReader
@@ -37,6 +39,9 @@ class McgvReader:
         self._video = VideoReader(bitstream.video, self._header.profile, self._header.width, 3 * self._header.height)
         if self._video.n_frames != bitstream.n_frames:
             raise CorruptFile(f"the video has {self._video.n_frames} frames, the header says {bitstream.n_frames}")
+        if self._header.outliers != (SECTION in bitstream.sections):
+            raise CorruptFile(f"header and section {SECTION!r} do not fit; get the file again from its source")
+        self._outliers = self._open_outliers() if self._header.outliers else None
 
     @property
     def n_frames(self) -> int:
@@ -84,7 +89,13 @@ class McgvReader:
         for first, planes in groups:
             for frame, plane in enumerate(planes, first):
                 self._motion.rebuild(frame, plane, result[frame - start])
+        if self._outliers:
+            self._outliers.apply(start, result)
         return result
+
+    def _open_outliers(self) -> MovesReader:
+        bitstream = self._bitstream
+        return MovesReader(bitstream.section(SECTION), bitstream.n_frames, bitstream.n_vertices, SECTION)
 
 
 def blended_layout(bitstream: Bitstream, header: sections.Header, base: BaseMesh, points: Points) -> Layout:

@@ -21,6 +21,7 @@ const SMALL = 1e-60;
  * @property {number} clusters K @property {number} segments
  * @property {number[]} origin @property {number} baseStep lattice of the base frame
  * @property {number} transformStep @property {number} residualStep model units
+ * @property {boolean} outliers whether residuals exceed the pictures' levels
  *
  * @param {object} header of the payload
  * @returns {Header}
@@ -61,7 +62,11 @@ export function readHeader(header) {
     baseStep: base[3],
     transformStep: checkNumber(settings, "transform_step", SMALL, LARGE),
     residualStep: checkNumber(settings, "residual_step", SMALL, LARGE),
+    outliers: "outliers" in settings,
   };
+  if (result.outliers && (settings.outliers !== true || header.version === 1)) {
+    throw corrupt("header", `outliers is ${JSON.stringify(settings.outliers)}`);
+  }
   if (result.width % result.block || result.height % result.block) {
     throw corrupt("header", `planes of ${result.width}x${result.height} are not whole blocks of ${result.block}`);
   }

@@ -1,8 +1,8 @@
 /** From an `mcgv` bitstream and the levels of its pictures to positions, any frame in any order. Mirrors the codec's reader. */
 
 import { decodeBase } from "../format/base_mesh.js";
-import { Corrections, SECTION } from "../format/corrections.js";
 import { AGAIN, GeometryVideoError } from "../format/errors.js";
+import { Moves } from "../format/moves.js";
 import { AffineMotion } from "./affine_motion.js";
 import { BlendedMotion } from "./blended_motion.js";
 import { readHeader } from "./header.js";
@@ -30,8 +30,13 @@ export class McgvReader {
     this.basePoints = base.points;
     const { pixels, motion } = decodeMotion(payload, header, base);
     this.motion = motion;
-    const corrections = payload.sections.get(SECTION);
-    this.corrections = corrections ? new Corrections(corrections, payload.header.frames, base.visits.length) : null;
+    if (header.outliers !== payload.sections.has("outliers")) {
+      throw new GeometryVideoError("corrupt", `its header and its section 'outliers' do not fit; ${AGAIN}`);
+    }
+    /** What the pictures cannot hold, then what a bound on every vertex needs. */
+    this.moves = ["outliers", "corrections"]
+      .filter((name) => payload.sections.has(name))
+      .map((name) => new Moves(payload.section(name), payload.header.frames, base.visits.length, name));
     const plane = header.width * header.height;
     /** (V, 3) which sample of a picture carries each coordinate. */
     this.samples = new Uint32Array(base.points.length);
@@ -52,15 +57,15 @@ export class McgvReader {
     const step = this.header.residualStep;
     for (let i = 0; i < positions.length; i++) positions[i] = step * (levels[i] - ZERO);
     this.motion.addTo(frame, positions);
-    this.corrections?.apply(frame, positions);
+    for (const moves of this.moves) moves.apply(frame, positions);
   }
 
   /**
    * The box that the whole motion stays in, but for residuals; model units. Decodes, and so checks, all transforms and
-   * corrections.
+   * moves.
    */
   bounds() {
-    this.corrections?.check();
+    for (const moves of this.moves) moves.check();
     const box = { min: [Infinity, Infinity, Infinity], max: [-Infinity, -Infinity, -Infinity] };
     this.motion.extend(box);
     if (![...box.min, ...box.max].every(Number.isFinite)) {

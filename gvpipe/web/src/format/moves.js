@@ -1,5 +1,5 @@
 /**
- * Corrections that keep every vertex within a bound. Mirrors the decoding half of `gvpipe.corrections`; `docs/format.md`,
+ * Sparse moves of vertices, in whole multiples of a step. Mirrors the decoding half of `gvpipe.moves`; `docs/format.md`,
  * section 9.
  */
 
@@ -7,16 +7,18 @@ import { Cursor } from "./cursor.js";
 import { decodeIntegers } from "./integers.js";
 import { Recent } from "./recent.js";
 
-export const SECTION = "corrections";
 const MAX_POSITIONS = 1 << 20; // of a group, unless one frame has more
 const [SMALL, LARGE] = [1e-60, 1e39]; // of the step
 const LARGEST = 2 ** 128; // float32 ends there
 const NEAR = 3; // magnitudes of the axes before that are told apart
 
-export class Corrections {
-  /** @param {Uint8Array} data the section @param {number} frames F @param {number} vertices V */
-  constructor(data, frames, vertices) {
-    const cursor = new Cursor(data, SECTION);
+export class Moves {
+  /**
+   * @param {Uint8Array} data the section @param {string} name its name
+   * @param {number} frames F @param {number} vertices V
+   */
+  constructor(data, frames, vertices, name) {
+    const cursor = new Cursor(data, name);
     this.step = cursor.f64();
     if (!(this.step > SMALL && this.step < LARGE)) throw cursor.corrupt(`its step is ${this.step}`);
     /** Frames of a group. */
@@ -28,7 +30,7 @@ export class Corrections {
     const groups = lengths.map((length) => cursor.take(length));
     cursor.end();
     const framesOf = (g) => Math.min(this.group, frames - g * this.group);
-    this.recent = new Recent((g) => decodeGroup(groups[g], framesOf(g), vertices, this.step));
+    this.recent = new Recent((g) => decodeGroup(groups[g], framesOf(g), vertices, this.step, name));
     this.count = count;
   }
 
@@ -49,16 +51,16 @@ export class Corrections {
 }
 
 /**
- * @returns {{starts: Uint32Array, coordinates: Uint32Array, moves: Float64Array}} sorted by frame: frame f has the corrections
+ * @returns {{starts: Uint32Array, coordinates: Uint32Array, moves: Float64Array}} sorted by frame: frame f has the moves
  *   starts[f] to starts[f + 1]; where the coordinates of a vertex begin, and (C, 3) by how much they move, model units
  */
-function decodeGroup(data, frames, vertices, step) {
+function decodeGroup(data, frames, vertices, step, name) {
   const starts = new Uint32Array(frames + 1);
   if (!data.length) return { starts, coordinates: new Uint32Array(0), moves: new Float64Array(0) };
-  const cursor = new Cursor(data, SECTION);
+  const cursor = new Cursor(data, name);
   const runs = cursor.varint(frames * vertices, "the number of runs");
   const take = (count, contexts) =>
-    decodeIntegers(cursor.take(cursor.varint(cursor.left, "a length")), count, contexts, SECTION);
+    decodeIntegers(cursor.take(cursor.varint(cursor.left, "a length")), count, contexts, name);
   const at = decodePositions(take(runs, null), take(runs, null), frames * vertices, cursor);
   const context = (i, ...axes) => Math.min(axes.reduce((sum, axis) => sum + Math.abs(axis[i]), 0), NEAR);
   const x = take(at.length, null);
@@ -75,7 +77,7 @@ function decodeGroup(data, frames, vertices, step) {
     coordinates[place] = 3 * Math.floor(position / frames);
     [x[i], y[i], z[i]].forEach((steps, axis) => (moves[3 * place + axis] = steps * step));
   });
-  if (moves.some((move) => Math.abs(move) >= LARGEST)) throw cursor.corrupt("a correction is larger than float32 can hold");
+  if (moves.some((move) => Math.abs(move) >= LARGEST)) throw cursor.corrupt("a move is larger than float32 can hold");
   return { starts, coordinates, moves };
 }
 
