@@ -140,11 +140,17 @@ def test_info_tells_of_frames_not_of_pictures(tmp_path: Path) -> None:
 
 
 def test_klt_is_smaller_at_equal_error(tmp_path: Path) -> None:
-    sequence, sizes, errors = waving(24, 60), [], []
-    for chosen in ({"prediction": "blended", "quality": 77}, {"prediction": "blended", "transform": "klt", "quality": 68}):
-        sizes.append(gvpipe.encode(sequence, tmp_path / "a.mp4", **chosen).bytes)  # type: ignore[arg-type]
-        errors.append(gvpipe.compare(sequence, gvpipe.decode(tmp_path / "a.mp4")).rmse)
-    assert errors[1] <= errors[0] and sizes[1] < sizes[0]
+    sequence = waving(24, 60)
+
+    def measure(quality: float, transform: str) -> tuple[int, float]:
+        path = tmp_path / "a.mp4"
+        size = gvpipe.encode(sequence, path, prediction="blended", transform=transform, quality=quality).bytes
+        return size, gvpipe.compare(sequence, gvpipe.decode(path)).rmse
+
+    size, error = measure(77, "none")
+    coarser, finer = measure(60, "klt"), measure(80, "klt")
+    assert finer[1] < error < coarser[1]
+    assert np.interp(np.log(error), np.log([finer[1], coarser[1]]), np.log([finer[0], coarser[0]])) < np.log(size)
 
 
 @pytest.mark.parametrize("wrong", [{"image": "jpeg"}, {"prediction": "affine"}, {"transform": "dct"}])

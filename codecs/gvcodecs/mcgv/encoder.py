@@ -47,7 +47,8 @@ BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
 AFFINE_CLUSTERS, AFFINE_BASE_BITS = 20, 12  # the paper's
 MOST_SEGMENTS = 4000  # one section each, of the 4096 that a bitstream may have
 BASE_BITS = 8, 16  # bits of a base frame that are chosen unasked
-DISTINCT = 0.995  # part of the places in a base frame that its lattice must tell apart
+BASE_STEP = 1.5  # of a base frame, times step / sqrt(frames): measured, docs/codecs/mcgv.md
+DISTINCT = 0.95  # part of the places in a base frame that its lattice must tell apart
 AUTO = "auto"
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
 
@@ -155,7 +156,7 @@ class Mcgv(Settings):
         # no range ends the qualities of trajectory images
         scale = PROFILES["h264-10"] if self.transform == "klt" else self._video_profile
         step = effective_step(self.quality, scale, float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0))))
-        lattice = self._lattice(first, step / math.sqrt(given.n_frames))
+        lattice = self._lattice(first, BASE_STEP * step / math.sqrt(given.n_frames))
         coded = memo(f"base {lattice.step}", lambda: encode_base(lattice.quantise(first), given.faces, self.reorder))
         memo.permutation = coded.permutation
         mesh = decode_base(coded.mesh, coded.order)
