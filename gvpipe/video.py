@@ -35,17 +35,17 @@ from gvpipe.images import decode_jpeg, encode_jpeg
 if TYPE_CHECKING:
     import av
 
+B_FRAMES = 8  # between two others, at most
 AHEAD = 2  # groups of pictures decoded ahead of the reader
 MAX_SIDE = 16384  # pixels, of a picture that is read
 QP_RANGE = (1, 51)  # 0 would be lossless, which is another H.264 profile that browsers do not read
 # measured on chicken, cow and samba (docs/benchmarks.md): psycho-visual choices and the deblocking filter only cost here, since
-# blocks are separate charts; long pyramids of B-frames suit residuals that change slowly; nothing moves in the pictures, so
-# neither partitions nor more references pay, and both cost decoding time
+# blocks are separate charts; long pyramids of B-frames (`B_FRAMES`) suit residuals that change slowly; nothing moves in the
+# pictures, so neither partitions nor more references pay, and both cost decoding time
 X264 = {
     "no-psy": 1,
     "aq-mode": 0,
     "no-deblock": 1,
-    "bframes": 8,
     "partitions": "none",
     "ref": 1,
     "b-adapt": 2,
@@ -116,10 +116,20 @@ class VideoWriter:
         quality: H.264: the quantisation parameter, 1..51 (10 bit: 1..63); JPEG: the quantisation step, 1..255 levels.
         gop: H.264: frames per group of pictures.
         preset: x264's.
+        b_frames: H.264: pictures predicted from both sides between two others, at most. They take fewer bits, but every
+            picture of the file then takes 8 bytes more in its tables.
     """
 
     def __init__(
-        self, profile: Profile, width: int, height: int, fps: float, quality: int, gop: int = 32, preset: str = "slow"
+        self,
+        profile: Profile,
+        width: int,
+        height: int,
+        fps: float,
+        quality: int,
+        gop: int = 32,
+        preset: str = "slow",
+        b_frames: int = B_FRAMES,
     ) -> None:
         import av
 
@@ -133,7 +143,7 @@ class VideoWriter:
             self._stream: Any = self._container.add_mux_stream("mjpeg", rate, width=width, height=height)
             self._stream.time_base = self._time_base
             return
-        self._stream = self._container.add_stream("libx264", rate, options=x264_options(quality, gop, preset))
+        self._stream = self._container.add_stream("libx264", rate, options=x264_options(quality, gop, preset, b_frames))
         self._stream.width, self._stream.height = width, height
         self._stream.pix_fmt = profile.pixel_format
         context = self._stream.codec_context
@@ -344,9 +354,9 @@ class _Plain:
         return result
 
 
-def x264_options(quality: int, gop: int, preset: str) -> dict[str, str]:
-    """Options of PyAV's ``libx264`` for a quantisation parameter, frames per group of pictures and preset."""
-    settings = {"qp": quality, "keyint": gop, "min-keyint": gop, **X264}
+def x264_options(quality: int, gop: int, preset: str, b_frames: int = B_FRAMES) -> dict[str, str]:
+    """Options of PyAV's ``libx264``: a quantisation parameter, frames per group of pictures, preset, and B-frames in a row."""
+    settings = {"qp": quality, "keyint": gop, "min-keyint": gop, "bframes": b_frames, **X264}
     return {"preset": preset, "x264-params": ":".join(f"{key}={value}" for key, value in settings.items())}
 
 

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
+from sequences import waving
 
 import gvpipe
 from gvcodecs.mcgv import Mcgv
@@ -811,3 +812,14 @@ def test_more_segments_than_sections_are_not_written(tmp_path: Path) -> None:
     sequence = MeshSequence(square + away, np.array([[0, 1, 2], [0, 2, 3]], np.int32), 30.0)
     gvpipe.encode(sequence, tmp_path / "a.mp4", segment=1, clusters=1, preset="ultrafast")
     assert gvpipe.decode(tmp_path / "a.mp4").n_frames == 4200
+
+
+def test_b_frames_only_where_they_pay() -> None:
+    """Nearly empty pictures go without: tables that tell their order would cost more than they save."""
+    sequence = waving(16, 64)
+    coarse = Mcgv(prediction="blended", quality=40).encode(sequence).video
+    assert b"ctts" not in coarse
+    rng = np.random.default_rng(0)
+    noisy = np.asarray(sequence.positions[:]) + rng.normal(0, 0.02, (64, sequence.n_vertices, 3))
+    fine = Mcgv(prediction="affine", quality=75).encode(MeshSequence(noisy.astype(np.float32), sequence.faces)).video
+    assert b"ctts" in fine

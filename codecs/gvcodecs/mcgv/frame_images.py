@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +15,9 @@ from gvcodecs.mcgv.padding import Padding
 from gvcodecs.mcgv.quality import Magnitudes, Quantiser
 from gvpipe.codec import Progress
 from gvpipe.sequence import MeshSequence
-from gvpipe.video import Plane, Profile, VideoWriter
+from gvpipe.video import B_FRAMES, Plane, Profile, VideoWriter
+
+SMALL = 60  # bytes to a frame: B-frames save a third of the pictures' at best, and cost 8 each in tables
 
 Float64 = NDArray[np.float64]
 
@@ -53,16 +55,26 @@ def code_frames(
         outliers: told of all residuals, for what pictures cannot hold.
         report: told of the part that is done.
     """
-    report("video", 0)
     padding = Padding(layout, block)
     shape = (3 * layout.height, layout.width)
-    with VideoWriter(profile, shape[1], shape[0], sequence.fps, quantiser.level, gop, preset) as writer:
-        for first, residual in _residuals(sequence, motion, bounds):
-            outliers.add(residual)
-            for picture in _pictures(residual, padding, profile, quantiser.step):
-                writer.add(picture)
-            report("video", (first + len(residual)) / sequence.n_frames)
-        return writer.finish()
+
+    def code(b_frames: int, tell: Callable[[int, Float64], None]) -> bytes:
+        with VideoWriter(profile, shape[1], shape[0], sequence.fps, quantiser.level, gop, preset, b_frames) as writer:
+            for first, residual in _residuals(sequence, motion, bounds):
+                for picture in _pictures(residual, padding, profile, quantiser.step):
+                    writer.add(picture)
+                tell(first, residual)
+            return writer.finish()
+
+    def tell(first: int, residual: Float64) -> None:
+        outliers.add(residual)
+        report("video", (first + len(residual)) / sequence.n_frames)
+
+    report("video", 0)
+    video = code(B_FRAMES, tell)
+    if profile.codec == "h264" and len(video) < SMALL * sequence.n_frames:
+        video = min(video, code(0, lambda first, residual: None), key=len)
+    return video
 
 
 def _residuals(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> Iterator[tuple[int, Float64]]:
