@@ -17,7 +17,7 @@ from gvpipe.codec import Progress
 from gvpipe.sequence import MeshSequence
 from gvpipe.video import B_FRAMES, Plane, Profile, VideoWriter
 
-SMALL = 60  # bytes to a frame: B-frames save a third of the pictures' at best, and cost 8 each in tables
+SMALL = 60, 2000  # bytes a frame, and of a file's own: B-frames save a third of the pictures' at best, and cost 8 each
 
 Float64 = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def code_frames(
 
     report("video", 0)
     video = code(B_FRAMES, tell)
-    if profile.codec == "h264" and len(video) < SMALL * sequence.n_frames:
+    if profile.codec == "h264" and len(video) < SMALL[0] * sequence.n_frames + SMALL[1]:
         video = min(video, code(0, lambda first, residual: None), key=len)
     return video
 
