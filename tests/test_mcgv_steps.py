@@ -814,6 +814,13 @@ def test_more_segments_than_sections_are_not_written(tmp_path: Path) -> None:
     assert gvpipe.decode(tmp_path / "a.mp4").n_frames == 4200
 
 
+def test_lattices_too_fine_for_halves_are_corrupt() -> None:
+    points = np.array([[0, 0, 0], [1, 2, (1 << 20) - 1]])
+    assert sorted(place(points, None, 16, 16, 16).pixel) == sorted(set(place(points, None, 16, 16, 16).pixel))
+    with pytest.raises(CorruptFile, match="too fine"):
+        place(points + 1, None, 16, 16, 16)
+
+
 def test_b_frames_only_where_they_pay() -> None:
     """Nearly empty pictures go without: tables that tell their order would cost more than they save."""
     sequence = waving(16, 64)

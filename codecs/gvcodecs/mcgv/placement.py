@@ -23,12 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.mcgv.packing import Layout
-from gvpipe.errors import InputError
+from gvpipe.errors import CorruptFile, InputError
 
 COMMON = 90  # a multiple of every direction's squared length
 FRAME = 4  # pixels: side of the squares that share one pair of directions
 MOMENT_BITS = 10  # of deviations in second moments: their sums stay exact in a double for 2**24 vertices
 SPREAD = 2  # groups are moved apart by this many times their distance from the middle
+MAX_COORDINATE = 1 << 20  # of points: no finer lattice is ever chosen
 MAX_RATIO = 3.0  # of the sides of an automatic plane
 
 Int64 = NDArray[np.int64]
@@ -82,7 +83,10 @@ def place(points: NDArray[np.integer], groups: NDArray[np.integer] | None, width
 
     Raises:
         InputError: more vertices than pixels.
+        CorruptFile: a point beyond the limit above; no encoder makes one.
     """
+    if points.max(initial=0) >= MAX_COORDINATE:
+        raise CorruptFile("section 'mesh' is corrupt: its lattice is too fine for placement by halves; get the file again")
     if width * height < len(points):
         raise InputError(f"{len(points)} vertices do not fit into planes of {width}x{height}; leave the size out")
     spread = _spread(points.astype(np.int64), groups)
