@@ -9,11 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 import gvpipe
 from gvpipe.cli import main
 from gvpipe.sequence import MeshSequence
 
+settings.register_profile("same", derandomize=True)  # the same examples in every run; --hypothesis-profile=default draws others
+settings.load_profile("same")
 FAST = {"preset": "ultrafast", "clusters": 3, "gop": 4}  # settings that cost little, for tests of anything but coding
 
 
