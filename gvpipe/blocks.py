@@ -15,14 +15,12 @@ All models are tables of integers.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe import magnitude_tables
 from gvpipe.binary import Cursor, varint
-from gvpipe.entropy import DIRECT, MAX_BITS, MAX_TOKENS, TABLE_TOTAL
+from gvpipe.entropy import MAX_BITS, MAX_TOKENS, TABLE_TOTAL, model, tokenise
 
 CHUNK = 16  # low bits coded at a time
 PARAMETRIC = 1  # kind of a table told by two numbers
@@ -40,7 +38,7 @@ class BlockEncoder:
 
     def add(self, values: NDArray[np.integer], contexts: NDArray[np.integer]) -> None:
         """Append a block of ``values (n,)``, magnitude below 2**39, in ``contexts (n,)``, 0..C-1."""
-        tokens, low, n_low = _tokenise(values.astype(np.int64))
+        tokens, low, n_low = tokenise(values.astype(np.int64))
         groups = []
         for context, where in _groups(contexts):
             groups.append((context, tokens[where]))
@@ -56,7 +54,7 @@ class BlockEncoder:
         for counts in self._counts:
             described, table = _describe(counts)
             head.append(described)
-            models.append(_model(table))
+            models.append(model(table) if len(table) > 1 else None)  # None: nothing to tell
         coder = constriction.stream.queue.RangeEncoder()
         for groups, low, n_low in self._blocks:
             for context, tokens in groups:
@@ -160,24 +158,3 @@ def _groups(contexts: NDArray[np.integer]) -> list[tuple[int, NDArray[np.intp]]]
     ordered = contexts[order]
     bounds = np.flatnonzero(np.diff(ordered)) + 1
     return [(int(contexts[part[0]]), part) for part in np.split(order, bounds)] if len(order) else []
-
-
-def _model(table: Int64) -> Any:
-    """The model of an integer table; None where there is nothing to tell."""
-    import constriction
-
-    if len(table) < 2:
-        return None
-    # integer / integer is one correctly rounded operation: the same on every machine
-    return constriction.stream.model.Categorical(table.astype(np.float64) / float(table.sum()), perfect=False)
-
-
-def _tokenise(values: Int64) -> tuple[Int64, Int64, Int64]:
-    """Tokens, low bits and their number, as `gvpipe.entropy` has them."""
-    u = np.where(values >= 0, 2 * values, -2 * values - 1)
-    if u.size and int(u.max()) >= 1 << MAX_BITS:
-        raise ValueError(f"a value of {int(np.abs(values).max())} does not fit the entropy coder ({MAX_BITS - 1} bits)")
-    bits = np.frexp(u.astype(np.float64))[1].astype(np.int64)  # exact: u < 2**53
-    n_low = np.where(u < DIRECT, 0, bits - 2)
-    tokens = np.where(u < DIRECT, u, DIRECT + 2 * (bits - 5) + ((u >> n_low) & 1))
-    return tokens, u & ((1 << n_low) - 1), n_low

@@ -17,6 +17,8 @@ Tokens are coded context after context, each context's in order of position.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,7 +42,7 @@ def encode_integers(values: NDArray[np.integer], contexts: NDArray[np.integer] |
     """
     import constriction
 
-    tokens, extra, n_extra = _tokenise(np.asarray(values, np.int64).ravel())
+    tokens, extra, n_extra = tokenise(np.asarray(values, np.int64).ravel())
     groups = _groups(contexts, tokens.size)
     encoder = constriction.stream.queue.RangeEncoder()
     head = [varint(len(groups))]
@@ -49,7 +51,7 @@ def encode_integers(values: NDArray[np.integer], contexts: NDArray[np.integer] |
         table = np.where(counts > 0, np.maximum(1, counts * TABLE_TOTAL // max(1, len(group))), 0)
         head.append(varint(len(table)) + b"".join(varint(int(f)) for f in table))
         if len(table) > 1:
-            encoder.encode(tokens[group].astype(np.int32), _model(table))
+            encoder.encode(tokens[group].astype(np.int32), model(table))
     words = encoder.get_compressed().astype("<u4")
     return b"".join([*head, varint(len(words)), words.tobytes(), _pack_bits(tokens, extra, n_extra)])
 
@@ -84,7 +86,7 @@ def decode_integers(data: bytes, count: int, contexts: NDArray[np.integer] | Non
     try:
         for group, table in zip(groups, tables, strict=True):
             if len(table) > 1 and len(group):
-                tokens[group] = decoder.decode(_model(table), len(group))
+                tokens[group] = decoder.decode(model(table), len(group))
     except (ValueError, AssertionError, RuntimeError) as exc:
         raise cursor.corrupt("its range-coded data do not decode") from exc
     return _untokenise(tokens, cursor)
@@ -102,22 +104,24 @@ def _groups(contexts: NDArray[np.integer] | None, count: int) -> list[NDArray[np
     return np.split(order, ends[:-1]) if count else []
 
 
-def _model(table: Int64) -> object:
+def model(table: Int64) -> Any:
+    """The library's model of a table of frequencies, two at least."""
     import constriction
 
     # integer / integer is one correctly rounded operation: the same on every machine
     return constriction.stream.model.Categorical(table.astype(np.float64) / float(table.sum()), perfect=False)
 
 
-def _bit_length(u: Int64) -> Int64:
-    return np.frexp(u.astype(np.float64))[1].astype(np.int64)  # exact: u < 2**53
+def tokenise(values: Int64) -> tuple[Int64, Int64, Int64]:
+    """Tokens of ``values (n,)``, the low bits that they leave out, and how many these are.
 
-
-def _tokenise(values: Int64) -> tuple[Int64, Int64, Int64]:
+    Raises:
+        ValueError: a value is too large.
+    """
     u = np.where(values >= 0, 2 * values, -2 * values - 1)
     if u.size and int(u.max()) >= 1 << MAX_BITS:
         raise ValueError(f"a value of {int(np.abs(values).max())} does not fit the entropy coder ({MAX_BITS - 1} bits)")
-    bits = _bit_length(u)
+    bits = np.frexp(u.astype(np.float64))[1].astype(np.int64)  # exact: u < 2**53
     n_extra = np.where(u < DIRECT, 0, bits - 2)
     second = (u >> n_extra) & 1
     tokens = np.where(u < DIRECT, u, DIRECT + 2 * (bits - 5) + second)

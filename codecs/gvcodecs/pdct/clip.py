@@ -29,14 +29,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.pdct.clustering import Clusters
-from gvcodecs.pdct.delta_coding import DeltaDecoder, DeltaEncoder, tokenise
+from gvcodecs.pdct.delta_coding import DeltaDecoder, DeltaEncoder
 from gvcodecs.pdct.dictionary import UNIT, Dictionary, Surface, place
 from gvcodecs.pdct.labels import decode_labels, encode_labels
 from gvcodecs.pdct.local_frames import local_frames
 from gvcodecs.pdct.momentum import Momentum
 from gvcodecs.pdct.seed_coding import decode_seeds, encode_seeds
 from gvpipe.binary import Cursor, varint
-from gvpipe.entropy import decode_integers, encode_integers
+from gvpipe.entropy import decode_integers, encode_integers, tokenise
 from gvpipe.quantize import Lattice
 from gvpipe.sequence import Float32
 

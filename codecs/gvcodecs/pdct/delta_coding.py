@@ -14,14 +14,13 @@ halve when they reach `FULL`::
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.binary import Cursor, varint
+from gvpipe.entropy import DIRECT, model, tokenise
 
-DIRECT = 16  # folded values that are tokens of their own
 MAX_BITS = 36  # bit length of the largest folded value
 N_TOKENS = DIRECT + 2 * (MAX_BITS - 4)
 GAIN = 32  # of a token's count, when it occurs
@@ -105,7 +104,7 @@ class DeltaEncoder:
         """Code one axis of a frame: ``values (C,)`` in ``contexts (C,)``."""
         tokens, extra, n_extra = tokenise(values)
         for context, where in _groups(contexts):
-            self._coder.encode(tokens[where].astype(np.int32), _model(self.contexts.counts[context]))
+            self._coder.encode(tokens[where].astype(np.int32), model(self.contexts.counts[context]))
         shifts = _shifts(n_extra)
         self._raw.append(((np.repeat(extra, n_extra) >> shifts) & 1).astype(np.uint8))
 
@@ -134,7 +133,7 @@ class DeltaDecoder:
         tokens = np.zeros(len(contexts), np.int64)
         try:
             for context, where in _groups(contexts):
-                tokens[where] = self._coder.decode(_model(self.contexts.counts[context]), len(where))
+                tokens[where] = self._coder.decode(model(self.contexts.counts[context]), len(where))
         except (ValueError, AssertionError, RuntimeError) as exc:
             raise self._cursor.corrupt("its range-coded data do not decode") from exc
         n_extra = EXTRA_BITS[tokens]
@@ -153,15 +152,6 @@ class DeltaDecoder:
         """Check that no raw byte is left over."""
         if (self._position + 7) // 8 * 8 != len(self._raw):
             raise self._cursor.corrupt("raw bits are left over")
-
-
-def tokenise(values: Int64) -> tuple[Int64, Int64, Int64]:
-    """Return tokens, raw low bits and how many of these, each of the shape of ``values``."""
-    u = np.where(values >= 0, 2 * values, -2 * values - 1)
-    bits = np.frexp(u.astype(np.float64))[1].astype(np.int64)  # exact: u < 2**53
-    n_extra = np.where(u < DIRECT, 0, bits - 2)
-    tokens = np.where(u < DIRECT, u, DIRECT + 2 * (bits - 5) + ((u >> n_extra) & 1))
-    return tokens, u & ((1 << n_extra) - 1), n_extra
 
 
 def _shifts(widths: Int64) -> Int64:
@@ -183,13 +173,6 @@ def _groups(contexts: Int64) -> list[tuple[int, NDArray[np.intp]]]:
     counts = np.bincount(contexts)
     ends = np.cumsum(counts)
     return [(int(c), order[ends[c] - counts[c] : ends[c]]) for c in np.flatnonzero(counts)]
-
-
-def _model(counts: Int64) -> Any:
-    import constriction
-
-    # integer / integer is one correctly rounded operation: the same on every machine
-    return constriction.stream.model.Categorical(counts / float(counts.sum()), perfect=False)
 
 
 EXTRA_BITS = np.concatenate([np.zeros(DIRECT, np.int64), np.repeat(np.arange(3, MAX_BITS - 1), 2)])
