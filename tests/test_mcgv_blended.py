@@ -17,12 +17,14 @@ from gvcodecs.mcgv.blend_fitting import fit_blend
 from gvcodecs.mcgv.blending import INFLUENCES, TOTAL, Blend, BlendFit, Weights, homogeneous
 from gvcodecs.mcgv.points import Points
 from gvcodecs.mcgv.rebuilding import rebuild_blended
+from gvcodecs.mcgv.separation import find_places, keep_apart
 from gvcodecs.mcgv.trajectories import decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.weight_choice import choose
 from gvcodecs.mcgv.weight_coding import Prices, decode_weights, earlier_neighbours, encode_weights
 from gvcodecs.mcgv.weight_kernels import MAX_LISTED, cluster_of, list_known, rank_of, share
 from gvpipe.codec import open_reader
 from gvpipe.errors import CorruptFile, FormatError, NewerVersion
+from gvpipe.quantize import Lattice
 from gvpipe.sequence import MeshSequence
 from gvpipe.topology import adjacency
 
@@ -319,12 +321,65 @@ def test_blends_beat_the_published_prediction() -> None:
 
 
 @pytest.mark.parametrize("name", awkward())
-def test_base_lattice_tells_places_apart(name: str) -> None:
-    """However coarse the quality: at least 95 of a hundred places of frame 0 that 16 bits tell apart stay apart."""
+def test_base_frame_tells_places_apart(name: str) -> None:
+    """However coarse the quality: nearly as many lattice points as places of frame 0 that 16 bits tell apart."""
     sequence: MeshSequence = awkward()[name]
     first = sequence.read(0, 1)[0]
-    lattice = Mcgv(prediction="blended", quality=0)._lattice(first, 1e3)
-    finest = Mcgv(prediction="blended", base_bits=16)._lattice(first, 1e3)
-    places = [len(np.unique(each.quantise(first), axis=0)) for each in (lattice, finest)]
-    assert places[0] >= 0.95 * places[1]
-    assert lattice.step >= finest.step
+    counts = []
+    for codec in (Mcgv(prediction="blended", quality=0), Mcgv(prediction="blended", base_bits=16)):
+        lattice = codec._lattice(first, 1e3)
+        counts.append(len(np.unique(keep_apart(lattice, first, find_places(sequence, lattice.step)), axis=0)))
+    assert counts[0] >= 0.99 * counts[1]
+
+
+# places
+
+
+def test_places_are_where_vertices_start_and_go_together() -> None:
+    frames = np.zeros((5, 7, 3), np.float32)
+    frames[:, 1] = 1.0
+    frames[:, 2] = -0.0  # where vertex 0 is
+    frames[:, 3:5, 0] = np.arange(5)[:, None]  # both leave it, together
+    frames[:, 5, 1] = np.arange(5)  # alone
+    frames[:, 6, 1] = 0.01 * np.arange(5)  # leaves it by less than what counts
+    sequence = MeshSequence(frames, np.array([[0, 1, 2]], np.int32), fps=25.0)
+    places = find_places(sequence, 0.1)
+    groups = {frozenset(np.flatnonzero(places == place).tolist()) for place in places}
+    assert groups == {frozenset({0, 2, 6}), frozenset({1}), frozenset({3, 4}), frozenset({5})}
+    assert np.unique(find_places(sequence, 100.0)[[0, 2, 3, 4, 5, 6]]).size == 1
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.floats(0.05, 4.0))
+@settings(deadline=None)
+def test_places_get_lattice_points_of_their_own(seed: int, n: int, spread: float) -> None:
+    """Different ones while there is room; nearest ones if no place is near another; never further off than a step."""
+    draw = np.random.default_rng(seed)
+    first = np.concatenate([[[0, 0, 0], [64, 64, 64]], 30 + spread * draw.standard_normal((n, 3))]).astype(np.float32)
+    lattice = Lattice((0.0, 0.0, 0.0), 1.0)
+    places = draw.integers(0, 2, len(first)).cumsum()  # neighbours in the list may be one place
+    first = first[np.unique(places, return_index=True)[1]][np.unique(places, return_inverse=True)[1]]
+    points = keep_apart(lattice, first, places)
+    nearest = lattice.quantise(first)
+    assert (points.min() >= 0) and (points <= nearest.max(axis=0)).all()
+    assert np.abs(points - nearest).max() <= 1
+    cells, counts = np.unique(nearest[np.unique(places, return_index=True)[1]], axis=0, return_counts=True)
+    alone = (nearest[:, None] == cells[counts == 1]).all(axis=2).any(axis=1)
+    assert np.array_equal(points[alone], nearest[alone])
+    _, point = np.unique(points, axis=0, return_inverse=True)
+    pairs = np.unique(np.column_stack([places, point.ravel()]), axis=0)
+    assert len(pairs) == len(np.unique(places))  # one point a place
+    if counts.max() <= 4:
+        assert len(np.unique(pairs[:, 1])) == len(pairs)  # one place a point
+
+
+def test_pieces_that_part_are_predicted_each_for_itself() -> None:
+    """Two sheets that start as one surface, edge on edge, and fly apart: no vertex follows the other sheet."""
+    points, faces = grid(12)
+    left = points - [points[:, 0].max(), 0, 0]
+    drift = np.linspace(0, 3, 20)[:, None, None] * np.array([1.0, 0, 0.5])
+    frames = np.concatenate([left - drift, points + drift], axis=1).astype(np.float32)
+    sequence = MeshSequence(frames, np.concatenate([faces, faces + len(points)]).astype(np.int32), fps=25.0)
+    stream = Mcgv(prediction="blended", quality=60).encode(sequence)
+    extent = float(np.linalg.norm(np.ptp(frames[0], axis=0)))
+    errors = np.linalg.norm(open_reader(stream).read(0, 20) - frames, axis=2) / extent
+    assert errors.max() < 0.02 and "outliers" not in stream.sections

@@ -6,8 +6,10 @@ Decomposition with Rigid Bones", 2012). A point considers the clusters that it a
 does not depend on how many there are. Weights are chosen closed loop, in the order in which they are coded, for the least of
 squared error and bits.
 
-A cluster costs twelve numbers a frame, and so should save a squared error: numbers of clusters are tried from the smallest up
-while error and cost together fall.
+A cluster costs twelve numbers a frame, and so should save a squared error: numbers of clusters are tried from the smallest up,
+until error and cost together fall no more. K-means is a draw of luck, and sees what is alike, not what a blend lacks. So each
+number is tried twice: by k-means, and by adding clusters to the blend before where its errors are; what costs less, weights'
+bits counted, is kept. One number that does worse ends nothing.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from scipy import sparse
 from gvcodecs.mcgv.blending import INFLUENCES, TOTAL, Blend, BlendFit, Weights
 from gvcodecs.mcgv.points import Points
 from gvcodecs.mcgv.segmentation import SEED, motion_features
-from gvcodecs.mcgv.weight_coding import Prices, earlier_neighbours
+from gvcodecs.mcgv.weight_coding import Prices, earlier_neighbours, encode_weights
 from gvpipe.codec import Progress
 from gvpipe.sequence import Int32, MeshSequence
 from gvpipe.topology import k_ring
@@ -34,7 +36,9 @@ TRIAL_PASSES, PASSES = 4, 12  # turns of weights and transforms
 FEWEST, MOST = 8, 1024  # clusters tried
 LEAST_POINTS = 8  # per cluster, on average
 GROWTH = 2**0.5  # from one number tried to the next
-CLUSTER_WORTH = 4.0  # squared steps a frame that a cluster must save
+PATIENCE = 2  # numbers of clusters that may do worse than a smaller one, in a row
+CLUSTER_WORTH = 2.8  # squared steps a frame that a cluster must save
+PATCH = 2  # order of the neighbourhood that an added cluster starts with
 BIT_WORTH = 0.14  # squared steps that a bit of the weights must save
 SAMPLES = 4000  # points that k-means sees
 ROUNDS = 15  # of k-means
@@ -68,19 +72,11 @@ def fit_blend(sequence: MeshSequence, base: Float64, points: Points, step: float
 
     def problem(n_frames: int) -> _Problem:
         motions = _motions(sequence, base, points, n_frames)
-        return _Problem(base, motions, neighbours, BIT_WORTH * price * motions.shape[1] / 3)
+        shown = motions.shape[1] / 3
+        return _Problem(base, motions, neighbours, BIT_WORTH * price * shown, CLUSTER_WORTH * step**2 * shown)
 
     clustering = _Clustering(features)
-    best = clustering.start(n_clusters or 1)
-    if not n_clusters:
-        trial, least, count = problem(TRIAL_FRAMES), np.inf, float(FEWEST)
-        while count <= min(MOST, len(base) / LEAST_POINTS):
-            fitted = _alternate(trial, clustering.start(round(count)), TRIAL_PASSES)
-            error = trial.error(fitted) * 3 / trial.motions.shape[1]
-            cost = error / step**2 + CLUSTER_WORTH * fitted.n_clusters
-            if cost >= least:
-                break
-            best, least, count = fitted, cost, count * GROWTH
+    best = clustering.start(n_clusters) if n_clusters else _find_number(problem(TRIAL_FRAMES), clustering)
     return _alternate(problem(FRAMES), best, PASSES)
 
 
@@ -92,18 +88,57 @@ class _Problem:
         base: ``(P, 3)``.
         motions: ``(P, 3n)`` displacements over n frames.
         neighbours: of the points.
-        price: of a bit, squared model units over these frames.
+        price, cluster_price: of a bit, and of a cluster: squared model units over these frames.
     """
 
     base: Float64
     motions: Float64
     neighbours: sparse.csr_array
     price: float
+    cluster_price: float
 
-    def error(self, fitted: Fitted) -> float:
-        """Squared error that a blend leaves."""
+    def errors(self, fitted: Fitted) -> Float64:
+        """Squared error ``(P,)`` that a blend leaves of each point."""
         fit = BlendFit(Blend(self.base, fitted.weights, fitted.n_clusters))
-        return float(np.square(self.motions - fit.matrix @ fit.fit(self.motions)).sum())
+        return np.asarray(np.square(self.motions - fit.matrix @ fit.fit(self.motions)).sum(axis=1))
+
+    def cost(self, fitted: Fitted) -> float:
+        """Squared error that a blend leaves, and what its weights and clusters cost."""
+        bits = 8 * len(encode_weights(fitted.weights, self.neighbours))
+        return float(self.errors(fitted).sum()) + self.price * bits + self.cluster_price * fitted.n_clusters
+
+
+def _find_number(problem: _Problem, clustering: _Clustering) -> Fitted:
+    """The blend, of as many clusters as pay, that costs least."""
+    draw, patches = np.random.default_rng(SEED), k_ring(problem.neighbours, PATCH)
+    best = last = clustering.start(1)
+    least, count, worse = np.inf, float(FEWEST), 0
+    most = min(MOST, len(problem.base) / LEAST_POINTS)
+    while count <= most and problem.cluster_price * count < least and worse < PATIENCE:
+        starts = [clustering.start(round(count)), _grow(problem, last, round(count), patches, draw)]
+        tried = [_alternate(problem, start, TRIAL_PASSES) for start in starts]
+        cost, last = min(((problem.cost(fitted), fitted) for fitted in tried), key=lambda pair: pair[0])
+        worse = 0 if cost < least else worse + 1
+        if not worse:
+            best, least = last, cost
+        count *= GROWTH
+    return best
+
+
+def _grow(problem: _Problem, fitted: Fitted, n_clusters: int, patches: sparse.csr_array, draw: np.random.Generator) -> Fitted:
+    """Give ``patches (P, P)`` of the surface clusters of their own, drawn by the error in them, until there are so many."""
+    clusters, parts = fitted.weights.clusters.copy(), fitted.weights.weights.copy()
+    errors = np.asarray(patches @ problem.errors(fitted))
+    for cluster in range(fitted.n_clusters, n_clusters):
+        total = np.cumsum(errors)
+        if not total[-1] > 0:
+            break
+        point = int(np.searchsorted(total, draw.random() * total[-1], side="right"))
+        patch = patches.indices[patches.indptr[point] : patches.indptr[point + 1]]
+        clusters[patch], parts[patch] = 0, 0
+        clusters[patch, 0], parts[patch, 0] = cluster, TOTAL
+        errors[patch] = 0
+    return _renumber(clusters, parts)
 
 
 def _alternate(problem: _Problem, fitted: Fitted, passes: int) -> Fitted:

@@ -31,6 +31,7 @@ from gvcodecs.mcgv.points import Points
 from gvcodecs.mcgv.quality import Magnitudes, choose_quantiser, effective_step
 from gvcodecs.mcgv.reader import McgvReader
 from gvcodecs.mcgv.segmentation import segment
+from gvcodecs.mcgv.separation import find_places, keep_apart
 from gvcodecs.mcgv.trajectory_encoder import code_trajectories
 from gvcodecs.mcgv.trajectory_header import TRANSFORMS
 from gvcodecs.mcgv.trajectory_reader import TrajectoryReader
@@ -48,7 +49,7 @@ AFFINE_CLUSTERS, AFFINE_BASE_BITS = 20, 12  # the paper's
 MOST_SEGMENTS = 4000  # one section each, of the 4096 that a bitstream may have
 BASE_BITS = 8, 16  # bits of a base frame that are chosen unasked
 BASE_STEP = 1.5  # of a base frame, times step / sqrt(frames): measured, docs/codecs/mcgv.md
-DISTINCT = 0.95  # part of the places in a base frame that its lattice must tell apart
+DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell apart; the others move over
 AUTO = "auto"
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
 
@@ -157,7 +158,7 @@ class Mcgv(Settings):
         scale = PROFILES["h264-10"] if self.transform == "klt" else self._video_profile
         step = effective_step(self.quality, scale, float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0))))
         lattice = self._lattice(first, BASE_STEP * step / math.sqrt(given.n_frames))
-        coded = memo(f"base {lattice.step}", lambda: encode_base(lattice.quantise(first), given.faces, self.reorder))
+        coded = memo(f"base {lattice.step}", lambda: encode_base(self._base_points(lattice, given), given.faces, self.reorder))
         memo.permutation = coded.permutation
         mesh = decode_base(coded.mesh, coded.order)
         sequence = given.reordered(coded.permutation, mesh.faces)
@@ -210,7 +211,7 @@ class Mcgv(Settings):
         return _Coded(layout, {**own, "outliers": True}, {**motion.sections, SECTION: apart}, video)
 
     def _lattice(self, first: Float32, step: float) -> Lattice:
-        """The base frame's lattice: by default of about this step, as its errors stay for all frames; it tells places apart."""
+        """The base frame's lattice: of about this step, as its errors stay for all frames; it tells most places apart."""
         if self.base_bits or self.prediction == "affine":
             return Lattice.over(first, self.base_bits or AFFINE_BASE_BITS)
         extent = float(np.ptp(first.astype(np.float64), axis=0).max())
@@ -222,6 +223,13 @@ class Mcgv(Settings):
                 break
             bits += 1
         return Lattice.over(first, bits)
+
+    def _base_points(self, lattice: Lattice, sequence: MeshSequence) -> Int32:
+        """The base frame on its lattice ``(V, 3)``."""
+        first = sequence.read(0, 1)[0]
+        if self.prediction == "affine":
+            return lattice.quantise(first)
+        return keep_apart(lattice, first, find_places(sequence, lattice.step))
 
     def _published(self, start: _Start, report: Progress) -> tuple[CodedMotion, Layout]:
         """The paper's partition, layout and transforms."""
