@@ -41,7 +41,8 @@ from gvpipe.sequence import MeshSequence
 from gvpipe.trajectories import code_points, read_trajectories
 from gvpipe.trajectory_basis import MAX_COMPONENTS, reduce_trajectories
 
-POINT_COST, ROW_COST = 0.1, 10.0  # of a component: deltas cost little, so that components are paid for by their basis
+NOISE = 3.0  # squared error that rounding of deltas leaves, in that of coefficients rounded alike, about
+POINT_COST, ROW_COST = 0.1, 5.0  # of a component: deltas cost little, so that components are paid for by their basis
 
 
 @dataclass(frozen=True)
@@ -122,8 +123,8 @@ class Laplacian(Settings):
         for s, (start, stop) in enumerate(pairwise(bounds)):
             report("segments", s / n_segments)
             trajectories = read_trajectories(sequence, start, stop, shared.members)
-            error = wanted**2 * mesh.n_points * (stop - start)
-            reduced = reduce_trajectories(trajectories, error, self.components, self.basis_ratio, POINT_COST, ROW_COST)
+            error = NOISE * wanted**2 * mesh.n_points * (stop - start)
+            reduced = reduce_trajectories(trajectories, error, self.components, self.basis_ratio, POINT_COST, ROW_COST, NOISE)
             sections[f"basis.{s}"] = reduced.basis
             anchors, deltas = encode_coefficients(reduced.coefficients, reduced.step, domain, header)
             sections[f"anchors.{s}"], sections[f"deltas.{s}"] = anchors, deltas
