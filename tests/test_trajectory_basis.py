@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from itertools import pairwise
 
 import numpy as np
 from hypothesis import given
@@ -48,7 +49,7 @@ def test_steps_fall_with_the_error_but_where_components_leave() -> None:
     assert len({step for step, _ in chosen}) > 290
     kept = [n for _, n in chosen]
     assert kept == sorted(kept)
-    for (before, n_before), (after, n_after) in zip(chosen, chosen[1:], strict=False):
+    for (before, n_before), (after, n_after) in pairwise(chosen):
         assert after < before or (n_after > n_before and after < 1.5 * before)
 
 

@@ -21,7 +21,7 @@ from gvcodecs.laplacian.average import average_mesh
 from gvcodecs.laplacian.average_coding import NAME, encode_average
 from gvcodecs.laplacian.coefficients import encode_coefficients
 from gvcodecs.laplacian.delta_rows import DELTA_PREDICTIONS
-from gvcodecs.laplacian.domain import build_domain, build_surface
+from gvcodecs.laplacian.domain import Domain, build_domain, build_surface
 from gvcodecs.laplacian.format import (
     COARSEST,
     FINEST,
@@ -38,7 +38,7 @@ from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import MeshSequence
-from gvpipe.trajectories import code_points, read_trajectories
+from gvpipe.trajectories import CodedPoints, code_points, read_trajectories
 from gvpipe.trajectory_basis import MAX_COMPONENTS, reduce_trajectories
 
 NOISE = 3.0  # squared error that rounding of deltas leaves, in that of coefficients rounded alike, about
@@ -111,14 +111,10 @@ class Laplacian(Settings):
             n_segments,
             (),
         )
-        surface = build_surface(mesh.point_faces, mesh.n_points)
-        average = None
-        if header.needs_average:
-            report("average", 0)
-            faces = shared.members[surface.faces].astype(np.int32)
-            shape = memo("average", lambda: average_mesh(sequence, faces)[shared.members])
-            sections[NAME], average = encode_average(shape, surface, header)
-        domain = memo("domain", lambda: build_domain(surface, average, header))
+        report("average", 0)
+        data, domain = memo("domain", lambda: _prepare(sequence, shared, header))
+        if data is not None:
+            sections[NAME] = data
         steps = []
         for s, (start, stop) in enumerate(pairwise(bounds)):
             report("segments", s / n_segments)
@@ -145,3 +141,14 @@ class Laplacian(Settings):
     def reader(cls, bitstream: Bitstream) -> FrameReader:
         """Open a ``laplacian`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         return LaplacianReader(bitstream)
+
+
+def _prepare(sequence: MeshSequence, shared: CodedPoints, header: Header) -> tuple[bytes | None, Domain]:
+    """The coded average mesh, where one is needed, and what coefficients are coded with: both know nothing of quality."""
+    mesh = shared.mesh
+    surface = build_surface(mesh.point_faces, mesh.n_points)
+    if not header.needs_average:
+        return None, build_domain(surface, None, header)
+    average = average_mesh(sequence, shared.members[surface.faces].astype(np.int32))[shared.members]
+    data, decoded = encode_average(average, surface, header)
+    return data, build_domain(surface, decoded, header)
