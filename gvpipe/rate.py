@@ -168,7 +168,7 @@ def find_quality(attempt: Attempt, target: Target, start: float, tolerance: floa
             slope = _slope((quality, value), high, slope)
             high = (quality, value)
         was_low = value < 0
-        is_near = abs(value) < NEAR * slope
+        is_near = abs(value) < NEAR * max(slope, goal.slope / 4)  # scatter makes slopes flat
         n_near += is_near
         if n_near > MOST_NEAR:
             _look_around(attempt, goal, tried)

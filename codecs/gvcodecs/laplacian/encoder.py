@@ -41,7 +41,7 @@ from gvpipe.sequence import MeshSequence
 from gvpipe.trajectories import CodedPoints, code_points, read_trajectories
 from gvpipe.trajectory_basis import MAX_COMPONENTS, reduce_trajectories
 
-AIM = 2.5  # squared error aimed at, in that of `pca` at the same quality
+AIM = 2.0  # squared error aimed at, in that of `pca` at the same quality
 NOISE = 3.0  # squared error that rounding of deltas leaves, in that of coefficients rounded alike, about
 POINT_COST, ROW_COST = 0.1, 5.0  # of a component: deltas cost little, so that components are paid for by their basis
 
@@ -50,7 +50,7 @@ POINT_COST, ROW_COST = 0.1, 5.0  # of a component: deltas cost little, so that c
 class Laplacian(Settings):
     """Settings of the geometric-Laplacian codec.
 
-    Quality aims at a Karni-Gotsman error of ``1.6 * 10 ** (1 - quality / 37.5)`` percent, 1.6 times that of `pca`, which takes
+    Quality aims at a Karni-Gotsman error of ``1.4 * 10 ** (1 - quality / 37.5)`` percent, 1.4 times that of `pca`, which takes
     about the same step: errors are small between neighbours and grow from anchor to anchor, and the perceived one is what bits
     are spent on. On thin parts and small meshes they grow further.
 
