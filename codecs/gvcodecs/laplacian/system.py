@@ -24,6 +24,7 @@ from scipy import sparse
 from gvpipe.sequence import Int32
 
 MAX_NEIGHBOURS = 64  # of a row
+COLUMNS = 32  # solved at once
 FITTING_STEPS = 2  # of conjugate gradients: a third saves under 1 % of the bytes, and costs two solutions
 TINY = 1e-300  # divides where there is nothing to fit
 
@@ -120,5 +121,8 @@ class ExtendedLaplacian:
         return self._weight**2 * self._divide(solution)[self._anchors]
 
     def _divide(self, right: Float64) -> Float64:
-        """Solve the normal equations."""
-        return np.asarray(self._factors.solve(right)) if right.size else right
+        """Solve the normal equations, a few columns at a time: more do not fit the cache and take up to twice as long."""
+        solved = np.empty_like(right)
+        for first in range(0, right.shape[1], COLUMNS):
+            solved[:, first : first + COLUMNS] = self._factors.solve(right[:, first : first + COLUMNS])
+        return solved
