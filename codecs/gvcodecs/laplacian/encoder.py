@@ -112,7 +112,8 @@ class Laplacian(Settings):
             n_segments,
             (),
         )
-        report("average", 0)
+        if header.needs_average:
+            report("average", 0)
         data, domain = memo("domain", lambda: _prepare(sequence, shared, header))
         if data is not None:
             sections[NAME] = data
