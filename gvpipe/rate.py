@@ -3,10 +3,12 @@
 Bytes and the logarithm of the error follow quality monotonically and nearly in a straight line, so a target is a root of a
 rising function of quality. `find_quality` takes steps of an assumed slope until the root lies between two qualities, then
 regula falsi; where one end would stay for ever, its value is halved (the Illinois rule: M. Dowell and P. Jarratt, A modified
-regula falsi method, 1971). Where errors scatter about their trend, as those of small meshes do, it tries the neighbours.
+regula falsi method, 1971). The errors of small meshes scatter by some percent about their trend, so that no method finds a
+root: then it tries qualities next to where the root lies on the mean, one after the other, until one is met.
 `find_smallest` fits parabolas to the logarithm of the size.
 
-Encodes are what costs, so neither makes more than a few.
+Encodes are what costs, so neither makes more than a few: 8, and 12 where errors scatter, since a trial of a small mesh costs
+about half of the first encode.
 """
 
 from __future__ import annotations
@@ -30,7 +32,10 @@ NAMES = {
     "bpvf": "a rate (bits per vertex and frame) of",
     "max": "a largest error of",
 }
-SCATTER = 0.3  # of quality: where a root is known so closely and not met, errors do not follow quality any more
+NEAR = 4.0  # of quality: so near to the root, smooth errors are as predicted
+MOST_NEAR = 2  # trials so near that miss; one more, and errors are taken to scatter
+MOST_SCATTERED = 12  # encodes where they do
+SPACING = 0.05  # of quality: between trials there, at least
 BOUND_RATIO = 2.8  # bound by rmse where files are smallest, about
 FIRST_STEP = 8.0  # of quality, when looking for the smallest
 LEAST_STEP = 1.5
@@ -136,20 +141,17 @@ def find_quality(attempt: Attempt, target: Target, start: float, tolerance: floa
     Raises:
         InputError: no quality meets the target; the message tells the best.
     """
-    aim = target.value * math.sqrt(1 - tolerance)
-    window = -math.log(1 - tolerance) / 2
-    sign = 1.0 if target.measure == "bpvf" else -1.0
-    slope = SLOPES[target.measure]
+    goal = _Goal(target, tolerance)
+    slope = goal.slope
     tried: list[Trial] = []
     low: tuple[float, float] | None = None  # quality and value below the root
     high: tuple[float, float] | None = None
-    quality, was_low = start, False
+    quality, was_low, n_near = start, False, 0
     for _ in range(MOST_ENCODES):
         trial = attempt(quality)
         tried.append(trial)
-        found = target.of(trial)
-        value = sign * math.log(max(found, 1e-300) / aim)  # rises with quality
-        if abs(value) <= window:
+        value = goal.value(trial)
+        if goal.is_close(value):
             break
         if value < 0:
             if quality >= 100:
@@ -166,16 +168,18 @@ def find_quality(attempt: Attempt, target: Target, start: float, tolerance: floa
             slope = _slope((quality, value), high, slope)
             high = (quality, value)
         was_low = value < 0
-        if low and high and high[0] - low[0] < SCATTER:
-            tried += _look_around(attempt, target, (low[0] + high[0]) / 2, window, MOST_ENCODES - len(tried))
+        is_near = abs(value) < NEAR * max(slope, goal.slope / 4)  # scatter makes slopes flat
+        n_near += is_near
+        if n_near > MOST_NEAR:
+            _look_around(attempt, goal, tried)
             break
         if low and high:
             part = min(max(low[1] / (low[1] - high[1]), 0.02), 0.98)
             quality = low[0] + part * (high[0] - low[0])
-        elif len(tried) > 2:
+        elif len(tried) > 2 and not is_near:
             quality = 100.0 if low else 0.0
         else:
-            quality = min(max(quality - value / slope, 0.0), 100.0)
+            quality = _within(quality - value / slope)
     allowed = [trial for trial in tried if target.is_met(trial)]
     if not allowed:
         best = min(tried, key=target.of)
@@ -186,15 +190,54 @@ def find_quality(attempt: Attempt, target: Target, start: float, tolerance: floa
     return max(allowed, key=target.of), tried
 
 
-def _look_around(attempt: Attempt, target: Target, middle: float, window: float, most: int) -> list[Trial]:
-    """Trials on both sides of a quality, until one is close enough: errors of small meshes scatter about their trend."""
-    tried: list[Trial] = []
-    for i in range(most):
-        side = 1 if i % 2 == 0 else -1
-        tried.append(attempt(_within(middle + side * (i // 2 + 1) * SCATTER)))
-        if 0 <= math.log(target.value / max(target.of(tried[-1]), 1e-300)) <= 2 * window:
+@dataclass(frozen=True)
+class _Goal:
+    """A target as the root of a rising function of quality."""
+
+    target: Target
+    tolerance: float
+
+    @property
+    def slope(self) -> float:
+        """Assumed, per unit of quality."""
+        return SLOPES[self.target.measure]
+
+    def value(self, trial: Trial) -> float:
+        """Logarithm of what the trial came to over the middle of what is close enough; below 0 where quality is too low."""
+        aim = self.target.value * math.sqrt(1 - self.tolerance)
+        value = math.log(max(self.target.of(trial), 1e-300) / aim)
+        return value if self.target.measure == "bpvf" else -value
+
+    def is_close(self, value: float) -> bool:
+        """Whether the trial lies within the tolerance."""
+        return abs(value) <= -math.log(1 - self.tolerance) / 2
+
+
+def _look_around(attempt: Attempt, goal: _Goal, tried: list[Trial]) -> None:
+    """Go on, where the trials near the root have it on the mean, until one is close enough; the trials go to ``tried``.
+
+    Errors that scatter are as if drawn anew at every quality, so that the best guess is any untried one next to the root. Where
+    a codec gives the same bytes as before, its qualities are coarser, and steps grow.
+    """
+    known = [(trial.codec.quality, goal.value(trial)) for trial in tried]
+    slope = _slope(min(known), max(known), goal.slope)
+    spacing = SPACING
+    while len(tried) < MOST_SCATTERED:
+        reach = max(NEAR * slope, min(abs(value) for _, value in known))
+        roots = [quality - value / slope for quality, value in known if abs(value) <= reach]
+        root = sum(roots) / len(roots)
+        around = (_within(root + side * i * spacing) for i in range(MOST_SCATTERED) for side in (1, -1))
+        free = (quality for quality in around if min(abs(quality - other) for other, _ in known) >= spacing)
+        quality = next(free, None)
+        if quality is None:
             break
-    return tried
+        trial = attempt(quality)
+        if any(trial.bytes == other.bytes for other in tried):
+            spacing *= 2
+        tried.append(trial)
+        known.append((quality, goal.value(trial)))
+        if goal.is_close(known[-1][1]):
+            break
 
 
 def find_smallest(attempt: Attempt, bound: float, start: float, tolerance: float = WORTH) -> tuple[Trial, list[Trial]]:

@@ -8,8 +8,9 @@ energy l_k and of basis vectors of energy 1; the basis is scaled by sqrt(l_k) be
 of D in either factor costs the same (reverse water-filling). Both factors are then coded alike (`row_coding`): the
 coefficients along the surface, the basis along time (`frame_rows`). The mean is one more column, of scale sqrt(V).
 
-Components are kept while they pay: l_k > THRESHOLD (V + 3F) D^2. After coding, coefficients are fitted anew to the decoded
-basis, so that what its errors span is not lost.
+Components are kept while they pay: l_k > THRESHOLD (V + 3F) D^2. D is such that the error comes to what is wanted, also
+where a component leaves. After coding, coefficients are fitted anew to the decoded basis, so that what its errors span is not
+lost.
 
 Basis stream: [varint] components R; [varint] bytes of the scales, scales [integers]: differences of round(8 log2(sqrt(l_k) /
 D)), then the rows. Source: Vasa and Skala 2010, section 3.2; the paper's basis coder (COBRA) predicts along time from frames
@@ -18,6 +19,9 @@ before alone.
 
 from __future__ import annotations
 
+import functools
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +38,7 @@ ROUNDING = 1e-13  # of the total energy: eigenvalues below are noise
 MAX_COMPONENTS = 1 << 14
 MAX_SCALE = 8 * 64  # scales run from 2**-64 to 2**64 steps
 PER_OCTAVE = 8
+PER_STEP_OCTAVE = 1024  # steps are 0.07 % apart
 LEAST_OUTSIDE = 0.2  # part of a basis' errors that is taken to lie outside its span, at least
 
 Float64 = NDArray[np.float64]
@@ -86,6 +91,7 @@ def reduce_trajectories(
     basis_ratio: float = 1.0,
     point_cost: float = THRESHOLD,
     row_cost: float = THRESHOLD,
+    noise: float = 1.0,
 ) -> Reduced:
     """Choose the step and the components of ``trajectories (V, 3F)``, and code their basis.
 
@@ -95,11 +101,15 @@ def reduce_trajectories(
         n_components: most components; 0: as many as pay.
         basis_ratio: step of the basis, in steps of the coefficients.
         point_cost, row_cost: of a component (`count_components`).
+        noise: squared error of decoded coefficients, in that of rounding them to the step.
     """
-    n_points = len(trajectories)
+    n_points, n_rows = trajectories.shape
     principal = find_principal(trajectories, error)
-    step = choose_step(principal, n_points, error)
-    kept = min(n_components, len(principal.energies)) or count_components(principal, n_points, step, point_cost, row_cost)
+    left = (noise * n_points + basis_ratio**2 * n_rows) / 12
+    step, kept = choose_step(
+        principal, error, lambda step: count_components(principal, n_points, step, point_cost, row_cost), left
+    )
+    kept = min(n_components, len(principal.energies)) or kept
     data, basis = encode_basis(principal, kept, n_points, step * basis_ratio)
     return Reduced(step, data, fit_coefficients(trajectories, basis))
 
@@ -140,23 +150,42 @@ def count_components(
     return min(worth, MAX_COMPONENTS, MAX_VALUES // max(n_points, n_rows) - 1)
 
 
-def expected_error(principal: Principal, n_points: int, step: float) -> float:
-    """Squared error, summed over all coordinates, that coding with this step leaves, model units squared."""
-    kept = count_components(principal, n_points, step)
-    samples = (kept + 1) * (n_points + len(principal.mean))
-    return float(samples * step * step / 12 + principal.energies[kept:].sum() + principal.rest)
+def expected_error(principal: Principal, n_kept: int, step: float, left: float) -> float:
+    """Squared error, summed over all coordinates, that coding R components with this step leaves, model units squared.
+
+    Of a component ``left`` squared steps, but no more than its energy (reverse water-filling); of the mean as of any.
+    """
+    each = left * step * step
+    kept, dropped = principal.energies[:n_kept], principal.energies[n_kept:]
+    return float(each + np.minimum(kept, each).sum() + dropped.sum() + principal.rest)
 
 
-def choose_step(principal: Principal, n_points: int, error: float) -> float:
-    """Return the step, model units, that leaves about the squared ``error``; by bisection in whole 1/64 octaves."""
-    low, high = -64 * 130, 64 * 128  # float32 positions reach 2**128
+def choose_step(principal: Principal, error: float, count: Callable[[float], int], left: float) -> tuple[float, int]:
+    """Return the step, model units, that leaves about the squared ``error``, and how many components to keep.
+
+    ``count`` tells how many are worth it at a step. Where one leaves, the error jumps, and no step leaves what lies between:
+    then the step is chosen for either number of components, and taken is the one that lies nearer to the jump.
+    """
+
+    def is_met(step: float, n_kept: int) -> bool:
+        return expected_error(principal, n_kept, step, left) <= error
+
+    jump = _coarsest(lambda step: is_met(step, count(step)))
+    counts = {count(jump), count(jump * 2 ** (1 / PER_STEP_OCTAVE))}
+    choices = [(_coarsest(functools.partial(is_met, n_kept=n)), n) for n in sorted(counts)]
+    return min(choices, key=lambda choice: abs(math.log(choice[0] / jump)))
+
+
+def _coarsest(is_fine: Callable[[float], bool]) -> float:
+    """The largest step that is fine, by bisection in whole 1 / PER_STEP_OCTAVE octaves: eigenvalues' last bits count little."""
+    low, high = -PER_STEP_OCTAVE * 130, PER_STEP_OCTAVE * 128  # float32 positions reach 2**128
     while high - low > 1:
         middle = (low + high) // 2
-        if expected_error(principal, n_points, 2.0 ** (middle / 64)) > error:
-            high = middle
-        else:
+        if is_fine(2.0 ** (middle / PER_STEP_OCTAVE)):
             low = middle
-    return float(2.0 ** (low / 64))
+        else:
+            high = middle
+    return float(2.0 ** (low / PER_STEP_OCTAVE))
 
 
 def encode_basis(principal: Principal, n_components: int, n_points: int, step: float) -> tuple[bytes, Basis]:

@@ -208,6 +208,27 @@ def test_a_solution_is_the_least_squares_one() -> None:
     assert np.allclose(system.solve(np.arange(6, dtype=np.int32), deltas, anchored), expected)
 
 
+def test_anchors_make_good_what_rounding_of_deltas_did() -> None:
+    """Two steps come near the least squares over all values of anchors; exact deltas leave them as they are."""
+    points, surface = surface_of(tube(12, 40))
+    domain = build_domain(surface, points, HEADER)  # type: ignore[arg-type]
+    wanted = np.random.default_rng(0).standard_normal((len(points), 5)) + 20 * points[:, :1]
+    exact = domain.system.deltas(wanted)[domain.delta_points]
+    true = wanted[domain.anchors.points]
+    assert np.abs(domain.system.fit_anchors(domain.delta_points, exact, wanted) - true).max() < 1e-8
+
+    def error(anchored: np.ndarray) -> np.ndarray:
+        return ((domain.system.solve(domain.delta_points, np.rint(exact), anchored) - wanted) ** 2).sum(axis=0)
+
+    fitted = domain.system.fit_anchors(domain.delta_points, np.rint(exact), wanted)
+    zero = domain.system.solve(domain.delta_points, np.rint(exact), 0 * true)
+    spread = domain.system.solve(domain.delta_points, np.zeros((len(exact), len(true))), np.eye(len(true)))  # (P, A)
+    best = np.linalg.lstsq(spread, wanted - zero)[0]
+    assert (error(best) <= error(fitted)).all()
+    assert (error(fitted) < 0.8 * error(true)).all()
+    assert (error(fitted) - error(best) < 0.35 * (error(true) - error(best))).all()
+
+
 def test_hubs_keep_few_neighbours_and_their_sum() -> None:
     n = 3000
     spokes = np.arange(1, n)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import random
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,7 +17,7 @@ import gvpipe
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import Memo, codec_class, codec_ids, open_reader
 from gvpipe.errors import InputError, SettingError
-from gvpipe.rate import MOST_ENCODES, TOLERANCE, Target, find_quality, find_smallest, parse_bound
+from gvpipe.rate import MOST_ENCODES, MOST_SCATTERED, TOLERANCE, Target, find_quality, find_smallest, parse_bound
 from gvpipe.sequence import MeshSequence
 from gvpipe.trials import Trial
 from gvpipe.vertex_errors import Errors
@@ -65,10 +66,44 @@ def test_bent_curves_are_met_in_a_few_encodes(level: float, decades: float, bend
     assert best.errors.kg >= (1 - TOLERANCE) * target.value or best.codec.quality == 0
 
 
+@pytest.mark.parametrize(("scatter", "least"), [(0.0, 1.0), (0.02, 0.98), (0.05, 0.85), (0.08, 0.65)])
+def test_errors_that_scatter_are_met_mostly(scatter: float, least: float) -> None:
+    """White noise on the logarithm of the error, another draw at every quality, as small meshes have it."""
+    n_met = n_encodes = 0
+    for seed in range(200):
+        draw = random.Random(seed)
+        decades, bend, at = draw.uniform(1.8, 3.2), draw.uniform(-0.3, 0.3), draw.uniform(20, 95)
+
+        def trend(quality: float, decades: float = decades, bend: float = bend) -> float:
+            x = quality / 100
+            return float(10 ** (1 - decades * (x + bend * x * (1 - x))))
+
+        def error(quality: float, seed: int = seed, trend: Callable[[float], float] = trend) -> float:
+            return trend(quality) * math.exp(random.Random(f"{seed} {quality:.6f}").gauss(0, scatter))
+
+        target = Target("kg", trend(at))
+        best, tried = find_quality(pretend(error, lambda q: 1 + q), target, 75)
+        assert len(tried) == len({trial.codec.quality for trial in tried}) <= MOST_SCATTERED
+        assert target.is_met(best)
+        n_met += target.of(best) >= (1 - TOLERANCE) * target.value
+        n_encodes += len(tried)
+    assert n_met >= least * 200
+    assert n_encodes <= (3.5 if scatter == 0 else 8) * 200
+
+
+def test_qualities_that_give_the_same_file_are_not_tried_for_ever() -> None:
+    """Where scattering errors change only every quarter of quality, steps grow until they do."""
+    attempt = pretend(
+        lambda q: 10 ** (1 - math.floor(4 * q) / 150 + 0.02 * math.sin(37 * math.floor(4 * q))), lambda q: math.floor(4 * q)
+    )
+    _, tried = find_quality(attempt, Target("kg", 0.117), 75)
+    assert len({trial.bytes for trial in tried}) >= len(tried) - 3
+
+
 def test_steps_too_coarse_give_the_closest_allowed() -> None:
     best, tried = find_quality(pretend(lambda q: 10 ** (-math.floor(q / 20))), Target("rmse", 0.05), 75)
     assert best.errors.rmse_diag == pytest.approx(0.01)
-    assert len(tried) <= MOST_ENCODES
+    assert len(tried) <= MOST_SCATTERED
 
 
 def test_sizes_land_below() -> None:
@@ -128,10 +163,7 @@ def test_bounds_are_lengths_or_parts_of_the_diagonal() -> None:
 @pytest.mark.parametrize("reorder", [False, True], ids=["", "reorder"])
 @pytest.mark.parametrize("measure", ["rmse", "kg", "bpvf"])
 def test_files_meet_their_targets(codec: str, measure: str, reorder: bool, tmp_path: Path) -> None:
-    """Asked for what quality 60 came to, the file comes within 3 % of it, on the allowed side.
-
-    On small meshes the errors of `laplacian` scatter by some percent: then it is the closest of all encodes, and says so.
-    """
+    """Asked for what quality 60 came to, the file comes within 3 % of it, on the allowed side."""
     sequence, path = waving(24 if codec == "laplacian" else 16, 24), tmp_path / "t.mp4"
 
     def measured() -> float:
@@ -145,9 +177,8 @@ def test_files_meet_their_targets(codec: str, measure: str, reorder: bool, tmp_p
     gvpipe.encode(sequence, path, codec, quality=60, reorder=reorder)
     wanted = measured()
     report = gvpipe.encode(sequence, path, codec, reorder=reorder, **{f"target_{measure}": wanted})  # type: ignore[arg-type]
-    is_closest = len(report.tried) == MOST_ENCODES and "the closest of 8" in report.reason
-    assert (0.9 if is_closest and codec == "laplacian" else 0.97) * wanted <= measured() <= wanted
-    assert len(report.tried) <= MOST_ENCODES
+    assert 0.97 * wanted <= measured() <= wanted
+    assert len(report.tried) <= MOST_SCATTERED
     chosen = next(tried for tried in report.tried if tried["quality"] == report.settings["quality"])
     assert chosen["bytes"] == report.bytes == path.stat().st_size
     key = {"rmse": "rmse_diag"}.get(measure, measure)
@@ -159,10 +190,10 @@ def test_small_steps_of_quality_change_the_error(codec: str) -> None:
     """Without that no search could come within 3 %."""
     sequence, memo = waving(16, 12), Memo()
     found = set()
-    for quality in (60.0, 60.25, 60.5, 60.75):
+    for quality in (60.0, 60.25, 60.5, 60.75) if codec in ("mcgv", "pdct") else (60.0, 60.05, 60.1, 60.15):
         bitstream = codec_class(codec)(quality=quality).encode(sequence, memo=memo)
         found.add(open_reader(bitstream).read(0, 12).tobytes())
-    assert len(found) >= 3  # pca's steps are 1/64 octaves: about a quarter
+    assert len(found) >= 3
 
 
 @each_codec

@@ -1,4 +1,7 @@
-"""Coefficients of a segment <-> the sections ``anchors`` and ``deltas``."""
+"""Coefficients of a segment <-> the sections ``anchors`` and ``deltas``.
+
+Deltas come first: they do not depend on the anchors' values, which are chosen to make good what the deltas' rounding did.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +17,10 @@ Float64 = NDArray[np.float64]
 
 def encode_coefficients(coefficients: Float64, step: float, domain: Domain, header: Header) -> tuple[bytes, bytes]:
     """Code ``coefficients (P, R)`` with the deltas' ``step``; return the bytes of anchors and of deltas."""
-    anchored = coefficients[domain.anchors.points]
-    anchors, _ = encode_rows(anchored, step * header.anchor_ratio, domain.anchors.rows)
     wanted = domain.system.deltas(coefficients)[domain.delta_points]
-    deltas, _ = encode_rows(wanted, step, domain.deltas, _predictor(header))
+    deltas, rounded = encode_rows(wanted, step, domain.deltas, _predictor(header))
+    anchored = domain.system.fit_anchors(domain.delta_points, rounded, coefficients)
+    anchors, _ = encode_rows(anchored, step * header.anchor_ratio, domain.anchors.rows)
     return anchors, deltas
 
 

@@ -21,7 +21,7 @@ from gvcodecs.laplacian.average import average_mesh
 from gvcodecs.laplacian.average_coding import NAME, encode_average
 from gvcodecs.laplacian.coefficients import encode_coefficients
 from gvcodecs.laplacian.delta_rows import DELTA_PREDICTIONS
-from gvcodecs.laplacian.domain import build_domain, build_surface
+from gvcodecs.laplacian.domain import Domain, build_domain, build_surface
 from gvcodecs.laplacian.format import (
     COARSEST,
     FINEST,
@@ -38,19 +38,21 @@ from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import MeshSequence
-from gvpipe.trajectories import code_points, read_trajectories
+from gvpipe.trajectories import CodedPoints, code_points, read_trajectories
 from gvpipe.trajectory_basis import MAX_COMPONENTS, reduce_trajectories
 
-POINT_COST, ROW_COST = 0.1, 10.0  # of a component: deltas cost little, so that components are paid for by their basis
+AIM = 2.0  # squared error aimed at, in that of `pca` at the same quality
+NOISE = 3.0  # squared error that rounding of deltas leaves, in that of coefficients rounded alike, about
+POINT_COST, ROW_COST = 0.1, 5.0  # of a component: deltas cost little, so that components are paid for by their basis
 
 
 @dataclass(frozen=True)
 class Laplacian(Settings):
     """Settings of the geometric-Laplacian codec.
 
-    Quality gives the deltas the step that `pca` gives its coefficients at the same quality: one that aims at a Karni-Gotsman
-    error of ``10 ** (1 - quality / 37.5)`` percent where errors are white. Here they are small between neighbours and grow from
-    anchor to anchor, so that the error is larger, and the perceived one is what bits are spent on.
+    Quality aims at a Karni-Gotsman error of ``1.4 * 10 ** (1 - quality / 37.5)`` percent, 1.4 times that of `pca`, which takes
+    about the same step: errors are small between neighbours and grow from anchor to anchor, and the perceived one is what bits
+    are spent on. On thin parts and small meshes they grow further.
 
     Raises:
         SettingError: a value out of its range.
@@ -110,20 +112,17 @@ class Laplacian(Settings):
             n_segments,
             (),
         )
-        surface = build_surface(mesh.point_faces, mesh.n_points)
-        average = None
         if header.needs_average:
             report("average", 0)
-            faces = shared.members[surface.faces].astype(np.int32)
-            shape = memo("average", lambda: average_mesh(sequence, faces)[shared.members])
-            sections[NAME], average = encode_average(shape, surface, header)
-        domain = memo("domain", lambda: build_domain(surface, average, header))
+        data, domain = memo("domain", lambda: _prepare(sequence, shared, header))
+        if data is not None:
+            sections[NAME] = data
         steps = []
         for s, (start, stop) in enumerate(pairwise(bounds)):
             report("segments", s / n_segments)
             trajectories = read_trajectories(sequence, start, stop, shared.members)
-            error = wanted**2 * mesh.n_points * (stop - start)
-            reduced = reduce_trajectories(trajectories, error, self.components, self.basis_ratio, POINT_COST, ROW_COST)
+            error = AIM * wanted**2 * mesh.n_points * (stop - start)
+            reduced = reduce_trajectories(trajectories, error, self.components, self.basis_ratio, POINT_COST, ROW_COST, NOISE)
             sections[f"basis.{s}"] = reduced.basis
             anchors, deltas = encode_coefficients(reduced.coefficients, reduced.step, domain, header)
             sections[f"anchors.{s}"], sections[f"deltas.{s}"] = anchors, deltas
@@ -144,3 +143,14 @@ class Laplacian(Settings):
     def reader(cls, bitstream: Bitstream) -> FrameReader:
         """Open a ``laplacian`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         return LaplacianReader(bitstream)
+
+
+def _prepare(sequence: MeshSequence, shared: CodedPoints, header: Header) -> tuple[bytes | None, Domain]:
+    """The coded average mesh, where one is needed, and what coefficients are coded with: both know nothing of quality."""
+    mesh = shared.mesh
+    surface = build_surface(mesh.point_faces, mesh.n_points)
+    if not header.needs_average:
+        return None, build_domain(surface, None, header)
+    average = average_mesh(sequence, shared.members[surface.faces].astype(np.int32))[shared.members]
+    data, decoded = encode_average(average, surface, header)
+    return data, build_domain(surface, decoded, header)
