@@ -13,7 +13,7 @@ from scipy import sparse
 from sequences import awkward, grid, waving
 
 from gvcodecs.mcgv import Mcgv
-from gvcodecs.mcgv.blend_fitting import fit_blend
+from gvcodecs.mcgv.blend_fitting import Clustering, fit_blend
 from gvcodecs.mcgv.blending import INFLUENCES, TOTAL, Blend, BlendFit, Weights, homogeneous
 from gvcodecs.mcgv.points import Points
 from gvcodecs.mcgv.rebuilding import rebuild_blended
@@ -182,7 +182,7 @@ def test_dearer_bits_make_smaller_sections() -> None:
     points = Points.of(np.arange(3 * len(base)).reshape(-1, 3), sequence.faces, np.arange(len(base)))
     sizes = []
     for step in (1e-4, 1e-2):
-        fitted = fit_blend(sequence, base, points, step, 6, lambda stage, done: None)
+        fitted = fit_blend(sequence, base, points, Clustering.of(sequence, base, points), step, 6)
         check_weights(fitted.weights, fitted.n_clusters)
         sizes.append(len(encode_weights(fitted.weights, points.neighbours)))
     assert sizes[1] < sizes[0]
@@ -193,7 +193,8 @@ def test_as_many_clusters_as_pay() -> None:
     sequence = waving(16, 30)
     base = np.asarray(sequence.read(0, 1)[0], np.float64)
     points = Points.of(np.arange(3 * len(base)).reshape(-1, 3), sequence.faces, np.arange(len(base)))
-    counts = [fit_blend(sequence, base, points, step, 0, lambda stage, done: None).n_clusters for step in (100.0, 0.02, 5e-4)]
+    clustering = Clustering.of(sequence, base, points)
+    counts = [fit_blend(sequence, base, points, clustering, step, 0).n_clusters for step in (100.0, 0.02, 5e-4)]
     assert counts == sorted(counts) and counts[0] <= 8 < counts[-1]
 
 

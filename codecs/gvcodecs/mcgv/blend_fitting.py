@@ -25,7 +25,6 @@ from gvcodecs.mcgv.blending import INFLUENCES, TOTAL, Blend, BlendFit, Weights
 from gvcodecs.mcgv.points import Points
 from gvcodecs.mcgv.segmentation import SEED, motion_features
 from gvcodecs.mcgv.weight_coding import Prices, earlier_neighbours, encode_weights
-from gvpipe.codec import Progress
 from gvpipe.sequence import Int32, MeshSequence
 from gvpipe.topology import k_ring
 
@@ -55,27 +54,26 @@ class Fitted:
     n_clusters: int
 
 
-def fit_blend(sequence: MeshSequence, base: Float64, points: Points, step: float, n_clusters: int, report: Progress) -> Fitted:
+def fit_blend(
+    sequence: MeshSequence, base: Float64, points: Points, clustering: Clustering, step: float, n_clusters: int
+) -> Fitted:
     """Fit a blend.
 
     Args:
         sequence: the animation.
         base: ``(P, 3)`` decoded base positions, model units.
         points: of the base frame.
+        clustering: of the points (`Clustering.of`).
         step: quantisation step wanted of positions, model units: what an error is worth.
         n_clusters: K, about; 0: as many as pay.
     """
-    report("segment", 0)
-    neighbours = points.neighbours
-    features = motion_features(sequence, base, k_ring(neighbours, RING), points.members)
     price = step**2 / sequence.n_frames  # of one squared step of one frame, as part of all frames
 
     def problem(n_frames: int) -> _Problem:
         motions = _motions(sequence, base, points, n_frames)
         shown = motions.shape[1] / 3
-        return _Problem(base, motions, neighbours, BIT_WORTH * price * shown, CLUSTER_WORTH * step**2 * shown)
+        return _Problem(base, motions, points.neighbours, BIT_WORTH * price * shown, CLUSTER_WORTH * step**2 * shown)
 
-    clustering = _Clustering(features)
     best = clustering.start(n_clusters) if n_clusters else _find_number(problem(TRIAL_FRAMES), clustering)
     return _alternate(problem(FRAMES), best, PASSES)
 
@@ -108,7 +106,7 @@ class _Problem:
         return float(self.errors(fitted).sum()) + self.price * bits + self.cluster_price * fitted.n_clusters
 
 
-def _find_number(problem: _Problem, clustering: _Clustering) -> Fitted:
+def _find_number(problem: _Problem, clustering: Clustering) -> Fitted:
     """The blend, of as many clusters as pay, that costs least."""
     draw, patches = np.random.default_rng(SEED), k_ring(problem.neighbours, PATCH)
     best = last = clustering.start(1)
@@ -174,8 +172,13 @@ def _alternate(problem: _Problem, fitted: Fitted, passes: int) -> Fitted:
     return fitted
 
 
-class _Clustering:
+class Clustering:
     """K-means of the points' motions for any number of clusters: the first K of one sequence of seeds start it."""
+
+    @classmethod
+    def of(cls, sequence: MeshSequence, base: Float64, points: Points) -> Clustering:
+        """Take in a sequence's local motions, for base positions ``(P, 3)``, model units; no step counts."""
+        return cls(motion_features(sequence, base, k_ring(points.neighbours, RING), points.members))
 
     def __init__(self, features: Float64) -> None:
         self._features = features

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.mcgv import format as sections
-from gvcodecs.mcgv.blend_fitting import fit_blend
+from gvcodecs.mcgv.blend_fitting import Clustering, fit_blend
 from gvcodecs.mcgv.blending import TOTAL, Blend, BlendFit
 from gvcodecs.mcgv.motion import CodedMotion, Samples, locate
 from gvcodecs.mcgv.packing import Layout
@@ -26,10 +26,17 @@ Float64 = NDArray[np.float64]
 
 
 def code_blended(
-    sequence: MeshSequence, base: Float64, points: Points, bounds: list[int], step: float, n_clusters: int, report: Progress
+    sequence: MeshSequence,
+    base: Float64,
+    points: Points,
+    clustering: Clustering,
+    bounds: list[int],
+    step: float,
+    n_clusters: int,
+    report: Progress,
 ) -> CodedMotion:
     """Fit a blend, and code its weights and the transforms of every segment with a quantisation step, model units."""
-    fitted = fit_blend(sequence, base[points.members], points, step, n_clusters, report)
+    fitted = fit_blend(sequence, base[points.members], points, clustering, step, n_clusters)
     blend = Blend(base[points.members], fitted.weights, fitted.n_clusters)
     fit = BlendFit(blend)
     coded = {"weights": encode_weights(fitted.weights, points.neighbours)}

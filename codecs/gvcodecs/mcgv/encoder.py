@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import code_affine
+from gvcodecs.mcgv.blend_fitting import Clustering
 from gvcodecs.mcgv.blended_motion import code_blended
 from gvcodecs.mcgv.frame_images import code_frames, measure_residuals
 from gvcodecs.mcgv.motion import PREDICTIONS, CodedMotion
@@ -175,7 +176,10 @@ class Mcgv(Settings):
     def _blended(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
         """Pictures are frames, predicted by a blend."""
         layout = self._blended_layout(start, memo, report)
-        motion = code_blended(start.sequence, start.base, start.points, start.bounds, start.step, self.clusters, report)
+        clustering = _clustering(start, memo, report)
+        motion = code_blended(
+            start.sequence, start.base, start.points, clustering, start.bounds, start.step, self.clusters, report
+        )
         return self._frames(start, motion, layout, measure_residuals(start.sequence, motion, start.bounds), report)
 
     def _trajectory_images(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
@@ -185,6 +189,7 @@ class Mcgv(Settings):
             start.sequence,
             start.base,
             start.points,
+            _clustering(start, memo, report),
             layout,
             BLOCKS[self.image],
             start.bounds,
@@ -315,6 +320,13 @@ class _Coded:
     own: dict[str, Any]
     sections: dict[str, bytes]
     video: bytes
+
+
+def _clustering(start: _Start, memo: Memo, report: Progress) -> Clustering:
+    """What a blend's clusters start from; quality touches it by the base frame's lattice alone."""
+    report("segment", 0)
+    members = start.base[start.points.members]
+    return memo(f"clustering {start.lattice.step}", lambda: Clustering.of(start.sequence, members, start.points))
 
 
 def _extent(sequence: MeshSequence, report: Progress) -> float:

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gvcodecs.mcgv.blend_fitting import fit_blend
+from gvcodecs.mcgv.blend_fitting import Clustering, fit_blend
 from gvcodecs.mcgv.blending import Blend, BlendFit
 from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.padding import Padding
@@ -47,6 +47,7 @@ def code_trajectories(
     sequence: MeshSequence,
     base: Float64,
     points: Points,
+    clustering: Clustering,
     layout: Layout,
     block: int,
     bounds: list[int],
@@ -61,13 +62,14 @@ def code_trajectories(
     Args:
         sequence: the animation.
         base: ``(V, 3)`` decoded base positions; points: of the base frame.
+        clustering: of the points.
         layout: the vertices' pixels, in blocks of side ``block``.
         bounds: first frame of every segment, and F.
         step: quantisation step of positions that leaves the error wanted, model units.
         n_clusters: K; 0: as many as pay.
         profile, preset: of the video.
     """
-    fitted = fit_blend(sequence, base[points.members], points, FIT_STEP * step, n_clusters, report)
+    fitted = fit_blend(sequence, base[points.members], points, clustering, FIT_STEP * step, n_clusters)
     fit = BlendFit(Blend(base[points.members], fitted.weights, fitted.n_clusters))
     sections = {"weights": encode_weights(fitted.weights, points.neighbours)}
     fineness = FINENESS[profile.name]
