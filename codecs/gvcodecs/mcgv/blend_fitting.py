@@ -8,8 +8,8 @@ squared error and bits.
 
 A cluster costs twelve numbers a frame, and so should save a squared error: numbers of clusters are tried from the smallest up,
 until error and cost together fall no more. K-means is a draw of luck, and sees what is alike, not what a blend lacks. So each
-number is tried twice: by k-means, and by adding clusters to the blend before where its errors are; what costs less, weights'
-bits counted, is kept. One number that does worse ends nothing.
+number is tried twice: by k-means, and by adding clusters to the blend before where its errors are. The best of either kind,
+weights' bits counted, goes on to the end, and the one that costs less there is kept. One number that does worse ends nothing.
 """
 
 from __future__ import annotations
@@ -74,8 +74,9 @@ def fit_blend(
         shown = motions.shape[1] / 3
         return _Problem(base, motions, points.neighbours, BIT_WORTH * price * shown, CLUSTER_WORTH * step**2 * shown)
 
-    best = clustering.start(n_clusters) if n_clusters else _find_number(problem(TRIAL_FRAMES), clustering)
-    return _alternate(problem(FRAMES), best, PASSES)
+    starts = [clustering.start(n_clusters)] if n_clusters else _find_number(problem(TRIAL_FRAMES), clustering)
+    whole = problem(FRAMES)
+    return min((_alternate(whole, start, PASSES) for start in starts), key=whole.cost)
 
 
 @dataclass(frozen=True)
@@ -106,19 +107,21 @@ class _Problem:
         return float(self.errors(fitted).sum()) + self.price * bits + self.cluster_price * fitted.n_clusters
 
 
-def _find_number(problem: _Problem, clustering: Clustering) -> Fitted:
-    """The blend, of as many clusters as pay, that costs least."""
+def _find_number(problem: _Problem, clustering: Clustering) -> list[Fitted]:
+    """The blends, of as many clusters as pay, that cost least after a few turns: from k-means, and grown."""
     draw, patches = np.random.default_rng(SEED), k_ring(problem.neighbours, PATCH)
-    best = last = clustering.start(1)
-    least, count, worse = np.inf, float(FEWEST), 0
-    most = min(MOST, len(problem.base) / LEAST_POINTS)
-    while count <= most and problem.cluster_price * count < least and worse < PATIENCE:
+    last = clustering.start(1)
+    best, least = [last, last], [np.inf, np.inf]
+    count, worse, most = float(FEWEST), 0, min(MOST, len(problem.base) / LEAST_POINTS)
+    while count <= most and problem.cluster_price * count < min(least) and worse < PATIENCE:
         starts = [clustering.start(round(count)), _grow(problem, last, round(count), patches, draw)]
         tried = [_alternate(problem, start, TRIAL_PASSES) for start in starts]
-        cost, last = min(((problem.cost(fitted), fitted) for fitted in tried), key=lambda pair: pair[0])
-        worse = 0 if cost < least else worse + 1
-        if not worse:
-            best, least = last, cost
+        costs = [problem.cost(fitted) for fitted in tried]
+        worse = 0 if min(costs) < min(least) else worse + 1
+        for kind, cost in enumerate(costs):
+            if cost < least[kind]:
+                best[kind], least[kind] = tried[kind], cost
+        last = tried[int(np.argmin(costs))]
         count *= GROWTH
     return best
 
