@@ -47,8 +47,7 @@ def canonical_triangles(faces: NDArray[np.integer]) -> NDArray[np.integer]:
 
 
 def _paths(sequence: MeshSequence) -> NDArray[np.float64]:
-    picked = np.unique(np.linspace(0, sequence.n_frames - 1, FRAMES).astype(int)).tolist()
-    return np.concatenate([sequence.read(i, i + 1)[0] for i in picked], axis=1).astype(np.float64)
+    return sequence.sample(FRAMES).swapaxes(0, 1).reshape(sequence.n_vertices, -1)
 
 
 def _turned(faces: NDArray[np.integer]) -> tuple[NDArray[np.integer], NDArray[np.intp]]:

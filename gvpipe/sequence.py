@@ -108,6 +108,11 @@ class MeshSequence:
         for first in range(start, stop, step):
             yield first, self.read(first, min(first + step, stop))
 
+    def sample(self, most: int, vertices: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
+        """Vertices of at most so many frames, evenly spaced from the first to the last: ``(n, vertices, 3)``, model units."""
+        picked = np.unique(np.linspace(0, self.n_frames - 1, most).astype(int))
+        return np.concatenate([self.read(i, i + 1)[:, vertices] for i in picked]).astype(np.float64)
+
 
 class _Permuted:
     """Positions of another sequence in another vertex order."""

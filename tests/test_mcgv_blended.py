@@ -326,11 +326,13 @@ def test_base_frame_tells_places_apart(name: str) -> None:
     """However coarse the quality: nearly as many lattice points as places of frame 0 that 16 bits tell apart."""
     sequence: MeshSequence = awkward()[name]
     first = sequence.read(0, 1)[0]
-    counts = []
+    counts, steps = [], []
     for codec in (Mcgv(prediction="blended", quality=0), Mcgv(prediction="blended", base_bits=16)):
         lattice = codec._lattice(first, 1e3)
-        counts.append(len(np.unique(keep_apart(lattice, first, find_places(sequence, lattice.step)), axis=0)))
+        steps.append(lattice.step)
+        counts.append(len(np.unique(keep_apart(lattice, first, find_places(sequence, first, lattice.step)), axis=0)))
     assert counts[0] >= 0.99 * counts[1]
+    assert steps[0] >= steps[1]
 
 
 # places
@@ -344,10 +346,10 @@ def test_places_are_where_vertices_start_and_go_together() -> None:
     frames[:, 5, 1] = np.arange(5)  # alone
     frames[:, 6, 1] = 0.01 * np.arange(5)  # leaves it by less than what counts
     sequence = MeshSequence(frames, np.array([[0, 1, 2]], np.int32), fps=25.0)
-    places = find_places(sequence, 0.1)
+    places = find_places(sequence, frames[0], 0.1)
     groups = {frozenset(np.flatnonzero(places == place).tolist()) for place in places}
     assert groups == {frozenset({0, 2, 6}), frozenset({1}), frozenset({3, 4}), frozenset({5})}
-    assert np.unique(find_places(sequence, 100.0)[[0, 2, 3, 4, 5, 6]]).size == 1
+    assert np.unique(find_places(sequence, frames[0], 100.0)[[0, 2, 3, 4, 5, 6]]).size == 1
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.floats(0.05, 4.0))

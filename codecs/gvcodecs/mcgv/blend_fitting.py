@@ -227,6 +227,5 @@ def _renumber(clusters: Int32, parts: Int32) -> Fitted:
 
 def _motions(sequence: MeshSequence, base: Float64, points: Points, n_frames: int) -> Float64:
     """Displacements ``(P, 3n)`` of at most ``n_frames`` frames, evenly spaced."""
-    picked = np.unique(np.linspace(0, sequence.n_frames - 1, n_frames).astype(int))
-    frames = np.concatenate([sequence.read(i, i + 1)[:, points.members] for i in picked]).astype(np.float64)
+    frames = sequence.sample(n_frames, points.members)
     return np.ascontiguousarray(np.moveaxis(frames - base, 0, 1).reshape(len(base), -1))

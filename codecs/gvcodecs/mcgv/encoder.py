@@ -159,7 +159,9 @@ class Mcgv(Settings):
         scale = PROFILES["h264-10"] if self.transform == "klt" else self._video_profile
         step = effective_step(self.quality, scale, float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0))))
         lattice = self._lattice(first, BASE_STEP * step / math.sqrt(given.n_frames))
-        coded = memo(f"base {lattice.step}", lambda: encode_base(self._base_points(lattice, given), given.faces, self.reorder))
+        coded = memo(
+            f"base {lattice.step}", lambda: encode_base(self._base_points(given, first, lattice), given.faces, self.reorder)
+        )
         memo.permutation = coded.permutation
         mesh = decode_base(coded.mesh, coded.order)
         sequence = given.reordered(coded.permutation, mesh.faces)
@@ -229,12 +231,11 @@ class Mcgv(Settings):
             bits += 1
         return Lattice.over(first, bits)
 
-    def _base_points(self, lattice: Lattice, sequence: MeshSequence) -> Int32:
-        """The base frame on its lattice ``(V, 3)``."""
-        first = sequence.read(0, 1)[0]
+    def _base_points(self, sequence: MeshSequence, first: Float32, lattice: Lattice) -> Int32:
+        """The first frame ``(V, 3)`` on its lattice."""
         if self.prediction == "affine":
             return lattice.quantise(first)
-        return keep_apart(lattice, first, find_places(sequence, lattice.step))
+        return keep_apart(lattice, first, find_places(sequence, first, lattice.step))
 
     def _published(self, start: _Start, report: Progress) -> tuple[CodedMotion, Layout]:
         """The paper's partition, layout and transforms."""

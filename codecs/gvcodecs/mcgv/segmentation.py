@@ -112,8 +112,7 @@ class LocalAffineFit:
 
 def refine(sequence: MeshSequence, base: Float64, ring: sparse.csr_array, members: NDArray[np.intp], clusters: Int32) -> Int32:
     """Move points to the cluster that predicts their neighbourhood ``ring (P, P)`` with the least squared error."""
-    picked = np.unique(np.linspace(0, sequence.n_frames - 1, REFINE_FRAMES).astype(int))
-    frames = np.concatenate([sequence.read(i, i + 1)[:, members] for i in picked]).astype(np.float64)
+    frames = sequence.sample(REFINE_FRAMES, members)
     for _ in range(REFINE_ROUNDS):
         predictor = AffinePredictor(base, clusters, int(clusters.max()) + 1)
         moved = _relabel((ring @ predictor.squared_errors(frames, predictor.fit(frames))).argmin(axis=1))

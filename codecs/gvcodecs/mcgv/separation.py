@@ -23,24 +23,24 @@ NEAR = np.array([d for d in itertools.product(range(-1, 2), repeat=3) if any(d)]
 Int64 = NDArray[np.int64]
 
 
-def find_places(sequence: MeshSequence, apart: float) -> Int64:
+def find_places(sequence: MeshSequence, first: Float32, apart: float) -> Int64:
     """Return ``(V,)`` ids of vertices, equal where they start at one place and go together.
 
     Args:
         sequence: the animation.
+        first: ``(V, 3)`` its first frame.
         apart: root mean square distance over frames, model units, from which on vertices part.
     """
-    place, same = weld(sequence.read(0, 1)[0] + np.float32(0))[1], np.zeros(sequence.n_vertices, np.int64)
+    place, same = weld(first + np.float32(0))[1], np.zeros(sequence.n_vertices, np.int64)
     left = np.flatnonzero(np.bincount(place)[place] > 1)
     if not len(left):
         return place.astype(np.int64)
-    picked = np.unique(np.linspace(0, sequence.n_frames - 1, FRAMES).astype(int))
-    frames = np.stack([sequence.read(i, i + 1)[0, left] for i in picked], axis=1).astype(np.float64)  # (n, frames, 3)
+    frames = sequence.sample(FRAMES, left)  # (n, left, 3)
     for motion in range(1 + len(NEAR)):  # the first of those left at a place tells who goes with it; more find no room
-        _, first, found = np.unique(place[left], return_index=True, return_inverse=True)
-        apart_from_first = np.square(frames - frames[first][found]).sum(axis=2).mean(axis=1) > apart**2
+        _, leader, found = np.unique(place[left], return_index=True, return_inverse=True)
+        parts = np.square(frames - frames[:, leader][:, found]).sum(axis=2).mean(axis=0) > apart**2
         same[left] = motion
-        left, frames = left[apart_from_first], frames[apart_from_first]
+        left, frames = left[parts], frames[:, parts]
     return row_ids(np.column_stack([place, same]))[0]
 
 
