@@ -10,9 +10,7 @@ everything after it, sees one surface; each corner then says which copy it uses.
 
 Mesh stream: [6 x 32 bits] bytes of Draco, merges, loose triangles, copies; loose triangles; points. Then these in that order:
 Draco; *merges* [integers]: how many Draco vertices come between one that is a second copy of an earlier one (Draco splits at
-non-manifold places), and how far back that one is; loose triangles, deflated as in `connectivity`; copies of each point less
-one [integers]; then, for corners of points with more than one, in order of point and corner, the copy's difference from that
-point's corner before [integers]. Order stream: `vertex_order`, with points in place of lattice positions.
+non-manifold places), and how far back that one is; loose triangles, deflated as in `connectivity`; the streams of `copies`.
 """
 
 from __future__ import annotations
@@ -27,14 +25,14 @@ from numpy.typing import NDArray
 from gvpipe.binary import Cursor, varint
 from gvpipe.bitstream import Bitstream
 from gvpipe.connectivity import COMPRESSION_LEVEL, MAX_PER_BYTE, EncodedMesh, check_draco_header
+from gvpipe.copies import decode_copies, encode_copies
 from gvpipe.entropy import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile
 from gvpipe.index_rows import decode_table, encode_table, row_ids, smallest_first, used_vertices
 from gvpipe.sequence import Int32
-from gvpipe.vertex_order import MAX_VERTICES, decode_order, encode_order
+from gvpipe.vertex_order import MAX_VERTICES
 
 HEADER = struct.Struct("<6I")
-MAX_COPIES = 7  # copies of a point that have contexts of their own
 
 Ints = NDArray[Any]
 
@@ -66,21 +64,9 @@ def encode_mesh(faces: Int32, points: Ints, reorder: bool) -> EncodedMesh:
         parts, place = _place_points(point_faces, n_points, draco, came_from)
     except (ValueError, CorruptFile):
         parts, place = _place_points(point_faces, n_points, b"", np.zeros(0, np.int64))
-    codec_faces = _point_faces(*parts)
-    # triangles alike over points are matched in order of appearance: which is which does not matter
-    turned, turns = _turned(place[point_faces])
-    matched = np.empty(len(faces), np.int64)
-    matched[np.lexsort(codec_faces.T[::-1])] = np.lexsort(turned.T[::-1])
-    corners = np.take_along_axis(faces, turns, axis=1)[matched]  # vertices of the codec's triangles
-    copies, copy_parts = _encode_copies(corners, codec_faces, place[points], n_points)
-    head = HEADER.pack(*(len(part) for part in parts[:2]), len(parts[2]), len(copy_parts[0]), parts[3], n_points)
-    mesh = head + b"".join([*parts[:3], *copy_parts])
-    permutation = np.lexsort((copies, place[points]))
-    if reorder:
-        return EncodedMesh(mesh, b"", permutation)
-    rank = np.argsort(permutation)
-    order = encode_order(rank, _as_lattice(place[points][permutation]), rank[corners])
-    return EncodedMesh(mesh, order, np.arange(len(points)))
+    coded = encode_copies(faces, place[points], _point_faces(*parts), n_points, reorder)
+    head = HEADER.pack(*(len(part) for part in parts[:2]), len(parts[2]), len(coded.counts), parts[3], n_points)
+    return EncodedMesh(head + b"".join([*parts[:3], coded.counts, coded.copies]), coded.order, coded.permutation)
 
 
 def decode_mesh(mesh: bytes, order: bytes, n_vertices: int) -> BareMesh:
@@ -93,10 +79,7 @@ def decode_mesh(mesh: bytes, order: bytes, n_vertices: int) -> BareMesh:
     point_faces = _point_faces(draco, merges, loose, n_loose)
     if point_faces.size and (point_faces.min() < 0 or point_faces.max() >= n_points):
         raise cursor.corrupt("a triangle names a point that does not exist")
-    faces, points = _decode_copies(cursor.take(bytes_counts), cursor.rest(), point_faces, n_points)
-    if order:
-        visits = decode_order(order, _as_lattice(points), faces)
-        points, faces = points[visits], np.argsort(visits)[faces]
+    faces, points = decode_copies(cursor.take(bytes_counts), cursor.rest(), order, point_faces, n_points)
     return BareMesh(faces.astype(np.int32), points, point_faces.astype(np.int32), n_points)
 
 
@@ -193,60 +176,3 @@ def _decode_draco(draco: bytes) -> tuple[Ints, int]:
     if faces.size and (faces.min() < 0 or faces.max() >= n_vertices):
         raise CorruptFile("section 'mesh' is corrupt: a triangle names a vertex that does not exist")
     return faces, n_vertices
-
-
-def _encode_copies(corners: Ints, point_faces: Ints, points: Ints, n_points: int) -> tuple[Ints, tuple[bytes, bytes]]:
-    """The number of each vertex among its point's copies ``(V,)``, by first use, and the streams that tell it."""
-    counts = np.bincount(points, minlength=n_points)
-    used, first = np.unique(corners.ravel(), return_index=True)
-    when = np.full(len(points), corners.size, np.int64)
-    when[used] = first
-    by_use = np.lexsort((when, points))
-    starts = np.cumsum(counts) - counts
-    copies = np.empty(len(points), np.int64)
-    copies[by_use] = np.arange(len(points)) - starts[points[by_use]]
-    where, is_first = _shared_corners(point_faces, counts)
-    differences = np.diff(copies[corners.ravel()[where]], prepend=0)
-    differences[is_first] = 0  # a point's first corner uses its first copy
-    contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_COPIES)
-    return copies, (encode_integers(counts - 1), encode_integers(differences, contexts))
-
-
-def _decode_copies(counts_data: bytes, data: bytes, point_faces: Ints, n_points: int) -> tuple[Ints, Ints]:
-    """Mirror of `_encode_copies`: triangles over vertices, and the point of each vertex."""
-    counts = 1 + decode_integers(counts_data, n_points, name="mesh")
-    if n_points and (counts.min() < 1 or counts.max() > MAX_VERTICES or counts.sum() > MAX_VERTICES):
-        raise CorruptFile("section 'mesh' is corrupt: a number of copies is out of range")
-    where, is_first = _shared_corners(point_faces, counts)
-    contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_COPIES)
-    total = np.cumsum(decode_integers(data, len(where), contexts, "mesh"))
-    begin = np.maximum.accumulate(np.where(is_first, np.arange(len(where)), 0))
-    copies = np.zeros(point_faces.size, np.int64)
-    copies[where] = total - total[begin] if len(where) else 0
-    flat = point_faces.ravel()
-    if ((copies < 0) | (copies >= counts[flat])).any():
-        raise CorruptFile("section 'mesh' is corrupt: a corner uses a copy that does not exist")
-    starts = np.cumsum(counts) - counts
-    faces: Ints = (starts[flat] + copies).reshape(-1, 3)
-    return faces, np.repeat(np.arange(n_points), counts)
-
-
-def _shared_corners(point_faces: Ints, counts: Ints) -> tuple[Ints, Ints]:
-    """Corners of points with more than one copy, in order of point and corner; which of them is its point's first."""
-    flat = point_faces.ravel()
-    where = np.flatnonzero(counts[flat] > 1)
-    where = np.asarray(where[np.argsort(flat[where], kind="stable")])
-    is_first: Ints = np.diff(flat[where], prepend=-1) > 0
-    return where, is_first
-
-
-def _turned(faces: Ints) -> tuple[Ints, Ints]:
-    """Triangles with the smallest index first, and where each of their corners was."""
-    turns = (faces.argmin(axis=1)[:, None] + np.arange(3)) % 3 if len(faces) else np.zeros((0, 3), np.int64)
-    return np.take_along_axis(faces, turns, axis=1), turns
-
-
-def _as_lattice(points: Ints) -> Ints:
-    """Positions for `vertex_order`, equal where points are."""
-    lattice: Ints = np.c_[points, np.zeros((len(points), 2), np.int64)]
-    return lattice

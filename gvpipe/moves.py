@@ -74,19 +74,42 @@ def encode_group(found: Moves, n_frames: int) -> bytes:
     return varint(len(starts)) + b"".join(varint(len(block)) + block for block in blocks)
 
 
+@dataclass(frozen=True)
+class Shared:
+    """Vertices that are moved together: those of number n are ``vertices[starts[n]:starts[n + 1]]``."""
+
+    vertices: Int64
+    starts: Int64
+
+    @classmethod
+    def of(cls, vertices: Int64, numbers: Int64, n_numbers: int) -> Shared:
+        """Group ``vertices (M,)`` by their ``numbers (M,)``, 0..n - 1."""
+        order = np.argsort(numbers, kind="stable")
+        return cls(vertices[order], np.concatenate([[0], np.cumsum(np.bincount(numbers, minlength=n_numbers))]))
+
+    def spread(self, moves: Moves) -> Moves:
+        """Moves of numbers as moves of all their vertices."""
+        counts = np.diff(self.starts)[moves.vertices]
+        own = np.repeat(np.arange(len(counts)), counts)
+        place = np.arange(len(own)) - np.repeat(np.cumsum(counts) - counts, counts)
+        return Moves(moves.frames[own], self.vertices[self.starts[moves.vertices[own]] + place], moves.steps[own])
+
+
 class MovesReader:
     """Moves by group; the last group is kept.
 
     Args:
         data: the section.
-        n_frames, n_vertices: F and V.
+        n_frames, n_vertices: F, and how many vertices, or numbers that vertices share, there are moves for.
         name: of the section, for messages.
+        shared: which vertices share a number; None: a number is a vertex.
 
     Raises:
         CorruptFile: here or later: the section is not what `encode_moves` writes.
     """
 
-    def __init__(self, data: bytes, n_frames: int, n_vertices: int, name: str) -> None:
+    def __init__(self, data: bytes, n_frames: int, n_vertices: int, name: str, shared: Shared | None = None) -> None:
+        self._shared = shared
         cursor = Cursor(data, name)
         (self.step,) = cursor.struct(HEAD)
         if not SMALL < self.step < LARGE:  # NaN neither
@@ -116,7 +139,8 @@ class MovesReader:
         last = self._last  # once: other threads may read too
         if last is None or last[0] != number:
             n_frames = min(self.group, self._n_frames - number * self.group)
-            last = self._last = (number, decode_group(self._groups[number], n_frames, self._n_vertices, self._name))
+            moves = decode_group(self._groups[number], n_frames, self._n_vertices, self._name)
+            last = self._last = (number, self._shared.spread(moves) if self._shared else moves)
         return last[1]
 
 

@@ -23,16 +23,16 @@ CURRENT: dict[str, tuple[str, dict[str, object]]] = {
         "laplacian",
         {"operator": "tutte", "delta_prediction": "none", "anchor_choice": "walk", "anchors": 9, "reorder": True},
     ),
-    "mcgv-2-h264": ("mcgv", {"prediction": "blended", "gop": 5, "segment": 7}),
-    "mcgv-2-affine": ("mcgv", {"clusters": 5, "prediction": "affine", "placement": "halves"}),
-    "mcgv-2-outliers": ("mcgv", {"clusters": 1, "quality": 95, "gop": 5}),
-    "mcgv-2-charts": ("mcgv", {"prediction": "blended", "clusters": 5, "profile": "precise", "placement": "charts"}),
-    "mcgv-2-jpeg": (
+    "mcgv-3-h264": ("mcgv", {"prediction": "blended", "gop": 5, "segment": 7}),
+    "mcgv-3-affine": ("mcgv", {"clusters": 5, "prediction": "affine", "placement": "halves"}),
+    "mcgv-3-outliers": ("mcgv", {"clusters": 1, "quality": 95, "gop": 5}),
+    "mcgv-3-charts": ("mcgv", {"prediction": "blended", "clusters": 5, "profile": "precise", "placement": "charts"}),
+    "mcgv-3-jpeg": (
         "mcgv",
         {"prediction": "blended", "clusters": 5, "image": "jpeg", "reorder": True, "placement": "halves"},
     ),
-    "mcgv-2-klt": ("mcgv", {"prediction": "blended", "transform": "klt", "segment": 7}),
-    "mcgv-2-klt-10": (
+    "mcgv-3-klt": ("mcgv", {"prediction": "blended", "transform": "klt", "segment": 7}),
+    "mcgv-3-klt-10": (
         "mcgv",
         {"prediction": "blended", "transform": "klt", "profile": "precise", "placement": "charts", "reorder": True},
     ),

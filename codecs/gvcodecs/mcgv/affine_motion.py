@@ -15,6 +15,7 @@ from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.motion import CodedMotion, Samples, locate
 from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.prediction import AffinePredictor
+from gvcodecs.mcgv.surface import Surface
 from gvcodecs.mcgv.transforms import decode_transforms, dequantise, encode_transforms, quantise
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import Progress
@@ -26,7 +27,7 @@ Float64 = NDArray[np.float64]
 def code_affine(
     sequence: MeshSequence, base: Float64, clusters: Int32, bounds: list[int], step: float, report: Progress
 ) -> CodedMotion:
-    """Fit and code the transforms of every segment, for clusters ``(V,)`` and a quantisation step, model units."""
+    """Fit and code the transforms of every segment, for clusters ``(S,)`` and a quantisation step, model units."""
     predictor = AffinePredictor(base, clusters, int(clusters.max()) + 1)
     segments = []
     for s, (start, stop) in enumerate(pairwise(bounds)):
@@ -48,26 +49,32 @@ class AffineMotion:
 
     Args:
         bitstream, header: of the file.
-        base: ``(V, 3)`` decoded base positions, model units.
-        clusters: ``(V,)`` cluster of each vertex.
-        layout: the vertices' pixels.
+        surface: of the base frame.
+        clusters: ``(S,)`` cluster of each slot.
+        layout: the slots' pixels.
         bounds: first frame of every segment, and F.
     """
 
     def __init__(
-        self, bitstream: Bitstream, header: sections.Header, base: Float64, clusters: Int32, layout: Layout, bounds: list[int]
+        self,
+        bitstream: Bitstream,
+        header: sections.Header,
+        surface: Surface,
+        clusters: Int32,
+        layout: Layout,
+        bounds: list[int],
     ) -> None:
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
-        predictor = AffinePredictor(base, clusters, header.clusters)
+        predictor = AffinePredictor(surface.base, clusters, header.clusters)
         self._rest = predictor.rest
-        self._samples = Samples(layout)
-        self._coordinates = predictor.coordinates[self._samples.vertices]
-        self._clusters = clusters[self._samples.vertices]
+        self._samples = Samples(surface, layout)
+        self._coordinates = predictor.coordinates[self._samples.slots]
+        self._clusters = clusters[self._samples.slots]
         self._residuals = header.residual_step * header.profile.offsets
         self._segment: tuple[int, Float64] = (-1, np.zeros((0, 0, 4, 3)))
 
     def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
-        """Fill ``positions (V, 3)`` of a frame from its ``samples (3 height, line)``; raises `CorruptFile`."""
+        """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
         from gvcodecs.mcgv.rebuilding import rebuild
 
         s = locate(self._bounds, frame)

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from gvcodecs.mcgv.blending import INFLUENCES, TOTAL, Blend, BlendFit, Weights
-from gvcodecs.mcgv.points import Points
 from gvcodecs.mcgv.segmentation import SEED, motion_features
 from gvcodecs.mcgv.weight_coding import Prices, earlier_neighbours, encode_weights
 from gvpipe.sequence import Int32, MeshSequence
@@ -55,14 +54,14 @@ class Fitted:
 
 
 def fit_blend(
-    sequence: MeshSequence, base: Float64, points: Points, clustering: Clustering, step: float, n_clusters: int
+    sequence: MeshSequence, base: Float64, neighbours: sparse.csr_array, clustering: Clustering, step: float, n_clusters: int
 ) -> Fitted:
     """Fit a blend.
 
     Args:
-        sequence: the animation.
-        base: ``(P, 3)`` decoded base positions, model units.
-        points: of the base frame.
+        sequence: the points' animation.
+        base: ``(P, 3)`` their decoded base positions, model units.
+        neighbours: their adjacency ``(P, P)``.
         clustering: of the points (`Clustering.of`).
         step: quantisation step wanted of positions, model units: what an error is worth.
         n_clusters: K, about; 0: as many as pay.
@@ -70,9 +69,9 @@ def fit_blend(
     price = step**2 / sequence.n_frames  # of one squared step of one frame, as part of all frames
 
     def problem(n_frames: int) -> _Problem:
-        motions = _motions(sequence, base, points, n_frames)
+        motions = _motions(sequence, base, n_frames)
         shown = motions.shape[1] / 3
-        return _Problem(base, motions, points.neighbours, BIT_WORTH * price * shown, CLUSTER_WORTH * step**2 * shown)
+        return _Problem(base, motions, neighbours, BIT_WORTH * price * shown, CLUSTER_WORTH * step**2 * shown)
 
     starts = [clustering.start(n_clusters)] if n_clusters else _find_number(problem(TRIAL_FRAMES), clustering)
     whole = problem(FRAMES)
@@ -179,9 +178,9 @@ class Clustering:
     """K-means of the points' motions for any number of clusters: the first K of one sequence of seeds start it."""
 
     @classmethod
-    def of(cls, sequence: MeshSequence, base: Float64, points: Points) -> Clustering:
-        """Take in a sequence's local motions, for base positions ``(P, 3)``, model units; no step counts."""
-        return cls(motion_features(sequence, base, k_ring(points.neighbours, RING), points.members))
+    def of(cls, sequence: MeshSequence, base: Float64, neighbours: sparse.csr_array) -> Clustering:
+        """Take in the local motions of points, for base positions ``(P, 3)``, model units; no step counts."""
+        return cls(motion_features(sequence, base, k_ring(neighbours, RING)))
 
     def __init__(self, features: Float64) -> None:
         self._features = features
@@ -225,7 +224,7 @@ def _renumber(clusters: Int32, parts: Int32) -> Fitted:
     return Fitted(Weights(np.where(parts > 0, number.reshape(clusters.shape), 0).astype(np.int32), parts), len(used))
 
 
-def _motions(sequence: MeshSequence, base: Float64, points: Points, n_frames: int) -> Float64:
+def _motions(sequence: MeshSequence, base: Float64, n_frames: int) -> Float64:
     """Displacements ``(P, 3n)`` of at most ``n_frames`` frames, evenly spaced."""
-    frames = sequence.sample(n_frames, points.members)
+    frames = sequence.sample(n_frames)
     return np.ascontiguousarray(np.moveaxis(frames - base, 0, 1).reshape(len(base), -1))

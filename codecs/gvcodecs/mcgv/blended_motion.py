@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.mcgv import format as sections
-from gvcodecs.mcgv.blend_fitting import Clustering, fit_blend
+from gvcodecs.mcgv.blend_fitting import Fitted
 from gvcodecs.mcgv.blending import TOTAL, Blend, BlendFit
 from gvcodecs.mcgv.motion import CodedMotion, Samples, locate
 from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.points import Points
+from gvcodecs.mcgv.surface import Surface
 from gvcodecs.mcgv.trajectories import Trajectories, decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.weight_coding import decode_weights, encode_weights
 from gvpipe.bitstream import Bitstream
@@ -26,23 +27,22 @@ Float64 = NDArray[np.float64]
 
 
 def code_blended(
-    sequence: MeshSequence,
-    base: Float64,
-    points: Points,
-    clustering: Clustering,
-    bounds: list[int],
-    step: float,
-    n_clusters: int,
-    report: Progress,
+    sequence: MeshSequence, base: Float64, points: Points, fitted: Fitted, bounds: list[int], step: float, report: Progress
 ) -> CodedMotion:
-    """Fit a blend, and code its weights and the transforms of every segment with a quantisation step, model units."""
-    fitted = fit_blend(sequence, base[points.members], points, clustering, step, n_clusters)
-    blend = Blend(base[points.members], fitted.weights, fitted.n_clusters)
-    fit = BlendFit(blend)
+    """Code a blend's weights and the transforms of every segment with a quantisation step, model units.
+
+    Args:
+        sequence: the points' animation.
+        base: ``(P, 3)`` their decoded base positions, model units.
+        points: what joins them.
+        fitted: their blend.
+        bounds: first frame of every segment, and F.
+    """
+    fit = BlendFit(Blend(base, fitted.weights, fitted.n_clusters))
     coded = {"weights": encode_weights(fitted.weights, points.neighbours)}
     segments: list[Trajectories] = []
     for s, (start, stop) in enumerate(pairwise(bounds)):
-        rows = [fit.fit(_columns(block[:, points.members] - base[points.members])) for _, block in sequence.chunks(start, stop)]
+        rows = [fit.fit(_columns(block - base)) for _, block in sequence.chunks(start, stop)]
         coded[f"transforms.{s}"], decoded = encode_trajectories(np.hstack(rows), step)
         segments.append(decoded)
         report("transforms", (s + 1) / (len(bounds) - 1))
@@ -50,7 +50,7 @@ def code_blended(
     def predict(start: int, stop: int) -> Float64:
         s = locate(bounds, start)
         moved = fit.matrix @ segments[s].rows(start - bounds[s], stop - bounds[s])  # (P, 3n)
-        return np.asarray(base + moved.reshape(len(moved), stop - start, 3)[points.point].swapaxes(0, 1))
+        return np.asarray(base + moved.reshape(len(moved), stop - start, 3).swapaxes(0, 1))
 
     return CodedMotion(fitted.n_clusters, step, coded, predict)
 
@@ -60,21 +60,20 @@ class BlendedMotion:
 
     Args:
         bitstream, header: of the file.
-        base: ``(V, 3)`` decoded base positions, model units.
-        points: of the base frame.
-        layout: the vertices' pixels.
+        surface: of the base frame.
+        layout: the slots' pixels.
         bounds: first frame of every segment, and F.
     """
 
     def __init__(
-        self, bitstream: Bitstream, header: sections.Header, base: Float64, points: Points, layout: Layout, bounds: list[int]
+        self, bitstream: Bitstream, header: sections.Header, surface: Surface, layout: Layout, bounds: list[int]
     ) -> None:
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
-        weights = decode_weights(bitstream.section("weights"), points.neighbours, header.clusters)
-        self._blend = Blend(base[points.members], weights, header.clusters)
-        self._samples = Samples(layout)
-        self._base = base[self._samples.vertices]
-        point = points.point[self._samples.vertices]
+        weights = decode_weights(bitstream.section("weights"), surface.points.neighbours, header.clusters)
+        self._blend = Blend(surface.base[surface.members], weights, header.clusters)
+        self._samples = Samples(surface, layout)
+        self._base = surface.base[self._samples.slots]
+        point = surface.point[self._samples.slots]
         self._homogeneous = self._blend.homogeneous[point]
         self._clusters, self._parts = weights.clusters[point], weights.weights[point] / TOTAL
         self._residuals = header.residual_step * header.profile.offsets
@@ -82,7 +81,7 @@ class BlendedMotion:
         self._chunk: tuple[int, int, Float64] = (-1, -1, np.zeros((0, 0, 4, 3)))
 
     def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
-        """Fill ``positions (V, 3)`` of a frame from its ``samples (3 height, line)``; raises `CorruptFile`."""
+        """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
         from gvcodecs.mcgv.rebuilding import rebuild_blended
 
         s = locate(self._bounds, frame)

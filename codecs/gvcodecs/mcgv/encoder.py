@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import code_affine
-from gvcodecs.mcgv.blend_fitting import Clustering
+from gvcodecs.mcgv.blend_fitting import Clustering, Fitted, fit_blend
 from gvcodecs.mcgv.blended_motion import code_blended
 from gvcodecs.mcgv.frame_images import code_frames, measure_residuals
-from gvcodecs.mcgv.motion import PREDICTIONS, CodedMotion
+from gvcodecs.mcgv.motion import CodedMotion
 from gvcodecs.mcgv.outliers import SECTION, OutlierWriter
 from gvcodecs.mcgv.packing import Layout, pack
 from gvcodecs.mcgv.parameterization import parameterize
@@ -32,25 +32,30 @@ from gvcodecs.mcgv.points import Points
 from gvcodecs.mcgv.quality import Magnitudes, choose_quantiser, effective_step
 from gvcodecs.mcgv.reader import McgvReader
 from gvcodecs.mcgv.segmentation import segment
-from gvcodecs.mcgv.separation import find_places, keep_apart
-from gvcodecs.mcgv.trajectory_encoder import code_trajectories
+from gvcodecs.mcgv.separation import keep_apart
+from gvcodecs.mcgv.surface import STILL
+from gvcodecs.mcgv.trajectory_encoder import FIT_STEP, code_trajectories
 from gvcodecs.mcgv.trajectory_header import TRANSFORMS
 from gvcodecs.mcgv.trajectory_reader import TrajectoryReader
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
-from gvpipe.connectivity import BaseMesh, EncodedMesh, decode_base, encode_base
+from gvpipe.connectivity import EncodedMesh
 from gvpipe.errors import SettingError
+from gvpipe.point_mesh import decode_points, encode_points
 from gvpipe.quantize import Lattice
 from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.stillness import encode_flags, find_still
 from gvpipe.video import PROFILES, Profile
+from gvpipe.welding import find_points
 
 BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
 AFFINE_CLUSTERS, AFFINE_BASE_BITS = 20, 12  # the paper's
 MOST_SEGMENTS = 4000  # one section each, of the 4096 that a bitstream may have
 BASE_BITS = 8, 16  # bits of a base frame that are chosen unasked
 BASE_STEP = 1.5  # of a base frame, times step / sqrt(frames): measured, docs/codecs/mcgv.md
-DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell apart; the others move over
+DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell apart; the others give way
+MERGED = 1 / 16  # steps that vertices of one point may be apart: far below the errors that follow
 AUTO = "auto"
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
 
@@ -66,7 +71,7 @@ class Mcgv(Settings):
     """
 
     id: ClassVar[str] = "mcgv"
-    version: ClassVar[int] = 2
+    version: ClassVar[int] = 3
     summary: ClassVar[str] = "multi-chart geometry video: residual images of a blended affine prediction, as H.264 or JPEG"
 
     quality: float = 75.0  # 0..100, higher is better
@@ -90,7 +95,7 @@ class Mcgv(Settings):
         self.check_choice("image", ("h264", "jpeg"))
         self.check_choice("profile", ("web", "precise"))
         self.check_choice("preset", PRESETS)
-        self.check_choice("prediction", PREDICTIONS)
+        self.check_choice("prediction", sections.PREDICTIONS)
         self.check_choice("transform", TRANSFORMS)
         self.check_choice("placement", (AUTO, *sections.PLACEMENTS))
         self.check_range(0, sections.MAX_CLUSTERS, "clusters")
@@ -131,17 +136,17 @@ class Mcgv(Settings):
             base=start.lattice,
             **coded.own,
         )
-        order = np.argsort(start.mesh.visits)
-        pixels = {} if self._placement == "halves" else {"pixels": sections.encode_pixels(coded.layout, order)}
+        pixels = {} if self._placement == "halves" else {"pixels": sections.encode_pixels(coded.layout)}
+        still = {STILL: start.still} if start.still else {}
         return Bitstream(
             codec=self.id,
-            version=header.version,
+            version=self.version,
             n_frames=sequence.n_frames,
             n_vertices=sequence.n_vertices,
-            n_triangles=len(start.mesh.faces),
+            n_triangles=len(sequence.faces),
             fps=float(sequence.fps),
             header=header.to_json(),
-            sections={"mesh": start.coded.mesh, "order": start.coded.order, **pixels, **coded.sections},
+            sections={"mesh": start.coded.mesh, "order": start.coded.order, **still, **pixels, **coded.sections},
             video=coded.video,
         )
 
@@ -158,16 +163,29 @@ class Mcgv(Settings):
         # no range ends the qualities of trajectory images
         scale = PROFILES["h264-10"] if self.transform == "klt" else self._video_profile
         step = effective_step(self.quality, scale, float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0))))
-        lattice = self._lattice(first, BASE_STEP * step / math.sqrt(given.n_frames))
-        coded = memo(
-            f"base {lattice.step}", lambda: encode_base(self._base_points(given, first, lattice), given.faces, self.reorder)
-        )
+        still = memo("still", lambda: find_still(given))
+        points = _find_points(given, still, MERGED * step)
+        members = np.unique(points, return_index=True)[1]
+        lattice = self._lattice(first[members], BASE_STEP * step / math.sqrt(given.n_frames))
+        name = f"base {lattice.step} {len(members)}"
+        coded = memo(name, lambda: encode_points(self._base_points(lattice, first[members]), given.faces, points, self.reorder))
         memo.permutation = coded.permutation
-        mesh = decode_base(coded.mesh, coded.order)
-        sequence = given.reordered(coded.permutation, mesh.faces)
-        points = Points.of(mesh.points, mesh.faces, mesh.visits)
+        mesh = decode_points(coded.mesh, coded.order)
+        sources = coded.permutation[mesh.members]  # the given vertex of each point
+        moves = np.flatnonzero(~still[sources])
+        if not len(moves):  # one point at least has samples
+            moves = np.zeros(1, np.int64)
+        own = Points.moving(mesh, moves)
+        base = lattice.place(mesh.lattice[moves])
+        sequence = given.reordered(sources[moves], own.faces)
+        if still.all():
+            sequence = MeshSequence(np.broadcast_to(base.astype(np.float32), sequence.positions.shape), own.faces, given.fps)
+        flags = np.ones(len(mesh.lattice), bool)
+        flags[moves] = False
         bounds = cut(sequence.n_frames, self.segment, MOST_SEGMENTS)
-        return _Start(sequence, coded, mesh, lattice, lattice.place(mesh.points), points, bounds, step)
+        return _Start(
+            sequence, coded, encode_flags(flags) if flags.any() else b"", lattice, mesh.lattice[moves], base, own, bounds, step
+        )
 
     def _affine(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
         """Pictures are frames, predicted as published; quality touches neither layout nor transforms."""
@@ -178,10 +196,8 @@ class Mcgv(Settings):
     def _blended(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
         """Pictures are frames, predicted by a blend."""
         layout = self._blended_layout(start, memo, report)
-        clustering = _clustering(start, memo, report)
-        motion = code_blended(
-            start.sequence, start.base, start.points, clustering, start.bounds, start.step, self.clusters, report
-        )
+        fitted = self._fit(start, start.step, memo, report)
+        motion = code_blended(start.sequence, start.base, start.points, fitted, start.bounds, start.step, report)
         return self._frames(start, motion, layout, measure_residuals(start.sequence, motion, start.bounds), report)
 
     def _trajectory_images(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
@@ -191,12 +207,11 @@ class Mcgv(Settings):
             start.sequence,
             start.base,
             start.points,
-            _clustering(start, memo, report),
+            self._fit(start, FIT_STEP * start.step, memo, report),
             layout,
             BLOCKS[self.image],
             start.bounds,
             start.step,
-            self.clusters,
             self._video_profile,
             self.preset,
             report,
@@ -231,24 +246,29 @@ class Mcgv(Settings):
             bits += 1
         return Lattice.over(first, bits)
 
-    def _base_points(self, sequence: MeshSequence, first: Float32, lattice: Lattice) -> Int32:
-        """The first frame ``(V, 3)`` on its lattice."""
-        if self.prediction == "affine":
-            return lattice.quantise(first)
-        return keep_apart(lattice, first, find_places(sequence, first, lattice.step))
+    def _base_points(self, lattice: Lattice, first: Float32) -> Int32:
+        """The points' first frame ``(P, 3)`` on its lattice."""
+        return lattice.quantise(first) if self.prediction == "affine" else keep_apart(lattice, first)
+
+    def _fit(self, start: _Start, step: float, memo: Memo, report: Progress) -> Fitted:
+        """The blend for a step, model units."""
+        report("segment", 0)
+        clustering = memo(
+            f"clustering {start.lattice.step}", lambda: Clustering.of(start.sequence, start.base, start.points.neighbours)
+        )
+        return fit_blend(start.sequence, start.base, start.points.neighbours, clustering, step, self.clusters)
 
     def _published(self, start: _Start, report: Progress) -> tuple[CodedMotion, Layout]:
         """The paper's partition, layout and transforms."""
-        sequence, mesh, points = start.sequence, start.mesh, start.points
+        sequence = start.sequence
         step = _extent(sequence, report) / 2**self.transform_bits
         report("segment", 0)
         n_clusters = self.clusters or AFFINE_CLUSTERS
-        partition = segment(sequence, start.base[points.members], points.faces, points.members, n_clusters)
-        clusters = partition[points.point]
-        layout = self._layout(start, partition, clusters, report)
+        clusters = segment(sequence, start.base, start.points.neighbours, n_clusters)
+        layout = self._layout(start, clusters, clusters, report)
         motion = code_affine(sequence, start.base, clusters, start.bounds, step, report)
         motion.sections["clusters"] = (
-            sections.encode_vertex_clusters(clusters, np.argsort(mesh.visits))
+            sections.encode_slot_clusters(clusters)
             if self._placement == "halves"
             else sections.encode_clusters(clusters, layout, BLOCKS[self.image])
         )
@@ -256,7 +276,7 @@ class Mcgv(Settings):
 
     def _blended_layout(self, start: _Start, memo: Memo, report: Progress) -> Layout:
         """Nothing ties a blend's charts to clusters: few, large ones are best."""
-        whole, groups = np.zeros(len(start.points.members), np.int32), start.points.pieces()
+        whole, groups = np.zeros(start.points.n_points, np.int32), start.points.pieces()
         return memo(f"layout {start.lattice.step}", lambda: self._layout(start, whole, groups, report))
 
     @property
@@ -271,14 +291,12 @@ class Mcgv(Settings):
         return "halves" if self.prediction == "blended" and self.image == "h264" else "charts"
 
     def _layout(self, start: _Start, partition: Int32, groups: Int32, report: Progress) -> Layout:
-        """The vertices' pixels: charts keep to the parts of ``partition (P,)``, halving parts ``groups (V,)`` first."""
-        block, size, points = BLOCKS[self.image], self._plane_size(), start.points
+        """The points' pixels: charts keep to the parts of ``partition (P,)``, halving parts ``groups (P,)`` first."""
+        block, size = BLOCKS[self.image], self._plane_size()
         if self._placement == "halves":
-            lattice = start.mesh.points
-            return place(lattice, groups, *(size or choose_size(len(lattice), block)), block)
+            return place(start.points_lattice, groups, *(size or choose_size(len(start.base), block)), block)
         report("parameterize", 0)
-        atlas = parameterize(start.base[points.members], points.faces, partition)
-        return pack(atlas, points.point, block, self.density, size)
+        return pack(parameterize(start.base, start.points.faces, partition), block, self.density, size)
 
     def _plane_size(self) -> tuple[int, int] | None:
         if self.size == AUTO:
@@ -295,18 +313,20 @@ class _Start:
     """What every route starts from.
 
     Args:
-        sequence: the animation, its vertices and triangles in the decoder's order.
-        coded, mesh: the base frame's sections, and what they decode to.
-        lattice: of the base frame; base: ``(V, 3)`` its decoded positions, model units.
-        points: of the base frame.
+        sequence: of the points that move, in the decoder's order.
+        coded: the mesh's sections; still: the section of that name, empty if all points move.
+        lattice: of the base frame.
+        points_lattice: ``(P, 3)`` the points on it; base: the same in model units.
+        points: what joins them.
         bounds: first frame of every segment, and F.
         step: that the quality asks for (`quality`), model units.
     """
 
     sequence: MeshSequence
     coded: EncodedMesh
-    mesh: BaseMesh
+    still: bytes
     lattice: Lattice
+    points_lattice: Int32
     base: Float64
     points: Points
     bounds: list[int]
@@ -323,11 +343,11 @@ class _Coded:
     video: bytes
 
 
-def _clustering(start: _Start, memo: Memo, report: Progress) -> Clustering:
-    """What a blend's clusters start from; quality touches it by the base frame's lattice alone."""
-    report("segment", 0)
-    members = start.base[start.points.members]
-    return memo(f"clustering {start.lattice.step}", lambda: Clustering.of(start.sequence, members, start.points))
+def _find_points(sequence: MeshSequence, still: NDArray[np.bool_], tolerance: float) -> NDArray[np.int64]:
+    """``(V,)`` the point of each vertex; a vertex that stands still shares none with one that moves."""
+    ids = np.column_stack([find_points(sequence, tolerance), still])
+    _, first, number = np.unique(ids, axis=0, return_index=True, return_inverse=True)
+    return np.asarray(np.argsort(np.argsort(first))[number.ravel()], np.int64)
 
 
 def _extent(sequence: MeshSequence, report: Progress) -> float:

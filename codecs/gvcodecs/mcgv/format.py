@@ -1,19 +1,21 @@
 """The sections of an ``mcgv`` bitstream, and the header that tells how to read them.
 
 =================  ==========================================================================================
-``mesh``           base frame on its lattice and connectivity (`gvpipe.connectivity`)
-``order``          vertex order, empty if the codec's own (`gvpipe.vertex_order`)
-``pixels``         [integers] x, then [integers] y of each vertex, vertices in the codec's order: the differences from
-                   the vertex before; y in the context of the magnitude of the difference in x (placement charts)
-``clusters``       affine: [integers] placement charts: cluster of each block that holds a vertex, in raster order,
-                   difference from the block before; halves: of each vertex in the codec's order, from the vertex before
+``mesh``           points on the base frame's lattice, connectivity, seams (`gvpipe.point_mesh`)
+``order``          vertex order, empty if the codec's own (`gvpipe.copies`)
+``still``          which points never move (`gvpipe.stillness`); absent if all do
+``pixels``         [integers] x, then [integers] y of each slot in the codec's order: the differences from the slot
+                   before; y in the context of the magnitude of the difference in x (placement charts)
+``clusters``       affine: [integers] placement charts: cluster of each block that holds a slot, in raster order,
+                   difference from the block before; halves: of each slot in the codec's order, from the slot before
 ``weights``        blended: which clusters each point follows (`weight_coding`)
 ``transforms.N``   transforms of segment N (affine: `transforms`, blended: `trajectories`)
 ``outliers``       what residuals exceed the pictures' levels by (`outliers`); absent if nothing
 ``trajectories.N`` klt, in place of ``transforms.N``: principal trajectories of segment N (`trajectory_images`)
 =================  ==========================================================================================
 
-Version 1 knows affine prediction and charts alone; files with both, and no outliers, are still written as version 1.
+Slots are the points that move (`surface`). In versions 1 and 2 every vertex is a slot, ``mesh`` and ``order`` are those of
+`gvpipe.connectivity`, and there is no section ``still``. Version 1 knows affine prediction and charts alone.
 
 Source: Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.3: base frame, partition, parametric
 coordinates, transforms, images. With charts the affine partition follows from the pixels, since no block holds two of them;
@@ -28,7 +30,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gvcodecs.mcgv.motion import PREDICTIONS
 from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvpipe.binary import Cursor, varint
@@ -39,6 +40,7 @@ from gvpipe.quantize import Lattice
 from gvpipe.sequence import Int32
 from gvpipe.video import MAX_SIDE, PROFILES, Profile
 
+PREDICTIONS = ("blended", "affine")
 PLACEMENTS = ("halves", "charts")
 MAX_CLUSTERS = 1024
 MAX_SEGMENTS = 1 << 16
@@ -81,11 +83,6 @@ class Header:
     outliers: bool = False
     images: TrajectoryHeader | None = None
 
-    @property
-    def version(self) -> int:
-        """The first version of the codec that reads this."""
-        return 1 if (self.prediction, self.placement, self.outliers) == ("affine", "charts", False) else 2
-
     def to_json(self) -> dict[str, Any]:
         """Return the header as JSON values."""
         values = asdict(self)
@@ -95,8 +92,6 @@ class Header:
         if self.images:
             del values["transform_step"], values["residual_step"]
             values |= self.images.to_json()
-        if self.version == 1:
-            del values["prediction"], values["placement"]
         values["profile"] = self.profile.name
         values["base"] = [*self.base.origin, self.base.step]
         return values
@@ -141,21 +136,23 @@ class Header:
             raise CorruptFile(f"header: planes of {header.width}x{header.height} are not whole blocks of {header.block}")
         if placement == "halves" and header.block not in (8, 16):
             raise CorruptFile(f"header: blocks of {header.block}; vertices are placed in blocks of 8 or 16")
-        if header.width * header.height < bitstream.n_vertices:
-            raise CorruptFile(f"header: planes of {header.width}x{header.height} do not hold {bitstream.n_vertices} vertices")
         return header
 
 
-def encode_pixels(layout: Layout, order: Int64) -> bytes:
-    """Return the section ``pixels``; ``order (V,)`` are the vertices in the codec's order."""
-    y, x = np.divmod(layout.pixel[order], layout.width)
+def encode_pixels(layout: Layout) -> bytes:
+    """Return the section ``pixels``."""
+    y, x = np.divmod(layout.pixel, layout.width)
     dx, dy = np.diff(x, prepend=0), np.diff(y, prepend=0)
     columns = encode_integers(dx)
     return varint(len(columns)) + columns + encode_integers(dy, _context(dx))
 
 
 def decode_pixels(data: bytes, order: Int64, width: int, height: int) -> Layout:
-    """Mirror of `encode_pixels`; raises `CorruptFile` unless every vertex gets a pixel of its own inside the plane."""
+    """Mirror of `encode_pixels`, for slots in the codec's ``order (S,)``.
+
+    Raises:
+        CorruptFile: a slot has no pixel of its own inside the plane.
+    """
     cursor = Cursor(data, "pixels")
     columns = cursor.take(cursor.varint(cursor.left, "a length"))
     dx = decode_integers(columns, len(order), name="pixels")
@@ -166,18 +163,18 @@ def decode_pixels(data: bytes, order: Int64, width: int, height: int) -> Layout:
     pixel = np.empty(len(order), np.int64)
     pixel[order] = y * width + x
     if np.bincount(pixel).max(initial=0) > 1:
-        raise cursor.corrupt("two vertices share a pixel")
+        raise cursor.corrupt("two slots share a pixel")
     return Layout(width, height, pixel)
 
 
 def encode_clusters(clusters: Int32, layout: Layout, block: int) -> bytes:
-    """Return the section ``clusters`` for ``clusters (V,)``, which must be constant inside each block."""
+    """Return the section ``clusters`` for ``clusters (S,)``, which must be constant inside each block."""
     _, first = np.unique(_blocks(layout, block), return_index=True)
     return encode_integers(np.diff(clusters[first], prepend=np.int32(0)))
 
 
 def decode_clusters(data: bytes, layout: Layout, block: int, n_clusters: int) -> Int32:
-    """Mirror of `encode_clusters`: ``(V,) int32``; raises `CorruptFile` for a cluster out of range."""
+    """Mirror of `encode_clusters`: ``(S,) int32``; raises `CorruptFile` for a cluster out of range."""
     used, block_of = np.unique(_blocks(layout, block), return_inverse=True)
     by_block = np.cumsum(decode_integers(data, len(used), name="clusters"))
     if ((by_block < 0) | (by_block >= n_clusters)).any():
@@ -185,13 +182,13 @@ def decode_clusters(data: bytes, layout: Layout, block: int, n_clusters: int) ->
     return np.asarray(by_block[block_of.ravel()], np.int32)
 
 
-def encode_vertex_clusters(clusters: Int32, order: Int64) -> bytes:
-    """Return the section ``clusters`` of placement halves; ``order (V,)`` are the vertices in the codec's order."""
-    return encode_integers(np.diff(clusters[order], prepend=np.int32(0)))
+def encode_slot_clusters(clusters: Int32) -> bytes:
+    """Return the section ``clusters (S,)`` of placement halves."""
+    return encode_integers(np.diff(clusters, prepend=np.int32(0)))
 
 
-def decode_vertex_clusters(data: bytes, order: Int64, n_clusters: int) -> Int32:
-    """Mirror of `encode_vertex_clusters`: ``(V,) int32``; raises `CorruptFile` for a cluster out of range."""
+def decode_slot_clusters(data: bytes, order: Int64, n_clusters: int) -> Int32:
+    """Mirror of `encode_slot_clusters`, slots in the codec's ``order (S,)``; raises `CorruptFile` if one is out of range."""
     ordered = np.cumsum(decode_integers(data, len(order), name="clusters"))
     if ((ordered < 0) | (ordered >= n_clusters)).any():
         raise CorruptFile(f"section 'clusters' is corrupt: a cluster is not in 0..{n_clusters - 1}")

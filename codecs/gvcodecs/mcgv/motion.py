@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.mcgv.packing import Layout
+from gvcodecs.mcgv.surface import Surface
 from gvpipe.sequence import Float32
-
-PREDICTIONS = ("blended", "affine")
 
 
 @dataclass(frozen=True)
@@ -24,7 +23,7 @@ class CodedMotion:
         n_clusters: K.
         step: quantisation step of the transforms, model units.
         sections: of the bitstream.
-        predict: ``(n, V, 3)`` positions, model units, of the frames from a first up to another one of the same segment, as the
+        predict: ``(n, S, 3)`` positions, model units, of the frames from a first up to another one of the same segment, as the
             decoder predicts them.
     """
 
@@ -38,7 +37,7 @@ class Motion(Protocol):
     """A prediction as it is decoded; keeps the transforms of the last segment for the next frame."""
 
     def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
-        """Fill ``positions (V, 3)`` of a frame from its ``samples (3 height, line)``; raises `CorruptFile`."""
+        """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
         ...
 
 
@@ -46,20 +45,23 @@ class Samples:
     """Where the vertices' samples are in a picture.
 
     Args:
-        layout: the vertices' pixels.
+        surface: whose vertices.
+        layout: the slots' pixels.
 
     Attributes:
-        vertices: ``(V,)`` the vertices in the order of their pixels: going through a picture from one end to the other takes
-            half the time.
+        vertices, slots: ``(M,)`` the vertices that move, and theirs, in the order of their pixels: going through a picture from
+            one end to the other takes half the time.
     """
 
-    def __init__(self, layout: Layout) -> None:
-        self.vertices = np.argsort(layout.pixel)
-        self._row, self._column = np.divmod(layout.pixel[self.vertices], layout.width)
+    def __init__(self, surface: Surface, layout: Layout) -> None:
+        pixel = layout.pixel[surface.slot]
+        order = np.argsort(pixel, kind="stable")
+        self.vertices, self.slots = surface.vertices[order], surface.slot[order]
+        self._row, self._column = np.divmod(pixel[order], layout.width)
         self._line, self._pixels = 0, self._row
 
     def pixels(self, line: int) -> NDArray[np.int64]:
-        """``(V,)`` where they are in a plane whose lines take ``line`` samples, the plane's width or more."""
+        """``(M,)`` where they are in a plane whose lines take ``line`` samples, the plane's width or more."""
         if line != self._line:
             self._line, self._pixels = line, self._row * line + self._column
         return self._pixels

@@ -32,11 +32,11 @@ Pixels = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Layout:
-    """Where each vertex sits in a plane of ``height x width`` pixels.
+    """Where each slot sits in a plane of ``height x width`` pixels.
 
     Args:
         width, height: of one plane, pixels, multiples of the block size.
-        pixel: ``(V,)`` row-major index of each vertex' pixel, all distinct.
+        pixel: ``(S,)`` row-major index of each slot's pixel, all distinct.
     """
 
     width: int
@@ -44,20 +44,19 @@ class Layout:
     pixel: Pixels
 
 
-def pack(atlas: Atlas, point: NDArray[np.intp], block: int, density: float, size: tuple[int, int] | None) -> Layout:
-    """Lay out the vertices.
+def pack(atlas: Atlas, block: int, density: float, size: tuple[int, int] | None) -> Layout:
+    """Lay out the points.
 
     Args:
         atlas: charts of the points.
-        point: ``(V,)`` point of each vertex; vertices of one point get neighbouring pixels.
         block: side of a block, pixels.
-        density: pixels per vertex inside the charts, >= 1.
+        density: pixels per point inside the charts, >= 1.
         size: ``(width, height)`` of a plane, or None for the smallest near-square one.
 
     Raises:
         InputError: the charts do not fit the size given.
     """
-    chart, uv = atlas.chart[point], atlas.uv[point]
+    chart, uv = atlas.chart, atlas.uv
     parts = np.split(np.argsort(chart, kind="stable"), np.cumsum(np.bincount(chart))[:-1])
 
     def attempt(density: float) -> Layout | None:
@@ -75,7 +74,7 @@ def pack(atlas: Atlas, point: NDArray[np.intp], block: int, density: float, size
     if best is None:
         raise (
             InputError(
-                f"the {atlas.n_charts} charts of {len(point)} vertices do not fit a plane of {size[0]}x{size[1]} pixels in "
+                f"the {atlas.n_charts} charts of {len(chart)} points do not fit a plane of {size[0]}x{size[1]} pixels in "
                 f"blocks of {block}; leave the size out, or give a larger one, or fewer clusters"
             )
             if size

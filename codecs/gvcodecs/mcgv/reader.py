@@ -8,6 +8,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import AffineMotion
@@ -16,11 +17,10 @@ from gvcodecs.mcgv.motion import Motion
 from gvcodecs.mcgv.outliers import SECTION
 from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.placement import place
-from gvcodecs.mcgv.points import Points
+from gvcodecs.mcgv.surface import Surface, read_surface
 from gvpipe.bitstream import Bitstream
-from gvpipe.connectivity import BaseMesh, read_base
 from gvpipe.errors import CorruptFile
-from gvpipe.moves import MovesReader
+from gvpipe.moves import MovesReader, Shared
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
 from gvpipe.video import VideoReader
@@ -41,7 +41,6 @@ class McgvReader:
             raise CorruptFile(f"the video has {self._video.n_frames} frames, the header says {bitstream.n_frames}")
         if self._header.outliers != (SECTION in bitstream.sections):
             raise CorruptFile(f"header and section {SECTION!r} do not fit; get the file again from its source")
-        self._outliers = self._open_outliers() if self._header.outliers else None
 
     @property
     def n_frames(self) -> int:
@@ -51,28 +50,24 @@ class McgvReader:
     @property
     def faces(self) -> Int32:
         """``(T, 3) int32`` triangles."""
-        return self._base.faces
+        return self._surface.faces
 
     @cached_property
-    def _base(self) -> BaseMesh:
-        return read_base(self._bitstream)
+    def _surface(self) -> Surface:
+        return read_surface(self._bitstream, self._header)
 
     @cached_property
     def _motion(self) -> Motion:
-        bitstream, header, base = self._bitstream, self._header, self._base
-        positions = header.base.place(base.points)
+        bitstream, header, surface = self._bitstream, self._header, self._surface
         if header.prediction == "blended":
-            points = Points.of(base.points, base.faces, base.visits)
-            layout = blended_layout(bitstream, header, base, points)
-            return BlendedMotion(bitstream, header, positions, points, layout, self._bounds)
-        order = np.argsort(base.visits)
+            return BlendedMotion(bitstream, header, surface, read_layout(bitstream, header, surface), self._bounds)
         if header.placement == "halves":
-            clusters = sections.decode_vertex_clusters(bitstream.section("clusters"), order, header.clusters)
-            layout = place(base.points, clusters, header.width, header.height, header.block)
+            clusters = sections.decode_slot_clusters(bitstream.section("clusters"), surface.order, header.clusters)
+            layout = read_layout(bitstream, header, surface, clusters)
         else:
-            layout = sections.decode_pixels(bitstream.section("pixels"), order, header.width, header.height)
+            layout = read_layout(bitstream, header, surface)
             clusters = sections.decode_clusters(bitstream.section("clusters"), layout, header.block, header.clusters)
-        return AffineMotion(bitstream, header, positions, clusters, layout, self._bounds)
+        return AffineMotion(bitstream, header, surface, clusters, layout, self._bounds)
 
     def group(self, frame: int) -> tuple[int, int]:
         """``(start, stop)`` of the group of pictures that a frame lies in."""
@@ -89,17 +84,29 @@ class McgvReader:
         for first, planes in groups:
             for frame, plane in enumerate(planes, first):
                 self._motion.rebuild(frame, plane, result[frame - start])
-        if self._outliers:
+        if self._header.outliers:
             self._outliers.apply(start, result)
+        self._surface.fill_still(result)
         return result
 
-    def _open_outliers(self) -> MovesReader:
-        bitstream = self._bitstream
-        return MovesReader(bitstream.section(SECTION), bitstream.n_frames, bitstream.n_vertices, SECTION)
+    @cached_property
+    def _outliers(self) -> MovesReader:
+        bitstream, surface = self._bitstream, self._surface
+        shared = Shared.of(surface.vertices, surface.slot, surface.n_slots)
+        return MovesReader(bitstream.section(SECTION), bitstream.n_frames, surface.n_slots, SECTION, shared)
 
 
-def blended_layout(bitstream: Bitstream, header: sections.Header, base: BaseMesh, points: Points) -> Layout:
-    """The vertices' pixels in a file of blended prediction; raises `CorruptFile`."""
+def read_layout(
+    bitstream: Bitstream, header: sections.Header, surface: Surface, groups: NDArray[np.integer] | None = None
+) -> Layout:
+    """The slots' pixels in a file; by halves, ``groups (S,)`` belong together, connected pieces if not given.
+
+    Raises:
+        CorruptFile: they are not what an encoder writes.
+    """
+    if header.width * header.height < surface.n_slots:
+        raise CorruptFile(f"header: planes of {header.width}x{header.height} do not hold {surface.n_slots} samples")
     if header.placement == "halves":
-        return place(base.points, points.pieces(), header.width, header.height, header.block)
-    return sections.decode_pixels(bitstream.section("pixels"), np.argsort(base.visits), header.width, header.height)
+        groups = surface.points.pieces()[surface.point] if groups is None else groups
+        return place(surface.lattice, groups, header.width, header.height, header.block)
+    return sections.decode_pixels(bitstream.section("pixels"), surface.order, header.width, header.height)

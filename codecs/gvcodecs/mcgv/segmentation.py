@@ -26,7 +26,7 @@ from scipy import sparse
 
 from gvcodecs.mcgv.prediction import AffinePredictor
 from gvpipe.sequence import Int32, MeshSequence
-from gvpipe.topology import adjacency, k_ring
+from gvpipe.topology import k_ring
 
 RING = 3  # order of the neighbourhood, the paper's
 DIMENSIONS = 40  # principal coordinates of the motion vectors that k-means sees
@@ -41,28 +41,25 @@ CHUNK_FLOATS = 8 << 20  # motion coefficients held at a time
 Float64 = NDArray[np.float64]
 
 
-def segment(sequence: MeshSequence, base: Float64, faces: Int32, members: NDArray[np.intp], n_clusters: int) -> Int32:
+def segment(sequence: MeshSequence, base: Float64, neighbours: sparse.csr_array, n_clusters: int) -> Int32:
     """Partition the points of a surface into at most ``n_clusters`` clusters of like motion.
 
     Args:
-        sequence: the animation.
+        sequence: the points' animation.
         base: ``(P, 3)`` the points in the base frame, model units.
-        faces: ``(T, 3)`` triangles over the points.
-        members: ``(P,)`` a vertex of the sequence for each point, whose trajectory stands for it.
+        neighbours: their adjacency ``(P, P)``.
         n_clusters: K >= 1.
 
     Returns:
         ``(P,) int32`` cluster of each point, 0..K'-1 with K' <= K and no cluster empty.
     """
-    n_points = len(base)
     if n_clusters == 1 or sequence.n_frames == 1:
-        return np.zeros(n_points, np.int32)
-    neighbours = adjacency(faces, n_points)
-    clusters = _k_means(motion_features(sequence, base, k_ring(neighbours, RING), members), n_clusters)
-    return refine(sequence, base, k_ring(neighbours, 1), members, clusters)
+        return np.zeros(len(base), np.int32)
+    clusters = _k_means(motion_features(sequence, base, k_ring(neighbours, RING)), n_clusters)
+    return refine(sequence, base, k_ring(neighbours, 1), clusters)
 
 
-def motion_features(sequence: MeshSequence, base: Float64, ring: sparse.csr_array, members: NDArray[np.intp]) -> Float64:
+def motion_features(sequence: MeshSequence, base: Float64, ring: sparse.csr_array) -> Float64:
     """Return ``(P, <= DIMENSIONS)`` principal coordinates of the motion vectors (distances are kept, up to truncation)."""
     centre, scale = (base.min(axis=0) + base.max(axis=0)) / 2, max(float(np.ptp(base, axis=0).max()), 1e-30)
     unit = (base - centre) / scale
@@ -70,7 +67,7 @@ def motion_features(sequence: MeshSequence, base: Float64, ring: sparse.csr_arra
     features: Float64 = np.zeros((len(base), 0))
     step = max(1, CHUNK_FLOATS // (12 * len(base)))
     for first in range(0, sequence.n_frames, step):
-        frames = sequence.read(first, min(first + step, sequence.n_frames))[:, members].astype(np.float64)
+        frames = sequence.read(first, min(first + step, sequence.n_frames)).astype(np.float64)
         motion = fit.motion((frames - centre) / scale)  # (P, n, 4, 3)
         features = _principal_coordinates(np.hstack([features, motion.reshape(len(base), -1)]))
     return features
@@ -110,9 +107,9 @@ class LocalAffineFit:
         return np.concatenate([linear, translation[:, :, None, :]], axis=2)
 
 
-def refine(sequence: MeshSequence, base: Float64, ring: sparse.csr_array, members: NDArray[np.intp], clusters: Int32) -> Int32:
+def refine(sequence: MeshSequence, base: Float64, ring: sparse.csr_array, clusters: Int32) -> Int32:
     """Move points to the cluster that predicts their neighbourhood ``ring (P, P)`` with the least squared error."""
-    frames = sequence.sample(REFINE_FRAMES, members)
+    frames = sequence.sample(REFINE_FRAMES)
     for _ in range(REFINE_ROUNDS):
         predictor = AffinePredictor(base, clusters, int(clusters.max()) + 1)
         moved = _relabel((ring @ predictor.squared_errors(frames, predictor.fit(frames))).argmin(axis=1))

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gvcodecs.mcgv.blend_fitting import Clustering, fit_blend
+from gvcodecs.mcgv.blend_fitting import Fitted
 from gvcodecs.mcgv.blending import Blend, BlendFit
 from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.padding import Padding
@@ -47,12 +47,11 @@ def code_trajectories(
     sequence: MeshSequence,
     base: Float64,
     points: Points,
-    clustering: Clustering,
+    fitted: Fitted,
     layout: Layout,
     block: int,
     bounds: list[int],
     step: float,
-    n_clusters: int,
     profile: Profile,
     preset: str,
     report: Progress,
@@ -60,17 +59,15 @@ def code_trajectories(
     """Code a sequence, with an error about that of frames coded with a quantisation step, model units.
 
     Args:
-        sequence: the animation.
-        base: ``(V, 3)`` decoded base positions; points: of the base frame.
-        clustering: of the points.
-        layout: the vertices' pixels, in blocks of side ``block``.
+        sequence: the points' animation.
+        base: ``(P, 3)`` their decoded base positions, model units; points: what joins them.
+        fitted: their blend, fitted for `FIT_STEP` steps.
+        layout: the points' pixels, in blocks of side ``block``.
         bounds: first frame of every segment, and F.
         step: quantisation step of positions that leaves the error wanted, model units.
-        n_clusters: K; 0: as many as pay.
         profile, preset: of the video.
     """
-    fitted = fit_blend(sequence, base[points.members], points, clustering, FIT_STEP * step, n_clusters)
-    fit = BlendFit(Blend(base[points.members], fitted.weights, fitted.n_clusters))
+    fit = BlendFit(Blend(base, fitted.weights, fitted.n_clusters))
     sections = {"weights": encode_weights(fitted.weights, points.neighbours)}
     fineness = FINENESS[profile.name]
     largest = profile.amplitude / fineness
@@ -81,7 +78,7 @@ def code_trajectories(
         for s, (start, stop) in enumerate(pairwise(bounds)):
             trajectories = _trajectories(sequence, base, start, stop)
             error = trajectories.size * step * step / 12
-            coded = encode_segment(trajectories, fit, points.point, points.members, largest, error)
+            coded = encode_segment(trajectories, fit, largest, error)
             sections[f"trajectories.{s}"] = coded.section
             components.append(len(coded.left))
             steps.append(coded.step)
@@ -93,15 +90,15 @@ def code_trajectories(
 
 
 def _trajectories(sequence: MeshSequence, base: Float64, start: int, stop: int) -> Float64:
-    """Displacements from the base frame, ``(V, 3n)``, of the frames ``start`` to ``stop``."""
+    """Displacements from the base frame, ``(P, 3n)``, of the frames ``start`` to ``stop``."""
     result = np.empty((len(base), stop - start, 3))
     for first, block in sequence.chunks(start, stop):
         result[:, first - start : first - start + len(block)] = block.swapaxes(0, 1) - base[:, None]
-    return result.reshape(len(base), -1)  # (V, n, 3) -> (V, 3n)
+    return result.reshape(len(base), -1)  # (P, n, 3) -> (P, 3n)
 
 
 def _pictures(levels: Float64, padding: Padding, profile: Profile) -> Iterator[Plane]:
-    """Yield pictures of three padded planes each for ``levels (R, V)``; what a plane cannot hold is at its limit."""
+    """Yield pictures of three padded planes each for ``levels (R, P)``; what a plane cannot hold is at its limit."""
     for k in range(count_pictures(len(levels))):
         own = np.zeros((PLANES, levels.shape[1]))
         part = levels[PLANES * k : PLANES * (k + 1)]

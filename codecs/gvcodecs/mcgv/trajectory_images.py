@@ -18,7 +18,7 @@ Stream, section ``trajectories.N`` of segment N, whose step and R stand in the h
     [varint] n, [varint] length, [integers] n gaps between the outliers' places, [integers] n values, steps
 
 A plane has a number of levels per step. Coefficients that it cannot hold are *outliers*: their pixels are at its limit and
-count for nothing, and they are sent apart; the place of component c of vertex v is ``v R + c``.
+count for nothing, and they are sent apart; the place of component c of slot s is ``s R + c``.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class CodedSegment:
     Args:
         step: D, model units.
         section: ``trajectories.N``.
-        left: ``(R, V)`` what the planes are to hold, steps.
+        left: ``(R, P)`` what the planes are to hold, steps.
     """
 
     step: float
@@ -63,21 +63,19 @@ def count_pictures(n_components: int) -> int:
     return max(1, -(-n_components // PLANES))
 
 
-def encode_segment(
-    trajectories: Float64, fit: BlendFit, point: Int64, members: Int64, largest: float, error: float
-) -> CodedSegment:
+def encode_segment(trajectories: Float64, fit: BlendFit, largest: float, error: float) -> CodedSegment:
     """Code a segment but for its pictures.
 
     Args:
-        trajectories: ``(V, 3n)`` displacements from the base frame, model units.
-        fit: of the blend; point: ``(V,)`` the point of each vertex; members: ``(P,)`` a vertex of each point.
+        trajectories: ``(P, 3n)`` the points' displacements from the base frame, model units.
+        fit: of their blend.
         largest: magnitude that planes hold, steps.
         error: squared error to leave, about, summed over all coordinates, model units squared.
     """
     reduced = reduce_trajectories(trajectories, error)
     step, head, coefficients = reduced.step, reduced.basis, reduced.coefficients
-    rows, transforms = encode_coefficients(fit.fit(coefficients[members]), step)
-    left = (coefficients - (fit.matrix @ transforms)[point]) / step
+    rows, transforms = encode_coefficients(fit.fit(coefficients), step)
+    left = (coefficients - fit.matrix @ transforms) / step
     section = varint(len(head)) + head + varint(len(rows)) + rows + _encode_outliers(left, largest)
     return CodedSegment(step, section, np.ascontiguousarray(left.T))
 

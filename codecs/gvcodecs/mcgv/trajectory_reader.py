@@ -16,13 +16,12 @@ from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.blending import Blend
 from gvcodecs.mcgv.motion import locate
 from gvcodecs.mcgv.packing import Layout
-from gvcodecs.mcgv.points import Points
-from gvcodecs.mcgv.reader import blended_layout
+from gvcodecs.mcgv.reader import read_layout
+from gvcodecs.mcgv.surface import Surface, read_surface
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvcodecs.mcgv.trajectory_images import PLANES, count_pictures, decode_segment
 from gvcodecs.mcgv.weight_coding import decode_weights
 from gvpipe.bitstream import Bitstream
-from gvpipe.connectivity import read_base
 from gvpipe.errors import CorruptFile
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
@@ -35,27 +34,23 @@ Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class _Surface:
+class _Shared:
     """What all segments share.
 
     Args:
-        faces: ``(T, 3)`` triangles.
-        base: ``(3, V)`` decoded base positions, model units.
-        point: ``(V,)`` the point of each vertex.
-        layout: the vertices' pixels.
+        base: ``(3, S)`` decoded base positions of the slots, model units.
+        layout: the slots' pixels.
         matrix: ``(P, 4K)`` of the blend.
     """
 
-    faces: Int32
     base: Float64
-    point: NDArray[np.int64]
     layout: Layout
     matrix: sparse.csr_array
 
 
 @dataclass(frozen=True)
 class _Segment:
-    """A decoded segment: its number, its basis, and its vertices' coefficients ``(R, V)``."""
+    """A decoded segment: its number, its basis, and its slots' coefficients ``(R, S)``."""
 
     number: int
     basis: Basis
@@ -90,15 +85,16 @@ class TrajectoryReader:
         return self._surface.faces
 
     @cached_property
-    def _surface(self) -> _Surface:
-        base = read_base(self._bitstream)
-        header = self._header
-        positions = header.base.place(base.points)
-        points = Points.of(base.points, base.faces, base.visits)
-        layout = blended_layout(self._bitstream, header, base, points)
-        weights = decode_weights(self._bitstream.section("weights"), points.neighbours, header.clusters)
-        matrix = Blend(positions[points.members], weights, header.clusters).matrix()
-        return _Surface(base.faces, np.ascontiguousarray(positions.T), points.point, layout, matrix)
+    def _surface(self) -> Surface:
+        return read_surface(self._bitstream, self._header)
+
+    @cached_property
+    def _shared(self) -> _Shared:
+        surface, header = self._surface, self._header
+        layout = read_layout(self._bitstream, header, surface)
+        weights = decode_weights(self._bitstream.section("weights"), surface.points.neighbours, header.clusters)
+        matrix = Blend(surface.base[surface.members], weights, header.clusters).matrix()
+        return _Shared(np.ascontiguousarray(surface.base.T), layout, matrix)
 
     def read(self, start: int, stop: int) -> Float32:
         """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
@@ -106,33 +102,34 @@ class TrajectoryReader:
         Raises:
             CorruptFile: a section or the video does not decode.
         """
-        base = self._surface.base
-        result = np.empty((stop - start, base.shape[1], 3), np.float32)
+        surface, base = self._surface, self._shared.base
+        result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
         for frame in range(start, stop):  # one by one, so that a frame's sums do not depend on what else is read
             s = locate(self._bounds, frame)
             segment = self._decode(s)
             rows = slice(3 * (frame - self._bounds[s]), 3 * (frame - self._bounds[s] + 1))
-            placed = segment.basis.vectors[rows] @ segment.coefficients  # (3, V)
+            placed = segment.basis.vectors[rows] @ segment.coefficients  # (3, S)
             placed += segment.basis.mean[rows, None]
             placed += base
             if not np.abs(placed).max(initial=0) <= MAX_FLOAT32:
                 raise CorruptFile(f"frame {frame} does not decode to finite positions; get the file again from its source")
-            result[frame - start] = placed.T
+            result[frame - start, surface.vertices] = placed.T[surface.slot]
+        surface.fill_still(result)
         return result
 
     def _decode(self, s: int) -> _Segment:
         if self._segment is None or self._segment.number != s:
-            surface, name = self._surface, f"trajectories.{s}"
+            name, point = f"trajectories.{s}", self._surface.point
             n_frames = self._bounds[s + 1] - self._bounds[s]
             data = self._bitstream.section(name)
             samples, step = self._samples(s), self._images.steps[s]
-            basis, coefficients = decode_segment(data, samples, step, surface.matrix, surface.point, n_frames, name)
+            basis, coefficients = decode_segment(data, samples, step, self._shared.matrix, point, n_frames, name)
             self._segment = _Segment(s, basis, coefficients)
         return self._segment
 
     def _samples(self, s: int) -> Float64:
-        """What a segment's planes hold at the vertices' pixels: ``(R, V)``, steps."""
-        pixel, profile, width = self._surface.layout.pixel, self._header.profile, self._header.width
+        """What a segment's planes hold at the slots' pixels: ``(R, S)``, steps."""
+        pixel, profile, width = self._shared.layout.pixel, self._header.profile, self._header.width
         first, last = int(self._pictures[s]), int(self._pictures[s + 1])
         result = np.empty((PLANES * (last - first), len(pixel)))
         for start, pictures in self._video.read(first, last):
