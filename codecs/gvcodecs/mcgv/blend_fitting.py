@@ -15,32 +15,35 @@ weights' bits counted, goes on to the end, and the one that costs less there is 
 from __future__ import annotations
 
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from gvcodecs.mcgv.blending import INFLUENCES, TOTAL, Blend, BlendFit, Weights
-from gvcodecs.mcgv.segmentation import SEED, motion_features
+from gvcodecs.mcgv.blending import INFLUENCES, TOTAL, Weights, homogeneous, solve_normal
+from gvcodecs.mcgv.segmentation import SEED, local_motions
 from gvcodecs.mcgv.weight_coding import Prices, earlier_neighbours, encode_weights
 from gvpipe.sequence import Int32, MeshSequence
 from gvpipe.topology import k_ring
 
 RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`
-FRAMES = 96  # frames, evenly spaced, that fitting looks at
-TRIAL_FRAMES = 32  # the same while the number of clusters is sought
-TRIAL_PASSES, PASSES = 4, 12  # turns of weights and transforms
+FRAMES = 192  # frames, evenly spaced, that fitting looks at
+DIMENSIONS = 40  # principal coordinates of motions that clusters start from
+TRIAL_PASSES, FIRST_PASSES, LAST_PASSES = 4, 4, 8  # turns of weights and transforms: per trial, for either start, for the best
 FEWEST, MOST = 8, 1024  # clusters tried
 LEAST_POINTS = 8  # per cluster, on average
-GROWTH = 2**0.5  # from one number tried to the next
-PATIENCE = 2  # numbers of clusters that may do worse than a smaller one, in a row
+GROWTH = (32, 2.0), (0, 2**0.5)  # from one number tried to the next, by how many times its clusters' cost all costs
+PATIENCE = 1  # numbers of clusters that may do worse than a smaller one, in a row
 CLUSTER_WORTH = 2.8  # squared steps a frame that a cluster must save
 PATCH = 2  # order of the neighbourhood that an added cluster starts with
 BIT_WORTH = 0.14  # squared steps that a bit of the weights must save
 SAMPLES = 4000  # points that k-means sees
 ROUNDS = 15  # of k-means
-NEGLIGIBLE = 1e-12  # part of all squared motion: points closer than this to seeds are no seeds
+NEGLIGIBLE = 0.1  # part of the noise of rounding to steps: motion below is left out
+TINY = 1e-12  # part of all squared motion: points closer than this to seeds are no seeds
 
 Float64 = NDArray[np.float64]
 
@@ -53,29 +56,48 @@ class Fitted:
     n_clusters: int
 
 
-def fit_blend(
-    sequence: MeshSequence, base: Float64, neighbours: sparse.csr_array, clustering: Clustering, step: float, n_clusters: int
-) -> Fitted:
-    """Fit a blend.
+class Motions:
+    """The points' motions over all frames, as few numbers each, and where clusters start.
+
+    Displacements from the base frame are turned to their principal coordinates: squared errors, least squares and local affine
+    motions are the same in these, and a tenth of the numbers tell nearly all.
 
     Args:
         sequence: the points' animation.
         base: ``(P, 3)`` their decoded base positions, model units.
         neighbours: their adjacency ``(P, P)``.
-        clustering: of the points (`Clustering.of`).
+    """
+
+    def __init__(self, sequence: MeshSequence, base: Float64, neighbours: sparse.csr_array) -> None:
+        moved = _displacements(sequence, base)
+        self.base, self.neighbours = base, neighbours
+        self.n_frames, self._scale = sequence.n_frames, sequence.n_frames / (moved.shape[1] / 3)
+        self._columns, self._energies = _principal(moved)
+        self.clustering = Clustering(local_motions(base, k_ring(neighbours, RING), self._columns[:, :DIMENSIONS]))
+
+    def problem(self, step: float) -> _Problem:
+        """What is fitted where an error of ``step``, model units, is left."""
+        left = np.cumsum(self._energies[::-1])[::-1]  # energy of each component and those after it
+        noise = self._columns.shape[0] * 3 * self.n_frames / self._scale * step**2 / 12
+        n = int((left > NEGLIGIBLE * noise).sum())
+        price = step**2 * self.n_frames / self._scale
+        return _Problem(
+            self.base, self._columns[:, :n].copy(), self.neighbours, BIT_WORTH * step**2 / self._scale, CLUSTER_WORTH * price
+        )
+
+
+def fit_blend(motions: Motions, step: float, n_clusters: int) -> Fitted:
+    """Fit a blend.
+
+    Args:
+        motions: of the points.
         step: quantisation step wanted of positions, model units: what an error is worth.
         n_clusters: K, about; 0: as many as pay.
     """
-    price = step**2 / sequence.n_frames  # of one squared step of one frame, as part of all frames
-
-    def problem(n_frames: int) -> _Problem:
-        motions = _motions(sequence, base, n_frames)
-        shown = motions.shape[1] / 3
-        return _Problem(base, motions, neighbours, BIT_WORTH * price * shown, CLUSTER_WORTH * step**2 * shown)
-
-    starts = [clustering.start(n_clusters)] if n_clusters else _find_number(problem(TRIAL_FRAMES), clustering)
-    whole = problem(FRAMES)
-    return min((_alternate(whole, start, PASSES) for start in starts), key=whole.cost)
+    problem = motions.problem(step)
+    starts = [motions.clustering.start(n_clusters)] if n_clusters else _find_number(problem, motions.clustering)
+    best = min(_alternate_all(problem, starts, FIRST_PASSES), key=problem.cost)
+    return _alternate(problem, best, LAST_PASSES)
 
 
 @dataclass(frozen=True)
@@ -84,9 +106,9 @@ class _Problem:
 
     Args:
         base: ``(P, 3)``.
-        motions: ``(P, 3n)`` displacements over n frames.
+        motions: ``(P, m)`` principal coordinates of displacements.
         neighbours: of the points.
-        price, cluster_price: of a bit, and of a cluster: squared model units over these frames.
+        price, cluster_price: of a bit, and of a cluster: squared model units.
     """
 
     base: Float64
@@ -95,10 +117,29 @@ class _Problem:
     price: float
     cluster_price: float
 
+    @cached_property
+    def homogeneous(self) -> Float64:
+        """``(P, 4)`` base positions and 1."""
+        return homogeneous(self.base)
+
+    def solve(self, fitted: Fitted) -> Float64:
+        """Transforms ``(K, 4, m)`` of least squared error, in homogeneous coordinates."""
+        from gvcodecs.mcgv.blend_kernels import add_normal
+
+        size = 4 * fitted.n_clusters
+        normal, right = np.zeros((size, size)), np.zeros((size, self.motions.shape[1]))
+        parts = fitted.weights.weights / TOTAL
+        add_normal(fitted.weights.clusters, parts, self.homogeneous, self.motions, normal, right)
+        return solve_normal(normal, right)
+
     def errors(self, fitted: Fitted) -> Float64:
         """Squared error ``(P,)`` that a blend leaves of each point."""
-        fit = BlendFit(Blend(self.base, fitted.weights, fitted.n_clusters))
-        return np.asarray(np.square(self.motions - fit.matrix @ fit.fit(self.motions)).sum(axis=1))
+        from gvcodecs.mcgv.blend_kernels import add_errors
+
+        errors = np.empty(len(self.base))
+        parts = fitted.weights.weights / TOTAL
+        add_errors(fitted.weights.clusters, parts, self.homogeneous, self.motions, self.solve(fitted), errors)
+        return errors
 
     def cost(self, fitted: Fitted) -> float:
         """Squared error that a blend leaves, and what its weights and clusters cost."""
@@ -114,15 +155,22 @@ def _find_number(problem: _Problem, clustering: Clustering) -> list[Fitted]:
     count, worse, most = float(FEWEST), 0, min(MOST, len(problem.base) / LEAST_POINTS)
     while count <= most and problem.cluster_price * count < min(least) and worse < PATIENCE:
         starts = [clustering.start(round(count)), _grow(problem, last, round(count), patches, draw)]
-        tried = [_alternate(problem, start, TRIAL_PASSES) for start in starts]
+        tried = _alternate_all(problem, starts, TRIAL_PASSES)
         costs = [problem.cost(fitted) for fitted in tried]
         worse = 0 if min(costs) < min(least) else worse + 1
         for kind, cost in enumerate(costs):
             if cost < least[kind]:
                 best[kind], least[kind] = tried[kind], cost
         last = tried[int(np.argmin(costs))]
-        count *= GROWTH
+        excess = min(costs) / (problem.cluster_price * count)
+        count *= next(growth for limit, growth in GROWTH if excess > limit)
     return best
+
+
+def _alternate_all(problem: _Problem, starts: list[Fitted], passes: int) -> list[Fitted]:
+    """`_alternate` from every start, side by side: nearly all of it is compiled, and holds no lock."""
+    with ThreadPoolExecutor(len(starts)) as pool:
+        return list(pool.map(lambda start: _alternate(problem, start, passes), starts))
 
 
 def _grow(problem: _Problem, fitted: Fitted, n_clusters: int, patches: sparse.csr_array, draw: np.random.Generator) -> Fitted:
@@ -143,24 +191,23 @@ def _grow(problem: _Problem, fitted: Fitted, n_clusters: int, patches: sparse.cs
 
 def _alternate(problem: _Problem, fitted: Fitted, passes: int) -> Fitted:
     """Fit transforms, then weights, several times over."""
-    from gvcodecs.mcgv.weight_choice import choose
+    from gvcodecs.mcgv.weight_choice import Transforms, choose
 
     known = earlier_neighbours(problem.neighbours)
     ring = problem.neighbours
     prices = Prices.guess()
     errors = np.zeros(len(problem.base))
     for _ in range(passes):
-        blend = Blend(problem.base, fitted.weights, fitted.n_clusters)
-        transforms = blend.transforms(BlendFit(blend).fit(problem.motions))
+        transforms = problem.solve(fitted)
         clusters, parts = fitted.weights.clusters.copy(), fitted.weights.weights.copy()
         choose(
             known.starts,
             known.near,
             ring.indptr.astype(np.int64),
             ring.indices.astype(np.int64),
-            blend.homogeneous,
+            problem.homogeneous,
             problem.motions,
-            transforms,
+            Transforms.of(transforms),
             problem.price,
             prices.count,
             prices.gap,
@@ -176,11 +223,6 @@ def _alternate(problem: _Problem, fitted: Fitted, passes: int) -> Fitted:
 
 class Clustering:
     """K-means of the points' motions for any number of clusters: the first K of one sequence of seeds start it."""
-
-    @classmethod
-    def of(cls, sequence: MeshSequence, base: Float64, neighbours: sparse.csr_array) -> Clustering:
-        """Take in the local motions of points, for base positions ``(P, 3)``, model units; no step counts."""
-        return cls(motion_features(sequence, base, k_ring(neighbours, RING)))
 
     def __init__(self, features: Float64) -> None:
         self._features = features
@@ -212,7 +254,7 @@ def _seeds(sample: Float64, n: int) -> Float64:
         distance = np.minimum(distance, np.maximum(squares + squares[last] - 2 * (sample @ sample[last]), 0))
         distance[seeds] = 0
         total = np.cumsum(distance)
-        if not total[-1] > NEGLIGIBLE * squares.sum():
+        if not total[-1] > TINY * squares.sum():
             break
         seeds.append(int(np.searchsorted(total, draw.random() * total[-1], side="right")))
     return sample[seeds]
@@ -224,7 +266,19 @@ def _renumber(clusters: Int32, parts: Int32) -> Fitted:
     return Fitted(Weights(np.where(parts > 0, number.reshape(clusters.shape), 0).astype(np.int32), parts), len(used))
 
 
-def _motions(sequence: MeshSequence, base: Float64, n_frames: int) -> Float64:
-    """Displacements ``(P, 3n)`` of at most ``n_frames`` frames, evenly spaced."""
-    frames = sequence.sample(n_frames)
+def _displacements(sequence: MeshSequence, base: Float64) -> Float64:
+    """``(P, 3n)`` of at most `FRAMES` frames, evenly spaced."""
+    frames = sequence.sample(FRAMES)
     return np.ascontiguousarray(np.moveaxis(frames - base, 0, 1).reshape(len(base), -1))
+
+
+def _principal(columns: Float64) -> tuple[Float64, Float64]:
+    """Principal coordinates ``(P, n)`` of rows, and the columns' energies, descending; none is subtracted first."""
+    from scipy.linalg import eigh
+
+    tall = columns.shape[0] >= columns.shape[1]
+    gram = columns.T @ columns if tall else columns @ columns.T
+    energies, vectors = eigh(gram, driver="evr", overwrite_a=True)
+    energies, vectors = np.maximum(energies[::-1], 0.0), vectors[:, ::-1]
+    placed = columns @ vectors if tall else vectors * np.sqrt(energies)
+    return np.ascontiguousarray(placed), energies

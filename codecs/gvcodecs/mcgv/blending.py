@@ -63,9 +63,7 @@ class Blend:
         rows, columns = weights.clusters.ravel(), np.repeat(np.arange(len(base)), parts.shape[1])
         squares = sparse.csr_array((np.square(parts).ravel(), (rows, columns)), shape=(n_clusters, len(base)))
         energy = (squares @ outer.reshape(-1, 16)).reshape(n_clusters, 4, 4)
-        trace = np.trace(energy, axis1=1, axis2=2)
-        energy += (FLAT * trace + LEAST_ENERGY)[:, None, None] * np.eye(4)
-        self._inverse = np.linalg.inv(np.linalg.cholesky(energy))  # (K, 4, 4)
+        self._inverse = _whiten(energy)  # (K, 4, 4)
 
     def matrix(self) -> sparse.csr_array:
         """B in coordinates of equal weight: ``(P, 4K)``."""
@@ -98,6 +96,26 @@ class BlendFit:
         from scipy.linalg import cho_solve
 
         return np.asarray(cho_solve(self._factor, self.matrix.T @ motions))
+
+
+def solve_normal(normal: Float64, right: Float64) -> Float64:
+    """Transforms ``(K, 4, m)`` that solve the normal equations ``normal (4K, 4K)``, ``right (4K, m)``, as `BlendFit` would."""
+    from scipy.linalg import cho_factor, cho_solve
+
+    n = len(normal) // 4
+    blocks = normal.reshape(n, 4, n, 4)
+    inverse = _whiten(blocks[np.arange(n), :, np.arange(n)])
+    half = (inverse @ normal.reshape(n, 4, -1)).reshape(-1, 4 * n)
+    white = (inverse @ half.T.reshape(n, 4, -1)).reshape(-1, 4 * n)
+    white[np.diag_indices_from(white)] += RIDGE
+    rows = cho_solve(cho_factor(white, overwrite_a=True), (inverse @ right.reshape(n, 4, -1)).reshape(4 * n, -1))
+    return np.ascontiguousarray(inverse.swapaxes(1, 2) @ rows.reshape(n, 4, -1))
+
+
+def _whiten(energy: Float64) -> Float64:
+    """Inverse Cholesky factors ``(K, 4, 4)`` of clusters' energies ``(K, 4, 4)``."""
+    trace = np.trace(energy, axis1=1, axis2=2)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(energy + (FLAT * trace + LEAST_ENERGY)[:, None, None] * np.eye(4))))
 
 
 def homogeneous(base: Float64) -> Float64:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import code_affine
-from gvcodecs.mcgv.blend_fitting import Clustering, Fitted, fit_blend
+from gvcodecs.mcgv.blend_fitting import Fitted, Motions, fit_blend
 from gvcodecs.mcgv.blended_motion import code_blended
 from gvcodecs.mcgv.frame_images import code_frames, measure_residuals
 from gvcodecs.mcgv.motion import CodedMotion
@@ -38,6 +38,7 @@ from gvcodecs.mcgv.trajectory_encoder import FIT_STEP, code_trajectories
 from gvcodecs.mcgv.trajectory_header import TRANSFORMS
 from gvcodecs.mcgv.trajectory_reader import TrajectoryReader
 from gvpipe.bitstream import Bitstream
+from gvpipe.blas import one_blas_thread
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.connectivity import EncodedMesh
 from gvpipe.errors import SettingError
@@ -112,6 +113,7 @@ class Mcgv(Settings):
             raise SettingError(f"base_bits is {self.base_bits}; 0 or an integer in 4..20 is needed")
         self._plane_size()
 
+    @one_blas_thread
     def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
         """Code a sequence.
 
@@ -253,10 +255,8 @@ class Mcgv(Settings):
     def _fit(self, start: _Start, step: float, memo: Memo, report: Progress) -> Fitted:
         """The blend for a step, model units."""
         report("segment", 0)
-        clustering = memo(
-            f"clustering {start.lattice.step}", lambda: Clustering.of(start.sequence, start.base, start.points.neighbours)
-        )
-        return fit_blend(start.sequence, start.base, start.points.neighbours, clustering, step, self.clusters)
+        motions = memo(f"motions {start.lattice.step}", lambda: Motions(start.sequence, start.base, start.points.neighbours))
+        return fit_blend(motions, step, self.clusters)
 
     def _published(self, start: _Start, report: Progress) -> tuple[CodedMotion, Layout]:
         """The paper's partition, layout and transforms."""

@@ -107,6 +107,30 @@ class LocalAffineFit:
         return np.concatenate([linear, translation[:, :, None, :]], axis=2)
 
 
+def local_motions(base: Float64, ring: sparse.csr_array, columns: Float64) -> Float64:
+    """Equation 1 for any coordinates of displacements: ``(P, <= DIMENSIONS)`` principal coordinates of the motion vectors.
+
+    A local affine motion is linear in the displacements, so that turned displacements have turned motions.
+
+    Args:
+        base: ``(P, 3)`` points, model units; ring: ``(P, P)`` their neighbourhoods.
+        columns: ``(P, m)`` displacements in orthonormal coordinates of all frames and axes.
+    """
+    centre, scale = (base.min(axis=0) + base.max(axis=0)) / 2, max(float(np.ptp(base, axis=0).max()), 1e-30)
+    unit, moved = (base - centre) / scale, columns / scale
+    size = np.asarray(ring.sum(axis=1)).ravel()[:, None]
+    mean, shift = (ring @ unit) / size, (ring @ moved) / size
+    outer = (unit[:, :, None] * unit[:, None, :]).reshape(-1, 9)
+    spread = (ring @ outer).reshape(-1, 3, 3) - size[:, :, None] * (mean[:, :, None] * mean[:, None, :])
+    ridge = RIDGE * np.trace(spread, axis1=1, axis2=2) + 1e-12
+    cross = np.stack(
+        [ring @ (unit[:, i, None] * moved) - size * mean[:, i, None] * shift for i in range(3)], axis=1
+    )  # (P, 3, m)
+    linear = np.linalg.inv(spread + ridge[:, None, None] * np.eye(3)) @ cross
+    translation = shift - np.einsum("pi,pim->pm", mean, linear)
+    return _principal_coordinates(np.concatenate([linear.reshape(len(base), -1), translation], axis=1))
+
+
 def refine(sequence: MeshSequence, base: Float64, ring: sparse.csr_array, clusters: Int32) -> Int32:
     """Move points to the cluster that predicts their neighbourhood ``ring (P, P)`` with the least squared error."""
     frames = sequence.sample(REFINE_FRAMES)
