@@ -16,6 +16,8 @@ from gvpipe.sequence import Float32, MeshSequence
 
 BLOCK_BYTES = 4 << 20  # float64 positions of one side worked on at a time: the temporaries of a block stay in cache
 
+LEAST_SPREAD = 1e-3  # of the largest coordinate, for a sequence of one point
+
 Float64 = NDArray[np.float64]
 
 
@@ -82,6 +84,17 @@ def measure_errors(reference: MeshSequence, read: Callable[[int, int], Float32])
             a = chunk[start : start + step].astype(np.float64)
             errors.add(a, np.linalg.norm(a - other[start : start + step], axis=2))
     return errors.result(frame_diagonal(reference))
+
+
+def measure_spread(sequence: MeshSequence) -> float:
+    """Root mean square distance, model units, of vertices from their frame's centre; of a point, a part of its coordinates."""
+    squared, largest = 0.0, 0.0
+    for _, block in sequence.chunks():
+        frames = block.astype(np.float64)
+        squared += float(np.square(frames - frames.mean(axis=1, keepdims=True)).sum())
+        largest = max(largest, float(np.abs(block).max()))
+    spread = math.sqrt(squared / (sequence.n_frames * sequence.n_vertices))
+    return spread or largest * LEAST_SPREAD or 1.0
 
 
 def frame_diagonal(reference: MeshSequence) -> float:

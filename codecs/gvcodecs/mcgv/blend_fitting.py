@@ -14,6 +14,7 @@ weights' bits counted, goes on to the end, and the one that costs less there is 
 
 from __future__ import annotations
 
+import math
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -36,6 +37,10 @@ TRIAL_PASSES, FIRST_PASSES, LAST_PASSES = 4, 4, 8  # turns of weights and transf
 FEWEST, MOST = 8, 1024  # clusters tried
 LEAST_POINTS = 8  # per cluster, on average
 GROWTH = (32, 2.0), (0, 2**0.5)  # from one number tried to the next, by how many times its clusters' cost all costs
+ROUNDS = 3  # steps tried
+PICTURED = 0.45  # steps, root mean square, that pictures leave of a point's residual
+CLOSE = 0.15  # logarithm of the error left over that wanted
+MOST_MOVED = 3.0  # times, the step at once
 PATIENCE = 1  # numbers of clusters that may do worse than a smaller one, in a row
 CLUSTER_WORTH = 2.8  # squared steps a frame that a cluster must save
 PATCH = 2  # order of the neighbourhood that an added cluster starts with
@@ -75,29 +80,46 @@ class Motions:
         self._columns, self._energies = _principal(moved)
         self.clustering = Clustering(local_motions(base, k_ring(neighbours, RING), self._columns[:, :DIMENSIONS]))
 
+    def error(self, problem: _Problem, fitted: Fitted, step: float) -> float:
+        """Expected root mean square error of points, model units: what a blend leaves, or pictures where that is less."""
+        n_points = len(self.base)
+        left = problem.errors(fitted) + self._energies[problem.motions.shape[1] :].sum() / n_points
+        most = (PICTURED * step) ** 2 * self.n_frames / self._scale
+        return math.sqrt(float(np.minimum(left, most).sum()) * self._scale / (n_points * self.n_frames))
+
     def problem(self, step: float) -> _Problem:
         """What is fitted where an error of ``step``, model units, is left."""
+        shown = self.n_frames / self._scale
         left = np.cumsum(self._energies[::-1])[::-1]  # energy of each component and those after it
-        noise = self._columns.shape[0] * 3 * self.n_frames / self._scale * step**2 / 12
-        n = int((left > NEGLIGIBLE * noise).sum())
-        price = step**2 * self.n_frames / self._scale
+        n = int((left > NEGLIGIBLE * len(self.base) * 3 * shown * step**2 / 12).sum())
+        price = step**2 * shown
         return _Problem(
             self.base, self._columns[:, :n].copy(), self.neighbours, BIT_WORTH * step**2 / self._scale, CLUSTER_WORTH * price
         )
 
 
-def fit_blend(motions: Motions, step: float, n_clusters: int) -> Fitted:
-    """Fit a blend.
+def fit_blend(motions: Motions, step: float, n_clusters: int, wanted: float = 0.0) -> tuple[Fitted, float]:
+    """Fit a blend; return it, and the quantisation step it was fitted for.
 
     Args:
         motions: of the points.
-        step: quantisation step wanted of positions, model units: what an error is worth.
+        step: quantisation step of positions, model units: what an error is worth.
         n_clusters: K, about; 0: as many as pay.
+        wanted: root mean square error of a point, model units, that a blend should leave: the step moves until it does, about.
+            0: the step stays.
     """
-    problem = motions.problem(step)
-    starts = [motions.clustering.start(n_clusters)] if n_clusters else _find_number(problem, motions.clustering)
-    best = min(_alternate_all(problem, starts, FIRST_PASSES), key=problem.cost)
-    return _alternate(problem, best, LAST_PASSES)
+    starts = [motions.clustering.start(n_clusters or 1)] * 2
+    for _ in range(ROUNDS):
+        problem = motions.problem(step)
+        if not n_clusters:
+            starts = _find_number(problem, motions.clustering, starts)
+        starts = _alternate_all(problem, starts, FIRST_PASSES)
+        best = min(starts, key=problem.cost)
+        left = motions.error(problem, best, step)
+        if not wanted or not left > 0 or abs(math.log(wanted / left)) < CLOSE:
+            break
+        step *= min(max(wanted / left, 1 / MOST_MOVED), MOST_MOVED)
+    return _alternate(problem, best, LAST_PASSES), step
 
 
 @dataclass(frozen=True)
@@ -147,15 +169,19 @@ class _Problem:
         return float(self.errors(fitted).sum()) + self.price * bits + self.cluster_price * fitted.n_clusters
 
 
-def _find_number(problem: _Problem, clustering: Clustering) -> list[Fitted]:
-    """The blends, of as many clusters as pay, that cost least after a few turns: from k-means, and grown."""
+def _find_number(problem: _Problem, clustering: Clustering, starts: list[Fitted]) -> list[Fitted]:
+    """The blends, of as many clusters as pay, that cost least after a few turns: from k-means, and grown.
+
+    ``starts`` are blends found for another step, or of one cluster: numbers from half of theirs up are tried.
+    """
     draw, patches = np.random.default_rng(SEED), k_ring(problem.neighbours, PATCH)
-    last = clustering.start(1)
+    last = min(starts, key=problem.cost)
     best, least = [last, last], [np.inf, np.inf]
-    count, worse, most = float(FEWEST), 0, min(MOST, len(problem.base) / LEAST_POINTS)
+    most = min(MOST, len(problem.base) / LEAST_POINTS)
+    count, worse = float(max(FEWEST, starts[0].n_clusters // 2)), 0
     while count <= most and problem.cluster_price * count < min(least) and worse < PATIENCE:
-        starts = [clustering.start(round(count)), _grow(problem, last, round(count), patches, draw)]
-        tried = _alternate_all(problem, starts, TRIAL_PASSES)
+        tried = [clustering.start(round(count)), _grow(problem, last, round(count), patches, draw)]
+        tried = _alternate_all(problem, tried, TRIAL_PASSES)
         costs = [problem.cost(fitted) for fitted in tried]
         worse = 0 if min(costs) < min(least) else worse + 1
         for kind, cost in enumerate(costs):

@@ -11,6 +11,7 @@ that looks at them (the extent, which affine transforms need, motion, transforms
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -29,24 +30,27 @@ from gvcodecs.mcgv.packing import Layout, pack
 from gvcodecs.mcgv.parameterization import parameterize
 from gvcodecs.mcgv.placement import choose_size, place
 from gvcodecs.mcgv.points import Points
-from gvcodecs.mcgv.quality import Magnitudes, choose_quantiser, effective_step
+from gvcodecs.mcgv.quality import Magnitudes, choose_quantiser
 from gvcodecs.mcgv.reader import McgvReader
 from gvcodecs.mcgv.segmentation import segment
 from gvcodecs.mcgv.separation import keep_apart
 from gvcodecs.mcgv.surface import STILL
-from gvcodecs.mcgv.trajectory_encoder import FIT_STEP, code_trajectories
+from gvcodecs.mcgv.trajectory_encoder import code_trajectories
 from gvcodecs.mcgv.trajectory_header import TRANSFORMS
 from gvcodecs.mcgv.trajectory_reader import TrajectoryReader
+from gvpipe.aiming import Aimed, aim, root_mean_square
 from gvpipe.bitstream import Bitstream
 from gvpipe.blas import one_blas_thread
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.connectivity import EncodedMesh
 from gvpipe.errors import SettingError
 from gvpipe.point_mesh import decode_points, encode_points
+from gvpipe.quality import error_of
 from gvpipe.quantize import Lattice
 from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import Float32, Int32, MeshSequence
 from gvpipe.stillness import encode_flags, find_still
+from gvpipe.vertex_errors import measure_spread
 from gvpipe.video import PROFILES, Profile
 from gvpipe.welding import find_points
 
@@ -56,6 +60,9 @@ MOST_SEGMENTS = 4000  # one section each, of the 4096 that a bitstream may have
 BASE_BITS = 8, 16  # bits of a base frame that are chosen unasked
 BASE_STEP = 1.5  # of a base frame, times step / sqrt(frames): measured, docs/codecs/mcgv.md
 DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell apart; the others give way
+GUESS = {"blended": 5.0, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
+BAND = {"blended": (0.86, 0.99), "affine": (1.0, 1.1)}  # of the error wanted: the published mode is no finer than asked
+REUSED = 1.6  # times the step, up to which a blend fitted for another serves
 MERGED = 1 / 16  # steps that vertices of one point may be apart: far below the errors that follow
 AUTO = "auto"
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
@@ -79,7 +86,7 @@ class Mcgv(Settings):
     image: str = "h264"  # h264: predictive; jpeg: every frame decodes alone
     profile: str = "web"  # web: 8 bits, browsers read it; precise: 10 bits (h264 only)
     transform: str = "none"  # none: pictures are frames; klt: coefficients of trajectories (blended h264 only), smaller
-    prediction: str = "affine"  # affine: vertices follow one cluster, as published; blended: up to four; smaller, opens later
+    prediction: str = "blended"  # blended: vertices follow up to four clusters; affine: one, as published
     clusters: int = 0  # K, 1..1024; 0: as many as pay (blended), 20 (affine)
     transform_bits: int = 17  # bits over the sequence's extent, 8..24 (affine)
     base_bits: int = 0  # bits along the base frame's longest side, 4..20; 0: as many as pay (blended), 12 (affine)
@@ -122,11 +129,46 @@ class Mcgv(Settings):
         """
         report = progress or (lambda stage, done: None)
         memo = memo or Memo()
-        start = self._start(sequence, memo, report)
-        route = self._blended if self.prediction == "blended" else self._affine
-        if self.transform == "klt":
-            route = self._trajectory_images
-        coded = route(start, memo, report)
+        wanted = error_of(self.quality) / 100 * memo("spread", lambda: measure_spread(sequence))
+        anchors = memo("anchors", list[_Anchor])
+        for anchor in anchors:  # what was measured at another quality serves this one
+            step = anchor.start.step * wanted / anchor.error
+            if not anchor.fitted or max(step / anchor.fitted_step, anchor.fitted_step / step) < REUSED:
+                return self._code(sequence, anchor.start, step, anchor.fitted, memo, report)
+        aimed, anchor = self._aim(sequence, wanted, memo, report)
+        anchors.append(anchor)
+        return aimed.bitstream
+
+    def _aim(self, sequence: MeshSequence, wanted: float, memo: Memo, report: Progress) -> tuple[Aimed, _Anchor]:
+        """Code with the step that leaves about the root mean square error wanted, model units."""
+        start, fitted = self._start(sequence, GUESS[self.prediction] * wanted, memo, report), None
+        step = start.step
+        if self.prediction == "blended":
+            fitted, step = self._fit(start, wanted, memo, report)
+        own = sequence.reordered(start.coded.permutation, start.faces)
+
+        def measure(bitstream: Bitstream) -> float:
+            report("measure", 0)
+            return root_mean_square(own, self.reader(bitstream))
+
+        def encode(step: float) -> Bitstream:
+            return self._code(sequence, start, step, fitted, memo, report)
+
+        aimed = aim(encode, measure, step, wanted, BAND[self.prediction])
+        if fitted and max(step / aimed.step, aimed.step / step) > REUSED:
+            fitted, step = self._fit(dataclasses.replace(start, step=aimed.step), 0.0, memo, report)
+            aimed = aim(encode, measure, step, wanted, BAND[self.prediction])
+        return aimed, _Anchor(dataclasses.replace(start, step=aimed.step), fitted, step, aimed.error)
+
+    def _code(
+        self, sequence: MeshSequence, start: _Start, step: float, fitted: Fitted | None, memo: Memo, report: Progress
+    ) -> Bitstream:
+        """Code with a step, model units, and a blend, or as published."""
+        start = dataclasses.replace(start, step=step)
+        coded = self._blended(start, fitted, memo, report) if fitted else self._affine(start, memo, report)
+        return self._bitstream(sequence, start, coded)
+
+    def _bitstream(self, sequence: MeshSequence, start: _Start, coded: _Coded) -> Bitstream:
         header = sections.Header(
             prediction=self.prediction,
             placement=self._placement,
@@ -158,13 +200,10 @@ class Mcgv(Settings):
         header = sections.Header.of(bitstream)
         return TrajectoryReader(bitstream, header, header.images) if header.images else McgvReader(bitstream)
 
-    def _start(self, given: MeshSequence, memo: Memo, report: Progress) -> _Start:
-        """Code the base frame, and see the sequence as the decoder will."""
+    def _start(self, given: MeshSequence, step: float, memo: Memo, report: Progress) -> _Start:
+        """Code the base frame for a step, model units, and see the sequence as the decoder will."""
         report("base", 0)
         first = given.read(0, 1)[0]
-        # no range ends the qualities of trajectory images
-        scale = PROFILES["h264-10"] if self.transform == "klt" else self._video_profile
-        step = effective_step(self.quality, scale, float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0))))
         still = memo("still", lambda: find_still(given))
         points = _find_points(given, still, MERGED * step)
         members = np.unique(points, return_index=True)[1]
@@ -186,7 +225,17 @@ class Mcgv(Settings):
         flags[moves] = False
         bounds = cut(sequence.n_frames, self.segment, MOST_SEGMENTS)
         return _Start(
-            sequence, coded, encode_flags(flags) if flags.any() else b"", lattice, mesh.lattice[moves], base, own, bounds, step
+            sequence=sequence,
+            coded=coded,
+            faces=mesh.faces,
+            still=encode_flags(flags) if flags.any() else b"",
+            lattice=lattice,
+            points_lattice=mesh.lattice[moves],
+            base=base,
+            points=own,
+            bounds=bounds,
+            step=step,
+            part=float((~flags[mesh.point]).mean()),
         )
 
     def _affine(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
@@ -195,21 +244,17 @@ class Mcgv(Settings):
         magnitudes = memo("magnitudes", lambda: measure_residuals(start.sequence, motion, start.bounds))
         return self._frames(start, motion, layout, magnitudes, report)
 
-    def _blended(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
-        """Pictures are frames, predicted by a blend."""
+    def _blended(self, start: _Start, fitted: Fitted, memo: Memo, report: Progress) -> _Coded:
+        """Pictures are frames, or coefficients of trajectories, predicted by a blend."""
         layout = self._blended_layout(start, memo, report)
-        fitted = self._fit(start, start.step, memo, report)
-        motion = code_blended(start.sequence, start.base, start.points, fitted, start.bounds, start.step, report)
-        return self._frames(start, motion, layout, measure_residuals(start.sequence, motion, start.bounds), report)
-
-    def _trajectory_images(self, start: _Start, memo: Memo, report: Progress) -> _Coded:
-        """Pictures are coefficients of trajectories, predicted by a blend."""
-        layout = self._blended_layout(start, memo, report)
+        if self.transform == "none":
+            motion = code_blended(start.sequence, start.base, start.points, fitted, start.bounds, start.step, report)
+            return self._frames(start, motion, layout, measure_residuals(start.sequence, motion, start.bounds), report)
         images = code_trajectories(
             start.sequence,
             start.base,
             start.points,
-            self._fit(start, FIT_STEP * start.step, memo, report),
+            fitted,
             layout,
             BLOCKS[self.image],
             start.bounds,
@@ -252,11 +297,11 @@ class Mcgv(Settings):
         """The points' first frame ``(P, 3)`` on its lattice."""
         return lattice.quantise(first) if self.prediction == "affine" else keep_apart(lattice, first)
 
-    def _fit(self, start: _Start, step: float, memo: Memo, report: Progress) -> Fitted:
-        """The blend for a step, model units."""
+    def _fit(self, start: _Start, wanted: float, memo: Memo, report: Progress) -> tuple[Fitted, float]:
+        """A blend that leaves about a root mean square error of vertices, model units, and the step that fits it."""
         report("segment", 0)
-        motions = memo(f"motions {start.lattice.step}", lambda: Motions(start.sequence, start.base, start.points.neighbours))
-        return fit_blend(motions, step, self.clusters)
+        motions = memo(f"motions {start.name}", lambda: Motions(start.sequence, start.base, start.points.neighbours))
+        return fit_blend(motions, start.step, self.clusters, wanted / math.sqrt(start.part))
 
     def _published(self, start: _Start, report: Progress) -> tuple[CodedMotion, Layout]:
         """The paper's partition, layout and transforms."""
@@ -277,7 +322,7 @@ class Mcgv(Settings):
     def _blended_layout(self, start: _Start, memo: Memo, report: Progress) -> Layout:
         """Nothing ties a blend's charts to clusters: few, large ones are best."""
         whole, groups = np.zeros(start.points.n_points, np.int32), start.points.pieces()
-        return memo(f"layout {start.lattice.step}", lambda: self._layout(start, whole, groups, report))
+        return memo(f"layout {start.name}", lambda: self._layout(start, whole, groups, report))
 
     @property
     def _video_profile(self) -> Profile:
@@ -314,16 +359,19 @@ class _Start:
 
     Args:
         sequence: of the points that move, in the decoder's order.
-        coded: the mesh's sections; still: the section of that name, empty if all points move.
+        coded: the mesh's sections; faces: ``(T, 3)`` as the decoder will have them.
+        still: the section of that name, empty if all points move.
         lattice: of the base frame.
         points_lattice: ``(P, 3)`` the points on it; base: the same in model units.
         points: what joins them.
         bounds: first frame of every segment, and F.
-        step: that the quality asks for (`quality`), model units.
+        step: of quantisation, model units.
+        part: of the vertices that moves.
     """
 
     sequence: MeshSequence
     coded: EncodedMesh
+    faces: Int32
     still: bytes
     lattice: Lattice
     points_lattice: Int32
@@ -331,6 +379,22 @@ class _Start:
     points: Points
     bounds: list[int]
     step: float
+    part: float
+
+    @property
+    def name(self) -> str:
+        """Of the base frame, for memos."""
+        return f"{self.lattice.step} {len(self.base)}"
+
+
+@dataclass(frozen=True)
+class _Anchor:
+    """An encode that was measured: its start and blend, the step that this was fitted for, and its error, model units."""
+
+    start: _Start
+    fitted: Fitted | None
+    fitted_step: float
+    error: float
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,6 @@
-"""From the quality setting to the image coder's quantiser and the residual step.
+"""From the effective step to the image coder's quantiser and the residual step.
 
-Quality fixes the *effective step* that a transform coefficient of a residual sees, as a part of the base frame's bounding-box
-diagonal, so that equal quality means about equal error whatever the residuals' range::
-
-    effective step = diagonal * 0.08 * 10 ** -decades(quality)
-
+The *effective step* is what a transform coefficient of a residual sees, whatever the residuals' range.
 The image coder's quantiser gives the coarse part of it, in whole steps; the residual step, model units per level, gives the
 rest. Levels must be finer than the step, or rounding to them adds errors that cost more bits to make up for than they save:
 pictures get eight levels to a step, whatever the largest residual, and what exceeds their range is sent apart
@@ -21,9 +17,6 @@ from numpy.typing import NDArray
 
 from gvpipe.video import QP_RANGE, Profile
 
-COARSEST = 0.08  # effective step at quality 0, part of the diagonal: beyond, the prediction alone is as good
-DECADES = {"h264-8": 2.1, "h264-10": 2.7, "jpeg": 2.1}  # from quality 0 to 100
-FINER = {"h264-8": 0.6, "h264-10": 0.0, "jpeg": 0.6}  # more from quality 75 to 100, so that all profiles end alike
 QP_STEP = 0.625  # H.264's quantiser step at QP 0, levels of an orthonormal transform; it doubles every 6 QP
 JPEG_STEPS = 255  # the coarsest step of a baseline JPEG, levels of an orthonormal transform; 1 is the finest
 LEVELS = 2.0, 8.0  # to an effective step, least and most (docs/codecs/mcgv.md)
@@ -58,12 +51,6 @@ class Magnitudes:
         """A magnitude that all but `OUTLIERS` of the coordinates keep to."""
         bin_ = int(np.searchsorted(np.cumsum(self._counts), (1 - OUTLIERS) * self._counts.sum()))
         return min(float(np.array((bin_ + 1) << BINS, np.int64).view(np.float64)), self.largest)
-
-
-def effective_step(quality: float, profile: Profile, diagonal: float) -> float:
-    """The step that quality asks for on a model of bounding-box ``diagonal``, model units; positive."""
-    decades = DECADES[profile.name] * quality / 100 + FINER[profile.name] * max(0.0, quality - 75) / 25
-    return float((diagonal or 1.0) * COARSEST * 10**-decades)
 
 
 def choose_quantiser(effective: float, profile: Profile, magnitudes: Magnitudes) -> Quantiser:

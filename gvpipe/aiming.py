@@ -1,0 +1,64 @@
+"""From the error that a quality asks for to an encoder's step: code, measure, mend.
+
+How error follows from step is a sequence's own. The error is nearly proportional to the step, so two or three encodes do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gvpipe.bitstream import Bitstream
+from gvpipe.codec import FrameReader
+from gvpipe.sequence import MeshSequence
+
+ROUNDS = 3  # encodes at most
+MOST_MOVED = 4.0  # times, a step at once
+
+
+@dataclass(frozen=True)
+class Aimed:
+    """An encode, its step and its root mean square error, model units."""
+
+    bitstream: Bitstream
+    step: float
+    error: float
+
+
+def aim(
+    encode: Callable[[float], Bitstream],
+    measure: Callable[[Bitstream], float],
+    step: float,
+    wanted: float,
+    band: tuple[float, float],
+) -> Aimed:
+    """Encode with one step after the other until the error is close enough; return the encode that came closest.
+
+    Args:
+        encode: makes a bitstream with a step, model units.
+        measure: its root mean square error, model units.
+        step: the first.
+        wanted: error.
+        band: least and most part of the error wanted that is close enough.
+    """
+    aimed_at = wanted * math.sqrt(band[0] * band[1])
+    tried: list[Aimed] = []
+    for _ in range(ROUNDS):
+        bitstream = encode(step)
+        tried.append(Aimed(bitstream, step, max(measure(bitstream), 1e-300)))
+        error = tried[-1].error
+        if band[0] <= error / wanted <= band[1]:
+            break
+        step *= min(max(aimed_at / error, 1 / MOST_MOVED), MOST_MOVED)
+    return min(tried, key=lambda trial: abs(math.log(trial.error / aimed_at)))
+
+
+def root_mean_square(sequence: MeshSequence, reader: FrameReader) -> float:
+    """Of the distances, model units, between a sequence's vertices and a reader's, in one order."""
+    total = 0.0
+    for first, block in sequence.chunks():
+        total += float(np.square(block.astype(np.float64) - reader.read(first, first + len(block))).sum())
+    return math.sqrt(total / (sequence.n_frames * sequence.n_vertices))
