@@ -22,6 +22,9 @@ from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import code_affine
 from gvcodecs.mcgv.blend_fitting import Clustering
 from gvcodecs.mcgv.blended_motion import code_blended
+from gvcodecs.mcgv.chart_coding import SECTION as CHARTS
+from gvcodecs.mcgv.chart_coding import encode_charts, number_charts
+from gvcodecs.mcgv.chart_placement import place_charts
 from gvcodecs.mcgv.frame_images import code_frames, measure_residuals
 from gvcodecs.mcgv.motion import PREDICTIONS, CodedMotion
 from gvcodecs.mcgv.outliers import SECTION, OutlierWriter
@@ -55,6 +58,7 @@ AUTO = "auto"
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
 
 Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,8 @@ class Mcgv(Settings):
     clusters: int = 0  # K, 1..1024; 0: as many as pay (blended), 20 (affine)
     transform_bits: int = 17  # bits over the sequence's extent, 8..24 (affine)
     base_bits: int = 0  # bits along the base frame's longest side, 4..20; 0: as many as pay (blended), 12 (affine)
-    placement: str = AUTO  # charts: as published; halves: pixels follow from the base frame; auto: halves if blended h264
+    placement: str = AUTO  # charts: as published; halves: pixels follow from the base frame; tiles (blended only): charts
+    # that fill the plane, from which pixels follow; auto: halves if blended h264, else charts
     density: float = 1.5  # pixels per vertex inside charts, 1..16 (placement charts)
     size: str = AUTO  # of a plane, pixels: auto, or WIDTHxHEIGHT in whole blocks, such as 256x256
     gop: int = 32  # frames per group of pictures, 1..1000 (h264)
@@ -103,6 +108,8 @@ class Mcgv(Settings):
             raise SettingError("profile precise needs image h264: JPEG has 8 bits")
         if self.transform == "klt" and (self.image != "h264" or self.prediction != "blended"):
             raise SettingError("transform klt needs image h264 and prediction blended")
+        if self.placement == "tiles" and self.prediction != "blended":
+            raise SettingError("placement tiles needs prediction blended")
         if 0 < self.base_bits < 4:
             raise SettingError(f"base_bits is {self.base_bits}; 0 or an integer in 4..20 is needed")
         self._plane_size()
@@ -132,7 +139,11 @@ class Mcgv(Settings):
             **coded.own,
         )
         order = np.argsort(start.mesh.visits)
-        pixels = {} if self._placement == "halves" else {"pixels": sections.encode_pixels(coded.layout, order)}
+        placed = {}
+        if self._placement == "charts":
+            placed["pixels"] = sections.encode_pixels(coded.layout, order)
+        elif self._placement == "tiles":
+            placed[CHARTS] = encode_charts(self._charts(start, memo, report), start.points.neighbours)
         return Bitstream(
             codec=self.id,
             version=header.version,
@@ -141,7 +152,7 @@ class Mcgv(Settings):
             n_triangles=len(start.mesh.faces),
             fps=float(sequence.fps),
             header=header.to_json(),
-            sections={"mesh": start.coded.mesh, "order": start.coded.order, **pixels, **coded.sections},
+            sections={"mesh": start.coded.mesh, "order": start.coded.order, **placed, **coded.sections},
             video=coded.video,
         )
 
@@ -256,8 +267,17 @@ class Mcgv(Settings):
 
     def _blended_layout(self, start: _Start, memo: Memo, report: Progress) -> Layout:
         """Nothing ties a blend's charts to clusters: few, large ones are best."""
-        whole, groups = np.zeros(len(start.points.members), np.int32), start.points.pieces()
+        whole, points = np.zeros(len(start.points.members), np.int32), start.points
+        tiled = self._placement == "tiles"
+        groups = self._charts(start, memo, report)[points.point] if tiled else points.pieces()
         return memo(f"layout {start.lattice.step}", lambda: self._layout(start, whole, groups, report))
+
+    def _charts(self, start: _Start, memo: Memo, report: Progress) -> Int64:
+        """The chart ``(P,)`` of every point, for placement by tiles."""
+        report("parameterize", 0)
+        base, whole = start.base[start.points.members], np.zeros(len(start.points.members), np.int32)
+        name = f"charts {start.lattice.step}"
+        return memo(name, lambda: number_charts(parameterize(base, start.points.faces, whole).chart))
 
     @property
     def _video_profile(self) -> Profile:
@@ -270,12 +290,13 @@ class Mcgv(Settings):
             return self.placement
         return "halves" if self.prediction == "blended" and self.image == "h264" else "charts"
 
-    def _layout(self, start: _Start, partition: Int32, groups: Int32, report: Progress) -> Layout:
-        """The vertices' pixels: charts keep to the parts of ``partition (P,)``, halving parts ``groups (V,)`` first."""
+    def _layout(self, start: _Start, partition: Int32, groups: NDArray[np.integer], report: Progress) -> Layout:
+        """The vertices' pixels: charts keep to the parts of ``partition (P,)``, the others part ``groups (V,)`` first."""
         block, size, points = BLOCKS[self.image], self._plane_size(), start.points
-        if self._placement == "halves":
+        if self._placement != "charts":
             lattice = start.mesh.points
-            return place(lattice, groups, *(size or choose_size(len(lattice), block)), block)
+            derive = place if self._placement == "halves" else place_charts
+            return derive(lattice, groups, *(size or choose_size(len(lattice), block)), block)
         report("parameterize", 0)
         atlas = parameterize(start.base[points.members], points.faces, partition)
         return pack(atlas, points.point, block, self.density, size)

@@ -5,6 +5,7 @@
 ``order``          vertex order, empty if the codec's own (`gvpipe.vertex_order`)
 ``pixels``         [integers] x, then [integers] y of each vertex, vertices in the codec's order: the differences from
                    the vertex before; y in the context of the magnitude of the difference in x (placement charts)
+``charts``         which chart each point belongs to (`chart_coding`, placement tiles)
 ``clusters``       affine: [integers] placement charts: cluster of each block that holds a vertex, in raster order,
                    difference from the block before; halves: of each vertex in the codec's order, from the vertex before
 ``weights``        blended: which clusters each point follows (`weight_coding`)
@@ -39,7 +40,7 @@ from gvpipe.quantize import Lattice
 from gvpipe.sequence import Int32
 from gvpipe.video import MAX_SIDE, PROFILES, Profile
 
-PLACEMENTS = ("halves", "charts")
+PLACEMENTS = ("halves", "charts", "tiles")
 MAX_CLUSTERS = 1024
 MAX_SEGMENTS = 1 << 16
 CONTEXTS = 4  # of a pixel's y: 0, 1, 2..3 or more columns from the vertex before
@@ -108,6 +109,8 @@ class Header:
         prediction, placement = str(words.get("prediction")), str(words.get("placement"))
         if prediction not in PREDICTIONS or placement not in PLACEMENTS:
             raise CorruptFile(f"header: no prediction {prediction!r} with placement {placement!r}; one of them is unknown")
+        if placement == "tiles" and prediction != "blended":
+            raise CorruptFile(f"header: no placement {placement!r} with prediction {prediction!r}; get the file again")
         profile = PROFILES.get(str(bitstream.header.get("profile")))
         base = bitstream.header.get("base")
         if profile is None:
@@ -139,7 +142,7 @@ class Header:
             raise CorruptFile(f"header: no trajectory images with prediction {prediction!r} and profile {profile.name!r}")
         if header.width % header.block or header.height % header.block:
             raise CorruptFile(f"header: planes of {header.width}x{header.height} are not whole blocks of {header.block}")
-        if placement == "halves" and header.block not in (8, 16):
+        if placement != "charts" and header.block not in (8, 16):
             raise CorruptFile(f"header: blocks of {header.block}; vertices are placed in blocks of 8 or 16")
         if header.width * header.height < bitstream.n_vertices:
             raise CorruptFile(f"header: planes of {header.width}x{header.height} do not hold {bitstream.n_vertices} vertices")

@@ -12,6 +12,9 @@ import numpy as np
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import AffineMotion
 from gvcodecs.mcgv.blended_motion import BlendedMotion
+from gvcodecs.mcgv.chart_coding import SECTION as CHARTS
+from gvcodecs.mcgv.chart_coding import decode_charts
+from gvcodecs.mcgv.chart_placement import place_charts
 from gvcodecs.mcgv.motion import Motion
 from gvcodecs.mcgv.outliers import SECTION
 from gvcodecs.mcgv.packing import Layout
@@ -102,4 +105,7 @@ def blended_layout(bitstream: Bitstream, header: sections.Header, base: BaseMesh
     """The vertices' pixels in a file of blended prediction; raises `CorruptFile`."""
     if header.placement == "halves":
         return place(base.points, points.pieces(), header.width, header.height, header.block)
+    if header.placement == "tiles":
+        charts = decode_charts(bitstream.section(CHARTS), points.neighbours)
+        return place_charts(base.points, charts[points.point], header.width, header.height, header.block)
     return sections.decode_pixels(bitstream.section("pixels"), np.argsort(base.visits), header.width, header.height)
