@@ -26,20 +26,47 @@ const NONE = [0, 0, 0];
  * @returns {Uint32Array} (V) row-major index of each vertex' pixel, all distinct
  */
 export function place(points, groups, { width, height, block }) {
+  checkLattice(points);
+  const order = Uint32Array.from({ length: points.length / 3 }, (_, v) => v);
+  const cells = [{ start: 0, end: order.length, x: 0, y: 0, width, height }];
+  return fill(cells, order, spreadGroups(points, groups), width, block);
+}
+
+/** Throw for points (V, 3) on too fine a lattice. */
+export function checkLattice(points) {
   if (points.some((c) => c >= MAX_COORDINATE)) throw corrupt("mesh", "its lattice is too fine for placement by halves");
-  const n = points.length / 3;
-  const spread = spreadGroups(points, groups);
-  const largest = spread.reduce((a, b) => Math.max(a, b), 0);
-  const shift = Math.max(0, 32 - Math.clz32(largest) - MOMENT_BITS);
-  const order = Uint32Array.from({ length: n }, (_, v) => v);
-  const pixels = new Uint32Array(n);
-  const cells = [{ start: 0, end: n, x: 0, y: 0, width, height, across: NONE, down: NONE }];
+}
+
+/**
+ * Halve cells down to single pixels.
+ *
+ * @param {object[]} cells each with vertices, no more than pixels
+ * @param {Uint32Array} order vertices, which `start` and `end` of the cells are places in; sorted
+ * @param {Int32Array} points (V, 3) all coordinates from 0, flat
+ * @param {number} width of the plane @param {number} block pixels
+ * @returns {Uint32Array} (V) pixels
+ */
+export function fill(cells, order, points, width, block) {
+  const shift = momentShift(points);
+  const pixels = new Uint32Array(order.length);
+  cells = cells.map((cell) => ({ ...cell, across: NONE, down: NONE }));
   while (cells.length) {
     const cell = cells.pop();
-    if (cell.width > 1 || cell.height > 1) cells.push(...halve(cell, order, spread, shift, block));
+    if (cell.width > 1 || cell.height > 1) cells.push(...halve(cell, order, points, shift, block));
     else pixels[order[cell.start]] = cell.y * width + cell.x;
   }
   return pixels;
+}
+
+/** Bits that the second moments of points, from 0, do without. */
+export function momentShift(points) {
+  const largest = points.reduce((a, b) => Math.max(a, b), 0);
+  return Math.max(0, 32 - Math.clz32(largest) - MOMENT_BITS);
+}
+
+/** The direction in which vertices spread most. */
+export function widest(vertices, points, shift) {
+  return DIRECTIONS[firstLargest(scoresOf(moments(vertices, points, shift)))];
 }
 
 /** Points with groups moved apart; all coordinates from 0. */
@@ -76,7 +103,7 @@ function halve(cell, order, points, shift, block) {
   const longer = isWide ? cell.width : cell.height;
   const { across, down } = turn(cell, order, points, shift, isWide);
   sortAlong(order.subarray(cell.start, cell.end), points, isWide ? across : down);
-  const first = longer > block ? Math.floor(longer / block / 2) * block : Math.floor(longer / 2);
+  const first = longer >= 2 * block ? Math.floor(longer / block / 2) * block : Math.floor(longer / 2);
   const middle = cell.start + Math.floor((2 * (cell.end - cell.start) * first + longer) / (2 * longer));
   const cut = (start, end, offset, side) => ({
     start, end, across, down,
