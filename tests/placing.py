@@ -27,6 +27,13 @@ def spread_along(points: list[list[int]], shift: int) -> list[int]:
 Cell = tuple[list[int], int, int, int, int]  # vertices, x, y, width, height
 
 
+def widest(spread: list[int]) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
+    """The direction of the highest score, and that of the highest at 60 degrees or more from it."""
+    one = DIRECTIONS[spread.index(max(spread))]
+    apart = [s if 4 * dot(one, d) ** 2 <= dot(one, one) * dot(d, d) else -1 for s, d in zip(spread, DIRECTIONS, strict=True)]
+    return one, DIRECTIONS[apart.index(max(apart))]
+
+
 def halved(
     points: list[list[int]], groups: list[int] | None, width: int, height: int, block: int, cells: list[Cell] | None = None
 ) -> list[int]:
@@ -55,7 +62,9 @@ def halved(
         if w == h == 1:
             pixels[own[0]] = y * width + x
             return
-        if max(w, h) > 4:
+        if cells:
+            pass  # they keep their directions
+        elif max(w, h) > 4:
             spread = scores(own)
             best = DIRECTIONS[spread.index(max(spread))]
             if w >= h:
@@ -63,12 +72,7 @@ def halved(
             else:
                 down = along(best, down)
         elif w == h == 4:
-            spread = scores(own)
-            one = DIRECTIONS[spread.index(max(spread))]
-            apart = [
-                s if 4 * dot(one, d) ** 2 <= dot(one, one) * dot(d, d) else -1 for s, d in zip(spread, DIRECTIONS, strict=True)
-            ]
-            two = DIRECTIONS[apart.index(max(apart))]
+            one, two = widest(scores(own))
 
             def like(d: tuple[int, ...], e: tuple[int, ...]) -> int:
                 return weight(d) * weight(e) * dot(d, e) ** 2
@@ -87,8 +91,11 @@ def halved(
             cell(own[:n], x, y, w, first, across, down)
             cell(own[n:], x, y + first, w, h - first, across, down)
 
-    for first_cell in cells or [(list(range(len(points))), 0, 0, width, height)]:
-        cell(*first_cell, (0, 0, 0), (0, 0, 0))
+    for own, x, y, w, h in cells or []:
+        one, two = widest(scores(own))
+        cell(own, x, y, w, h, *((one, two) if w >= h else (two, one)))
+    if not cells:
+        cell(list(range(len(points))), 0, 0, width, height, (0, 0, 0), (0, 0, 0))
     return pixels
 
 

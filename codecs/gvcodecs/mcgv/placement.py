@@ -89,7 +89,7 @@ def place(points: NDArray[np.integer], groups: NDArray[np.integer] | None, width
     spread = _spread(points.astype(np.int64), groups)
     none = np.zeros((1, 3), np.int64)
     cells = Cells(np.array([0, len(points)]), np.zeros((1, 2), np.int64), np.array([[width, height]]), none, none)
-    return Layout(width, height, fill(cells, np.arange(len(points)), spread, width, block))
+    return Layout(width, height, fill(cells, np.arange(len(points)), spread, width, block, moment_shift(spread)))
 
 
 def check_room(points: NDArray[np.integer], width: int, height: int) -> None:
@@ -100,15 +100,15 @@ def check_room(points: NDArray[np.integer], width: int, height: int) -> None:
         raise InputError(f"{len(points)} vertices do not fit into planes of {width}x{height}; leave the size out")
 
 
-def fill(cells: Cells, order: Int64, points: Int64, width: int, block: int) -> Int64:
+def fill(cells: Cells, order: Int64, points: Int64, width: int, block: int, shift: int | None) -> Int64:
     """Halve cells down to single pixels: ``(V,)`` row-major pixels in a plane of a width.
 
     Args:
         cells: with no more vertices than pixels each; their runs of ``order (V,)``, which are vertices.
         points: ``(V, 3)`` all coordinates from 0.
         block: as in `place`.
+        shift: of moments where cells turn as their points do; None: they keep their directions.
     """
-    shift = moment_shift(points)
     while (cells.side > 1).any():
         cells, order = _halve(cells, order, points, shift, block)
     pixel = np.empty(len(points), np.int64)
@@ -131,12 +131,12 @@ def _spread(points: Int64, groups: NDArray[np.integer] | None) -> Int64:
     return np.asarray(points - points.min(axis=0))
 
 
-def _halve(cells: Cells, order: Int64, points: Int64, shift: int, block: int) -> tuple[Cells, Int64]:
+def _halve(cells: Cells, order: Int64, points: Int64, shift: int | None, block: int) -> tuple[Cells, Int64]:
     """Cut every cell of more than one pixel across its longer side, and its vertices with it."""
     counts = np.diff(cells.starts)
     wide = cells.side[:, 0] >= cells.side[:, 1]
     longer = cells.side.max(axis=1)
-    across, down = _turn(cells, order, points, shift, wide)
+    across, down = (cells.across, cells.down) if shift is None else _turn(cells, order, points, shift, wide)
     direction = np.where(wide[:, None], across, down)
     keys = np.einsum("vi,vi->v", points[order], np.repeat(direction, counts, axis=0))
     order = order[np.lexsort((keys, np.repeat(np.arange(len(counts)), counts)))]
@@ -174,10 +174,7 @@ def _turn(cells: Cells, order: Int64, points: Int64, shift: int, wide: NDArray[n
     for target, chosen in ((across, wide[larger]), (down, ~wide[larger])):
         target[larger[chosen]] = best[chosen]
     if len(frames):
-        scores = spreads(moments[frames])
-        one = DIRECTIONS[scores.argmax(axis=1)]
-        square = 4 * np.square(one @ DIRECTIONS.T) * WEIGHTS * _weight(one)[:, None]
-        two = DIRECTIONS[np.where(square <= COMMON**2, scores, -1).argmax(axis=1)]  # at 60 degrees or more from the first
+        one, two = widest_pairs(spreads(moments[frames]))
         u, v = across[frames], down[frames]
         swap = _likeness(two, u) + _likeness(one, v) > _likeness(one, u) + _likeness(two, v)
         across[frames] = _towards(np.where(swap[:, None], two, one), u)
@@ -199,6 +196,13 @@ def spreads(moments: Int64) -> Int64:
     x, y, z = DIRECTIONS.T
     terms = np.stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z])
     return np.asarray(moments @ (terms * WEIGHTS))
+
+
+def widest_pairs(scores: Int64) -> tuple[Int64, Int64]:
+    """The directions ``(n, 3)`` of the highest of ``scores (n, 49)``, and of the highest at 60 degrees or more from these."""
+    one = DIRECTIONS[scores.argmax(axis=1)]
+    square = 4 * np.square(one @ DIRECTIONS.T) * WEIGHTS * _weight(one)[:, None]
+    return one, DIRECTIONS[np.where(square <= COMMON**2, scores, -1).argmax(axis=1)]
 
 
 def _towards(directions: Int64, before: Int64) -> Int64:

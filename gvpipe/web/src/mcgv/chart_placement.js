@@ -3,7 +3,7 @@
  * level by level; `docs/format.md`, section 5.5.
  */
 
-import { checkLattice, fill, momentShift, widest } from "./placement.js";
+import { checkLattice, fill, momentShift, widestPair } from "./placement.js";
 
 /**
  * @param {Int32Array} points (V, 3) base frame on its lattice, flat
@@ -22,10 +22,11 @@ export function placeCharts(points, charts, { width, height, block }) {
     const cell = cells.pop();
     const vertices = order.subarray(cell.start, cell.end);
     if (vertices.every((v) => charts[v] === charts[vertices[0]])) {
-      tiles.push(cell);
+      const [one, two] = widestPair(vertices, own, shift);
+      tiles.push(cell.width >= cell.height ? { ...cell, across: one, down: two } : { ...cell, across: two, down: one });
       continue;
     }
-    const direction = widest(vertices, centres, shift);
+    const [direction] = widestPair(vertices, centres, shift);
     const along = (v) => direction[0] * centres[3 * v] + direction[1] * centres[3 * v + 1] + direction[2] * centres[3 * v + 2];
     const members = new Map(); // of each chart, in order
     for (const v of vertices) {
@@ -36,7 +37,7 @@ export function placeCharts(points, charts, { width, height, block }) {
     vertices.set(sorted.flat());
     cells.push(...cut(cell, sorted.map((part) => part.length)));
   }
-  return fill(tiles, order, own, width, block);
+  return fill(tiles, order, own, width, block, null);
 }
 
 /** Points with all coordinates from 0. */

@@ -28,8 +28,9 @@ const NONE = [0, 0, 0];
 export function place(points, groups, { width, height, block }) {
   checkLattice(points);
   const order = Uint32Array.from({ length: points.length / 3 }, (_, v) => v);
-  const cells = [{ start: 0, end: order.length, x: 0, y: 0, width, height }];
-  return fill(cells, order, spreadGroups(points, groups), width, block);
+  const cells = [{ start: 0, end: order.length, x: 0, y: 0, width, height, across: NONE, down: NONE }];
+  const spread = spreadGroups(points, groups);
+  return fill(cells, order, spread, width, block, momentShift(spread));
 }
 
 /** Throw for points (V, 3) on too fine a lattice. */
@@ -40,16 +41,15 @@ export function checkLattice(points) {
 /**
  * Halve cells down to single pixels.
  *
- * @param {object[]} cells each with vertices, no more than pixels
+ * @param {object[]} cells each with vertices, no more than pixels; emptied
  * @param {Uint32Array} order vertices, which `start` and `end` of the cells are places in; sorted
  * @param {Int32Array} points (V, 3) all coordinates from 0, flat
  * @param {number} width of the plane @param {number} block pixels
+ * @param {number|null} shift of moments where cells turn as their vertices do; null: they keep their directions
  * @returns {Uint32Array} (V) pixels
  */
-export function fill(cells, order, points, width, block) {
-  const shift = momentShift(points);
+export function fill(cells, order, points, width, block, shift) {
   const pixels = new Uint32Array(order.length);
-  cells = cells.map((cell) => ({ ...cell, across: NONE, down: NONE }));
   while (cells.length) {
     const cell = cells.pop();
     if (cell.width > 1 || cell.height > 1) cells.push(...halve(cell, order, points, shift, block));
@@ -64,9 +64,15 @@ export function momentShift(points) {
   return Math.max(0, 32 - Math.clz32(largest) - MOMENT_BITS);
 }
 
-/** The direction in which vertices spread most. */
-export function widest(vertices, points, shift) {
-  return DIRECTIONS[firstLargest(scoresOf(moments(vertices, points, shift)))];
+/** The direction in which vertices spread most, and the one of those at 60 degrees or more from it. */
+export function widestPair(vertices, points, shift) {
+  return pairOf(scoresOf(moments(vertices, points, shift)));
+}
+
+function pairOf(scores) {
+  const one = DIRECTIONS[firstLargest(scores)];
+  const isFar = (d) => 4 * dot(d, one) ** 2 * weight(d) * weight(one) <= COMMON ** 2;
+  return [one, DIRECTIONS[firstLargest(scores.map((score, i) => (isFar(DIRECTIONS[i]) ? score : -1)))]];
 }
 
 /** Points with groups moved apart; all coordinates from 0. */
@@ -119,13 +125,15 @@ function halve(cell, order, points, shift, block) {
 /** A cell's directions after a look at its vertices. */
 function turn(cell, order, points, shift, isWide) {
   const { across, down } = cell;
+  if (shift === null) return { across, down };
   const isFrame = cell.width === FRAME && cell.height === FRAME;
   if (!isFrame && cell.width <= FRAME && cell.height <= FRAME) return { across, down };
   const scores = scoresOf(moments(order.subarray(cell.start, cell.end), points, shift));
-  const one = DIRECTIONS[firstLargest(scores)];
-  if (!isFrame) return isWide ? { across: towards(one, across), down } : { across, down: towards(one, down) };
-  const isFar = (d) => 4 * dot(d, one) ** 2 * weight(d) * weight(one) <= COMMON ** 2; // at 60 degrees or more from the first
-  const two = DIRECTIONS[firstLargest(scores.map((score, i) => (isFar(DIRECTIONS[i]) ? score : -1)))];
+  if (!isFrame) {
+    const one = DIRECTIONS[firstLargest(scores)];
+    return isWide ? { across: towards(one, across), down } : { across, down: towards(one, down) };
+  }
+  const [one, two] = pairOf(scores);
   const swap = likeness(two, across) + likeness(one, down) > likeness(one, across) + likeness(two, down);
   return { across: towards(swap ? two : one, across), down: towards(swap ? one : two, down) };
 }
