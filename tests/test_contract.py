@@ -35,6 +35,7 @@ SETTINGS: dict[str, list[dict[str, object]]] = {
         {"profile": "precise"},
         {"prediction": "blended"},
         {"placement": "halves"},
+        {"prediction": "blended", "placement": "tiles"},
         {"prediction": "blended", "transform": "klt"},
     ],
     "pca": [{}, {"predictor": "rbf"}, {"predictor": "lsp"}, {"predictor": "navg"}],

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import json
-import math
 import zlib
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from placing import halved
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 from sequences import waving
@@ -305,79 +305,6 @@ def test_points_of_many_vertices_get_neighbouring_pixels() -> None:
 
 
 # placement by halving
-
-
-def halved(points: list[list[int]], groups: list[int] | None, width: int, height: int, block: int) -> list[int]:
-    """Pixels by section 5.1 of docs/format.md in Python's integers, one cell after the other."""
-    if groups is not None:
-        middle = [sum(c) // len(points) for c in zip(*points, strict=True)]
-        moves = {}
-        for g in set(groups):
-            own = [p for p, h in zip(points, groups, strict=True) if h == g]
-            moves[g] = [2 * (sum(c) // len(own) - m) for c, m in zip(zip(*own, strict=True), middle, strict=True)]
-        points = [[a + b for a, b in zip(p, moves[g], strict=True)] for p, g in zip(points, groups, strict=True)]
-    low = [min(c) for c in zip(*points, strict=True)]
-    points = [[a - b for a, b in zip(p, low, strict=True)] for p in points]
-    shift = max(0, max(max(p) for p in points).bit_length() - 10)
-    steps = range(-2, 3)
-    directions = [(a, b, c) for a in steps for b in steps for c in steps if (a, b, c) > (0, 0, 0) and math.gcd(a, b, c) == 1]
-    assert len(directions) == 49
-    pixels = [-1] * len(points)
-
-    def dot(a: tuple[int, ...], b: tuple[int, ...]) -> int:
-        return sum(i * j for i, j in zip(a, b, strict=True))
-
-    def weight(d: tuple[int, ...]) -> int:
-        return 90 // dot(d, d) if any(d) else 90
-
-    def along(d: tuple[int, ...], before: tuple[int, ...]) -> tuple[int, ...]:
-        return tuple(-i for i in d) if dot(d, before) < 0 else d
-
-    def scores(own: list[int]) -> list[int]:
-        mean = [sum(c) // len(own) for c in zip(*(points[v] for v in own), strict=True)]
-        left = [tuple((a - b) >> shift for a, b in zip(points[v], mean, strict=True)) for v in own]
-        return [weight(d) * sum(dot(d, e) ** 2 for e in left) for d in directions]
-
-    def cell(own: list[int], x: int, y: int, w: int, h: int, across: tuple[int, ...], down: tuple[int, ...]) -> None:
-        if not own:
-            return
-        if w == h == 1:
-            pixels[own[0]] = y * width + x
-            return
-        if max(w, h) > 4:
-            spread = scores(own)
-            best = directions[spread.index(max(spread))]
-            if w >= h:
-                across = along(best, across)
-            else:
-                down = along(best, down)
-        elif w == h == 4:
-            spread = scores(own)
-            one = directions[spread.index(max(spread))]
-            apart = [
-                s if 4 * dot(one, d) ** 2 <= dot(one, one) * dot(d, d) else -1 for s, d in zip(spread, directions, strict=True)
-            ]
-            two = directions[apart.index(max(apart))]
-
-            def like(d: tuple[int, ...], e: tuple[int, ...]) -> int:
-                return weight(d) * weight(e) * dot(d, e) ** 2
-
-            if like(two, across) + like(one, down) > like(one, across) + like(two, down):
-                one, two = two, one
-            across, down = along(one, across), along(two, down)
-        longer, direction = (w, across) if w >= h else (h, down)
-        first = longer // block // 2 * block if longer > block else longer // 2
-        own = sorted(own, key=lambda v: dot(tuple(points[v]), direction))
-        n = (2 * len(own) * first + longer) // (2 * longer)
-        if w >= h:
-            cell(own[:n], x, y, first, h, across, down)
-            cell(own[n:], x + first, y, w - first, h, across, down)
-        else:
-            cell(own[:n], x, y, w, first, across, down)
-            cell(own[n:], x, y + first, w, h - first, across, down)
-
-    cell(list(range(len(points))), 0, 0, width, height, (0, 0, 0), (0, 0, 0))
-    return pixels
 
 
 @pytest.mark.parametrize("name", awkward_surfaces())

@@ -46,6 +46,7 @@ KINDS: dict[str, dict[str, Any]] = {  # how vertices move, and where their pixel
     "affine-halves": {"prediction": "affine", "placement": "halves"},
     "blended": {"prediction": "blended", "placement": "halves"},
     "blended-charts": {"prediction": "blended", "placement": "charts"},
+    "tiles": {"prediction": "blended", "placement": "tiles"},
     "outliers": {"prediction": "affine", "clusters": 1, "quality": 100},
 }
 LARGEST_ERROR = 0.001  # model units, of the file with corrections
@@ -141,7 +142,7 @@ def test_frames_of_a_sample_equal_pythons(kind: str, module: Callable[..., Any],
 
 
 @pytest.mark.skipif(not SAMBA.exists(), reason="no ../shared/data")
-@pytest.mark.parametrize("kind", ["affine", "blended"])
+@pytest.mark.parametrize("kind", ["affine", "blended", "tiles"])
 def test_frames_of_samba_equal_pythons(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     gvpipe.encode(SAMBA, site[0] / "samba.mp4", preset="veryfast", **KINDS[kind])
     _check_frames(module, site[0] / "samba.mp4")
@@ -166,7 +167,7 @@ def test_frames_of_several_segments_in_the_codecs_order(kind: str, module: Calla
     _check_frames(module, _encode(site, waving(10, 50), **settings))
 
 
-@pytest.mark.parametrize("kind", ["affine-halves", "blended"])
+@pytest.mark.parametrize("kind", ["affine-halves", "blended", "tiles"])
 def test_frames_on_the_finest_lattice(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     """Where integers are largest: sums that decide pixels and contexts must be exact still."""
     _check_frames(module, _encode(site, waving(20, 12), base_bits=20, quality=100, **KINDS[kind]))
@@ -340,6 +341,8 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Bitstream]:
         ("blended", {"placement": "anywhere"}),
         ("blended", {"placement": "charts"}),
         ("blended", {"block": 4}),
+        ("tiles", {"block": 4}),
+        ("tiles", {"prediction": "affine"}),
         ("blended", {"clusters": 1}),
         ("affine-halves", {"prediction": "blended"}),
         ("blended-charts", {"placement": ["charts"]}),
@@ -368,6 +371,7 @@ def test_settings_out_of_range_are_noticed(
         ("blended", "mesh"),
         ("blended", "weights"),
         ("blended", "transforms.0"),
+        ("tiles", "charts"),
         ("corrected", "corrections"),
         ("outliers", "outliers"),
     ],

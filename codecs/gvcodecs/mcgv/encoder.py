@@ -23,6 +23,9 @@ from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import code_affine
 from gvcodecs.mcgv.blend_fitting import Fitted, Motions, fit_blend
 from gvcodecs.mcgv.blended_motion import code_blended
+from gvcodecs.mcgv.chart_coding import SECTION as CHARTS
+from gvcodecs.mcgv.chart_coding import encode_charts, number_charts
+from gvcodecs.mcgv.chart_placement import place_charts
 from gvcodecs.mcgv.frame_images import code_frames, measure_residuals
 from gvcodecs.mcgv.motion import CodedMotion
 from gvcodecs.mcgv.outliers import SECTION, OutlierWriter
@@ -68,6 +71,7 @@ AUTO = "auto"
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
 
 Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -90,7 +94,8 @@ class Mcgv(Settings):
     clusters: int = 0  # K, 1..1024; 0: as many as pay (blended), 20 (affine)
     transform_bits: int = 17  # bits over the sequence's extent, 8..24 (affine)
     base_bits: int = 0  # bits along the base frame's longest side, 4..20; 0: as many as pay (blended), 12 (affine)
-    placement: str = AUTO  # charts: as published; halves: pixels follow from the base frame; auto: halves if blended h264
+    placement: str = AUTO  # charts: as published; halves: pixels follow from the base frame; tiles (blended only): charts
+    # that fill the plane, from which pixels follow; auto: halves if blended h264, else charts
     density: float = 1.5  # pixels per vertex inside charts, 1..16 (placement charts)
     size: str = AUTO  # of a plane, pixels: auto, or WIDTHxHEIGHT in whole blocks, such as 256x256
     gop: int = 32  # frames per group of pictures, 1..1000 (h264)
@@ -116,6 +121,8 @@ class Mcgv(Settings):
             raise SettingError("profile precise needs image h264: JPEG has 8 bits")
         if self.transform == "klt" and (self.image != "h264" or self.prediction != "blended"):
             raise SettingError("transform klt needs image h264 and prediction blended")
+        if self.placement == "tiles" and self.prediction != "blended":
+            raise SettingError("placement tiles needs prediction blended")
         if 0 < self.base_bits < 4:
             raise SettingError(f"base_bits is {self.base_bits}; 0 or an integer in 4..20 is needed")
         self._plane_size()
@@ -180,8 +187,9 @@ class Mcgv(Settings):
             base=start.lattice,
             **coded.own,
         )
-        pixels = {} if self._placement == "halves" else {"pixels": sections.encode_pixels(coded.layout)}
-        still = {STILL: start.still} if start.still else {}
+        placed = {STILL: start.still} if start.still else {}
+        if self._placement == "charts":
+            placed["pixels"] = sections.encode_pixels(coded.layout)
         return Bitstream(
             codec=self.id,
             version=self.version,
@@ -190,7 +198,7 @@ class Mcgv(Settings):
             n_triangles=len(sequence.faces),
             fps=float(sequence.fps),
             header=header.to_json(),
-            sections={"mesh": start.coded.mesh, "order": start.coded.order, **still, **pixels, **coded.sections},
+            sections={"mesh": start.coded.mesh, "order": start.coded.order, **placed, **coded.sections},
             video=coded.video,
         )
 
@@ -247,8 +255,12 @@ class Mcgv(Settings):
     def _blended(self, start: _Start, fitted: Fitted, memo: Memo, report: Progress) -> _Coded:
         """Pictures are frames, or coefficients of trajectories, predicted by a blend."""
         layout = self._blended_layout(start, memo, report)
+        tiles = {}
+        if self._placement == "tiles":
+            tiles = {CHARTS: encode_charts(self._charts(start, memo, report), start.points.neighbours)}
         if self.transform == "none":
             motion = code_blended(start.sequence, start.base, start.points, fitted, start.bounds, start.step, report)
+            motion.sections.update(tiles)
             return self._frames(start, motion, layout, measure_residuals(start.sequence, motion, start.bounds), report)
         images = code_trajectories(
             start.sequence,
@@ -263,7 +275,8 @@ class Mcgv(Settings):
             self.preset,
             report,
         )
-        return _Coded(layout, {"clusters": images.n_clusters, "images": images.header}, images.sections, images.video)
+        own = {"clusters": images.n_clusters, "images": images.header}
+        return _Coded(layout, own, {**tiles, **images.sections}, images.video)
 
     def _frames(self, start: _Start, motion: CodedMotion, layout: Layout, magnitudes: Magnitudes, report: Progress) -> _Coded:
         """Code what a prediction leaves, of such magnitudes, as one picture per frame and outliers."""
@@ -321,8 +334,15 @@ class Mcgv(Settings):
 
     def _blended_layout(self, start: _Start, memo: Memo, report: Progress) -> Layout:
         """Nothing ties a blend's charts to clusters: few, large ones are best."""
-        whole, groups = np.zeros(start.points.n_points, np.int32), start.points.pieces()
+        whole, tiled = np.zeros(start.points.n_points, np.int32), self._placement == "tiles"
+        groups = self._charts(start, memo, report) if tiled else start.points.pieces()
         return memo(f"layout {start.name}", lambda: self._layout(start, whole, groups, report))
+
+    def _charts(self, start: _Start, memo: Memo, report: Progress) -> Int64:
+        """The chart ``(P,)`` of every point, for placement by tiles."""
+        report("parameterize", 0)
+        whole = np.zeros(start.points.n_points, np.int32)
+        return memo(f"charts {start.name}", lambda: number_charts(parameterize(start.base, start.points.faces, whole).chart))
 
     @property
     def _video_profile(self) -> Profile:
@@ -335,11 +355,12 @@ class Mcgv(Settings):
             return self.placement
         return "halves" if self.prediction == "blended" and self.image == "h264" else "charts"
 
-    def _layout(self, start: _Start, partition: Int32, groups: Int32, report: Progress) -> Layout:
-        """The points' pixels: charts keep to the parts of ``partition (P,)``, halving parts ``groups (P,)`` first."""
-        block, size = BLOCKS[self.image], self._plane_size()
-        if self._placement == "halves":
-            return place(start.points_lattice, groups, *(size or choose_size(len(start.base), block)), block)
+    def _layout(self, start: _Start, partition: Int32, groups: NDArray[np.integer], report: Progress) -> Layout:
+        """The points' pixels: charts keep to the parts of ``partition (P,)``, the others part ``groups (P,)`` first."""
+        block, size, lattice = BLOCKS[self.image], self._plane_size(), start.points_lattice
+        if self._placement != "charts":
+            derive = place if self._placement == "halves" else place_charts
+            return derive(lattice, groups, *(size or choose_size(len(lattice), block)), block)
         report("parameterize", 0)
         return pack(parameterize(start.base, start.points.faces, partition), block, self.density, size)
 

@@ -6,6 +6,7 @@
 ``still``          which points never move (`gvpipe.stillness`); absent if all do
 ``pixels``         [integers] x, then [integers] y of each slot in the codec's order: the differences from the slot
                    before; y in the context of the magnitude of the difference in x (placement charts)
+``charts``         which chart each point belongs to (`chart_coding`, placement tiles)
 ``clusters``       affine: [integers] placement charts: cluster of each block that holds a slot, in raster order,
                    difference from the block before; halves: of each slot in the codec's order, from the slot before
 ``weights``        blended: which clusters each point follows (`weight_coding`)
@@ -41,7 +42,7 @@ from gvpipe.sequence import Int32
 from gvpipe.video import MAX_SIDE, PROFILES, Profile
 
 PREDICTIONS = ("blended", "affine")
-PLACEMENTS = ("halves", "charts")
+PLACEMENTS = ("halves", "charts", "tiles")
 MAX_CLUSTERS = 1024
 MAX_SEGMENTS = 1 << 16
 CONTEXTS = 4  # of a pixel's y: 0, 1, 2..3 or more columns from the vertex before
@@ -103,6 +104,8 @@ class Header:
         prediction, placement = str(words.get("prediction")), str(words.get("placement"))
         if prediction not in PREDICTIONS or placement not in PLACEMENTS:
             raise CorruptFile(f"header: no prediction {prediction!r} with placement {placement!r}; one of them is unknown")
+        if placement == "tiles" and prediction != "blended":
+            raise CorruptFile(f"header: no placement {placement!r} with prediction {prediction!r}; get the file again")
         profile = PROFILES.get(str(bitstream.header.get("profile")))
         base = bitstream.header.get("base")
         if profile is None:
@@ -134,7 +137,7 @@ class Header:
             raise CorruptFile(f"header: no trajectory images with prediction {prediction!r} and profile {profile.name!r}")
         if header.width % header.block or header.height % header.block:
             raise CorruptFile(f"header: planes of {header.width}x{header.height} are not whole blocks of {header.block}")
-        if placement == "halves" and header.block not in (8, 16):
+        if placement != "charts" and header.block not in (8, 16):
             raise CorruptFile(f"header: blocks of {header.block}; vertices are placed in blocks of 8 or 16")
         return header
 

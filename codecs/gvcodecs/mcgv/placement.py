@@ -45,7 +45,7 @@ WEIGHTS = COMMON // np.square(DIRECTIONS).sum(axis=1)  # (49,)
 
 
 @dataclass(frozen=True)
-class _Cells:
+class Cells:
     """Rectangles of the image, each with a run of the vertices.
 
     Args:
@@ -85,20 +85,40 @@ def place(points: NDArray[np.integer], groups: NDArray[np.integer] | None, width
         InputError: more vertices than pixels.
         CorruptFile: a point beyond the limit above; no encoder makes one.
     """
+    check_room(points, width, height)
+    spread = _spread(points.astype(np.int64), groups)
+    none = np.zeros((1, 3), np.int64)
+    cells = Cells(np.array([0, len(points)]), np.zeros((1, 2), np.int64), np.array([[width, height]]), none, none)
+    return Layout(width, height, fill(cells, np.arange(len(points)), spread, width, block, moment_shift(spread)))
+
+
+def check_room(points: NDArray[np.integer], width: int, height: int) -> None:
+    """Raise what `place` raises, for ``points (V, 3)`` on their lattice."""
     if points.max(initial=0) >= MAX_COORDINATE:
         raise CorruptFile("section 'mesh' is corrupt: its lattice is too fine for placement by halves; get the file again")
     if width * height < len(points):
         raise InputError(f"{len(points)} vertices do not fit into planes of {width}x{height}; leave the size out")
-    spread = _spread(points.astype(np.int64), groups)
-    shift = max(0, int(spread.max()).bit_length() - MOMENT_BITS)
-    order = np.arange(len(points))
-    none = np.zeros((1, 3), np.int64)
-    cells = _Cells(np.array([0, len(points)]), np.zeros((1, 2), np.int64), np.array([[width, height]]), none, none)
+
+
+def fill(cells: Cells, order: Int64, points: Int64, width: int, block: int, shift: int | None) -> Int64:
+    """Halve cells down to single pixels: ``(V,)`` row-major pixels in a plane of a width.
+
+    Args:
+        cells: with no more vertices than pixels each; their runs of ``order (V,)``, which are vertices.
+        points: ``(V, 3)`` all coordinates from 0.
+        block: as in `place`.
+        shift: of moments where cells turn as their points do; None: they keep their directions.
+    """
     while (cells.side > 1).any():
-        cells, order = _halve(cells, order, spread, shift, block)
+        cells, order = _halve(cells, order, points, shift, block)
     pixel = np.empty(len(points), np.int64)
     pixel[order] = cells.corner[:, 1] * width + cells.corner[:, 0]
-    return Layout(width, height, pixel)
+    return pixel
+
+
+def moment_shift(points: Int64) -> int:
+    """Bits that `second_moments` of ``points (V, 3)``, from 0, does without."""
+    return max(0, int(points.max()).bit_length() - MOMENT_BITS)
 
 
 def _spread(points: Int64, groups: NDArray[np.integer] | None) -> Int64:
@@ -111,16 +131,16 @@ def _spread(points: Int64, groups: NDArray[np.integer] | None) -> Int64:
     return np.asarray(points - points.min(axis=0))
 
 
-def _halve(cells: _Cells, order: Int64, points: Int64, shift: int, block: int) -> tuple[_Cells, Int64]:
+def _halve(cells: Cells, order: Int64, points: Int64, shift: int | None, block: int) -> tuple[Cells, Int64]:
     """Cut every cell of more than one pixel across its longer side, and its vertices with it."""
     counts = np.diff(cells.starts)
     wide = cells.side[:, 0] >= cells.side[:, 1]
     longer = cells.side.max(axis=1)
-    across, down = _turn(cells, order, points, shift, wide)
+    across, down = (cells.across, cells.down) if shift is None else _turn(cells, order, points, shift, wide)
     direction = np.where(wide[:, None], across, down)
     keys = np.einsum("vi,vi->v", points[order], np.repeat(direction, counts, axis=0))
     order = order[np.lexsort((keys, np.repeat(np.arange(len(counts)), counts)))]
-    first = np.where(longer > block, longer // block // 2 * block, longer // 2)  # columns or rows of the first half
+    first = np.where(longer >= 2 * block, longer // block // 2 * block, longer // 2)  # columns or rows of the first half
     first = np.where(longer == 1, 1, first)
     kept = (2 * counts * first + longer) // (2 * longer)  # rounded; no half overflows, since the whole did not
     axis = np.where(wide, 0, 1)
@@ -131,7 +151,7 @@ def _halve(cells: _Cells, order: Int64, points: Int64, shift: int, block: int) -
     side[2 * rows + 1, axis] = longer - first
     ends = np.stack([cells.starts[:-1] + kept, cells.starts[1:]], axis=1).ravel()
     used = np.diff(ends, prepend=0) > 0
-    halves = _Cells(
+    halves = Cells(
         starts=np.r_[0, ends[used]],
         corner=corner[used],
         side=side[used],
@@ -141,23 +161,20 @@ def _halve(cells: _Cells, order: Int64, points: Int64, shift: int, block: int) -
     return halves, order
 
 
-def _turn(cells: _Cells, order: Int64, points: Int64, shift: int, wide: NDArray[np.bool_]) -> tuple[Int64, Int64]:
+def _turn(cells: Cells, order: Int64, points: Int64, shift: int, wide: NDArray[np.bool_]) -> tuple[Int64, Int64]:
     """Return the cells' directions ``(n, 3)`` across and down, after a look at their points."""
     across, down = cells.across.copy(), cells.down.copy()
     frames = np.flatnonzero((cells.side == FRAME).all(axis=1))
     larger = np.flatnonzero(cells.side.max(axis=1) > FRAME)
     if not len(frames) and not len(larger):
         return across, down
-    moments = _moments(points[order], cells.starts, shift)
-    scores = _scores(moments[larger])
+    moments = second_moments(points[order], cells.starts, shift)
+    scores = spreads(moments[larger])
     best = _towards(DIRECTIONS[scores.argmax(axis=1)], np.where(wide[larger, None], across[larger], down[larger]))
     for target, chosen in ((across, wide[larger]), (down, ~wide[larger])):
         target[larger[chosen]] = best[chosen]
     if len(frames):
-        scores = _scores(moments[frames])
-        one = DIRECTIONS[scores.argmax(axis=1)]
-        square = 4 * np.square(one @ DIRECTIONS.T) * WEIGHTS * _weight(one)[:, None]
-        two = DIRECTIONS[np.where(square <= COMMON**2, scores, -1).argmax(axis=1)]  # at 60 degrees or more from the first
+        one, two = widest_pairs(spreads(moments[frames]))
         u, v = across[frames], down[frames]
         swap = _likeness(two, u) + _likeness(one, v) > _likeness(one, u) + _likeness(two, v)
         across[frames] = _towards(np.where(swap[:, None], two, one), u)
@@ -165,7 +182,7 @@ def _turn(cells: _Cells, order: Int64, points: Int64, shift: int, wide: NDArray[
     return across, down
 
 
-def _moments(points: Int64, starts: Int64, shift: int) -> Int64:
+def second_moments(points: Int64, starts: Int64, shift: int) -> Int64:
     """Second moments ``(n, 6)`` of the cells' points about their means: xx, yy, zz, xy, xz, yz."""
     counts = np.diff(starts)
     means = np.add.reduceat(points, starts[:-1], axis=0) // counts[:, None]
@@ -174,11 +191,18 @@ def _moments(points: Int64, starts: Int64, shift: int) -> Int64:
     return np.asarray(np.add.reduceat(products, starts[:-1], axis=0))
 
 
-def _scores(moments: Int64) -> Int64:
+def spreads(moments: Int64) -> Int64:
     """`COMMON` times the points' spread ``(n, 49)`` along each direction."""
     x, y, z = DIRECTIONS.T
     terms = np.stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z])
     return np.asarray(moments @ (terms * WEIGHTS))
+
+
+def widest_pairs(scores: Int64) -> tuple[Int64, Int64]:
+    """The directions ``(n, 3)`` of the highest of ``scores (n, 49)``, and of the highest at 60 degrees or more from these."""
+    one = DIRECTIONS[scores.argmax(axis=1)]
+    square = 4 * np.square(one @ DIRECTIONS.T) * WEIGHTS * _weight(one)[:, None]
+    return one, DIRECTIONS[np.where(square <= COMMON**2, scores, -1).argmax(axis=1)]
 
 
 def _towards(directions: Int64, before: Int64) -> Int64:

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import AffineMotion
 from gvcodecs.mcgv.blended_motion import BlendedMotion
+from gvcodecs.mcgv.chart_coding import SECTION as CHARTS
+from gvcodecs.mcgv.chart_coding import decode_charts
+from gvcodecs.mcgv.chart_placement import place_charts
 from gvcodecs.mcgv.motion import Motion
 from gvcodecs.mcgv.outliers import SECTION
 from gvcodecs.mcgv.packing import Layout
@@ -109,4 +112,7 @@ def read_layout(
     if header.placement == "halves":
         groups = surface.points.pieces()[surface.point] if groups is None else groups
         return place(surface.lattice, groups, header.width, header.height, header.block)
+    if header.placement == "tiles":
+        charts = decode_charts(bitstream.section(CHARTS), surface.points.neighbours)
+        return place_charts(surface.lattice, charts[surface.point], header.width, header.height, header.block)
     return sections.decode_pixels(bitstream.section("pixels"), surface.order, header.width, header.height)

@@ -7,7 +7,7 @@ export const CODEC = "mcgv";
 export const VERSION = 2;
 export const PROFILE = "h264-8"; // the one that a browser gives back sample by sample
 const PREDICTIONS = ["blended", "affine"];
-const PLACEMENTS = ["halves", "charts"];
+const PLACEMENTS = ["halves", "charts", "tiles"];
 const MAX_SIDE = 16384;
 const LARGE = 1e39;
 const SMALL = 1e-60;
@@ -15,7 +15,7 @@ const SMALL = 1e-60;
 /**
  * @typedef {object} Header
  * @property {"blended"|"affine"} prediction how the clusters move the vertices
- * @property {"halves"|"charts"} placement how the vertices get their pixels
+ * @property {"halves"|"charts"|"tiles"} placement how the vertices get their pixels
  * @property {number} block side of the blocks of the image coder, pixels
  * @property {number} width @property {number} height of one plane, pixels
  * @property {number} clusters K @property {number} segments
@@ -70,7 +70,8 @@ export function readHeader(header) {
   if (result.width % result.block || result.height % result.block) {
     throw corrupt("header", `planes of ${result.width}x${result.height} are not whole blocks of ${result.block}`);
   }
-  if (placement === "halves" && ![8, 16].includes(result.block)) throw corrupt("header", `blocks of ${result.block} pixels`);
+  if (placement === "tiles" && prediction !== "blended") throw corrupt("header", `placement is tiles, prediction ${prediction}`);
+  if (placement !== "charts" && ![8, 16].includes(result.block)) throw corrupt("header", `blocks of ${result.block} pixels`);
   if (result.width * result.height < header.vertices) {
     throw corrupt("header", `planes of ${result.width}x${result.height} do not hold ${header.vertices} vertices`);
   }

@@ -26,20 +26,53 @@ const NONE = [0, 0, 0];
  * @returns {Uint32Array} (V) row-major index of each vertex' pixel, all distinct
  */
 export function place(points, groups, { width, height, block }) {
-  if (points.some((c) => c >= MAX_COORDINATE)) throw corrupt("mesh", "its lattice is too fine for placement by halves");
-  const n = points.length / 3;
+  checkLattice(points);
+  const order = Uint32Array.from({ length: points.length / 3 }, (_, v) => v);
+  const cells = [{ start: 0, end: order.length, x: 0, y: 0, width, height, across: NONE, down: NONE }];
   const spread = spreadGroups(points, groups);
-  const largest = spread.reduce((a, b) => Math.max(a, b), 0);
-  const shift = Math.max(0, 32 - Math.clz32(largest) - MOMENT_BITS);
-  const order = Uint32Array.from({ length: n }, (_, v) => v);
-  const pixels = new Uint32Array(n);
-  const cells = [{ start: 0, end: n, x: 0, y: 0, width, height, across: NONE, down: NONE }];
+  return fill(cells, order, spread, width, block, momentShift(spread));
+}
+
+/** Throw for points (V, 3) on too fine a lattice. */
+export function checkLattice(points) {
+  if (points.some((c) => c >= MAX_COORDINATE)) throw corrupt("mesh", "its lattice is too fine for placement by halves");
+}
+
+/**
+ * Halve cells down to single pixels.
+ *
+ * @param {object[]} cells each with vertices, no more than pixels; emptied
+ * @param {Uint32Array} order vertices, which `start` and `end` of the cells are places in; sorted
+ * @param {Int32Array} points (V, 3) all coordinates from 0, flat
+ * @param {number} width of the plane @param {number} block pixels
+ * @param {number|null} shift of moments where cells turn as their vertices do; null: they keep their directions
+ * @returns {Uint32Array} (V) pixels
+ */
+export function fill(cells, order, points, width, block, shift) {
+  const pixels = new Uint32Array(order.length);
   while (cells.length) {
     const cell = cells.pop();
-    if (cell.width > 1 || cell.height > 1) cells.push(...halve(cell, order, spread, shift, block));
+    if (cell.width > 1 || cell.height > 1) cells.push(...halve(cell, order, points, shift, block));
     else pixels[order[cell.start]] = cell.y * width + cell.x;
   }
   return pixels;
+}
+
+/** Bits that the second moments of points, from 0, do without. */
+export function momentShift(points) {
+  const largest = points.reduce((a, b) => Math.max(a, b), 0);
+  return Math.max(0, 32 - Math.clz32(largest) - MOMENT_BITS);
+}
+
+/** The direction in which vertices spread most, and the one of those at 60 degrees or more from it. */
+export function widestPair(vertices, points, shift) {
+  return pairOf(scoresOf(moments(vertices, points, shift)));
+}
+
+function pairOf(scores) {
+  const one = DIRECTIONS[firstLargest(scores)];
+  const isFar = (d) => 4 * dot(d, one) ** 2 * weight(d) * weight(one) <= COMMON ** 2;
+  return [one, DIRECTIONS[firstLargest(scores.map((score, i) => (isFar(DIRECTIONS[i]) ? score : -1)))]];
 }
 
 /** Points with groups moved apart; all coordinates from 0. */
@@ -76,7 +109,7 @@ function halve(cell, order, points, shift, block) {
   const longer = isWide ? cell.width : cell.height;
   const { across, down } = turn(cell, order, points, shift, isWide);
   sortAlong(order.subarray(cell.start, cell.end), points, isWide ? across : down);
-  const first = longer > block ? Math.floor(longer / block / 2) * block : Math.floor(longer / 2);
+  const first = longer >= 2 * block ? Math.floor(longer / block / 2) * block : Math.floor(longer / 2);
   const middle = cell.start + Math.floor((2 * (cell.end - cell.start) * first + longer) / (2 * longer));
   const cut = (start, end, offset, side) => ({
     start, end, across, down,
@@ -92,13 +125,15 @@ function halve(cell, order, points, shift, block) {
 /** A cell's directions after a look at its vertices. */
 function turn(cell, order, points, shift, isWide) {
   const { across, down } = cell;
+  if (shift === null) return { across, down };
   const isFrame = cell.width === FRAME && cell.height === FRAME;
   if (!isFrame && cell.width <= FRAME && cell.height <= FRAME) return { across, down };
   const scores = scoresOf(moments(order.subarray(cell.start, cell.end), points, shift));
-  const one = DIRECTIONS[firstLargest(scores)];
-  if (!isFrame) return isWide ? { across: towards(one, across), down } : { across, down: towards(one, down) };
-  const isFar = (d) => 4 * dot(d, one) ** 2 * weight(d) * weight(one) <= COMMON ** 2; // at 60 degrees or more from the first
-  const two = DIRECTIONS[firstLargest(scores.map((score, i) => (isFar(DIRECTIONS[i]) ? score : -1)))];
+  if (!isFrame) {
+    const one = DIRECTIONS[firstLargest(scores)];
+    return isWide ? { across: towards(one, across), down } : { across, down: towards(one, down) };
+  }
+  const [one, two] = pairOf(scores);
   const swap = likeness(two, across) + likeness(one, down) > likeness(one, across) + likeness(two, down);
   return { across: towards(swap ? two : one, across), down: towards(swap ? one : two, down) };
 }

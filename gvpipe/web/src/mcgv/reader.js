@@ -5,6 +5,8 @@ import { AGAIN, GeometryVideoError } from "../format/errors.js";
 import { Moves } from "../format/moves.js";
 import { AffineMotion } from "./affine_motion.js";
 import { BlendedMotion } from "./blended_motion.js";
+import { decodeCharts } from "./chart_coding.js";
+import { placeCharts } from "./chart_placement.js";
 import { readHeader } from "./header.js";
 import { decodeClusters, decodePixels, decodeVertexClusters } from "./layout.js";
 import { place } from "./placement.js";
@@ -82,11 +84,18 @@ function decodeMotion(payload, header, base) {
   const charts = header.placement === "charts" ? decodePixels(payload.section("pixels"), base.visits, header) : null;
   if (header.prediction === "blended") {
     const points = new Points(base.points, base.faces, base.visits);
-    const pixels = charts ?? place(base.points, points.pieces(), header);
+    const pixels = charts ?? placePoints(payload, header, base, points);
     return { pixels, motion: new BlendedMotion(payload, header, positions, points) };
   }
   const data = payload.section("clusters");
   const clusters = charts ? decodeClusters(data, charts, header) : decodeVertexClusters(data, base.visits, header);
   const pixels = charts ?? place(base.points, clusters, header);
   return { pixels, motion: new AffineMotion(payload, header, positions, clusters) };
+}
+
+/** The vertices' pixels where they follow from the base frame. */
+function placePoints(payload, header, base, points) {
+  if (header.placement === "halves") return place(base.points, points.pieces(), header);
+  const charts = decodeCharts(payload.section("charts"), points.earlierNeighbours());
+  return placeCharts(base.points, points.point.map((p) => charts[p]), header);
 }
