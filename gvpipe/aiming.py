@@ -1,6 +1,7 @@
 """From the error that a quality asks for to an encoder's step: code, measure, mend.
 
-How error follows from step is a sequence's own. The error is nearly proportional to the step, so two or three encodes do.
+How error follows from step is a sequence's own. Its logarithm is nearly a straight line over the step's, so two or
+three encodes do.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from gvpipe.sequence import MeshSequence
 
 ROUNDS = 3  # encodes at most
 MOST_MOVED = 4.0  # times, a step at once
+SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: assumed, and believed
 
 
 @dataclass(frozen=True)
@@ -46,13 +48,17 @@ def aim(
     """
     aimed_at = wanted * math.sqrt(band[0] * band[1])
     tried: list[Aimed] = []
+    slope = SLOPE
     for _ in range(ROUNDS):
         bitstream = encode(step)
-        tried.append(Aimed(bitstream, step, max(measure(bitstream), 1e-300)))
-        error = tried[-1].error
-        if band[0] <= error / wanted <= band[1]:
+        trial = Aimed(bitstream, step, max(measure(bitstream), 1e-300))
+        if tried:
+            last = tried[-1]
+            slope = min(max(math.log(trial.error / last.error) / math.log(trial.step / last.step), SLOPES[0]), SLOPES[1])
+        tried.append(trial)
+        if band[0] <= trial.error / wanted <= band[1]:
             break
-        step *= min(max(aimed_at / error, 1 / MOST_MOVED), MOST_MOVED)
+        step *= min(max((aimed_at / trial.error) ** (1 / slope), 1 / MOST_MOVED), MOST_MOVED)
     return min(tried, key=lambda trial: abs(math.log(trial.error / aimed_at)))
 
 

@@ -66,6 +66,7 @@ DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell
 GUESS = {"blended": 5.0, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
 BAND = {"blended": (0.86, 0.99), "affine": (1.0, 1.1)}  # of the error wanted: the published mode is no finer than asked
 REUSED = 1.6  # times the step, up to which a blend fitted for another serves
+PART = 250  # points of a part by motion that charts refine: xatlas takes more than ten times as long per point for all at once
 MERGED = 1 / 16  # steps that vertices of one point may be apart: far below the errors that follow
 AUTO = "auto"
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
@@ -313,8 +314,10 @@ class Mcgv(Settings):
     def _fit(self, start: _Start, wanted: float, memo: Memo, report: Progress) -> tuple[Fitted, float]:
         """A blend that leaves about a root mean square error of vertices, model units, and the step that fits it."""
         report("segment", 0)
-        motions = memo(f"motions {start.name}", lambda: Motions(start.sequence, start.base, start.points.neighbours))
-        return fit_blend(motions, start.step, self.clusters, wanted / math.sqrt(start.part))
+        return fit_blend(self._motions(start, memo), start.step, self.clusters, wanted / math.sqrt(start.part))
+
+    def _motions(self, start: _Start, memo: Memo) -> Motions:
+        return memo(f"motions {start.name}", lambda: Motions(start.sequence, start.base, start.points.neighbours))
 
     def _published(self, start: _Start, report: Progress) -> tuple[CodedMotion, Layout]:
         """The paper's partition, layout and transforms."""
@@ -339,10 +342,11 @@ class Mcgv(Settings):
         return memo(f"layout {start.name}", lambda: self._layout(start, whole, groups, report))
 
     def _charts(self, start: _Start, memo: Memo, report: Progress) -> Int64:
-        """The chart ``(P,)`` of every point, for placement by tiles."""
+        """The chart ``(P,)`` of every point, for placement by tiles; as published, charts refine a partition by motion."""
         report("parameterize", 0)
-        whole = np.zeros(start.points.n_points, np.int32)
-        return memo(f"charts {start.name}", lambda: number_charts(parameterize(start.base, start.points.faces, whole).chart))
+        n_parts = max(1, start.points.n_points // PART)
+        parts = self._motions(start, memo).clustering.start(n_parts).weights.clusters[:, 0]
+        return memo(f"charts {start.name}", lambda: number_charts(parameterize(start.base, start.points.faces, parts).chart))
 
     @property
     def _video_profile(self) -> Profile:
@@ -353,7 +357,7 @@ class Mcgv(Settings):
         """JPEG, which sees no other frame, codes the smoother images of charts for less; see docs/codecs/mcgv.md."""
         if self.placement != AUTO:
             return self.placement
-        return "halves" if self.prediction == "blended" and self.image == "h264" else "charts"
+        return "tiles" if self.prediction == "blended" and self.image == "h264" else "charts"
 
     def _layout(self, start: _Start, partition: Int32, groups: NDArray[np.integer], report: Progress) -> Layout:
         """The points' pixels: charts keep to the parts of ``partition (P,)``, the others part ``groups (P,)`` first."""
