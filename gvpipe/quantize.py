@@ -28,6 +28,12 @@ class Lattice:
         x, y, z = low.tolist()
         return cls((x, y, z), extent / (2**bits - 1) if extent > 0 else 1.0)
 
+    @classmethod
+    def spaced(cls, points: NDArray[np.floating], step: float) -> Lattice:
+        """Return the lattice of a step, model units, from the least coordinates of ``points (V, 3)`` on."""
+        x, y, z = points.min(axis=0).astype(np.float64).tolist()
+        return cls((x, y, z), step if step > 0 else 1.0)
+
     def quantise(self, points: NDArray[np.floating]) -> NDArray[np.int32]:
         """Return the nearest lattice indices, ``(V, 3) int32``."""
         return np.rint((points.astype(np.float64) - self.origin) / self.step).astype(np.int32)

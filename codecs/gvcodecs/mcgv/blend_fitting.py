@@ -39,7 +39,9 @@ LEAST_POINTS = 8  # per cluster, on average
 GROWTH = (32, 2.0), (0, 2**0.5)  # from one number tried to the next, by how many times its clusters' cost all costs
 ROUNDS = 3  # steps tried
 PICTURED = 0.45  # steps, root mean square, that pictures leave of a point's residual
-CLOSE = 0.15  # logarithm of the error left over that wanted
+AIM = 0.87  # of the error wanted, what a blend is to leave: coding adds to it
+CLOSE = 0.25  # logarithm of the error left over that
+SLOPE = 0.75  # of its logarithm over the step's
 MOST_MOVED = 3.0  # times, the step at once
 PATIENCE = 1  # numbers of clusters that may do worse than a smaller one, in a row
 CLUSTER_WORTH = 2.8  # squared steps a frame that a cluster must save
@@ -116,9 +118,9 @@ def fit_blend(motions: Motions, step: float, n_clusters: int, wanted: float = 0.
         starts = _alternate_all(problem, starts, FIRST_PASSES)
         best = min(starts, key=problem.cost)
         left = motions.error(problem, best, step)
-        if not wanted or not left > 0 or abs(math.log(wanted / left)) < CLOSE:
+        if not wanted or not left > 0 or abs(math.log(AIM * wanted / left)) < CLOSE:
             break
-        step *= min(max(wanted / left, 1 / MOST_MOVED), MOST_MOVED)
+        step *= min(max((AIM * wanted / left) ** (1 / SLOPE), 1 / MOST_MOVED), MOST_MOVED)
     return _alternate(problem, best, LAST_PASSES), step
 
 

@@ -60,8 +60,9 @@ from gvpipe.welding import find_points
 BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
 AFFINE_CLUSTERS, AFFINE_BASE_BITS = 20, 12  # the paper's
 MOST_SEGMENTS = 4000  # one section each, of the 4096 that a bitstream may have
-BASE_BITS = 8, 16  # bits of a base frame that are chosen unasked
-BASE_STEP = 1.5  # of a base frame, times step / sqrt(frames): measured, docs/codecs/mcgv.md
+BASE_BITS = 8, 16  # bits along a base frame's longest side that are chosen unasked, about
+BASE_STEP = 1.3  # of a base frame, times step / sqrt(frames): measured, docs/codecs/mcgv.md
+FINER = 2**0.25  # times, a lattice that does not
 DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell apart; the others give way
 GUESS = {"blended": 5.0, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
 BAND = {"blended": (0.86, 0.99), "affine": (1.0, 1.1)}  # of the error wanted: the published mode is no finer than asked
@@ -163,9 +164,6 @@ class Mcgv(Settings):
             return self._code(sequence, start, step, fitted, memo, report)
 
         aimed = aim(encode, measure, step, wanted, BAND[self.prediction])
-        if fitted and max(step / aimed.step, aimed.step / step) > REUSED:
-            fitted, step = self._fit(dataclasses.replace(start, step=aimed.step), 0.0, memo, report)
-            aimed = aim(encode, measure, step, wanted, BAND[self.prediction])
         return aimed, _Anchor(dataclasses.replace(start, step=aimed.step), fitted, step, aimed.error)
 
     def _code(
@@ -298,14 +296,15 @@ class Mcgv(Settings):
         if self.base_bits or self.prediction == "affine":
             return Lattice.over(first, self.base_bits or AFFINE_BASE_BITS)
         extent = float(np.ptp(first.astype(np.float64), axis=0).max())
-        bits = min(max(math.ceil(math.log2(max(extent / step, 1.0))), BASE_BITS[0]), BASE_BITS[1])
+        finest, coarsest = (extent / 2**bits for bits in reversed(BASE_BITS))
+        step = min(max(step, finest), coarsest)
         n_places = len(np.unique(first, axis=0))
-        while bits < BASE_BITS[1]:
-            lattice = Lattice.over(first, bits)
+        while step > finest:
+            lattice = Lattice.spaced(first, step)
             if len(np.unique(lattice.quantise(first), axis=0)) >= DISTINCT * n_places:
                 break
-            bits += 1
-        return Lattice.over(first, bits)
+            step = max(step / FINER, finest)
+        return Lattice.spaced(first, step)
 
     def _base_points(self, lattice: Lattice, first: Float32) -> Int32:
         """The points' first frame ``(P, 3)`` on its lattice."""
