@@ -3,18 +3,28 @@
 The meshes of a scene are joined in trimesh's traversal order, which depends on the file alone, each moved by its
 node's transform. trimesh makes one mesh per primitive, so primitives that share a vertex buffer get a copy each: more
 vertices than the file, but the same in every frame.
+
+trimesh leaves out animations, skins and morph targets without a word, so files that need them are refused here. Every skin
+is: its still pose is the joints', and to find out whether that equals the bind pose is to apply the skin. Morph targets
+whose weights are 0 move nothing, so a file of them without animations passes.
 """
 
 from __future__ import annotations
 
+import json
+import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.errors import InputError
 from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, as_positions, concatenate
 from gvpipe.sequence import Float32, Int32
+
+MAGIC = b"glTF"
+GLB_HEAD = struct.Struct("<4sIIII")  # magic, version, bytes of the file, bytes and type of the first chunk
 
 
 class GltfLoader:
@@ -24,16 +34,19 @@ class GltfLoader:
         self._is_first = True
 
     def __call__(self, path: Path) -> Mesh:
-        """Load one file; after the first, without attributes.
+        """Load one file, binary or text by its first bytes, whatever its name; after the first, without attributes.
 
         Raises:
+            InputError: the file moves, or its pose needs what is not imported.
             Exception: the file cannot be read; trimesh raises many kinds, and the caller names the file.
         """
         import trimesh
 
+        data = path.read_bytes()
+        _check_still(_parse_json(data), path)
         # trimesh drops texture coordinates together with the materials, so the first file is read with both
         scene: Any = trimesh.load_scene(
-            path, file_type=path.suffix[1:].lower(), process=False, skip_materials=not self._is_first
+            path, file_type="glb" if data.startswith(MAGIC) else "gltf", process=False, skip_materials=not self._is_first
         )
         meshes = []
         for node in scene.graph.nodes_geometry:
@@ -45,6 +58,33 @@ class GltfLoader:
             raise ValueError("it has no triangle mesh in its scene")
         self._is_first = False
         return concatenate(meshes)
+
+
+def _parse_json(data: bytes) -> dict[str, Any]:
+    """The JSON part of a binary or text file; raises `ValueError` if there is none."""
+    if data.startswith(MAGIC):
+        *_, length, _ = GLB_HEAD.unpack(data[: GLB_HEAD.size].ljust(GLB_HEAD.size, b"\0"))
+        data = data[GLB_HEAD.size : GLB_HEAD.size + length]
+    parsed = json.loads(data)
+    if not isinstance(parsed, dict):
+        raise ValueError("its JSON is not an object")
+    return parsed
+
+
+def _check_still(gltf: dict[str, Any], path: Path) -> None:
+    """Raise `InputError` unless the meshes as stored are what the file shows, at all times."""
+    nodes, meshes = gltf.get("nodes", []), gltf.get("meshes", [])
+    weights = [node.get("weights", meshes[node["mesh"]].get("weights", [])) for node in nodes if "mesh" in node]
+    n_animations = len(gltf.get("animations", []))
+    if n_animations:
+        found = f"holds {n_animations} animation{'s' * (n_animations > 1)}"
+    elif any("skin" in node for node in nodes):
+        found = "holds a skinned mesh"
+    elif any(any(own) for own in weights):
+        found = "is posed by morph targets"
+    else:
+        return
+    raise InputError(f"{path} {found}, which gvpipe does not import yet; export its frames as still files, one file per frame")
 
 
 def _place(geometry: Any, transform: NDArray[np.float64], with_attributes: bool) -> Mesh:
