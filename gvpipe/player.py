@@ -16,11 +16,13 @@ from gvpipe.codec import GroupReader, LevelReader, open_reader
 from gvpipe.container import read_file
 from gvpipe.errors import FormatError, InputError
 from gvpipe.frame_cache import FrameCache
-from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.sequence import Float32, Float64, Int32, MeshSequence
 
 
 class Player:
-    """An open geometry video: a sequence of frames, each ``(V, 3) float32``, model units. A context manager; thread-safe.
+    """An open geometry video: a sequence of frames, each ``(V, 3) float32``, model units, relative to ``origin``.
+
+    A context manager; thread-safe.
 
     ``video[k]`` decodes no more than the group of frames that frame k lies in, and keeps the last groups; frames asked for
     in a row, forwards or backwards, are decoded ahead on another thread. ``video[a:b]`` gives ``(b - a, V, 3)``.
@@ -52,6 +54,11 @@ class Player:
         return self.bitstream.fps
 
     @property
+    def origin(self) -> Float64:
+        """``(3,) float64`` to add to positions, model units: 0 unless the mesh is far from there for its size."""
+        return np.array(self.bitstream.origin)
+
+    @property
     def levels(self) -> list[int]:
         """Vertex counts of the levels of detail, the mesh itself first; one entry for codecs that have none."""
         return self._reader.levels if isinstance(self._reader, LevelReader) else [self.bitstream.n_vertices]
@@ -66,7 +73,7 @@ class Player:
             return self.sequence()
         if not isinstance(self._reader, LevelReader) or not 0 < lod < len(self.levels):
             raise InputError(f"{self.path}: no level of detail {lod}; there are levels 0..{len(self.levels) - 1}")
-        return MeshSequence(_Level(self, lod), self._reader.level_faces(lod), self.fps, name=self.path)
+        return MeshSequence(_Level(self, lod), self._reader.level_faces(lod), self.fps, name=self.path, origin=self.origin)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -75,7 +82,7 @@ class Player:
 
     def sequence(self) -> MeshSequence:
         """The video as a sequence whose frames are decoded when they are read."""
-        return MeshSequence(self, self.faces, self.fps, name=self.path)
+        return MeshSequence(self, self.faces, self.fps, name=self.path, origin=self.origin)
 
     def __len__(self) -> int:
         return self.bitstream.n_frames

@@ -2,22 +2,29 @@
 
 A `MeshSequence` has constant connectivity and moving vertices. Its positions may be an array in memory, a memory
 map or frames that load when they are read, so nothing here touches more frames than it is asked for.
+
+Positions are float32 relative to an origin in float64 (`gvpipe.origin`). Where an array in memory holds more digits than that,
+it is kept beside, so that errors are measured against what was given and not against its rounding.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.arguments import check_number, show
 from gvpipe.errors import InputError
+from gvpipe.notes import ASSUMED_FPS
+from gvpipe.origin import as_origin, choose_origin, is_rounded, narrow
 
 CHUNK_BYTES = 16 << 20  # positions handed out at a time by `chunks`: large enough to vectorise, small beside any budget
 
 Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
 Int32 = NDArray[np.int32]
 
 
@@ -35,12 +42,15 @@ class MeshSequence:
     """A triangle-mesh animation with constant connectivity.
 
     Args:
-        positions: ``(F, V, 3) float32``, model units; an array, or anything of that shape that slices by frame.
+        positions: ``(F, V, 3) float32``, model units, relative to the origin; an array, or anything of that shape that slices
+            by frame. An array of float64 is rounded, relative to an origin where float32 would lose its shape.
         faces: ``(T, 3) int32``, counter-clockwise seen from outside.
         fps: frames per second.
         attributes: static arrays by name: ``uv (V, 2)``, ``normal (V, 3)``, ``color (V, 4) uint8`` per vertex, or the
             same per corner with first dimension ``3 T``.
         name: where the sequence came from, for messages.
+        origin: ``(3,) float64``, model units: what to add to positions; 0 unless the mesh is far from there for its size.
+        notes: what a reader did that its user should know, a line each.
 
     Raises:
         InputError: a wrong shape, no frame, no vertex, an index out of range, an fps that is not a positive number, a
@@ -52,10 +62,22 @@ class MeshSequence:
     fps: float = 30.0
     attributes: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
     name: str = "sequence"
+    origin: Float64 = field(default_factory=lambda: np.zeros(3))
+    notes: tuple[str, ...] = ()
+    _exact: Frames | None = field(default=None, init=False, repr=False, compare=False)  # absolute; what float32 rounded
 
     def __post_init__(self) -> None:
-        if isinstance(self.positions, np.ndarray):
-            object.__setattr__(self, "positions", _as_positions(self.positions, self.name))
+        object.__setattr__(self, "origin", as_origin(self.origin, self.name))
+        given: Any = self.positions
+        if isinstance(given, list | tuple):
+            given = np.asarray(given)
+        if isinstance(given, np.ndarray):
+            self._narrow(given)
+        elif not hasattr(given, "shape") or not hasattr(given, "__getitem__"):
+            raise TypeError(f"positions are {show(given)}; an array of shape (frames, vertices, 3) is needed")
+        check_number(self.fps, "fps")
+        if not isinstance(self.attributes, Mapping):
+            raise TypeError(f"attributes are {show(self.attributes)}; arrays by name are needed, such as {{'uv': uv}}")
         shape = tuple(self.positions.shape)
         if len(shape) != 3 or shape[2] != 3 or shape[0] < 1 or shape[1] < 1:
             raise InputError(f"{self.name}: positions have shape {shape}; (frames >= 1, vertices >= 1, 3) is needed")
@@ -68,6 +90,15 @@ class MeshSequence:
                     f"{self.name}: attribute {key!r} has {len(values)} rows; one per vertex ({shape[1]}) or per corner "
                     f"({3 * len(self.faces)}) is needed"
                 )
+
+    def _narrow(self, positions: NDArray[np.generic]) -> None:
+        """Round an array in memory, keep it if that lost anything, and find its origin."""
+        narrowed, origin = _as_positions(positions, self.name)
+        given = self.origin
+        object.__setattr__(self, "positions", narrowed)
+        object.__setattr__(self, "origin", given + origin)
+        if narrowed.ndim == 3 and is_rounded(positions, narrowed, origin):
+            object.__setattr__(self, "_exact", _Shifted(positions, given) if given.any() else positions)
 
     @property
     def n_frames(self) -> int:
@@ -83,7 +114,7 @@ class MeshSequence:
         return self.n_frames
 
     def read(self, start: int, stop: int) -> Float32:
-        """Frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
+        """Frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units, relative to the origin.
 
         Raises:
             InputError: a position is NaN or infinite; the message names frame and vertex.
@@ -93,20 +124,55 @@ class MeshSequence:
             check_finite(block, self.name, start)
         return block
 
+    def read_exact(self, start: int, stop: int) -> Float64:
+        """The same in float64, with all digits that were given; raises `InputError`."""
+        if self._exact is None:
+            return self.read(start, stop).astype(np.float64)
+        return np.asarray(self._exact[start:stop], dtype=np.float64) - self.origin
+
+    def read_absolute(self, start: int, stop: int) -> Float64:
+        """Frames with the origin added: ``(stop - start, V, 3) float64``, model units; raises `InputError`."""
+        if self._exact is None:
+            return self.read(start, stop) + self.origin
+        return np.asarray(self._exact[start:stop], dtype=np.float64)
+
     def reordered(self, permutation: NDArray[np.integer], faces: Int32) -> MeshSequence:
         """Return the sequence whose vertex i is this one's vertex ``permutation[i]``; frames still load when read."""
-        return MeshSequence(_Permuted(self, permutation), faces, self.fps, name=self.name)
+        exact = None if self._exact is None else _Permuted(self, permutation, is_exact=True)
+        return self._derived(_Permuted(self, permutation), exact, faces=faces, attributes={})
 
     def part(self, start: int, stop: int) -> MeshSequence:
         """Return frames ``start`` to ``stop`` as a sequence; they still load when read."""
-        return MeshSequence(_Part(self, start, stop), self.faces, self.fps, name=self.name)
+        exact = None if self._exact is None else _Part(self, start, stop, is_exact=True)
+        return self._derived(_Part(self, start, stop), exact, attributes={})
+
+    def local(self) -> MeshSequence:
+        """Return the sequence with its origin left out: the same float32 positions, relative to nothing."""
+        return replace(self, origin=np.zeros(3))
+
+    def with_fps(self, fps: float) -> MeshSequence:
+        """Return the sequence at another frame rate."""
+        kept = tuple(note for note in self.notes if note != ASSUMED_FPS)
+        return self._derived(self.positions, self._exact, fps=fps, notes=kept)
+
+    def _derived(self, positions: Frames, exact: Frames | None, **changes: Any) -> MeshSequence:
+        result = replace(self, positions=positions, **changes)
+        object.__setattr__(result, "_exact", exact)
+        return result
 
     def chunks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[int, Float32]]:
         """Yield ``(first frame, (n, V, 3) float32)`` over all frames, a bounded number of bytes at a time."""
+        return ((first, self.read(first, last)) for first, last in self.spans(start, stop))
+
+    def exact_chunks(self) -> Iterator[tuple[int, Float64]]:
+        """The same, by `read_exact`."""
+        return ((first, self.read_exact(first, last)) for first, last in self.spans())
+
+    def spans(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[int, int]]:
+        """Yield ``(start, stop)`` of all frames, a bounded number of bytes at a time."""
         stop = self.n_frames if stop is None else stop
         step = max(1, CHUNK_BYTES // (12 * self.n_vertices))
-        for first in range(start, stop, step):
-            yield first, self.read(first, min(first + step, stop))
+        return ((first, min(first + step, stop)) for first in range(start, stop, step))
 
     def sample(self, most: int, vertices: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
         """Vertices of at most so many frames, evenly spaced from the first to the last: ``(n, vertices, 3)``, model units."""
@@ -115,30 +181,43 @@ class MeshSequence:
 
 
 class _Permuted:
-    """Positions of another sequence in another vertex order."""
+    """Positions of another sequence in another vertex order; exact: absolute, in float64."""
 
-    def __init__(self, sequence: MeshSequence, permutation: NDArray[np.integer]) -> None:
+    def __init__(self, sequence: MeshSequence, permutation: NDArray[np.integer], is_exact: bool = False) -> None:
         self._sequence, self._permutation = sequence, permutation
+        self._read = sequence.read_absolute if is_exact else sequence.read
 
     @property
     def shape(self) -> tuple[int, ...]:
         return (self._sequence.n_frames, len(self._permutation), 3)
 
-    def __getitem__(self, key: slice, /) -> Float32:
+    def __getitem__(self, key: slice, /) -> NDArray[np.floating]:
         start, stop, _ = key.indices(self._sequence.n_frames)
-        return self._sequence.read(start, stop)[:, self._permutation]
+        return self._read(start, stop)[:, self._permutation]
 
 
 class _Part:
-    """Some frames of another sequence."""
+    """Some frames of another sequence; exact: absolute, in float64."""
 
-    def __init__(self, sequence: MeshSequence, start: int, stop: int) -> None:
-        self._sequence, self._start = sequence, start
+    def __init__(self, sequence: MeshSequence, start: int, stop: int, is_exact: bool = False) -> None:
+        self._start = start
+        self._read = sequence.read_absolute if is_exact else sequence.read
         self.shape: tuple[int, ...] = (stop - start, sequence.n_vertices, 3)
 
-    def __getitem__(self, key: slice, /) -> Float32:
+    def __getitem__(self, key: slice, /) -> NDArray[np.floating]:
         start, stop, _ = key.indices(self.shape[0])
-        return self._sequence.read(self._start + start, self._start + stop)
+        return self._read(self._start + start, self._start + stop)
+
+
+class _Shifted:
+    """Positions given relative to an origin, absolute, in float64."""
+
+    def __init__(self, positions: NDArray[Any], origin: Float64) -> None:
+        self._positions, self._origin = positions, origin
+        self.shape: tuple[int, ...] = positions.shape
+
+    def __getitem__(self, key: slice, /) -> Float64:
+        return np.asarray(self._positions[key] + self._origin, np.float64)
 
 
 def check_finite(block: Float32, name: str, first_frame: int = 0) -> None:
@@ -153,16 +232,18 @@ def check_finite(block: Float32, name: str, first_frame: int = 0) -> None:
         )
 
 
-def _as_positions(positions: NDArray[np.generic], name: str) -> NDArray[np.float32]:
+def _as_positions(positions: NDArray[np.generic], name: str) -> tuple[Float32, Float64]:
+    """An array in memory as float32, and the origin that it is relative to."""
     if positions.dtype.kind not in "fiu":
         raise InputError(f"{name}: positions have type {positions.dtype}; numbers are needed")
+    if positions.ndim != 3 or positions.shape[2] != 3:
+        return np.asarray(positions, np.float32), np.zeros(3)  # refused with its shape
     if isinstance(positions, np.memmap) and positions.dtype == np.float32:
-        return positions  # checked as it is read, so that it need not fit in memory
-    with np.errstate(over="ignore"):
-        result = np.ascontiguousarray(positions, dtype=np.float32)
-    if result.ndim == 3:
-        check_finite(result, name)
-    return result
+        return positions, np.zeros(3)  # checked as it is read, so that it need not fit in memory
+    origin = choose_origin(positions) if positions.size else np.zeros(3)
+    result = narrow(positions, origin)
+    check_finite(result, name)
+    return result, origin
 
 
 def _as_faces(faces: NDArray[np.integer], n_vertices: int, name: str) -> Int32:

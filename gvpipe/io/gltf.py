@@ -13,15 +13,17 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe import notes
 from gvpipe.errors import InputError
-from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, as_positions, concatenate
-from gvpipe.sequence import Float32, Int32
+from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, concatenate
+from gvpipe.sequence import Float32, Float64, Int32
 
 MAGIC = b"glTF"
 GLB_HEAD = struct.Struct("<4sIIII")  # magic, version, bytes of the file, bytes and type of the first chunk
@@ -48,16 +50,18 @@ class GltfLoader:
         scene: Any = trimesh.load_scene(
             path, file_type="glb" if data.startswith(MAGIC) else "gltf", process=False, skip_materials=not self._is_first
         )
-        meshes = []
+        meshes, n_others = [], 0
         for node in scene.graph.nodes_geometry:
             transform, name = scene.graph[node]
             geometry = scene.geometry[name]
             if isinstance(geometry, trimesh.Trimesh):
                 meshes.append(_place(geometry, np.asarray(transform), self._is_first))
+            else:
+                n_others += 1
         if not meshes:
             raise ValueError("it has no triangle mesh in its scene")
         self._is_first = False
-        return concatenate(meshes)
+        return replace(concatenate(meshes), notes=notes.left_out(n_others))
 
 
 def _parse_json(data: bytes) -> dict[str, Any]:
@@ -92,10 +96,11 @@ def _place(geometry: Any, transform: NDArray[np.float64], with_attributes: bool)
     faces = as_faces(np.asarray(geometry.faces), len(positions))
     linear = transform[:3, :3]
     if not np.array_equal(transform, np.eye(4)):  # float32 positions pass exactly where nothing moves them
-        positions = positions @ linear.T + transform[:3, 3]
+        with np.errstate(invalid="ignore"):  # infinite positions are refused later
+            positions = positions @ linear.T + transform[:3, 3]
         if np.linalg.det(linear) < 0:
             faces = np.ascontiguousarray(faces[:, ::-1])  # glTF 2.0, 3.7.4: a mirroring node flips the winding
-    return Mesh(as_positions(positions), faces, _attributes(geometry, linear) if with_attributes else {})
+    return Mesh(positions, faces, _attributes(geometry, linear) if with_attributes else {})
 
 
 def _attributes(geometry: Any, linear: NDArray[np.float64]) -> Attributes:
@@ -114,12 +119,13 @@ def _attributes(geometry: Any, linear: NDArray[np.float64]) -> Attributes:
     return {name: values for name, values in attributes.items() if len(values) == len(geometry.vertices)}
 
 
-def encode_glb(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder:
+def encode_glb(faces: Int32, attributes: Attributes, n_vertices: int, origin: Float64) -> Encoder:
     """A writer of frames with these faces, texture coordinates and colours where there is one per vertex.
 
-    glTF has no corner attributes: they would need vertices split along seams, and vertex order goes first.
+    glTF has no corner attributes: they would need vertices split along seams, and vertex order goes first. Its positions are
+    float32, so an origin becomes the node's translation.
     """
-    from trimesh import Trimesh
+    from trimesh import Scene, Trimesh
     from trimesh.visual import TextureVisuals
 
     make_visual: Any = TextureVisuals
@@ -127,6 +133,9 @@ def encode_glb(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder
         values if values is not None and len(values) == n_vertices else None
         for values in (attributes.get("uv"), attributes.get("color"))
     )
+
+    place = np.eye(4)
+    place[:3, 3] = origin
 
     def encode(positions: Float32) -> bytes:
         mesh: Any = Trimesh(positions, faces, process=False, validate=False)
@@ -136,7 +145,11 @@ def encode_glb(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder
                 mesh.visual.vertex_attributes["color"] = color
         elif color is not None:
             mesh.visual.vertex_colors = color
-        exported: bytes = mesh.export(file_type="glb")
+        scene: Any = mesh
+        if origin.any():
+            scene = Scene()
+            scene.add_geometry(mesh, transform=place)
+        exported: bytes = scene.export(file_type="glb")
         return exported
 
     return encode
