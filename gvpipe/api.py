@@ -240,7 +240,7 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0)
         InputError: no such file, or the frames or the level are not in it.
         FormatError: not a geometry video, or a damaged one.
     """
-    player = open(path)
+    player = Player(path)
     start, stop = frame_range(player, start, stop)
     # positions before faces: the video decodes on other threads while the mesh does on this one
     positions = np.asarray(player.level(lod).positions[start:stop]) if lod else player[start:stop]
@@ -249,7 +249,6 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0)
 
 def open(path: StrPath) -> Player:
     """Open a geometry video for random access; see `Player`; raises TypeError for what is no path."""
-    check_path(path, "the geometry video")
     return Player(path)
 
 
@@ -260,7 +259,7 @@ def info(path: StrPath) -> Info:
         InputError: no such file.
         FormatError: not a geometry video, or a damaged one.
     """
-    player = open(path)
+    player = Player(path)
     bitstream = player.bitstream
     first = player[0]
     size = os.path.getsize(path)
@@ -304,7 +303,7 @@ def _candidates(codec: str | Codec | Sequence[Codec], settings: dict[str, Any]) 
             return [make_codec(name, settings, KEYWORDS) for name in codec_ids()]
         return make_codec(codec, settings, KEYWORDS)
     given = codec if isinstance(codec, list | tuple) else [codec]
-    if not given or not all(isinstance(one, Codec) for one in given):
+    if not given or not all(isinstance(one, Codec) and not isinstance(one, type) for one in given):
         raise TypeError(f"codec is {show(codec)}; an id such as 'mcgv', a settings object or a list of those is needed")
     if settings:
         names = ", ".join(settings)

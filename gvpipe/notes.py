@@ -6,7 +6,7 @@ them. The library itself never prints.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +53,6 @@ def origin_left_out(origin: Sequence[float]) -> str:
     return f"positions are relative to {show_origin(origin)}, which was left out"
 
 
-def show_origin(origin: Sequence[float]) -> str:
+def show_origin(origin: Iterable[float]) -> str:
     """``5200001, 0, -500000``."""
     return ", ".join(f"{x:.17g}" for x in origin)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import operator
 import os
 import threading
@@ -11,12 +12,13 @@ from typing import overload
 
 import numpy as np
 
+from gvpipe.arguments import check_path
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import GroupReader, LevelReader, open_reader
 from gvpipe.container import read_file
 from gvpipe.errors import FormatError, InputError
 from gvpipe.frame_cache import FrameCache
-from gvpipe.sequence import Float32, Float64, Int32, MeshSequence
+from gvpipe.sequence import Float32, Float64, Int32, MeshSequence, describe
 
 
 class Player:
@@ -33,6 +35,7 @@ class Player:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
+        check_path(path, "the geometry video")
         self.path = os.fspath(path)
         self.bitstream: Bitstream = read_file(path)
         try:
@@ -105,6 +108,23 @@ class Player:
 
     def __iter__(self) -> Iterator[Float32]:
         return (self[i] for i in range(len(self)))
+
+    def __repr__(self) -> str:
+        return f"<Player {self.path}: codec {self.bitstream.codec}, {describe(self.sequence())}>"
+
+    def _repr_html_(self) -> str:
+        from gvpipe.notebook import card, numbers_of
+
+        sequence = self.sequence()
+        numbers = numbers_of(sequence)
+        if len(self.levels) > 1:
+            numbers["levels of detail"] = ", ".join(map(str, self.levels))
+        with contextlib.suppress(OSError):  # the file may be gone: what was read of it stays usable
+            size = os.path.getsize(self.path)
+            n_samples = self.bitstream.n_vertices * len(self)
+            numbers["size"] = f"{size} bytes, {8 * size / n_samples:.3f} bits per vertex and frame"
+        numbers["codec"] = f"{self.bitstream.codec} version {self.bitstream.version}"
+        return card(self.path, numbers, sequence)
 
     def __enter__(self) -> Player:
         return self

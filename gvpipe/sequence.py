@@ -9,6 +9,7 @@ it is kept beside, so that errors are measured against what was given and not ag
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from gvpipe.arguments import check_number, show
 from gvpipe.errors import InputError
-from gvpipe.notes import ASSUMED_FPS
+from gvpipe.notes import ASSUMED_FPS, show_origin
 from gvpipe.origin import as_origin, choose_origin, is_rounded, narrow
 
 CHUNK_BYTES = 16 << 20  # positions handed out at a time by `chunks`: large enough to vectorise, small beside any budget
@@ -37,9 +38,12 @@ class Frames(Protocol):
     def __getitem__(self, key: slice, /) -> NDArray[np.floating]: ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class MeshSequence:
     """A triangle-mesh animation with constant connectivity.
+
+    It slices by frame as `gvpipe.Player` does: ``sequence[3]`` is ``(V, 3) float32``, ``sequence[2:5]`` is ``(3, V, 3)``, both
+    relative to the origin; `part` makes a sequence of some frames.
 
     Args:
         positions: ``(F, V, 3) float32``, model units, relative to the origin; an array, or anything of that shape that slices
@@ -110,8 +114,38 @@ class MeshSequence:
         """V, the number of vertices."""
         return int(self.positions.shape[1])
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """``(F, V, 3)``."""
+        return (self.n_frames, self.n_vertices, 3)
+
     def __len__(self) -> int:
         return self.n_frames
+
+    def __getitem__(self, key: int | slice, /) -> Float32:
+        if not isinstance(key, slice):
+            index = operator.index(key)
+            if not -len(self) <= index < len(self):
+                raise IndexError(f"frame {index} of {self.name}: there are {len(self)}")
+            frame: Float32 = self.read(index % len(self), index % len(self) + 1)[0]
+            return frame
+        start, stop, step = key.indices(len(self))
+        if step == 1:
+            return self.read(start, max(start, stop))
+        frames = [self[i] for i in range(start, stop, step)]
+        return np.stack(frames) if frames else self.read(0, 0)
+
+    def __iter__(self) -> Iterator[Float32]:
+        for _, block in self.chunks():
+            yield from block
+
+    def __repr__(self) -> str:
+        return f"<MeshSequence {self.name}: {describe(self)}>"
+
+    def _repr_html_(self) -> str:
+        from gvpipe.notebook import card, numbers_of
+
+        return card(self.name, numbers_of(self), self)
 
     def read(self, start: int, stop: int) -> Float32:
         """Frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units, relative to the origin.
@@ -180,6 +214,15 @@ class MeshSequence:
         return np.concatenate([self.read(i, i + 1)[:, vertices] for i in picked]).astype(np.float64)
 
 
+def describe(sequence: MeshSequence) -> str:
+    """``24 frames of 300 vertices, 596 triangles, 30 fps``."""
+    parts = [f"{sequence.n_frames} frames of {sequence.n_vertices} vertices", f"{len(sequence.faces)} triangles"]
+    parts.append(f"{sequence.fps:g} fps")
+    if sequence.origin.any():
+        parts.append(f"origin ({show_origin(sequence.origin)})")
+    return ", ".join(parts)
+
+
 class _Permuted:
     """Positions of another sequence in another vertex order; exact: absolute, in float64."""
 
@@ -246,8 +289,10 @@ def _as_positions(positions: NDArray[np.generic], name: str) -> tuple[Float32, F
     return result, origin
 
 
-def _as_faces(faces: NDArray[np.integer], n_vertices: int, name: str) -> Int32:
-    faces = np.asarray(faces)
+def _as_faces(given: Any, n_vertices: int, name: str) -> Int32:
+    if isinstance(given, str | bytes) or given is None:
+        raise TypeError(f"faces are {show(given)}; an array of shape (triangles, 3) is needed")
+    faces = np.asarray(given)
     if faces.size == 0:
         faces = np.zeros((0, 3), np.int32)
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
