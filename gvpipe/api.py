@@ -215,6 +215,7 @@ def encode(
     bitstream = dataclasses.replace(bitstream, origin=(x, y, z))
     size = write_file(bitstream, path, choice.trials.check if choice else None)
     clock("", 1.0)
+    noticed += notes.rounded(sequence.rounding, frame_diagonal(sequence))
     return Report(
         codec=chosen.id,
         settings=dataclasses.asdict(cast("DataclassInstance", chosen)),

@@ -31,7 +31,7 @@ VIDEO_SUFFIXES = (".mp4", ".m4v")
 def main() -> None:
     """Run the command line and exit."""
     try:
-        status = cli(standalone_mode=False)
+        status = cli(standalone_mode=False, prog_name="gvpipe")
     except GvpipeError as exc:
         status = _fail(_one_line(exc), 1)
     except click.UsageError as exc:

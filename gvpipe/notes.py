@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+ROUNDED = 1e-5  # part of the diagonal: what float32 may round without a word
 DEFAULT_FPS = 30.0
 ASSUMED_FPS = f"the input has no frame rate; {DEFAULT_FPS:g} frames per second were assumed (fps, --fps)"
 
@@ -41,6 +42,14 @@ def given_order(count: int) -> str:
 def loose_bound(bound: float, diagonal: float) -> str:
     """Of a largest error that allows everything."""
     return f"the largest error allowed, {bound:g}, is larger than the object, whose diagonal is {diagonal:g}"
+
+
+def rounded(rounding: float, diagonal: float) -> tuple[str, ...]:
+    """Of positions that reach so far, for the object's size, that float32 deforms it even from the best origin."""
+    if not rounding > ROUNDED * diagonal > 0:
+        return ()
+    part = f"{100 * rounding / diagonal:.2g} % of the object's diagonal"
+    return (f"positions reach so far from the first frame's that float32 rounds them by up to {rounding:.2g}, {part}",)
 
 
 def not_carried(names: Sequence[str]) -> tuple[str, ...]:

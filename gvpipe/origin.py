@@ -61,12 +61,12 @@ def narrow(positions: NDArray[np.generic], origin: Float64) -> Float32:
     return result
 
 
-def is_rounded(positions: NDArray[np.generic], narrowed: Float32, origin: Float64) -> bool:
-    """Whether ``narrowed`` differs from the positions, both ``(F, V, 3)``, that it was made of."""
+def rounding(positions: NDArray[np.generic], narrowed: Float32, origin: Float64) -> float:
+    """By how much, along an axis, ``narrowed`` differs at most from the positions ``(F, V, 3)`` that it was made of."""
     if positions.dtype.kind == "f" and positions.dtype.itemsize <= 4:
-        return False
+        return 0.0
     pairs = zip(_blocks(positions), _blocks(narrowed), strict=True)
-    return not all(np.array_equal(block.astype(np.float64) - origin, short) for block, short in pairs)
+    return max((float(np.abs(block.astype(np.float64) - origin - short).max(initial=0)) for block, short in pairs), default=0.0)
 
 
 def as_origin(values: object, name: str) -> Float64:

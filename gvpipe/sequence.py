@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from gvpipe.arguments import check_number, show
 from gvpipe.errors import InputError
 from gvpipe.notes import ASSUMED_FPS, show_origin
-from gvpipe.origin import as_origin, choose_origin, is_rounded, narrow
+from gvpipe.origin import as_origin, choose_origin, narrow, rounding
 
 CHUNK_BYTES = 16 << 20  # positions handed out at a time by `chunks`: large enough to vectorise, small beside any budget
 
@@ -68,7 +68,8 @@ class MeshSequence:
     name: str = "sequence"
     origin: Float64 = field(default_factory=lambda: np.zeros(3))
     notes: tuple[str, ...] = ()
-    _exact: Frames | None = field(default=None, init=False, repr=False, compare=False)  # absolute; what float32 rounded
+    _exact: Frames | None = field(default=None, init=False)  # absolute; what float32 rounded
+    _rounding: float = field(default=0.0, init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "origin", as_origin(self.origin, self.name))
@@ -101,8 +102,10 @@ class MeshSequence:
         given = self.origin
         object.__setattr__(self, "positions", narrowed)
         object.__setattr__(self, "origin", given + origin)
-        if narrowed.ndim == 3 and is_rounded(positions, narrowed, origin):
+        lost = rounding(positions, narrowed, origin) if narrowed.ndim == 3 else 0.0
+        if lost:
             object.__setattr__(self, "_exact", _Shifted(positions, given) if given.any() else positions)
+            object.__setattr__(self, "_rounding", lost)
 
     @property
     def n_frames(self) -> int:
@@ -170,6 +173,11 @@ class MeshSequence:
             return self.read(start, stop) + self.origin
         return np.asarray(self._exact[start:stop], dtype=np.float64)
 
+    @property
+    def rounding(self) -> float:
+        """By how much float32 moved a coordinate at most, model units; for frames that load later, so far as they did."""
+        return max(self._rounding, float(getattr(self.positions, "rounding", 0.0)))
+
     def reordered(self, permutation: NDArray[np.integer], faces: Int32) -> MeshSequence:
         """Return the sequence whose vertex i is this one's vertex ``permutation[i]``; frames still load when read."""
         exact = None if self._exact is None else _Permuted(self, permutation, is_exact=True)
@@ -192,6 +200,7 @@ class MeshSequence:
     def _derived(self, positions: Frames, exact: Frames | None, **changes: Any) -> MeshSequence:
         result = replace(self, positions=positions, **changes)
         object.__setattr__(result, "_exact", exact)
+        object.__setattr__(result, "_rounding", self._rounding)
         return result
 
     def chunks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[int, Float32]]:

@@ -327,3 +327,16 @@ def test_unexpected_errors(run: Run, video: Path, monkeypatch: pytest.MonkeyPatc
     assert ended.status == 1 and ended.err == "Error: unexpected ZeroDivisionError: of all; report what --verbose prints\n"
     told = run("info", video, "--verbose")
     assert told.status == 1 and "Traceback" in told.err and told.err.endswith(ended.err)
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shell_completion(shell: str, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The lines that docs/cli.md shows give a script, which asks for words that are commands and options."""
+    assert f"_GVPIPE_COMPLETE={shell}_source gvpipe" in (Path(__file__).parents[1] / "docs" / "cli.md").read_text()
+    monkeypatch.setenv("_GVPIPE_COMPLETE", f"{shell}_source")
+    assert f"_GVPIPE_COMPLETE={shell}_complete" in run().out
+    monkeypatch.setenv("_GVPIPE_COMPLETE", f"{shell}_complete")
+    for words, expected in (("gvpipe enc", "encode"), ("gvpipe decode --lo", "--local")):
+        monkeypatch.setenv("COMP_WORDS", words)
+        monkeypatch.setenv("COMP_CWORD", words.split()[-1] if shell == "fish" else str(len(words.split()) - 1))
+        assert expected in run().out

@@ -239,6 +239,21 @@ def test_text_frames_have_one(run: Run, tmp_path: Path) -> None:
     assert np.abs(read.read(0, 4) + read.origin - np.stack(frames)).max() < 2e-7
 
 
+def test_what_no_origin_can_save_is_told(tmp_path: Path) -> None:
+    """An object that flies a million times its size: in memory and as frame files."""
+    points, faces = grid(5)
+    flight = np.stack([points + np.array([0.3e6 * i + 0.001, 0, 0]) for i in range(4)])
+    in_memory = MeshSequence(flight, faces)
+    (tmp_path / "f").mkdir()
+    tail = "".join("f {} {} {}\n".format(*(face + 1)) for face in faces)
+    for i, frame in enumerate(flight):
+        (tmp_path / "f" / f"{i}.obj").write_text("".join("v {!r} {!r} {!r}\n".format(*row) for row in frame.tolist()) + tail)
+    for source in (in_memory, gvpipe.read(tmp_path / "f", 30.0)):
+        (note,) = gvpipe.encode(source, tmp_path / "o.mp4", "pca").notes
+        assert note.startswith("positions reach so far from the first frame's that float32 rounds them by up to 0.0")
+    assert gvpipe.encode(sheet(FAR), tmp_path / "o.mp4", "pca").notes == []
+
+
 # the bytes
 
 

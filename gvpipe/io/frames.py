@@ -18,7 +18,7 @@ from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.mesh import Loader, Mesh
 from gvpipe.io.spool import Spool
 from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS, given_order
-from gvpipe.origin import choose_origin, narrow
+from gvpipe.origin import choose_origin, narrow, rounding
 from gvpipe.sequence import Float32, Float64, MeshSequence, check_finite
 
 
@@ -40,7 +40,8 @@ class FrameFiles:
         self._loader: Loader = FRAME_FORMATS[self._paths[0].suffix.lower()].loader()
         self.first: Mesh = load_mesh(self._loader, self._paths[0], 0)
         self.origin: Float64 = choose_origin(self.first.positions[None])
-        positions = narrow(self.first.positions[None], self.origin)[0]
+        self.rounding = 0.0  # what float32 moved a coordinate by at most, model units, in the frames loaded so far
+        positions = self._narrow(self.first)
         self._spool = Spool(len(self._paths), positions.nbytes)
         self._spool.store(0, positions)
 
@@ -80,8 +81,13 @@ class FrameFiles:
                     f"but {self.first.faces[at].tolist()} in {first_path.name}; "
                     "all frames need the same triangles in the same order"
                 )
-        positions: Float32 = narrow(mesh.positions[None], self.origin)[0]
-        return positions
+        return self._narrow(mesh)
+
+    def _narrow(self, mesh: Mesh) -> Float32:
+        positions = narrow(mesh.positions[None], self.origin)
+        self.rounding = max(self.rounding, rounding(mesh.positions[None], positions, self.origin))
+        result: Float32 = positions[0]
+        return result
 
 
 def load_mesh(loader: Loader, path: Path, frame: int) -> Mesh:
