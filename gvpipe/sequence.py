@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from gvpipe.arguments import check_number, show
 from gvpipe.errors import InputError
+from gvpipe.frame_views import Part, Permuted, Shifted
 from gvpipe.notes import ASSUMED_FPS, show_origin
 from gvpipe.origin import as_origin, choose_origin, narrow, rounding
 
@@ -47,7 +48,8 @@ class MeshSequence:
 
     Args:
         positions: ``(F, V, 3) float32``, model units, relative to the origin; an array, or anything of that shape that slices
-            by frame. An array of float64 is rounded, relative to an origin where float32 would lose its shape.
+            by frame. An array of float64 is rounded, relative to an origin where float32 would lose its shape; it is kept
+            to measure errors against, so it must not change afterwards.
         faces: ``(T, 3) int32``, counter-clockwise seen from outside.
         fps: frames per second.
         attributes: static arrays by name: ``uv (V, 2)``, ``normal (V, 3)``, ``color (V, 4) uint8`` per vertex, or the
@@ -104,7 +106,7 @@ class MeshSequence:
         object.__setattr__(self, "origin", given + origin)
         lost = rounding(positions, narrowed, origin) if narrowed.ndim == 3 else 0.0
         if lost:
-            object.__setattr__(self, "_exact", _Shifted(positions, given) if given.any() else positions)
+            object.__setattr__(self, "_exact", Shifted(positions, given) if given.any() else positions)
             object.__setattr__(self, "_rounding", lost)
 
     @property
@@ -180,13 +182,14 @@ class MeshSequence:
 
     def reordered(self, permutation: NDArray[np.integer], faces: Int32) -> MeshSequence:
         """Return the sequence whose vertex i is this one's vertex ``permutation[i]``; frames still load when read."""
-        exact = None if self._exact is None else _Permuted(self, permutation, is_exact=True)
-        return self._derived(_Permuted(self, permutation), exact, faces=faces, attributes={})
+        exact = None if self._exact is None else Permuted(self.read_absolute, len(self), permutation)
+        return self._derived(Permuted(self.read, len(self), permutation), exact, faces=faces, attributes={})
 
     def part(self, start: int, stop: int) -> MeshSequence:
         """Return frames ``start`` to ``stop`` as a sequence; they still load when read."""
-        exact = None if self._exact is None else _Part(self, start, stop, is_exact=True)
-        return self._derived(_Part(self, start, stop), exact, attributes={})
+        size = stop - start, self.n_vertices
+        exact = None if self._exact is None else Part(self.read_absolute, start, *size)
+        return self._derived(Part(self.read, start, *size), exact, attributes={})
 
     def local(self) -> MeshSequence:
         """Return the sequence with its origin left out: the same float32 positions, relative to nothing."""
@@ -230,46 +233,6 @@ def describe(sequence: MeshSequence) -> str:
     if sequence.origin.any():
         parts.append(f"origin ({show_origin(sequence.origin)})")
     return ", ".join(parts)
-
-
-class _Permuted:
-    """Positions of another sequence in another vertex order; exact: absolute, in float64."""
-
-    def __init__(self, sequence: MeshSequence, permutation: NDArray[np.integer], is_exact: bool = False) -> None:
-        self._sequence, self._permutation = sequence, permutation
-        self._read = sequence.read_absolute if is_exact else sequence.read
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return (self._sequence.n_frames, len(self._permutation), 3)
-
-    def __getitem__(self, key: slice, /) -> NDArray[np.floating]:
-        start, stop, _ = key.indices(self._sequence.n_frames)
-        return self._read(start, stop)[:, self._permutation]
-
-
-class _Part:
-    """Some frames of another sequence; exact: absolute, in float64."""
-
-    def __init__(self, sequence: MeshSequence, start: int, stop: int, is_exact: bool = False) -> None:
-        self._start = start
-        self._read = sequence.read_absolute if is_exact else sequence.read
-        self.shape: tuple[int, ...] = (stop - start, sequence.n_vertices, 3)
-
-    def __getitem__(self, key: slice, /) -> NDArray[np.floating]:
-        start, stop, _ = key.indices(self.shape[0])
-        return self._read(self._start + start, self._start + stop)
-
-
-class _Shifted:
-    """Positions given relative to an origin, absolute, in float64."""
-
-    def __init__(self, positions: NDArray[Any], origin: Float64) -> None:
-        self._positions, self._origin = positions, origin
-        self.shape: tuple[int, ...] = positions.shape
-
-    def __getitem__(self, key: slice, /) -> Float64:
-        return np.asarray(self._positions[key] + self._origin, np.float64)
 
 
 def check_finite(block: Float32, name: str, first_frame: int = 0) -> None:

@@ -6,9 +6,6 @@ not clearly one series without gaps is refused: a sequence put together wrongly 
 
 A list is what a shell makes of a glob, sorted as text. So it is ordered like the glob, gaps refused, if its names are one
 numbered series; if they are not, or a file occurs twice, someone chose the order, and it is kept.
-
-A hyphen before a number is a minus sign behind ``_``, ``.`` or nothing (``f_-5``). Elsewhere (``f-5``) it is one if only that
-makes the names one series, as where ``f0`` is among them. It separates otherwise.
 """
 
 from __future__ import annotations
@@ -24,12 +21,10 @@ from pathlib import Path
 from gvpipe import notes
 from gvpipe.errors import InputError
 from gvpipe.io.formats import FRAME_FORMATS, format_names
+from gvpipe.io.numbering import is_number, name_parts, natural_key, shape, signed_rows, stem_parts, varying
 from gvpipe.io.pattern import Pattern, match_pattern
 
 GLOB_CHARACTERS = "*?["
-UNSIGNED = re.compile(r"([0-9]+)")
-CLEARLY_SIGNED = re.compile(r"((?:(?<=[_./\\])-|^-)?[0-9]+)")
-SIGNED = re.compile(r"((?:(?<![0-9])-)?[0-9]+)")
 LISTED = 3  # gaps, series and names spelt out in a message before it says "and more"
 
 
@@ -74,10 +69,10 @@ def order_list(files: Sequence[Path]) -> tuple[list[Path], bool]:
 
 def sibling_note(path: Path) -> tuple[str, ...]:
     """What to say of a single file beside which others lie that differ in a number alone."""
-    parts = _stem_parts(Path(path.name))
+    parts = stem_parts(Path(path.name))
     others = [file.name for file in _list_folder(path.parent)]
     for i in reversed(range(len(parts))):
-        if not _is_number(parts[i]):
+        if not is_number(parts[i]):
             continue
         width = len(parts[i]) if parts[i].startswith("0") else 0
         pattern = Pattern("".join(parts[:i]), "".join(parts[i + 1 :]) + path.suffix, width)
@@ -86,24 +81,6 @@ def sibling_note(path: Path) -> tuple[str, ...]:
             mark = f"%0{width}d" if width > 1 else "%d"
             return (notes.one_of_many(path.name, count, str(path.parent / (pattern.before + mark + pattern.after))),)
     return ()
-
-
-def natural_key(name: str) -> tuple[list[tuple[int, int, str]], str]:
-    """Sort key that compares numbers in names as numbers: ``a2 < a10``, ``a < a1 < b``."""
-    return _row_key(_parts(name)), name
-
-
-def _row_key(row: Sequence[str]) -> list[tuple[int, int, str]]:
-    return [(0, int(part), "") if _is_number(part) else (1, 0, part.casefold()) for part in row]
-
-
-def _parts(name: str, numbers: re.Pattern[str] = UNSIGNED) -> list[str]:
-    """A name as text and numbers in turn, without empty parts: ``a12_b -> ["a", "12", "_b"]``."""
-    return [part for part in numbers.split(name) if part]
-
-
-def _is_number(part: str) -> bool:
-    return part[-1] in "0123456789"
 
 
 def _list_folder(folder: Path) -> list[Path]:
@@ -151,55 +128,30 @@ def _find_pattern(path: Path, pattern: Pattern) -> list[Path]:
 
 def _order(files: list[Path], path: str) -> list[Path]:
     """Files in frame order, checked to be one series without gaps."""
-    files = sorted(files, key=lambda file: natural_key(str(file)))
     if len(files) == 1 or not any(re.search(r"[0-9]", file.stem) for file in files):
-        return files  # a.obj, b.obj: nothing to count
-    files, rows = _signed_rows(files)
-    by_shape = _group(files, [_shape(row) for row in rows])
+        return sorted(files, key=lambda file: natural_key(str(file)))  # a.obj, b.obj: nothing to count
+    files, rows = signed_rows(files)
+    by_shape = _group(files, [shape(row) for row in rows])
     if len(by_shape) > 1:
         raise _several_series(path, by_shape)
-    varying = _varying(rows)
-    if not varying:  # frame1.obj and frame01.obj
+    numbers = varying(rows)
+    if not numbers:  # frame1.obj and frame01.obj
         raise _same_number(files[0], files[1])
-    series = _group(files, [tuple(int(row[i]) for i in varying[:-1]) for row in rows])
+    series = _group(files, [tuple(int(row[i]) for i in numbers[:-1]) for row in rows])
     if len(series) == len(files):
         return files  # several numbers, no two files alike in all but the last: dates and times, not a count
     if len(series) > 1:
         raise _several_series(path, series)
-    digits = [row[varying[-1]] for row in rows]
+    digits = [row[numbers[-1]] for row in rows]
     _check_gaps(files, [int(text) for text in digits], digits)
     return files
 
 
 def _is_one_series(files: Sequence[Path]) -> bool:
     """Whether `_order` takes the files for one series, gaps aside."""
-    _, rows = _signed_rows(files)
-    varying = _varying(rows) if len({_shape(row) for row in rows}) == 1 else []
-    return bool(varying) and len({tuple(int(row[i]) for i in varying[:-1]) for row in rows}) in (1, len(files))
-
-
-def _signed_rows(files: Sequence[Path]) -> tuple[list[Path], list[list[str]]]:
-    """The files in order and their names' parts, hyphens taken for minus signs where they must be."""
-    rows = [_stem_parts(file, CLEARLY_SIGNED) for file in files]
-    if len({_shape(row) for row in rows}) > 1:
-        signed = [_stem_parts(file, SIGNED) for file in files]
-        rows = signed if len({_shape(row) for row in signed}) == 1 else [_stem_parts(file) for file in files]
-    ordered = sorted(zip(files, rows, strict=True), key=lambda pair: (_row_key(pair[1]), str(pair[0])))
-    return [file for file, _ in ordered], [row for _, row in ordered]
-
-
-def _shape(row: Sequence[str]) -> str:
-    return "".join("#" if _is_number(part) else part for part in row)
-
-
-def _stem_parts(file: Path, numbers: re.Pattern[str] = UNSIGNED) -> list[str]:
-    return _parts(str(file.with_suffix("")), numbers)
-
-
-def _varying(rows: Sequence[list[str]]) -> list[int]:
-    """Where rows of equal shape hold different numbers."""
-    columns = enumerate(zip(*rows, strict=True))
-    return [i for i, column in columns if _is_number(column[0]) and len(set(map(int, column))) > 1]
+    _, rows = signed_rows(files)
+    numbers = varying(rows) if len(set(map(shape, rows))) == 1 else []
+    return bool(numbers) and len({tuple(int(row[i]) for i in numbers[:-1]) for row in rows}) in (1, len(files))
 
 
 def _group(files: Sequence[Path], keys: Sequence[Hashable]) -> list[list[Path]]:
@@ -213,8 +165,8 @@ def _group(files: Sequence[Path], keys: Sequence[Hashable]) -> list[list[Path]]:
 def _several_series(path: str, series: Sequence[list[Path]]) -> InputError:
     listed = ", ".join(f"{Path(_abstract(files, '#')).name} ({len(files)})" for files in series[:LISTED])
     more = f" and {len(series) - LISTED} more" if len(series) > LISTED else ""
-    first = _stem_parts(series[0][0])
-    number = next((part for part in reversed(first) if _is_number(part)), "")
+    first = stem_parts(series[0][0])
+    number = next((part for part in reversed(first) if is_number(part)), "")
     mark = f"%0{len(number)}d" if number.startswith("0") and len(number) > 1 else "%d"
     choice = _abstract(series[0], mark)
     return InputError(f"{path}: {len(series)} series of files, {listed}{more}; choose one, such as '{choice}'")
@@ -222,9 +174,9 @@ def _several_series(path: str, series: Sequence[list[Path]]) -> InputError:
 
 def _abstract(files: Sequence[Path], mark: str) -> str:
     """The path that the files of one series share, with a mark for the frame number."""
-    rows = [_stem_parts(file) for file in files]
-    numbers = _varying(rows) or [i for i, part in enumerate(rows[0]) if _is_number(part)]
-    name_starts = len(_parts(str(files[0].parent)))
+    rows = [stem_parts(file) for file in files]
+    numbers = varying(rows) or [i for i, part in enumerate(rows[0]) if is_number(part)]
+    name_starts = len(name_parts(str(files[0].parent)))
     numbers = [i for i in numbers if i >= name_starts]
     if numbers:
         rows[0][numbers[-1]] = mark
