@@ -195,8 +195,8 @@ def encode(
     noticed = list(sequence.notes)
     clock = _StageClock(progress)
     target = wanted and Target(wanted[0], parse_bound(wanted[1], sequence) if wanted[0] == "max" else cast("float", wanted[1]))
-    if target and target.measure == "max" and target.value > frame_diagonal(sequence):
-        noticed.append(notes.loose_bound(target.value, frame_diagonal(sequence)))
+    if target and target.measure == "max":
+        noticed += notes.loose_bound(target.value, frame_diagonal(sequence))
     not_carried = sorted(sequence.attributes)
     choice = None
     if not isinstance(candidates, Codec):

@@ -39,9 +39,11 @@ def given_order(count: int) -> str:
     return f"the names of the {count} files are not one numbered series; they are frames in the order given"
 
 
-def loose_bound(bound: float, diagonal: float) -> str:
+def loose_bound(bound: float, diagonal: float) -> tuple[str, ...]:
     """Of a largest error that allows everything."""
-    return f"the largest error allowed, {bound:g}, is larger than the object, whose diagonal is {diagonal:g}"
+    if not bound > diagonal > 0:
+        return ()
+    return (f"the largest error allowed, {bound:g}, is larger than the object, whose diagonal is {diagonal:g}",)
 
 
 def rounded(rounding: float, diagonal: float) -> tuple[str, ...]:

@@ -83,6 +83,7 @@ class MeshSequence:
         elif not hasattr(given, "shape") or not hasattr(given, "__getitem__"):
             raise TypeError(f"positions are {show(given)}; an array of shape (frames, vertices, 3) is needed")
         check_number(self.fps, "fps")
+        object.__setattr__(self, "fps", float(self.fps))
         if not isinstance(self.attributes, Mapping):
             raise TypeError(f"attributes are {show(self.attributes)}; arrays by name are needed, such as {{'uv': uv}}")
         shape = tuple(self.positions.shape)

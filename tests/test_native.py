@@ -100,6 +100,11 @@ def test_sequences_are_values_that_move(sequence: MeshSequence) -> None:
         assert np.array_equal(same[:], sequence[:]) and same != sequence and len({same, sequence}) == 2
 
 
+def test_numbers_of_numpy_are_numbers(sequence: MeshSequence, tmp_path: Path) -> None:
+    made = MeshSequence(sequence.positions, sequence.faces, np.float32(24))  # type: ignore[arg-type]
+    assert gvpipe.encode(made, tmp_path / "o.mp4", preset="ultrafast", clusters=3).fps == 24.0 and type(made.fps) is float
+
+
 def test_a_list_is_an_array() -> None:
     assert MeshSequence([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], [[0, 1, 2]]).shape == (1, 3, 3)  # type: ignore[arg-type]
 

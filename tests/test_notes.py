@@ -181,6 +181,8 @@ def test_lists_that_cannot_be_used(run: Run, walk: Path, tmp_path: Path) -> None
     for arguments in ((f1, f2), (f1, f2, f4, tmp_path / "out.npz"), (f1, "-", tmp_path / "o.mp4")):
         ended = run("encode", *arguments)
         assert ended.status == (1 if len(arguments) == 2 else 2) and not (tmp_path / "o.mp4").exists()
+    with pytest.raises(InputError, match="list of frame files is empty"):
+        gvpipe.read([])
     (tmp_path / "o.mp4").write_bytes(b"old")
     assert "input too" in run("encode", f1, tmp_path / "o.mp4", tmp_path / "o.mp4").err
 

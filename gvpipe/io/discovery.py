@@ -56,6 +56,8 @@ def order_list(files: Sequence[Path]) -> tuple[list[Path], bool]:
     Raises:
         InputError: a file that is not there, several formats, or gaps in what is one series.
     """
+    if not files:
+        raise InputError("the list of frame files is empty; give at least one")
     for file in files:
         if os.path.isdir(file):
             raise InputError(f"{file} is a folder among {len(files)} inputs; give one folder, or frame files")
