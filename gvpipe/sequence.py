@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from gvpipe.arguments import check_number, show
 from gvpipe.errors import InputError
-from gvpipe.frame_views import Part, Permuted, Shifted
+from gvpipe.frame_views import Narrowed, Part, Permuted, Shifted
 from gvpipe.notes import ASSUMED_FPS, show_origin
 from gvpipe.origin import as_origin, choose_origin, narrow, rounding
 
@@ -48,8 +48,8 @@ class MeshSequence:
 
     Args:
         positions: ``(F, V, 3) float32``, model units, relative to the origin; an array, or anything of that shape that slices
-            by frame. An array of float64 is rounded, relative to an origin where float32 would lose its shape; it is kept
-            to measure errors against, so it must not change afterwards.
+            by frame. An array or dataset of float64 is rounded, relative to an origin where float32 would lose its shape;
+            it is kept to measure errors against, so it must not change afterwards.
         faces: ``(T, 3) int32``, counter-clockwise seen from outside.
         fps: frames per second.
         attributes: static arrays by name: ``uv (V, 2)``, ``normal (V, 3)``, ``color (V, 4) uint8`` per vertex, or the
@@ -82,6 +82,8 @@ class MeshSequence:
             self._narrow(given)
         elif not hasattr(given, "shape") or not hasattr(given, "__getitem__"):
             raise TypeError(f"positions are {show(given)}; an array of shape (frames, vertices, 3) is needed")
+        elif getattr(given, "dtype", None) == np.float64 and len(given.shape) == 3 and min(given.shape) > 0:
+            self._narrow_lazily(given)
         check_number(self.fps, "fps")
         object.__setattr__(self, "fps", float(self.fps))
         if not isinstance(self.attributes, Mapping):
@@ -99,7 +101,7 @@ class MeshSequence:
                     f"({3 * len(self.faces)}) is needed"
                 )
 
-    def _narrow(self, positions: NDArray[np.generic]) -> None:
+    def _narrow(self, positions: NDArray[Any]) -> None:
         """Round an array in memory, keep it if that lost anything, and find its origin."""
         narrowed, origin = _as_positions(positions, self.name)
         given = self.origin
@@ -109,6 +111,13 @@ class MeshSequence:
         if lost:
             object.__setattr__(self, "_exact", Shifted(positions, given) if given.any() else positions)
             object.__setattr__(self, "_rounding", lost)
+
+    def _narrow_lazily(self, positions: Frames) -> None:
+        """The same for a dataset that slices, as of HDF5 or Zarr; its origin is that of its first frame."""
+        given, origin = self.origin, choose_origin(np.asarray(positions[0:1]))
+        object.__setattr__(self, "positions", Narrowed(positions, origin))
+        object.__setattr__(self, "origin", given + origin)
+        object.__setattr__(self, "_exact", Shifted(positions, given) if given.any() else positions)
 
     @property
     def n_frames(self) -> int:
@@ -168,13 +177,16 @@ class MeshSequence:
         """The same in float64, with all digits that were given; raises `InputError`."""
         if self._exact is None:
             return self.read(start, stop).astype(np.float64)
-        return np.asarray(self._exact[start:stop], dtype=np.float64) - self.origin
+        return self.read_absolute(start, stop) - self.origin
 
     def read_absolute(self, start: int, stop: int) -> Float64:
         """Frames with the origin added: ``(stop - start, V, 3) float64``, model units; raises `InputError`."""
         if self._exact is None:
             return self.read(start, stop) + self.origin
-        return np.asarray(self._exact[start:stop], dtype=np.float64)
+        block = np.asarray(self._exact[start:stop], dtype=np.float64)
+        if type(self._exact) is not np.ndarray:
+            check_finite(block, self.name, start)
+        return block
 
     @property
     def rounding(self) -> float:
@@ -236,7 +248,7 @@ def describe(sequence: MeshSequence) -> str:
     return ", ".join(parts)
 
 
-def check_finite(block: Float32, name: str, first_frame: int = 0) -> None:
+def check_finite(block: NDArray[np.floating], name: str, first_frame: int = 0) -> None:
     """Raise `InputError` naming frame and vertex if ``block (n, V, 3)`` holds a NaN or an infinity."""
     with np.errstate(invalid="ignore"):
         extremes = (block.min(initial=0), block.max(initial=0))  # a NaN shows in both, an infinity in one

@@ -119,6 +119,37 @@ def test_positions_relative_to_an_origin_that_is_given() -> None:
     assert np.abs(both.read_absolute(0, 40) - positions(np.zeros(3))).max() < 1e-8
 
 
+def test_datasets_of_float64(tmp_path: Path) -> None:
+    """What slices like an HDF5 dataset is as exact as the array in it, and loads no more than it is asked for."""
+
+    class Dataset:
+        def __init__(self, values: np.ndarray) -> None:
+            self.values, self.shape, self.dtype, self.asked = values, values.shape, values.dtype, 0
+
+        def __getitem__(self, key: slice) -> np.ndarray:
+            assert isinstance(key, slice)
+            self.asked = max(self.asked, len(range(*key.indices(40))))
+            return self.values[key].copy()
+
+    data = Dataset(positions())
+    lazy = MeshSequence(data, FACES, 24.0)
+    assert data.asked == 1 and lazy.origin.tolist() == [5200000, 0, -500000]
+    assert np.array_equal(lazy.read_absolute(3, 7), positions()[3:7]) and data.asked == 4
+    assert np.abs(lazy[:] + lazy.origin - positions()).max() < 4e-7 and 0 < lazy.rounding < 4e-7
+    assert gvpipe.compare(lazy, sheet(FAR)).max == 0
+    gvpipe.encode(lazy, tmp_path / "lazy.mp4", "pca")
+    found = gvpipe.compare(lazy.part(2, 30), gvpipe.decode(tmp_path / "lazy.mp4", 2, 30))
+    assert found.rmse_diag is not None and found.rmse_diag < 1e-3
+    moved = MeshSequence(Dataset(positions(np.zeros(3))), FACES, origin=FAR)
+    assert np.array_equal(moved.origin, FAR) and gvpipe.compare(moved, sheet(FAR)).max < 1e-8
+    with pytest.raises(InputError, match="shape"):
+        MeshSequence(Dataset(np.zeros((0, 3, 3))), FACES)
+    broken = MeshSequence(Dataset(np.where(np.arange(40)[:, None, None] == 5, np.nan, positions())), FACES)
+    for read in (broken.read, broken.read_exact, broken.read_absolute):
+        with pytest.raises(InputError, match="frame 5, vertex 0"):
+            read(0, 40)
+
+
 @pytest.mark.parametrize("origin", [[0, 0], [np.nan, 0, 0], [0, np.inf, 0], [1e39, 0, 0], ["a", "b", "c"], None])
 def test_bad_origins(origin: object) -> None:
     with pytest.raises(InputError, match="origin"):
