@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from gvpipe import notes
+from gvpipe.arguments import StrPath, check_path, show
 from gvpipe.auto import AUTO, DEFAULT, choose_codec
-from gvpipe.codec import Codec, Progress, codec_class, codec_ids
+from gvpipe.codec import Codec, Progress, codec_ids, make_codec
 from gvpipe.container import bytes_by_part, write_file
 from gvpipe.errors import InputError, OutputError, SettingError
 from gvpipe.io import read as read_sequence
@@ -22,13 +24,15 @@ from gvpipe.player import Player
 from gvpipe.poster import poster_of
 from gvpipe.rate import Target, meet, parse_bound
 from gvpipe.sequence import MeshSequence
+from gvpipe.vertex_errors import frame_diagonal
 
 VIDEO_SUFFIXES = (".mp4", ".m4v")
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-StrPath = str | os.PathLike[str]
+Source = StrPath | Sequence[StrPath]
+KEYWORDS = ("source", "path", "codec", "progress", "fps", "target_rmse", "target_kg", "target_bpvf", "max_error")  # of `encode`
 
 
 @dataclass(frozen=True)
@@ -36,8 +40,9 @@ class Report:
     """What an encode did.
 
     ``seconds`` holds the whole as ``encode``, then each stage; ``not_carried`` names the attributes of the sequence that the
-    file does not hold; ``sections`` are as in `Info`. Where a target was given, or codec ``auto``, ``tried`` holds every encode
-    that was measured (`gvpipe.trials.Trial`), and ``reason`` why the one in the file was chosen.
+    file does not hold; ``notes`` what a user should know, those attributes among it, a line each; ``sections`` are as in
+    `Info`. Where a target was given, or codec ``auto``, ``tried`` holds every encode that was measured
+    (`gvpipe.trials.Trial`), and ``reason`` why the one in the file was chosen.
     """
 
     codec: str
@@ -53,6 +58,7 @@ class Report:
     sections: dict[str, int]
     tried: list[dict[str, Any]]
     reason: str
+    notes: list[str]
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values."""
@@ -61,8 +67,8 @@ class Report:
 
 @dataclass(frozen=True)
 class Info:
-    """What a geometry video is: ``bounding_box`` is frame 0's corners, model units; ``sections`` the bytes of every part of
-    the file, which add up to ``bytes``; ``levels`` the vertex counts of its levels of detail."""
+    """What a geometry video is: ``bounding_box`` is frame 0's corners, model units, relative to ``origin``; ``sections`` the
+    bytes of every part of the file, which add up to ``bytes``; ``levels`` the vertex counts of its levels of detail."""
 
     codec: str
     version: int
@@ -76,6 +82,7 @@ class Info:
     sections: dict[str, int]
     levels: list[int]
     settings: dict[str, Any]
+    origin: list[float]
 
     def to_json(self) -> dict[str, Any]:
         """The information as JSON values."""
@@ -100,20 +107,29 @@ class _StageClock:
             self.progress(stage, done)
 
 
-def read(path: StrPath, fps: float | None = None) -> MeshSequence:
+def read(path: Source, fps: float | None = None) -> MeshSequence:
     """Read a mesh sequence, or a geometry video as one.
 
     Args:
-        path: an ``.npz``, an ``.mp4``, or frame files as a folder, a glob, a ``%04d`` pattern or one file.
+        path: an ``.npz``, an ``.mp4``, or frame files as a folder, a glob, a ``%04d`` pattern, a list or one file.
         fps: frames per second; overrides the file's. Frame files have 30 by default.
 
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
+        TypeError: it is no path.
     """
-    if Path(path).suffix.lower() not in VIDEO_SUFFIXES:
-        return read_sequence(path, fps)
-    sequence = Player(path).sequence()
-    return dataclasses.replace(sequence, fps=fps) if fps else sequence
+    if isinstance(path, list | tuple):
+        for file in path:
+            check_path(file, "a file of gvpipe.read's list")
+        if len(path) != 1:
+            return read_sequence(path, fps)
+        path = path[0]
+    check_path(path, "what gvpipe.read is given", "a list of frame files or ")
+    one = cast("StrPath", path)
+    if Path(one).suffix.lower() not in VIDEO_SUFFIXES:
+        return read_sequence(one, fps)
+    sequence = Player(one).sequence()
+    return sequence if fps is None else sequence.with_fps(fps)
 
 
 def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> None:
@@ -122,12 +138,16 @@ def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> None:
     Raises:
         InputError: the path names no format that can be written.
         OutputError: a file cannot be written; nothing half-written is left.
+        TypeError: the first argument is no sequence, or the second no path.
     """
+    if not isinstance(sequence, MeshSequence):
+        raise TypeError(f"gvpipe.write's sequence is {show(sequence)}; a MeshSequence is needed")
+    check_path(path, "gvpipe.write's path")
     write_sequence(sequence, path, start)
 
 
 def encode(
-    source: MeshSequence | StrPath,
+    source: MeshSequence | Source,
     path: StrPath,
     codec: str | Codec | Sequence[Codec] = "mcgv",
     progress: Progress | None = None,
@@ -158,19 +178,26 @@ def encode(
     Raises:
         InputError: the source, a setting or the path cannot be used, or no quality meets the target.
         OutputError: the file cannot be written; no part of it is left.
+        TypeError: an argument of a type that is none of these.
     """
+    check_path(path, "gvpipe.encode's path")
     _check_target(Path(path))
-    given = None if isinstance(source, MeshSequence) else source
-    if given is not None and os.path.exists(path) and os.path.exists(given) and os.path.samefile(given, path):
+    if not isinstance(source, MeshSequence | list | tuple):
+        check_path(source, "gvpipe.encode's source", "a MeshSequence or ")
+    if _is_among(path, source):
         raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
     wanted = _one_of({"rmse": target_rmse, "kg": target_kg, "bpvf": target_bpvf, "max": max_error})
     candidates = _candidates(codec, settings)
     started = time.perf_counter()
-    sequence = source if isinstance(source, MeshSequence) else read(source)
+    sequence = source if isinstance(source, MeshSequence) else read(source, fps)
     if fps is not None:
-        sequence = dataclasses.replace(sequence, fps=fps)
+        sequence = sequence.with_fps(fps)
+    noticed = list(sequence.notes)
     clock = _StageClock(progress)
     target = wanted and Target(wanted[0], parse_bound(wanted[1], sequence) if wanted[0] == "max" else cast("float", wanted[1]))
+    if target and target.measure == "max":
+        noticed += notes.loose_bound(target.value, frame_diagonal(sequence))
+    not_carried = sorted(sequence.attributes)
     choice = None
     if not isinstance(candidates, Codec):
         choice = choose_codec(candidates, sequence, target or DEFAULT, clock)
@@ -184,8 +211,11 @@ def encode(
     clock("write", 0.0)
     if not bitstream.video:
         bitstream = dataclasses.replace(bitstream, video=poster_of(sequence))
+    x, y, z = sequence.origin.tolist()
+    bitstream = dataclasses.replace(bitstream, origin=(x, y, z))
     size = write_file(bitstream, path, choice.trials.check if choice else None)
     clock("", 1.0)
+    noticed += notes.rounded(sequence.rounding, frame_diagonal(sequence))
     return Report(
         codec=chosen.id,
         settings=dataclasses.asdict(cast("DataclassInstance", chosen)),
@@ -196,10 +226,11 @@ def encode(
         bytes=size,
         bpvf=8 * size / (bitstream.n_vertices * bitstream.n_frames),
         seconds={"encode": time.perf_counter() - started, **clock.seconds},
-        not_carried=sorted(sequence.attributes),
+        not_carried=not_carried,
         sections=bytes_by_part(bitstream, size),
         tried=[trial.to_json() for trial in choice.tried] if choice else [],
         reason=choice.reason if choice else "",
+        notes=[*noticed, *notes.not_carried(not_carried)],
     )
 
 
@@ -214,11 +245,11 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0)
     start, stop = frame_range(player, start, stop)
     # positions before faces: the video decodes on other threads while the mesh does on this one
     positions = np.asarray(player.level(lod).positions[start:stop]) if lod else player[start:stop]
-    return MeshSequence(positions, player.level(lod).faces, player.fps, name=player.path)
+    return MeshSequence(positions, player.level(lod).faces, player.fps, name=player.path, origin=player.origin)
 
 
 def open(path: StrPath) -> Player:
-    """Open a geometry video for random access; see `Player`."""
+    """Open a geometry video for random access; see `Player`; raises TypeError for what is no path."""
     return Player(path)
 
 
@@ -246,6 +277,7 @@ def info(path: StrPath) -> Info:
         sections=bytes_by_part(bitstream, size),
         levels=player.levels,
         settings=dict(bitstream.header),
+        origin=list(bitstream.origin),
     )
 
 
@@ -267,9 +299,25 @@ def _one_of(targets: dict[str, float | str | None]) -> tuple[str, float | str] |
 
 def _candidates(codec: str | Codec | Sequence[Codec], settings: dict[str, Any]) -> Codec | Sequence[Codec]:
     """The settings object of the one codec that is asked for, or of all to choose from."""
-    if codec == AUTO:
-        return [codec_class(name)(**settings) for name in codec_ids()]
-    return cast("Codec", codec_class(codec)(**settings)) if isinstance(codec, str) else codec
+    if isinstance(codec, str):
+        if codec == AUTO:
+            return [make_codec(name, settings, KEYWORDS) for name in codec_ids()]
+        return make_codec(codec, settings, KEYWORDS)
+    given = codec if isinstance(codec, list | tuple) else [codec]
+    if not given or not all(isinstance(one, Codec) and not isinstance(one, type) for one in given):
+        raise TypeError(f"codec is {show(codec)}; an id such as 'mcgv', a settings object or a list of those is needed")
+    if settings:
+        names = ", ".join(settings)
+        raise SettingError(f"{names} beside a settings object; set it there, or give the codec's id and settings by name")
+    return codec
+
+
+def _is_among(path: StrPath, source: MeshSequence | Source) -> bool:
+    """Whether the output is one of the inputs."""
+    if isinstance(source, MeshSequence) or not os.path.exists(path):
+        return False
+    sources = source if isinstance(source, list | tuple) else [cast("StrPath", source)]
+    return any(os.path.exists(one) and os.path.samefile(one, path) for one in sources)
 
 
 def _check_target(path: Path) -> None:

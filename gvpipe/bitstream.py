@@ -37,6 +37,10 @@ MAX_FRAMES = 1 << 24
 MAX_VERTICES = 1 << 28
 
 
+NO_ORIGIN = (0.0, 0.0, 0.0)
+MAX_ORIGIN = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]  # of its coordinates' magnitudes: float32's largest number
+
+
 @dataclass(frozen=True)
 class Bitstream:
     """A coded sequence.
@@ -48,6 +52,7 @@ class Bitstream:
         fps: frames per second.
         header: what else the codec's reader must know, as JSON values.
         sections: the codec's binary data by name.
+        origin: what to add to positions, model units (`gvpipe.origin`); the same for every codec.
         video: an MP4 file whose one track holds the codec's images; empty for codecs that have none, whose files show a
             poster (`gvpipe.poster`) instead.
     """
@@ -61,6 +66,7 @@ class Bitstream:
     header: Mapping[str, Any] = field(default_factory=dict)
     sections: Mapping[str, bytes] = field(default_factory=dict)
     video: bytes = b""
+    origin: tuple[float, float, float] = NO_ORIGIN
 
     def section(self, name: str) -> bytes:
         """Return a section's bytes; raises `CorruptFile` if there is none of that name."""
@@ -121,6 +127,7 @@ def pack_payload(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
         "vertices": bitstream.n_vertices,
         "triangles": bitstream.n_triangles,
         "fps": bitstream.fps,
+        **({"origin": list(bitstream.origin)} if bitstream.origin != NO_ORIGIN else {}),
         "container": dict(extra),
         "settings": dict(bitstream.header),
     }
@@ -196,6 +203,7 @@ def _read_header(sections: dict[str, bytes]) -> tuple[Bitstream, dict[str, Any]]
             fps=float(header["fps"]),
             header=dict(header["settings"]),
             sections=sections,
+            origin=_read_origin(header.get("origin", list(NO_ORIGIN))),
         )
         if not 0 < bitstream.fps <= 100_000:
             raise ValueError(f"fps {bitstream.fps}")
@@ -206,6 +214,13 @@ def _read_header(sections: dict[str, bytes]) -> tuple[Bitstream, dict[str, Any]]
 
 def _is_number(value: object, low: float, high: float) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
+
+
+def _read_origin(value: object) -> tuple[float, float, float]:
+    if not isinstance(value, list) or len(value) != 3 or not all(_is_number(x, -MAX_ORIGIN, MAX_ORIGIN) for x in value):
+        raise ValueError(f"origin {value!r}")
+    x, y, z = map(float, value)
+    return x, y, z
 
 
 def _count(value: object, low: int, high: int) -> int:

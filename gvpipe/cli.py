@@ -1,21 +1,23 @@
 """The command line: parse, call the library, print. Results go to standard output, everything else to standard error.
 
+What is printed, and how much of it, is `gvpipe.console`'s; ``-`` in place of a file's name is `gvpipe.pipes`'.
+
 Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage.
 """
 
 from __future__ import annotations
 
-import contextlib
-import json
 import os
 import sys
-from collections.abc import Iterator
+import traceback
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from gvpipe import __version__
+from gvpipe.console import Output, is_verbose, output_options, print_options
 from gvpipe.errors import GvpipeError
+from gvpipe.pipes import PIPE, STDIN, STDOUT, shown, source_path, target_path
 
 if TYPE_CHECKING:
     from gvpipe.codec import Progress
@@ -23,15 +25,15 @@ if TYPE_CHECKING:
     from gvpipe.web import ExportReport
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
-as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
+VIDEO_SUFFIXES = (".mp4", ".m4v")
 
 
 def main() -> None:
     """Run the command line and exit."""
     try:
-        status = cli(standalone_mode=False)
+        status = cli(standalone_mode=False, prog_name="gvpipe")
     except GvpipeError as exc:
-        status = _fail(" ".join(str(exc).split()), 1)
+        status = _fail(_one_line(exc), 1)
     except click.UsageError as exc:
         exc.show()
         status = 2
@@ -47,6 +49,10 @@ def main() -> None:
         status = 1
     except OSError as exc:  # files' own errors are GvpipeErrors already: what is left is our output, as on a full disk
         status = _fail(f"cannot print the result: {exc.strerror or exc}; free some space or print elsewhere", 1)
+    except Exception as exc:
+        if is_verbose(sys.argv[1:]):
+            traceback.print_exc()
+        status = _fail(f"unexpected {type(exc).__name__}: {_one_line(exc)}; report what --verbose prints", 1)
     sys.exit(status or 0)
 
 
@@ -57,7 +63,7 @@ def cli() -> None:
 
 
 @cli.command()
-@click.argument("source", metavar="INPUT")
+@click.argument("sources", metavar="INPUT...", nargs=-1, required=True)
 @click.argument("target", metavar="OUTPUT.mp4")
 @click.option("--codec", default="mcgv", show_default=True, help="See `gvpipe codecs`; auto: the one with the smallest file.")
 @click.option("--quality", type=float, help="0-100, higher is better; with a target, where the search begins. [default: 75]")
@@ -69,9 +75,9 @@ def cli() -> None:
 @click.option("--segment", type=int, help="Most frames per segment. [default: 500]")
 @click.option("--fps", type=float, help="Frames per second, instead of the input's.")
 @click.option("--reorder", is_flag=True, help="Let the codec choose the vertex order: smaller.")
-@as_json
+@output_options
 def encode(
-    source: str,
+    sources: tuple[str, ...],
     target: str,
     codec: str,
     quality: float | None,
@@ -83,17 +89,23 @@ def encode(
     segment: int | None,
     fps: float | None,
     reorder: bool,
-    as_json: bool,
+    out: Output,
 ) -> None:
     """Encode a mesh sequence as a geometry video.
 
     INPUT is an .npz (vertices (F,V,3), faces (T,3), fps), a folder of frame files (OBJ, PLY, STL, OFF, GLB), a glob
-    ('walk/*.obj'), a pattern (walk/%04d.obj) or a geometry video.
+    ('walk/*.obj', or without the quotes), a pattern (walk/%04d.obj, walk/####.obj, 'walk/$F4.obj'), a geometry video, or - for
+    an .npz or a geometry video on standard input. OUTPUT - is standard output.
     """
     from gvpipe import api
     from gvpipe.auto import AUTO
     from gvpipe.codec import codec_class, codec_ids
 
+    if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
+        message = f"{len(sources) + 1} files are given, and the last, {target}, is no .mp4; end with the output's name"
+        raise click.UsageError(message, click.get_current_context())
+    if len(sources) > 1 and PIPE in sources:
+        raise click.UsageError("- is one input among others; give it alone", click.get_current_context())
     targets = {"target_rmse": target_rmse, "target_kg": target_kg, "target_bpvf": target_bpvf, "max_error": max_error}
     if sum(value is not None for value in targets.values()) > 1:
         raise click.UsageError("give one of --target-rmse, --target-kg, --target-bpvf and --max-error")
@@ -101,25 +113,27 @@ def encode(
     given = {"quality": quality, "segment": segment, "reorder": reorder or None}
     settings.update({key: str(value) for key, value in given.items() if value is not None})
     chosen = [codec_class(name).from_texts(settings) for name in (codec_ids() if codec == AUTO else [codec])]
-    with _progress() as progress:
-        report = api.encode(source, target, chosen if codec == AUTO else chosen[0], progress, fps, **targets)  # type: ignore[arg-type]  # by name
-    if report.not_carried:
-        click.echo(f"Note: the file does not carry {', '.join(report.not_carried)}.", err=True)
-    if as_json:
-        return _print_json(report.to_json())
+    with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
+        source = first if len(sources) == 1 else list(sources)
+        report = api.encode(source, path, chosen if codec == AUTO else chosen[0], progress, fps, **targets)  # type: ignore[arg-type]  # by name
+    out = out.carrying(target)
+    for note in report.notes:
+        out.note(note)
+    out.json(report.to_json())
     shape = f"{report.frames} frames, {report.vertices} vertices"
-    click.echo(f"{source} ({shape}) -> {target} ({_size(report.bytes)}, {report.bpvf:.3f} bits per vertex and frame)")
+    name = shown(sources[0], STDIN) + (f" and {len(sources) - 1} more" if len(sources) > 1 else "")
+    size = f"{_size(report.bytes)}, {report.bpvf:.3f} bits per vertex and frame"
+    out.text(f"{name} ({shape}) -> {shown(target, STDOUT)} ({size})")
     seconds = dict(report.seconds)
     stages = ", ".join(f"{name} {value:.1f}" for name, value in seconds.items() if name != "encode" and value >= 0.05)
-    click.echo(f"{seconds['encode']:.1f} s: {stages}")
+    out.text(f"{seconds['encode']:.1f} s: {stages}")
     for tried in report.tried:
         keys = [key for key in ("bpvf", "rmse_diag", "kg", "max_diag") if tried[key] is not None]
         measures = ", ".join(f"{key} {tried[key]:.4g}" for key in keys)
-        click.echo(f"  {tried['codec']} at quality {tried['quality']:.4g}: {tried['bytes']} bytes, {measures}")
+        out.text(f"  {tried['codec']} at quality {tried['quality']:.4g}: {tried['bytes']} bytes, {measures}")
     if report.reason:
-        click.echo(report.reason)
-    _print_sections(report.sections, report.vertices * report.frames)
-    return None
+        out.text(report.reason)
+    _print_sections(out, report.sections, report.vertices * report.frames)
 
 
 @cli.command()
@@ -128,64 +142,75 @@ def encode(
 @click.option("--start", type=int, default=0, show_default=True, help="First frame.")
 @click.option("--stop", type=int, help="Frame after the last. [default: the end]")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail: 0 the mesh, higher is coarser.")
-def decode(source: str, target: str, start: int, stop: int | None, lod: int) -> None:
+@click.option("--local", is_flag=True, help="Leave out the origin of a mesh far from the world's: float32 positions near 0.")
+@output_options
+def decode(source: str, target: str, start: int, stop: int | None, lod: int, local: bool, out: Output) -> None:
     """Decode a geometry video.
 
-    OUTPUT is an .npz, or a pattern of frame files such as out/%04d.obj (also .ply, .stl, .off, .glb).
+    OUTPUT is an .npz, or a pattern of frame files such as out/%04d.obj (also .ply, .stl, .off, .glb), or - for an .npz on
+    standard output. FILE - is a geometry video on standard input.
     """
-    from gvpipe import api
+    from gvpipe import api, notes
     from gvpipe.sequence import MeshSequence
 
-    player = api.open(source)
-    start, stop = api.frame_range(player, start, stop)
-    level = player.level(lod)
-    part = _Part(level, start, stop)
-    with _progress() as progress:
-        part.progress = progress
-        api.write(MeshSequence(part, level.faces, player.fps, name=source), target, start)
-    click.echo(f"{source} -> {target} ({stop - start} frames, {part.shape[1]} vertices)")
+    out = out.carrying(target)
+    with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
+        player = api.open(given)
+        start, stop = api.frame_range(player, start, stop)
+        level = player.level(lod)
+        part = _Part(level, start, stop, progress)
+        sequence = MeshSequence(part, level.faces, player.fps, name=given, origin=player.origin)
+        api.write(sequence.local() if local else sequence, path, start)
+    noticed = [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
+    for note in noticed:
+        out.note(note)
+    values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": player.fps}
+    values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces), "lod": lod}
+    out.json({**values, "origin": [0.0, 0.0, 0.0] if local else player.origin.tolist(), "notes": noticed})
+    shape = f"{stop - start} frames, {sequence.n_vertices} vertices"
+    out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")
 
 
 @cli.command()
 @click.argument("source", metavar="FILE.mp4")
-@as_json
-def info(source: str, as_json: bool) -> None:
-    """Tell what a geometry video holds and where its bytes go."""
-    from gvpipe import api
+@output_options
+def info(source: str, out: Output) -> None:
+    """Tell what a geometry video (- for standard input) holds and where its bytes go."""
+    from gvpipe import api, notes
 
-    found = api.info(source)
-    if as_json:
-        return _print_json(found.to_json())
+    with source_path(source) as path, out.progress():
+        found = api.info(path)
+    out.json(found.to_json())
     low, high = found.bounding_box["min"], found.bounding_box["max"]
-    click.echo(f"{source}: {found.codec} version {found.version}")
-    click.echo(f"{found.vertices} vertices, {found.triangles} triangles, {found.frames} frames at {found.fps:g} fps")
-    click.echo("frame 0 lies in " + " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True)))
+    place = f", relative to {notes.show_origin(found.origin)}" if any(found.origin) else ""
+    out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}")
+    out.text(f"{found.vertices} vertices, {found.triangles} triangles, {found.frames} frames at {found.fps:g} fps")
+    out.text("frame 0 lies in " + " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True)) + place)
     if len(found.levels) > 1:
-        click.echo("levels of detail, vertices: " + ", ".join(f"{lod}: {count}" for lod, count in enumerate(found.levels)))
-    click.echo(f"{_size(found.bytes)}, {found.bpvf:.3f} bits per vertex and frame:")
-    _print_sections(found.sections, found.vertices * found.frames)
-    return None
+        out.text("levels of detail, vertices: " + ", ".join(f"{lod}: {count}" for lod, count in enumerate(found.levels)))
+    out.text(f"{_size(found.bytes)}, {found.bpvf:.3f} bits per vertex and frame:")
+    _print_sections(out, found.sections, found.vertices * found.frames)
 
 
 @cli.command()
 @click.argument("reference", metavar="REFERENCE")
 @click.argument("distorted", metavar="DISTORTED")
-@as_json
-def compare(reference: str, distorted: str, as_json: bool) -> None:
-    """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos."""
+@output_options
+def compare(reference: str, distorted: str, out: Output) -> None:
+    """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos, one may be - for standard input."""
     from gvpipe import api, metrics
 
-    with _progress() as progress:
+    if reference == distorted == PIPE:
+        raise click.UsageError("both are -, and there is one standard input", click.get_current_context())
+    with source_path(reference) as one, source_path(distorted) as other, out.progress() as progress:
         result = metrics.compare(
-            api.read(reference), api.read(distorted), lambda done, of: progress("compare", done / of) if progress else None
+            api.read(one), api.read(other), lambda done, of: progress("compare", done / of) if progress else None
         )
     values = result.to_json()
-    if as_json:
-        return _print_json(values)
+    out.json(values)
     for name, value in values.items():
         if name != "frames":
-            click.echo(f"{name:<14} {'not defined' if value is None else format(value, '.6g')}")
-    return None
+            out.text(f"{name:<14} {'not defined' if value is None else format(value, '.6g')}")
 
 
 @cli.command("export-html")
@@ -193,27 +218,27 @@ def compare(reference: str, distorted: str, as_json: bool) -> None:
 @click.argument("target", metavar="OUT.html")
 @click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="The axis that stands upright.")
 @click.option("--quality", type=float, help="0-100, where the file must be converted. [default: 75]")
-@as_json
-def export_html(source: str, target: str, up: str, quality: float | None, as_json: bool) -> None:
+@output_options
+def export_html(source: str, target: str, up: str, quality: float | None, out: Output) -> None:
     """Write a web page of one file that plays a geometry video, without a network.
 
     Browsers read codec mcgv in its web profile; other files are converted, which adds an error that is told.
     """
     from gvpipe import web
 
-    with _progress() as progress:
-        report = web.export_html(source, target, up, quality, progress)
-    if as_json:
-        return _print_json(report.to_json())
-    click.echo(f"{source} -> {target} ({_size(report.bytes)}, {_size(report.video_bytes)} of which are the geometry video)")
-    _tell_conversion(report)
-    return None
+    with source_path(source) as path, out.progress() as progress:
+        report = web.export_html(path, target, up, quality, progress)
+    out.json(report.to_json())
+    size = f"{_size(report.bytes)}, {_size(report.video_bytes)} of which are the geometry video"
+    out.text(f"{shown(source, STDIN)} -> {target} ({size})")
+    _tell_conversion(out, report)
 
 
 @cli.command()
 @click.argument("source", metavar="FILE.mp4")
 @click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="The axis that stands upright.")
-def play(source: str, up: str) -> None:
+@output_options
+def play(source: str, up: str, out: Output) -> None:
     """Play a geometry video in your browser; print the path of the page where there is none."""
     import tempfile
     from pathlib import Path
@@ -221,11 +246,13 @@ def play(source: str, up: str) -> None:
     from gvpipe import web
     from gvpipe.web.browser import open_page
 
-    with _progress() as progress:
-        page = Path(tempfile.mkdtemp(prefix="gvpipe-")) / f"{Path(source).stem}.html"  # stays: the browser reads it later
-        report = web.export_html(source, page, up, None, progress)
-    _tell_conversion(report)
-    click.echo(f"{source} plays in your browser" if open_page(page) else page)
+    with source_path(source) as path, out.progress() as progress:
+        page = Path(tempfile.mkdtemp(prefix="gvpipe-")) / f"{Path(path).stem}.html"  # stays: the browser reads it later
+        report = web.export_html(path, page, up, None, progress)
+    _tell_conversion(out, report)
+    is_open = open_page(page)
+    out.json({"page": str(page), "opened": is_open, **report.to_json()})
+    out.text(f"{shown(source, STDIN)} plays in your browser" if is_open else page)
 
 
 @cli.command()
@@ -241,14 +268,17 @@ def play(source: str, up: str) -> None:
 @click.option("--error-of", "error_of", metavar="REFERENCE", help="Colour each vertex by its distance from REFERENCE's.")
 @click.option("--error-max", type=float, metavar="PERCENT", help="Where the colours end. [default: the largest error drawn]")
 @click.option("--shading", type=click.Choice(["smooth", "flat"]), default="smooth", show_default=True)
-def render(source: str, target: str, size: str, **options: Any) -> None:
+@output_options
+def render(source: str, target: str, size: str, out: Output, **options: Any) -> None:
     """Paint a geometry video or a sequence as a picture or a film; needs no display and no GPU."""
     from gvpipe.rendering.pictures import parse_size, render
 
     pixels = parse_size(size)
-    with _progress() as progress:
-        render(source, target, size=pixels, progress=progress, **options)
-    click.echo(f"{source} -> {target} ({pixels[0]}x{pixels[1]}, {_size(os.path.getsize(target))})")
+    with source_path(source) as path, out.progress() as progress:
+        render(path, target, size=pixels, progress=progress, **options)
+    n_bytes = os.path.getsize(target)
+    out.json({"output": target, "width": pixels[0], "height": pixels[1], "bytes": n_bytes})
+    out.text(f"{shown(source, STDIN)} -> {target} ({pixels[0]}x{pixels[1]}, {_size(n_bytes)})")
 
 
 @cli.command()
@@ -261,6 +291,7 @@ def render(source: str, target: str, size: str, **options: Any) -> None:
 @click.option("--json", "target", metavar="OUT.json", help="Write all results to this file.")
 @click.option("--plot", "report", metavar="OUT.json", help="Measure nothing: draw these results into the folder given.")
 @click.option("--peers", metavar="RESULTS.csv", help="With --plot: other codecs' results to draw beside.")
+@print_options
 def bench(
     sources: tuple[str, ...],
     codec_list: str | None,
@@ -271,6 +302,7 @@ def bench(
     target: str | None,
     report: str | None,
     peers: str | None,
+    out: Output,
 ) -> None:
     """Measure rate, distortion, times and memory of codecs, every round trip verified; or draw such results.
 
@@ -289,67 +321,51 @@ def bench(
         if len(sources) != 1:
             raise click.UsageError("--plot OUT.json needs one folder to draw into")
         drawn = plots.draw(benches.Report.read(report), sources[0], plots.read_peers(peers) if peers else None)
-        click.echo("\n".join(map(str, drawn)))
+        out.text("\n".join(map(str, drawn)))
         return
     chosen = [name.strip() for name in codec_list.split(",")] if codec_list else codec_ids()
     wanted = _parse_numbers("--qualities", qualities) if qualities else list(benches.QUALITIES)
     levels = {"kg": _parse_numbers("--kg", kg), **({"sted": _parse_numbers("--sted", sted)} if sted else {})}
-    with _progress() as progress:
+    with out.progress() as progress:
         made = benches.run(sources, chosen, wanted, _parse_pairs(pairs), progress)
     if target:
         made.write(target)
-    click.echo(tables(made.curves, levels))
+    out.text(tables(made.curves, levels))
 
 
 @cli.command()
-def codecs() -> None:
+@output_options
+def codecs(out: Output) -> None:
     """List the codecs and their settings."""
     import dataclasses
 
     from gvpipe.codec import codec_class, codec_ids
 
-    for name in codec_ids():
-        codec = codec_class(name)
-        defaults = " ".join(f"{field.name}={field.default}" for field in dataclasses.fields(codec))
-        click.echo(f"{name}: {codec.summary}; {defaults}")
+    with out.progress():
+        found = {name: codec_class(name) for name in codec_ids()}
+    settings = {name: {field.name: field.default for field in dataclasses.fields(codec)} for name, codec in found.items()}
+    values = [
+        {"id": name, "version": codec.version, "summary": codec.summary, "settings": settings[name]}
+        for name, codec in found.items()
+    ]
+    out.json({"codecs": values})
+    for name, codec in found.items():
+        defaults = " ".join(f"{key}={value}" for key, value in settings[name].items())
+        out.text(f"{name}: {codec.summary}; {defaults}")
 
 
 class _Part:
     """Some frames of a sequence, which tell how far they have been read."""
 
-    def __init__(self, sequence: MeshSequence, start: int, stop: int) -> None:
-        self._sequence, self._start = sequence, start
+    def __init__(self, sequence: MeshSequence, start: int, stop: int, progress: Progress | None) -> None:
+        self._sequence, self._start, self._progress = sequence, start, progress
         self.shape = (stop - start, sequence.n_vertices, 3)
-        self.progress: Progress | None = None
 
     def __getitem__(self, key: slice, /) -> Any:
         first, last, _ = key.indices(self.shape[0])
-        if self.progress:
-            self.progress("decode", last / self.shape[0])
+        if self._progress:
+            self._progress("decode", last / self.shape[0])
         return self._sequence.read(self._start + first, self._start + last)
-
-
-@contextlib.contextmanager
-def _progress() -> Iterator[Progress | None]:
-    """A bar per stage on standard error, where that is a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import Progress as Bars
-
-    with Bars(console=Console(stderr=True), transient=True) as bars:
-        tasks: dict[str, Any] = {}
-
-        def show(stage: str, done: float) -> None:
-            for name, task in tasks.items():
-                if name != stage:
-                    bars.update(task, completed=1.0)
-            if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=1.0)
-            bars.update(tasks[stage], completed=done)
-
-        yield show
 
 
 def _parse_numbers(option: str, text: str) -> list[float]:
@@ -369,22 +385,17 @@ def _parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:
     return settings
 
 
-def _tell_conversion(report: ExportReport) -> None:
+def _tell_conversion(out: Output, report: ExportReport) -> None:
     """Say on standard error what the page shows instead of the file's own frames."""
     if report.converted:
         rmse, largest = ("not defined" if v is None else f"{v:.1e}" for v in (report.rmse_diag, report.max_diag))
-        click.echo(
-            f"Note: browsers cannot read {report.converted}; the page holds a conversion to mcgv, web profile, which adds an "
-            f"error of rmse {rmse}, at most {largest}, of the diagonal.",
-            err=True,
+        out.note(
+            f"browsers cannot read {report.converted}; the page holds a conversion to mcgv, web profile, which adds an "
+            f"error of rmse {rmse}, at most {largest}, of the diagonal"
         )
 
 
-def _print_json(values: dict[str, Any]) -> None:
-    click.echo(json.dumps(values, allow_nan=False))
-
-
-def _print_sections(sections: dict[str, int], n_samples: int) -> None:
+def _print_sections(out: Output, sections: dict[str, int], n_samples: int) -> None:
     from rich.console import Console
 
     from gvpipe.breakdown import section_table
@@ -394,11 +405,15 @@ def _print_sections(sections: dict[str, int], n_samples: int) -> None:
         console.print(section_table(sections, n_samples))
     text = "\n".join(line.rstrip() for line in captured.get().splitlines())
     encoding = sys.stdout.encoding or "utf-8"
-    click.echo(text.encode(encoding, "replace").decode(encoding))
+    out.text(text.encode(encoding, "replace").decode(encoding))
 
 
 def _size(count: int) -> str:
     return f"{count / 1e6:.2f} MB" if count >= 1e6 else f"{count / 1e3:.1f} kB"
+
+
+def _one_line(exc: Exception) -> str:
+    return " ".join(str(exc).split())
 
 
 def _fail(message: str, status: int) -> int:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, ClassVar, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.arguments import did_you_mean
 from gvpipe.bitstream import Bitstream
 from gvpipe.corrections import correct
 from gvpipe.errors import NewerVersion, SettingError
@@ -127,8 +128,7 @@ class Settings:
         fields = {field.name: field for field in dataclasses.fields(cls)}  # type: ignore[arg-type]  # subclasses are dataclasses
         values: dict[str, Any] = {}
         for key, text in texts.items():
-            if key not in fields:
-                raise SettingError(f"no setting {key!r}; there are {', '.join(fields)}")
+            check_name(key, fields)
             values[key] = _parse(key, text, type(fields[key].default))
         return cls(**values)
 
@@ -145,7 +145,24 @@ class Settings:
     def check_choice(self, name: str, choices: tuple[str, ...]) -> None:
         """Raise `SettingError` unless the named setting is one of ``choices``."""
         if getattr(self, name) not in choices:
-            raise SettingError(f"{name} is {getattr(self, name)!r}; one of {', '.join(choices)} is needed")
+            value = getattr(self, name)
+            raise SettingError(f"{name} is {value!r}; one of {', '.join(choices)} is needed{did_you_mean(value, choices)}")
+
+
+def make_codec(codec: str, settings: Mapping[str, Any], also: Iterable[str] = ()) -> Codec:
+    """Return a codec's settings object; raises `SettingError` for an unknown one, naming the nearest of these and ``also``."""
+    chosen = codec_class(codec)
+    names = [field.name for field in dataclasses.fields(chosen)]
+    for key in settings:
+        check_name(key, names, also)
+    made: Codec = chosen(**settings)
+    return made
+
+
+def check_name(key: str, names: Iterable[str], also: Iterable[str] = ()) -> None:
+    """Raise `SettingError` unless ``key`` is one of the settings' names; it may have been meant for one of ``also``."""
+    if key not in names:
+        raise SettingError(f"no setting {key!r}; there are {', '.join(names)}{did_you_mean(key, [*names, *also])}")
 
 
 def codec_ids() -> list[str]:
@@ -157,7 +174,7 @@ def codec_ids() -> list[str]:
 def codec_class(codec: str) -> type[Any]:
     """Return the class of the codec with that id; raises `SettingError` if there is none."""
     if codec not in _entries():
-        raise SettingError(f"no codec {codec!r}; there are {', '.join(codec_ids())}")
+        raise SettingError(f"no codec {codec!r}; there are {', '.join(codec_ids())}{did_you_mean(codec, codec_ids())}")
     loaded: type[Any] = _entries()[codec].load()
     return loaded
 

@@ -75,17 +75,17 @@ def encode_corrections(sequence: MeshSequence, reader: FrameReader, bound: Bound
     size = min(GROUP, most_frames(sequence.n_vertices))
     for first in range(0, sequence.n_frames, size):
         stop = min(first + size, sequence.n_frames)
-        wanted, decoded = sequence.read(first, stop), reader.read(first, stop)
+        wanted, decoded = sequence.read_exact(first, stop), reader.read(first, stop)
         found = find_corrections(wanted, decoded, bound)
         groups.append(encode_group(found, stop - first))
         at = found.frames, found.vertices
         decoded[at] = move(decoded[at], found.steps, bound.step)
-        errors.add(wanted.astype(np.float64), _distance(wanted, decoded))
+        errors.add(wanted, _distance(wanted, decoded))
     left = errors.result(frame_diagonal(sequence))
     return encode_moves(bound.step, size, groups), left
 
 
-def find_corrections(wanted: Float32, decoded: Float32, bound: Bound) -> Moves:
+def find_corrections(wanted: NDArray[np.floating], decoded: Float32, bound: Bound) -> Moves:
     """Corrections that bring ``decoded`` within the bound of ``wanted``, both ``(n, V, 3)``, model units."""
     off = _distance(wanted, decoded) > bound.inner
     vertices, frames = np.nonzero(off.T)

@@ -28,7 +28,7 @@ def match_vertices(reference: MeshSequence, distorted: MeshSequence) -> Index | 
 
     Both must have equal numbers of frames, vertices and triangles.
     """
-    ours, theirs = _paths(reference), _paths(distorted)
+    ours, theirs = _paths(reference), _paths(distorted, distorted.origin - reference.origin)
     first, point = np.unique(ours, axis=0, return_index=True, return_inverse=True)[1:]
     point = point.ravel()
     place = np.asarray(cKDTree(ours[first]).query(theirs)[1], np.intp)
@@ -46,8 +46,8 @@ def canonical_triangles(faces: NDArray[np.integer]) -> NDArray[np.integer]:
     return turned[np.lexsort(turned.T[::-1])]
 
 
-def _paths(sequence: MeshSequence) -> NDArray[np.float64]:
-    return sequence.sample(FRAMES).swapaxes(0, 1).reshape(sequence.n_vertices, -1)
+def _paths(sequence: MeshSequence, shift: NDArray[np.float64] | float = 0.0) -> NDArray[np.float64]:
+    return (sequence.sample(FRAMES) + shift).swapaxes(0, 1).reshape(sequence.n_vertices, -1)
 
 
 def _turned(faces: NDArray[np.integer]) -> tuple[NDArray[np.integer], NDArray[np.intp]]:

@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.arguments import show
 from gvpipe.errors import InputError
 from gvpipe.matching import canonical_triangles, match_vertices
 from gvpipe.sequence import MeshSequence
@@ -65,6 +66,9 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: Progress
         InputError: the two differ in their number of frames or vertices or in their triangles, so that no vertex of
             one answers to a vertex of the other.
     """
+    for role, given in (("reference", reference), ("distorted", distorted)):
+        if not isinstance(given, MeshSequence):
+            raise TypeError(f"compare's {role} is {show(given)}; a MeshSequence is needed, such as gvpipe.read(path)")
     distorted = aligned(reference, distorted)
     n_frames = reference.n_frames
     edges = unique_edges(reference.faces)
@@ -73,11 +77,11 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: Progress
     hausdorff = Hausdorff(reference.faces, edges, reference.n_vertices)
     errors = VertexErrors()
     step = max(1, BLOCK_BYTES // (24 * reference.n_vertices))
-    for first, chunk in reference.chunks():
-        other = distorted.read(first, first + len(chunk))
+    apart = distorted.origin - reference.origin
+    for first, chunk in reference.exact_chunks():
+        other = distorted.read_exact(first, first + len(chunk)) + apart
         for start in range(0, len(chunk), step):
-            a = chunk[start : start + step].astype(np.float64)  # (n, V, 3), n frames
-            b = other[start : start + step].astype(np.float64)
+            a, b = chunk[start : start + step], other[start : start + step]  # (n, V, 3), n frames
             distance = np.linalg.norm(a - b, axis=2)  # (n, V)
             errors.add(a, distance)
             sted.add(a, b)

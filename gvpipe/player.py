@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import operator
 import os
 import threading
@@ -11,16 +12,19 @@ from typing import overload
 
 import numpy as np
 
+from gvpipe.arguments import check_path
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import GroupReader, LevelReader, open_reader
 from gvpipe.container import read_file
 from gvpipe.errors import FormatError, InputError
 from gvpipe.frame_cache import FrameCache
-from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.sequence import Float32, Float64, Int32, MeshSequence, describe
 
 
 class Player:
-    """An open geometry video: a sequence of frames, each ``(V, 3) float32``, model units. A context manager; thread-safe.
+    """An open geometry video: a sequence of frames, each ``(V, 3) float32``, model units, relative to ``origin``.
+
+    A context manager; thread-safe.
 
     ``video[k]`` decodes no more than the group of frames that frame k lies in, and keeps the last groups; frames asked for
     in a row, forwards or backwards, are decoded ahead on another thread. ``video[a:b]`` gives ``(b - a, V, 3)``.
@@ -31,6 +35,7 @@ class Player:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
+        check_path(path, "the geometry video")
         self.path = os.fspath(path)
         self.bitstream: Bitstream = read_file(path)
         try:
@@ -52,6 +57,11 @@ class Player:
         return self.bitstream.fps
 
     @property
+    def origin(self) -> Float64:
+        """``(3,) float64`` to add to positions, model units: 0 unless the mesh is far from there for its size."""
+        return np.array(self.bitstream.origin)
+
+    @property
     def levels(self) -> list[int]:
         """Vertex counts of the levels of detail, the mesh itself first; one entry for codecs that have none."""
         return self._reader.levels if isinstance(self._reader, LevelReader) else [self.bitstream.n_vertices]
@@ -66,7 +76,7 @@ class Player:
             return self.sequence()
         if not isinstance(self._reader, LevelReader) or not 0 < lod < len(self.levels):
             raise InputError(f"{self.path}: no level of detail {lod}; there are levels 0..{len(self.levels) - 1}")
-        return MeshSequence(_Level(self, lod), self._reader.level_faces(lod), self.fps, name=self.path)
+        return MeshSequence(_Level(self, lod), self._reader.level_faces(lod), self.fps, name=self.path, origin=self.origin)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -75,7 +85,7 @@ class Player:
 
     def sequence(self) -> MeshSequence:
         """The video as a sequence whose frames are decoded when they are read."""
-        return MeshSequence(self, self.faces, self.fps, name=self.path)
+        return MeshSequence(self, self.faces, self.fps, name=self.path, origin=self.origin)
 
     def __len__(self) -> int:
         return self.bitstream.n_frames
@@ -98,6 +108,23 @@ class Player:
 
     def __iter__(self) -> Iterator[Float32]:
         return (self[i] for i in range(len(self)))
+
+    def __repr__(self) -> str:
+        return f"<Player {self.path}: codec {self.bitstream.codec}, {describe(self.sequence())}>"
+
+    def _repr_html_(self) -> str:
+        from gvpipe.notebook import card, numbers_of
+
+        sequence = self.sequence()
+        numbers = numbers_of(sequence)
+        if len(self.levels) > 1:
+            numbers["levels of detail"] = ", ".join(map(str, self.levels))
+        with contextlib.suppress(OSError):  # the file may be gone: what was read of it stays usable
+            size = os.path.getsize(self.path)
+            n_samples = self.bitstream.n_vertices * len(self)
+            numbers["size"] = f"{size} bytes, {8 * size / n_samples:.3f} bits per vertex and frame"
+        numbers["codec"] = f"{self.bitstream.codec} version {self.bitstream.version}"
+        return card(self.path, numbers, sequence)
 
     def __enter__(self) -> Player:
         return self

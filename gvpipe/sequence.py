@@ -2,22 +2,31 @@
 
 A `MeshSequence` has constant connectivity and moving vertices. Its positions may be an array in memory, a memory
 map or frames that load when they are read, so nothing here touches more frames than it is asked for.
+
+Positions are float32 relative to an origin in float64 (`gvpipe.origin`). Where an array in memory holds more digits than that,
+it is kept beside, so that errors are measured against what was given and not against its rounding.
 """
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.arguments import check_number, show
 from gvpipe.errors import InputError
+from gvpipe.frame_views import Narrowed, Part, Permuted, Shifted
+from gvpipe.notes import ASSUMED_FPS, show_origin
+from gvpipe.origin import as_origin, choose_origin, narrow, rounding
 
 CHUNK_BYTES = 16 << 20  # positions handed out at a time by `chunks`: large enough to vectorise, small beside any budget
 
 Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
 Int32 = NDArray[np.int32]
 
 
@@ -30,17 +39,24 @@ class Frames(Protocol):
     def __getitem__(self, key: slice, /) -> NDArray[np.floating]: ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class MeshSequence:
     """A triangle-mesh animation with constant connectivity.
 
+    It slices by frame as `gvpipe.Player` does: ``sequence[3]`` is ``(V, 3) float32``, ``sequence[2:5]`` is ``(3, V, 3)``, both
+    relative to the origin; `part` makes a sequence of some frames.
+
     Args:
-        positions: ``(F, V, 3) float32``, model units; an array, or anything of that shape that slices by frame.
+        positions: ``(F, V, 3) float32``, model units, relative to the origin; an array, or anything of that shape that slices
+            by frame. An array or dataset of float64 is rounded, relative to an origin where float32 would lose its shape;
+            it is kept to measure errors against, so it must not change afterwards.
         faces: ``(T, 3) int32``, counter-clockwise seen from outside.
         fps: frames per second.
         attributes: static arrays by name: ``uv (V, 2)``, ``normal (V, 3)``, ``color (V, 4) uint8`` per vertex, or the
             same per corner with first dimension ``3 T``.
         name: where the sequence came from, for messages.
+        origin: ``(3,) float64``, model units: what to add to positions; 0 unless the mesh is far from there for its size.
+        notes: what a reader did that its user should know, a line each.
 
     Raises:
         InputError: a wrong shape, no frame, no vertex, an index out of range, an fps that is not a positive number, a
@@ -52,10 +68,26 @@ class MeshSequence:
     fps: float = 30.0
     attributes: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
     name: str = "sequence"
+    origin: Float64 = field(default_factory=lambda: np.zeros(3))
+    notes: tuple[str, ...] = ()
+    _exact: Frames | None = field(default=None, init=False)  # absolute; what float32 rounded
+    _rounding: float = field(default=0.0, init=False)
 
     def __post_init__(self) -> None:
-        if isinstance(self.positions, np.ndarray):
-            object.__setattr__(self, "positions", _as_positions(self.positions, self.name))
+        object.__setattr__(self, "origin", as_origin(self.origin, self.name))
+        given: Any = self.positions
+        if isinstance(given, list | tuple):
+            given = np.asarray(given)
+        if isinstance(given, np.ndarray):
+            self._narrow(given)
+        elif not hasattr(given, "shape") or not hasattr(given, "__getitem__"):
+            raise TypeError(f"positions are {show(given)}; an array of shape (frames, vertices, 3) is needed")
+        elif getattr(given, "dtype", None) == np.float64 and len(given.shape) == 3 and min(given.shape) > 0:
+            self._narrow_lazily(given)
+        check_number(self.fps, "fps")
+        object.__setattr__(self, "fps", float(self.fps))
+        if not isinstance(self.attributes, Mapping):
+            raise TypeError(f"attributes are {show(self.attributes)}; arrays by name are needed, such as {{'uv': uv}}")
         shape = tuple(self.positions.shape)
         if len(shape) != 3 or shape[2] != 3 or shape[0] < 1 or shape[1] < 1:
             raise InputError(f"{self.name}: positions have shape {shape}; (frames >= 1, vertices >= 1, 3) is needed")
@@ -69,6 +101,24 @@ class MeshSequence:
                     f"({3 * len(self.faces)}) is needed"
                 )
 
+    def _narrow(self, positions: NDArray[Any]) -> None:
+        """Round an array in memory, keep it if that lost anything, and find its origin."""
+        narrowed, origin = _as_positions(positions, self.name)
+        given = self.origin
+        object.__setattr__(self, "positions", narrowed)
+        object.__setattr__(self, "origin", given + origin)
+        lost = rounding(positions, narrowed, origin) if narrowed.ndim == 3 else 0.0
+        if lost:
+            object.__setattr__(self, "_exact", Shifted(positions, given) if given.any() else positions)
+            object.__setattr__(self, "_rounding", lost)
+
+    def _narrow_lazily(self, positions: Frames) -> None:
+        """The same for a dataset that slices, as of HDF5 or Zarr; its origin is that of its first frame."""
+        given, origin = self.origin, choose_origin(np.asarray(positions[0:1]))
+        object.__setattr__(self, "positions", Narrowed(positions, origin))
+        object.__setattr__(self, "origin", given + origin)
+        object.__setattr__(self, "_exact", Shifted(positions, given) if given.any() else positions)
+
     @property
     def n_frames(self) -> int:
         """F, the number of frames."""
@@ -79,11 +129,41 @@ class MeshSequence:
         """V, the number of vertices."""
         return int(self.positions.shape[1])
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """``(F, V, 3)``."""
+        return (self.n_frames, self.n_vertices, 3)
+
     def __len__(self) -> int:
         return self.n_frames
 
+    def __getitem__(self, key: int | slice, /) -> Float32:
+        if not isinstance(key, slice):
+            index = operator.index(key)
+            if not -len(self) <= index < len(self):
+                raise IndexError(f"frame {index} of {self.name}: there are {len(self)}")
+            frame: Float32 = self.read(index % len(self), index % len(self) + 1)[0]
+            return frame
+        start, stop, step = key.indices(len(self))
+        if step == 1:
+            return self.read(start, max(start, stop))
+        frames = [self[i] for i in range(start, stop, step)]
+        return np.stack(frames) if frames else self.read(0, 0)
+
+    def __iter__(self) -> Iterator[Float32]:
+        for _, block in self.chunks():
+            yield from block
+
+    def __repr__(self) -> str:
+        return f"<MeshSequence {self.name}: {describe(self)}>"
+
+    def _repr_html_(self) -> str:
+        from gvpipe.notebook import card, numbers_of
+
+        return card(self.name, numbers_of(self), self)
+
     def read(self, start: int, stop: int) -> Float32:
-        """Frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
+        """Frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units, relative to the origin.
 
         Raises:
             InputError: a position is NaN or infinite; the message names frame and vertex.
@@ -93,20 +173,65 @@ class MeshSequence:
             check_finite(block, self.name, start)
         return block
 
+    def read_exact(self, start: int, stop: int) -> Float64:
+        """The same in float64, with all digits that were given; raises `InputError`."""
+        if self._exact is None:
+            return self.read(start, stop).astype(np.float64)
+        return self.read_absolute(start, stop) - self.origin
+
+    def read_absolute(self, start: int, stop: int) -> Float64:
+        """Frames with the origin added: ``(stop - start, V, 3) float64``, model units; raises `InputError`."""
+        if self._exact is None:
+            return self.read(start, stop) + self.origin
+        block = np.asarray(self._exact[start:stop], dtype=np.float64)
+        if type(self._exact) is not np.ndarray:
+            check_finite(block, self.name, start)
+        return block
+
+    @property
+    def rounding(self) -> float:
+        """By how much float32 moved a coordinate at most, model units; for frames that load later, so far as they did."""
+        return max(self._rounding, float(getattr(self.positions, "rounding", 0.0)))
+
     def reordered(self, permutation: NDArray[np.integer], faces: Int32) -> MeshSequence:
         """Return the sequence whose vertex i is this one's vertex ``permutation[i]``; frames still load when read."""
-        return MeshSequence(_Permuted(self, permutation), faces, self.fps, name=self.name)
+        exact = None if self._exact is None else Permuted(self.read_absolute, len(self), permutation)
+        return self._derived(Permuted(self.read, len(self), permutation), exact, faces=faces, attributes={})
 
     def part(self, start: int, stop: int) -> MeshSequence:
         """Return frames ``start`` to ``stop`` as a sequence; they still load when read."""
-        return MeshSequence(_Part(self, start, stop), self.faces, self.fps, name=self.name)
+        size = stop - start, self.n_vertices
+        exact = None if self._exact is None else Part(self.read_absolute, start, *size)
+        return self._derived(Part(self.read, start, *size), exact, attributes={})
+
+    def local(self) -> MeshSequence:
+        """Return the sequence with its origin left out: the same float32 positions, relative to nothing."""
+        return replace(self, origin=np.zeros(3))
+
+    def with_fps(self, fps: float) -> MeshSequence:
+        """Return the sequence at another frame rate."""
+        kept = tuple(note for note in self.notes if note != ASSUMED_FPS)
+        return self._derived(self.positions, self._exact, fps=fps, notes=kept)
+
+    def _derived(self, positions: Frames, exact: Frames | None, **changes: Any) -> MeshSequence:
+        result = replace(self, positions=positions, **changes)
+        object.__setattr__(result, "_exact", exact)
+        object.__setattr__(result, "_rounding", self._rounding)
+        return result
 
     def chunks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[int, Float32]]:
         """Yield ``(first frame, (n, V, 3) float32)`` over all frames, a bounded number of bytes at a time."""
+        return ((first, self.read(first, last)) for first, last in self.spans(start, stop))
+
+    def exact_chunks(self) -> Iterator[tuple[int, Float64]]:
+        """The same, by `read_exact`."""
+        return ((first, self.read_exact(first, last)) for first, last in self.spans())
+
+    def spans(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[int, int]]:
+        """Yield ``(start, stop)`` of all frames, a bounded number of bytes at a time."""
         stop = self.n_frames if stop is None else stop
         step = max(1, CHUNK_BYTES // (12 * self.n_vertices))
-        for first in range(start, stop, step):
-            yield first, self.read(first, min(first + step, stop))
+        return ((first, min(first + step, stop)) for first in range(start, stop, step))
 
     def sample(self, most: int, vertices: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
         """Vertices of at most so many frames, evenly spaced from the first to the last: ``(n, vertices, 3)``, model units."""
@@ -114,34 +239,16 @@ class MeshSequence:
         return np.concatenate([self.read(i, i + 1)[:, vertices] for i in picked]).astype(np.float64)
 
 
-class _Permuted:
-    """Positions of another sequence in another vertex order."""
-
-    def __init__(self, sequence: MeshSequence, permutation: NDArray[np.integer]) -> None:
-        self._sequence, self._permutation = sequence, permutation
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return (self._sequence.n_frames, len(self._permutation), 3)
-
-    def __getitem__(self, key: slice, /) -> Float32:
-        start, stop, _ = key.indices(self._sequence.n_frames)
-        return self._sequence.read(start, stop)[:, self._permutation]
+def describe(sequence: MeshSequence) -> str:
+    """``24 frames of 300 vertices, 596 triangles, 30 fps``."""
+    parts = [f"{sequence.n_frames} frames of {sequence.n_vertices} vertices", f"{len(sequence.faces)} triangles"]
+    parts.append(f"{sequence.fps:g} fps")
+    if sequence.origin.any():
+        parts.append(f"origin ({show_origin(sequence.origin)})")
+    return ", ".join(parts)
 
 
-class _Part:
-    """Some frames of another sequence."""
-
-    def __init__(self, sequence: MeshSequence, start: int, stop: int) -> None:
-        self._sequence, self._start = sequence, start
-        self.shape: tuple[int, ...] = (stop - start, sequence.n_vertices, 3)
-
-    def __getitem__(self, key: slice, /) -> Float32:
-        start, stop, _ = key.indices(self.shape[0])
-        return self._sequence.read(self._start + start, self._start + stop)
-
-
-def check_finite(block: Float32, name: str, first_frame: int = 0) -> None:
+def check_finite(block: NDArray[np.floating], name: str, first_frame: int = 0) -> None:
     """Raise `InputError` naming frame and vertex if ``block (n, V, 3)`` holds a NaN or an infinity."""
     with np.errstate(invalid="ignore"):
         extremes = (block.min(initial=0), block.max(initial=0))  # a NaN shows in both, an infinity in one
@@ -153,20 +260,24 @@ def check_finite(block: Float32, name: str, first_frame: int = 0) -> None:
         )
 
 
-def _as_positions(positions: NDArray[np.generic], name: str) -> NDArray[np.float32]:
+def _as_positions(positions: NDArray[np.generic], name: str) -> tuple[Float32, Float64]:
+    """An array in memory as float32, and the origin that it is relative to."""
     if positions.dtype.kind not in "fiu":
         raise InputError(f"{name}: positions have type {positions.dtype}; numbers are needed")
+    if positions.ndim != 3 or positions.shape[2] != 3:
+        return np.asarray(positions, np.float32), np.zeros(3)  # refused with its shape
     if isinstance(positions, np.memmap) and positions.dtype == np.float32:
-        return positions  # checked as it is read, so that it need not fit in memory
-    with np.errstate(over="ignore"):
-        result = np.ascontiguousarray(positions, dtype=np.float32)
-    if result.ndim == 3:
-        check_finite(result, name)
-    return result
+        return positions, np.zeros(3)  # checked as it is read, so that it need not fit in memory
+    origin = choose_origin(positions) if positions.size else np.zeros(3)
+    result = narrow(positions, origin)
+    check_finite(result, name)
+    return result, origin
 
 
-def _as_faces(faces: NDArray[np.integer], n_vertices: int, name: str) -> Int32:
-    faces = np.asarray(faces)
+def _as_faces(given: Any, n_vertices: int, name: str) -> Int32:
+    if isinstance(given, str | bytes) or given is None:
+        raise TypeError(f"faces are {show(given)}; an array of shape (triangles, 3) is needed")
+    faces = np.asarray(given)
     if faces.size == 0:
         faces = np.zeros((0, 3), np.int32)
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":

@@ -75,13 +75,13 @@ class VertexErrors:
 
 
 def measure_errors(reference: MeshSequence, read: Callable[[int, int], Float32]) -> Errors:
-    """Errors of the frames that ``read(start, stop)`` returns, vertex by vertex, frame by frame."""
+    """Errors of the frames that ``read(start, stop)`` returns, relative to the reference's origin, frame by frame."""
     errors = VertexErrors()
     step = max(1, BLOCK_BYTES // (24 * reference.n_vertices))
-    for first, chunk in reference.chunks():
+    for first, chunk in reference.exact_chunks():
         other = read(first, first + len(chunk))
         for start in range(0, len(chunk), step):
-            a = chunk[start : start + step].astype(np.float64)
+            a = chunk[start : start + step]
             errors.add(a, np.linalg.norm(a - other[start : start + step], axis=2))
     return errors.result(frame_diagonal(reference))
 
@@ -99,8 +99,7 @@ def measure_spread(sequence: MeshSequence) -> float:
 
 def frame_diagonal(reference: MeshSequence) -> float:
     """Diagonal of frame 0's bounding box, model units."""
-    frame = reference.read(0, 1)[0].astype(np.float64)
-    return float(np.linalg.norm(np.ptp(frame, axis=0)))
+    return float(np.linalg.norm(np.ptp(reference.read_exact(0, 1)[0], axis=0)))
 
 
 def ratio(value: float, size: float) -> float | None:

@@ -7,7 +7,7 @@ of single frames is one module and one entry in `formats.FRAME_FORMATS`.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from gvpipe.errors import InputError
@@ -22,18 +22,20 @@ READERS: dict[str, Callable[[Path, float | None], MeshSequence]] = {".npz": read
 WRITERS: dict[str, Callable[[MeshSequence, Path], None]] = {".npz": write_npz}
 
 
-def read(path: str | os.PathLike[str], fps: float | None = None) -> MeshSequence:
+def read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], fps: float | None = None) -> MeshSequence:
     """Read a mesh sequence.
 
     Args:
-        path: an ``.npz``, or frame files as a folder, a glob (``walk/*.obj``), a pattern (``walk/%04d.obj``) or one
-            file.
+        path: an ``.npz``, or frame files as a folder, a glob (``walk/*.obj``), a pattern (``walk/%04d.obj``,
+            ``walk/####.obj``, ``walk/$F4.obj``), one file or a list of files.
         fps: frames per second; overrides the file's. Frame files, and archives without one, have 30 by default.
 
     Raises:
         InputError: the path or what it holds cannot be used. Frame files after the first are read, and may raise it,
             when their positions are.
     """
+    if not isinstance(path, str | os.PathLike):
+        return read_frames([os.fspath(file) for file in path], fps)
     path = os.fspath(path)
     reader = READERS.get(Path(path).suffix.lower())
     if reader is not None and not os.path.isdir(path):
@@ -56,6 +58,6 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
     """
     path = os.fspath(path)
     writer = WRITERS.get(Path(path).suffix.lower())
-    if writer is not None and not os.path.isdir(path):
+    if writer is not None and not path.endswith(("/", os.sep)):
         return writer(sequence, Path(path))
     return write_frames(sequence, path, start)

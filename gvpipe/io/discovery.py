@@ -1,8 +1,11 @@
 """Which files are the frames, and in what order.
 
-An input may be a folder, a glob, a printf pattern or one file. File names are compared as text and numbers in turn,
-so that ``frame2`` comes before ``frame10``; the number that varies is the frame number, wherever it stands. What is
+An input may be a folder, a glob, a pattern, one file or a list of files. File names are compared as text and numbers in
+turn, so that ``frame2`` comes before ``frame10``; the number that varies is the frame number, wherever it stands. What is
 not clearly one series without gaps is refused: a sequence put together wrongly plays, but wrongly.
+
+A list is what a shell makes of a glob, sorted as text. So it is ordered like the glob, gaps refused, if its names are one
+numbered series; if they are not, or a file occurs twice, someone chose the order, and it is kept.
 """
 
 from __future__ import annotations
@@ -15,8 +18,10 @@ from collections import Counter
 from collections.abc import Hashable, Sequence
 from pathlib import Path
 
+from gvpipe import notes
 from gvpipe.errors import InputError
 from gvpipe.io.formats import FRAME_FORMATS, format_names
+from gvpipe.io.numbering import is_number, name_parts, natural_key, shape, signed_rows, stem_parts, varying
 from gvpipe.io.pattern import Pattern, match_pattern
 
 GLOB_CHARACTERS = "*?["
@@ -45,15 +50,39 @@ def find_frames(path: str) -> list[Path]:
     raise InputError(f"{path}: no such file or folder; check the path")
 
 
-def natural_key(name: str) -> tuple[list[tuple[int, int, str]], str]:
-    """Sort key that compares numbers in names as numbers: ``a2 < a10``, ``a < a1 < b``."""
-    parts = [(0, int(part), "") if part.isdecimal() else (1, 0, part.casefold()) for part in _parts(name)]
-    return parts, name
+def order_list(files: Sequence[Path]) -> tuple[list[Path], bool]:
+    """Frame files of a list, in frame order, and whether that is the order given for want of a better one.
+
+    Raises:
+        InputError: a file that is not there, several formats, or gaps in what is one series.
+    """
+    if not files:
+        raise InputError("the list of frame files is empty; give at least one")
+    for file in files:
+        if os.path.isdir(file):
+            raise InputError(f"{file} is a folder among {len(files)} inputs; give one folder, or frame files")
+        if not os.path.exists(file):
+            raise InputError(f"{file}: no such file; check the path")
+    files = _of_one_format(files, f"{files[0]} ...")
+    if len(files) == 1 or len(set(files)) < len(files) or not _is_one_series(files):
+        return files, len(files) > 1
+    return _order(files, f"{files[0]} ..."), False
 
 
-def _parts(name: str) -> list[str]:
-    """A name as text and numbers in turn, without empty parts: ``a12_b -> ["a", "12", "_b"]``."""
-    return re.findall(r"[0-9]+|[^0-9]+", name)
+def sibling_note(path: Path) -> tuple[str, ...]:
+    """What to say of a single file beside which others lie that differ in a number alone."""
+    parts = stem_parts(Path(path.name))
+    others = [file.name for file in _list_folder(path.parent)]
+    for i in reversed(range(len(parts))):
+        if not is_number(parts[i]):
+            continue
+        width = len(parts[i]) if parts[i].startswith("0") else 0
+        pattern = Pattern("".join(parts[:i]), "".join(parts[i + 1 :]) + path.suffix, width)
+        count = sum(pattern.number(name) is not None for name in others)
+        if count > 1:
+            mark = f"%0{width}d" if width > 1 else "%d"
+            return (notes.one_of_many(path.name, count, str(path.parent / (pattern.before + mark + pattern.after))),)
+    return ()
 
 
 def _list_folder(folder: Path) -> list[Path]:
@@ -101,34 +130,30 @@ def _find_pattern(path: Path, pattern: Pattern) -> list[Path]:
 
 def _order(files: list[Path], path: str) -> list[Path]:
     """Files in frame order, checked to be one series without gaps."""
-    files = sorted(files, key=lambda file: natural_key(str(file)))
     if len(files) == 1 or not any(re.search(r"[0-9]", file.stem) for file in files):
-        return files  # a.obj, b.obj: nothing to count
-    rows = [_stem_parts(file) for file in files]
-    by_shape = _group(files, ["".join("#" if part.isdecimal() else part for part in row) for row in rows])
+        return sorted(files, key=lambda file: natural_key(str(file)))  # a.obj, b.obj: nothing to count
+    files, rows = signed_rows(files)
+    by_shape = _group(files, [shape(row) for row in rows])
     if len(by_shape) > 1:
         raise _several_series(path, by_shape)
-    varying = _varying(rows)
-    if not varying:  # frame1.obj and frame01.obj
+    numbers = varying(rows)
+    if not numbers:  # frame1.obj and frame01.obj
         raise _same_number(files[0], files[1])
-    series = _group(files, [tuple(int(row[i]) for i in varying[:-1]) for row in rows])
+    series = _group(files, [tuple(int(row[i]) for i in numbers[:-1]) for row in rows])
     if len(series) == len(files):
         return files  # several numbers, no two files alike in all but the last: dates and times, not a count
     if len(series) > 1:
         raise _several_series(path, series)
-    digits = [row[varying[-1]] for row in rows]
+    digits = [row[numbers[-1]] for row in rows]
     _check_gaps(files, [int(text) for text in digits], digits)
     return files
 
 
-def _stem_parts(file: Path) -> list[str]:
-    return _parts(str(file.with_suffix("")))
-
-
-def _varying(rows: Sequence[list[str]]) -> list[int]:
-    """Where rows of equal shape hold different numbers."""
-    columns = enumerate(zip(*rows, strict=True))
-    return [i for i, column in columns if column[0].isdecimal() and len(set(map(int, column))) > 1]
+def _is_one_series(files: Sequence[Path]) -> bool:
+    """Whether `_order` takes the files for one series, gaps aside."""
+    _, rows = signed_rows(files)
+    numbers = varying(rows) if len(set(map(shape, rows))) == 1 else []
+    return bool(numbers) and len({tuple(int(row[i]) for i in numbers[:-1]) for row in rows}) in (1, len(files))
 
 
 def _group(files: Sequence[Path], keys: Sequence[Hashable]) -> list[list[Path]]:
@@ -142,8 +167,8 @@ def _group(files: Sequence[Path], keys: Sequence[Hashable]) -> list[list[Path]]:
 def _several_series(path: str, series: Sequence[list[Path]]) -> InputError:
     listed = ", ".join(f"{Path(_abstract(files, '#')).name} ({len(files)})" for files in series[:LISTED])
     more = f" and {len(series) - LISTED} more" if len(series) > LISTED else ""
-    first = _stem_parts(series[0][0])
-    number = next((part for part in reversed(first) if part.isdecimal()), "")
+    first = stem_parts(series[0][0])
+    number = next((part for part in reversed(first) if is_number(part)), "")
     mark = f"%0{len(number)}d" if number.startswith("0") and len(number) > 1 else "%d"
     choice = _abstract(series[0], mark)
     return InputError(f"{path}: {len(series)} series of files, {listed}{more}; choose one, such as '{choice}'")
@@ -151,9 +176,9 @@ def _several_series(path: str, series: Sequence[list[Path]]) -> InputError:
 
 def _abstract(files: Sequence[Path], mark: str) -> str:
     """The path that the files of one series share, with a mark for the frame number."""
-    rows = [_stem_parts(file) for file in files]
-    numbers = _varying(rows) or [i for i, part in enumerate(rows[0]) if part.isdecimal()]
-    name_starts = len(_parts(str(files[0].parent)))
+    rows = [stem_parts(file) for file in files]
+    numbers = varying(rows) or [i for i, part in enumerate(rows[0]) if is_number(part)]
+    name_starts = len(name_parts(str(files[0].parent)))
     numbers = [i for i in numbers if i >= name_starts]
     if numbers:
         rows[0][numbers[-1]] = mark
@@ -177,7 +202,7 @@ def _check_gaps(files: Sequence[Path], numbers: Sequence[int], digits: Sequence[
         return
     told = []
     for i in gaps[:LISTED]:
-        width = len(digits[i]) if digits[i].startswith("0") else 0
+        width = len(digits[i]) if digits[i].lstrip("-").startswith("0") else 0
         missing = f"frame {numbers[i] + 1:0{width}d}"
         if steps[i] > 2:
             missing = f"frames {numbers[i] + 1:0{width}d} to {numbers[i + 1] - 1:0{width}d}"

@@ -37,6 +37,7 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> None:
             f"{path}: frames cannot be written as {target.suffix or 'a file without extension'}; give a folder that "
             f"ends in '/', or a name with %04d and one of {', '.join(writable)}"
         )
+    encode = entry.encoder(sequence.faces, sequence.attributes, sequence.n_vertices, sequence.origin)
     pattern = match_pattern(path)
     if pattern is None and sequence.n_frames > 1:
         raise InputError(
@@ -48,7 +49,6 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> None:
             target.parent.mkdir(parents=True, exist_ok=True)
         except OSError as exc:
             raise output_error(target.parent, exc) from exc
-    encode = entry.encoder(sequence.faces, sequence.attributes, sequence.n_vertices)
     for first, block in sequence.chunks():
         for i, positions in enumerate(block):
             number = start + first + i

@@ -11,7 +11,7 @@ from gvpipe.io.obj import ObjLoader, encode_obj
 from gvpipe.io.off import OffLoader, encode_off
 from gvpipe.io.ply import encode_ply, load_ply
 from gvpipe.io.stl import StlLoader, encode_stl
-from gvpipe.sequence import Int32
+from gvpipe.sequence import Float64, Int32
 
 
 @dataclass(frozen=True)
@@ -20,11 +20,12 @@ class FrameFormat:
 
     Args:
         loader: makes a loader for one sequence.
-        encoder: makes a writer for one sequence from faces, attributes and the number of vertices; None: read only.
+        encoder: makes a writer for one sequence from faces, attributes, the number of vertices and the origin, which it
+            adds to positions; raises `InputError` if the format cannot hold them then. None: read only.
     """
 
     loader: Callable[[], Loader]
-    encoder: Callable[[Int32, Attributes, int], Encoder] | None = None
+    encoder: Callable[[Int32, Attributes, int, Float64], Encoder] | None = None
 
 
 FRAME_FORMATS = {

@@ -6,23 +6,26 @@ and later reads come from there.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from gvpipe.errors import InputError
-from gvpipe.io.discovery import find_frames
+from gvpipe.io.discovery import find_frames, order_list, sibling_note
 from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.mesh import Loader, Mesh
 from gvpipe.io.spool import Spool
-from gvpipe.sequence import Float32, MeshSequence, check_finite
-
-DEFAULT_FPS = 30.0
+from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS, given_order
+from gvpipe.origin import choose_origin, narrow, rounding
+from gvpipe.sequence import Float32, Float64, MeshSequence, check_finite
 
 
 class FrameFiles:
     """Positions of frame files, ``(F, V, 3) float32`` model units, loaded as they are sliced.
+
+    They are relative to ``origin``, which is chosen for the first file's.
 
     Args:
         paths: the files in frame order, all of one format.
@@ -36,8 +39,11 @@ class FrameFiles:
         self._paths = list(paths)
         self._loader: Loader = FRAME_FORMATS[self._paths[0].suffix.lower()].loader()
         self.first: Mesh = load_mesh(self._loader, self._paths[0], 0)
-        self._spool = Spool(len(self._paths), self.first.positions.nbytes)
-        self._spool.store(0, self.first.positions)
+        self.origin: Float64 = choose_origin(self.first.positions[None])
+        self.rounding = 0.0  # what float32 moved a coordinate by at most, model units, in the frames loaded so far
+        positions = self._narrow(self.first)
+        self._spool = Spool(len(self._paths), positions.nbytes)
+        self._spool.store(0, positions)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -75,7 +81,13 @@ class FrameFiles:
                     f"but {self.first.faces[at].tolist()} in {first_path.name}; "
                     "all frames need the same triangles in the same order"
                 )
-        return mesh.positions
+        return self._narrow(mesh)
+
+    def _narrow(self, mesh: Mesh) -> Float32:
+        positions = narrow(mesh.positions[None], self.origin)
+        self.rounding = max(self.rounding, rounding(mesh.positions[None], positions, self.origin))
+        result: Float32 = positions[0]
+        return result
 
 
 def load_mesh(loader: Loader, path: Path, frame: int) -> Mesh:
@@ -91,16 +103,28 @@ def load_mesh(loader: Loader, path: Path, frame: int) -> Mesh:
     except Exception as exc:  # damaged files raise nearly anything inside NumPy, json and trimesh
         reason = getattr(exc, "strerror", None) or " ".join(str(exc).split())[:200] or type(exc).__name__
         raise InputError(f"{path} cannot be read as {path.suffix[1:].upper()}: {reason}; export this frame again") from exc
-    check_finite(mesh.positions[None], str(path), frame)
+    check_finite(narrow(mesh.positions[None], np.zeros(3)), str(path), frame)
     return mesh
 
 
-def read_frames(path: str, fps: float | None = None) -> MeshSequence:
-    """Read a folder, glob, pattern or single file of frames; attributes are those of the first.
+def read_frames(path: str | Sequence[str], fps: float | None = None) -> MeshSequence:
+    """Read a folder, glob, pattern, list or single file of frames; attributes are those of the first.
 
     Raises:
         InputError: no frames, gaps, mixed formats, or a first frame that cannot be read.
     """
-    frames = FrameFiles(find_frames(path))
+    noticed: tuple[str, ...] = ()
+    if isinstance(path, str):
+        files, name = find_frames(path), path
+        if len(files) == 1 and os.path.isfile(path):
+            noticed = sibling_note(Path(path))
+    else:
+        files, is_kept = order_list([Path(file) for file in path])
+        name = f"{files[0]} and {len(files) - 1} more"
+        noticed = (given_order(len(files)),) if is_kept else ()
+    frames = FrameFiles(files)
     first = frames.first
-    return MeshSequence(frames, first.faces, DEFAULT_FPS if fps is None else fps, first.attributes, path)
+    if fps is None and len(files) > 1:
+        noticed = (*noticed, ASSUMED_FPS)
+    rate = DEFAULT_FPS if fps is None else fps
+    return MeshSequence(frames, first.faces, rate, first.attributes, name, frames.origin, (*noticed, *first.notes))

@@ -3,18 +3,30 @@
 The meshes of a scene are joined in trimesh's traversal order, which depends on the file alone, each moved by its
 node's transform. trimesh makes one mesh per primitive, so primitives that share a vertex buffer get a copy each: more
 vertices than the file, but the same in every frame.
+
+trimesh leaves out animations, skins and morph targets without a word, so files that need them are refused here. Every skin
+is: its still pose is the joints', and to find out whether that equals the bind pose is to apply the skin. Morph targets
+whose weights are 0 move nothing, so a file of them without animations passes.
 """
 
 from __future__ import annotations
 
+import json
+import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, as_positions, concatenate
-from gvpipe.sequence import Float32, Int32
+from gvpipe import notes
+from gvpipe.errors import InputError
+from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, concatenate
+from gvpipe.sequence import Float32, Float64, Int32
+
+MAGIC = b"glTF"
+GLB_HEAD = struct.Struct("<4sIIII")  # magic, version, bytes of the file, bytes and type of the first chunk
 
 
 class GltfLoader:
@@ -24,27 +36,59 @@ class GltfLoader:
         self._is_first = True
 
     def __call__(self, path: Path) -> Mesh:
-        """Load one file; after the first, without attributes.
+        """Load one file, binary or text by its first bytes, whatever its name; after the first, without attributes.
 
         Raises:
+            InputError: the file moves, or its pose needs what is not imported.
             Exception: the file cannot be read; trimesh raises many kinds, and the caller names the file.
         """
         import trimesh
 
+        data = path.read_bytes()
+        _check_still(_parse_json(data), path)
         # trimesh drops texture coordinates together with the materials, so the first file is read with both
         scene: Any = trimesh.load_scene(
-            path, file_type=path.suffix[1:].lower(), process=False, skip_materials=not self._is_first
+            path, file_type="glb" if data.startswith(MAGIC) else "gltf", process=False, skip_materials=not self._is_first
         )
-        meshes = []
+        meshes, n_others = [], 0
         for node in scene.graph.nodes_geometry:
             transform, name = scene.graph[node]
             geometry = scene.geometry[name]
             if isinstance(geometry, trimesh.Trimesh):
                 meshes.append(_place(geometry, np.asarray(transform), self._is_first))
+            else:
+                n_others += 1
         if not meshes:
             raise ValueError("it has no triangle mesh in its scene")
         self._is_first = False
-        return concatenate(meshes)
+        return replace(concatenate(meshes), notes=notes.left_out(n_others))
+
+
+def _parse_json(data: bytes) -> dict[str, Any]:
+    """The JSON part of a binary or text file; raises `ValueError` if there is none."""
+    if data.startswith(MAGIC):
+        *_, length, _ = GLB_HEAD.unpack(data[: GLB_HEAD.size].ljust(GLB_HEAD.size, b"\0"))
+        data = data[GLB_HEAD.size : GLB_HEAD.size + length]
+    parsed = json.loads(data)
+    if not isinstance(parsed, dict):
+        raise ValueError("its JSON is not an object")
+    return parsed
+
+
+def _check_still(gltf: dict[str, Any], path: Path) -> None:
+    """Raise `InputError` unless the meshes as stored are what the file shows, at all times."""
+    nodes, meshes = gltf.get("nodes", []), gltf.get("meshes", [])
+    weights = [node.get("weights", meshes[node["mesh"]].get("weights", [])) for node in nodes if "mesh" in node]
+    n_animations = len(gltf.get("animations", []))
+    if n_animations:
+        found = f"holds {n_animations} animation{'s' * (n_animations > 1)}"
+    elif any("skin" in node for node in nodes):
+        found = "holds a skinned mesh"
+    elif any(any(own) for own in weights):
+        found = "is posed by morph targets"
+    else:
+        return
+    raise InputError(f"{path} {found}, which gvpipe does not import yet; export its frames as still files, one file per frame")
 
 
 def _place(geometry: Any, transform: NDArray[np.float64], with_attributes: bool) -> Mesh:
@@ -52,10 +96,11 @@ def _place(geometry: Any, transform: NDArray[np.float64], with_attributes: bool)
     faces = as_faces(np.asarray(geometry.faces), len(positions))
     linear = transform[:3, :3]
     if not np.array_equal(transform, np.eye(4)):  # float32 positions pass exactly where nothing moves them
-        positions = positions @ linear.T + transform[:3, 3]
+        with np.errstate(invalid="ignore"):  # infinite positions are refused later
+            positions = positions @ linear.T + transform[:3, 3]
         if np.linalg.det(linear) < 0:
             faces = np.ascontiguousarray(faces[:, ::-1])  # glTF 2.0, 3.7.4: a mirroring node flips the winding
-    return Mesh(as_positions(positions), faces, _attributes(geometry, linear) if with_attributes else {})
+    return Mesh(positions, faces, _attributes(geometry, linear) if with_attributes else {})
 
 
 def _attributes(geometry: Any, linear: NDArray[np.float64]) -> Attributes:
@@ -74,12 +119,13 @@ def _attributes(geometry: Any, linear: NDArray[np.float64]) -> Attributes:
     return {name: values for name, values in attributes.items() if len(values) == len(geometry.vertices)}
 
 
-def encode_glb(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder:
+def encode_glb(faces: Int32, attributes: Attributes, n_vertices: int, origin: Float64) -> Encoder:
     """A writer of frames with these faces, texture coordinates and colours where there is one per vertex.
 
-    glTF has no corner attributes: they would need vertices split along seams, and vertex order goes first.
+    glTF has no corner attributes: they would need vertices split along seams, and vertex order goes first. Its positions are
+    float32, so an origin becomes the node's translation.
     """
-    from trimesh import Trimesh
+    from trimesh import Scene, Trimesh
     from trimesh.visual import TextureVisuals
 
     make_visual: Any = TextureVisuals
@@ -87,6 +133,9 @@ def encode_glb(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder
         values if values is not None and len(values) == n_vertices else None
         for values in (attributes.get("uv"), attributes.get("color"))
     )
+
+    place = np.eye(4)
+    place[:3, 3] = origin
 
     def encode(positions: Float32) -> bytes:
         mesh: Any = Trimesh(positions, faces, process=False, validate=False)
@@ -96,7 +145,11 @@ def encode_glb(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder
                 mesh.visual.vertex_attributes["color"] = color
         elif color is not None:
             mesh.visual.vertex_colors = color
-        exported: bytes = mesh.export(file_type="glb")
+        scene: Any = mesh
+        if origin.any():
+            scene = Scene()
+            scene.add_geometry(mesh, transform=place)
+        exported: bytes = scene.export(file_type="glb")
         return exported
 
     return encode

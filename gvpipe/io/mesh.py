@@ -23,18 +23,20 @@ class Mesh:
     """What one frame file holds.
 
     Args:
-        positions: ``(V, 3) float32``, model units, in the file's own order.
+        positions: ``(V, 3)``, float32 or float64 as the file has them, model units, in the file's own order.
         faces: ``(T, 3) int32``.
         attributes: static arrays, as in `MeshSequence`.
+        notes: what the loader did that the user should know, a line each; of the first file alone.
     """
 
-    positions: Float32
+    positions: NDArray[np.floating]
     faces: Int32
     attributes: Attributes = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 Loader = Callable[[Path], Mesh]  # one per sequence: it may remember its first file to read the others faster
-Encoder = Callable[[Float32], bytes]  # positions (V, 3) -> a whole file
+Encoder = Callable[[Float32], bytes]  # positions (V, 3), relative to the origin that it was made for -> a whole file
 
 
 def fan(counts: Int64) -> Int64:
@@ -56,12 +58,6 @@ def fan(counts: Int64) -> Int64:
     first = np.repeat(np.cumsum(counts) - counts, n_triangles)
     step = np.arange(n_triangles.sum()) - np.repeat(np.cumsum(n_triangles) - n_triangles, n_triangles)
     return np.stack([first, first + step + 1, first + step + 2], axis=1)
-
-
-def as_positions(values: NDArray[np.generic]) -> Float32:
-    """Round to ``(V, 3) float32``; what float32 cannot hold becomes infinite, and `load_mesh` refuses that."""
-    with np.errstate(over="ignore"):
-        return np.ascontiguousarray(values, dtype=np.float32)
 
 
 def as_faces(values: NDArray[np.integer], n_vertices: int) -> Int32:

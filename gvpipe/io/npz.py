@@ -9,20 +9,20 @@ from __future__ import annotations
 import zipfile
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.atomic import atomic_path
 from gvpipe.errors import InputError
-from gvpipe.io.mesh import ATTRIBUTES, as_color, as_positions
-from gvpipe.sequence import Float32, MeshSequence
-
-DEFAULT_FPS = 30.0
+from gvpipe.io.mesh import ATTRIBUTES, as_color
+from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS
+from gvpipe.sequence import MeshSequence
 
 
 def write_npz(sequence: MeshSequence, path: Path) -> None:
-    """Write the sequence as ``float32``, some frames at a time.
+    """Write the sequence as float32, or as float64 where it has an origin, which is added; some frames at a time.
 
     Raises:
         OutputError: the file cannot be written.
@@ -30,12 +30,13 @@ def write_npz(sequence: MeshSequence, path: Path) -> None:
     statics: dict[str, NDArray[np.generic]] = {"faces": sequence.faces, "fps": np.array(sequence.fps, np.float64)}
     statics |= {name: np.asarray(values) for name, values in sequence.attributes.items()}
     # `numpy.savez_compressed` wants all frames at once, so the one large member is written by hand
-    header = {"descr": "<f4", "fortran_order": False, "shape": (sequence.n_frames, sequence.n_vertices, 3)}
+    descr, read = ("<f8", sequence.read_absolute) if sequence.origin.any() else ("<f4", sequence.read)
+    header = {"descr": descr, "fortran_order": False, "shape": (sequence.n_frames, sequence.n_vertices, 3)}
     with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         with archive.open(_member("vertices"), "w", force_zip64=True) as file:
             np.lib.format.write_array_header_1_0(file, header)
-            for _, block in sequence.chunks():
-                file.write(np.ascontiguousarray(block, "<f4").data)
+            for start, stop in sequence.spans():
+                file.write(np.ascontiguousarray(read(start, stop), descr).data)
         for name, values in statics.items():
             with archive.open(_member(name), "w", force_zip64=True) as file:
                 np.lib.format.write_array(file, values, allow_pickle=False)
@@ -65,21 +66,23 @@ def read_npz(path: Path, fps: float | None = None) -> MeshSequence:
     for key in ("vertices", "faces"):
         if key not in arrays:
             raise InputError(f"{path} has no array {key!r} (it holds {held}); 'vertices' and 'faces' are needed")
+    is_assumed = fps is None and "fps" not in arrays and len(arrays["vertices"]) > 1
     return MeshSequence(
         _as_vertices(arrays["vertices"], path),
         arrays["faces"],
         fps if fps is not None else _as_fps(arrays["fps"], path) if "fps" in arrays else DEFAULT_FPS,
         {name: _as_attribute(name, arrays[name], path) for name in ATTRIBUTES if name in arrays},
         str(path),
+        notes=(ASSUMED_FPS,) if is_assumed else (),
     )
 
 
-def _as_vertices(vertices: NDArray[np.generic], path: Path) -> Float32:
+def _as_vertices(vertices: NDArray[np.generic], path: Path) -> NDArray[Any]:
     if vertices.ndim != 3 or vertices.shape[2] != 3 or vertices.dtype.kind not in "fiu":
         raise InputError(
             f"{path}: 'vertices' has shape {vertices.shape} and type {vertices.dtype}; (frames, vertices, 3) numbers are needed"
         )
-    return as_positions(vertices)
+    return vertices
 
 
 def _as_fps(fps: NDArray[np.generic], path: Path) -> float:

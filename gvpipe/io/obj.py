@@ -18,17 +18,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.io.mesh import Attributes, Encoder, Int64, Mesh, UInt8, as_color, as_faces, as_positions, fan, per_vertex
+from gvpipe import notes
+from gvpipe.io.mesh import Attributes, Encoder, Int64, Mesh, UInt8, as_color, as_faces, fan, per_vertex
 from gvpipe.io.text import (
     clean_lines,
     count_tokens,
+    format_positions,
     format_rows,
     line_spans,
     parse_floats,
     parse_integers,
     token_starts,
 )
-from gvpipe.sequence import Float32, Int32
+from gvpipe.sequence import Float32, Float64, Int32
 
 
 class ObjLoader:
@@ -48,7 +50,7 @@ class ObjLoader:
         values, counts = lines.table(b"v")
         if len(counts) == 0:
             raise ValueError("it has no vertices")
-        positions = as_positions(_columns(values, counts, 3))
+        positions = _columns(values, counts, 3)
         face_lines, starts = lines.of_kind(b"f")
         if self._faces is not None and face_lines.tobytes() == self._face_lines and _fits(self._faces, positions):
             return Mesh(positions, self._faces)
@@ -60,7 +62,7 @@ class ObjLoader:
         self._faces = faces
         # relative indices depend on where the face lines stand, so equal lines need not mean equal faces
         self._face_lines = b"" if b"-" in face_lines.tobytes() else face_lines.tobytes()
-        return Mesh(positions, faces, _attributes(lines, parsed, faces, values, counts))
+        return Mesh(positions, faces, _attributes(lines, parsed, faces, values, counts), notes.cut(parsed.counts))
 
 
 @dataclass(frozen=True)
@@ -183,11 +185,11 @@ def _attributes(
     return attributes
 
 
-def _fits(faces: Int32, positions: Float32) -> bool:
+def _fits(faces: Int32, positions: NDArray[np.floating]) -> bool:
     return int(faces.max()) < len(positions)
 
 
-def encode_obj(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder:
+def encode_obj(faces: Int32, attributes: Attributes, n_vertices: int, origin: Float64) -> Encoder:
     """A writer of frames with these faces; texture coordinates and vertex colours go into each.
 
     Normals do not: those of the first frame would be wrong in all others, and readers compute them.
@@ -203,10 +205,10 @@ def encode_obj(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder
 
     def encode(positions: Float32) -> bytes:
         if color is None or len(color) != n_vertices:  # OBJ has no place for corner colours
-            head = format_rows("v %.9g %.9g %.9g\n", positions)
+            head = format_positions("v {0} {0} {0}\n", positions, origin)
         else:
             rgb = color[:, :3].astype(np.float64) / 255
-            head = format_rows("v %.9g %.9g %.9g %.4f %.4f %.4f\n", np.concatenate([positions, rgb], axis=1))
+            head = format_positions("v {0} {0} {0} %.4f %.4f %.4f\n", positions, origin, rgb)
         return (head + tail).encode("ascii")
 
     return encode

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.io.mesh import Attributes, Encoder, Int64, Mesh, as_color, as_faces, as_positions, fan
-from gvpipe.io.text import clean_lines, count_tokens, format_rows, line_spans, parse_floats, parse_integers
-from gvpipe.sequence import Float32, Int32
+from gvpipe import notes
+from gvpipe.io.mesh import Attributes, Encoder, Int64, Mesh, as_color, as_faces, fan
+from gvpipe.io.text import clean_lines, count_tokens, format_positions, format_rows, line_spans, parse_floats, parse_integers
+from gvpipe.sequence import Float32, Float64, Int32
 
 HEADER = re.compile(rb"\s*(ST)?(C)?(N)?OFF\b")
 
@@ -48,15 +49,15 @@ class OffLoader:
         values, counts, first = _parse_rows(body[ends[0] : ends[n_vertices]])
         if (counts < 3).any():
             raise ValueError("a vertex has fewer than 3 coordinates")
-        positions = as_positions(values[first[:, None] + np.arange(3)])
+        positions = values[first[:, None] + np.arange(3)]
         face_lines = body[ends[n_vertices] : ends[n_vertices + n_faces]]
-        if self._faces is None or face_lines != self._face_lines or self._faces.max() >= n_vertices:
-            faces = _parse_faces(face_lines, n_vertices)
-        else:
-            faces = self._faces
+        if self._faces is not None and face_lines == self._face_lines and self._faces.max() < n_vertices:
+            return Mesh(positions, self._faces)
+        faces, n_corners = _parse_faces(face_lines, n_vertices)
         if self._faces is None:
             self._faces, self._face_lines = faces, face_lines
-        return Mesh(positions, faces, _colors(values, counts, first) if header[2] and not header[1] else {})
+        colors = _colors(values, counts, first) if header[2] and not header[1] else {}
+        return Mesh(positions, faces, colors, notes.cut(n_corners))
 
 
 def _parse_rows(text: bytes) -> tuple[NDArray[np.float64], Int64, Int64]:
@@ -68,8 +69,8 @@ def _parse_rows(text: bytes) -> tuple[NDArray[np.float64], Int64, Int64]:
     return values, counts, np.cumsum(counts) - counts
 
 
-def _parse_faces(text: bytes, n_vertices: int) -> Int32:
-    """Polygons as triangles ``(T, 3)``; colours behind the corners are skipped."""
+def _parse_faces(text: bytes, n_vertices: int) -> tuple[Int32, Int64]:
+    """Polygons as triangles ``(T, 3)``, and their numbers of corners; colours behind the corners are skipped."""
     values, counts, first = _parse_rows(text)
     n_corners = values[first].astype(np.int64)
     if (n_corners >= counts).any():
@@ -77,7 +78,7 @@ def _parse_faces(text: bytes, n_vertices: int) -> Int32:
     triangles = fan(n_corners)
     # corner c of polygon p stands at first[p] + 1 + c, behind the number of corners
     at = np.repeat(first + 1 - (np.cumsum(n_corners) - n_corners), n_corners) + np.arange(n_corners.sum())
-    return as_faces(values[at].astype(np.int64)[triangles], n_vertices)
+    return as_faces(values[at].astype(np.int64)[triangles], n_vertices), n_corners
 
 
 def _colors(values: NDArray[np.float64], counts: Int64, first: Int64) -> Attributes:
@@ -88,17 +89,17 @@ def _colors(values: NDArray[np.float64], counts: Int64, first: Int64) -> Attribu
     return {"color": as_color(values[(first + counts[0] - width)[:, None] + np.arange(width)])}
 
 
-def encode_off(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder:
+def encode_off(faces: Int32, attributes: Attributes, n_vertices: int, origin: Float64) -> Encoder:
     """A writer of frames with these faces, and with colours if there is one per vertex."""
     color = attributes.get("color")
     tail = format_rows("3 %d %d %d\n", faces)
 
     def encode(positions: Float32) -> bytes:
         if color is None or len(color) != n_vertices:
-            head = f"OFF\n{n_vertices} {len(faces)} 0\n" + format_rows("%.9g %.9g %.9g\n", positions)
+            head = f"OFF\n{n_vertices} {len(faces)} 0\n" + format_positions("{0} {0} {0}\n", positions, origin)
         else:
-            rows = np.concatenate([positions.astype(np.float64), color], axis=1)
-            head = f"COFF\n{n_vertices} {len(faces)} 0\n" + format_rows("%.9g %.9g %.9g %d %d %d %d\n", rows)
+            rows = format_positions("{0} {0} {0} %d %d %d %d\n", positions, origin, color)
+            head = f"COFF\n{n_vertices} {len(faces)} 0\n" + rows
         return (head + tail).encode("ascii")
 
     return encode

@@ -13,11 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, as_positions, per_vertex
-from gvpipe.sequence import Float32, Int32
+from gvpipe import notes
+from gvpipe.io.mesh import Attributes, Encoder, Int64, Mesh, as_color, as_faces, per_vertex
+from gvpipe.sequence import Float32, Float64, Int32
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 NORMAL_NAMES = ("nx", "ny", "nz")
+INDEX_NAMES = ("vertex_indices", "vertex_index")
 COLOR_NAMES = ("red", "green", "blue", "alpha")
 
 
@@ -39,10 +41,24 @@ def load_ply(path: Path) -> Mesh:
             raise ValueError(f"it has no element {name!r}")
         if any(len(column) != element["length"] for column in _columns(element).values()):
             raise ValueError(f"it announces {element['length']} of element {name!r} but ends before the last")
-    positions, faces = as_positions(loaded.vertices), as_faces(loaded.faces, len(loaded.vertices))
+    positions, faces = np.asarray(loaded.vertices), as_faces(loaded.faces, len(loaded.vertices))
     if len(positions) != elements["vertex"]["length"]:
         raise ValueError("trimesh changed its number of vertices")
-    return Mesh(positions, faces, _attributes(_columns(elements["vertex"]), _columns(elements["face"]), faces))
+    counts = _corner_counts(_columns(elements["face"]), len(faces))
+    return Mesh(
+        positions, faces, _attributes(_columns(elements["vertex"]), _columns(elements["face"]), faces), notes.cut(counts)
+    )
+
+
+def _corner_counts(face: dict[str, Any], n_triangles: int) -> Int64:
+    """Corners of each face ``(N,)``; all triangles if its list of vertices has an unusual name."""
+    name = next((name for name in INDEX_NAMES if name in face), None)
+    if name is None:
+        return np.full(n_triangles, 3)
+    column = face[name]["f1"] if face[name].dtype.names else face[name]
+    if column.dtype == object:
+        return np.fromiter(map(len, column), np.int64, len(column))
+    return np.full(len(column), column.reshape(len(column), -1).shape[1])
 
 
 def _columns(element: dict[str, Any]) -> dict[str, Any]:
@@ -76,10 +92,13 @@ def _stack(columns: dict[str, Any], names: tuple[str, ...]) -> NDArray[Any]:
     return np.stack([np.asarray(columns[name]).reshape(-1) for name in names], axis=1)
 
 
-def encode_ply(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder:
-    """A writer of frames with these faces, texture coordinates and vertex colours (normals: see `encode_obj`)."""
+def encode_ply(faces: Int32, attributes: Attributes, n_vertices: int, origin: Float64) -> Encoder:
+    """A writer of frames with these faces, texture coordinates and vertex colours (normals: see `encode_obj`).
+
+    Coordinates are ``double`` where they count from an origin.
+    """
     uv, color = attributes.get("uv"), attributes.get("color")
-    vertex_fields: list[tuple[str, str]] = [(name, "<f4") for name in "xyz"]
+    vertex_fields: list[tuple[str, str]] = [(name, "<f8" if origin.any() else "<f4") for name in "xyz"]
     face_fields: list[tuple[Any, ...]] = [("n", "u1"), ("vertex_indices", "<i4", 3)]
     if uv is not None and len(uv) == n_vertices:
         vertex_fields += [("s", "<f4"), ("t", "<f4")]
@@ -100,7 +119,7 @@ def encode_ply(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder
         polygons["n_texcoord"], polygons["texcoord"] = 6, uv.reshape(-1, 6)
         lists.append("property list uchar float texcoord")
 
-    kinds = {"<f4": "float", "u1": "uchar"}
+    kinds = {"<f4": "float", "<f8": "double", "u1": "uchar"}
     properties = [f"property {kinds[kind]} {name}" for name, kind in vertex_fields]
     header = "\n".join(
         [
@@ -116,7 +135,7 @@ def encode_ply(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder
 
     def encode(positions: Float32) -> bytes:
         for i, name in enumerate("xyz"):
-            vertices[name] = positions[:, i]
+            vertices[name] = positions[:, i] + origin[i] if origin.any() else positions[:, i]
         return header + vertices.tobytes() + polygons.tobytes()
 
     return encode

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from gvpipe.errors import InputError
-from gvpipe.io.mesh import Attributes, Encoder, Int64, Mesh, as_faces, as_positions
-from gvpipe.sequence import Float32, Int32, check_finite
+from gvpipe.io.mesh import Attributes, Encoder, Int64, Mesh, as_faces
+from gvpipe.origin import choose_origin, narrow
+from gvpipe.sequence import Float32, Float64, Int32, check_finite
 
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 HEADER_BYTES = 80
@@ -26,6 +27,7 @@ class StlLoader:
 
     def __init__(self) -> None:
         self._first: Path | None = None
+        self._origin: Float64 = np.zeros(3)  # corners are compared as the float32 that they become
         self._faces: Int32 = np.zeros((0, 3), np.int32)
         self._corner_of: Int64 = np.zeros(0, np.int64)  # (V,), the first corner at each vertex
 
@@ -36,7 +38,10 @@ class StlLoader:
             InputError: corners that were one vertex in the first file are apart in this one.
             Exception: the file cannot be read; trimesh raises many kinds, and the caller names the file.
         """
-        corners = _load_corners(path)
+        exact = _load_corners(path)
+        if self._first is None:
+            self._origin = choose_origin(exact[None])
+        corners = narrow(exact[None], self._origin)[0]
         if self._first is None:
             self._corner_of, corner_vertices = _weld(corners)
             self._faces = as_faces(corner_vertices.reshape(-1, 3), len(self._corner_of))
@@ -55,15 +60,15 @@ class StlLoader:
                 f"corner {corner % 3} of triangle {corner // 3} shares a vertex with another in {self._first.name} "
                 f"but not in {path.name}; STL has no vertices of its own: export OBJ, PLY or GLB"
             )
-        return Mesh(positions, self._faces)
+        return Mesh(exact[self._corner_of], self._faces)
 
 
-def _load_corners(path: Path) -> Float32:
+def _load_corners(path: Path) -> Float64:
     """All corners, ``(3 T, 3)``."""
     import trimesh
 
     scene: Any = trimesh.load_scene(path, file_type="stl", process=False)
-    solids = [as_positions(solid.vertices[solid.faces.reshape(-1)]) for solid in scene.geometry.values()]
+    solids = [np.asarray(solid.vertices, np.float64)[solid.faces.reshape(-1)] for solid in scene.geometry.values()]
     if not solids:
         raise ValueError("it has no triangles")
     return np.concatenate(solids)
@@ -79,8 +84,18 @@ def _weld(corners: Float32) -> tuple[Int64, Int64]:
     return first[by_appearance], rank[inverse]
 
 
-def encode_stl(faces: Int32, attributes: Attributes, n_vertices: int) -> Encoder:
-    """A writer of frames with these faces; STL holds nothing but triangles."""
+def encode_stl(faces: Int32, attributes: Attributes, n_vertices: int, origin: Float64) -> Encoder:
+    """A writer of frames with these faces; STL holds nothing but triangles.
+
+    Raises:
+        InputError: there is an origin.
+    """
+    if origin.any():
+        place = ", ".join(f"{x:.17g}" for x in origin)
+        raise InputError(
+            f"STL holds float32, too few digits for this mesh at ({place}); write .obj, .ply, .off, .glb or .npz, or "
+            "positions relative to there (decode --local)"
+        )
     records = np.zeros(len(faces), RECORD)
     header = b"gvpipe".ljust(HEADER_BYTES) + struct.pack("<I", len(faces))
 

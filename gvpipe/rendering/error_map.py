@@ -16,6 +16,7 @@ from gvpipe.metrics import aligned
 from gvpipe.rendering.camera import sampled, used_vertices
 from gvpipe.rendering.colours import BACKGROUND, error_colours
 from gvpipe.sequence import MeshSequence
+from gvpipe.vertex_errors import frame_diagonal
 
 SMALLEST = (160, 120)  # pixels, of a picture with a legend
 INK = (60, 60, 60)
@@ -40,15 +41,16 @@ class ErrorMap:
         self, reference: MeshSequence, distorted: MeshSequence, frames: Sequence[int], largest: float | None = None
     ) -> None:
         self._reference, self.sequence = reference, aligned(reference, distorted)
-        diagonal = float(np.linalg.norm(np.ptp(reference.read(0, 1)[0].astype(np.float64), axis=0)))
+        diagonal = frame_diagonal(reference)
         self._unit, self._unit_name = (diagonal / 100, "% of diagonal") if diagonal > 0 else (1.0, "model units")
         used = used_vertices(self.sequence)  # what no triangle uses cannot be seen
         self.largest = largest or max(float(self.errors(frame)[used].max()) for frame in sampled(frames))
 
     def errors(self, frame: int) -> NDArray[np.float64]:
         """``(V,)`` distances, percent of the diagonal."""
-        original = self._reference.read(frame, frame + 1)[0].astype(np.float64)
-        distance: NDArray[np.float64] = np.linalg.norm(self.sequence.read(frame, frame + 1)[0] - original, axis=1)
+        original, here = (side.read_exact(frame, frame + 1)[0] for side in (self._reference, self.sequence))
+        apart = self.sequence.origin - self._reference.origin
+        distance: NDArray[np.float64] = np.linalg.norm(here + apart - original, axis=1)
         return distance / self._unit
 
     def values(self, frame: int) -> NDArray[np.float64]:

@@ -1,0 +1,37 @@
+"""Arguments of the wrong type, and misspelt names: what was given, what is needed, what was probably meant.
+
+A wrong type is a mistake in the calling program and raises TypeError. A wrong value may come from a user and raises a
+`gvpipe.errors.GvpipeError`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Iterable
+
+StrPath = str | os.PathLike[str]
+
+
+def check_path(value: object, role: str, instead: str = "") -> None:
+    """Raise TypeError unless ``value`` is a path; ``instead`` names what else is possible, such as ``"a MeshSequence or "``."""
+    if not isinstance(value, str | os.PathLike) or isinstance(os.fspath(value), bytes):
+        raise TypeError(f"{role} is {show(value)}; {instead}a path (str or os.PathLike) is needed")
+
+
+def check_number(value: object, role: str) -> None:
+    """Raise TypeError unless ``value`` is a number; NumPy's are."""
+    if isinstance(value, bool | str | bytes) or not hasattr(value, "__float__"):
+        raise TypeError(f"{role} is {show(value)}; a number is needed")
+
+
+def show(value: object) -> str:
+    """A value and its type, short: ``5 (int)``."""
+    text = repr(value)
+    return f"{text if len(text) <= 40 else text[:37] + '...'} ({type(value).__name__})"
+
+
+def did_you_mean(name: object, names: Iterable[str]) -> str:
+    """``; did you mean 'quality'?``, or nothing where no name is near."""
+    near = difflib.get_close_matches(str(name).lower(), list(names), 1, 0.6)
+    return f"; did you mean {near[0]!r}?" if near else ""

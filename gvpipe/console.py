@@ -1,0 +1,137 @@
+"""What a command prints, and where: results on standard output, notes, progress and timings on standard error.
+
+Every command has ``--json``, ``--quiet`` and ``--verbose`` and prints through an `Output` made of them. Where standard output
+carries a file (``-``), results go to standard error too.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from gvpipe.codec import Progress
+
+VERBOSE = ("--verbose", "-v")
+
+Command = Callable[..., None]
+
+
+@dataclass(frozen=True)
+class Output:
+    """How much a command prints.
+
+    Args:
+        as_json: one JSON object instead of text.
+        quiet: no text, notes or progress; JSON that is asked for, and errors, are printed still.
+        verbose: the seconds of each stage too.
+        beside: results go to standard error, since standard output carries a file.
+    """
+
+    as_json: bool = False
+    quiet: bool = False
+    verbose: bool = False
+    beside: bool = False
+
+    def carrying(self, target: str) -> Output:
+        """The output of a command that writes to ``target``, which may be ``-``."""
+        return replace(self, beside=target == "-")
+
+    def text(self, line: object) -> None:
+        """Print a line of a result for people."""
+        if not self.quiet and not self.as_json:
+            click.echo(line, err=self.beside)
+
+    def note(self, line: str) -> None:
+        """Print what the user should know, one line."""
+        if not self.quiet:
+            click.echo(f"Note: {line}", err=True)
+
+    def json(self, values: dict[str, Any]) -> None:
+        """Print a result as one JSON object, if that is asked for."""
+        if self.as_json:
+            click.echo(json.dumps(values, allow_nan=False), err=self.beside)
+
+    @contextlib.contextmanager
+    def progress(self) -> Iterator[Progress | None]:
+        """A bar per stage, where standard error is a terminal; verbose: the seconds of each stage when it ends."""
+        if self.verbose:
+            stages = _Stages()
+            yield stages
+            stages.end()
+        elif self.quiet or not sys.stderr.isatty():
+            yield None
+        else:
+            with _bars() as show:
+                yield show
+
+
+def output_options(command: Command) -> Command:
+    """Give a command ``--json``, ``--quiet`` and ``--verbose``, and call it with ``out``, an `Output`."""
+    as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
+    return as_json(print_options(command))
+
+
+def print_options(command: Command) -> Command:
+    """The same without ``--json``."""
+
+    @click.option("-q", "--quiet", is_flag=True, help="Print no progress, no notes and no text.")
+    @click.option("-v", "--verbose", is_flag=True, help="Print the time of each stage; unexpected errors with their traceback.")
+    @functools.wraps(command)
+    def wrapped(*args: Any, quiet: bool, verbose: bool, as_json: bool = False, **options: Any) -> None:
+        command(*args, out=Output(as_json, quiet, verbose), **options)
+
+    return wrapped
+
+
+def is_verbose(arguments: list[str]) -> bool:
+    """Whether a command line asks for tracebacks; looked at before, and whether or not, it is parsed."""
+    return any(argument in VERBOSE for argument in arguments)
+
+
+class _Stages:
+    """Progress that prints how long each stage took, and all of them."""
+
+    def __init__(self) -> None:
+        self._stage, self._since = "", time.perf_counter()
+        self._started = self._since
+
+    def end(self) -> None:
+        """Print what is left."""
+        self("", 1.0)
+        click.echo(f"total: {time.perf_counter() - self._started:.2f} s", err=True)
+
+    def __call__(self, stage: str, done: float) -> None:
+        if stage == self._stage:
+            return
+        now = time.perf_counter()
+        if self._stage:
+            click.echo(f"{self._stage}: {now - self._since:.2f} s", err=True)
+        self._stage, self._since = stage, now
+
+
+@contextlib.contextmanager
+def _bars() -> Iterator[Progress]:
+    from rich.console import Console
+    from rich.progress import Progress as Bars
+
+    with Bars(console=Console(stderr=True), transient=True) as bars:
+        tasks: dict[str, Any] = {}
+
+        def show(stage: str, done: float) -> None:
+            for name, task in tasks.items():
+                if name != stage:
+                    bars.update(task, completed=1.0)
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=1.0)
+            bars.update(tasks[stage], completed=done)
+
+        yield show

@@ -1,0 +1,69 @@
+"""What was done that a user should know, though nothing is wrong: one line each.
+
+Readers put notes on the sequence (`MeshSequence.notes`), `gvpipe.encode` adds its own (`Report.notes`), the command line prints
+them. The library itself never prints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+ROUNDED = 1e-5  # part of the diagonal: what float32 may round without a word
+DEFAULT_FPS = 30.0
+ASSUMED_FPS = f"the input has no frame rate; {DEFAULT_FPS:g} frames per second were assumed (fps, --fps)"
+
+
+def cut(counts: NDArray[np.integer]) -> tuple[str, ...]:
+    """Of polygons, given their numbers of corners ``(N,)``; nothing if all are triangles."""
+    larger = counts[counts > 3]
+    if not len(larger):
+        return ()
+    return (f"{len(larger)} of {len(counts)} faces have more than 3 corners; they became {int((larger - 2).sum())} triangles",)
+
+
+def left_out(n_primitives: int) -> tuple[str, ...]:
+    """Of points and lines beside the triangles."""
+    return (f"{n_primitives} of its primitives are points or lines; they were left out",) if n_primitives else ()
+
+
+def one_of_many(name: str, count: int, choice: str) -> str:
+    """Of a single file that looks like one frame of many; ``choice`` is what would name them all."""
+    return f"{name} is 1 of {count} numbered files and was read alone; all of them are '{choice}'"
+
+
+def given_order(count: int) -> str:
+    """Of a list of files whose names do not say an order."""
+    return f"the names of the {count} files are not one numbered series; they are frames in the order given"
+
+
+def loose_bound(bound: float, diagonal: float) -> tuple[str, ...]:
+    """Of a largest error that allows everything."""
+    if not bound > diagonal > 0:
+        return ()
+    return (f"the largest error allowed, {bound:g}, is larger than the object, whose diagonal is {diagonal:g}",)
+
+
+def rounded(rounding: float, diagonal: float) -> tuple[str, ...]:
+    """Of positions that reach so far, for the object's size, that float32 deforms it even from the best origin."""
+    if not rounding > ROUNDED * diagonal > 0:
+        return ()
+    part = f"{100 * rounding / diagonal:.2g} % of the object's diagonal"
+    return (f"positions reach so far from the first frame's that float32 rounds them by up to {rounding:.2g}, {part}",)
+
+
+def not_carried(names: Sequence[str]) -> tuple[str, ...]:
+    """Of attributes that the file has no place for."""
+    return (f"the file does not carry {', '.join(names)}",) if names else ()
+
+
+def origin_left_out(origin: Sequence[float]) -> str:
+    """Of positions that were written without their origin."""
+    return f"positions are relative to {show_origin(origin)}, which was left out"
+
+
+def show_origin(origin: Iterable[float]) -> str:
+    """``5200001, 0, -500000``."""
+    return ", ".join(f"{x:.17g}" for x in origin)
