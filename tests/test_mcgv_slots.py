@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from sequences import patched
 
-from gvcodecs.mcgv import Mcgv
+from gvcodecs.mcgv import Mcgv, trajectory_reader
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.reader import read_layout
 from gvcodecs.mcgv.surface import read_surface
@@ -97,3 +97,17 @@ def test_planes_must_hold_the_slots() -> None:
     header = sections.Header.of(stream)
     with pytest.raises(CorruptFile, match="do not hold"):
         read_layout(stream, dataclasses.replace(header, width=16, height=16), read_surface(stream, header))
+
+
+def test_components_are_limited_by_slots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By what an encoder counts: with copies there are more vertices."""
+    stream = Mcgv(**FAST, prediction="blended", transform="klt").encode(patched())
+    header = sections.Header.of(stream)
+    assert header.images is not None
+    most = max(header.images.components) * read_surface(stream, header).n_slots
+    assert 0 < most < max(header.images.components) * stream.n_vertices
+    monkeypatch.setattr(trajectory_reader, "MAX_VALUES", most)
+    assert np.isfinite(decode(stream)).all()
+    monkeypatch.setattr(trajectory_reader, "MAX_VALUES", most - 1)
+    with pytest.raises(CorruptFile, match="components"):
+        decode(stream)
