@@ -15,8 +15,8 @@ Int64 = NDArray[np.int64]
 def find_points(sequence: MeshSequence, tolerance: float = 0.0) -> Int64:
     """Return ``(V,)`` the point of each vertex, 0..P-1, numbered as their first vertices are.
 
-    Vertices of one point start at one position, and stay within the tolerance of the point's first vertex. Vertices with one
-    trajectory are always one point.
+    Vertices of one point start at one position, and stay within the tolerance of the point's first vertex, or within twice the
+    tolerance if they leave another vertex together in a later chunk. Vertices with one trajectory are always one point.
 
     Args:
         sequence: the animation.

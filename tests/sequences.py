@@ -36,6 +36,21 @@ def _moving(points: npt.ArrayLike, faces: npt.ArrayLike, name: str, n_frames: in
     return MeshSequence(positions, np.asarray(faces, np.int32).reshape(-1, 3), 30.0, name=name)
 
 
+def patched(n: int = 9, n_frames: int = 12, still: float = 0.3) -> MeshSequence:
+    """A waving sheet with a seam and a corner of loose triangles, of which the part left of ``still`` never moves; shuffled."""
+    sheet = waving(n, n_frames)
+    positions, faces = np.array(sheet.positions[:]), sheet.faces
+    x, y = grid(n)[0][np.random.default_rng(3).permutation(n * n), :2].T  # of the vertices, as `waving` shuffles them
+    positions[:, x <= still] = positions[:1, x <= still]
+    middle = np.stack([x, y])[:, faces].mean(axis=2)  # (2, T)
+    part = np.where(middle[1] > 0.5, 1, 0) + np.where((middle > 0.6).all(axis=0), 2 + np.arange(len(faces)), 0)
+    pairs = np.stack([faces, np.broadcast_to(part[:, None], faces.shape)], axis=2).reshape(-1, 2)
+    copies, corners = np.unique(pairs, axis=0, return_inverse=True)
+    order = np.random.default_rng(4).permutation(len(copies))
+    own = np.argsort(order)[corners.ravel()].reshape(-1, 3).astype(np.int32)
+    return MeshSequence(positions[:, copies[order, 0]], own, sheet.fps, name="patched")
+
+
 def awkward() -> dict[str, MeshSequence]:
     """The inputs that every codec must survive."""
     points, faces = grid(6)

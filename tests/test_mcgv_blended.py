@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,18 +16,23 @@ from sequences import awkward, grid, waving
 from gvcodecs.mcgv import Mcgv
 from gvcodecs.mcgv.blend_fitting import Clustering, fit_blend
 from gvcodecs.mcgv.blending import INFLUENCES, TOTAL, Blend, BlendFit, Weights, homogeneous
-from gvcodecs.mcgv.points import Points
+from gvcodecs.mcgv.points import Points, weld_vertices
 from gvcodecs.mcgv.rebuilding import rebuild_blended
-from gvcodecs.mcgv.separation import find_places, keep_apart
+from gvcodecs.mcgv.separation import keep_apart
 from gvcodecs.mcgv.trajectories import decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.weight_choice import choose
 from gvcodecs.mcgv.weight_coding import Prices, decode_weights, earlier_neighbours, encode_weights
 from gvcodecs.mcgv.weight_kernels import MAX_LISTED, cluster_of, list_known, rank_of, share
 from gvpipe.codec import open_reader
+from gvpipe.container import read_file
 from gvpipe.errors import CorruptFile, FormatError, NewerVersion
+from gvpipe.point_mesh import PointMesh
 from gvpipe.quantize import Lattice
 from gvpipe.sequence import MeshSequence
 from gvpipe.topology import adjacency
+from gvpipe.welding import find_points
+
+GOLDEN = Path(__file__).parent / "golden"
 
 Float64 = NDArray[np.float64]
 
@@ -78,11 +84,30 @@ def test_points_are_numbered_along_the_codecs_order() -> None:
     lattice = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
     faces = np.array([[0, 1, 2], [3, 5, 4]], np.int32)
     visits = np.array([3, 0, 5, 4, 1, 2])  # the codec goes through vertices 1 4 5 0 3 2
-    points = Points.of(lattice, faces, visits)
-    assert points.members.tolist() == [1, 4, 5, 0]
-    assert points.point.tolist() == [3, 0, 1, 0, 1, 2]
+    points, point, members = weld_vertices(lattice, faces, visits)
+    assert members.tolist() == [1, 4, 5, 0]
+    assert point.tolist() == [3, 0, 1, 0, 1, 2]
     assert points.faces.tolist() == [[3, 0, 1], [0, 2, 1]]
     assert points.neighbours.toarray().tolist() == [[0, 1, 1, 1], [1, 0, 1, 1], [1, 1, 0, 0], [1, 1, 0, 0]]
+
+
+def test_points_that_move_keep_the_sides_between_them() -> None:
+    """Also those of triangles whose third corner stands still, which are no triangles any more."""
+    mesh = PointMesh(
+        faces=np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2]], np.int32),
+        point=np.arange(5),
+        lattice=np.arange(15, dtype=np.int32).reshape(5, 3),
+        point_faces=np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4]], np.int32),
+    )
+    points = Points.moving(mesh, np.array([1, 2, 3]))
+    assert points.faces.tolist() == [[0, 2, 1]]
+    assert points.neighbours.toarray().tolist() == [[0, 1, 1], [1, 0, 1], [1, 1, 0]]
+    points = Points.moving(mesh, np.array([0, 1, 3, 4]))
+    assert len(points.faces) == 0
+    assert points.neighbours.toarray().tolist() == [[0, 1, 0, 0], [1, 0, 1, 0], [0, 1, 0, 1], [0, 0, 1, 0]]
+    assert points.pieces().tolist() == [0, 0, 0, 0]
+    whole = Points.moving(mesh, np.arange(5))
+    assert np.array_equal(whole.faces, mesh.point_faces) and whole.n_points == 5
 
 
 # weights
@@ -179,12 +204,12 @@ def _applied(points: Float64, weights: Weights, transforms: Float64) -> Float64:
 def test_dearer_bits_make_smaller_sections() -> None:
     sequence = waving(16, 30)
     base = np.asarray(sequence.read(0, 1)[0], np.float64)
-    points = Points.of(np.arange(3 * len(base)).reshape(-1, 3), sequence.faces, np.arange(len(base)))
+    neighbours = adjacency(sequence.faces, len(base))
     sizes = []
     for step in (1e-4, 1e-2):
-        fitted = fit_blend(sequence, base, points, Clustering.of(sequence, base, points), step, 6)
+        fitted = fit_blend(sequence, base, neighbours, Clustering.of(sequence, base, neighbours), step, 6)
         check_weights(fitted.weights, fitted.n_clusters)
-        sizes.append(len(encode_weights(fitted.weights, points.neighbours)))
+        sizes.append(len(encode_weights(fitted.weights, neighbours)))
     assert sizes[1] < sizes[0]
 
 
@@ -192,9 +217,9 @@ def test_as_many_clusters_as_pay() -> None:
     """A finer step asks for more of them; one that no motion reaches, for the fewest."""
     sequence = waving(16, 30)
     base = np.asarray(sequence.read(0, 1)[0], np.float64)
-    points = Points.of(np.arange(3 * len(base)).reshape(-1, 3), sequence.faces, np.arange(len(base)))
-    clustering = Clustering.of(sequence, base, points)
-    counts = [fit_blend(sequence, base, points, clustering, step, 0).n_clusters for step in (100.0, 0.02, 5e-4)]
+    neighbours = adjacency(sequence.faces, len(base))
+    clustering = Clustering.of(sequence, base, neighbours)
+    counts = [fit_blend(sequence, base, neighbours, clustering, step, 0).n_clusters for step in (100.0, 0.02, 5e-4)]
     assert counts == sorted(counts) and counts[0] <= 8 < counts[-1]
 
 
@@ -286,12 +311,15 @@ def test_hostile_trajectories() -> None:
 # files
 
 
-def test_affine_files_stay_version_1() -> None:
+def test_versions_and_predictions_must_fit() -> None:
+    """Files without the key are version 1, and affine; version 3 has another mesh than those before."""
     sequence = waving(10, 12)
-    published = Mcgv(prediction="affine", clusters=3, quality=30).encode(sequence)  # coarse: no outliers
+    published = read_file(GOLDEN / "mcgv-1-h264.mp4")
     assert published.version == 1 and "prediction" not in published.header and "weights" not in published.sections
+    affine = Mcgv(prediction="affine", clusters=3, quality=30).encode(sequence)
+    assert affine.version == 3 and affine.header["prediction"] == "affine" and "weights" not in affine.sections
     chosen = Mcgv(prediction="blended", clusters=3).encode(sequence)
-    assert chosen.version == 2 and chosen.header["prediction"] == "blended" and "clusters" not in chosen.sections
+    assert chosen.version == 3 and chosen.header["prediction"] == "blended" and "clusters" not in chosen.sections
     for wrong in (
         dataclasses.replace(published, version=2),
         dataclasses.replace(chosen, header={**chosen.header, "prediction": ["blended"]}),
@@ -300,12 +328,13 @@ def test_affine_files_stay_version_1() -> None:
             open_reader(wrong)
     for wrong in (
         dataclasses.replace(chosen, version=1),
+        dataclasses.replace(chosen, version=2),
         dataclasses.replace(chosen, header={**chosen.header, "prediction": "affine"}),
     ):
         with pytest.raises(FormatError):
             open_reader(wrong).read(0, 1)
     with pytest.raises(NewerVersion):
-        open_reader(dataclasses.replace(chosen, version=3))
+        open_reader(dataclasses.replace(chosen, version=4))
 
 
 def test_blends_beat_the_published_prediction() -> None:
@@ -325,54 +354,33 @@ def test_blends_beat_the_published_prediction() -> None:
 def test_base_frame_tells_places_apart(name: str) -> None:
     """However coarse the quality: nearly as many lattice points as places of frame 0 that 16 bits tell apart."""
     sequence: MeshSequence = awkward()[name]
-    first = sequence.read(0, 1)[0]
+    first = sequence.read(0, 1)[0][np.unique(find_points(sequence), return_index=True)[1]]
     counts, steps = [], []
     for codec in (Mcgv(prediction="blended", quality=0), Mcgv(prediction="blended", base_bits=16)):
         lattice = codec._lattice(first, 1e3)
         steps.append(lattice.step)
-        counts.append(len(np.unique(keep_apart(lattice, first, find_places(sequence, first, lattice.step)), axis=0)))
+        counts.append(len(np.unique(keep_apart(lattice, first), axis=0)))
     assert counts[0] >= 0.99 * counts[1]
     assert steps[0] >= steps[1]
 
 
-# places
-
-
-def test_places_are_where_vertices_start_and_go_together() -> None:
-    frames = np.zeros((5, 7, 3), np.float32)
-    frames[:, 1] = 1.0
-    frames[:, 2] = -0.0  # where vertex 0 is
-    frames[:, 3:5, 0] = np.arange(5)[:, None]  # both leave it, together
-    frames[:, 5, 1] = np.arange(5)  # alone
-    frames[:, 6, 1] = 0.01 * np.arange(5)  # leaves it by less than what counts
-    sequence = MeshSequence(frames, np.array([[0, 1, 2]], np.int32), fps=25.0)
-    places = find_places(sequence, frames[0], 0.1)
-    groups = {frozenset(np.flatnonzero(places == place).tolist()) for place in places}
-    assert groups == {frozenset({0, 2, 6}), frozenset({1}), frozenset({3, 4}), frozenset({5})}
-    assert np.unique(find_places(sequence, frames[0], 100.0)[[0, 2, 3, 4, 5, 6]]).size == 1
-
-
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.floats(0.05, 4.0))
 @settings(deadline=None)
-def test_places_get_lattice_points_of_their_own(seed: int, n: int, spread: float) -> None:
-    """Different ones while there is room; nearest ones if no place is near another; never further off than a step."""
+def test_points_get_lattice_points_of_their_own(seed: int, n: int, spread: float) -> None:
+    """Different ones while there is room; nearest ones if no point is near another; never further off than a step."""
     draw = np.random.default_rng(seed)
     first = np.concatenate([[[0, 0, 0], [64, 64, 64]], 30 + spread * draw.standard_normal((n, 3))]).astype(np.float32)
+    first = np.concatenate([first, first[2 : 2 + n // 8]])  # points that part later
     lattice = Lattice((0.0, 0.0, 0.0), 1.0)
-    places = draw.integers(0, 2, len(first)).cumsum()  # neighbours in the list may be one place
-    first = first[np.unique(places, return_index=True)[1]][np.unique(places, return_inverse=True)[1]]
-    points = keep_apart(lattice, first, places)
+    points = keep_apart(lattice, first)
     nearest = lattice.quantise(first)
     assert (points.min() >= 0) and (points <= nearest.max(axis=0)).all()
     assert np.abs(points - nearest).max() <= 1
-    cells, counts = np.unique(nearest[np.unique(places, return_index=True)[1]], axis=0, return_counts=True)
+    cells, counts = np.unique(nearest, axis=0, return_counts=True)
     alone = (nearest[:, None] == cells[counts == 1]).all(axis=2).any(axis=1)
     assert np.array_equal(points[alone], nearest[alone])
-    _, point = np.unique(points, axis=0, return_inverse=True)
-    pairs = np.unique(np.column_stack([places, point.ravel()]), axis=0)
-    assert len(pairs) == len(np.unique(places))  # one point a place
     if counts.max() <= 4:
-        assert len(np.unique(pairs[:, 1])) == len(pairs)  # one place a point
+        assert len(np.unique(points, axis=0)) == len(points)
 
 
 def test_pieces_that_part_are_predicted_each_for_itself() -> None:

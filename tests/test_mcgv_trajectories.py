@@ -55,7 +55,7 @@ def test_a_segment_comes_back_within_its_error(largest: float) -> None:
     base, trajectories = bent()
     fit, point = one_cluster(base), np.arange(len(base))
     error = trajectories.size * 1e-3**2
-    coded = encode_segment(trajectories, fit, point, point, largest, error)
+    coded = encode_segment(trajectories, fit, largest, error)
     samples = np.clip(np.rint(coded.left * 6) / 6, -largest, largest)
     assert (np.abs(coded.left) > 3.0).any()
     basis, coefficients = decode_segment(coded.section, samples, coded.step, fit.matrix, point, 30, "s")
@@ -68,8 +68,7 @@ def test_affine_motion_leaves_nothing_to_the_planes() -> None:
     turned = base @ np.array([[0.9, 0.2, 0.1], [-0.3, 1.1, 0.4], [0.0, 0.5, 0.7]])
     weight = np.linspace(0, 1, 20)[:, None, None]
     trajectories = ((turned - base) * weight).swapaxes(0, 1).reshape(len(base), -1)
-    point = np.arange(len(base))
-    coded = encode_segment(trajectories, one_cluster(base), point, point, 1e9, trajectories.size * 1e-4**2)
+    coded = encode_segment(trajectories, one_cluster(base), 1e9, trajectories.size * 1e-4**2)
     assert len(coded.left) >= 1 and np.abs(coded.left).max() < 1.5
 
 

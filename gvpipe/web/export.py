@@ -27,7 +27,7 @@ from gvpipe.codec import Progress
 from gvpipe.errors import InputError, OutputError
 from gvpipe.player import Player
 
-READS = ("mcgv", 2, "h264-8")  # codec, its highest version, profile: what src/mcgv/header.js reads
+READS = ("mcgv", 3, "h264-8")  # codec, its highest version, profile: what src/mcgv/header.js reads
 SUFFIXES = (".html", ".htm")
 AXES = ("y", "z")
 

@@ -7,7 +7,6 @@ from typing import Any
 
 from gvpipe.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
-from gvpipe.row_coding import MAX_VALUES
 from gvpipe.segments import count_longest, read_steps
 from gvpipe.trajectory_basis import MAX_COMPONENTS
 
@@ -40,6 +39,6 @@ class TrajectoryHeader:
             return None
         if bitstream.header["transform"] != "klt" or bitstream.version == 1:
             raise CorruptFile(f"header: version {bitstream.version} has no transform {bitstream.header['transform']!r}")
-        most = min(MAX_COMPONENTS, 3 * count_longest(bitstream.n_frames, segments), MAX_VALUES // bitstream.n_vertices)
+        most = min(MAX_COMPONENTS, 3 * count_longest(bitstream.n_frames, segments))
         components = bitstream.integers("components", segments, 0, most)
         return cls(bitstream.integer("fineness", 1, MAX_FINENESS), components, read_steps(bitstream, segments))

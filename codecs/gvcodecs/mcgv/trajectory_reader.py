@@ -23,6 +23,7 @@ from gvcodecs.mcgv.trajectory_images import PLANES, count_pictures, decode_segme
 from gvcodecs.mcgv.weight_coding import decode_weights
 from gvpipe.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
+from gvpipe.row_coding import MAX_VALUES
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
 from gvpipe.trajectory_basis import Basis
@@ -91,6 +92,9 @@ class TrajectoryReader:
     @cached_property
     def _shared(self) -> _Shared:
         surface, header = self._surface, self._header
+        n_components = max(self._images.components)
+        if n_components * surface.n_slots > MAX_VALUES:
+            raise CorruptFile(f"header: {n_components} components of {surface.n_slots} samples; {MAX_VALUES} values at most")
         layout = read_layout(self._bitstream, header, surface)
         weights = decode_weights(self._bitstream.section("weights"), surface.points.neighbours, header.clusters)
         matrix = Blend(surface.base[surface.members], weights, header.clusters).matrix()

@@ -58,7 +58,7 @@ export class GeometryVideo {
     this.bounds = reader.bounds();
     this.#reader = reader;
     this.#pictures = pictures;
-    this.#levels = new Uint8Array(3 * header.vertices);
+    this.#levels = new Uint8Array(reader.samples.length);
   }
 
   /** Seconds. */

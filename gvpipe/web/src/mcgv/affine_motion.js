@@ -9,21 +9,21 @@ export class AffineMotion {
   /**
    * @param {import("../format/payload.js").Payload} payload
    * @param {import("./header.js").Header} header
-   * @param {Float64Array} base (V, 3) model units, flat
-   * @param {Uint16Array} clusters (V)
+   * @param {import("./surface.js").Surface} surface of the base frame
+   * @param {Uint16Array} clusters (S)
    */
-  constructor(payload, header, base, clusters) {
-    this.predictor = new AffinePredictor(base, clusters, header.clusters);
+  constructor(payload, header, surface, clusters) {
+    this.predictor = new AffinePredictor(surface.base, clusters, header.clusters);
     const { rest } = this.predictor;
     this.segments = new Segments(payload.header.frames, header.segments, (name, frames) =>
       decodeTransforms(payload.section(name), frames, rest, header.transformStep, name),
     );
   }
 
-  addTo(frame, levels) {
+  predict(frame, predicted) {
     const [transforms, place] = this.segments.locate(frame);
     const size = this.predictor.rest.length;
-    this.predictor.addTo(levels, transforms.subarray(place * size, (place + 1) * size));
+    this.predictor.predict(transforms.subarray(place * size, (place + 1) * size), predicted);
   }
 
   extend(box) {

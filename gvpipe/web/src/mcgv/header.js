@@ -4,7 +4,7 @@ import { GeometryVideoError, corrupt } from "../format/errors.js";
 import { checkInteger, checkNumber } from "../format/payload.js";
 
 export const CODEC = "mcgv";
-export const VERSION = 2;
+export const VERSION = 3;
 export const PROFILE = "h264-8"; // the one that a browser gives back sample by sample
 const PREDICTIONS = ["blended", "affine"];
 const PLACEMENTS = ["halves", "charts", "tiles"];
@@ -14,8 +14,8 @@ const SMALL = 1e-60;
 
 /**
  * @typedef {object} Header
- * @property {"blended"|"affine"} prediction how the clusters move the vertices
- * @property {"halves"|"charts"|"tiles"} placement how the vertices get their pixels
+ * @property {"blended"|"affine"} prediction how the clusters move the slots
+ * @property {"halves"|"charts"|"tiles"} placement how the slots get their pixels
  * @property {number} block side of the blocks of the image coder, pixels
  * @property {number} width @property {number} height of one plane, pixels
  * @property {number} clusters K @property {number} segments
@@ -72,8 +72,5 @@ export function readHeader(header) {
   }
   if (placement === "tiles" && prediction !== "blended") throw corrupt("header", `placement is tiles, prediction ${prediction}`);
   if (placement !== "charts" && ![8, 16].includes(result.block)) throw corrupt("header", `blocks of ${result.block} pixels`);
-  if (result.width * result.height < header.vertices) {
-    throw corrupt("header", `planes of ${result.width}x${result.height} do not hold ${header.vertices} vertices`);
-  }
   return result;
 }

@@ -1,19 +1,19 @@
 /**
- * Where each vertex sits in the picture, and which cluster moves it. Mirrors `decode_pixels`, `decode_clusters` and
- * `decode_vertex_clusters` of `gvcodecs.mcgv.format`; `docs/format.md`, section 5.
+ * Where each slot sits in the picture, and which cluster moves it. Mirrors `decode_pixels`, `decode_clusters` and
+ * `decode_slot_clusters` of `gvcodecs.mcgv.format`; `docs/format.md`, section 5.
  */
 
 import { Cursor } from "../format/cursor.js";
 import { corrupt } from "../format/errors.js";
 import { decodeIntegers } from "../format/integers.js";
 
-const CONTEXTS = 4; // of a pixel's y: 0, 1, 2, 3 or more columns from the vertex before
+const CONTEXTS = 4; // of a pixel's y: 0, 1, 2, 3 or more columns from the slot before
 
 /**
  * @param {Uint8Array} data section `pixels`
- * @param {Int32Array} visits (V) the codec's vertex of each of the user's
+ * @param {Int32Array} visits (S) each slot's place in the codec's order
  * @param {import("./header.js").Header} header
- * @returns {Uint32Array} (V) row-major index of each vertex' pixel in a plane, all distinct
+ * @returns {Uint32Array} (S) row-major index of each slot's pixel in a plane, all distinct
  */
 export function decodePixels(data, visits, { width, height }) {
   const n = visits.length;
@@ -28,7 +28,7 @@ export function decodePixels(data, visits, { width, height }) {
     y += dy[i];
     if (x < 0 || x >= width || y < 0 || y >= height) throw cursor.corrupt("a pixel lies outside the plane");
     byCodec[i] = y * width + x;
-    if (taken[byCodec[i]]++) throw cursor.corrupt("two vertices share a pixel");
+    if (taken[byCodec[i]]++) throw cursor.corrupt("two slots share a pixel");
   }
   return Uint32Array.from(visits, (v) => byCodec[v]);
 }
@@ -37,7 +37,7 @@ export function decodePixels(data, visits, { width, height }) {
  * @param {Uint8Array} data section `clusters`
  * @param {Uint32Array} pixels of `decodePixels`
  * @param {import("./header.js").Header} header
- * @returns {Uint16Array} (V) cluster of each vertex, 0..K-1
+ * @returns {Uint16Array} (S) cluster of each slot, 0..K-1
  */
 export function decodeClusters(data, pixels, { width, height, block, clusters }) {
   const across = width / block;
@@ -52,11 +52,11 @@ export function decodeClusters(data, pixels, { width, height, block, clusters })
 
 /**
  * @param {Uint8Array} data section `clusters` of placement halves
- * @param {Int32Array} visits (V) the codec's vertex of each of the user's
+ * @param {Int32Array} visits (S) each slot's place in the codec's order
  * @param {import("./header.js").Header} header
- * @returns {Uint16Array} (V) cluster of each vertex, 0..K-1
+ * @returns {Uint16Array} (S) cluster of each slot, 0..K-1
  */
-export function decodeVertexClusters(data, visits, { clusters }) {
+export function decodeSlotClusters(data, visits, { clusters }) {
   const byCodec = decodeRunning(data, visits.length, clusters);
   return Uint16Array.from(visits, (v) => byCodec[v]);
 }

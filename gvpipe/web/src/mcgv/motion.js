@@ -4,7 +4,7 @@ import { Recent } from "../format/recent.js";
 
 /**
  * @typedef {object} Motion
- * @property {(frame: number, levels: Float32Array) => void} addTo adds a frame's prediction (V, 3), model units, flat
+ * @property {(frame: number, predicted: Float64Array) => void} predict fills in a frame's prediction (S, 3), model units, flat
  * @property {(box: {min: number[], max: number[]}) => void} extend makes a box hold the prediction of all frames; decodes them
  */
 

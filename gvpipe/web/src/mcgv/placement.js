@@ -1,5 +1,5 @@
 /**
- * Placement by halving: each vertex' pixel, from the base frame's integers alone. Mirrors `gvcodecs.mcgv.placement`, but cell by
+ * Placement by halving: each slot's pixel, from the base frame's integers alone. Mirrors `gvcodecs.mcgv.placement`, but cell by
  * cell, not level by level; `docs/format.md`, section 5.1. All sums stay below 2^53.
  */
 
@@ -20,10 +20,10 @@ const TERMS = DIRECTIONS.map(([x, y, z]) =>
 const NONE = [0, 0, 0];
 
 /**
- * @param {Int32Array} points (V, 3) base frame on its lattice, flat
- * @param {ArrayLike<number>|null} groups (V) vertices that belong together, such as clusters with a motion each
- * @param {{width: number, height: number, block: number}} plane pixels; holds all vertices
- * @returns {Uint32Array} (V) row-major index of each vertex' pixel, all distinct
+ * @param {Int32Array} points (S, 3) slots of the base frame on its lattice, flat; called vertices below
+ * @param {ArrayLike<number>|null} groups (S) slots that belong together, such as clusters with a motion each
+ * @param {{width: number, height: number, block: number}} plane pixels; holds all slots
+ * @returns {Uint32Array} (S) row-major index of each slot's pixel, all distinct
  */
 export function place(points, groups, { width, height, block }) {
   checkLattice(points);

@@ -1,29 +1,15 @@
-/** Vertices at one base position as one point. Mirrors `gvcodecs.mcgv.points`. */
+/** Points: what a blend moves. In files of version 3, the mesh's points that move. Mirrors `gvcodecs.mcgv.points`. */
 
 import { previousEqual } from "../format/points.js";
 
 export class Points {
   /**
-   * @param {Int32Array} lattice (V, 3) base frame on its lattice, flat
-   * @param {Uint32Array} faces (T, 3) flat
-   * @param {Int32Array} visits (V) each vertex' place in the codec's order
+   * @param {Int32Array} faces (T, 3) triangles over points, flat; -1 for those that never move: sides that lack one count not
+   * @param {number} n P
    */
-  constructor(lattice, faces, visits) {
-    const n = visits.length;
-    const order = new Int32Array(n); // vertices in the codec's order
-    visits.forEach((place, v) => (order[place] = v));
-    const ordered = new Int32Array(3 * n);
-    for (let i = 0; i < ordered.length; i++) ordered[i] = lattice[3 * order[Math.floor(i / 3)] + (i % 3)];
-    const previous = previousEqual(ordered, 3);
-    const members = [];
-    /** (V) the point of each vertex: points are numbered as their first vertices come in the codec's order. */
-    this.point = new Int32Array(n);
-    order.forEach((v, place) => {
-      this.point[v] = previous[place] < 0 ? members.push(v) - 1 : this.point[order[previous[place]]];
-    });
-    /** (P) the first vertex of each point, in the codec's order. */
-    this.members = Int32Array.from(members);
-    this.faces = faces.map((v) => this.point[v]);
+  constructor(faces, n) {
+    this.faces = faces;
+    this.n = n;
   }
 
   /**
@@ -32,19 +18,12 @@ export class Points {
    * @returns {{starts: Int32Array, near: Int32Array}} `starts` (P + 1) bounds in `near`; each point's are ascending
    */
   earlierNeighbours() {
-    const { faces } = this;
-    const n = this.members.length;
+    const { n } = this;
     const counts = new Int32Array(n + 1); // by lower point: the pairs are sorted by it first, then by the higher one
-    const eachPair = (use) => {
-      for (let i = 0; i < faces.length; i++) {
-        const [a, b] = [faces[i], faces[i % 3 === 2 ? i - 2 : i + 1]];
-        if (a !== b) use(Math.min(a, b), Math.max(a, b));
-      }
-    };
-    eachPair((low) => counts[low + 1]++);
+    this.#eachSide((low) => counts[low + 1]++);
     for (let p = 0; p < n; p++) counts[p + 1] += counts[p];
     const highs = new Int32Array(counts[n]);
-    eachPair((low, high) => (highs[counts[low]++] = high)); // counts now end where they began
+    this.#eachSide((low, high) => (highs[counts[low]++] = high)); // counts now end where they began
     const latest = new Int32Array(n).fill(-1); // the lower point that a point was last met with
     const starts = new Int32Array(n + 1);
     const eachEdge = (use) => {
@@ -65,19 +44,52 @@ export class Points {
     return { starts, near };
   }
 
-  /** (V) the connected piece of the surface that each vertex belongs to. */
+  /** (P) the connected piece of the surface that each point belongs to. */
   pieces() {
-    const { faces, point } = this;
-    const parent = Int32Array.from(this.members, (_, p) => p); // each a point of its piece: itself, or one of lower number
+    const parent = Int32Array.from({ length: this.n }, (_, p) => p); // each a point of its piece: itself, or one of lower number
     const root = (p) => {
       while (parent[p] !== p) p = parent[p] = parent[parent[p]];
       return p;
     };
-    for (let i = 0; i < faces.length; i++) {
-      if (i % 3 === 2) continue; // two sides join three points
-      const [a, b] = [root(faces[i]), root(faces[i + 1])];
+    this.#eachSide((low, high) => {
+      const [a, b] = [root(low), root(high)];
       parent[Math.max(a, b)] = Math.min(a, b);
-    }
-    return point.map((p) => root(p));
+    });
+    return parent.map((_, p) => root(p));
   }
+
+  /** Call `use(low, high)` for every side of a triangle between two different points. */
+  #eachSide(use) {
+    const { faces } = this;
+    for (let i = 0; i < faces.length; i++) {
+      const [a, b] = [faces[i], faces[i % 3 === 2 ? i - 2 : i + 1]];
+      if (a !== b && a >= 0 && b >= 0) use(Math.min(a, b), Math.max(a, b));
+    }
+  }
+}
+
+/**
+ * Vertices at one base position as one point, as in files before version 3; points are numbered as their first vertices come in
+ * the codec's order.
+ *
+ * @param {Int32Array} lattice (V, 3) base frame on its lattice, flat
+ * @param {Uint32Array} faces (T, 3) flat
+ * @param {Int32Array} visits (V) each vertex' place in the codec's order
+ * @returns {{points: Points, point: Int32Array, members: Int32Array}} with the point of each vertex (V), and the first vertex of
+ *   each point (P)
+ */
+export function weldVertices(lattice, faces, visits) {
+  const n = visits.length;
+  const order = new Int32Array(n); // vertices in the codec's order
+  visits.forEach((place, v) => (order[place] = v));
+  const ordered = new Int32Array(3 * n);
+  for (let i = 0; i < ordered.length; i++) ordered[i] = lattice[3 * order[Math.floor(i / 3)] + (i % 3)];
+  const previous = previousEqual(ordered, 3);
+  const members = [];
+  const point = new Int32Array(n);
+  order.forEach((v, place) => {
+    point[v] = previous[place] < 0 ? members.push(v) - 1 : point[order[previous[place]]];
+  });
+  const points = new Points(Int32Array.from(faces, (v) => point[v]), members.length);
+  return { points, point, members: Int32Array.from(members) };
 }

@@ -2,14 +2,14 @@
 
 export class AffinePredictor {
   /**
-   * @param {Float64Array} base (V, 3) base frame, model units, flat
-   * @param {Uint16Array} clusters (V) cluster of each vertex
+   * @param {Float64Array} base (S, 3) base frame, model units, flat
+   * @param {Uint16Array} clusters (S) cluster of each slot
    * @param {number} nClusters K; a cluster may be empty
    */
   constructor(base, clusters, nClusters) {
     this.clusters = clusters;
     this.rest = new Float64Array(12 * nClusters); // (K, 4, 3): the transforms that leave the base frame as it is
-    this.coordinates = new Float64Array(base.length); // (V, 3) in the frame of the vertex' cluster, at most 1 long
+    this.coordinates = new Float64Array(base.length); // (S, 3) in the frame of the slot's cluster, at most 1 long
     const centres = middles(base, clusters, nClusters);
     const radii = new Float64Array(nClusters);
     clusters.forEach((k, v) => {
@@ -31,22 +31,22 @@ export class AffinePredictor {
 
   /**
    * @param {Float64Array} transforms (K, 4, 3) of one frame, flat
-   * @param {Float32Array} levels (V, 3) what to add, model units, flat; replaced by the positions
+   * @param {Float64Array} positions (S, 3) filled, model units, flat
    */
-  addTo(levels, transforms) {
+  predict(transforms, positions) {
     const { clusters, coordinates } = this;
     for (let v = 0, i = 0; v < clusters.length; v++, i += 3) {
       const row = 12 * clusters[v];
       const [x, y, z] = [coordinates[i], coordinates[i + 1], coordinates[i + 2]];
       for (let axis = 0; axis < 3; axis++) {
         const t = row + axis;
-        levels[i + axis] += x * transforms[t] + y * transforms[t + 3] + z * transforms[t + 6] + transforms[t + 9];
+        positions[i + axis] = x * transforms[t] + y * transforms[t + 3] + z * transforms[t + 6] + transforms[t + 9];
       }
     }
   }
 
   /**
-   * The box that the predictions of frames stay in, without a look at any vertex: a cluster lies in a ball and in a box about
+   * The box that the predictions of frames stay in, without a look at any slot: a cluster lies in a ball and in a box about
    * its centre, and each moves with it.
    *
    * @param {Float64Array} transforms (frames, K, 4, 3) flat

@@ -1,16 +1,15 @@
 /** From an `mcgv` bitstream and the levels of its pictures to positions, any frame in any order. Mirrors the codec's reader. */
 
-import { decodeBase } from "../format/base_mesh.js";
-import { AGAIN, GeometryVideoError } from "../format/errors.js";
+import { AGAIN, GeometryVideoError, corrupt } from "../format/errors.js";
 import { Moves } from "../format/moves.js";
 import { AffineMotion } from "./affine_motion.js";
 import { BlendedMotion } from "./blended_motion.js";
 import { decodeCharts } from "./chart_coding.js";
 import { placeCharts } from "./chart_placement.js";
 import { readHeader } from "./header.js";
-import { decodeClusters, decodePixels, decodeVertexClusters } from "./layout.js";
+import { decodeClusters, decodePixels, decodeSlotClusters } from "./layout.js";
 import { place } from "./placement.js";
-import { Points } from "./points.js";
+import { readSurface } from "./surface.js";
 
 const ZERO = 128; // the level of a zero residual
 
@@ -18,31 +17,37 @@ export class McgvReader {
   /** @param {import("../format/payload.js").Payload} payload @returns {Promise<McgvReader>} */
   static async open(payload) {
     const header = readHeader(payload.header);
-    const base = await decodeBase(payload.section("mesh"), payload.section("order"));
-    const { vertices, triangles } = payload.header;
-    if (base.visits.length !== vertices || base.faces.length !== 3 * triangles) {
-      throw new GeometryVideoError("corrupt", `the mesh has other counts than the header says; ${AGAIN}`);
-    }
-    return new McgvReader(payload, header, base);
+    return new McgvReader(payload, header, await readSurface(payload, header));
   }
 
-  constructor(payload, header, base) {
+  constructor(payload, header, surface) {
     this.header = header;
-    this.faces = base.faces;
-    this.basePoints = base.points;
-    const { pixels, motion } = decodeMotion(payload, header, base);
+    this.surface = surface;
+    const { pixels, motion } = decodeMotion(payload, header, surface);
     this.motion = motion;
     if (header.outliers !== payload.sections.has("outliers")) {
       throw new GeometryVideoError("corrupt", `its header and its section 'outliers' do not fit; ${AGAIN}`);
     }
-    /** What the pictures cannot hold, then what a bound on every vertex needs. */
-    this.moves = ["outliers", "corrections"]
-      .filter((name) => payload.sections.has(name))
-      .map((name) => new Moves(payload.section(name), payload.header.frames, base.visits.length, name));
+    const movesOf = (name, n) =>
+      payload.sections.has(name) ? [new Moves(payload.section(name), payload.header.frames, n, name)] : [];
+    /** What the pictures cannot hold. */
+    this.outliers = movesOf("outliers", surface.nSlots);
+    /** What a bound on every vertex needs. */
+    this.corrections = movesOf("corrections", surface.slot.length);
     const plane = header.width * header.height;
-    /** (V, 3) which sample of a picture carries each coordinate. */
-    this.samples = new Uint32Array(base.points.length);
-    pixels.forEach((pixel, v) => this.samples.set([pixel, pixel + plane, pixel + 2 * plane], 3 * v));
+    /** (S, 3) which sample of a picture carries each coordinate. */
+    this.samples = new Uint32Array(3 * surface.nSlots);
+    pixels.forEach((pixel, slot) => this.samples.set([pixel, pixel + plane, pixel + 2 * plane], 3 * slot));
+    this.predicted = new Float64Array(3 * surface.nSlots);
+    this.placed = new Float32Array(3 * surface.nSlots);
+  }
+
+  get faces() {
+    return this.surface.faces;
+  }
+
+  get basePoints() {
+    return this.surface.basePoints;
   }
 
   /** Width and height of a picture: the x, y and z planes, one below the other. */
@@ -52,14 +57,17 @@ export class McgvReader {
 
   /**
    * @param {number} frame
-   * @param {Uint8Array} levels (V, 3) of the picture's `samples`
+   * @param {Uint8Array} levels (S, 3) of the picture's `samples`
    * @param {Float32Array} positions (V, 3) filled, model units
    */
   rebuild(frame, levels, positions) {
+    const { predicted, placed } = this;
     const step = this.header.residualStep;
-    for (let i = 0; i < positions.length; i++) positions[i] = step * (levels[i] - ZERO);
-    this.motion.addTo(frame, positions);
-    for (const moves of this.moves) moves.apply(frame, positions);
+    this.motion.predict(frame, predicted);
+    for (let i = 0; i < placed.length; i++) placed[i] = predicted[i] + step * (levels[i] - ZERO); // rounded once
+    for (const moves of this.outliers) moves.apply(frame, placed);
+    this.surface.spread(placed, positions);
+    for (const moves of this.corrections) moves.apply(frame, positions);
   }
 
   /**
@@ -67,9 +75,10 @@ export class McgvReader {
    * moves.
    */
   bounds() {
-    for (const moves of this.moves) moves.check();
+    for (const moves of [...this.outliers, ...this.corrections]) moves.check();
     const box = { min: [Infinity, Infinity, Infinity], max: [-Infinity, -Infinity, -Infinity] };
     this.motion.extend(box);
+    this.surface.extend(box);
     if (![...box.min, ...box.max].every(Number.isFinite)) {
       throw new GeometryVideoError("corrupt", `its motion leaves all bounds; ${AGAIN}`);
     }
@@ -77,25 +86,32 @@ export class McgvReader {
   }
 }
 
-/** The vertices' pixels, and how they move: clusters or pixels, whichever follows from the other, come second. */
-function decodeMotion(payload, header, base) {
-  const { origin, baseStep } = header;
-  const positions = Float64Array.from(base.points, (index, i) => origin[i % 3] + index * baseStep);
-  const charts = header.placement === "charts" ? decodePixels(payload.section("pixels"), base.visits, header) : null;
+/** The slots' pixels, and how they move: clusters or pixels, whichever follows from the other, come second. */
+function decodeMotion(payload, header, surface) {
+  const { lattice, visits, nSlots } = surface;
+  const { width, height } = header;
+  if (width * height < nSlots) throw corrupt("header", `planes of ${width}x${height} do not hold ${nSlots} samples`);
+  const charts = header.placement === "charts" ? decodePixels(payload.section("pixels"), visits, header) : null;
   if (header.prediction === "blended") {
-    const points = new Points(base.points, base.faces, base.visits);
-    const pixels = charts ?? placePoints(payload, header, base, points);
-    return { pixels, motion: new BlendedMotion(payload, header, positions, points) };
+    const pixels = charts ?? placePoints(payload, header, surface);
+    return { pixels, motion: new BlendedMotion(payload, header, surface) };
   }
   const data = payload.section("clusters");
-  const clusters = charts ? decodeClusters(data, charts, header) : decodeVertexClusters(data, base.visits, header);
-  const pixels = charts ?? place(base.points, clusters, header);
-  return { pixels, motion: new AffineMotion(payload, header, positions, clusters) };
+  const clusters = charts ? decodeClusters(data, charts, header) : decodeSlotClusters(data, visits, header);
+  const pixels = charts ?? place(lattice, clusters, header);
+  return { pixels, motion: new AffineMotion(payload, header, surface, clusters) };
 }
 
-/** The vertices' pixels where they follow from the base frame. */
-function placePoints(payload, header, base, points) {
-  if (header.placement === "halves") return place(base.points, points.pieces(), header);
+/** (S) the connected piece of the surface that each slot belongs to. */
+function piecesOf({ point, points }) {
+  const pieces = points.pieces();
+  return point.map((p) => pieces[p]);
+}
+
+/** The slots' pixels where they follow from the base frame. */
+function placePoints(payload, header, surface) {
+  const { lattice, point, points } = surface;
+  if (header.placement === "halves") return place(lattice, piecesOf(surface), header);
   const charts = decodeCharts(payload.section("charts"), points.earlierNeighbours());
-  return placeCharts(base.points, points.point.map((p) => charts[p]), header);
+  return placeCharts(lattice, point.map((p) => charts[p]), header);
 }

@@ -1,0 +1,116 @@
+"""Vertices that never move: found exactly, and their flags as bytes that may be hostile."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+import gvpipe.sequence
+from gvpipe.binary import varint
+from gvpipe.entropy import encode_integers
+from gvpipe.errors import CorruptFile
+from gvpipe.sequence import MeshSequence
+from gvpipe.stillness import decode_flags, encode_flags, find_still
+
+NO_FACES = np.zeros((0, 3), np.int32)
+
+
+def check_round_trip(flags: NDArray[np.bool_]) -> bytes:
+    data = encode_flags(flags)
+    found = decode_flags(data, len(flags), "still")
+    assert found.dtype == bool and np.array_equal(found, flags)
+    return data
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 7, 5000])
+def test_none_and_all(n: int) -> None:
+    assert len(check_round_trip(np.zeros(n, bool))) < 10
+    assert len(check_round_trip(np.ones(n, bool))) < 10
+
+
+@given(st.lists(st.booleans(), max_size=70))
+def test_flags_come_back(flags: list[bool]) -> None:
+    check_round_trip(np.array(flags, bool))
+
+
+@settings(deadline=None)
+@given(st.lists(st.integers(1, 400), min_size=1, max_size=20), st.booleans())
+def test_runs_cost_little(lengths: list[int], first: bool) -> None:
+    flags = np.repeat((np.arange(len(lengths)) % 2 == 1) ^ first, lengths)
+    assert len(check_round_trip(flags)) < 40 + 4 * len(lengths)
+
+
+def stream(runs: list[int], count: int | None = None) -> bytes:
+    return varint(len(runs) if count is None else count) + encode_integers(np.array(runs, np.int64))
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"\x00",
+        stream([3], 2),
+        stream([3]) + b"\0",
+        stream([10]),  # the last run is left out, and not empty
+        stream([11]),
+        stream([4, 6]),
+        stream([4, 0]),
+        stream([0, 0]),
+        stream([-1]),
+        stream([5, -2]),
+        stream([1] * 11),
+        stream([1 << 38]),
+        stream([1 << 38] * 4),
+        stream([], 1 << 60),
+    ],
+)
+def test_runs_that_do_not_fit(data: bytes) -> None:
+    with pytest.raises(CorruptFile, match="section 'still'"):
+        decode_flags(data, 10, "still")
+
+
+def test_changed_bytes_and_prefixes() -> None:
+    """Flags, or one line of CorruptFile."""
+    draw = np.random.default_rng(0)
+    data = encode_flags(draw.random(200) < 0.3)
+    for cut in range(len(data)):
+        with pytest.raises(CorruptFile):
+            decode_flags(data[:cut], 200, "still")
+    for _ in range(400):
+        changed = bytearray(data)
+        changed[draw.integers(len(data))] = draw.integers(256)
+        try:
+            assert decode_flags(bytes(changed), 200, "still").shape == (200,)
+        except CorruptFile as exc:
+            assert "\n" not in str(exc)
+
+
+@given(st.binary(max_size=40), st.integers(0, 50))
+def test_garbage(data: bytes, n: int) -> None:
+    try:
+        assert decode_flags(data, n, "still").shape == (n,)
+    except CorruptFile as exc:
+        assert "'still'" in str(exc)
+
+
+# which vertices they are
+
+
+@pytest.mark.parametrize("frames_of_a_chunk", [100, 1, 2])
+def test_still_vertices_have_one_position(frames_of_a_chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gvpipe.sequence, "CHUNK_BYTES", 12 * 30 * frames_of_a_chunk)
+    draw = np.random.default_rng(2)
+    frames = np.repeat(draw.random((1, 30, 3)).astype(np.float32), 7, axis=0)
+    frames[draw.integers(1, 7, 9), np.arange(9), draw.integers(0, 3, 9)] += np.float32(1e-6)  # once, and back
+    still = find_still(MeshSequence(frames, NO_FACES))
+    assert still.tolist() == [False] * 9 + [True] * 21
+    for flags, part in ((still, frames[:, 9:]), (~still, frames[:, :9])):
+        assert (find_still(MeshSequence(part, NO_FACES)) == (flags is still)).all()
+
+
+def test_of_one_frame_nothing_is_still() -> None:
+    assert not find_still(MeshSequence(np.ones((1, 4, 3), np.float32), NO_FACES)).any()
+    assert find_still(MeshSequence(np.ones((2, 4, 3), np.float32), NO_FACES)).all()
