@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from gvpipe.bitstream import Bitstream
 from gvpipe.corrections import correct
 from gvpipe.errors import NewerVersion, SettingError
+from gvpipe.holds import HeldReader, add_holds, find_holds, read_holds
 from gvpipe.sequence import Float32, Int32, MeshSequence
 
 GROUP = "gvpipe.codecs"
@@ -163,7 +164,7 @@ def codec_class(codec: str) -> type[Any]:
 
 
 def open_reader(bitstream: Bitstream) -> FrameReader:
-    """Open a bitstream with the codec that wrote it; corrections to its frames (`gvpipe.corrections`) are applied.
+    """Open a bitstream with the codec that wrote it: its frames corrected (`gvpipe.corrections`), then held (`gvpipe.holds`).
 
     Raises:
         NewerVersion: no installed codec has that id, or only an older version of it.
@@ -177,8 +178,25 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
             f"it was made by version {bitstream.version} of codec {bitstream.codec!r}, this gvpipe has version "
             f"{codec.version}; upgrade gvpipe"
         )
-    reader: FrameReader = codec.reader(bitstream)
-    return correct(bitstream, reader)
+    holds = read_holds(bitstream)
+    distinct = bitstream if holds is None else dataclasses.replace(bitstream, n_frames=holds.n_distinct)
+    reader = correct(distinct, codec.reader(distinct))
+    return reader if holds is None else HeldReader(reader, holds)
+
+
+def encode_sequence(
+    codec: Codec, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None
+) -> Bitstream:
+    """Code a sequence; where the codec lets it (`gvpipe.holds`), frames that repeat the one before are coded by a run length.
+
+    Raises:
+        InputError: what the codec raises.
+    """
+    memo = memo or Memo()
+    holds = memo("holds", lambda: find_holds(sequence)) if getattr(codec, "holds", False) else None
+    if holds is None:
+        return codec.encode(sequence, progress, memo)
+    return add_holds(codec.encode(holds.distinct(sequence), progress, memo), holds, codec.version)
 
 
 @functools.cache

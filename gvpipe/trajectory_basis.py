@@ -77,11 +77,13 @@ class Reduced:
         step: D, model units.
         basis: its bytes.
         coefficients: ``(V, R)``, still to be coded, model units.
+        decoded: the basis, as the decoder will have it.
     """
 
     step: float
     basis: bytes
     coefficients: Float64
+    decoded: Basis
 
 
 def reduce_trajectories(
@@ -111,7 +113,7 @@ def reduce_trajectories(
     )
     kept = min(n_components, len(principal.energies)) or kept
     data, basis = encode_basis(principal, kept, n_points, step * basis_ratio)
-    return Reduced(step, data, fit_coefficients(trajectories, basis))
+    return Reduced(step, data, fit_coefficients(trajectories, basis), basis)
 
 
 def find_principal(trajectories: Float64, error: float) -> Principal:
