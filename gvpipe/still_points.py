@@ -1,12 +1,12 @@
 """Still points of codecs that code trajectories of points: one position each, in place of a trajectory.
 
-What: the flags of the points that never move (`gvpipe.stillness`), and their positions. These are predicted along a vertex
-hierarchy of the triangles between still points alone (`gvpipe.hierarchy`, `gvpipe.row_coding`), and rounded to float32 once, so
-that all frames, segments and levels of detail have the same bits.
+What: the flags of the points that never move (`gvpipe.stillness`), and their positions on a lattice. These are predicted by
+parallelograms along a walk over the triangles between still points (`gvpipe.mesh_rows`), and rounded to float32 once, so that
+all frames, segments and levels of detail have the same bits.
 Why: no shimmer, and three numbers in place of a trajectory. Moving points are still predicted from still neighbours: a still
 point's coefficients are those that bring the decoded basis closest to its position::
 
-    section = [float64] step, [3 x float32] origin, [varint] bytes, flags, rows of 3 components (positions less the origin)
+    section = [float64] step, [3 x float32] origin, [varint] bytes, flags, rows of 3 components: lattice points
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ from gvpipe.bare_mesh import BareMesh
 from gvpipe.binary import Cursor, varint
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import Memo
-from gvpipe.hierarchy import build_hierarchy
-from gvpipe.mesh_rows import mesh_rows
+from gvpipe.mesh_rows import walk_rows
 from gvpipe.row_coding import decode_rows, encode_rows
 from gvpipe.row_prediction import Rows
 from gvpipe.segments import LARGEST_STEP, SMALLEST_STEP
@@ -103,9 +102,10 @@ def encode_still(flags: Flags, positions: Float64, error: float, point_faces: In
     """
     step = float(np.clip(2 * error, SMALLEST_STEP, LARGEST_STEP))  # rounding leaves step / sqrt(12) on each of three axes
     origin = positions.mean(axis=0).astype(np.float32)
-    data, decoded = encode_rows(positions - origin, step, _still_rows(flags, point_faces))
+    indices = np.rint((positions - origin) / step)
+    data, _ = encode_rows(indices, 1.0, _still_rows(flags, point_faces), "navg")
     coded = encode_flags(flags)
-    return HEAD.pack(step, *origin.tolist()) + varint(len(coded)) + coded + data, _place(flags, decoded, origin)
+    return HEAD.pack(step, *origin.tolist()) + varint(len(coded)) + coded + data, _place(flags, indices, step, origin)
 
 
 def decode_still(data: bytes, point_faces: Int32, n_points: int) -> StillPoints:
@@ -117,22 +117,22 @@ def decode_still(data: bytes, point_faces: Int32, n_points: int) -> StillPoints:
     flags = decode_flags(cursor.take(cursor.varint(cursor.left, "a length")), n_points, SECTION)
     if not flags.any():
         raise cursor.corrupt("no point stands still")
-    decoded = decode_rows(cursor.rest(), 3, step, _still_rows(flags, point_faces), SECTION)
-    still = _place(flags, decoded, np.array(origin, np.float32))
+    indices = decode_rows(cursor.rest(), 3, 1.0, _still_rows(flags, point_faces), SECTION, predictor="navg")
+    still = _place(flags, indices, step, np.array(origin, np.float32))
     if not np.isfinite(still.positions).all():
         raise cursor.corrupt("a position is larger than float32 can hold")
     return still
 
 
 def _still_rows(flags: Flags, point_faces: Int32) -> Rows:
-    """Rows of the still points, numbered among themselves, along the hierarchy of the triangles between them."""
+    """Rows of the still points, numbered among themselves, along a walk over the triangles between them."""
     number = np.cumsum(flags) - 1
     between = point_faces[flags[point_faces].all(axis=1)]
-    return mesh_rows(build_hierarchy(number[between].astype(np.int32), int(flags.sum())))
+    return walk_rows(number[between].astype(np.int32), int(flags.sum()))
 
 
-def _place(flags: Flags, decoded: Float64, origin: Float32) -> StillPoints:
+def _place(flags: Flags, indices: Float64, step: float, origin: Float32) -> StillPoints:
     positions = np.zeros((len(flags), 3), np.float32)
     with np.errstate(over="ignore"):
-        positions[flags] = (decoded + origin).astype(np.float32)
+        positions[flags] = (origin + step * indices).astype(np.float32)
     return StillPoints(flags, positions)
