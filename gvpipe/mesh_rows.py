@@ -53,8 +53,8 @@ def mesh_rows(hierarchy: Hierarchy, overshoot: float = OVERSHOOT) -> Rows:
 def walk_rows(faces: Int32, n_vertices: int) -> Rows:
     """Return the rows of V vertices along a walk from triangle to triangle, each predicted by a parallelogram (``navg``).
 
-    For static positions: they take 10 to 40 % fewer bytes than along a hierarchy, least where parts are alike or have straight
-    edges. Weights are 1 and -1 (1 alone where no parallelogram is known), so that integers are predicted by integers, exactly.
+    For static positions: on a frame of four meshes, 10 to 38 % fewer bytes than along a hierarchy; edges are straight there.
+    Weights are 1 and -1 (1 alone where no parallelogram is known), so that integers predict integers, exactly.
     """
     from gvpipe.coarse_walk import walk_coarse
 

@@ -21,8 +21,9 @@ from gvpipe.bare_mesh import BareMesh
 from gvpipe.binary import Cursor, varint
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import Memo
+from gvpipe.errors import CorruptFile
 from gvpipe.mesh_rows import walk_rows
-from gvpipe.row_coding import decode_rows, encode_rows
+from gvpipe.row_coding import MAX_VALUES, decode_rows, encode_rows
 from gvpipe.row_prediction import Rows
 from gvpipe.segments import LARGEST_STEP, SMALLEST_STEP
 from gvpipe.sequence import Float32, Int32, MeshSequence
@@ -53,12 +54,33 @@ class StillPoints:
         """How many points move."""
         return int((~self.flags).sum())
 
-    def coefficients(self, basis: Basis) -> Float64:
-        """``(P, R)`` coefficients of the still points in a segment's decoded basis, in closest fit; 0 for the others."""
+    @property
+    def most_components(self) -> int:
+        """How many components a segment may have, still points counted."""
+        return MAX_VALUES // len(self.flags)
+
+    def given(self, basis: Basis) -> Float64 | None:
+        """``(P, R)`` coefficients of the still points in a segment's decoded basis, in closest fit; None if all points move.
+
+        Raises:
+            CorruptFile: more than `most_components`.
+        """
+        if not self.flags.any():
+            return None
+        if basis.vectors.shape[1] > self.most_components:
+            size = f"{basis.vectors.shape[1]} components of {len(self.flags)} points"
+            raise CorruptFile(f"section {SECTION!r} is corrupt: {size}; get the file again from its source")
         result = np.zeros((len(self.flags), basis.vectors.shape[1]))
-        if self.flags.any():
-            trajectories = np.tile(self.positions[self.flags].astype(np.float64), len(basis.mean) // 3)
-            result[self.flags] = fit_coefficients(trajectories, basis)
+        trajectories = np.tile(self.positions[self.flags].astype(np.float64), len(basis.mean) // 3)
+        result[self.flags] = fit_coefficients(trajectories, basis)
+        return result
+
+    def join(self, moving: Float64, given: Float64 | None) -> Float64:
+        """``(P, R)`` coefficients of all points: those of the ``moving (Q, R)``, and those that are given."""
+        if given is None:
+            return moving
+        result = given.copy()
+        result[~self.flags] = moving
         return result
 
     def place(self, frames: Float32, points: NDArray[np.integer]) -> None:

@@ -49,7 +49,7 @@ def choose_anchors(
     rows: Rows,
     walk: Int32,
     component_of: NDArray[np.integer],
-    is_still: NDArray[np.bool_],
+    is_still: NDArray[np.bool_] | None = None,
 ) -> Anchors:
     """Choose about one anchor per ``spacing`` points.
 
@@ -58,8 +58,9 @@ def choose_anchors(
         rows: of all points along the hierarchy.
         walk: all points in border-expansion order.
         component_of: ``(P,)`` the component of each point.
-        is_still: ``(P,)`` the points whose coefficients are given.
+        is_still: ``(P,)`` the points whose coefficients are given; none if None.
     """
+    is_still = np.zeros(len(component_of), bool) if is_still is None else is_still
     is_held = (np.bincount(component_of, minlength=1) <= SMALL)[component_of] | is_still
     n_points = len(component_of)
     if choice == "hierarchy":

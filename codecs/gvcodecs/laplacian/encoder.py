@@ -123,16 +123,18 @@ class Laplacian(Settings):
         data, domain = memo("domain", lambda: _prepare(sequence, shared, header, still))
         if data is not None:
             sections[NAME] = data
-        steps = []
+        steps, moving = [], shared.members[~still.flags]
         for s, (start, stop) in enumerate(pairwise(bounds) if still.n_moving else []):
             report("segments", s / n_segments)
-            moving = read_trajectories(sequence, start, stop, shared.members)[~still.flags]
+            trajectories = read_trajectories(sequence, start, stop, moving)
             error = AIM * wanted**2 * still.n_moving * (stop - start)
-            reduced = reduce_trajectories(moving, error, self.components, self.basis_ratio, POINT_COST, ROW_COST, NOISE)
-            given = still.coefficients(reduced.decoded)
-            coefficients = given.copy()
-            coefficients[~still.flags] = reduced.coefficients
+            most = still.most_components
+            reduced = reduce_trajectories(
+                trajectories, error, self.components, self.basis_ratio, POINT_COST, ROW_COST, NOISE, most
+            )
+            given = still.given(reduced.decoded)
             sections[f"basis.{s}"] = reduced.basis
+            coefficients = still.join(reduced.coefficients, given)
             anchors, deltas = encode_coefficients(coefficients, reduced.step, domain, header, given)
             sections[f"anchors.{s}"], sections[f"deltas.{s}"] = anchors, deltas
             steps.append(reduced.step)

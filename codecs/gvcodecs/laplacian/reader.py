@@ -76,7 +76,7 @@ class LaplacianReader:
             basis = decode_basis(section(name), n_frames, self._still.n_moving, step * self._header.basis_ratio, name)
             names = (f"anchors.{s}", f"deltas.{s}")
             anchors, deltas = (section(name) for name in names)
-            given = self._still.coefficients(basis)
-            coefficients = decode_coefficients(anchors, deltas, given.shape[1], step, self._domain, self._header, names, given)
+            n_components, given = basis.vectors.shape[1], self._still.given(basis)
+            coefficients = decode_coefficients(anchors, deltas, n_components, step, self._domain, self._header, names, given)
             self._kept = s, Segment(basis, np.ascontiguousarray(coefficients.T))
         return self._kept[1]

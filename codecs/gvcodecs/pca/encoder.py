@@ -72,16 +72,16 @@ class Pca(Settings):
         mesh, wanted = shared.mesh, shared.aimed_error(self.quality)
         rows = memo("rows", lambda: ordered_rows(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor))
         data, still = code_still(sequence, shared, wanted, memo)
-        rows = rows_left(rows, still.flags)
+        rows, moving = rows_left(rows, still.flags), shared.members[~still.flags]
         bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
         n_segments = len(bounds) - 1
         sections = {"mesh": shared.coded.mesh, "order": shared.coded.order, **({SECTION: data} if data else {})}
         steps = []
         for s, (start, stop) in enumerate(pairwise(bounds) if still.n_moving else []):
             report("segments", s / n_segments)
-            trajectories = read_trajectories(sequence, start, stop, shared.members)
+            trajectories = read_trajectories(sequence, start, stop, moving)
             error = wanted**2 * still.n_moving * (stop - start)
-            reduced = reduce_trajectories(trajectories[~still.flags], error, self.components)
+            reduced = reduce_trajectories(trajectories, error, self.components, most=still.most_components)
             steps.append(reduced.step)
             sections[f"basis.{s}"] = reduced.basis
             sections[f"coefficients.{s}"] = self._encode_coefficients(reduced, still, rows)
@@ -99,11 +99,11 @@ class Pca(Settings):
         )
 
     def _encode_coefficients(self, reduced: Reduced, still: StillPoints, rows: Rows) -> bytes:
-        given = still.coefficients(reduced.decoded)
-        wanted = np.zeros_like(given)
-        wanted[~still.flags] = reduced.coefficients
+        given = still.given(reduced.decoded)
+        wanted = still.join(reduced.coefficients, given)
         if self.predictor == "lsp":  # section 3.4: the small ones first
-            wanted, given = (np.ascontiguousarray(values[:, ::-1]) for values in (wanted, given))
+            wanted = np.ascontiguousarray(wanted[:, ::-1])
+            given = None if given is None else np.ascontiguousarray(given[:, ::-1])
         return encode_rows(wanted, reduced.step, rows, self.predictor, self.beta, given)[0]
 
     @classmethod

@@ -90,8 +90,8 @@ class PcaReader:
             name = f"basis.{s}"
             basis = decode_basis(self._bitstream.section(name), n_frames, self._still.n_moving, step, name)
             name = f"coefficients.{s}"
-            given = self._still.coefficients(basis)
-            if self._header.predictor == "lsp":
+            given = self._still.given(basis)
+            if given is not None and self._header.predictor == "lsp":
                 given = np.ascontiguousarray(given[:, ::-1])
             coefficients = decode_rows(
                 self._bitstream.section(name),
