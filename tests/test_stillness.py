@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sequences import held, partly_still, waving
+from sequences import awkward, held, partly_still, waving
 
 import gvpipe
 from gvpipe.codec import LevelReader, Memo, codec_class, encode_sequence, open_reader
@@ -15,6 +15,7 @@ from gvpipe.holds import Holds, find_holds, read_holds
 from gvpipe.sequence import MeshSequence
 from gvpipe.stillness import decode_flags, encode_flags, find_still
 
+AWKWARD = awkward()
 MORPH_WAVE = Path(__file__).parents[2] / "shared" / "data" / "morph_wave.npz"
 MCGV = "mcgv signals neither stillness nor repeated frames yet"
 PLAIN: list[tuple[str, dict[str, object]]] = [
@@ -123,6 +124,22 @@ def test_still_vertices_save_bytes(codec: str, settings: dict[str, object]) -> N
         for f in (np.asarray(sequence.positions[:]), frames)
     ]
     assert size[0] < size[1]
+
+
+@pytest.mark.parametrize("few", ["one moves", "one stands", "half stand"])
+@pytest.mark.parametrize("name", AWKWARD)
+@pytest.mark.parametrize(("codec", "settings"), [("pca", {}), ("laplacian", {}), ("pdct", {"clusters": 3})])
+def test_awkward_inputs(codec: str, settings: dict[str, object], name: str, few: str, tmp_path: Path) -> None:
+    frames = np.asarray(AWKWARD[name].positions[:]).copy()
+    stands = np.arange(frames.shape[1]) % 2 == 0 if few == "half stand" else np.arange(frames.shape[1]) == 2
+    stands = ~stands if few == "one moves" else stands
+    frames[:, stands] = frames[-1, stands]
+    sequence = MeshSequence(frames, AWKWARD[name].faces)
+    still = find_still(sequence)
+    decoded = encode(sequence, tmp_path, codec, settings, quality=90)[:]
+    assert (decoded[:, still] == decoded[:1, still]).all()
+    extent = float(np.ptp(frames.astype(np.float64), axis=(0, 1)).max())
+    assert np.abs(decoded.astype(np.float64) - frames).max() <= 0.02 * extent + 1e-6 * np.abs(frames).max()
 
 
 @pytest.mark.parametrize(("codec", "settings"), PLAIN)
