@@ -98,7 +98,10 @@ class FrameReader(Protocol):
 
 @runtime_checkable
 class Codec(Protocol):
-    """A codec's settings, and what it does with them."""
+    """A codec's settings, and what it does with them.
+
+    A class attribute ``holds = True`` keeps repeated frames away from it (`gvpipe.holds`); its ``version`` then knows of them.
+    """
 
     id: ClassVar[str]
     version: ClassVar[int]
@@ -178,7 +181,7 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
             f"it was made by version {bitstream.version} of codec {bitstream.codec!r}, this gvpipe has version "
             f"{codec.version}; upgrade gvpipe"
         )
-    holds = read_holds(bitstream)
+    holds = read_holds(bitstream) if _is_held(codec) else None
     distinct = bitstream if holds is None else dataclasses.replace(bitstream, n_frames=holds.n_distinct)
     reader = correct(distinct, codec.reader(distinct))
     return reader if holds is None else HeldReader(reader, holds)
@@ -193,7 +196,7 @@ def encode_sequence(
         InputError: what the codec raises.
     """
     memo = memo or Memo()
-    holds = memo("holds", lambda: find_holds(sequence)) if getattr(codec, "holds", False) else None
+    holds = memo("holds", lambda: find_holds(sequence)) if _is_held(codec) else None
     if holds is None:
         return codec.encode(sequence, progress, memo)
     return add_holds(codec.encode(holds.distinct(sequence), progress, memo), holds, codec.version)
@@ -202,6 +205,11 @@ def encode_sequence(
 @functools.cache
 def _entries() -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in entry_points(group=GROUP)}
+
+
+def _is_held(codec: Codec | type[Any]) -> bool:
+    """Whether repeated frames are coded around the codec."""
+    return bool(getattr(codec, "holds", False))
 
 
 def _parse(key: str, text: str, kind: type) -> Any:
