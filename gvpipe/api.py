@@ -15,7 +15,7 @@ import numpy as np
 from gvpipe import notes
 from gvpipe.arguments import StrPath, check_path, show
 from gvpipe.auto import AUTO, DEFAULT, choose_codec
-from gvpipe.codec import Codec, Progress, codec_ids, make_codec
+from gvpipe.codec import Codec, Progress, codec_ids, encode_sequence, make_codec
 from gvpipe.container import bytes_by_part, write_file
 from gvpipe.errors import InputError, OutputError, SettingError
 from gvpipe.io import read as read_sequence
@@ -207,7 +207,7 @@ def encode(
         chosen, bitstream = choice.trial.codec, choice.trial.bitstream
     else:
         chosen = cast("Codec", candidates)
-        bitstream = chosen.encode(sequence, clock)
+        bitstream = encode_sequence(chosen, sequence, clock)
     clock("write", 0.0)
     if not bitstream.video:
         bitstream = dataclasses.replace(bitstream, video=poster_of(sequence))

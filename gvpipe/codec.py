@@ -19,6 +19,7 @@ from gvpipe.arguments import did_you_mean
 from gvpipe.bitstream import Bitstream
 from gvpipe.corrections import correct
 from gvpipe.errors import NewerVersion, SettingError
+from gvpipe.holds import HeldReader, add_holds, find_holds, read_holds
 from gvpipe.sequence import Float32, Int32, MeshSequence
 
 GROUP = "gvpipe.codecs"
@@ -98,7 +99,10 @@ class FrameReader(Protocol):
 
 @runtime_checkable
 class Codec(Protocol):
-    """A codec's settings, and what it does with them."""
+    """A codec's settings, and what it does with them.
+
+    A class attribute ``holds = True`` keeps repeated frames away from it (`gvpipe.holds`); its ``version`` then knows of them.
+    """
 
     id: ClassVar[str]
     version: ClassVar[int]
@@ -180,7 +184,7 @@ def codec_class(codec: str) -> type[Any]:
 
 
 def open_reader(bitstream: Bitstream) -> FrameReader:
-    """Open a bitstream with the codec that wrote it; corrections to its frames (`gvpipe.corrections`) are applied.
+    """Open a bitstream with the codec that wrote it: its frames corrected (`gvpipe.corrections`), then held (`gvpipe.holds`).
 
     Raises:
         NewerVersion: no installed codec has that id, or only an older version of it.
@@ -194,13 +198,35 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
             f"it was made by version {bitstream.version} of codec {bitstream.codec!r}, this gvpipe has version "
             f"{codec.version}; upgrade gvpipe"
         )
-    reader: FrameReader = codec.reader(bitstream)
-    return correct(bitstream, reader)
+    holds = read_holds(bitstream) if _is_held(codec) else None
+    distinct = bitstream if holds is None else dataclasses.replace(bitstream, n_frames=holds.n_distinct)
+    reader = correct(distinct, codec.reader(distinct))
+    return reader if holds is None else HeldReader(reader, holds)
+
+
+def encode_sequence(
+    codec: Codec, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None
+) -> Bitstream:
+    """Code a sequence; where the codec lets it (`gvpipe.holds`), frames that repeat the one before are coded by a run length.
+
+    Raises:
+        InputError: what the codec raises.
+    """
+    memo = memo or Memo()
+    holds = memo("holds", lambda: find_holds(sequence)) if _is_held(codec) else None
+    if holds is None:
+        return codec.encode(sequence, progress, memo)
+    return add_holds(codec.encode(holds.distinct(sequence), progress, memo), holds, codec.version)
 
 
 @functools.cache
 def _entries() -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in entry_points(group=GROUP)}
+
+
+def _is_held(codec: Codec | type[Any]) -> bool:
+    """Whether repeated frames are coded around the codec."""
+    return bool(getattr(codec, "holds", False))
 
 
 def _parse(key: str, text: str, kind: type) -> Any:

@@ -68,24 +68,32 @@ class Surroundings(NamedTuple):
 
 
 def encode_rows(
-    target: Float64, step: float, rows: Rows, predictor: str = "kalman", beta: float = 1.8
+    target: Float64,
+    step: float,
+    rows: Rows,
+    predictor: str = "kalman",
+    beta: float = 1.8,
+    given: Float64 | None = None,
 ) -> tuple[bytes, Float64]:
     """Code ``target (n, R)`` with a quantisation step; return the bytes and what the decoder will have.
+
+    ``given (n, R)`` holds the decoded rows that ``rows`` leaves out (`gvpipe.row_prediction.rows_left`); contexts take their
+    residuals for 0.
 
     Raises:
         InputError: a value is too large for the step.
     """
     from gvpipe.row_kernels import find_all_contexts
 
-    residuals = np.zeros(target.shape, np.int64)
-    decoded = np.zeros(target.shape)
+    residuals = np.zeros((len(rows.order), target.shape[1]), np.int64)
+    decoded = np.zeros(target.shape) if given is None else given.copy()
     predict_rows(rows, step, residuals, decoded, target, predictor, beta)
     largest = int(np.abs(residuals).max(initial=0))
     if largest >= LARGEST:
         raise InputError(f"a residual has {largest} quantisation steps, at most {LARGEST} fit; ask for a lower quality")
     means = np.abs(residuals).sum(axis=0) * ONE // max(1, len(residuals))
     levels = np.searchsorted(_level_bounds(), means + 1, side="right") - 1
-    contexts = find_all_contexts(residuals, _surroundings(rows, levels, len(rows.blocks) - 1))
+    contexts = find_all_contexts(residuals, _surroundings(rows, len(target), levels, len(rows.blocks) - 1))
     coder = BlockEncoder(N_CONTEXTS)
     for first, end in pairwise(rows.blocks.tolist()):
         for c in range(target.shape[1]):
@@ -103,8 +111,9 @@ def decode_rows(
     n_blocks: int | None = None,
     predictor: str = "kalman",
     beta: float = 1.8,
+    given: Float64 | None = None,
 ) -> Float64:
-    """Mirror of `encode_rows`: ``(n, R)``; of the first ``n_blocks`` blocks only if given, other rows stay 0.
+    """Mirror of `encode_rows`: ``(n, R)``; of the first ``n_blocks`` blocks only if that is not None, other rows stay 0.
 
     Raises:
         CorruptFile: the bytes are not what the encoder writes.
@@ -121,19 +130,19 @@ def decode_rows(
     coder = BlockDecoder(cursor.rest(), N_CONTEXTS, name)
     wanted = len(rows.blocks) - 1 if n_blocks is None else n_blocks
     residuals = np.zeros((int(rows.blocks[wanted]), n_components), np.int64)
-    around = _surroundings(rows, levels, wanted)
+    decoded = np.zeros((len(rows.order), n_components)) if given is None else given.copy()
+    around = _surroundings(rows, len(decoded), levels, wanted)
     coder.check(decode_residuals(residuals, around, coder.state, coder.words, coder.edges, coder.sizes))
     if n_blocks is None:
         coder.end()
     if np.abs(residuals).max(initial=0) >= LARGEST:
         raise CorruptFile(f"section {name!r} is corrupt: a residual is out of range; get the file again from its source")
-    decoded = np.zeros((len(rows.order), n_components))
     predict_rows(rows, step, residuals, decoded, None, predictor, beta)
     return decoded
 
 
-def _surroundings(rows: Rows, levels: Int64, n_blocks: int) -> Surroundings:
-    place = np.zeros(len(rows.order), np.int64)
+def _surroundings(rows: Rows, n_rows: int, levels: Int64, n_blocks: int) -> Surroundings:
+    place = np.full(n_rows, len(rows.order), np.int64)  # given rows: behind all blocks, so that they count for 0
     place[rows.order] = np.arange(len(rows.order))
     arrays = (
         rows.blocks[: n_blocks + 1],

@@ -20,6 +20,7 @@ never a decision, since residuals are integers and nothing else is decided from 
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,7 +40,7 @@ class Rows:
     Args:
         order: ``(n,)`` rows.
         starts: ``(n + 1,)`` bounds of each row's known rows in ``near``.
-        near: known rows, each earlier in ``order``.
+        near: known rows, each earlier in ``order``, or given (`rows_left`).
         weights, variances: prior means and variances of the weights, as long as ``near``.
         rings: ``(n,)`` how many of the first known rows ``navg``, ``lsp`` and ``rbf`` use; 0: none of them interpolates here.
         blocks: ``(B + 1,)`` bounds in ``order`` of blocks that are entropy coded at once.
@@ -58,14 +59,24 @@ class Rows:
 
 def select_rows(rows: Rows, keep: NDArray[np.bool_]) -> Rows:
     """The rows whose place in the order ``keep (n,)`` marks, renumbered by place; what they know must be marked, too."""
+    left = _keep_places(rows, keep)
+    number = np.zeros(len(keep), np.int32)
+    number[left.order] = np.arange(len(left.order), dtype=np.int32)
+    return dataclasses.replace(left, order=np.arange(len(left.order), dtype=np.int32), near=number[left.near])
+
+
+def rows_left(rows: Rows, given: NDArray[np.bool_]) -> Rows:
+    """The rows that are left to be coded if those that ``given (n,)`` marks are known beforehand; rows keep their numbers."""
+    return _keep_places(rows, ~given[rows.order])
+
+
+def _keep_places(rows: Rows, keep: NDArray[np.bool_]) -> Rows:
     counts = np.diff(rows.starts)
     wanted = np.repeat(keep, counts)
-    number = np.zeros(len(keep), np.int32)
-    number[rows.order[keep]] = np.arange(int(keep.sum()), dtype=np.int32)
     return Rows(
-        order=np.arange(int(keep.sum()), dtype=np.int32),
+        order=rows.order[keep],
         starts=np.concatenate([[0], np.cumsum(counts[keep])]).astype(np.int32),
-        near=number[rows.near[wanted]],
+        near=rows.near[wanted],
         weights=rows.weights[wanted],
         variances=rows.variances[wanted],
         rings=rows.rings[keep],
@@ -83,7 +94,7 @@ def predict_rows(
         rows: of any number n.
         step: quantisation step of every component.
         residuals: ``(m, R)`` for the first m rows of the order, in steps.
-        decoded: ``(n, R)`` components, by row; in the order of transmission.
+        decoded: ``(n, R)`` components, by row; in the order of transmission. Given rows are there already.
         target: ``(n, R)`` what to code, or None.
     """
     from gvpipe.prediction_kernels import predict

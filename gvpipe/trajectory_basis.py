@@ -77,11 +77,13 @@ class Reduced:
         step: D, model units.
         basis: its bytes.
         coefficients: ``(V, R)``, still to be coded, model units.
+        decoded: the basis, as the decoder will have it.
     """
 
     step: float
     basis: bytes
     coefficients: Float64
+    decoded: Basis
 
 
 def reduce_trajectories(
@@ -92,6 +94,7 @@ def reduce_trajectories(
     point_cost: float = THRESHOLD,
     row_cost: float = THRESHOLD,
     noise: float = 1.0,
+    most: int = MAX_COMPONENTS,
 ) -> Reduced:
     """Choose the step and the components of ``trajectories (V, 3F)``, and code their basis.
 
@@ -102,16 +105,17 @@ def reduce_trajectories(
         basis_ratio: step of the basis, in steps of the coefficients.
         point_cost, row_cost: of a component (`count_components`).
         noise: squared error of decoded coefficients, in that of rounding them to the step.
+        most: components, whatever pays.
     """
     n_points, n_rows = trajectories.shape
     principal = find_principal(trajectories, error)
     left = (noise * n_points + basis_ratio**2 * n_rows) / 12
     step, kept = choose_step(
-        principal, error, lambda step: count_components(principal, n_points, step, point_cost, row_cost), left
+        principal, error, lambda step: min(most, count_components(principal, n_points, step, point_cost, row_cost)), left
     )
-    kept = min(n_components, len(principal.energies)) or kept
+    kept = min(n_components, most, len(principal.energies)) or kept
     data, basis = encode_basis(principal, kept, n_points, step * basis_ratio)
-    return Reduced(step, data, fit_coefficients(trajectories, basis))
+    return Reduced(step, data, fit_coefficients(trajectories, basis), basis)
 
 
 def find_principal(trajectories: Float64, error: float) -> Principal:

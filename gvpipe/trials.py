@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from gvpipe.bitstream import Bitstream
-from gvpipe.codec import Codec, FrameReader, Memo, Progress, open_reader
+from gvpipe.codec import Codec, FrameReader, Memo, Progress, encode_sequence, open_reader
 from gvpipe.container import file_size
 from gvpipe.corrections import SECTION, Bound, encode_corrections
 from gvpipe.errors import InputError
+from gvpipe.holds import HeldReader
 from gvpipe.poster import poster_of
 from gvpipe.sequence import MeshSequence
 from gvpipe.vertex_errors import Errors, measure_errors
@@ -83,7 +84,7 @@ class Trials:
         """Encode at a quality, and measure."""
         memo, report = self._memo, self._progress or (lambda stage, done: None)
         codec = cast("Codec", dataclasses.replace(cast("DataclassInstance", self.codec), quality=quality))
-        bitstream = codec.encode(self._sequence, self._progress, memo)
+        bitstream = encode_sequence(codec, self._sequence, self._progress, memo)
         if not bitstream.video:
             bitstream = dataclasses.replace(bitstream, video=memo("poster", lambda: poster_of(self._sequence)))
         report("measure", 0.0)
@@ -93,9 +94,7 @@ class Trials:
             errors = measure_errors(reference, reader.read)
         else:
             bound = Bound.of(self._bound, memo("coordinate", lambda: _largest_coordinate(self._sequence)))
-            section, errors = encode_corrections(reference, reader, bound)
-            if section:
-                bitstream = dataclasses.replace(bitstream, sections={**bitstream.sections, SECTION: section})
+            bitstream, errors = _correct(bitstream, reference, reader, bound)
         size = file_size(bitstream)
         report("measure", 1.0)
         return Trial(codec, size, 8 * size / (bitstream.n_vertices * bitstream.n_frames), errors, bitstream)
@@ -117,6 +116,20 @@ class Trials:
         sequence, permutation = self._sequence, self._memo.permutation
         assert permutation is not None, "an encoder must tell its memo the permutation"
         return sequence.reordered(permutation, reader.faces)
+
+
+def _correct(bitstream: Bitstream, reference: MeshSequence, reader: FrameReader, bound: Bound) -> tuple[Bitstream, Errors]:
+    """Add what corrections the bound needs; return the bitstream, and the errors that are left."""
+    if not isinstance(reader, HeldReader):
+        section, errors = encode_corrections(reference, reader, bound)
+        return _with(bitstream, section), errors
+    section, _ = encode_corrections(reader.holds.distinct(reference), reader.distinct, bound)  # repeated frames: once
+    bitstream = _with(bitstream, section)
+    return bitstream, measure_errors(reference, open_reader(bitstream).read)
+
+
+def _with(bitstream: Bitstream, section: bytes) -> Bitstream:
+    return dataclasses.replace(bitstream, sections={**bitstream.sections, SECTION: section}) if section else bitstream
 
 
 def _largest_coordinate(sequence: MeshSequence) -> float:

@@ -27,6 +27,25 @@ def waving(n: int = 14, n_frames: int = 40, name: str = "waving") -> MeshSequenc
     return MeshSequence(turned[:, order].astype(np.float32), np.argsort(order)[faces].astype(np.int32), 24.0, name=name)
 
 
+def partly_still() -> MeshSequence:
+    """A sheet half of which waves; two vertices elsewhere and one at the sheet's middle stand still too. 20 frames."""
+    points, faces = grid(12)
+    t = np.arange(20)[:, None] / 6
+    x = points[:, 0]
+    height = np.where(x < 0.5, 0, 0.3 * np.sin(5 * x + 2 * t) * (x - 0.4))
+    frames = np.stack([x + 0 * t, points[:, 1] + 0.1 * height, height], axis=2) + 7
+    frames[:, 139] = frames[:1, 139]
+    extra = np.array([[7.0, 8.0, 9.0], [6.5, 7.0, 7.0]])
+    frames = np.concatenate([frames, np.tile(extra, (len(frames), 1, 1))], axis=1)
+    order = np.random.default_rng(1).permutation(frames.shape[1])
+    return MeshSequence(frames[:, order].astype(np.float32), np.argsort(order)[faces].astype(np.int32), 24.0)
+
+
+def held(sequence: MeshSequence, lengths: list[int]) -> MeshSequence:
+    """Each frame shown for so many frames."""
+    return MeshSequence(np.repeat(np.asarray(sequence.positions[:]), lengths, axis=0), sequence.faces, sequence.fps)
+
+
 def _moving(points: npt.ArrayLike, faces: npt.ArrayLike, name: str, n_frames: int = 9) -> MeshSequence:
     """Any mesh, made to sway, each vertex a little differently."""
     points = np.asarray(points, float).reshape(-1, 3)

@@ -2,7 +2,7 @@
 
 What: the first points of the vertex hierarchy, which lie evenly over the surface, at least one on every component. They
 come in the hierarchy's order, so that each is interpolated from those before it as `pca` does it. A component of up to `SMALL`
-points is all anchors, and needs no deltas.
+points is all anchors, and needs no deltas. Points that stand still are anchors too, whose coefficients are given.
 Why: deltas tell little of where a point far from any anchor lies. With few anchors the surface drifts, with many their
 own bits grow; anchors are quantised as finely as the wanted drift is small.
 
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.hierarchy import Hierarchy
-from gvpipe.row_prediction import Rows, select_rows
+from gvpipe.row_prediction import Rows, rows_left, select_rows
 from gvpipe.sequence import Int32
 
 ANCHOR_CHOICES = ("hierarchy", "walk")
@@ -33,15 +33,23 @@ Int64 = NDArray[np.int64]
 class Anchors:
     """Args:
     points: ``(A,)`` anchors, in the order of their rows.
-    rows: of the anchors, numbered 0..A-1.
+    rows: of the anchors, numbered 0..A-1; those that stand still are left out.
+    is_free: ``(A,)`` the anchors that do not stand still.
     """
 
     points: Int32
     rows: Rows
+    is_free: NDArray[np.bool_]
 
 
 def choose_anchors(
-    choice: str, spacing: int, hierarchy: Hierarchy, rows: Rows, walk: Int32, component_of: NDArray[np.integer]
+    choice: str,
+    spacing: int,
+    hierarchy: Hierarchy,
+    rows: Rows,
+    walk: Int32,
+    component_of: NDArray[np.integer],
+    is_still: NDArray[np.bool_] | None = None,
 ) -> Anchors:
     """Choose about one anchor per ``spacing`` points.
 
@@ -50,18 +58,21 @@ def choose_anchors(
         rows: of all points along the hierarchy.
         walk: all points in border-expansion order.
         component_of: ``(P,)`` the component of each point.
+        is_still: ``(P,)`` the points whose coefficients are given; none if None.
     """
-    is_small = (np.bincount(component_of, minlength=1) <= SMALL)[component_of]
+    is_still = np.zeros(len(component_of), bool) if is_still is None else is_still
+    is_held = (np.bincount(component_of, minlength=1) <= SMALL)[component_of] | is_still
     n_points = len(component_of)
     if choice == "hierarchy":
         n_coarse = int((hierarchy.rings == 0).sum())
         keep = np.arange(n_points) < max(n_coarse, -(-n_points // spacing))
-        keep |= is_small[hierarchy.order]
-        return Anchors(hierarchy.order[keep], select_rows(rows, keep))
-    keep = (np.arange(n_points) % spacing == 0) | is_small[walk]
+        keep |= is_held[hierarchy.order]
+        points, anchor_rows = hierarchy.order[keep], select_rows(rows, keep)
+        return Anchors(points, rows_left(anchor_rows, is_still[points]), ~is_still[points])
+    keep = (np.arange(n_points) % spacing == 0) | is_held[walk]
     keep[np.unique(component_of[walk], return_index=True)[1]] = True
     points = walk[keep]
-    return Anchors(points, _chain(len(points)))
+    return Anchors(points, rows_left(_chain(len(points)), is_still[points]), ~is_still[points])
 
 
 def _chain(n: int) -> Rows:

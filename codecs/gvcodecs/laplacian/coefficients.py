@@ -15,22 +15,39 @@ from gvpipe.row_coding import decode_rows, encode_rows
 Float64 = NDArray[np.float64]
 
 
-def encode_coefficients(coefficients: Float64, step: float, domain: Domain, header: Header) -> tuple[bytes, bytes]:
-    """Code ``coefficients (P, R)`` with the deltas' ``step``; return the bytes of anchors and of deltas."""
+def encode_coefficients(
+    coefficients: Float64, step: float, domain: Domain, header: Header, given: Float64 | None = None
+) -> tuple[bytes, bytes]:
+    """Code ``coefficients (P, R)`` with the deltas' ``step``; return the bytes of anchors and of deltas.
+
+    ``given (P, R)`` has the coefficients of the points that stand still, which are those in ``coefficients``.
+    """
     wanted = domain.system.deltas(coefficients)[domain.delta_points]
     deltas, rounded = encode_rows(wanted, step, domain.deltas, _predictor(header))
     anchored = domain.system.fit_anchors(domain.delta_points, rounded, coefficients)
-    anchors, _ = encode_rows(anchored, step * header.anchor_ratio, domain.anchors.rows)
+    anchors, _ = encode_rows(anchored, step * header.anchor_ratio, domain.anchors.rows, given=_of_anchors(given, domain))
     return anchors, deltas
 
 
 def decode_coefficients(
-    anchors: bytes, deltas: bytes, n_components: int, step: float, domain: Domain, header: Header, names: tuple[str, str]
+    anchors: bytes,
+    deltas: bytes,
+    n_components: int,
+    step: float,
+    domain: Domain,
+    header: Header,
+    names: tuple[str, str],
+    given: Float64 | None = None,
 ) -> Float64:
     """Mirror of `encode_coefficients`: ``(P, R)``; raises `CorruptFile` naming the section that is not what it writes."""
-    anchored = decode_rows(anchors, n_components, step * header.anchor_ratio, domain.anchors.rows, names[0])
+    anchor_step, held = step * header.anchor_ratio, _of_anchors(given, domain)
+    anchored = decode_rows(anchors, n_components, anchor_step, domain.anchors.rows, names[0], given=held)
     decoded = decode_rows(deltas, n_components, step, domain.deltas, names[1], predictor=_predictor(header))
     return domain.system.solve(domain.delta_points, decoded, anchored)
+
+
+def _of_anchors(given: Float64 | None, domain: Domain) -> Float64 | None:
+    return None if given is None else given[domain.anchors.points]
 
 
 def _predictor(header: Header) -> str:

@@ -64,19 +64,32 @@ def build_surface(point_faces: Int32, n_points: int) -> Surface:
     return Surface(faces, unique_edges(faces), adjacency(faces, n_points), hierarchy, mesh_rows(hierarchy))
 
 
-def build_domain(surface: Surface, average: Float64 | None, header: Header) -> Domain:
-    """Set up the coding of coefficients, given the decoded ``average (P, 3)`` in mean edge lengths, if there is one."""
+def build_domain(
+    surface: Surface, average: Float64 | None, header: Header, is_still: NDArray[np.bool_] | None = None
+) -> Domain:
+    """Set up the coding of coefficients.
+
+    Args:
+        surface: the mesh.
+        average: ``(P, 3)`` decoded, in mean edge lengths, if there is one.
+        header: of the bitstream.
+        is_still: ``(P,)`` the points whose coefficients are given; none if None.
+    """
     n_points = len(surface.hierarchy.order)
     points = np.zeros((n_points, 3)) if average is None else average
     walk = border_order(surface.faces, n_points)
     _, component_of = components(surface.neighbours)
-    anchors = choose_anchors(header.anchor_choice, header.anchors, surface.hierarchy, surface.rows, walk, component_of)
+    is_still = np.zeros(n_points, bool) if is_still is None else is_still
+    anchors = choose_anchors(
+        header.anchor_choice, header.anchors, surface.hierarchy, surface.rows, walk, component_of, is_still
+    )
     is_anchor = np.zeros(n_points, bool)
     is_anchor[anchors.points] = True
     has_deltas = (np.bincount(component_of[~is_anchor], minlength=int(component_of.max()) + 1) > 0)[component_of]
+    has_deltas &= ~is_still
     scale = np.ones(n_points) if average is None else fineness(average, surface.edges, header.edge_power)
     operator = sparse.diags_array(scale * has_deltas) @ thin_hubs(laplacian(points, surface.faces, header.operator))
     operator = sparse.csr_array(operator)
     order, blocks, limits = delta_order(header.delta_prediction, surface.hierarchy, walk, has_deltas)
     rows = delta_rows(header.delta_prediction, order, blocks, limits, surface.neighbours, operator @ points)
-    return Domain(anchors, order, rows, ExtendedLaplacian(operator, anchors.points, 1 / header.anchor_ratio))
+    return Domain(anchors, order, rows, ExtendedLaplacian(operator, anchors.points, 1 / header.anchor_ratio, anchors.is_free))

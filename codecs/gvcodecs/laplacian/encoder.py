@@ -5,6 +5,8 @@ its own: connectivity (`gvpipe.bare_mesh`), average mesh in edge shape space (`a
 principal trajectories (`gvpipe.trajectory_basis`), Laplacian (`operators`) with anchors (`anchors`) and its inverse (`system`),
 prediction of delta trajectories (`delta_rows`), range coding (`gvpipe.row_coding`).
 
+Points that never move have a position in place of a trajectory (`gvpipe.still_points`); they are anchors that cost nothing.
+
 Frames are read three times: for size and points, for the average, then segment by segment.
 """
 
@@ -30,6 +32,7 @@ from gvcodecs.laplacian.format import (
     MAX_SPACING,
     MOST_POWER,
     MOST_RATIO,
+    VERSION_STILL,
     Header,
 )
 from gvcodecs.laplacian.operators import OPERATORS
@@ -38,6 +41,7 @@ from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import MeshSequence
+from gvpipe.still_points import SECTION, StillPoints, code_still
 from gvpipe.trajectories import CodedPoints, code_points, read_trajectories
 from gvpipe.trajectory_basis import MAX_COMPONENTS, reduce_trajectories
 
@@ -59,8 +63,9 @@ class Laplacian(Settings):
     """
 
     id: ClassVar[str] = "laplacian"
-    version: ClassVar[int] = 1
+    version: ClassVar[int] = VERSION_STILL
     summary: ClassVar[str] = "trajectory PCA through geometric Laplacians: smallest files at equal perceived distortion"
+    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.holds`)
 
     quality: float = 75.0  # 0..100, higher is better
     operator: str = "mean-value"  # mean-value, cotangent or tutte
@@ -99,7 +104,8 @@ class Laplacian(Settings):
         mesh, wanted = shared.mesh, shared.aimed_error(self.quality)
         bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
         n_segments = len(bounds) - 1
-        sections = {"mesh": shared.coded.mesh, "order": shared.coded.order}
+        held, still = code_still(sequence, shared, AIM**0.5 * wanted, memo)
+        sections = {"mesh": shared.coded.mesh, "order": shared.coded.order, **({SECTION: held} if held else {})}
         header = Header(
             self.operator,
             self.delta_prediction,
@@ -114,28 +120,33 @@ class Laplacian(Settings):
         )
         if header.needs_average:
             report("average", 0)
-        data, domain = memo("domain", lambda: _prepare(sequence, shared, header))
+        data, domain = memo("domain", lambda: _prepare(sequence, shared, header, still))
         if data is not None:
             sections[NAME] = data
-        steps = []
-        for s, (start, stop) in enumerate(pairwise(bounds)):
+        steps, moving = [], shared.members[~still.flags]
+        for s, (start, stop) in enumerate(pairwise(bounds) if still.n_moving else []):
             report("segments", s / n_segments)
-            trajectories = read_trajectories(sequence, start, stop, shared.members)
-            error = AIM * wanted**2 * mesh.n_points * (stop - start)
-            reduced = reduce_trajectories(trajectories, error, self.components, self.basis_ratio, POINT_COST, ROW_COST, NOISE)
+            trajectories = read_trajectories(sequence, start, stop, moving)
+            error = AIM * wanted**2 * still.n_moving * (stop - start)
+            most = still.most_components
+            reduced = reduce_trajectories(
+                trajectories, error, self.components, self.basis_ratio, POINT_COST, ROW_COST, NOISE, most
+            )
+            given = still.given(reduced.decoded)
             sections[f"basis.{s}"] = reduced.basis
-            anchors, deltas = encode_coefficients(reduced.coefficients, reduced.step, domain, header)
+            coefficients = still.join(reduced.coefficients, given)
+            anchors, deltas = encode_coefficients(coefficients, reduced.step, domain, header, given)
             sections[f"anchors.{s}"], sections[f"deltas.{s}"] = anchors, deltas
             steps.append(reduced.step)
         report("segments", 1)
         return Bitstream(
             codec=self.id,
-            version=self.version,
+            version=self.version if still.n_moving < mesh.n_points else 1,
             n_frames=sequence.n_frames,
             n_vertices=sequence.n_vertices,
             n_triangles=len(mesh.faces),
             fps=float(sequence.fps),
-            header={**header.to_json(), "steps": steps},
+            header={**header.to_json(), "steps": steps or [1.0] * n_segments},
             sections=sections,
         )
 
@@ -145,12 +156,12 @@ class Laplacian(Settings):
         return LaplacianReader(bitstream)
 
 
-def _prepare(sequence: MeshSequence, shared: CodedPoints, header: Header) -> tuple[bytes | None, Domain]:
+def _prepare(sequence: MeshSequence, shared: CodedPoints, header: Header, still: StillPoints) -> tuple[bytes | None, Domain]:
     """The coded average mesh, where one is needed, and what coefficients are coded with: both know nothing of quality."""
     mesh = shared.mesh
     surface = build_surface(mesh.point_faces, mesh.n_points)
     if not header.needs_average:
-        return None, build_domain(surface, None, header)
+        return None, build_domain(surface, None, header, still.flags)
     average = average_mesh(sequence, shared.members[surface.faces].astype(np.int32))[shared.members]
     data, decoded = encode_average(average, surface, header)
-    return data, build_domain(surface, decoded, header)
+    return data, build_domain(surface, decoded, header, still.flags)

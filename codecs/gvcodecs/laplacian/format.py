@@ -2,11 +2,15 @@
 
 ====================  ======================================================================================
 ``mesh``, ``order``   triangles, seams and vertex order (`gvpipe.bare_mesh`)
+``still``             points that never move, and their positions (`gvpipe.still_points`); absent if all move
 ``average``           the average mesh (`average_coding`); absent where nothing needs it
 ``basis.N``           mean and principal trajectories of segment N (`gvpipe.trajectory_basis`)
 ``anchors.N``         coefficients of the anchors, coarse to fine (`gvpipe.row_coding`, `anchors`)
 ``deltas.N``          delta trajectories of the other points (`gvpipe.row_coding`, `delta_rows`)
 ====================  ======================================================================================
+
+Version 1 has no section ``still``; files without one are still written as version 1. Where no point moves, segments have no
+sections.
 """
 
 from __future__ import annotations
@@ -21,6 +25,7 @@ from gvpipe.bitstream import Bitstream
 from gvpipe.segments import read_segments, read_steps
 
 MAX_SEGMENTS = 1300  # three sections each, of the 4096 that a bitstream may have
+VERSION_STILL = 2  # of files with a section `still` or `holds`
 MAX_SPACING = 1 << 20  # points per anchor
 LEAST_RATIO, MOST_RATIO = 2.0**-10, 2.0**10  # of steps
 FINEST, COARSEST = 2.0**-20, 1.0  # step of the average, mean edge lengths

@@ -17,6 +17,7 @@ from gvpipe.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
+from gvpipe.still_points import read_still
 from gvpipe.trajectory_basis import decode_basis
 from gvpipe.trajectory_frames import Segment, read_frames
 
@@ -31,6 +32,7 @@ class LaplacianReader:
     def __init__(self, bitstream: Bitstream) -> None:
         self._header = Header.of(bitstream)
         self._mesh, self._bitstream = read_mesh(bitstream), bitstream
+        self._still = read_still(bitstream, self._mesh)
         surface = build_surface(self._mesh.point_faces, self._mesh.n_points)
         try:
             self._domain = self._build_domain(surface)
@@ -55,22 +57,26 @@ class LaplacianReader:
         Raises:
             CorruptFile: a segment does not decode.
         """
-        return read_frames(start, stop, self._bounds, self._mesh.points, self._decode)
+        if not self._still.n_moving:
+            return np.repeat(self._still.positions[None, self._mesh.points], stop - start, axis=0)
+        frames = read_frames(start, stop, self._bounds, self._mesh.points, self._decode)
+        self._still.place(frames, self._mesh.points)
+        return frames
 
     def _build_domain(self, surface: Surface) -> Domain:
         average = None
         if self._header.needs_average:
             average = decode_average(self._bitstream.section(NAME), surface, self._header)
-        return build_domain(surface, average, self._header)
+        return build_domain(surface, average, self._header, self._still.flags)
 
     def _decode(self, s: int) -> Segment:
         if self._kept is None or self._kept[0] != s:
             step, section = self._header.steps[s], self._bitstream.section
             name, n_frames = f"basis.{s}", self._bounds[s + 1] - self._bounds[s]
-            basis = decode_basis(section(name), n_frames, self._mesh.n_points, step * self._header.basis_ratio, name)
+            basis = decode_basis(section(name), n_frames, self._still.n_moving, step * self._header.basis_ratio, name)
             names = (f"anchors.{s}", f"deltas.{s}")
             anchors, deltas = (section(name) for name in names)
-            n_components = basis.vectors.shape[1]
-            coefficients = decode_coefficients(anchors, deltas, n_components, step, self._domain, self._header, names)
+            n_components, given = basis.vectors.shape[1], self._still.given(basis)
+            coefficients = decode_coefficients(anchors, deltas, n_components, step, self._domain, self._header, names, given)
             self._kept = s, Segment(basis, np.ascontiguousarray(coefficients.T))
         return self._kept[1]

@@ -61,12 +61,16 @@ class ExtendedLaplacian:
     operator: ``(P, P)``, rows scaled as deltas are quantised; rows of points without deltas empty.
     anchors: ``(A,)`` points, at least one in each component of the operator's graph, and all points of empty rows.
     weight: of an anchor's row, beside 1 for a delta's.
+    is_free: ``(A,)`` the anchors whose values the encoder may choose; all if None.
     """
 
-    def __init__(self, operator: sparse.csr_array, anchors: Int32, weight: float) -> None:
+    def __init__(
+        self, operator: sparse.csr_array, anchors: Int32, weight: float, is_free: NDArray[np.bool_] | None = None
+    ) -> None:
         from scipy.sparse.linalg import splu
 
         self._operator, self._anchors, self._weight = operator, anchors, weight
+        self._is_free = np.ones(len(anchors), bool) if is_free is None else is_free
         held = np.zeros(operator.shape[0])
         held[anchors] = weight * weight
         normal = sparse.csc_array(operator.T @ operator + sparse.diags_array(held))
@@ -100,7 +104,7 @@ class ExtendedLaplacian:
         missing = wanted - self.solve(points, deltas, anchored)
         direction, last = np.zeros_like(anchored), np.ones(anchored.shape[1])
         for _ in range(FITTING_STEPS):
-            gradient = self._gather(missing)
+            gradient = self._gather(missing) * self._is_free[:, None]
             slope = np.einsum("ar,ar->r", gradient, gradient)
             direction = gradient + direction * (slope / np.maximum(last, TINY))
             moved = self._spread(direction)

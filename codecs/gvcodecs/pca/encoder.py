@@ -5,8 +5,8 @@ module of its own: connectivity (`gvpipe.bare_mesh`), principal trajectories and
 vertex hierarchy (`gvpipe.hierarchy`), closed-loop prediction (`gvpipe.row_prediction`) and range coding (`gvpipe.row_coding`)
 of feature vectors.
 
-Vertices that share one trajectory (seams, triangle soups) are one point, coded once. Frames are read twice: for size and
-points, then segment by segment.
+Vertices that share one trajectory (seams, triangle soups) are one point, coded once. Points that never move have a position in
+place of a trajectory (`gvpipe.still_points`). Frames are read twice: for size, points and stillness, then segment by segment.
 """
 
 from __future__ import annotations
@@ -17,17 +17,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from gvcodecs.pca.format import MAX_SEGMENTS, Header
+from gvcodecs.pca.format import MAX_SEGMENTS, VERSION_STILL, Header
 from gvcodecs.pca.reader import PcaReader, ordered_rows
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.hierarchy import build_hierarchy
 from gvpipe.row_coding import encode_rows
-from gvpipe.row_prediction import PREDICTORS
+from gvpipe.row_prediction import PREDICTORS, Rows, rows_left
 from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import MeshSequence
+from gvpipe.still_points import SECTION, StillPoints, code_still
 from gvpipe.trajectories import code_points, read_trajectories
-from gvpipe.trajectory_basis import MAX_COMPONENTS, reduce_trajectories
+from gvpipe.trajectory_basis import MAX_COMPONENTS, Reduced, reduce_trajectories
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,9 @@ class Pca(Settings):
     """
 
     id: ClassVar[str] = "pca"
-    version: ClassVar[int] = 1
+    version: ClassVar[int] = VERSION_STILL
     summary: ClassVar[str] = "trajectory PCA with geometric predictors: smallest files, levels of detail"
+    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.holds`)
 
     quality: float = 75.0  # 0..100, higher is better
     predictor: str = "kalman"  # kalman, or the paper's rbf, lsp, navg
@@ -69,25 +71,25 @@ class Pca(Settings):
         shared = code_points(sequence, self.reorder, memo, report)
         mesh, wanted = shared.mesh, shared.aimed_error(self.quality)
         rows = memo("rows", lambda: ordered_rows(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor))
+        data, still = code_still(sequence, shared, wanted, memo)
+        rows, moving = rows_left(rows, still.flags), shared.members[~still.flags]
         bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
         n_segments = len(bounds) - 1
-        steps, sections = [], {"mesh": shared.coded.mesh, "order": shared.coded.order}
-        for s, (start, stop) in enumerate(pairwise(bounds)):
+        sections = {"mesh": shared.coded.mesh, "order": shared.coded.order, **({SECTION: data} if data else {})}
+        steps = []
+        for s, (start, stop) in enumerate(pairwise(bounds) if still.n_moving else []):
             report("segments", s / n_segments)
-            trajectories = read_trajectories(sequence, start, stop, shared.members)
-            error = wanted**2 * mesh.n_points * (stop - start)
-            reduced = reduce_trajectories(trajectories, error, self.components)
-            step, coefficients = reduced.step, reduced.coefficients
-            steps.append(step)
+            trajectories = read_trajectories(sequence, start, stop, moving)
+            error = wanted**2 * still.n_moving * (stop - start)
+            reduced = reduce_trajectories(trajectories, error, self.components, most=still.most_components)
+            steps.append(reduced.step)
             sections[f"basis.{s}"] = reduced.basis
-            if self.predictor == "lsp":
-                coefficients = np.ascontiguousarray(coefficients[:, ::-1])  # section 3.4: the small ones first
-            sections[f"coefficients.{s}"], _ = encode_rows(coefficients, step, rows, self.predictor, self.beta)
+            sections[f"coefficients.{s}"] = self._encode_coefficients(reduced, still, rows)
         report("segments", 1)
-        header = Header(self.predictor, float(self.beta), n_segments, tuple(steps))
+        header = Header(self.predictor, float(self.beta), n_segments, tuple(steps) or (1.0,) * n_segments)
         return Bitstream(
             codec=self.id,
-            version=self.version,
+            version=self.version if data else 1,
             n_frames=sequence.n_frames,
             n_vertices=sequence.n_vertices,
             n_triangles=len(mesh.faces),
@@ -95,6 +97,14 @@ class Pca(Settings):
             header=header.to_json(),
             sections=sections,
         )
+
+    def _encode_coefficients(self, reduced: Reduced, still: StillPoints, rows: Rows) -> bytes:
+        given = still.given(reduced.decoded)
+        wanted = still.join(reduced.coefficients, given)
+        if self.predictor == "lsp":  # section 3.4: the small ones first
+            wanted = np.ascontiguousarray(wanted[:, ::-1])
+            given = None if given is None else np.ascontiguousarray(given[:, ::-1])
+        return encode_rows(wanted, reduced.step, rows, self.predictor, self.beta, given)[0]
 
     @classmethod
     def reader(cls, bitstream: Bitstream) -> FrameReader:

@@ -2,9 +2,13 @@
 
 ====================  ======================================================================================
 ``mesh``, ``order``   triangles, seams and vertex order (`gvpipe.bare_mesh`)
+``still``             points that never move, and their positions (`gvpipe.still_points`); absent if all move
 ``basis.N``           mean and principal trajectories of segment N (`gvpipe.trajectory_basis`)
 ``coefficients.N``    feature vectors of segment N, coarse to fine (`gvpipe.row_coding`, `gvpipe.hierarchy`)
 ====================  ======================================================================================
+
+Version 1 has no section ``still``; files without one are still written as version 1. Where no point moves, segments have no
+sections.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ from gvpipe.row_prediction import PREDICTORS
 from gvpipe.segments import read_segments, read_steps
 
 MAX_SEGMENTS = 2000  # two sections each, of the 4096 that a bitstream may have
+VERSION_STILL = 2  # of files with a section `still` or `holds`
 
 
 @dataclass(frozen=True)
@@ -27,7 +32,7 @@ class Header:
         predictor: of the coefficients.
         beta: exponent of the radial function (rbf).
         segments: how many; segment s starts at frame ``s * F // segments``.
-        steps: quantisation step of each segment, model units.
+        steps: quantisation step of each segment, model units; 1 where no point moves.
     """
 
     predictor: str

@@ -15,9 +15,10 @@ from gvpipe.errors import InputError
 from gvpipe.hierarchy import Hierarchy, build_hierarchy, level_faces
 from gvpipe.mesh_rows import OVERSHOOT, mesh_rows
 from gvpipe.row_coding import decode_rows
-from gvpipe.row_prediction import Rows
+from gvpipe.row_prediction import Rows, rows_left
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
+from gvpipe.still_points import read_still
 from gvpipe.trajectory_basis import decode_basis
 from gvpipe.trajectory_frames import Segment, read_frames
 
@@ -36,7 +37,8 @@ class PcaReader:
         self._header = Header.of(bitstream)
         self._mesh, self._bitstream = read_mesh(bitstream), bitstream
         self._hierarchy = build_hierarchy(self._mesh.point_faces, self._mesh.n_points)
-        self._rows = ordered_rows(self._hierarchy, self._header.predictor)
+        self._still = read_still(bitstream, self._mesh)
+        self._rows = rows_left(ordered_rows(self._hierarchy, self._header.predictor), self._still.flags)
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
         self._kept: tuple[tuple[int, int], Segment] | None = None  # segment and level; points that the level lacks are 0
 
@@ -75,30 +77,42 @@ class PcaReader:
         """
         self._check_level(lod)
         vertices = self._mesh.points if lod == 0 else self._alive(lod)
-        return read_frames(start, stop, self._bounds, vertices, lambda s: self._decode(s, lod))
+        if not self._still.n_moving:
+            return np.repeat(self._still.positions[None, vertices], stop - start, axis=0)
+        frames = read_frames(start, stop, self._bounds, vertices, lambda s: self._decode(s, lod))
+        self._still.place(frames, vertices)
+        return frames
 
     def _decode(self, s: int, lod: int) -> Segment:
         if self._kept is None or self._kept[0] != (s, lod):
             step = self._header.steps[s]
             n_frames = self._bounds[s + 1] - self._bounds[s]
             name = f"basis.{s}"
-            basis = decode_basis(self._bitstream.section(name), n_frames, self._mesh.n_points, step, name)
+            basis = decode_basis(self._bitstream.section(name), n_frames, self._still.n_moving, step, name)
             name = f"coefficients.{s}"
-            n_blocks = len(self._rows.blocks) - 1 - lod if lod else None
+            given = self._still.given(basis)
+            if given is not None and self._header.predictor == "lsp":
+                given = np.ascontiguousarray(given[:, ::-1])
             coefficients = decode_rows(
                 self._bitstream.section(name),
                 basis.vectors.shape[1],
                 step,
                 self._rows,
                 name,
-                n_blocks,
+                self._count_blocks(lod) if lod else None,
                 self._header.predictor,
                 self._header.beta,
+                given,
             )
             if self._header.predictor == "lsp":
                 coefficients = coefficients[:, ::-1]
             self._kept = (s, lod), Segment(basis, np.ascontiguousarray(coefficients.T))
         return self._kept[1]
+
+    def _count_blocks(self, lod: int) -> int:
+        """How many blocks of coefficients a level needs: those of its points that move."""
+        n_moving = int((~self._still.flags[self._alive(lod)]).sum())
+        return int(np.searchsorted(self._rows.blocks, n_moving))
 
     def _alive(self, lod: int) -> NDArray[np.int32]:
         """Points of a level, ascending."""

@@ -86,7 +86,7 @@ def encode_clip(frames: Float32, surface: Surface, quantiser: Quantiser, cluster
 
 
 def decode_clip(data: bytes, n_frames: int, surface: Surface, name: str) -> Float32:
-    """Mirror of `encode_clip`: ``(n_frames, V, 3) float32``, model units.
+    """Mirror of `encode_clip`: ``(n_frames, V, 3) float32``, model units; vertices that are not on the walk are left at 0.
 
     Raises:
         CorruptFile: the clip does not decode to that many frames.
@@ -105,15 +105,15 @@ def decode_clip(data: bytes, n_frames: int, surface: Surface, name: str) -> Floa
     seeds = np.cumsum(decode_integers(blocks[0], 3 * n_seeds, name=name)).reshape(-1, 3)
     if seeds.min() < 0 or seeds.max() >= n_vertices:
         raise cursor.corrupt("a seed vertex does not exist")
-    labels = np.empty(n_vertices, np.int64)
-    labels[surface.walk] = decode_labels(Cursor(blocks[1], name), n_vertices, n_seeds, name)
+    labels = np.zeros(n_vertices, np.int64)
+    labels[surface.walk] = decode_labels(Cursor(blocks[1], name), len(surface.walk), n_seeds, name)
     if np.abs((surface.base - origin) / seed_step).max() > 1 << 40:
         raise cursor.corrupt("the base lies out of the seed lattice's range")
     dictionary = Dictionary(surface, seeds, labels, lattice, fineness)
     seed_points = decode_seeds(Cursor(blocks[2], name), n_frames, dictionary.base_seeds, name)
     sums = _decode_deltas(cursor, n_frames, dictionary)
     origins, axes = local_frames(seed_points)
-    result = np.empty((n_frames, n_vertices, 3))
+    result = np.zeros((n_frames, n_vertices, 3))
     result[:, dictionary.members] = dictionary.to_world(dictionary.rebuild(sums, step), place(lattice, origins), axes)
     result[:, seeds.ravel()] = lattice.place(seed_points).reshape(n_frames, -1, 3)
     if not np.abs(result).max() <= LARGEST:

@@ -8,6 +8,7 @@ out alike in encoder and decoder.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,12 +34,16 @@ class Surface:
     Args:
         base: ``(V, 3)`` decoded base frame, model units.
         faces: ``(T, 3)`` triangles.
-        walk: ``(V,)`` vertices in the order of the DCT's signals.
+        walk: ``(M,)`` vertices that move, in the order of the DCT's signals.
     """
 
     base: Float64
     faces: Int32
     walk: Int64
+
+    def without(self, still: NDArray[np.integer]) -> Surface:
+        """The surface whose walk leaves out the vertices ``still``."""
+        return dataclasses.replace(self, walk=self.walk[~np.isin(self.walk, still)])
 
 
 class Dictionary:

@@ -17,14 +17,16 @@ from numpy.typing import NDArray
 from gvcodecs.pdct.clip import MAX_CLUSTERS, Quantiser, encode_clip
 from gvcodecs.pdct.clustering import find_clusters
 from gvcodecs.pdct.dictionary import Surface
-from gvcodecs.pdct.format import MAX_CLIPS, Header, surface_of
+from gvcodecs.pdct.format import MAX_CLIPS, VERSION_STILL, Header, surface_of
 from gvcodecs.pdct.reader import PdctReader
+from gvcodecs.pdct.stillness import SECTION, encode_still
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.connectivity import BaseMesh, EncodedMesh, decode_base, encode_base
 from gvpipe.quantize import Lattice
 from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.stillness import find_still
 
 COARSEST, DECADES = 0.03, 2.4  # step at quality 0, part of frame 0's diagonal, and decades down to quality 100
 PER_CLUSTER, AUTO = 200, (20, 64)  # vertices per cluster, and the range of the automatic count
@@ -42,8 +44,9 @@ class Pdct(Settings):
     """
 
     id: ClassVar[str] = "pdct"
-    version: ClassVar[int] = 1
+    version: ClassVar[int] = VERSION_STILL
     summary: ClassVar[str] = "predictive DCT in local coordinate frames: streams frame by frame, short clips"
+    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.holds`)
 
     quality: float = 75.0  # 0..100, higher is better
     clusters: int = 0  # N, seed triangles per clip, 1..1024; 0: one per 200 vertices, 20..64
@@ -75,18 +78,19 @@ class Pdct(Settings):
         report = progress or (lambda stage, done: None)
         report("base", 0)
         memo = memo or Memo()
-        base = SharedBase(sequence.read(0, 1)[0], sequence.faces, self, memo)
+        still = memo("still", lambda: find_still(sequence))
+        base = SharedBase(sequence.read(0, 1)[0], sequence.faces, self, memo, still)
         memo.permutation = base.coded.permutation
         bounds = cut(sequence.n_frames, self.clip_frames, MAX_CLIPS)
         n_clips = len(bounds) - 1
-        sections = {"mesh": base.coded.mesh, "order": base.coded.order}
-        for c in range(n_clips):
+        sections = {"mesh": base.coded.mesh, "order": base.coded.order, **({SECTION: base.still} if base.still else {})}
+        for c in range(n_clips if base.n_moving else 0):
             report("clips", c / n_clips)
             sections[f"clip.{c}"] = base.encode(sequence.read(bounds[c], bounds[c + 1]), memo, f"clip.{c}")
         report("clips", 1)
         return Bitstream(
             codec=self.id,
-            version=self.version,
+            version=self.version if base.still else 1,
             n_frames=sequence.n_frames,
             n_vertices=sequence.n_vertices,
             n_triangles=len(base.mesh.faces),
@@ -102,15 +106,30 @@ class Pdct(Settings):
 
 
 class SharedBase:
-    """Frame 0 and connectivity, coded, and the coder of clips that start from them."""
+    """Frame 0 and connectivity, coded, and the coder of clips that start from them.
 
-    def __init__(self, frame: Float32, faces: Int32, settings: Pdct, memo: Memo | None = None) -> None:
+    Where vertices are flagged as ``still (V,)``, ``still`` has their section, and clips leave them out.
+    """
+
+    def __init__(
+        self,
+        frame: Float32,
+        faces: Int32,
+        settings: Pdct,
+        memo: Memo | None = None,
+        still: NDArray[np.bool_] | None = None,
+    ) -> None:
         self._settings, memo = settings, memo or Memo()
         self.lattice = Lattice.over(frame, settings.base_bits)
         self.coded: EncodedMesh = memo("base", lambda: encode_base(self.lattice.quantise(frame), faces, settings.reorder))
         self.mesh: BaseMesh = decode_base(self.coded.mesh, self.coded.order)
         self._surface: Surface = surface_of(self.mesh, self.lattice)
         self._diagonal = _diagonal(frame)
+        self.still = b""
+        if still is not None and still.any():
+            ordered = still[self.coded.permutation]
+            self.still = encode_still(ordered, frame[self.coded.permutation], self._surface, self._step(self._diagonal or 1.0))
+            self._surface = self._surface.without(np.flatnonzero(ordered))
 
     def encode(self, frames: Float32, memo: Memo | None = None, name: str = "clip") -> bytes:
         """Code a clip, ``(n, V, 3)`` in the given order of vertices, model units; ``memo`` keeps its clusters by its name."""
@@ -118,11 +137,18 @@ class SharedBase:
         ordered = np.ascontiguousarray(frames[:, self.coded.permutation])
         own = _diagonal(frames.reshape(-1, 3))
         diagonal = max(self._diagonal or own, SMALLEST * own) or 1.0
-        step = diagonal * COARSEST * 10 ** (-DECADES * settings.quality / 100)
-        quantiser = Quantiser(step, float(settings.fineness), settings.kept)
+        quantiser = Quantiser(self._step(diagonal), float(settings.fineness), settings.kept)
         n_clusters = settings.clusters or min(max(len(self.mesh.points) // PER_CLUSTER, AUTO[0]), AUTO[1])
         clusters = (memo or Memo())(name, lambda: find_clusters(ordered, self._surface.faces, n_clusters))
         return encode_clip(ordered, self._surface, quantiser, clusters, settings.seed_bits)
+
+    @property
+    def n_moving(self) -> int:
+        """How many vertices move."""
+        return len(self._surface.walk)
+
+    def _step(self, diagonal: float) -> float:
+        return diagonal * COARSEST * 10 ** (-DECADES * self._settings.quality / 100)
 
 
 def _diagonal(points: NDArray[np.floating]) -> float:

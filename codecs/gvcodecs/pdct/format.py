@@ -3,8 +3,11 @@
 ============  ===========================================================================
 ``mesh``      base frame (frame 0) on its lattice and connectivity (`gvpipe.connectivity`)
 ``order``     vertex order, empty if the codec's own (`gvpipe.vertex_order`)
+``still``     vertices that never move, and their positions (`stillness`); absent if all move
 ``clip.N``    frames of clip N (`clip`); clip c starts at frame ``c * F // clips``
 ============  ===========================================================================
+
+Version 1 has no section ``still``; files without one are still written as version 1. Where no vertex moves, there are no clips.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ from gvpipe.errors import CorruptFile
 from gvpipe.quantize import Lattice
 from gvpipe.segments import read_segments
 
+VERSION_STILL = 2  # of files with a section `still` or `holds`
 MAX_CLIPS = 4000
 
 

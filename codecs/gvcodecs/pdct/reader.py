@@ -8,6 +8,7 @@ import numpy as np
 
 from gvcodecs.pdct.clip import decode_clip
 from gvcodecs.pdct.format import Header, surface_of
+from gvcodecs.pdct.stillness import SECTION, decode_still
 from gvpipe.bitstream import Bitstream
 from gvpipe.connectivity import read_base
 from gvpipe.segments import segment_starts
@@ -24,7 +25,9 @@ class PdctReader:
     def __init__(self, bitstream: Bitstream) -> None:
         header = Header.of(bitstream)
         self._bitstream, self._mesh = bitstream, read_base(bitstream)
-        self._surface = surface_of(self._mesh, header.base)
+        surface = surface_of(self._mesh, header.base)
+        self._still = decode_still(bitstream.section(SECTION), surface) if SECTION in bitstream.sections else None
+        self._surface = surface if self._still is None else surface.without(self._still.vertices)
         self._bounds = segment_starts(bitstream.n_frames, header.clips)
         self._clip: tuple[int, Float32] = (-1, np.zeros((0, 0, 3), np.float32))
 
@@ -52,8 +55,10 @@ class PdctReader:
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
         for c, (begin, end) in enumerate(zip(self._bounds[:-1], self._bounds[1:], strict=True)):
             first, last = max(start, begin), min(stop, end)
-            if first < last:
+            if first < last and len(self._surface.walk):
                 result[first - start : last - start] = self._decode(c)[first - begin : last - begin]
+        if self._still is not None:
+            result[:, self._still.vertices] = self._still.positions
         return result
 
     def _decode(self, c: int) -> Float32:

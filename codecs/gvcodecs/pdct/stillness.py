@@ -1,0 +1,71 @@
+"""Vertices that never move: the base frame has nearly their position, and a few bits refine it, once for all clips.
+
+A clip codes neither cluster nor deltas of them, and the file's reader puts them where this section says::
+
+    section = [float64] step, [varint] bytes, flags (`gvpipe.stillness`) along the walk, [integers] position less the base's, in
+              steps: x of all still vertices along the walk, then y, then z
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.pdct.dictionary import Surface
+from gvpipe.binary import Cursor, varint
+from gvpipe.entropy import decode_integers, encode_integers
+from gvpipe.segments import LARGEST_STEP, SMALLEST_STEP
+from gvpipe.sequence import Float32
+from gvpipe.stillness import decode_flags, encode_flags
+
+SECTION = "still"
+HEAD = struct.Struct("<d")
+MOST = 1 << 38  # steps
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StillVertices:
+    """Args:
+    vertices: ``(S,)``, in the order of the walk.
+    positions: ``(S, 3) float32``, model units.
+    """
+
+    vertices: NDArray[np.intp]
+    positions: Float32
+
+
+def encode_still(still: NDArray[np.bool_], frame: Float32, surface: Surface, step: float) -> bytes:
+    """Code the vertices that ``still (V,)`` flags, in the order of vertices that ``surface`` has.
+
+    Args:
+        still: one at least is set.
+        frame: ``(V, 3)`` any frame, model units.
+        surface: with all vertices on its walk.
+        step: what differences from the base frame are rounded to, model units.
+    """
+    vertices = surface.walk[still[surface.walk]]
+    step = float(np.clip(step, SMALLEST_STEP, LARGEST_STEP))
+    off = np.rint((frame[vertices].astype(np.float64) - surface.base[vertices]) / step).astype(np.int64)
+    flags = encode_flags(still[surface.walk])
+    return HEAD.pack(step) + varint(len(flags)) + flags + encode_integers(off.T)
+
+
+def decode_still(data: bytes, surface: Surface) -> StillVertices:
+    """Mirror of `encode_still`; raises `CorruptFile` if the bytes are not what it writes."""
+    cursor = Cursor(data, SECTION)
+    (step,) = cursor.struct(HEAD)
+    if not SMALLEST_STEP <= step <= LARGEST_STEP:  # NaN neither
+        raise cursor.corrupt(f"its step is {step}")
+    flags = decode_flags(cursor.take(cursor.varint(cursor.left, "a length")), len(surface.walk), SECTION)
+    vertices = surface.walk[flags]
+    off = decode_integers(cursor.rest(), 3 * len(vertices), name=SECTION).reshape(3, -1).T
+    with np.errstate(over="ignore"):
+        positions = (surface.base[vertices] + step * off).astype(np.float32)
+    if not np.isfinite(positions).all():
+        raise cursor.corrupt("a position is larger than float32 can hold")
+    return StillVertices(vertices, positions)
