@@ -93,7 +93,7 @@ class Motions:
         """What is fitted where an error of ``step``, model units, is left."""
         shown = self.n_frames / self._scale
         left = np.cumsum(self._energies[::-1])[::-1]  # energy of each component and those after it
-        n = int((left > NEGLIGIBLE * len(self.base) * 3 * shown * step**2 / 12).sum())
+        n = max(1, int((left > NEGLIGIBLE * len(self.base) * 3 * shown * step**2 / 12).sum()))
         price = step**2 * shown
         return _Problem(
             self.base, self._columns[:, :n].copy(), self.neighbours, BIT_WORTH * step**2 / self._scale, CLUSTER_WORTH * price
