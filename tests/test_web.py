@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import chromium
+import browsers
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -27,7 +27,7 @@ from gvpipe.corrections import Bound, encode_corrections
 from gvpipe.errors import CorruptFile
 from gvpipe.sequence import MeshSequence
 
-pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
+pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())
 
 BUNDLE = Path(gvpipe.__file__).parent / "web" / "bundle"
 GOLDEN = Path(__file__).parent / "golden"
@@ -61,13 +61,13 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]
         shutil.copy(bundle, folder)
     (folder / "module.html").write_text(MODULE_PAGE)
     (folder / "player.html").write_text(PLAYER_PAGE)
-    with chromium.served(folder) as address:
+    with browsers.served(folder) as address:
         yield folder, address
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    with chromium.chromium(tmp_path_factory.mktemp("profile")) as driver:
+    with browsers.browser("chromium", tmp_path_factory.mktemp("profile")) as driver:
         yield driver
 
 

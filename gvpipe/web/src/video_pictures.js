@@ -1,26 +1,26 @@
 /**
- * The pictures of a geometry video, by the browser's own `<video>`; a canvas gives their luma back exactly.
+ * The pictures of a geometry video by the browser's own `<video>`, where it has no WebCodecs; a canvas gives their luma back.
  *
- * Luma 16..235 (limited range, neutral chroma) comes out of the canvas as a grey of 0..255; the steps are 1.16 apart, so a
- * table undoes the expansion without doubt. Playback follows the video's clock: whoever draws late gets the picture of that
- * moment, and none is queued. A frame is sought in the middle of its time, and checked by what the browser says it shows.
+ * Luma 16..235 (limited range, neutral chroma) comes out of the canvas as a grey of 0..255, which a table undoes. Playback
+ * follows the video's clock: whoever draws late gets the picture of that moment, and none is queued. A frame is sought in the
+ * middle of its time, and checked by what the browser says it shows. It loops by seeking, since Firefox' times of pictures go
+ * on growing where the element loops by itself.
  */
 
 import { GeometryVideoError } from "./format/errors.js";
+import { OF_GREY } from "./levels.js";
 
-const LOW = 16;
-const HIGH = 235;
-const LEVELS = Uint8Array.from({ length: 256 }, (_, grey) => LOW + Math.round((grey * (HIGH - LOW)) / 255));
+const CLOCK_ROUNDING = 1e-5; // s, of `currentTime`
 const SHOWN_WITHIN = 1000; // ms after `seeked` in which the browser says what it shows; in a hidden page it never does
 
 export class VideoPictures {
   /**
-   * @param {Blob} file @param {number} fps @param {number} frames
-   * @param {[number, number]} size of a picture, pixels
+   * @param {Uint8Array} file @param {number} fps @param {number} frames
+   * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
    * @returns {Promise<VideoPictures>}
    */
-  static async open(file, fps, frames, size) {
-    const pictures = new VideoPictures(file, fps, frames, size);
+  static async open(file, fps, frames, size, samples) {
+    const pictures = new VideoPictures(file, fps, frames, size, samples);
     try {
       await pictures.#load();
     } catch (error) {
@@ -30,14 +30,16 @@ export class VideoPictures {
     return pictures;
   }
 
-  constructor(file, fps, frames, [width, height]) {
+  constructor(file, fps, frames, [width, height], samples) {
     this.fps = fps;
     this.frames = frames;
     this.width = width;
     this.height = height;
+    this.samples = samples;
+    this.read = new Uint8Array(samples.length);
     /** The frame that the video shows; -1: not known. A video that has loaded may have nothing to draw yet. */
     this.shown = -1;
-    this.url = URL.createObjectURL(file);
+    this.url = URL.createObjectURL(new Blob([file], { type: "video/mp4" }));
     this.video = Object.assign(document.createElement("video"), { muted: true, playsInline: true, preload: "auto" });
     const canvas = Object.assign(document.createElement("canvas"), { width, height });
     this.context = canvas.getContext("2d", { willReadFrequently: true, alpha: false });
@@ -65,8 +67,9 @@ export class VideoPictures {
   }
 
   #failure() {
-    const reason = this.video.error?.message || "H.264 in MP4 is needed";
-    return new GeometryVideoError("unsupported", `this browser cannot decode the video: ${reason}`);
+    const reason = this.video.error?.message || "no more is known";
+    const remedy = "a browser with a decoder for H.264 is needed (on Linux, install FFmpeg's: for WebKitGTK gstreamer1.0-libav)";
+    return new GeometryVideoError("unsupported", `this browser cannot decode the video: ${reason}; ${remedy}`);
   }
 
   /** Show a frame and wait until it is there. Pauses. */
@@ -118,26 +121,34 @@ export class VideoPictures {
   }
 
   /**
-   * Play on from here, `rate` times as fast; `show(frame)` is called for each frame that the browser shows while it is there
-   * to be read, `ended()` at the end if it does not loop.
+   * Play on from here, `rate` times as fast; calls `show(frame)` for each frame that the browser shows while it is there to be
+   * read, `ended()` at the end if it does not loop, `failed(error)` if it cannot go on.
    */
-  async play(show, ended, rate, loop) {
+  async play({ show, ended, failed }, rate, loop) {
     const { video } = this;
     video.playbackRate = rate;
-    video.loop = loop;
     this.shown = -1;
     const playing = (this.playing = {});
     const next = (_, { mediaTime }) => {
       if (this.playing !== playing) return;
-      const frame = Math.min(this.frames - 1, this.#frameAt(mediaTime));
+      const frame = Math.min(this.frames - 1, this.#capture(mediaTime));
       if (frame !== this.shown) {
         this.shown = frame;
         show(frame);
       }
       if (!video.ended && !video.paused) video.requestVideoFrameCallback(next);
     };
+    const again = () => {
+      video.currentTime = 0;
+      video.requestVideoFrameCallback(next);
+      video.play().catch((error) => this.playing === playing && failed(error));
+    };
     video.onended = () => {
       if (this.playing !== playing) return;
+      if (loop) {
+        again();
+        return;
+      }
       this.pause();
       ended();
     };
@@ -158,11 +169,30 @@ export class VideoPictures {
     return Math.floor(time * this.fps + 0.25);
   }
 
-  /** @param {Uint32Array} samples indices of a picture's samples @param {Uint8Array} levels filled with theirs, 16..235 */
-  gather(samples, levels) {
-    this.context.drawImage(this.video, 0, 0);
+  /**
+   * Draw what plays now, and return its frame. What is drawn is of the time that the picture itself tells (Chromium), or of the
+   * element's clock (Firefox, whose pictures tell 0); where pictures tell nothing, of the time of the callback.
+   */
+  #capture(mediaTime) {
+    if (typeof VideoFrame !== "function") {
+      this.context.drawImage(this.video, 0, 0);
+      return this.#frameAt(mediaTime);
+    }
+    const picture = new VideoFrame(this.video);
+    const { currentTime } = this.video;
+    this.context.drawImage(picture, 0, 0);
+    const time = picture.timestamp / 1e6;
+    picture.close();
+    this.hasTimes ||= time > 0;
+    return this.hasTimes ? this.#frameAt(time) : Math.floor((currentTime + CLOCK_ROUNDING) * this.fps);
+  }
+
+  /** `Uint8Array` (V, 3): the levels of the frame shown. */
+  levels() {
+    if (!this.playing) this.context.drawImage(this.video, 0, 0); // else it is drawn already
     const { data } = this.context.getImageData(0, 0, this.width, this.height);
-    for (let i = 0; i < samples.length; i++) levels[i] = LEVELS[data[4 * samples[i]]];
+    for (let i = 0; i < this.samples.length; i++) this.read[i] = OF_GREY[data[4 * this.samples[i]]];
+    return this.read;
   }
 
   close() {

@@ -134,7 +134,8 @@ export class GeometryVideoElement extends HTMLElement {
         this.#setPaused(true);
         this.dispatchEvent(new CustomEvent("ended"));
       };
-      await video.play(show, { rate: this.speed, loop: this.hasAttribute("loop"), ended });
+      const failed = (error) => video === this.video && this.#fail(error);
+      await video.play(show, { rate: this.speed, loop: this.hasAttribute("loop"), ended, failed });
     } catch (error) {
       if (error.name === "AbortError") return; // paused before the browser had begun
       if (error.name === "NotAllowedError") this.#setPaused(true);
