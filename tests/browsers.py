@@ -1,6 +1,7 @@
 """The browsers that tests drive, without a screen, and a server for the pages that they open.
 
-Chromium and WebKitGTK are driven by their WebDrivers, Firefox by `marionette`. WebKitGTK needs an X display: Xvfb's.
+Chromium and WebKitGTK are driven by their WebDrivers, Firefox by `marionette`. All but Chromium need an X display, Xvfb's: without
+one, Firefox has no WebGL.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import os
 import shutil
 import subprocess
 import threading
+import warnings
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -31,12 +33,14 @@ CHROMIUM_FLAGS = [
     "--disable-component-update",
     "--disable-sync",
 ]
-NEEDS = {"chromium": ("chromium", "chromedriver"), "firefox": ("firefox-esr",), "webkit": ("WebKitWebDriver", "Xvfb")}
+NEEDS = {"chromium": ("chromium", "chromedriver"), "firefox": ("firefox-esr", "Xvfb"), "webkit": ("WebKitWebDriver", "Xvfb")}
 PACKAGES = {
     "chromium": "chromium chromium-driver",
-    "firefox": "firefox-esr",
+    "firefox": "firefox-esr xvfb",
     "webkit": "webkit2gtk-driver gstreamer1.0-libav gstreamer1.0-plugins-good gstreamer1.0-plugins-bad xvfb",
 }
+NO_FFMPEG = {"media.ffmpeg.enabled": False, "media.rdd-ffmpeg.enabled": False, "media.gmp-gmpopenh264.enabled": False}
+NO_GSTREAMER_DECODERS = {"GST_PLUGIN_FEATURE_RANK": "avdec_h264:NONE,openh264dec:NONE,vah264dec:NONE,vaapih264dec:NONE"}
 MINI_BROWSERS = "*/webkit2gtk-4.1/MiniBrowser"  # below /usr/lib
 SCRIPT_SECONDS = 120
 
@@ -52,10 +56,21 @@ def missing(name: str = "chromium") -> str:
 
 
 @contextlib.contextmanager
-def browser(name: str, profile: Path, size: tuple[int, int] = (700, 700)) -> Iterator[Any]:
-    """A running browser of `NEEDS` with a new profile in the folder given: a Selenium driver, or what `Firefox` has of one."""
-    with _display(size) if name == "webkit" else contextlib.nullcontext() as display:
-        driver = {"chromium": _chromium, "firefox": _firefox, "webkit": _webkit}[name](profile, size, display)
+def browser(name: str, profile: Path, size: tuple[int, int] = (700, 700), h264: bool = True) -> Iterator[Any]:
+    """A running browser of `NEEDS` with a new profile in the folder given: a Selenium driver, or what `Firefox` has of one.
+
+    Args:
+        size: of its window, pixels.
+        h264: whether it may decode H.264; all but Chromium can do without.
+    """
+    with contextlib.nullcontext("") if name == "chromium" else _display(size) as display:
+        environment = {**os.environ, "DISPLAY": display}
+        if name == "chromium":
+            driver = _chromium(profile, size)
+        elif name == "firefox":
+            driver = Firefox(str(_program("firefox-esr")), profile, size, environment, {} if h264 else NO_FFMPEG)
+        else:
+            driver = _webkit(profile, size, environment | ({} if h264 else NO_GSTREAMER_DECODERS))
         try:
             driver.set_script_timeout(SCRIPT_SECONDS)
             yield driver
@@ -63,7 +78,7 @@ def browser(name: str, profile: Path, size: tuple[int, int] = (700, 700)) -> Ite
             driver.quit()
 
 
-def _chromium(profile: Path, size: tuple[int, int], _: str | None) -> Any:
+def _chromium(profile: Path, size: tuple[int, int]) -> Any:
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
@@ -74,20 +89,18 @@ def _chromium(profile: Path, size: tuple[int, int], _: str | None) -> Any:
     return webdriver.Chrome(options=options, service=Service(str(_program("chromedriver"))))
 
 
-def _firefox(profile: Path, size: tuple[int, int], _: str | None) -> Any:
-    return Firefox(str(_program("firefox-esr")), profile, size)
-
-
-def _webkit(profile: Path, size: tuple[int, int], display: str | None) -> Any:
+def _webkit(profile: Path, size: tuple[int, int], environment: dict[str, str]) -> Any:
     from selenium import webdriver
     from selenium.webdriver.webkitgtk.service import Service
 
     options = webdriver.WebKitGTKOptions()
     options.binary_location = _mini_browser()
     options.add_argument("--automation")
-    home = {"HOME": str(profile), "XDG_RUNTIME_DIR": str(profile), "DISPLAY": str(display)}
-    service = Service(str(_program("WebKitWebDriver")), env={**os.environ, **home})
-    driver = webdriver.WebKitGTK(options=options, service=service)
+    home = {"HOME": str(profile), "XDG_RUNTIME_DIR": str(profile)}
+    service = Service(str(_program("WebKitWebDriver")), env={**environment, **home})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # Selenium's own: it calls itself in an old way
+        driver = webdriver.WebKitGTK(options=options, service=service)
     driver.set_window_size(*size)
     return driver
 

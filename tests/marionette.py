@@ -37,15 +37,22 @@ class MarionetteError(Exception):
 
 
 class Firefox:
-    """A running Firefox with a new profile in the folder given."""
+    """A running Firefox with a new profile in the folder given, and preferences beside `PREFERENCES`."""
 
-    def __init__(self, program: str, profile: Path, size: tuple[int, int]) -> None:
+    def __init__(
+        self,
+        program: str,
+        profile: Path,
+        size: tuple[int, int],
+        environment: dict[str, str],
+        preferences: dict[str, Any],
+    ) -> None:
         profile.mkdir(parents=True, exist_ok=True)
-        lines = [f"user_pref({json.dumps(name)}, {json.dumps(value)});\n" for name, value in PREFERENCES.items()]
+        lines = [f"user_pref({json.dumps(name)}, {json.dumps(value)});\n" for name, value in (PREFERENCES | preferences).items()]
         (profile / "user.js").write_text("".join(lines))
-        command = [program, "--headless", "--marionette", "--no-remote", "--profile", str(profile)]
+        command = [program, "--marionette", "--no-remote", "--profile", str(profile)]
         command += ["--width", str(size[0]), "--height", str(size[1])]
-        self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self._process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self._numbers = itertools.count()
         try:
             self._socket = self._connect(profile / "MarionetteActivePort")
@@ -80,6 +87,7 @@ class Firefox:
         """End the browser."""
         try:
             self._call("DeleteSession")
+            self._stream.close()
             self._socket.close()
         finally:
             self._process.terminate()

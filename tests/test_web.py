@@ -15,7 +15,9 @@ from typing import Any
 import browsers
 import numpy as np
 import numpy.typing as npt
+import pages
 import pytest
+from pages import FRAMES, LOAD, check_frames, run
 from PIL import Image
 from sequences import awkward, waving
 
@@ -29,17 +31,9 @@ from gvpipe.sequence import MeshSequence
 
 pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())
 
-BUNDLE = Path(gvpipe.__file__).parent / "web" / "bundle"
 GOLDEN = Path(__file__).parent / "golden"
 DOCS = (Path(__file__).parents[1] / "docs" / "player.md").read_text("utf-8")
 SAMBA = Path(__file__).parents[2] / "shared" / "data" / "samba.npz"
-MODULE_PAGE = """<!doctype html><link rel="icon" href="data:,"><script type="module">
-import { GeometryVideo, GeometryVideoError } from "./geometry-video.js";
-Object.assign(window, { GeometryVideo, GeometryVideoError });
-</script>"""
-PLAYER_PAGE = """<!doctype html><link rel="icon" href="data:,">
-<style>html, body { margin: 0; height: 100% } geometry-video { height: 100%; --backdrop: #ff00ff }</style>
-<script type="module" src="player.js"></script><geometry-video></geometry-video>"""
 FAST = {"preset": "ultrafast", "clusters": 3, "gop": 4}
 KINDS: dict[str, dict[str, Any]] = {  # how vertices move, and where their pixels are: all that a file may be
     "affine": {"prediction": "affine", "placement": "charts"},
@@ -57,10 +51,7 @@ Mask = npt.NDArray[np.bool_]
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
     """A folder with both pages and both bundles, and its address."""
     folder = tmp_path_factory.mktemp("site")
-    for bundle in BUNDLE.glob("*.js"):
-        shutil.copy(bundle, folder)
-    (folder / "module.html").write_text(MODULE_PAGE)
-    (folder / "player.html").write_text(PLAYER_PAGE)
+    pages.write_pages(folder)
     with browsers.served(folder) as address:
         yield folder, address
 
@@ -75,24 +66,16 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 def module(browser: Any, site: tuple[Path, str]) -> Callable[..., Any]:
     """``module(body, *arguments)`` runs an asynchronous function's body in a page that has imported the module."""
     browser.get(f"{site[1]}/module.html")
-    return lambda body, *arguments: _run(browser, body, *arguments)
+    return lambda body, *arguments: run(browser, body, *arguments)
 
 
 @pytest.fixture
 def player(browser: Any, site: tuple[Path, str]) -> Callable[..., Any]:
     """The same in a page with a player, which is `element` there."""
     browser.get(f"{site[1]}/player.html")
-    return lambda body, *arguments: _run(
+    return lambda body, *arguments: run(
         browser, "const element = document.querySelector('geometry-video');" + body, *arguments
     )
-
-
-def _run(browser: Any, body: str, *arguments: Any) -> Any:
-    script = f"""const [args, done] = [[...arguments].slice(0, -1), arguments[arguments.length - 1]];
-        (async () => {{ {body} }})().then((value) => done({{ value }}), (error) => done({{ error: String(error.stack) }}))"""
-    result = browser.execute_async_script(script, *arguments)
-    assert "error" not in result, result["error"]
-    return result.get("value")
 
 
 def _encode(site: tuple[Path, str], sequence: MeshSequence, name: str = "x.mp4", **settings: Any) -> Path:
@@ -100,51 +83,17 @@ def _encode(site: tuple[Path, str], sequence: MeshSequence, name: str = "x.mp4",
     return site[0] / name
 
 
-FRAMES = """const video = await GeometryVideo.load(args[0]);
-    const frames = [];
-    for (const k of args[1]) frames.push(await video.frame(k));
-    const text = (array) => {
-      let binary = "";
-      for (const byte of new Uint8Array(array.buffer)) binary += String.fromCharCode(byte);
-      return btoa(binary);
-    };
-    const { indices, bounds, fps, frameCount, vertexCount, triangleCount, byteLength } = video;
-    video.close();
-    return { frames: frames.map(text), indices: text(indices), bounds, fps, counts: [frameCount, vertexCount, triangleCount],
-      byteLength };"""
-
-
-def _check_frames(module: Callable[..., Any], path: Path, reference: MeshSequence | None = None, count: int = 12) -> None:
-    """Positions that JavaScript rebuilds equal Python's, frames visited in random order, frame 0 and the last among them."""
-    with gvpipe.open(path) as video:
-        reference = reference or video.sequence()
-        order = np.random.default_rng(7).permutation(len(video))
-        visited = [*order[:count].tolist(), len(video) - 1, 0]
-        result = module(FRAMES, path.name, visited)
-        assert result["counts"] == [len(video), video.shape[1], len(video.faces)]
-        assert result["fps"] == video.fps
-        assert result["byteLength"] == path.stat().st_size
-    indices = np.frombuffer(base64.b64decode(result["indices"]), "<u4").reshape(-1, 3)
-    assert np.array_equal(indices, reference.faces)
-    first = reference.read(0, 1)[0].astype(np.float64)
-    rounding = 4 * np.spacing(np.abs(np.asarray(reference.positions[:])).max())  # of float32, far from the origin
-    tolerance = 1e-5 * np.linalg.norm(np.ptp(first, axis=0)) + rounding
-    for k, text in zip(visited, result["frames"], strict=True):
-        found = np.frombuffer(base64.b64decode(text), "<f4").reshape(-1, 3)
-        assert np.abs(found - reference.read(k, k + 1)[0]).max() <= tolerance, f"frame {k}"
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_frames_of_a_sample_equal_pythons(kind: str, module: Callable[..., Any], site: tuple[Path, str], samples: Path) -> None:
     gvpipe.encode(samples / "creature.npz", site[0] / "creature.mp4", preset="fast", **KINDS[kind])
-    _check_frames(module, site[0] / "creature.mp4")
+    check_frames(module, site[0] / "creature.mp4")
 
 
 @pytest.mark.skipif(not SAMBA.exists(), reason="no ../shared/data")
 @pytest.mark.parametrize("kind", ["affine", "blended"])
 def test_frames_of_samba_equal_pythons(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     gvpipe.encode(SAMBA, site[0] / "samba.mp4", preset="veryfast", **KINDS[kind])
-    _check_frames(module, site[0] / "samba.mp4")
+    check_frames(module, site[0] / "samba.mp4")
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -152,31 +101,31 @@ def test_frames_of_samba_equal_pythons(kind: str, module: Callable[..., Any], si
 def test_frames_of_awkward_inputs_equal_pythons(
     sequence: MeshSequence, kind: str, module: Callable[..., Any], site: tuple[Path, str]
 ) -> None:
-    _check_frames(module, _encode(site, sequence, **KINDS[kind]))
+    check_frames(module, _encode(site, sequence, **KINDS[kind]))
 
 
 @pytest.mark.parametrize("fps", [0.5, 12.0, 29.97, 59.94, 240.0])
 def test_frames_at_any_rate(fps: float, module: Callable[..., Any], site: tuple[Path, str]) -> None:
-    _check_frames(module, _encode(site, dataclasses.replace(waving(8, 30), fps=fps)))
+    check_frames(module, _encode(site, dataclasses.replace(waving(8, 30), fps=fps)))
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_frames_of_several_segments_in_the_codecs_order(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     settings = {"segment": 11, "reorder": True, "quality": 95, **KINDS[kind]}
-    _check_frames(module, _encode(site, waving(10, 50), **settings))
+    check_frames(module, _encode(site, waving(10, 50), **settings))
 
 
 @pytest.mark.parametrize("kind", ["affine-halves", "blended"])
 def test_frames_on_the_finest_lattice(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     """Where integers are largest: sums that decide pixels and contexts must be exact still."""
-    _check_frames(module, _encode(site, waving(20, 12), base_bits=20, quality=100, **KINDS[kind]))
+    check_frames(module, _encode(site, waving(20, 12), base_bits=20, quality=100, **KINDS[kind]))
 
 
 def test_frames_are_corrected(module: Callable[..., Any], site: tuple[Path, str], kinds: dict[str, Bitstream]) -> None:
     """Files with a bound on every vertex keep it in the browser: all frames, over several groups of corrections."""
     sequence, bitstream = waving(9, 12), kinds["corrected"]
     write_file(bitstream, site[0] / "corrected.mp4")
-    _check_frames(module, site[0] / "corrected.mp4")
+    check_frames(module, site[0] / "corrected.mp4")
     frames = module(FRAMES, "corrected.mp4", [*range(12)])["frames"]
     found = np.stack([np.frombuffer(base64.b64decode(text), "<f4").reshape(-1, 3) for text in frames])
     plain = open_reader(kinds["blended"]).read(0, 12)
@@ -191,7 +140,7 @@ def test_frames_of_golden_files(module: Callable[..., Any], site: tuple[Path, st
         if bitstream.header["profile"] == "h264-8" and "transform" not in bitstream.header:
             versions.add(bitstream.version)
             shutil.copy(path, site[0])
-            _check_frames(module, site[0] / path.name, gvpipe.read(path.with_suffix(".npz")))
+            check_frames(module, site[0] / path.name, gvpipe.read(path.with_suffix(".npz")))
     assert versions == {1, 2}
 
 
@@ -413,12 +362,6 @@ def _outcome(path: Path) -> str:
 
 # --- the player --------------------------------------------------------------------------------------------------------------
 
-LOAD = """const ready = new Promise((resolve, reject) => {
-      element.addEventListener("ready", resolve, { once: true });
-      element.addEventListener("error", (event) => reject(event.detail), { once: true });
-    });
-    element.src = args[0];
-    await ready;"""
 PAINTED = "await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(resolve, 50))));"
 
 
@@ -615,7 +558,7 @@ def test_a_corrupt_file_shows_an_error_in_the_page(
 def test_exported_page_opens_from_a_disk_and_plays(browser: Any, video: Path, tmp_path: Path) -> None:
     gvpipe.export_html(video, tmp_path / "page.html")
     browser.get((tmp_path / "page.html").as_uri())
-    frames, requests, title = _run(
+    frames, requests, title = run(
         browser,
         """const element = document.querySelector("geometry-video");
         const frames = new Set();
@@ -640,7 +583,7 @@ def test_the_element_as_the_docs_show_it(browser: Any, site: tuple[Path, str]) -
     played = """const element = document.querySelector("geometry-video");
         await new Promise((resolve) => element.addEventListener("frame", () => !element.paused && resolve()));
         return element.video.frameCount;"""
-    assert _run(browser, played) == 24
+    assert run(browser, played) == 24
 
 
 def test_the_module_as_the_docs_show_it(module: Callable[..., Any], browser: Any, site: tuple[Path, str]) -> None:
@@ -650,4 +593,4 @@ def test_the_module_as_the_docs_show_it(module: Callable[..., Any], browser: Any
     (site[0] / "docs.html").write_text(f"<!doctype html><script>{drawn}</script><script type=module>{script}</script>")
     browser.get(f"{site[1]}/docs.html")
     wait = "while (!window.drawn) await new Promise((resolve) => setTimeout(resolve, 50)); return window.drawn;"
-    assert _run(browser, wait) == [300, 3 * 162]
+    assert run(browser, wait) == [300, 3 * 162]

@@ -14,6 +14,8 @@ import { openPictures } from "./pictures.js";
 
 export { GeometryVideoError };
 
+const FROM_DISK = "pages opened from a disk may not fetch; open it from a web server, or make a page with gvpipe export-html";
+
 export class GeometryVideo {
   /**
    * Load a geometry video of codec `mcgv` in its web profile, as `gvpipe encode` writes it.
@@ -127,7 +129,8 @@ async function fetchBytes(source) {
   try {
     response = await fetch(source);
   } catch (error) {
-    throw new GeometryVideoError("load", `${source} cannot be fetched: ${error.message}`);
+    const remedy = location.protocol === "file:" ? `; ${FROM_DISK}` : "";
+    throw new GeometryVideoError("load", `${source} cannot be fetched: ${error.message}${remedy}`);
   }
   if (!response.ok) throw new GeometryVideoError("load", `${source} cannot be fetched: status ${response.status}`);
   return new Uint8Array(await response.arrayBuffer());

@@ -132,15 +132,14 @@ export class VideoPictures {
     const next = (_, { mediaTime }) => {
       if (this.playing !== playing) return;
       const frame = Math.min(this.frames - 1, this.#capture(mediaTime));
-      if (frame !== this.shown) {
+      if (frame !== this.shown && frame >= 0) {
         this.shown = frame;
         show(frame);
       }
-      if (!video.ended && !video.paused) video.requestVideoFrameCallback(next);
+      video.requestVideoFrameCallback(next);
     };
     const again = () => {
       video.currentTime = 0;
-      video.requestVideoFrameCallback(next);
       video.play().catch((error) => this.playing === playing && failed(error));
     };
     video.onended = () => {
@@ -170,21 +169,25 @@ export class VideoPictures {
   }
 
   /**
-   * Draw what plays now, and return its frame. What is drawn is of the time that the picture itself tells (Chromium), or of the
-   * element's clock (Firefox, whose pictures tell 0); where pictures tell nothing, of the time of the callback.
+   * Draw what plays now, and return its frame; -1: not known for sure.
+   *
+   * What is drawn is of the time that the picture itself tells (Chromium). Firefox' pictures tell nothing: it draws what is
+   * due by the element's clock, except for a moment after it dropped some. Where no picture can be had, the callback's time
+   * must do.
    */
   #capture(mediaTime) {
+    const announced = this.#frameAt(mediaTime);
     if (typeof VideoFrame !== "function") {
       this.context.drawImage(this.video, 0, 0);
-      return this.#frameAt(mediaTime);
+      return announced;
     }
     const picture = new VideoFrame(this.video);
-    const { currentTime } = this.video;
+    const due = Math.floor((this.video.currentTime + CLOCK_ROUNDING) * this.fps);
     this.context.drawImage(picture, 0, 0);
-    const time = picture.timestamp / 1e6;
+    const told = this.#frameAt(picture.timestamp / 1e6);
     picture.close();
-    this.hasTimes ||= time > 0;
-    return this.hasTimes ? this.#frameAt(time) : Math.floor((currentTime + CLOCK_ROUNDING) * this.fps);
+    if (told === announced) return told;
+    return announced - due === 0 || announced - due === 1 ? due : -1;
   }
 
   /** `Uint8Array` (V, 3): the levels of the frame shown. */

@@ -2,7 +2,8 @@
  * The player as an element: `<geometry-video src="walk.mp4" autoplay loop></geometry-video>`.
  *
  * Attributes: `src` (an address, or `#id` of an element in the page that holds the file as base64 text), `autoplay` (not for
- * those who prefer reduced motion), `loop`, `wireframe`, `speed` (1 is the video's own), `up` ("y", or "z").
+ * those who prefer reduced motion), `loop`, `wireframe`, `follow` (the camera goes with the mesh), `speed` (1 is the video's
+ * own), `up` ("y", or "z").
  * Events: `ready`, `frame` (detail: the frame's number), `ended`, `error` (detail: a `GeometryVideoError`).
  */
 
@@ -23,7 +24,7 @@ const TURN = Math.PI / 18; // by one press of a key
 const ZOOM = 1.15;
 
 export class GeometryVideoElement extends HTMLElement {
-  static observedAttributes = ["src", "loop", "wireframe", "speed"];
+  static observedAttributes = ["src", "loop", "wireframe", "follow", "speed"];
 
   #stage = null;
   #bar;
@@ -52,6 +53,8 @@ export class GeometryVideoElement extends HTMLElement {
     });
     this.#bar.setEnabled(false);
     root.addEventListener("keydown", (event) => this.#onKey(event));
+    if (!document.fullscreenEnabled) this.#bar.hide("fullscreen"); // phones may show films alone so
+    this.addEventListener("fullscreenchange", () => this.#bar.setPressed("fullscreen", this.#isFullscreen));
   }
 
   connectedCallback() {
@@ -68,8 +71,9 @@ export class GeometryVideoElement extends HTMLElement {
 
   attributeChangedCallback(name, before, value) {
     if (name === "src" && before !== value && this.isConnected && value !== null) this.load(value);
-    if (name === "loop" || name === "wireframe") this.#bar.setPressed(name, value !== null);
+    if (["loop", "wireframe", "follow"].includes(name)) this.#bar.setPressed(name, value !== null);
     if (name === "wireframe") this.#stage?.setWireframe(value !== null);
+    if (name === "follow") this.#stage?.setFollowing(value !== null);
     if (name === "speed") this.#bar.setSpeed(this.speed);
     if ((name === "loop" || name === "speed") && !this.paused) this.play(); // with the new value
   }
@@ -106,6 +110,7 @@ export class GeometryVideoElement extends HTMLElement {
       this.#stage ??= openStage(this.shadowRoot.querySelector("canvas"));
       this.#stage.setMesh(video, this.#positions, this.getAttribute("up") ?? "y");
       this.#stage.setWireframe(this.hasAttribute("wireframe"));
+      this.#stage.setFollowing(this.hasAttribute("follow"));
     } catch (error) {
       if (loading === this.#loading) this.#fail(error);
       return undefined;
@@ -186,6 +191,28 @@ export class GeometryVideoElement extends HTMLElement {
     sought.then(() => this.play());
   }
 
+  /** The picture as it is now, without its backdrop: a promise of a PNG file as `Blob`, null while there is none. */
+  still() {
+    return this.video ? this.#stage.still() : Promise.resolve(null);
+  }
+
+  async #saveStill() {
+    const frame = this.currentFrame;
+    const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(await this.still()) });
+    link.download = `${document.title || "geometry-video"}-${frame}.png`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 60_000); // the browser may ask its user first where to put it
+  }
+
+  get #isFullscreen() {
+    return document.fullscreenElement === this || this.getRootNode().fullscreenElement === this;
+  }
+
+  #toggleFullscreen() {
+    const changed = this.#isFullscreen ? document.exitFullscreen() : this.requestFullscreen();
+    changed.catch(() => {}); // refused by the user or by a frame around the page: it stays as it is
+  }
+
   #act(name) {
     const actions = {
       play: () => (this.paused ? this.play() : this.pause()),
@@ -197,7 +224,10 @@ export class GeometryVideoElement extends HTMLElement {
       faster: () => this.setAttribute("speed", nextSpeed(this.speed, 1)),
       loop: () => this.toggleAttribute("loop"),
       wireframe: () => this.toggleAttribute("wireframe"),
+      follow: () => this.toggleAttribute("follow"),
       view: () => this.#stage.resetView(),
+      still: () => this.#saveStill(),
+      fullscreen: () => this.#toggleFullscreen(),
       nearer: () => this.#stage.zoom(1 / ZOOM),
       farther: () => this.#stage.zoom(ZOOM),
       "turn-left": () => this.#stage.orbit(-TURN, 0),
