@@ -10,7 +10,9 @@
 import { GeometryVideoError } from "./format/errors.js";
 import { OF_GREY } from "./levels.js";
 
-const CLOCK_ROUNDING = 1e-5; // s, of `currentTime`
+const CHANGING = 0.05; // of a frame, about its beginning: when Firefox may draw either
+const LOOK_AGAIN = 4; // ms, if it is not sure which frame is drawn
+const LOOKS = 3;
 const SHOWN_WITHIN = 1000; // ms after `seeked` in which the browser says what it shows; in a hidden page it never does
 
 export class VideoPictures {
@@ -129,15 +131,20 @@ export class VideoPictures {
     video.playbackRate = rate;
     this.shown = -1;
     const playing = (this.playing = {});
-    const next = (_, { mediaTime }) => {
+    const look = (mediaTime, left) => {
       if (this.playing !== playing) return;
       const frame = Math.min(this.frames - 1, this.#capture(mediaTime));
+      if (frame < 0 && left) {
+        setTimeout(look, LOOK_AGAIN, mediaTime, left - 1);
+        return;
+      }
       if (frame !== this.shown && frame >= 0) {
         this.shown = frame;
         show(frame);
       }
       video.requestVideoFrameCallback(next);
     };
+    const next = (_, { mediaTime }) => look(mediaTime, LOOKS);
     const again = () => {
       video.currentTime = 0;
       video.play().catch((error) => this.playing === playing && failed(error));
@@ -182,19 +189,28 @@ export class VideoPictures {
       return announced;
     }
     const picture = new VideoFrame(this.video);
-    const due = Math.floor((this.video.currentTime + CLOCK_ROUNDING) * this.fps);
+    const due = this.video.currentTime * this.fps;
     this.context.drawImage(picture, 0, 0);
     const told = this.#frameAt(picture.timestamp / 1e6);
     picture.close();
     if (told === announced) return told;
-    return announced - due === 0 || announced - due === 1 ? due : -1;
+    const isSure = Math.abs(due - Math.round(due)) > CHANGING && Math.abs(announced - due) < 1;
+    return isSure ? Math.floor(due) : -1;
   }
 
   /** `Uint8Array` (V, 3): the levels of the frame shown. */
   levels() {
     if (!this.playing) this.context.drawImage(this.video, 0, 0); // else it is drawn already
     const { data } = this.context.getImageData(0, 0, this.width, this.height);
-    for (let i = 0; i < this.samples.length; i++) this.read[i] = OF_GREY[data[4 * this.samples[i]]];
+    let lowest = 255;
+    for (let i = 0; i < this.samples.length; i++) {
+      this.read[i] = OF_GREY[data[4 * this.samples[i]]];
+      lowest = Math.min(lowest, this.read[i]);
+    }
+    if (lowest === 0) {
+      const message = "this browser changes the colours of a video, and has no WebCodecs to read them by; use a newer one";
+      throw new GeometryVideoError("unsupported", message);
+    }
     return this.read;
   }
 
