@@ -1,7 +1,7 @@
 """The browsers that tests drive, without a screen, and a server for the pages that they open.
 
-Chromium and WebKitGTK are driven by their WebDrivers, Firefox by `marionette`. All but Chromium need an X display, Xvfb's: without
-one, Firefox has no WebGL.
+Chromium and WebKitGTK are driven by their WebDrivers, Firefox by `marionette`. All but Chromium need an X
+display, which Xvfb is: without one, Firefox has no WebGL.
 """
 
 from __future__ import annotations

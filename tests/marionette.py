@@ -48,7 +48,9 @@ class Firefox:
         preferences: dict[str, Any],
     ) -> None:
         profile.mkdir(parents=True, exist_ok=True)
-        lines = [f"user_pref({json.dumps(name)}, {json.dumps(value)});\n" for name, value in (PREFERENCES | preferences).items()]
+        lines = [
+            f"user_pref({json.dumps(name)}, {json.dumps(value)});\n" for name, value in (PREFERENCES | preferences).items()
+        ]
         (profile / "user.js").write_text("".join(lines))
         command = [program, "--marionette", "--no-remote", "--profile", str(profile)]
         command += ["--width", str(size[0]), "--height", str(size[1])]

@@ -52,7 +52,8 @@ def write_pages(folder: Path) -> None:
 def run(browser: Any, body: str, *arguments: Any) -> Any:
     """What the body of an asynchronous function returns; ``args`` are its arguments."""
     script = f"""const [args, done] = [[...arguments].slice(0, -1), arguments[arguments.length - 1]];
-        (async () => {{ {body} }})().then((value) => done({{ value }}), (error) => done({{ error: `${{error}}\\n${{error.stack}}` }}))"""
+        (async () => {{ {body} }})().then((value) => done({{ value }}), (error) =>
+          done({{ error: `${{error}}\\n${{error.stack}}` }}))"""
     result = browser.execute_async_script(script, *arguments)
     assert "error" not in result, result["error"]
     return result.get("value")

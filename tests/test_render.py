@@ -344,7 +344,10 @@ def test_command_writes_every_kind(run: Run, video: Path, sequence: MeshSequence
     assert run("render", video, tmp_path / "e.png", "--size", 200, *against).status == 0
     with Image.open(tmp_path / "e.png") as image:
         assert image.size == (200, 200)
-    assert run("render", tmp_path / "tube.npz", tmp_path / "t.gif", "--size", 32, "--turntable", "--follow", "--frame", 0).status == 0
+    assert (
+        run("render", tmp_path / "tube.npz", tmp_path / "t.gif", "--size", 32, "--turntable", "--follow", "--frame", 0).status
+        == 0
+    )
     with Image.open(tmp_path / "t.gif") as image:
         assert getattr(image, "n_frames", 0) == 100
 

@@ -73,9 +73,7 @@ def module(browser: Any, site: tuple[Path, str]) -> Callable[..., Any]:
 def player(browser: Any, site: tuple[Path, str]) -> Callable[..., Any]:
     """The same in a page with a player, which is `element` there."""
     browser.get(f"{site[1]}/player.html")
-    return lambda body, *arguments: run(
-        browser, "const element = document.querySelector('geometry-video');" + body, *arguments
-    )
+    return lambda body, *arguments: run(browser, "const element = document.querySelector('geometry-video');" + body, *arguments)
 
 
 def _encode(site: tuple[Path, str], sequence: MeshSequence, name: str = "x.mp4", **settings: Any) -> Path:

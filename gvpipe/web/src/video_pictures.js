@@ -1,18 +1,17 @@
 /**
  * The pictures of a geometry video by the browser's own `<video>`, where it has no WebCodecs; a canvas gives their luma back.
  *
- * Luma 16..235 (limited range, neutral chroma) comes out of the canvas as a grey of 0..255, which a table undoes. Playback
- * follows the video's clock: whoever draws late gets the picture of that moment, and none is queued. A frame is sought in the
- * middle of its time, and checked by what the browser says it shows. It loops by seeking, since Firefox' times of pictures go
- * on growing where the element loops by itself.
+ * Luma 16..235 (limited range, neutral chroma) comes out of the canvas as a grey of 0..255, which a table undoes. A frame is
+ * sought in the middle of its time, and checked by what the browser says it shows.
+ *
+ * Chromium plays: the video's clock leads, and whoever draws late gets the picture of that moment. It loops by seeking. Firefox
+ * announces other pictures than it draws while it plays (and times that go on growing where the element loops by itself), so
+ * there every frame that is due is sought.
  */
 
 import { GeometryVideoError } from "./format/errors.js";
 import { OF_GREY } from "./levels.js";
 
-const CHANGING = 0.05; // of a frame, about its beginning: when Firefox may draw either
-const LOOK_AGAIN = 4; // ms, if it is not sure which frame is drawn
-const LOOKS = 3;
 const SHOWN_WITHIN = 1000; // ms after `seeked` in which the browser says what it shows; in a hidden page it never does
 
 export class VideoPictures {
@@ -77,10 +76,16 @@ export class VideoPictures {
   /** Show a frame and wait until it is there. Pauses. */
   async seek(frame) {
     this.pause();
-    if (this.shown === frame) return;
+    if (this.shown !== frame) await this.#reach(frame);
+  }
+
+  async #reach(frame) {
     const time = (frame + 0.5) / this.fps;
+    const reaching = (this.reaching = {});
     for (let attempt = 0; attempt < 3; attempt++) {
-      if ((await this.#seekTo(frame, time + (attempt * 0.1) / this.fps)) === frame) {
+      const found = await this.#seekTo(frame, time + (attempt * 0.1) / this.fps);
+      if (this.reaching !== reaching) return; // another frame is sought since
+      if (found === frame) {
         this.shown = frame;
         return;
       }
@@ -126,40 +131,69 @@ export class VideoPictures {
    * Play on from here, `rate` times as fast; calls `show(frame)` for each frame that the browser shows while it is there to be
    * read, `ended()` at the end if it does not loop, `failed(error)` if it cannot go on.
    */
-  async play({ show, ended, failed }, rate, loop) {
+  async play(on, rate, loop) {
     const { video } = this;
     video.playbackRate = rate;
     this.shown = -1;
     const playing = (this.playing = {});
-    const look = (mediaTime, left) => {
+    const next = (_, { mediaTime }) => {
       if (this.playing !== playing) return;
-      const frame = Math.min(this.frames - 1, this.#capture(mediaTime));
-      if (frame < 0 && left) {
-        setTimeout(look, LOOK_AGAIN, mediaTime, left - 1);
+      const frame = Math.min(this.frames - 1, this.#frameAt(mediaTime));
+      if (frame > 0) this.tellsFrames ??= this.#tellsFrames();
+      if (this.tellsFrames === false) {
+        video.pause();
+        this.#playBySeeking(playing, frame, on, rate, loop).catch((error) => this.playing === playing && on.failed(error));
         return;
       }
-      if (frame !== this.shown && frame >= 0) {
+      if (frame !== this.shown) {
         this.shown = frame;
-        show(frame);
+        this.context.drawImage(video, 0, 0);
+        on.show(frame);
       }
       video.requestVideoFrameCallback(next);
     };
-    const next = (_, { mediaTime }) => look(mediaTime, LOOKS);
-    const again = () => {
-      video.currentTime = 0;
-      video.play().catch((error) => this.playing === playing && failed(error));
-    };
     video.onended = () => {
-      if (this.playing !== playing) return;
+      if (this.playing !== playing || this.tellsFrames === false) return;
       if (loop) {
-        again();
+        video.currentTime = 0;
+        video.play().catch((error) => this.playing === playing && on.failed(error));
         return;
       }
       this.pause();
-      ended();
+      on.ended();
     };
     video.requestVideoFrameCallback(next);
     await video.play();
+  }
+
+  /** The same by seeking to whatever is due: slower, and exact where it is not known which picture of a playing video is drawn. */
+  async #playBySeeking(playing, first, { show, ended }, rate, loop) {
+    const start = performance.now() - (1000 * first) / (this.fps * rate);
+    while (this.playing === playing) {
+      const due = Math.floor(((performance.now() - start) * this.fps * rate) / 1000);
+      const frame = loop ? due % this.frames : Math.min(due, this.frames - 1);
+      if (frame !== this.shown) {
+        await this.#reach(frame);
+        if (this.playing !== playing) return;
+        this.context.drawImage(this.video, 0, 0);
+        show(frame);
+      }
+      if (!loop && due >= this.frames && this.playing === playing) {
+        this.pause();
+        ended();
+        return;
+      }
+      await new Promise((resolve) => requestAnimationFrame(resolve));
+    }
+  }
+
+  /** Whether pictures tell their times: then the one drawn is the one announced. Firefox' do not, and it draws others too. */
+  #tellsFrames() {
+    if (typeof VideoFrame !== "function") return !("mozHasAudio" in this.video);
+    const picture = new VideoFrame(this.video);
+    const { timestamp } = picture;
+    picture.close();
+    return this.#frameAt(timestamp / 1e6) > 0;
   }
 
   /** Stop playing; the frame shown last stays. */
@@ -173,29 +207,6 @@ export class VideoPictures {
   /** Browsers tell when the frame begins, rounded either way, or (Firefox) the time sought inside it. */
   #frameAt(time) {
     return Math.floor(time * this.fps + 0.25);
-  }
-
-  /**
-   * Draw what plays now, and return its frame; -1: not known for sure.
-   *
-   * What is drawn is of the time that the picture itself tells (Chromium). Firefox' pictures tell nothing: it draws what is
-   * due by the element's clock, except for a moment after it dropped some. Where no picture can be had, the callback's time
-   * must do.
-   */
-  #capture(mediaTime) {
-    const announced = this.#frameAt(mediaTime);
-    if (typeof VideoFrame !== "function") {
-      this.context.drawImage(this.video, 0, 0);
-      return announced;
-    }
-    const picture = new VideoFrame(this.video);
-    const due = this.video.currentTime * this.fps;
-    this.context.drawImage(picture, 0, 0);
-    const told = this.#frameAt(picture.timestamp / 1e6);
-    picture.close();
-    if (told === announced) return told;
-    const isSure = Math.abs(due - Math.round(due)) > CHANGING && Math.abs(announced - due) < 1;
-    return isSure ? Math.floor(due) : -1;
   }
 
   /** `Uint8Array` (V, 3): the levels of the frame shown. */
