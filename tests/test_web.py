@@ -232,6 +232,34 @@ def test_broken_files_are_told_apart(case: str, module: Callable[..., Any], site
     assert "\n" not in found[2]
 
 
+def test_a_damaged_index_gives_one_clear_error(module: Callable[..., Any], site: tuple[Path, str], video_bytes: bytes) -> None:
+    """No checksum covers the video's tables: whatever they hold, the file opens or there is one error of ours."""
+    start, end = video_bytes.index(b"moov"), video_bytes.index(b"mdat")
+    positions = np.random.default_rng(5).integers(video_bytes.index(b"stbl"), end - 8, 60)
+    lengths = [
+        position + 4 for kind in (b"stsz", b"stco", b"stsc", b"stts", b"ctts", b"stss") for position in _all(video_bytes, kind)
+    ]
+    assert start < min(positions)
+    for i, position in enumerate([*positions.tolist(), *(p + k for p in lengths for k in (4, 5, 7, 11))]):
+        (site[0] / f"i{i}.mp4").write_bytes(_flipped(video_bytes, position))
+    outcomes = module(
+        """const outcomes = [];
+        for (let i = 0; i < args[0]; i++) {
+          const outcome = await GeometryVideo.load(`i${i}.mp4`).then((video) => (video.close(), "loaded"),
+            (error) => (error instanceof GeometryVideoError ? error.kind : String(error.stack)));
+          outcomes.push(outcome);
+        }
+        return outcomes;""",
+        i + 1,
+    )
+    assert set(outcomes) <= {"loaded", "corrupt", "unsupported", "not-geometry-video"}, outcomes
+    assert outcomes.count("corrupt") > 10
+
+
+def _all(data: bytes, kind: bytes) -> list[int]:
+    return [match.start() for match in re.finditer(re.escape(kind), data)]
+
+
 def test_a_file_that_is_not_there(module: Callable[..., Any]) -> None:
     for address in ("nothing.mp4", "http://127.0.0.1:9/x.mp4"):
         assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", address) == "load"
@@ -517,6 +545,13 @@ def test_controls_by_mouse_and_keyboard(player: Callable[..., Any], browser: Any
     assert player(attributes) == ["", "", "2"]
     ActionChains(browser).send_keys(" ").perform()
     assert player("return element.paused") is False
+    ActionChains(browser).send_keys("c").perform()
+    assert player("return element.hasAttribute('follow')")
+    fullscreen = "await new Promise((resolve) => setTimeout(resolve, 500)); return document.fullscreenElement === element"
+    root.find_element("css selector", "[data-act=fullscreen]").click()
+    assert player(fullscreen)
+    ActionChains(browser).send_keys("f").perform()
+    assert not player(fullscreen)
 
 
 def test_size_and_bit_rate_are_shown(player: Callable[..., Any], site: tuple[Path, str]) -> None:

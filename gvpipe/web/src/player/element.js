@@ -9,7 +9,9 @@
 
 import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
 import { Bar, nextSpeed } from "./bar.js";
+import { embedded } from "./embedded.js";
 import { actionOf } from "./keys.js";
+import { isFullscreen, save, toggleFullscreen } from "./outside.js";
 import { Stage } from "./stage.js";
 import style from "./style.css";
 
@@ -54,7 +56,7 @@ export class GeometryVideoElement extends HTMLElement {
     this.#bar.setEnabled(false);
     root.addEventListener("keydown", (event) => this.#onKey(event));
     if (!document.fullscreenEnabled) this.#bar.hide("fullscreen"); // phones may show films alone so
-    this.addEventListener("fullscreenchange", () => this.#bar.setPressed("fullscreen", this.#isFullscreen));
+    this.addEventListener("fullscreenchange", () => this.#bar.setPressed("fullscreen", isFullscreen(this)));
   }
 
   connectedCallback() {
@@ -197,20 +199,8 @@ export class GeometryVideoElement extends HTMLElement {
   }
 
   async #saveStill() {
-    const frame = this.currentFrame;
-    const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(await this.still()) });
-    link.download = `${document.title || "geometry-video"}-${frame}.png`;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 60_000); // the browser may ask its user first where to put it
-  }
-
-  get #isFullscreen() {
-    return document.fullscreenElement === this || this.getRootNode().fullscreenElement === this;
-  }
-
-  #toggleFullscreen() {
-    const changed = this.#isFullscreen ? document.exitFullscreen() : this.requestFullscreen();
-    changed.catch(() => {}); // refused by the user or by a frame around the page: it stays as it is
+    const name = `${document.title || "geometry-video"}-${this.currentFrame}.png`;
+    save(await this.still(), name);
   }
 
   #act(name) {
@@ -227,7 +217,7 @@ export class GeometryVideoElement extends HTMLElement {
       follow: () => this.toggleAttribute("follow"),
       view: () => this.#stage.resetView(),
       still: () => this.#saveStill(),
-      fullscreen: () => this.#toggleFullscreen(),
+      fullscreen: () => toggleFullscreen(this),
       nearer: () => this.#stage.zoom(1 / ZOOM),
       farther: () => this.#stage.zoom(ZOOM),
       "turn-left": () => this.#stage.orbit(-TURN, 0),
@@ -286,16 +276,5 @@ function openStage(canvas) {
     return new Stage(canvas);
   } catch {
     throw new GeometryVideoError("unsupported", "this browser offers no WebGL to draw with");
-  }
-}
-
-/** The file that an element of the page holds as base64 text. */
-function embedded(selector) {
-  const holder = document.getElementById(selector.slice(1));
-  if (!holder) throw new GeometryVideoError("load", `the page has no element ${selector}`);
-  try {
-    return Uint8Array.from(atob(holder.textContent.trim()), (character) => character.charCodeAt(0));
-  } catch {
-    throw new GeometryVideoError("corrupt", `the element ${selector} does not hold base64 text`);
   }
 }
