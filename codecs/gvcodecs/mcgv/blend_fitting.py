@@ -40,7 +40,7 @@ GROWTH = (32, 2.0), (0, 2**0.5)  # from one number tried to the next, by how man
 ROUNDS = 3  # steps tried
 PICTURED = 0.45  # steps, root mean square, that pictures leave of a point's residual
 AIM = 0.87  # of the error wanted, what a blend is to leave: coding adds to it
-CLOSE = 0.25  # logarithm of the error left over that
+CLOSE = 0.15  # logarithm of the error left over that
 SLOPE = 0.75  # of its logarithm over the step's
 MOST_MOVED = 3.0  # times, the step at once
 PATIENCE = 1  # numbers of clusters that may do worse than a smaller one, in a row
@@ -83,11 +83,16 @@ class Motions:
         self.clustering = Clustering(local_motions(base, k_ring(neighbours, RING), self._columns[:, :DIMENSIONS]))
 
     def error(self, problem: _Problem, fitted: Fitted, step: float) -> float:
-        """Expected root mean square error of points, model units: what a blend leaves, or pictures where that is less."""
-        n_points = len(self.base)
-        left = problem.errors(fitted) + self._energies[problem.motions.shape[1] :].sum() / n_points
+        """Expected root mean square error of points, model units: what a blend leaves, or pictures where that is less.
+
+        Beside that, a rounding to steps in each number of the transforms.
+        """
+        n_points, n_columns = problem.motions.shape
+        left = problem.errors(fitted) + self._energies[n_columns:].sum() / n_points
+        rounded = min(4 * fitted.n_clusters, n_points) * n_columns * step**2 / 12
         most = (PICTURED * step) ** 2 * self.n_frames / self._scale
-        return math.sqrt(float(np.minimum(left, most).sum()) * self._scale / (n_points * self.n_frames))
+        total = float(np.minimum(left + rounded / n_points, most).sum())
+        return math.sqrt(total * self._scale / (n_points * self.n_frames))
 
     def problem(self, step: float) -> _Problem:
         """What is fitted where an error of ``step``, model units, is left."""
