@@ -36,6 +36,7 @@ def aim(
     step: float,
     wanted: float,
     band: tuple[float, float],
+    rounds: int = ROUNDS,
 ) -> Aimed:
     """Encode with one step after the other until the error is close enough; return the encode that came closest.
 
@@ -45,16 +46,18 @@ def aim(
         step: the first.
         wanted: error.
         band: least and most part of the error wanted that is close enough.
+        rounds: most encodes.
     """
     aimed_at = wanted * math.sqrt(band[0] * band[1])
     tried: list[Aimed] = []
     slope = SLOPE
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         bitstream = encode(step)
         trial = Aimed(bitstream, step, max(measure(bitstream), 1e-300))
-        if tried:
+        if tried and trial.step != tried[-1].step:
             last = tried[-1]
-            slope = min(max(math.log(trial.error / last.error) / math.log(trial.step / last.step), SLOPES[0]), SLOPES[1])
+            slope = math.log(trial.error / last.error) / math.log(trial.step / last.step)
+            slope = min(max(slope, SLOPES[0]), SLOPES[1])
         tried.append(trial)
         if band[0] <= trial.error / wanted <= band[1]:
             break

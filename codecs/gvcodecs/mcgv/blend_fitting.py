@@ -38,9 +38,10 @@ FEWEST, MOST = 8, 1024  # clusters tried
 LEAST_POINTS = 8  # per cluster, on average
 GROWTH = (32, 2.0), (0, 2**0.5)  # from one number tried to the next, by how many times its clusters' cost all costs
 ROUNDS = 3  # steps tried
+ROUNDED = 0.025  # squared steps that rounding a number of the transforms leaves: many are of components too small to be coded
 PICTURED = 0.45  # steps, root mean square, that pictures leave of a point's residual
-AIM = 0.87  # of the error wanted, what a blend is to leave: coding adds to it
-CLOSE = 0.15  # logarithm of the error left over that
+AIM = 0.88  # of the error wanted, what a blend is to leave: coding adds to it
+CLOSE = 0.18  # logarithm of the error left over that
 SLOPE = 0.75  # of its logarithm over the step's
 MOST_MOVED = 3.0  # times, the step at once
 PATIENCE = 1  # numbers of clusters that may do worse than a smaller one, in a row
@@ -85,11 +86,11 @@ class Motions:
     def error(self, problem: _Problem, fitted: Fitted, step: float) -> float:
         """Expected root mean square error of points, model units: what a blend leaves, or pictures where that is less.
 
-        Beside that, a rounding to steps in each number of the transforms.
+        Beside that, what rounding the transforms leaves.
         """
         n_points, n_columns = problem.motions.shape
         left = problem.errors(fitted) + self._energies[n_columns:].sum() / n_points
-        rounded = min(4 * fitted.n_clusters, n_points) * n_columns * step**2 / 12
+        rounded = ROUNDED * min(4 * fitted.n_clusters, n_points) * n_columns * step**2
         most = (PICTURED * step) ** 2 * self.n_frames / self._scale
         total = float(np.minimum(left + rounded / n_points, most).sum())
         return math.sqrt(total * self._scale / (n_points * self.n_frames))

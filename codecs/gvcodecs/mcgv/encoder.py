@@ -12,6 +12,7 @@ that looks at them (the extent, which affine transforms need, motion, transforms
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -64,8 +65,9 @@ BASE_BITS = 8, 16  # bits along a base frame's longest side that are chosen unas
 BASE_STEP = 1.3  # of a base frame, times step / sqrt(frames): measured, docs/codecs/mcgv.md
 FINER = 2**0.25  # times, a lattice that does not
 DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell apart; the others give way
-GUESS = {"blended": 5.0, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
+GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
 BAND = {"blended": (0.86, 0.99), "affine": (1.0, 1.1)}  # of the error wanted: the published mode is no finer than asked
+FAR = 0.75, 1.4  # of the error wanted: what a blend is kept for
 REUSED = 1.6  # times the step, up to which a blend fitted for another serves
 PART = 250  # points of a part by motion that charts refine: xatlas takes more than ten times as long per point for all at once
 MERGED = 1 / 16  # steps that vertices of one point may be apart: far below the errors that follow
@@ -160,9 +162,15 @@ class Mcgv(Settings):
             report("measure", 0)
             return root_mean_square(own, self.reader(bitstream))
 
+        @functools.cache
         def encode(step: float) -> Bitstream:
             return self._code(sequence, start, step, fitted, memo, report)
 
+        if fitted:
+            first = measure(encode(step)) / wanted
+            if not FAR[0] <= first <= FAR[1]:  # another step wants another blend; the error follows it, then
+                near = dataclasses.replace(start, step=step * 0.9 / first)
+                fitted, step = self._fit(near, 0.0, memo, report)
         aimed = aim(encode, measure, step, wanted, BAND[self.prediction])
         return aimed, _Anchor(dataclasses.replace(start, step=aimed.step), fitted, step, aimed.error)
 
