@@ -17,7 +17,7 @@ from gvpipe.codec import FrameReader
 from gvpipe.sequence import MeshSequence
 
 ROUNDS = 3  # encodes at most
-MOST_MOVED = 4.0  # times, a step at once
+MOST_MOVED = math.log(4)  # of a step's logarithm, at once
 SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: assumed, and believed
 
 
@@ -61,7 +61,8 @@ def aim(
         tried.append(trial)
         if band[0] <= trial.error / wanted <= band[1]:
             break
-        step *= min(max((aimed_at / trial.error) ** (1 / slope), 1 / MOST_MOVED), MOST_MOVED)
+        moved = math.log(aimed_at / trial.error) / slope
+        step *= math.exp(min(max(moved, -MOST_MOVED), MOST_MOVED))
     return min(tried, key=lambda trial: abs(math.log(trial.error / aimed_at)))
 
 

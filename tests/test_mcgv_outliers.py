@@ -22,7 +22,7 @@ from gvpipe.moves import MovesReader
 from gvpipe.sequence import MeshSequence
 from gvpipe.video import PROFILES
 
-FAST: dict[str, Any] = {"preset": "ultrafast", "gop": 8, "clusters": 12}
+FAST: dict[str, Any] = {"prediction": "affine", "preset": "ultrafast", "gop": 8, "clusters": 12}
 
 
 def jumping(n_frames: int = 30) -> tuple[MeshSequence, np.ndarray]:
@@ -45,7 +45,7 @@ def stream() -> Bitstream:
     [
         {"quality": 85},
         {"quality": 85, "placement": "halves"},
-        {"quality": 100, "prediction": "blended"},
+        {"quality": 90, "prediction": "blended"},
         {"quality": 100, "profile": "precise"},
         {"quality": 85, "image": "jpeg"},
     ],

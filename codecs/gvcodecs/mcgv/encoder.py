@@ -68,6 +68,7 @@ DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell
 GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
 BAND = {"blended": (0.86, 0.99), "affine": (1.0, 1.1)}  # of the error wanted: the published mode is no finer than asked
 FAR = 0.75, 1.4  # of the error wanted: what a blend is kept for
+FARTHEST = 4.0  # times, a step for another blend
 REUSED = 1.6  # times the step, up to which a blend fitted for another serves
 PART = 250  # points of a part by motion that charts refine: xatlas takes more than ten times as long per point for all at once
 MERGED = 1 / 16  # steps that vertices of one point may be apart: far below the errors that follow
@@ -169,7 +170,7 @@ class Mcgv(Settings):
         if fitted:
             first = measure(encode(step)) / wanted
             if not FAR[0] <= first <= FAR[1]:  # another step wants another blend; the error follows it, then
-                near = dataclasses.replace(start, step=step * 0.9 / first)
+                near = dataclasses.replace(start, step=step * min(max(0.9 / max(first, 1e-9), 1 / FARTHEST), FARTHEST))
                 fitted, step = self._fit(near, 0.0, memo, report)
         aimed = aim(encode, measure, step, wanted, BAND[self.prediction])
         return aimed, _Anchor(dataclasses.replace(start, step=aimed.step), fitted, step, aimed.error)
