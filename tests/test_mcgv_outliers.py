@@ -22,7 +22,7 @@ from gvpipe.moves import MovesReader
 from gvpipe.sequence import MeshSequence
 from gvpipe.video import PROFILES
 
-FAST: dict[str, Any] = {"prediction": "affine", "preset": "ultrafast", "gop": 8, "clusters": 12}
+FAST: dict[str, Any] = {"preset": "ultrafast", "gop": 8, "clusters": 12}
 
 
 def jumping(n_frames: int = 30) -> tuple[MeshSequence, np.ndarray]:
@@ -43,11 +43,11 @@ def stream() -> Bitstream:
 @pytest.mark.parametrize(
     "settings",
     [
-        {"quality": 85},
-        {"quality": 85, "placement": "halves"},
+        {"quality": 60, "prediction": "affine"},
+        {"quality": 60, "prediction": "affine", "placement": "halves"},
         {"quality": 90, "prediction": "blended"},
-        {"quality": 100, "profile": "precise"},
-        {"quality": 85, "image": "jpeg"},
+        {"quality": 70, "prediction": "affine", "profile": "precise"},
+        {"quality": 60, "prediction": "affine", "image": "jpeg"},
     ],
     ids=str,
 )

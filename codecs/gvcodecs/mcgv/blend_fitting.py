@@ -36,7 +36,12 @@ DIMENSIONS = 40  # principal coordinates of motions that clusters start from
 TRIAL_PASSES, FIRST_PASSES, LAST_PASSES = 4, 4, 8  # turns of weights and transforms: per trial, for either start, for the best
 FEWEST, MOST = 8, 1024  # clusters tried
 LEAST_POINTS = 8  # per cluster, on average
-GROWTH = (32, 2.0), (0, 2**0.5)  # from one number tried to the next, by how many times its clusters' cost all costs
+MOST_DISTANCES = 4_000_000  # of points from clusters: beyond, k-means takes longer than it is worth
+GROWTH = (
+    (1000, 4.0),
+    (32, 2.0),
+    (0, 2**0.5),
+)  # from one number tried to the next, by how many times its clusters' cost all costs
 ROUNDS = 3  # steps tried
 ROUNDED = 0.025  # squared steps that rounding a number of the transforms leaves: many are of components too small to be coded
 PICTURED = 0.45  # steps, root mean square, that pictures leave of a point's residual
@@ -178,7 +183,7 @@ class _Problem:
 
 
 def _find_number(problem: _Problem, clustering: Clustering, starts: list[Fitted]) -> list[Fitted]:
-    """The blends, of as many clusters as pay, that cost least after a few turns: from k-means, and grown.
+    """The blends, of as many clusters as pay, that cost least after a few turns: grown, and from k-means.
 
     ``starts`` are blends found for another step, or of one cluster: numbers from half of theirs up are tried.
     """
@@ -188,7 +193,9 @@ def _find_number(problem: _Problem, clustering: Clustering, starts: list[Fitted]
     most = min(MOST, len(problem.base) / LEAST_POINTS)
     count, worse = float(max(FEWEST, starts[0].n_clusters // 2)), 0
     while count <= most and problem.cluster_price * count < min(least) and worse < PATIENCE:
-        tried = [clustering.start(round(count)), _grow(problem, last, round(count), patches, draw)]
+        tried = [_grow(problem, last, round(count), patches, draw)]
+        if count * len(problem.base) <= MOST_DISTANCES:
+            tried.append(clustering.start(round(count)))
         tried = _alternate_all(problem, tried, TRIAL_PASSES)
         costs = [problem.cost(fitted) for fitted in tried]
         worse = 0 if min(costs) < min(least) else worse + 1
