@@ -63,10 +63,17 @@ class BlendedMotion:
         surface: of the base frame.
         layout: the slots' pixels.
         bounds: first frame of every segment, and F.
+        first: transforms of the first segment.
     """
 
     def __init__(
-        self, bitstream: Bitstream, header: sections.Header, surface: Surface, layout: Layout, bounds: list[int]
+        self,
+        bitstream: Bitstream,
+        header: sections.Header,
+        surface: Surface,
+        layout: Layout,
+        bounds: list[int],
+        first: Trajectories,
     ) -> None:
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
         weights = decode_weights(bitstream.section("weights"), surface.points.neighbours, header.clusters)
@@ -77,7 +84,7 @@ class BlendedMotion:
         self._homogeneous = self._blend.homogeneous[point]
         self._clusters, self._parts = weights.clusters[point], weights.weights[point] / TOTAL
         self._residuals = header.residual_step * header.profile.offsets
-        self._segment: tuple[int, Trajectories | None] = (-1, None)
+        self._segment = (0, first)
         self._chunk: tuple[int, int, Float64] = (-1, -1, np.zeros((0, 0, 4, 3)))
 
     def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
@@ -105,13 +112,17 @@ class BlendedMotion:
         """``(n, K, 4, 3)`` of a chunk of a segment's frames: always whole, so that sums do not depend on what else is read."""
         kept, trajectories = self._segment
         n_frames = self._bounds[s + 1] - self._bounds[s]
-        if kept != s or trajectories is None:
-            header, name = self._header, f"transforms.{s}"
-            data = self._bitstream.section(name)
-            trajectories = decode_trajectories(data, header.clusters, n_frames, header.transform_step, name)
+        if kept != s:
+            trajectories = decode_transforms(self._bitstream, self._header, s, n_frames)
             self._segment = (s, trajectories)
         transforms = self._blend.transforms(trajectories.rows(chunk * CHUNK, min((chunk + 1) * CHUNK, n_frames)))
         return np.ascontiguousarray(transforms.reshape(*transforms.shape[:2], -1, 3).transpose(2, 0, 1, 3))
+
+
+def decode_transforms(bitstream: Bitstream, header: sections.Header, s: int, n_frames: int) -> Trajectories:
+    """The transforms of segment s; raises `CorruptFile`."""
+    name = f"transforms.{s}"
+    return decode_trajectories(bitstream.section(name), header.clusters, n_frames, header.transform_step, name)
 
 
 def _columns(frames: Float64) -> Float64:

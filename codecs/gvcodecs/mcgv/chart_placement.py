@@ -39,11 +39,11 @@ def place_charts(points: NDArray[np.integer], charts: NDArray[np.integer], width
     """
     check_room(points, width, height)
     own = np.asarray(points - points.min(axis=0), np.int64)
-    centres = _centres(own, charts)[charts]
+    centres = _centres(own, charts)
     shift = moment_shift(own)
     none = np.zeros((1, 3), np.int64)
     cells = Cells(np.array([0, len(own)]), np.zeros((1, 2), np.int64), np.array([[width, height]]), none, none)
-    order = np.arange(len(own))
+    order = np.argsort(charts, kind="stable")
     while True:
         order = _sort(cells, order, centres, charts, shift)
         cuts = _choose_cuts(cells, charts[order])
@@ -76,11 +76,23 @@ def _centres(points: Int64, charts: NDArray[np.integer]) -> Int64:
 
 
 def _sort(cells: Cells, order: Int64, centres: Int64, charts: NDArray[np.integer], shift: int) -> Int64:
-    """Sort the cells' vertices by their charts, and these along the direction in which their centres ``(V, 3)`` spread most."""
-    directions = DIRECTIONS[spreads(second_moments(centres[order], cells.starts, shift)).argmax(axis=1)]
-    cell = np.repeat(np.arange(len(directions)), np.diff(cells.starts))
-    keys = np.einsum("vi,vi->v", centres[order], directions[cell])
-    return np.asarray(order[np.lexsort((charts[order], keys, cell))])
+    """Sort the cells' vertices by their charts, and these along the direction in which their ``centres (C, 3)`` spread most.
+
+    A chart's vertices stand together in every cell, so that whole runs are sorted.
+    """
+    chart = charts[order]
+    begins = np.diff(chart, prepend=-1) != 0
+    begins[cells.starts[:-1]] = True
+    runs = np.flatnonzero(begins)
+    counts, chart = np.diff(runs, append=len(order)), chart[runs]
+    cell = np.searchsorted(cells.starts, runs, "right") - 1
+    moments = second_moments(centres[chart], np.searchsorted(runs, cells.starts), shift, counts)
+    directions = DIRECTIONS[spreads(moments).argmax(axis=1)]
+    keys = np.einsum("ri,ri->r", centres[chart], directions[cell])
+    sorted_ = np.lexsort((chart, keys, cell))
+    counts = counts[sorted_]
+    shifts = runs[sorted_] - (np.cumsum(counts) - counts)
+    return np.asarray(order[np.repeat(shifts, counts) + np.arange(len(order))])
 
 
 def _choose_cuts(cells: Cells, charts: NDArray[np.integer]) -> _Cuts:

@@ -182,13 +182,17 @@ def _turn(cells: Cells, order: Int64, points: Int64, shift: int, wide: NDArray[n
     return across, down
 
 
-def second_moments(points: Int64, starts: Int64, shift: int) -> Int64:
-    """Second moments ``(n, 6)`` of the cells' points about their means: xx, yy, zz, xy, xz, yz."""
-    counts = np.diff(starts)
-    means = np.add.reduceat(points, starts[:-1], axis=0) // counts[:, None]
-    x, y, z = ((points - np.repeat(means, counts, axis=0)) >> shift).T
+def second_moments(points: Int64, starts: Int64, shift: int, counts: Int64 | None = None) -> Int64:
+    """Second moments ``(n, 6)`` of the cells' points about their means: xx, yy, zz, xy, xz, yz.
+
+    Cell c has the points ``starts[c]`` to ``starts[c + 1]``, each of them ``counts`` times, or once.
+    """
+    times = np.ones(len(points), np.int64) if counts is None else counts
+    n = np.add.reduceat(times, starts[:-1])
+    means = np.add.reduceat(points * times[:, None], starts[:-1], axis=0) // n[:, None]
+    x, y, z = ((points - np.repeat(means, np.diff(starts), axis=0)) >> shift).T
     products = np.stack([x * x, y * y, z * z, x * y, x * z, y * z], axis=1)
-    return np.asarray(np.add.reduceat(products, starts[:-1], axis=0))
+    return np.asarray(np.add.reduceat(products * times[:, None], starts[:-1], axis=0))
 
 
 def spreads(moments: Int64) -> Int64:

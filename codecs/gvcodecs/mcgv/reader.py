@@ -5,6 +5,7 @@ A frame costs its group of pictures (H.264) or its one picture (JPEG), and the t
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.affine_motion import AffineMotion
-from gvcodecs.mcgv.blended_motion import BlendedMotion
+from gvcodecs.mcgv.blended_motion import BlendedMotion, decode_transforms
 from gvcodecs.mcgv.chart_coding import SECTION as CHARTS
 from gvcodecs.mcgv.chart_coding import decode_charts
 from gvcodecs.mcgv.chart_placement import place_charts
@@ -61,9 +62,14 @@ class McgvReader:
 
     @cached_property
     def _motion(self) -> Motion:
-        bitstream, header, surface = self._bitstream, self._header, self._surface
+        bitstream, header = self._bitstream, self._header
         if header.prediction == "blended":
-            return BlendedMotion(bitstream, header, surface, read_layout(bitstream, header, surface), self._bounds)
+            with ThreadPoolExecutor(1) as pool:  # transforms decode beside the mesh: most of both is compiled
+                first = pool.submit(decode_transforms, bitstream, header, 0, self._bounds[1])
+                surface = self._surface
+                layout = read_layout(bitstream, header, surface)
+                return BlendedMotion(bitstream, header, surface, layout, self._bounds, first.result())
+        surface = self._surface
         if header.placement == "halves":
             clusters = sections.decode_slot_clusters(bitstream.section("clusters"), surface.order, header.clusters)
             layout = read_layout(bitstream, header, surface, clusters)
