@@ -6,6 +6,7 @@ three encodes do.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,11 +24,12 @@ SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: ass
 
 @dataclass(frozen=True)
 class Aimed:
-    """An encode, its step and its root mean square error, model units."""
+    """An encode, its step and its root mean square error, model units, and how its logarithm rises with the step's."""
 
     bitstream: Bitstream
     step: float
     error: float
+    slope: float = SLOPE
 
 
 def aim(
@@ -63,7 +65,8 @@ def aim(
             break
         moved = math.log(aimed_at / trial.error) / slope
         step *= math.exp(min(max(moved, -MOST_MOVED), MOST_MOVED))
-    return min(tried, key=lambda trial: abs(math.log(trial.error / aimed_at)))
+    best = min(tried, key=lambda trial: abs(math.log(trial.error / aimed_at)))
+    return dataclasses.replace(best, slope=slope)
 
 
 def root_mean_square(sequence: MeshSequence, reader: FrameReader) -> float:

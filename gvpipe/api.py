@@ -14,14 +14,15 @@ import numpy as np
 
 from gvpipe import notes
 from gvpipe.arguments import StrPath, check_path, show
-from gvpipe.auto import AUTO, DEFAULT, choose_codec
-from gvpipe.codec import Codec, Progress, codec_ids, encode_sequence, make_codec
+from gvpipe.auto import choose_codec, default_target
+from gvpipe.codec import Codec, Progress, encode_sequence, make_codec
 from gvpipe.container import bytes_by_part, write_file
 from gvpipe.errors import InputError, OutputError, SettingError
 from gvpipe.io import read as read_sequence
 from gvpipe.io import write as write_sequence
 from gvpipe.player import Player
 from gvpipe.poster import poster_of
+from gvpipe.purposes import candidates, check_purpose, check_serves
 from gvpipe.rate import Target, meet, parse_bound
 from gvpipe.sequence import MeshSequence
 from gvpipe.vertex_errors import frame_diagonal
@@ -32,7 +33,8 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Source = StrPath | Sequence[StrPath]
-KEYWORDS = ("source", "path", "codec", "progress", "fps", "target_rmse", "target_kg", "target_bpvf", "max_error")  # of `encode`
+TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
+KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose")  # of `encode`
 
 
 @dataclass(frozen=True)
@@ -149,7 +151,7 @@ def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> None:
 def encode(
     source: MeshSequence | Source,
     path: StrPath,
-    codec: str | Codec | Sequence[Codec] = "mcgv",
+    codec: str | Codec | Sequence[Codec] | None = None,
     progress: Progress | None = None,
     fps: float | None = None,
     *,
@@ -157,23 +159,27 @@ def encode(
     target_kg: float | None = None,
     target_bpvf: float | None = None,
     max_error: float | str | None = None,
+    purpose: str | None = None,
     **settings: Any,
 ) -> Report:
     """Encode a sequence into a geometry video.
 
-    At most one target may be given. Then the quality is searched, from the one in the settings on; see `gvpipe.rate`.
+    At most one target may be given. Then the quality is searched; see `gvpipe.rate`.
 
     Args:
         source: a sequence, or what `read` takes.
         path: the ``.mp4`` to write; an older file is replaced once the new one is complete.
-        codec: its id, with ``settings`` by name, or its settings object. Several, or ``"auto"`` for all with settings that all
-            have: the one with the smallest file that meets the target, by default `gvpipe.auto.DEFAULT`.
+        codec: its id, with ``settings`` by name, or its settings object. Several, or ``"auto"`` for all that serve the purpose
+            with settings that all have: the one with the smallest file that meets the target, by default the KG error of their
+            quality (`gvpipe.quality`). None: ``"auto"`` if a purpose is given, else ``"mcgv"``.
         progress: called with a stage's name and the part of it that is done.
         fps: overrides the source's frames per second.
         target_rmse: largest root mean square error, as a part of frame 0's diagonal.
         target_kg: largest Karni-Gotsman error, percent.
         target_bpvf: most bits per vertex and frame, of the whole file.
         max_error: a bound that every vertex of every frame keeps: model units, or a part of the diagonal such as ``"0.05%"``.
+        purpose: what the file is for: ``"web"`` (browsers play it as it is), ``"stream"`` (starts at once, jumps fast, in
+            bounded memory) or ``"archive"`` (the smallest); see `gvpipe.purposes`.
 
     Raises:
         InputError: the source, a setting or the path cannot be used, or no quality meets the target.
@@ -187,7 +193,7 @@ def encode(
     if _is_among(path, source):
         raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
     wanted = _one_of({"rmse": target_rmse, "kg": target_kg, "bpvf": target_bpvf, "max": max_error})
-    candidates = _candidates(codec, settings)
+    given = _candidates(codec, settings, purpose)
     started = time.perf_counter()
     sequence = source if isinstance(source, MeshSequence) else read(source, fps)
     if fps is not None:
@@ -199,14 +205,14 @@ def encode(
         noticed += notes.loose_bound(target.value, frame_diagonal(sequence))
     not_carried = sorted(sequence.attributes)
     choice = None
-    if not isinstance(candidates, Codec):
-        choice = choose_codec(candidates, sequence, target or DEFAULT, clock)
+    if not isinstance(given, Codec):
+        choice = choose_codec(given, sequence, target or default_target(given), clock)
     elif target:
-        choice = meet(target, candidates, sequence, clock)
+        choice = meet(target, given, sequence, clock)
     if choice:
         chosen, bitstream = choice.trial.codec, choice.trial.bitstream
     else:
-        chosen = cast("Codec", candidates)
+        chosen = cast("Codec", given)
         bitstream = encode_sequence(chosen, sequence, clock)
     clock("write", 0.0)
     if not bitstream.video:
@@ -297,15 +303,20 @@ def _one_of(targets: dict[str, float | str | None]) -> tuple[str, float | str] |
     return given[0] if given else None
 
 
-def _candidates(codec: str | Codec | Sequence[Codec], settings: dict[str, Any]) -> Codec | Sequence[Codec]:
+def _candidates(
+    codec: str | Codec | Sequence[Codec] | None, settings: dict[str, Any], purpose: str | None
+) -> Codec | Sequence[Codec]:
     """The settings object of the one codec that is asked for, or of all to choose from."""
-    if isinstance(codec, str):
-        if codec == AUTO:
-            return [make_codec(name, settings, KEYWORDS) for name in codec_ids()]
-        return make_codec(codec, settings, KEYWORDS)
+    if codec is None or isinstance(codec, str):
+        return candidates(
+            codec, purpose, lambda name, own: make_codec(name, {**own, **settings}, KEYWORDS), frozenset(settings)
+        )
     given = codec if isinstance(codec, list | tuple) else [codec]
     if not given or not all(isinstance(one, Codec) and not isinstance(one, type) for one in given):
         raise TypeError(f"codec is {show(codec)}; an id such as 'mcgv', a settings object or a list of those is needed")
+    check_purpose(purpose)
+    for one in given:
+        check_serves(cast("Codec", one), purpose)
     if settings:
         names = ", ".join(settings)
         raise SettingError(f"{names} beside a settings object; set it there, or give the codec's id and settings by name")

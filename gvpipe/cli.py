@@ -65,8 +65,18 @@ def cli() -> None:
 @cli.command()
 @click.argument("sources", metavar="INPUT...", nargs=-1, required=True)
 @click.argument("target", metavar="OUTPUT.mp4")
-@click.option("--codec", default="mcgv", show_default=True, help="See `gvpipe codecs`; auto: the one with the smallest file.")
-@click.option("--quality", type=float, help="0-100, higher is better; with a target, where the search begins. [default: 75]")
+@click.option("--codec", help="See `gvpipe codecs`; auto: the one with the smallest file. [default: mcgv; with --for, auto]")
+@click.option(
+    "--for",
+    "purpose",
+    type=click.Choice(["web", "archive", "stream"]),
+    help="What the file is for: browsers play it; the smallest; starts at once and jumps fast. [default: archive]",
+)
+@click.option(
+    "--quality",
+    type=float,
+    help="0-100, higher is better; with --target-bpvf and --max-error, where the search begins. [default: 75]",
+)
 @click.option("--target-rmse", type=float, metavar="X", help="Largest rmse, as a part of the diagonal, such as 1e-4.")
 @click.option("--target-kg", type=float, metavar="X", help="Largest KG error, percent, such as 0.1.")
 @click.option("--target-bpvf", type=float, metavar="X", help="Most bits per vertex and frame.")
@@ -79,7 +89,8 @@ def cli() -> None:
 def encode(
     sources: tuple[str, ...],
     target: str,
-    codec: str,
+    codec: str | None,
+    purpose: str | None,
     quality: float | None,
     target_rmse: float | None,
     target_kg: float | None,
@@ -98,8 +109,8 @@ def encode(
     an .npz or a geometry video on standard input. OUTPUT - is standard output.
     """
     from gvpipe import api
-    from gvpipe.auto import AUTO
-    from gvpipe.codec import codec_class, codec_ids
+    from gvpipe.codec import codec_class
+    from gvpipe.purposes import candidates
 
     if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
         message = f"{len(sources) + 1} files are given, and the last, {target}, is no .mp4; end with the output's name"
@@ -112,10 +123,15 @@ def encode(
     settings = _parse_pairs(pairs)
     given = {"quality": quality, "segment": segment, "reorder": reorder or None}
     settings.update({key: str(value) for key, value in given.items() if value is not None})
-    chosen = [codec_class(name).from_texts(settings) for name in (codec_ids() if codec == AUTO else [codec])]
+    chosen = candidates(
+        codec,
+        purpose,
+        lambda name, own: codec_class(name).from_texts({**{key: str(value) for key, value in own.items()}, **settings}),
+        frozenset(settings),
+    )
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
-        report = api.encode(source, path, chosen if codec == AUTO else chosen[0], progress, fps, **targets)  # type: ignore[arg-type]  # by name
+        report = api.encode(source, path, chosen, progress, fps, **targets)  # type: ignore[arg-type]  # by name
     out = out.carrying(target)
     for note in report.notes:
         out.note(note)
@@ -217,12 +233,13 @@ def compare(reference: str, distorted: str, out: Output) -> None:
 @click.argument("source", metavar="FILE.mp4")
 @click.argument("target", metavar="OUT.html")
 @click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="The axis that stands upright.")
-@click.option("--quality", type=float, help="0-100, where the file must be converted. [default: 75]")
+@click.option("--quality", type=float, help="0-100, of a conversion: the error that it may add. [default: 90]")
 @output_options
 def export_html(source: str, target: str, up: str, quality: float | None, out: Output) -> None:
     """Write a web page of one file that plays a geometry video, without a network.
 
-    Browsers read codec mcgv in its web profile; other files are converted, which adds an error that is told.
+    Browsers read codec mcgv in its web profile; other files are converted, which adds an error that is told: KG 0.044 or less
+    by default.
     """
     from gvpipe import web
 
@@ -284,7 +301,12 @@ def render(source: str, target: str, size: str, out: Output, **options: Any) -> 
 
 @cli.command()
 @click.argument("sources", metavar="SEQUENCES...", nargs=-1, required=True)
-@click.option("--codecs", "codec_list", metavar="ID,ID...", help="Codecs to measure, ID or ID:KEY=VALUE. [default: all]")
+@click.option(
+    "--codecs",
+    "codec_list",
+    metavar="ID,ID...",
+    help="What to measure, ID or ID:KEY=VALUE. [default: all, mcgv in 3 ways]",
+)
 @click.option("--qualities", metavar="Q,Q...", help="Qualities to measure. [default: 0,20,40,60,75,90,100]")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting for all these codecs; repeat for more.")
 @click.option("--kg", default="1,0.3,0.1", show_default=True, metavar="KG,KG...", help="Errors at which to tell rates.")
@@ -309,11 +331,10 @@ def bench(
 
     \b
     gvpipe bench a.npz b.npz --json out.json
-    gvpipe bench a.npz --codecs mcgv,mcgv:prediction=blended,pca
+    gvpipe bench a.npz --codecs mcgv,mcgv:prediction=affine,pca
     gvpipe bench --plot out.json plots/
     """
     from gvpipe import bench as benches
-    from gvpipe.codec import codec_ids
     from gvpipe.curves import tables
 
     if report is not None:
@@ -324,7 +345,7 @@ def bench(
         drawn = plots.draw(benches.Report.read(report), sources[0], plots.read_peers(peers) if peers else None)
         out.text("\n".join(map(str, drawn)))
         return
-    chosen = [name.strip() for name in codec_list.split(",")] if codec_list else codec_ids()
+    chosen = [name.strip() for name in codec_list.split(",")] if codec_list else benches.default_codecs()
     wanted = _parse_numbers("--qualities", qualities) if qualities else list(benches.QUALITIES)
     levels = {"kg": _parse_numbers("--kg", kg), **({"sted": _parse_numbers("--sted", sted)} if sted else {})}
     with out.progress() as progress:
@@ -337,22 +358,26 @@ def bench(
 @cli.command()
 @output_options
 def codecs(out: Output) -> None:
-    """List the codecs and their settings."""
+    """List the codecs and their settings, and the settings that --codec auto tries beside the defaults."""
     import dataclasses
 
     from gvpipe.codec import codec_class, codec_ids
+    from gvpipe.purposes import VARIANTS
 
     with out.progress():
         found = {name: codec_class(name) for name in codec_ids()}
     settings = {name: {field.name: field.default for field in dataclasses.fields(codec)} for name, codec in found.items()}
+    variants = {name: [own for own in VARIANTS.get(name, ()) if own] for name in found}
     values = [
-        {"id": name, "version": codec.version, "summary": codec.summary, "settings": settings[name]}
+        {"id": name, "version": codec.version, "summary": codec.summary, "settings": settings[name], "variants": variants[name]}
         for name, codec in found.items()
     ]
     out.json({"codecs": values})
     for name, codec in found.items():
         defaults = " ".join(f"{key}={value}" for key, value in settings[name].items())
         out.text(f"{name}: {codec.summary}; {defaults}")
+        for own in variants[name]:
+            out.text(f"  --codec auto tries too: {' '.join(f'{key}={value}' for key, value in own.items())}")
 
 
 class _Part:
@@ -389,10 +414,11 @@ def _parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:
 def _tell_conversion(out: Output, report: ExportReport) -> None:
     """Say on standard error what the page shows instead of the file's own frames."""
     if report.converted:
-        rmse, largest = ("not defined" if v is None else f"{v:.1e}" for v in (report.rmse_diag, report.max_diag))
+        values = (report.rmse_diag, report.max_diag, report.kg)
+        rmse, largest, kg = ("not defined" if v is None else f"{v:.1e}" for v in values)
         out.note(
             f"browsers cannot read {report.converted}; the page holds a conversion to mcgv, web profile, which adds an "
-            f"error of rmse {rmse}, at most {largest}, of the diagonal"
+            f"error of rmse {rmse}, at most {largest}, of the diagonal (KG {kg} %)"
         )
 
 

@@ -3,8 +3,14 @@
 Bytes and the logarithm of the error follow quality monotonically and nearly in a straight line, so a target is a root of a
 rising function of quality. `find_quality` takes steps of an assumed slope until the root lies between two qualities, then
 regula falsi; where one end would stay for ever, its value is halved (the Illinois rule: M. Dowell and P. Jarratt, A modified
-regula falsi method, 1971). The errors of small meshes scatter by some percent about their trend, so that no method finds a
-root: then it tries qualities next to where the root lies on the mean, one after the other, until one is met.
+regula falsi method, 1971). A target error begins with the quality that aims at it (`gvpipe.quality`).
+
+An encoder that aims measures its first encode, and corrects those that follow by it. So a first trial that misses by little
+is not on the curve of the others: half of its miss is corrected, and it bounds no root.
+
+The errors of small meshes scatter by some percent about their trend, so that no method finds a root: then it tries qualities
+next to where the root lies on the mean, one after the other, until one is met.
+
 `find_smallest` fits parabolas to the logarithm of the size.
 
 Encodes are what costs, so neither makes more than a few: 8, and 12 where errors scatter, since a trial of a small mesh costs
@@ -19,13 +25,16 @@ from dataclasses import dataclass
 
 from gvpipe.codec import Codec, Progress
 from gvpipe.errors import InputError, SettingError
+from gvpipe.quality import ABOVE, BELOW, MIDDLE, quality_of
 from gvpipe.sequence import MeshSequence
 from gvpipe.trials import Trial, Trials
-from gvpipe.vertex_errors import frame_diagonal
+from gvpipe.vertex_errors import frame_diagonal, measure_spread
 
 TOLERANCE = 0.03  # how far on its allowed side of the target a result may lie
 MOST_ENCODES = 8
-SLOPES = {"rmse": 0.055, "kg": 0.055, "bpvf": 0.025}  # assumed change of the logarithm per unit of quality
+RATE_SLOPE = 0.025  # assumed change of the logarithm of the size per unit of quality; that of the error: `gvpipe.quality`
+AIMED = 0.35  # logarithm: a first trial that misses the error by no more was aimed at it
+BELIEVED = 0.7, 1.3  # times the assumed slope: between such a trial and the second
 NAMES = {
     "rmse": "an rmse (of the diagonal) of",
     "kg": "a KG error (percent) of",
@@ -93,7 +102,9 @@ class Choice:
 def meet(
     target: Target, codec: Codec, sequence: MeshSequence, progress: Progress | None = None, is_rough: bool = False
 ) -> Choice:
-    """Encode at the quality that meets a target, within 3 % or, for estimates, roughly; starts at the codec's own quality.
+    """Encode at the quality that meets a target, within 3 % or, for estimates, roughly.
+
+    The search starts at the quality that aims at an rmse or KG error, for other targets at the codec's own.
 
     Raises:
         InputError: no quality meets it.
@@ -106,7 +117,8 @@ def meet(
         )
         return Choice(trial, trials, tried, reason)
     trials = Trials(codec, sequence, None, progress)
-    trial, tried = find_quality(trials, target, codec.quality, ROUGH_TOLERANCE if is_rough else TOLERANCE)
+    tolerance = ROUGH_TOLERANCE if is_rough else TOLERANCE
+    trial, tried = find_quality(trials, target, _start(target, codec, sequence, tolerance), tolerance)
     found = target.of(trial)
     reason = f"quality {trial.codec.quality:.4g} gives {NAMES[target.measure]} {found:.4g} where {target.value:g} is allowed"
     if found < (1 - TOLERANCE) * target.value:
@@ -142,42 +154,45 @@ def find_quality(attempt: Attempt, target: Target, start: float, tolerance: floa
         InputError: no quality meets the target; the message tells the best.
     """
     goal = _Goal(target, tolerance)
-    slope = goal.slope
+    slope = goal.slope(start)
     tried: list[Trial] = []
     low: tuple[float, float] | None = None  # quality and value below the root
     high: tuple[float, float] | None = None
+    aimed: tuple[float, float] | None = None  # the first trial, if it misses by little
     quality, was_low, n_near = start, False, 0
     for _ in range(MOST_ENCODES):
         trial = attempt(quality)
         tried.append(trial)
         value = goal.value(trial)
-        if goal.is_close(value):
+        if goal.is_close(value) or (value < 0 and quality >= 100) or (value > 0 and quality <= 0):
             break
+        if len(tried) == 1 and target.measure != "bpvf" and abs(value) < AIMED:
+            aimed = (quality, value)
+            quality = _within(quality - value / 2 / slope)
+            continue
         if value < 0:
-            if quality >= 100:
-                break
             if low and high and was_low:
                 high = (high[0], high[1] / 2)
             slope = _slope(low, (quality, value), slope)
             low = (quality, value)
         else:
-            if quality <= 0:
-                break
             if low and high and not was_low:
                 low = (low[0], low[1] / 2)
             slope = _slope((quality, value), high, slope)
             high = (quality, value)
         was_low = value < 0
-        is_near = abs(value) < NEAR * max(slope, goal.slope / 4)  # scatter makes slopes flat
+        is_near = abs(value) < NEAR * max(slope, goal.slope(quality) / 4)  # scatter makes slopes flat
         n_near += is_near
         if n_near > MOST_NEAR:
-            _look_around(attempt, goal, tried)
+            _look_around(attempt, goal, tried, 1 if aimed else 0)
             break
         if low and high:
             part = min(max(low[1] / (low[1] - high[1]), 0.02), 0.98)
             quality = low[0] + part * (high[0] - low[0])
-        elif len(tried) > 2 and not is_near:
+        elif len(tried) > 2 and abs(value) > AIMED:
             quality = 100.0 if low else 0.0
+        elif aimed and len(tried) == 2:
+            quality = _within(quality - value / _slope(aimed, (quality, value), slope, BELIEVED))
         else:
             quality = _within(quality - value / slope)
     allowed = [trial for trial in tried if target.is_met(trial)]
@@ -197,10 +212,11 @@ class _Goal:
     target: Target
     tolerance: float
 
-    @property
-    def slope(self) -> float:
+    def slope(self, quality: float) -> float:
         """Assumed, per unit of quality."""
-        return SLOPES[self.target.measure]
+        if self.target.measure == "bpvf":
+            return RATE_SLOPE
+        return BELOW if quality < MIDDLE else ABOVE
 
     def value(self, trial: Trial) -> float:
         """Logarithm of what the trial came to over the middle of what is close enough; below 0 where quality is too low."""
@@ -213,14 +229,16 @@ class _Goal:
         return abs(value) <= -math.log(1 - self.tolerance) / 2
 
 
-def _look_around(attempt: Attempt, goal: _Goal, tried: list[Trial]) -> None:
-    """Go on, where the trials near the root have it on the mean, until one is close enough; the trials go to ``tried``.
+def _look_around(attempt: Attempt, goal: _Goal, tried: list[Trial], first: int) -> None:
+    """Go on, where the trials near the root, from ``first`` on, have it on the mean, until one is close enough.
+
+    The trials go to ``tried``.
 
     Errors that scatter are as if drawn anew at every quality, so that the best guess is any untried one next to the root. Where
     a codec gives the same bytes as before, its qualities are coarser, and steps grow.
     """
-    known = [(trial.codec.quality, goal.value(trial)) for trial in tried]
-    slope = _slope(min(known), max(known), goal.slope)
+    known = [(trial.codec.quality, goal.value(trial)) for trial in tried[first:]]
+    slope = _slope(min(known), max(known), goal.slope(known[-1][0]))
     spacing = SPACING
     while len(tried) < MOST_SCATTERED:
         reach = max(NEAR * slope, min(abs(value) for _, value in known))
@@ -252,7 +270,7 @@ def find_smallest(attempt: Attempt, bound: float, start: float, tolerance: float
     size(start)
     rmse = trials[start].errors.rmse
     if rmse > 0:  # towards where rmse is a usual part of the bound
-        size(_within(start + _clip(math.log(BOUND_RATIO * rmse / bound) / SLOPES["rmse"], 30.0)))
+        size(_within(start + _clip(math.log(BOUND_RATIO * rmse / bound) / BELOW, 30.0)))
     step = FIRST_STEP
     while len(trials) < MOST_ENCODES:
         known = sorted(trials)
@@ -275,11 +293,26 @@ def find_smallest(attempt: Attempt, bound: float, start: float, tolerance: float
     return min(tried, key=lambda trial: trial.bytes), tried
 
 
-def _slope(low: tuple[float, float] | None, high: tuple[float, float] | None, assumed: float) -> float:
-    """Slope through two points, if both are there and it is near enough to the assumed one to be believed."""
+def _start(target: Target, codec: Codec, sequence: MeshSequence, tolerance: float) -> float:
+    """The first quality to try: of the KG error in the middle of what is close enough, or the codec's own."""
+    if target.measure not in ("rmse", "kg"):
+        return codec.quality
+    error = target.value * math.sqrt(1 - tolerance)
+    if target.measure == "rmse":
+        error *= 100 * frame_diagonal(sequence) / measure_spread(sequence)
+    return quality_of(error) if error > 0 else codec.quality
+
+
+def _slope(
+    low: tuple[float, float] | None,
+    high: tuple[float, float] | None,
+    assumed: float,
+    believed: tuple[float, float] = (0.25, 4.0),
+) -> float:
+    """Slope through two points, if both are there, as near to the assumed one as is believed."""
     if low is None or high is None or low[0] == high[0]:
         return assumed
-    return min(max((high[1] - low[1]) / (high[0] - low[0]), assumed / 4), assumed * 4)
+    return min(max((high[1] - low[1]) / (high[0] - low[0]), assumed * believed[0]), assumed * believed[1])
 
 
 def _vertex(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> tuple[float, float]:

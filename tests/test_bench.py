@@ -202,4 +202,7 @@ def test_bars_are_as_long_as_their_share(run: Run, tmp_path: Path) -> None:
 
 def test_every_codec_by_default(sheet: Path) -> None:
     assert set(codec_ids()) >= {"mcgv", "pca", "pdct"}
+    named = bench.default_codecs()
+    assert {name.split(":")[0] for name in named} == set(codec_ids()) and len(named) == len(codec_ids()) + 2
+    assert {"mcgv", "mcgv:transform=klt", "mcgv:prediction=affine"} <= set(named)
     assert {curve.codec for curve in bench.run([str(sheet)], codec_ids(), (50,)).curves} == set(codec_ids())

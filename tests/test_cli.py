@@ -183,8 +183,10 @@ def test_reorder(run: Run, npz: Path, sequence: MeshSequence, tmp_path: Path) ->
 
 
 def test_codecs(run: Run) -> None:
-    """One line per codec: its id, and every setting with its default."""
-    lines = run("codecs").out.splitlines()
+    """One line per codec: its id, and every setting with its default; below, indented, what competes beside the defaults."""
+    printed = run("codecs").out.splitlines()
+    lines = [line for line in printed if not line.startswith(" ")]
+    assert printed[printed.index(next(line for line in lines if line.startswith("mcgv"))) + 1].endswith(": transform=klt")
     assert [line.split(":")[0] for line in lines] == codec_ids() and "mcgv" in codec_ids()
     for line, name in zip(lines, codec_ids(), strict=True):
         told = dict(word.split("=", 1) for word in line.split("; ")[-1].split())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import json
 import re
 import shutil
@@ -12,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from conftest import Finished
 from sequences import waving
@@ -19,7 +21,9 @@ from sequences import waving
 import gvpipe
 from gvpipe.codec import codec_class
 from gvpipe.errors import CorruptFile, InputError, OutputError
-from gvpipe.web.export import READS
+from gvpipe.quality import error_of
+from gvpipe.trials import Trial, Trials
+from gvpipe.web.export import MOST_ENCODES, READS
 
 WEB = Path(gvpipe.__file__).parent / "web"
 PLAYER_BYTES = 1.5e6  # what a page may hold beside 1.4 times its file
@@ -71,9 +75,44 @@ def test_conversion_is_measured(settings: dict[str, Any], kind: str, tmp_path: P
     report = gvpipe.export_html(tmp_path / "other.mp4", tmp_path / "page.html", quality=90)
     (tmp_path / "inside.mp4").write_bytes(_embedded(tmp_path / "page.html"))
     added = gvpipe.compare(gvpipe.decode(tmp_path / "other.mp4"), gvpipe.decode(tmp_path / "inside.mp4"))
-    assert (report.converted, report.rmse_diag, report.max_diag) == (kind, added.rmse_diag, added.max_diag)
-    assert 0 < (report.rmse_diag or 0) < 1e-3
+    assert report.converted == kind
+    assert (report.rmse_diag, report.max_diag, report.kg) == pytest.approx(
+        (added.rmse_diag, added.max_diag, added.kg), rel=1e-9
+    )
+    assert 0 < (report.kg or 0) <= error_of(90)
     assert gvpipe.open(tmp_path / "inside.mp4").bitstream.header["profile"] == "h264-8"
+
+
+def test_conversion_adds_little(tmp_path: Path) -> None:
+    """To a file at default quality; vertices that coincide do so in the page too."""
+    sequence = gvpipe.read(Path(__file__).parents[1] / "samples" / "creature.npz").part(0, 30)
+    corners = sequence.faces.ravel()  # a soup: each triangle has vertices of its own
+    soup = gvpipe.MeshSequence(sequence.read(0, 30)[:, corners], np.arange(len(corners), dtype=np.int32).reshape(-1, 3), 30.0)
+    gvpipe.encode(soup, tmp_path / "other.mp4", "pca")
+    gvpipe.export_html(tmp_path / "other.mp4", tmp_path / "page.html")
+    (tmp_path / "inside.mp4").write_bytes(_embedded(tmp_path / "page.html"))
+    own, shown = (gvpipe.compare(soup, gvpipe.decode(tmp_path / name)).kg for name in ("other.mp4", "inside.mp4"))
+    assert own is not None and shown is not None and shown <= 1.15 * own
+    positions = gvpipe.decode(tmp_path / "inside.mp4").read(0, 30)
+    _, first, number = np.unique(corners, return_index=True, return_inverse=True)
+    assert np.array_equal(positions, positions[:, first[number]])
+
+
+def test_a_conversion_takes_few_encodes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the error allowed is out of reach, the best of them is shown, and the report has its error."""
+    gvpipe.encode(waving(8, 6), tmp_path / "other.mp4", "pca")
+    qualities: list[float] = []
+    encode = Trials.__call__
+
+    def counted(self: Trials, quality: float) -> Trial:
+        qualities.append(quality)
+        trial = encode(self, quality)
+        return dataclasses.replace(trial, errors=dataclasses.replace(trial.errors, kg=10 / len(qualities)))
+
+    monkeypatch.setattr(Trials, "__call__", counted)
+    report = gvpipe.export_html(tmp_path / "other.mp4", tmp_path / "page.html", quality=40)
+    assert len(qualities) == MOST_ENCODES and qualities == sorted(qualities)
+    assert report.kg == 10 / MOST_ENCODES
 
 
 def test_command_says_what_it_did(run: Run, video: Path, tmp_path: Path) -> None:
@@ -82,7 +121,10 @@ def test_command_says_what_it_did(run: Run, video: Path, tmp_path: Path) -> None
     assert plain.status == 0 and plain.err == "" and "MB" in plain.out
     converted = run("export-html", tmp_path / "other.mp4", tmp_path / "b.html")
     assert converted.status == 0
-    assert re.search(r"browsers cannot read pca.*rmse \d\.\de-\d\d, at most \d\.\de-\d\d", converted.err)
+    assert re.search(
+        r"browsers cannot read pca.*rmse \d\.\de-\d\d, at most \d\.\de-\d\d, of the diagonal \(KG \d\.\de-\d\d %\)",
+        converted.err,
+    )
     values = json.loads(run("export-html", video, tmp_path / "a.html", "--json").out)
     assert values == gvpipe.export_html(video, tmp_path / "a.html").to_json()
 

@@ -147,7 +147,7 @@ class Mcgv(Settings):
         wanted = error_of(self.quality) / 100 * memo("spread", lambda: measure_spread(sequence))
         anchors = memo("anchors", list[_Anchor])
         for anchor in anchors:  # what was measured at another quality serves this one
-            step = anchor.start.step * wanted / anchor.error
+            step = anchor.start.step * (wanted / anchor.error) ** (1 / anchor.slope)
             if not anchor.fitted or max(step / anchor.fitted_step, anchor.fitted_step / step) < REUSED:
                 return self._code(sequence, anchor.start, step, anchor.fitted, memo, report)
         aimed, anchor = self._aim(sequence, wanted, memo, report)
@@ -176,7 +176,7 @@ class Mcgv(Settings):
                 near = dataclasses.replace(start, step=step * min(max(0.9 / max(first, 1e-9), 1 / FARTHEST), FARTHEST))
                 fitted, step = self._fit(near, 0.0, memo, report)
         aimed = aim(encode, measure, step, wanted, BAND[self.prediction])
-        return aimed, _Anchor(dataclasses.replace(start, step=aimed.step), fitted, step, aimed.error)
+        return aimed, _Anchor(dataclasses.replace(start, step=aimed.step), fitted, step, aimed.error, aimed.slope)
 
     def _code(
         self, sequence: MeshSequence, start: _Start, step: float, fitted: Fitted | None, memo: Memo, report: Progress
@@ -429,12 +429,13 @@ class _Start:
 
 @dataclass(frozen=True)
 class _Anchor:
-    """An encode that was measured: its start and blend, the step that this was fitted for, and its error, model units."""
+    """An encode that was measured: its start and blend, the step that this was fitted for, its error, and `Aimed.slope`."""
 
     start: _Start
     fitted: Fitted | None
     fitted_step: float
     error: float
+    slope: float
 
 
 @dataclass(frozen=True)
