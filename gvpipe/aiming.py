@@ -1,14 +1,16 @@
 """From the error that a quality asks for to an encoder's step: code, measure, mend.
 
 How error follows from step is a sequence's own. Its logarithm is nearly a straight line over the step's, so two or
-three encodes do.
+three encodes do. Encodes of the same sequence at other qualities interpolate between the steps that were measured (`Anchor`),
+without a loop.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,7 +20,9 @@ from gvpipe.sequence import MeshSequence
 
 ROUNDS = 3  # encodes at most
 MOST_MOVED = 4.0  # times, a step at once
-SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: assumed, and believed
+SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: assumed by `aim`, and believed
+BAND = 0.9, 1.06  # part of the error wanted that is close enough, for codecs whose errors scatter by a few percent
+NEAR = 2.0  # times, an error beside a measured one for which the step in proportion is believed
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,14 @@ class Aimed:
     """An encode, its step and its root mean square error, model units."""
 
     bitstream: Bitstream
+    step: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """A step and the root mean square error that it left, model units."""
+
     step: float
     error: float
 
@@ -46,20 +58,59 @@ def aim(
         wanted: error.
         band: least and most part of the error wanted that is close enough.
     """
+
+    def attempt(step: float) -> Aimed:
+        bitstream = encode(step)
+        return Aimed(bitstream, step, measure(bitstream))
+
+    return mend(attempt, step, wanted, band, SLOPE)
+
+
+def mend(
+    attempt: Callable[[float], Aimed], step: float, wanted: float, band: tuple[float, float] = BAND, slope: float = 1.0
+) -> Aimed:
+    """As `aim`, for encoders that know their error: ``attempt`` makes and measures a bitstream with a step.
+
+    ``slope`` of the error's logarithm over the step's is assumed until two are measured.
+    """
     aimed_at = wanted * math.sqrt(band[0] * band[1])
     tried: list[Aimed] = []
-    slope = SLOPE
     for _ in range(ROUNDS):
-        bitstream = encode(step)
-        trial = Aimed(bitstream, step, max(measure(bitstream), 1e-300))
+        trial = attempt(step)
+        trial = Aimed(trial.bitstream, step, max(trial.error, 1e-300))
         if tried:
             last = tried[-1]
             slope = min(max(math.log(trial.error / last.error) / math.log(trial.step / last.step), SLOPES[0]), SLOPES[1])
         tried.append(trial)
         if band[0] <= trial.error / wanted <= band[1]:
             break
-        step *= min(max((aimed_at / trial.error) ** (1 / slope), 1 / MOST_MOVED), MOST_MOVED)
-    return min(tried, key=lambda trial: abs(math.log(trial.error / aimed_at)))
+        move = (math.log(aimed_at) - math.log(trial.error)) / slope
+        step *= math.exp(min(max(move, -math.log(MOST_MOVED)), math.log(MOST_MOVED)))
+    return min(tried, key=lambda trial: abs(math.log(trial.error) - math.log(aimed_at)))
+
+
+def step_between(anchors: Sequence[Anchor], wanted: float) -> float | None:
+    """The step for an error, model units, that lies between or near those measured; None if it lies far from all.
+
+    Between two anchors the logarithm of the step is interpolated; beside one, steps are in proportion to errors.
+    """
+    ordered = sorted(anchors, key=lambda anchor: anchor.error)
+    for low, high in pairwise(ordered):
+        if low.error <= wanted < high.error:
+            part = math.log(wanted / low.error) / math.log(high.error / low.error)
+            return low.step * math.exp(part * math.log(high.step / low.step))
+    near = _nearest(anchors, wanted)
+    return near.step * wanted / near.error if near and 1 / NEAR <= wanted / near.error <= NEAR else None
+
+
+def first_step(anchors: Sequence[Anchor], wanted: float, ratio: float) -> float:
+    """Where a loop starts: in proportion to the nearest anchor; without one, ``ratio`` times the error wanted."""
+    near = _nearest(anchors, wanted)
+    return wanted * (near.step / near.error if near else ratio)
+
+
+def _nearest(anchors: Sequence[Anchor], wanted: float) -> Anchor | None:
+    return min(anchors, key=lambda anchor: abs(math.log(anchor.error / wanted)), default=None)
 
 
 def root_mean_square(sequence: MeshSequence, reader: FrameReader) -> float:

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from gvpipe.bare_mesh import BareMesh, decode_mesh, encode_mesh
 from gvpipe.codec import Memo, Progress
 from gvpipe.connectivity import EncodedMesh
+from gvpipe.quality import error_of
 from gvpipe.sequence import MeshSequence
-
-COARSEST, DECADES = 10.0, 2 * 4 / 3  # aimed error at quality 0, percent of the spread, and decades down to quality 100
 
 Float64 = NDArray[np.float64]
 
@@ -37,8 +36,8 @@ class CodedPoints:
     spread: float
 
     def aimed_error(self, quality: float) -> float:
-        """Root mean square error of a vertex, model units: a Karni-Gotsman error of ``10 ** (1 - quality / 37.5)`` percent."""
-        return self.spread * COARSEST * 10 ** -(DECADES * quality / 100) / 100
+        """Root mean square error of a vertex, model units, that a quality asks for (`gvpipe.quality`)."""
+        return self.spread * error_of(quality) / 100
 
 
 def code_points(sequence: MeshSequence, reorder: bool, memo: Memo, report: Progress) -> CodedPoints:
