@@ -15,7 +15,7 @@ from pathlib import Path
 import gvpipe
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from chromium import chromium
+from browsers import browser as running
 
 MEASURE = """
 const [size, seconds, done] = arguments;
@@ -55,7 +55,7 @@ def main() -> None:
     folder = Path(tempfile.mkdtemp(prefix="gvpipe-"))
     try:
         report = gvpipe.export_html(options.file, folder / "page.html")
-        with chromium(folder / "profile", (options.size + 100, options.size + 300)) as browser:
+        with running("chromium", folder / "profile", (options.size + 100, options.size + 300)) as browser:
             browser.get((folder / "page.html").as_uri())
             width, height, rate, gap, seek, load = browser.execute_async_script(MEASURE, options.size, options.seconds)
     finally:

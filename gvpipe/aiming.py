@@ -19,7 +19,7 @@ from gvpipe.codec import FrameReader
 from gvpipe.sequence import MeshSequence
 
 ROUNDS = 3  # encodes at most
-MOST_MOVED = 4.0  # times, a step at once
+MOST_MOVED = math.log(4)  # of a step's logarithm, at once
 SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: assumed by `aim`, and believed
 BAND = 0.9, 1.06  # part of the error wanted that is close enough, for codecs whose errors scatter by a few percent
 NEAR = 2.0  # times, an error beside a measured one for which the step in proportion is believed
@@ -48,6 +48,7 @@ def aim(
     step: float,
     wanted: float,
     band: tuple[float, float],
+    rounds: int = ROUNDS,
 ) -> Aimed:
     """Encode with one step after the other until the error is close enough; return the encode that came closest.
 
@@ -57,17 +58,23 @@ def aim(
         step: the first.
         wanted: error.
         band: least and most part of the error wanted that is close enough.
+        rounds: most encodes.
     """
 
     def attempt(step: float) -> Aimed:
         bitstream = encode(step)
         return Aimed(bitstream, step, measure(bitstream))
 
-    return mend(attempt, step, wanted, band, SLOPE)
+    return mend(attempt, step, wanted, band, SLOPE, rounds)
 
 
 def mend(
-    attempt: Callable[[float], Aimed], step: float, wanted: float, band: tuple[float, float] = BAND, slope: float = 1.0
+    attempt: Callable[[float], Aimed],
+    step: float,
+    wanted: float,
+    band: tuple[float, float] = BAND,
+    slope: float = 1.0,
+    rounds: int = ROUNDS,
 ) -> Aimed:
     """As `aim`, for encoders that know their error: ``attempt`` makes and measures a bitstream with a step.
 
@@ -75,17 +82,18 @@ def mend(
     """
     aimed_at = wanted * math.sqrt(band[0] * band[1])
     tried: list[Aimed] = []
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         trial = attempt(step)
         trial = Aimed(trial.bitstream, step, max(trial.error, 1e-300))
-        if tried:
+        if tried and trial.step != tried[-1].step:
             last = tried[-1]
-            slope = min(max(math.log(trial.error / last.error) / math.log(trial.step / last.step), SLOPES[0]), SLOPES[1])
+            slope = math.log(trial.error / last.error) / math.log(trial.step / last.step)
+            slope = min(max(slope, SLOPES[0]), SLOPES[1])
         tried.append(trial)
         if band[0] <= trial.error / wanted <= band[1]:
             break
         move = (math.log(aimed_at) - math.log(trial.error)) / slope
-        step *= math.exp(min(max(move, -math.log(MOST_MOVED)), math.log(MOST_MOVED)))
+        step *= math.exp(min(max(move, -MOST_MOVED), MOST_MOVED))
     return min(tried, key=lambda trial: abs(math.log(trial.error) - math.log(aimed_at)))
 
 

@@ -265,6 +265,7 @@ def play(source: str, up: str, out: Output) -> None:
 )
 @click.option("--up", type=click.Choice(["x", "y", "z"]), default="y", show_default=True, help="The axis that is up.")
 @click.option("--turntable", is_flag=True, help="Let the camera go once around.")
+@click.option("--follow", is_flag=True, help="Let the camera go with the mesh.")
 @click.option("--error-of", "error_of", metavar="REFERENCE", help="Colour each vertex by its distance from REFERENCE's.")
 @click.option("--error-max", type=float, metavar="PERCENT", help="Where the colours end. [default: the largest error drawn]")
 @click.option("--shading", type=click.Choice(["smooth", "flat"]), default="smooth", show_default=True)

@@ -87,14 +87,21 @@ def measure_errors(reference: MeshSequence, read: Callable[[int, int], Float32])
 
 
 def measure_spread(sequence: MeshSequence) -> float:
-    """Root mean square distance, model units, of vertices from their frame's centre; of a point, a part of its coordinates."""
+    """Root mean square distance, model units, of vertices from their frame's centre.
+
+    Of one vertex, or vertices at one place: of all frames' from their centre, or a part of the coordinates if none moves.
+    """
     squared, largest = 0.0, 0.0
+    centres = []
     for _, block in sequence.chunks():
         frames = block.astype(np.float64)
-        squared += float(np.square(frames - frames.mean(axis=1, keepdims=True)).sum())
+        centres.append(frames.mean(axis=1))
+        squared += float(np.square(frames - centres[-1][:, None]).sum())
         largest = max(largest, float(np.abs(block).max()))
     spread = math.sqrt(squared / (sequence.n_frames * sequence.n_vertices))
-    return spread or largest * LEAST_SPREAD or 1.0
+    path = np.concatenate(centres)
+    moved = float(np.sqrt(np.square(path - path.mean(axis=0)).sum(axis=1).mean()))
+    return spread or moved or largest * LEAST_SPREAD or 1.0
 
 
 def frame_diagonal(reference: MeshSequence) -> float:

@@ -256,7 +256,7 @@ def test_usage(run: Run, arguments: list[str]) -> None:
         (["--set", "profile=precise", "--set", "image=jpeg"], ["precise", "h264"]),
         (["--set", "size=100x100"], ["size", "100x100", "16"]),
         (["--set", "size=16x"], ["size", "16x", "WIDTHxHEIGHT"]),
-        (["--set", "size=16x16"], ["16x16", "larger"]),
+        (["--set", "prediction=affine", "--set", "size=16x16"], ["16x16", "larger"]),
         (["--set", "clusters=-1"], ["clusters", "-1", "0..1024"]),
         (["--set", "clusters=2.5"], ["clusters", "2.5", "integer"]),
         (["--set", "clusters=99999999999999999999"], ["clusters", "0..1024"]),
@@ -350,7 +350,7 @@ def test_one_file_is_one_frame(run: Run, sequence: MeshSequence, tmp_path: Path)
     assert run("encode", path, tmp_path / "one.mp4").status == 0
     back = gvpipe.open(tmp_path / "one.mp4")
     assert back.shape == (1, 72, 3)
-    assert np.abs(back[0] - sequence.read(0, 1)[0]).max() < 8 / 2**12  # twice a step of the base frame, extent 8
+    assert np.abs(back[0] - sequence.read(0, 1)[0]).max() < 0.01  # 0.14 % of its spread, root mean square; extent 8
 
 
 # outputs that cannot be written

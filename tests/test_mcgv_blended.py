@@ -14,13 +14,13 @@ from scipy import sparse
 from sequences import awkward, grid, waving
 
 from gvcodecs.mcgv import Mcgv
-from gvcodecs.mcgv.blend_fitting import Clustering, fit_blend
+from gvcodecs.mcgv.blend_fitting import Motions, fit_blend
 from gvcodecs.mcgv.blending import INFLUENCES, TOTAL, Blend, BlendFit, Weights, homogeneous
 from gvcodecs.mcgv.points import Points, weld_vertices
 from gvcodecs.mcgv.rebuilding import rebuild_blended
 from gvcodecs.mcgv.separation import keep_apart
 from gvcodecs.mcgv.trajectories import decode_trajectories, encode_trajectories
-from gvcodecs.mcgv.weight_choice import choose
+from gvcodecs.mcgv.weight_choice import Transforms, choose
 from gvcodecs.mcgv.weight_coding import Prices, decode_weights, earlier_neighbours, encode_weights
 from gvcodecs.mcgv.weight_kernels import MAX_LISTED, cluster_of, list_known, rank_of, share
 from gvpipe.codec import open_reader
@@ -185,7 +185,9 @@ def test_choice_finds_the_weights_of_a_blend() -> None:
     prices = (guess.count, guess.gap, guess.change)
     points = homogeneous(base)
     for price, most in ((0.0, 1.0), (1e-4, 2.0)):
-        choose(known.starts, known.near, *near, points, motions, transforms, price, *prices, clusters, parts, errors)
+        choose(
+            known.starts, known.near, *near, points, motions, Transforms.of(transforms), price, *prices, clusters, parts, errors
+        )
         found = Weights(clusters, parts)
         check_weights(found, 3)
         exact = motions - _applied(points, found, transforms)
@@ -207,7 +209,8 @@ def test_dearer_bits_make_smaller_sections() -> None:
     neighbours = adjacency(sequence.faces, len(base))
     sizes = []
     for step in (1e-4, 1e-2):
-        fitted = fit_blend(sequence, base, neighbours, Clustering.of(sequence, base, neighbours), step, 6)
+        fitted, fitted_step = fit_blend(Motions(sequence, base, neighbours), step, 6)
+        assert fitted_step == step
         check_weights(fitted.weights, fitted.n_clusters)
         sizes.append(len(encode_weights(fitted.weights, neighbours)))
     assert sizes[1] < sizes[0]
@@ -218,8 +221,8 @@ def test_as_many_clusters_as_pay() -> None:
     sequence = waving(16, 30)
     base = np.asarray(sequence.read(0, 1)[0], np.float64)
     neighbours = adjacency(sequence.faces, len(base))
-    clustering = Clustering.of(sequence, base, neighbours)
-    counts = [fit_blend(sequence, base, neighbours, clustering, step, 0).n_clusters for step in (100.0, 0.02, 5e-4)]
+    motions = Motions(sequence, base, neighbours)
+    counts = [fit_blend(motions, step, 0)[0].n_clusters for step in (100.0, 0.02, 5e-4)]
     assert counts == sorted(counts) and counts[0] <= 8 < counts[-1]
 
 
@@ -361,7 +364,7 @@ def test_base_frame_tells_places_apart(name: str) -> None:
         steps.append(lattice.step)
         counts.append(len(np.unique(keep_apart(lattice, first), axis=0)))
     assert counts[0] >= 0.99 * counts[1]
-    assert steps[0] >= steps[1]
+    assert steps[0] >= steps[1] * (1 - 1e-4)  # 2**16 and 2**16 - 1 steps along the longest side
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.floats(0.05, 4.0))

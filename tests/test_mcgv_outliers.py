@@ -43,11 +43,11 @@ def stream() -> Bitstream:
 @pytest.mark.parametrize(
     "settings",
     [
-        {"quality": 85},
-        {"quality": 85, "placement": "halves"},
-        {"quality": 100, "prediction": "blended"},
-        {"quality": 100, "profile": "precise"},
-        {"quality": 85, "image": "jpeg"},
+        {"quality": 60, "prediction": "affine"},
+        {"quality": 60, "prediction": "affine", "placement": "halves"},
+        {"quality": 90, "prediction": "blended"},
+        {"quality": 70, "prediction": "affine", "profile": "precise"},
+        {"quality": 60, "prediction": "affine", "image": "jpeg"},
     ],
     ids=str,
 )

@@ -27,7 +27,7 @@ from gvcodecs.mcgv.padding import Padding
 from gvcodecs.mcgv.parameterization import Atlas, parameterize
 from gvcodecs.mcgv.placement import choose_size, place
 from gvcodecs.mcgv.prediction import AffinePredictor
-from gvcodecs.mcgv.quality import LEVELS, OUTLIERS, QP_STEP, Magnitudes, choose_quantiser, effective_step
+from gvcodecs.mcgv.quality import LEVELS, OUTLIERS, QP_STEP, Magnitudes, choose_quantiser
 from gvcodecs.mcgv.segmentation import LocalAffineFit, segment
 from gvcodecs.mcgv.transforms import decode_transforms, dequantise, encode_transforms, quantise
 from gvpipe.binary import Cursor, varint
@@ -35,9 +35,11 @@ from gvpipe.bitstream import ENTRY, MAGIC, PREFIX, Bitstream, pack_payload, unpa
 from gvpipe.codec import open_reader
 from gvpipe.entropy import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile, FormatError, InputError, NewerVersion, TruncatedFile
+from gvpipe.quality import error_of
 from gvpipe.quantize import Lattice
 from gvpipe.sequence import MeshSequence
 from gvpipe.topology import adjacency, components, k_ring, unique_edges, weld
+from gvpipe.vertex_errors import measure_errors
 from gvpipe.video import PROFILES
 
 calmly = settings(max_examples=120, deadline=None)
@@ -421,7 +423,6 @@ def test_quality_is_monotone(name: str, largest: float) -> None:
     effective = []
     for quality in np.linspace(0, 100, 201):
         wanted = 2.0 * 0.08 * 10 ** -np.interp(quality, [0, 75, 100], [0, 0.75 * usual, 2.7])
-        assert effective_step(float(quality), profile, 2.0) == pytest.approx(wanted, rel=1e-9)
         chosen = choose_quantiser(wanted, profile, magnitudes)
         reach = chosen.step * profile.amplitude * (1 + 1e-9)
         assert isinstance(chosen.level, int)
@@ -666,8 +667,8 @@ def test_any_float32_scale(sequence: MeshSequence, scale: float) -> None:
     codec = Mcgv(preset="ultrafast", clusters=3, gop=4)
     scaled = MeshSequence((sequence.read(0, 11) * np.float64(scale)).astype(np.float32), sequence.faces)
     back = open_reader(codec.encode(scaled)).read(0, 11)
-    error = np.abs(back.astype(float) / scale - sequence.read(0, 11)).max()
-    assert error < 8 * 10**-2.8  # one effective step of the default quality, diagonal 8 and more
+    kg = measure_errors(sequence, lambda start, stop: (back[start:stop].astype(float) / scale).astype(np.float32)).kg
+    assert kg is not None and 0.8 * error_of(75) < kg < 1.2 * error_of(75)
 
 
 # quantize, topology

@@ -20,7 +20,7 @@ from gvpipe.poster import make_poster, paint
 from gvpipe.rendering.camera import UP_AXES, VIEWS, Camera, framing
 from gvpipe.rendering.colours import BACKGROUND, LEVELS, error_colours, srgb_codes, to_linear, to_srgb
 from gvpipe.rendering.error_map import ErrorMap
-from gvpipe.rendering.pictures import parse_size
+from gvpipe.rendering.pictures import Film, parse_size
 from gvpipe.rendering.renderer import Renderer
 from gvpipe.sequence import MeshSequence
 
@@ -242,6 +242,22 @@ def test_srgb_there_and_back() -> None:
     assert codes[round(0.2140 * (LEVELS - 1))] in (127, 128)
 
 
+@pytest.mark.parametrize("turntable", [False, True])
+def test_a_camera_that_follows_keeps_the_mesh_where_it_is(turntable: bool) -> None:
+    """A mesh that only moves along gives the same picture in every frame, larger than in a picture of the whole way."""
+    still = waving(10, 6)
+    way = np.linspace(0, 40, 6, dtype=np.float32)[:, None, None] * np.float32([1, 0.5, -1])
+    walking = replace(still, positions=np.repeat(still.positions[:1], 6, axis=0) + way)
+    renderer = gvpipe.Renderer(walking.faces, walking.positions[0], (96, 96))
+    camera = framing(walking, turntable=turntable, follow=True)
+    assert camera.distance < framing(walking, turntable=turntable).distance / 2
+    film = Film(walking, [0, 3, 5], camera, renderer, follow=True)
+    first, *others = (film[k].astype(int) for k in range(3))
+    assert (first != first[0, 0]).any()
+    for picture in others:
+        assert np.abs(picture - first).mean() < 0.5  # coordinates round as they grow
+
+
 def test_turntable_ends_one_step_before_its_start(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     azimuths: list[float] = []
     draw = Renderer.draw
@@ -328,7 +344,10 @@ def test_command_writes_every_kind(run: Run, video: Path, sequence: MeshSequence
     assert run("render", video, tmp_path / "e.png", "--size", 200, *against).status == 0
     with Image.open(tmp_path / "e.png") as image:
         assert image.size == (200, 200)
-    assert run("render", tmp_path / "tube.npz", tmp_path / "t.gif", "--size", 32, "--turntable", "--frame", 0).status == 0
+    assert (
+        run("render", tmp_path / "tube.npz", tmp_path / "t.gif", "--size", 32, "--turntable", "--follow", "--frame", 0).status
+        == 0
+    )
     with Image.open(tmp_path / "t.gif") as image:
         assert getattr(image, "n_frames", 0) == 100
 

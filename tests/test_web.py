@@ -12,10 +12,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import chromium
+import browsers
 import numpy as np
 import numpy.typing as npt
+import pages
 import pytest
+from pages import FRAMES, LOAD, check_frames, run
 from PIL import Image
 from sequences import awkward, patched, waving
 
@@ -29,19 +31,11 @@ from gvpipe.corrections import Bound, encode_corrections
 from gvpipe.errors import CorruptFile
 from gvpipe.sequence import MeshSequence
 
-pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
+pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())
 
-BUNDLE = Path(gvpipe.__file__).parent / "web" / "bundle"
 GOLDEN = Path(__file__).parent / "golden"
 DOCS = (Path(__file__).parents[1] / "docs" / "player.md").read_text("utf-8")
 SAMBA = Path(__file__).parents[2] / "shared" / "data" / "samba.npz"
-MODULE_PAGE = """<!doctype html><link rel="icon" href="data:,"><script type="module">
-import { GeometryVideo, GeometryVideoError } from "./geometry-video.js";
-Object.assign(window, { GeometryVideo, GeometryVideoError });
-</script>"""
-PLAYER_PAGE = """<!doctype html><link rel="icon" href="data:,">
-<style>html, body { margin: 0; height: 100% } geometry-video { height: 100%; --backdrop: #ff00ff }</style>
-<script type="module" src="player.js"></script><geometry-video></geometry-video>"""
 FAST = {"preset": "ultrafast", "clusters": 3, "gop": 4}
 KINDS: dict[str, dict[str, Any]] = {  # how vertices move, and where their pixels are: all that a file may be
     "affine": {"prediction": "affine", "placement": "charts"},
@@ -60,17 +54,14 @@ Mask = npt.NDArray[np.bool_]
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
     """A folder with both pages and both bundles, and its address."""
     folder = tmp_path_factory.mktemp("site")
-    for bundle in BUNDLE.glob("*.js"):
-        shutil.copy(bundle, folder)
-    (folder / "module.html").write_text(MODULE_PAGE)
-    (folder / "player.html").write_text(PLAYER_PAGE)
-    with chromium.served(folder) as address:
+    pages.write_pages(folder)
+    with browsers.served(folder) as address:
         yield folder, address
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    with chromium.chromium(tmp_path_factory.mktemp("profile")) as driver:
+    with browsers.browser("chromium", tmp_path_factory.mktemp("profile")) as driver:
         yield driver
 
 
@@ -78,24 +69,14 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 def module(browser: Any, site: tuple[Path, str]) -> Callable[..., Any]:
     """``module(body, *arguments)`` runs an asynchronous function's body in a page that has imported the module."""
     browser.get(f"{site[1]}/module.html")
-    return lambda body, *arguments: _run(browser, body, *arguments)
+    return lambda body, *arguments: run(browser, body, *arguments)
 
 
 @pytest.fixture
 def player(browser: Any, site: tuple[Path, str]) -> Callable[..., Any]:
     """The same in a page with a player, which is `element` there."""
     browser.get(f"{site[1]}/player.html")
-    return lambda body, *arguments: _run(
-        browser, "const element = document.querySelector('geometry-video');" + body, *arguments
-    )
-
-
-def _run(browser: Any, body: str, *arguments: Any) -> Any:
-    script = f"""const [args, done] = [[...arguments].slice(0, -1), arguments[arguments.length - 1]];
-        (async () => {{ {body} }})().then((value) => done({{ value }}), (error) => done({{ error: String(error.stack) }}))"""
-    result = browser.execute_async_script(script, *arguments)
-    assert "error" not in result, result["error"]
-    return result.get("value")
+    return lambda body, *arguments: run(browser, "const element = document.querySelector('geometry-video');" + body, *arguments)
 
 
 def _encode(site: tuple[Path, str], sequence: MeshSequence, name: str = "x.mp4", **settings: Any) -> Path:
@@ -103,54 +84,17 @@ def _encode(site: tuple[Path, str], sequence: MeshSequence, name: str = "x.mp4",
     return site[0] / name
 
 
-FRAMES = """const video = await GeometryVideo.load(args[0]);
-    const frames = [];
-    const filled = () => new Float32Array(3 * video.vertexCount).fill(NaN);
-    for (const k of args[1]) frames.push(await video.frame(k, filled()));
-    const text = (array) => {
-      let binary = "";
-      for (const byte of new Uint8Array(array.buffer)) binary += String.fromCharCode(byte);
-      return btoa(binary);
-    };
-    const { indices, bounds, fps, frameCount, vertexCount, triangleCount, byteLength } = video;
-    video.close();
-    return { frames: frames.map(text), indices: text(indices), bounds, fps, counts: [frameCount, vertexCount, triangleCount],
-      byteLength };"""
-
-
-def _check_frames(module: Callable[..., Any], path: Path, reference: MeshSequence | None = None, count: int = 12) -> None:
-    """Positions that JavaScript rebuilds are Python's, bit for bit; frames in random order, frame 0 and the last among them.
-
-    Of a ``reference`` that another machine wrote, sums that cancel may differ.
-    """
-    with gvpipe.open(path) as video:
-        order = np.random.default_rng(7).permutation(len(video))
-        visited = [*order[:count].tolist(), len(video) - 1, 0]
-        result = module(FRAMES, path.name, visited)
-        assert result["counts"] == [len(video), video.shape[1], len(video.faces)]
-        assert result["fps"] == video.fps
-        assert result["byteLength"] == path.stat().st_size
-        indices = np.frombuffer(base64.b64decode(result["indices"]), "<u4").reshape(-1, 3)
-        assert np.array_equal(indices, video.faces)
-        for k, text in zip(visited, result["frames"], strict=True):
-            found = np.frombuffer(base64.b64decode(text), "<f4").reshape(-1, 3)
-            assert np.array_equal(found, video[k]), f"frame {k}"
-            if reference:
-                wanted = reference.read(k, k + 1)[0]
-                assert np.abs(found - wanted).max() <= np.spacing(np.abs(wanted).max()), f"frame {k}"
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_frames_of_a_sample_equal_pythons(kind: str, module: Callable[..., Any], site: tuple[Path, str], samples: Path) -> None:
     gvpipe.encode(samples / "creature.npz", site[0] / "creature.mp4", preset="fast", **KINDS[kind])
-    _check_frames(module, site[0] / "creature.mp4")
+    check_frames(module, site[0] / "creature.mp4")
 
 
 @pytest.mark.skipif(not SAMBA.exists(), reason="no ../shared/data")
 @pytest.mark.parametrize("kind", ["affine", "blended", "tiles"])
 def test_frames_of_samba_equal_pythons(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     gvpipe.encode(SAMBA, site[0] / "samba.mp4", preset="veryfast", **KINDS[kind])
-    _check_frames(module, site[0] / "samba.mp4")
+    check_frames(module, site[0] / "samba.mp4")
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -158,7 +102,7 @@ def test_frames_of_samba_equal_pythons(kind: str, module: Callable[..., Any], si
 def test_frames_of_awkward_inputs_equal_pythons(
     sequence: MeshSequence, kind: str, module: Callable[..., Any], site: tuple[Path, str]
 ) -> None:
-    _check_frames(module, _encode(site, sequence, **KINDS[kind]))
+    check_frames(module, _encode(site, sequence, **KINDS[kind]))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -173,38 +117,38 @@ def test_frames_of_seams_and_still_vertices_equal_pythons(
     surface = read_surface(bitstream, header)
     assert surface.n_slots < len(surface.vertices) < bitstream.n_vertices
     assert header.outliers or kind != "outliers"
-    _check_frames(module, path)
+    check_frames(module, path)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_frames_of_what_never_moves_equal_pythons(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     path = _encode(site, patched(still=1.0), **KINDS[kind])
     assert "still" in read_file(path).sections
-    _check_frames(module, path)
+    check_frames(module, path)
 
 
 @pytest.mark.parametrize("fps", [0.5, 12.0, 29.97, 59.94, 240.0])
 def test_frames_at_any_rate(fps: float, module: Callable[..., Any], site: tuple[Path, str]) -> None:
-    _check_frames(module, _encode(site, dataclasses.replace(waving(8, 30), fps=fps)))
+    check_frames(module, _encode(site, dataclasses.replace(waving(8, 30), fps=fps)))
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_frames_of_several_segments_in_the_codecs_order(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     settings = {"segment": 11, "reorder": True, "quality": 95, **KINDS[kind]}
-    _check_frames(module, _encode(site, waving(10, 50), **settings))
+    check_frames(module, _encode(site, waving(10, 50), **settings))
 
 
 @pytest.mark.parametrize("kind", ["affine-halves", "blended", "tiles"])
 def test_frames_on_the_finest_lattice(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     """Where integers are largest: sums that decide pixels and contexts must be exact still."""
-    _check_frames(module, _encode(site, waving(20, 12), base_bits=20, quality=100, **KINDS[kind]))
+    check_frames(module, _encode(site, waving(20, 12), base_bits=20, quality=100, **KINDS[kind]))
 
 
 def test_frames_are_corrected(module: Callable[..., Any], site: tuple[Path, str], kinds: dict[str, Bitstream]) -> None:
     """Files with a bound on every vertex keep it in the browser: all frames, over several groups of corrections."""
     sequence, bitstream = patched(), kinds["corrected"]
     write_file(bitstream, site[0] / "corrected.mp4")
-    _check_frames(module, site[0] / "corrected.mp4")
+    check_frames(module, site[0] / "corrected.mp4")
     frames = module(FRAMES, "corrected.mp4", [*range(12)])["frames"]
     found = np.stack([np.frombuffer(base64.b64decode(text), "<f4").reshape(-1, 3) for text in frames])
     plain = open_reader(kinds["patched"]).read(0, 12)
@@ -219,7 +163,7 @@ def test_frames_of_golden_files(module: Callable[..., Any], site: tuple[Path, st
         if bitstream.header["profile"] == "h264-8" and "transform" not in bitstream.header:
             versions.add(bitstream.version)
             shutil.copy(path, site[0])
-            _check_frames(module, site[0] / path.name, gvpipe.read(path.with_suffix(".npz")))
+            check_frames(module, site[0] / path.name, gvpipe.read(path.with_suffix(".npz")))
     assert versions >= {1, 2}
 
 
@@ -321,6 +265,29 @@ def test_broken_files_are_told_apart(case: str, module: Callable[..., Any], site
     )
     assert found[:2] == [True, kind], found
     assert "\n" not in found[2]
+
+
+def test_a_damaged_index_gives_one_clear_error(module: Callable[..., Any], site: tuple[Path, str], video_bytes: bytes) -> None:
+    """No checksum covers the video's tables: whatever they hold, the file opens or there is one error of ours."""
+    first, end = video_bytes.index(b"stbl"), video_bytes.index(b"mdat")
+    positions = np.random.default_rng(5).integers(first, end - 8, 60).tolist()
+    for kind in (b"stsz", b"stco", b"stsc", b"stts", b"ctts", b"stss"):
+        if kind in video_bytes:
+            positions += [video_bytes.index(kind) + offset for offset in (8, 9, 11, 15)]  # numbers of rows, and the first row
+    for i, position in enumerate(positions):
+        (site[0] / f"i{i}.mp4").write_bytes(_flipped(video_bytes, position))
+    outcomes = module(
+        """const outcomes = [];
+        for (let i = 0; i < args[0]; i++) {
+          const outcome = await GeometryVideo.load(`i${i}.mp4`).then((video) => (video.close(), "loaded"),
+            (error) => (error instanceof GeometryVideoError ? error.kind : String(error.stack)));
+          outcomes.push(outcome);
+        }
+        return outcomes;""",
+        len(positions),
+    )
+    assert set(outcomes) <= {"loaded", "corrupt", "unsupported", "not-geometry-video"}, outcomes
+    assert outcomes.count("corrupt") > 10
 
 
 def test_a_file_that_is_not_there(module: Callable[..., Any]) -> None:
@@ -460,12 +427,6 @@ def _outcome(path: Path) -> str:
 
 # --- the player --------------------------------------------------------------------------------------------------------------
 
-LOAD = """const ready = new Promise((resolve, reject) => {
-      element.addEventListener("ready", resolve, { once: true });
-      element.addEventListener("error", (event) => reject(event.detail), { once: true });
-    });
-    element.src = args[0];
-    await ready;"""
 PAINTED = "await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(resolve, 50))));"
 
 
@@ -623,6 +584,13 @@ def test_controls_by_mouse_and_keyboard(player: Callable[..., Any], browser: Any
     assert player(attributes) == ["", "", "2"]
     ActionChains(browser).send_keys(" ").perform()
     assert player("return element.paused") is False
+    ActionChains(browser).send_keys("c").perform()
+    assert player("return element.hasAttribute('follow')")
+    fullscreen = "await new Promise((resolve) => setTimeout(resolve, 500)); return document.fullscreenElement === element"
+    root.find_element("css selector", "[data-act=fullscreen]").click()
+    assert player(fullscreen)
+    ActionChains(browser).send_keys("f").perform()
+    assert not player(fullscreen)
 
 
 def test_size_and_bit_rate_are_shown(player: Callable[..., Any], site: tuple[Path, str]) -> None:
@@ -662,7 +630,7 @@ def test_a_corrupt_file_shows_an_error_in_the_page(
 def test_exported_page_opens_from_a_disk_and_plays(browser: Any, video: Path, tmp_path: Path) -> None:
     gvpipe.export_html(video, tmp_path / "page.html")
     browser.get((tmp_path / "page.html").as_uri())
-    frames, requests, title = _run(
+    frames, requests, title = run(
         browser,
         """const element = document.querySelector("geometry-video");
         const frames = new Set();
@@ -687,7 +655,7 @@ def test_the_element_as_the_docs_show_it(browser: Any, site: tuple[Path, str]) -
     played = """const element = document.querySelector("geometry-video");
         await new Promise((resolve) => element.addEventListener("frame", () => !element.paused && resolve()));
         return element.video.frameCount;"""
-    assert _run(browser, played) == 24
+    assert run(browser, played) == 24
 
 
 def test_the_module_as_the_docs_show_it(module: Callable[..., Any], browser: Any, site: tuple[Path, str]) -> None:
@@ -697,4 +665,4 @@ def test_the_module_as_the_docs_show_it(module: Callable[..., Any], browser: Any
     (site[0] / "docs.html").write_text(f"<!doctype html><script>{drawn}</script><script type=module>{script}</script>")
     browser.get(f"{site[1]}/docs.html")
     wait = "while (!window.drawn) await new Promise((resolve) => setTimeout(resolve, 50)); return window.drawn;"
-    assert _run(browser, wait) == [300, 3 * 162]
+    assert run(browser, wait) == [300, 3 * 162]

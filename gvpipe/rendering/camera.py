@@ -104,6 +104,8 @@ def framing(
     up: str = "y",
     aspect: float = 1.0,
     turntable: bool = False,
+    *,
+    follow: bool = False,
 ) -> Camera:
     """Return a camera that holds the motion in the picture with a small margin.
 
@@ -115,6 +117,7 @@ def framing(
         view: a name of `VIEWS`, or azimuth and elevation in degrees.
         aspect: width / height of the picture.
         turntable: whether the camera will go once around.
+        follow: whether the camera will go with the mesh' `middle`; the one returned is frame 0's.
 
     Raises:
         InputError: the sequence has no triangles; an unknown view or axis.
@@ -128,7 +131,8 @@ def framing(
     # an eye at z sees what has |x| <= slope_x (z - z of the point): planes of equal x / slope_x + z, and so on
     x, y, z = np.diag([1 / slope_x, 1 / slope_y, 1.0])
     normals = np.stack([x + z, z - x, y + z, z - y, z, -z]) @ rotations  # (A, 6, 3)
-    reach = _reach(sequence, range(len(sequence)) if frames is None else frames, normals.reshape(-1, 3)).reshape(-1, 6)
+    frames = range(len(sequence)) if frames is None else frames
+    reach = _reach(sequence, frames, normals.reshape(-1, 3), follow).reshape(-1, 6)
     middle = np.stack(
         [(reach[:, 0] - reach[:, 1]) * slope_x, (reach[:, 2] - reach[:, 3]) * slope_y, reach[:, 4] - reach[:, 5]], axis=1
     )
@@ -136,6 +140,8 @@ def framing(
     target = np.einsum("ai,aij->j", middle / 2, rotations) / len(turns)
     distance = float((reach[:, :4] - normals[:, :4] @ target).max())
     smallest = 1e-6 * float(np.abs(target).max())  # all at one point: any distance will do
+    if follow:
+        target = target + middle_of(sequence.read(0, 1)[0], used_vertices(sequence))
     place = (float(target[0]), float(target[1]), float(target[2]))
     return Camera(place, max(distance, smallest) or 1.0, azimuth, elevation, up)
 
@@ -157,11 +163,20 @@ def used_vertices(sequence: MeshSequence) -> Int32:
     return np.unique(sequence.faces)
 
 
-def _reach(sequence: MeshSequence, frames: Sequence[int], normals: Float64) -> Float64:
-    """How far the vertices reach along each of ``normals (n, 3)``: ``(n,)``."""
+def middle_of(positions: NDArray[np.float32], used: Int32) -> Float64:
+    """``(3,)`` mean of the vertices that triangles use; moves evenly where a bounding box' centre would twitch."""
+    mean: Float64 = positions[used].mean(axis=0, dtype=np.float64)
+    return mean
+
+
+def _reach(sequence: MeshSequence, frames: Sequence[int], normals: Float64, follow: bool) -> Float64:
+    """How far the vertices reach along each of ``normals (n, 3)``, from the origin or from their middle: ``(n,)``."""
     used = used_vertices(sequence)
     reach = np.full(len(normals), -np.inf)
     for frame in sampled(frames):
-        points = sequence.read(frame, frame + 1)[0][used].astype(np.float64)
+        positions = sequence.read(frame, frame + 1)[0]
+        points = positions[used].astype(np.float64)
+        if follow:
+            points -= middle_of(positions, used)
         reach = np.maximum(reach, (points @ normals.T).max(axis=0))
     return reach

@@ -11,6 +11,7 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,10 +20,10 @@ from numpy.typing import NDArray
 
 from gvpipe.atomic import atomic_path
 from gvpipe.errors import InputError
-from gvpipe.rendering.camera import Camera, framing
+from gvpipe.rendering.camera import Camera, framing, middle_of, used_vertices
 from gvpipe.rendering.error_map import ErrorMap
 from gvpipe.rendering.renderer import Renderer
-from gvpipe.sequence import MeshSequence
+from gvpipe.sequence import Int32, MeshSequence
 
 if TYPE_CHECKING:
     from gvpipe.codec import Progress
@@ -34,6 +35,7 @@ GIF_FPS = 50.0  # browsers slow down GIFs that are faster
 PALETTE_FRAMES = 6  # pictures that a GIF's one palette is made from
 
 Picture = NDArray[np.uint8]
+Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -47,13 +49,31 @@ class Film:
     turntable: bool = False
     errors: ErrorMap | None = None
     legend: Picture | None = None  # a strip at the left
+    follow: bool = False  # whether the camera goes with the mesh
 
     def __len__(self) -> int:
         return len(self.frames)
 
     def camera_of(self, k: int) -> Camera:
         """The camera of the k-th picture."""
-        return replace(self.camera, azimuth=self.camera.azimuth + 360.0 * k / len(self)) if self.turntable else self.camera
+        camera = self.camera
+        if self.turntable:
+            camera = replace(camera, azimuth=camera.azimuth + 360.0 * k / len(self))
+        if self.follow:
+            x, y, z = np.asarray(camera.target) + self._middle(self.frames[k]) - self._first_middle
+            camera = replace(camera, target=(float(x), float(y), float(z)))
+        return camera
+
+    @cached_property
+    def _first_middle(self) -> Float64:
+        return self._middle(0)
+
+    @cached_property
+    def _used(self) -> Int32:
+        return used_vertices(self.sequence)
+
+    def _middle(self, frame: int) -> Float64:
+        return middle_of(self.sequence.read(frame, frame + 1)[0], self._used)
 
     def __getitem__(self, k: int) -> Picture:
         frame = self.frames[k]
@@ -71,6 +91,7 @@ def render(
     view: str | tuple[float, float] = "three-quarter",
     up: str = "y",
     turntable: bool = False,
+    follow: bool = False,
     error_of: MeshSequence | str | os.PathLike[str] | None = None,
     error_max: float | None = None,
     shading: str = "smooth",
@@ -88,6 +109,7 @@ def render(
             ``(azimuth, elevation)`` in degrees.
         up: the world's axis that is up: ``"x"``, ``"y"`` or ``"z"``.
         turntable: let the camera go once around.
+        follow: let the camera go with the mesh, which then stays in the middle of the picture.
         error_of: a reference; colours then show each vertex' distance from it, with a legend.
         error_max: where the colours end, percent of the reference's diagonal, instead of at the largest error drawn.
         shading: ``"smooth"`` or ``"flat"``.
@@ -118,10 +140,10 @@ def render(
         errors = ErrorMap(reference, sequence, frames, error_max)
         sequence, legend = errors.sequence, errors.legend((width, height))
         across -= legend.shape[1]
-    camera = camera or framing(sequence, None, view, up, across / height, turntable)
+    camera = camera or framing(sequence, None, view, up, across / height, turntable, follow=follow)
     samples = STILL_SAMPLES if suffix == ".png" else FILM_SAMPLES
     renderer = Renderer(sequence.faces, sequence.read(0, 1)[0], (across, height), shading, samples)
-    film = Film(sequence, frames, camera, renderer, turntable, errors, legend)
+    film = Film(sequence, frames, camera, renderer, turntable, errors, legend, follow)
     with atomic_path(path) as temporary:
         WRITERS[suffix](film, temporary, progress)
 

@@ -36,11 +36,17 @@ DIMENSIONS = 40  # principal coordinates of motions that clusters start from
 TRIAL_PASSES, FIRST_PASSES, LAST_PASSES = 4, 4, 8  # turns of weights and transforms: per trial, for either start, for the best
 FEWEST, MOST = 8, 1024  # clusters tried
 LEAST_POINTS = 8  # per cluster, on average
-GROWTH = (32, 2.0), (0, 2**0.5)  # from one number tried to the next, by how many times its clusters' cost all costs
+MOST_DISTANCES = 4_000_000  # of points from clusters: beyond, k-means takes longer than it is worth
+GROWTH = (
+    (1000, 4.0),
+    (32, 2.0),
+    (0, 2**0.5),
+)  # from one number tried to the next, by how many times its clusters' cost all costs
 ROUNDS = 3  # steps tried
+ROUNDED = 0.025  # squared steps that rounding a number of the transforms leaves: many are of components too small to be coded
 PICTURED = 0.45  # steps, root mean square, that pictures leave of a point's residual
-AIM = 0.87  # of the error wanted, what a blend is to leave: coding adds to it
-CLOSE = 0.25  # logarithm of the error left over that
+AIM = 0.88  # of the error wanted, what a blend is to leave: coding adds to it
+CLOSE = 0.18  # logarithm of the error left over that
 SLOPE = 0.75  # of its logarithm over the step's
 MOST_MOVED = 3.0  # times, the step at once
 PATIENCE = 1  # numbers of clusters that may do worse than a smaller one, in a row
@@ -83,17 +89,22 @@ class Motions:
         self.clustering = Clustering(local_motions(base, k_ring(neighbours, RING), self._columns[:, :DIMENSIONS]))
 
     def error(self, problem: _Problem, fitted: Fitted, step: float) -> float:
-        """Expected root mean square error of points, model units: what a blend leaves, or pictures where that is less."""
-        n_points = len(self.base)
-        left = problem.errors(fitted) + self._energies[problem.motions.shape[1] :].sum() / n_points
+        """Expected root mean square error of points, model units: what a blend leaves, or pictures where that is less.
+
+        Beside that, what rounding the transforms leaves.
+        """
+        n_points, n_columns = problem.motions.shape
+        left = problem.errors(fitted) + self._energies[n_columns:].sum() / n_points
+        rounded = ROUNDED * min(4 * fitted.n_clusters, n_points) * n_columns * step**2
         most = (PICTURED * step) ** 2 * self.n_frames / self._scale
-        return math.sqrt(float(np.minimum(left, most).sum()) * self._scale / (n_points * self.n_frames))
+        total = float(np.minimum(left + rounded / n_points, most).sum())
+        return math.sqrt(total * self._scale / (n_points * self.n_frames))
 
     def problem(self, step: float) -> _Problem:
         """What is fitted where an error of ``step``, model units, is left."""
         shown = self.n_frames / self._scale
         left = np.cumsum(self._energies[::-1])[::-1]  # energy of each component and those after it
-        n = int((left > NEGLIGIBLE * len(self.base) * 3 * shown * step**2 / 12).sum())
+        n = max(1, int((left > NEGLIGIBLE * len(self.base) * 3 * shown * step**2 / 12).sum()))
         price = step**2 * shown
         return _Problem(
             self.base, self._columns[:, :n].copy(), self.neighbours, BIT_WORTH * step**2 / self._scale, CLUSTER_WORTH * price
@@ -172,7 +183,7 @@ class _Problem:
 
 
 def _find_number(problem: _Problem, clustering: Clustering, starts: list[Fitted]) -> list[Fitted]:
-    """The blends, of as many clusters as pay, that cost least after a few turns: from k-means, and grown.
+    """The blends, of as many clusters as pay, that cost least after a few turns: grown, and from k-means.
 
     ``starts`` are blends found for another step, or of one cluster: numbers from half of theirs up are tried.
     """
@@ -182,7 +193,9 @@ def _find_number(problem: _Problem, clustering: Clustering, starts: list[Fitted]
     most = min(MOST, len(problem.base) / LEAST_POINTS)
     count, worse = float(max(FEWEST, starts[0].n_clusters // 2)), 0
     while count <= most and problem.cluster_price * count < min(least) and worse < PATIENCE:
-        tried = [clustering.start(round(count)), _grow(problem, last, round(count), patches, draw)]
+        tried = [_grow(problem, last, round(count), patches, draw)]
+        if count * len(problem.base) <= MOST_DISTANCES:
+            tried.append(clustering.start(round(count)))
         tried = _alternate_all(problem, tried, TRIAL_PASSES)
         costs = [problem.cost(fitted) for fitted in tried]
         worse = 0 if min(costs) < min(least) else worse + 1

@@ -12,6 +12,7 @@ that looks at them (the extent, which affine transforms need, motion, transforms
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -64,9 +65,14 @@ BASE_BITS = 8, 16  # bits along a base frame's longest side that are chosen unas
 BASE_STEP = 1.3  # of a base frame, times step / sqrt(frames): measured, docs/codecs/mcgv.md
 FINER = 2**0.25  # times, a lattice that does not
 DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell apart; the others give way
-GUESS = {"blended": 5.0, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
+GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
 BAND = {"blended": (0.86, 0.99), "affine": (1.0, 1.1)}  # of the error wanted: the published mode is no finer than asked
+FAR = 0.75, 1.4  # of the error wanted: what a blend is kept for
+FARTHEST = 4.0  # times, a step for another blend
 REUSED = 1.6  # times the step, up to which a blend fitted for another serves
+MOST_TILED = (
+    1 << 15
+)  # points: beyond, xatlas takes longer than all else, and labels of charts are a tenth of a smooth mesh's file
 PART = 250  # points of a part by motion that charts refine: xatlas takes more than ten times as long per point for all at once
 MERGED = 1 / 16  # steps that vertices of one point may be apart: far below the errors that follow
 AUTO = "auto"
@@ -96,8 +102,8 @@ class Mcgv(Settings):
     clusters: int = 0  # K, 1..1024; 0: as many as pay (blended), 20 (affine)
     transform_bits: int = 17  # bits over the sequence's extent, 8..24 (affine)
     base_bits: int = 0  # bits along the base frame's longest side, 4..20; 0: as many as pay (blended), 12 (affine)
-    placement: str = AUTO  # charts: as published; halves: pixels follow from the base frame; tiles (blended only): charts
-    # that fill the plane, from which pixels follow; auto: halves if blended h264, else charts
+    placement: str = AUTO  # charts: as published; halves: pixels follow from the base frame; tiles (blended): from charts;
+    # auto: tiles if blended h264 (halves beyond 32768 points), else charts
     density: float = 1.5  # pixels per vertex inside charts, 1..16 (placement charts)
     size: str = AUTO  # of a plane, pixels: auto, or WIDTHxHEIGHT in whole blocks, such as 256x256
     gop: int = 32  # frames per group of pictures, 1..1000 (h264)
@@ -160,9 +166,15 @@ class Mcgv(Settings):
             report("measure", 0)
             return root_mean_square(own, self.reader(bitstream))
 
+        @functools.cache
         def encode(step: float) -> Bitstream:
             return self._code(sequence, start, step, fitted, memo, report)
 
+        if fitted:
+            first = measure(encode(step)) / wanted
+            if not FAR[0] <= first <= FAR[1]:  # another step wants another blend; the error follows it, then
+                near = dataclasses.replace(start, step=step * min(max(0.9 / max(first, 1e-9), 1 / FARTHEST), FARTHEST))
+                fitted, step = self._fit(near, 0.0, memo, report)
         aimed = aim(encode, measure, step, wanted, BAND[self.prediction])
         return aimed, _Anchor(dataclasses.replace(start, step=aimed.step), fitted, step, aimed.error)
 
@@ -177,7 +189,7 @@ class Mcgv(Settings):
     def _bitstream(self, sequence: MeshSequence, start: _Start, coded: _Coded) -> Bitstream:
         header = sections.Header(
             prediction=self.prediction,
-            placement=self._placement,
+            placement=start.placement,
             profile=self._video_profile,
             block=BLOCKS[self.image],
             width=coded.layout.width,
@@ -187,7 +199,7 @@ class Mcgv(Settings):
             **coded.own,
         )
         placed = {STILL: start.still} if start.still else {}
-        if self._placement == "charts":
+        if start.placement == "charts":
             placed["pixels"] = sections.encode_pixels(coded.layout)
         return Bitstream(
             codec=self.id,
@@ -237,6 +249,7 @@ class Mcgv(Settings):
             faces=mesh.faces,
             still=encode_flags(flags) if flags.any() else b"",
             lattice=lattice,
+            placement=self._chosen_placement(len(moves)),
             points_lattice=mesh.lattice[moves],
             base=base,
             points=own,
@@ -255,7 +268,7 @@ class Mcgv(Settings):
         """Pictures are frames, or coefficients of trajectories, predicted by a blend."""
         layout = self._blended_layout(start, memo, report)
         tiles = {}
-        if self._placement == "tiles":
+        if start.placement == "tiles":
             tiles = {CHARTS: encode_charts(self._charts(start, memo, report), start.points.neighbours)}
         if self.transform == "none":
             motion = code_blended(start.sequence, start.base, start.points, fitted, start.bounds, start.step, report)
@@ -329,14 +342,14 @@ class Mcgv(Settings):
         motion = code_affine(sequence, start.base, clusters, start.bounds, step, report)
         motion.sections["clusters"] = (
             sections.encode_slot_clusters(clusters)
-            if self._placement == "halves"
+            if start.placement == "halves"
             else sections.encode_clusters(clusters, layout, BLOCKS[self.image])
         )
         return motion, layout
 
     def _blended_layout(self, start: _Start, memo: Memo, report: Progress) -> Layout:
         """Nothing ties a blend's charts to clusters: few, large ones are best."""
-        whole, tiled = np.zeros(start.points.n_points, np.int32), self._placement == "tiles"
+        whole, tiled = np.zeros(start.points.n_points, np.int32), start.placement == "tiles"
         groups = self._charts(start, memo, report) if tiled else start.points.pieces()
         return memo(f"layout {start.name}", lambda: self._layout(start, whole, groups, report))
 
@@ -351,18 +364,19 @@ class Mcgv(Settings):
     def _video_profile(self) -> Profile:
         return PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
 
-    @property
-    def _placement(self) -> str:
+    def _chosen_placement(self, n_points: int) -> str:
         """JPEG, which sees no other frame, codes the smoother images of charts for less; see docs/codecs/mcgv.md."""
         if self.placement != AUTO:
             return self.placement
-        return "tiles" if self.prediction == "blended" and self.image == "h264" else "charts"
+        if self.prediction != "blended" or self.image != "h264":
+            return "charts"
+        return "tiles" if n_points <= MOST_TILED else "halves"
 
     def _layout(self, start: _Start, partition: Int32, groups: NDArray[np.integer], report: Progress) -> Layout:
         """The points' pixels: charts keep to the parts of ``partition (P,)``, the others part ``groups (P,)`` first."""
         block, size, lattice = BLOCKS[self.image], self._plane_size(), start.points_lattice
-        if self._placement != "charts":
-            derive = place if self._placement == "halves" else place_charts
+        if start.placement != "charts":
+            derive = place if start.placement == "halves" else place_charts
             return derive(lattice, groups, *(size or choose_size(len(lattice), block)), block)
         report("parameterize", 0)
         return pack(parameterize(start.base, start.points.faces, partition), block, self.density, size)
@@ -386,6 +400,7 @@ class _Start:
         coded: the mesh's sections; faces: ``(T, 3)`` as the decoder will have them.
         still: the section of that name, empty if all points move.
         lattice: of the base frame.
+        placement: of the points' pixels.
         points_lattice: ``(P, 3)`` the points on it; base: the same in model units.
         points: what joins them.
         bounds: first frame of every segment, and F.
@@ -398,6 +413,7 @@ class _Start:
     faces: Int32
     still: bytes
     lattice: Lattice
+    placement: str
     points_lattice: Int32
     base: Float64
     points: Points

@@ -10,9 +10,11 @@ import { readContainer } from "./format/boxes.js";
 import { GeometryVideoError } from "./format/errors.js";
 import { readPayload } from "./format/payload.js";
 import { McgvReader } from "./mcgv/reader.js";
-import { VideoPictures } from "./video_pictures.js";
+import { openPictures } from "./pictures.js";
 
 export { GeometryVideoError };
+
+const FROM_DISK = "pages opened from a disk may not fetch; open it from a web server, or make a page with gvpipe export-html";
 
 export class GeometryVideo {
   /**
@@ -29,7 +31,7 @@ export class GeometryVideo {
       const payload = await readPayload(readContainer(file));
       const reader = await McgvReader.open(payload);
       const { fps, frames } = payload.header;
-      pictures = await VideoPictures.open(new Blob([file], { type: "video/mp4" }), fps, frames, reader.pictureSize);
+      pictures = await openPictures(file, fps, frames, reader.pictureSize, reader.samples);
       return new GeometryVideo(payload.header, file.length, reader, pictures);
     } catch (error) {
       pictures?.close();
@@ -40,7 +42,6 @@ export class GeometryVideo {
 
   #reader;
   #pictures;
-  #levels;
   #queue = Promise.resolve();
 
   constructor(header, byteLength, reader, pictures) {
@@ -58,7 +59,6 @@ export class GeometryVideo {
     this.bounds = reader.bounds();
     this.#reader = reader;
     this.#pictures = pictures;
-    this.#levels = new Uint8Array(reader.samples.length);
   }
 
   /** Seconds. */
@@ -92,15 +92,17 @@ export class GeometryVideo {
   }
 
   /**
-   * Play on from the frame last shown. The video's clock leads: a page too slow for every frame gets those that are due.
+   * Play on from the frame last shown. The clock leads: a page too slow for every frame gets those that are due.
    *
    * @param {(positions: Float32Array, k: number) => void} show called for each frame; the array is used again for the next
-   * @param {{rate?: number, loop?: boolean, ended?: () => void}} [options] `rate` 1 is the video's own speed
+   * @param {{rate?: number, loop?: boolean, ended?: () => void, failed?: (error: Error) => void}} [options] `rate` 1 is the
+   *   video's own speed; `failed` is called if a frame later on cannot be decoded
    */
-  async play(show, { rate = 1, loop = false, ended = () => {} } = {}) {
+  async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {} } = {}) {
     await this.#queue;
     const positions = new Float32Array(3 * this.vertexCount);
-    await this.#pictures.play((k) => show(this.#read(k, positions), k), ended, rate, loop);
+    const on = { show: (k) => show(this.#read(k, positions), k), ended, failed };
+    await this.#pictures.play(on, rate, loop);
   }
 
   /** Stop playing. */
@@ -114,8 +116,7 @@ export class GeometryVideo {
   }
 
   #read(k, positions) {
-    this.#pictures.gather(this.#reader.samples, this.#levels);
-    this.#reader.rebuild(k, this.#levels, positions);
+    this.#reader.rebuild(k, this.#pictures.levels(), positions);
     return positions;
   }
 }
@@ -128,7 +129,8 @@ async function fetchBytes(source) {
   try {
     response = await fetch(source);
   } catch (error) {
-    throw new GeometryVideoError("load", `${source} cannot be fetched: ${error.message}`);
+    const remedy = location.protocol === "file:" ? `; ${FROM_DISK}` : "";
+    throw new GeometryVideoError("load", `${source} cannot be fetched: ${error.message}${remedy}`);
   }
   if (!response.ok) throw new GeometryVideoError("load", `${source} cannot be fetched: status ${response.status}`);
   return new Uint8Array(await response.arrayBuffer());

@@ -1,26 +1,27 @@
 /**
- * The pictures of a geometry video, by the browser's own `<video>`; a canvas gives their luma back exactly.
+ * The pictures of a geometry video by the browser's own `<video>`, where it has no WebCodecs; a canvas gives their luma back.
  *
- * Luma 16..235 (limited range, neutral chroma) comes out of the canvas as a grey of 0..255; the steps are 1.16 apart, so a
- * table undoes the expansion without doubt. Playback follows the video's clock: whoever draws late gets the picture of that
- * moment, and none is queued. A frame is sought in the middle of its time, and checked by what the browser says it shows.
+ * Luma 16..235 (limited range, neutral chroma) comes out of the canvas as a grey of 0..255, which a table undoes. A frame is
+ * sought in the middle of its time, and checked by what the browser says it shows.
+ *
+ * Chromium plays: the video's clock leads, and whoever draws late gets the picture of that moment. It loops by seeking. Firefox
+ * announces other pictures than it draws while it plays (and times that go on growing where the element loops by itself), so
+ * there every frame that is due is sought.
  */
 
 import { GeometryVideoError } from "./format/errors.js";
+import { OF_GREY } from "./levels.js";
 
-const LOW = 16;
-const HIGH = 235;
-const LEVELS = Uint8Array.from({ length: 256 }, (_, grey) => LOW + Math.round((grey * (HIGH - LOW)) / 255));
 const SHOWN_WITHIN = 1000; // ms after `seeked` in which the browser says what it shows; in a hidden page it never does
 
 export class VideoPictures {
   /**
-   * @param {Blob} file @param {number} fps @param {number} frames
-   * @param {[number, number]} size of a picture, pixels
+   * @param {Uint8Array} file @param {number} fps @param {number} frames
+   * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
    * @returns {Promise<VideoPictures>}
    */
-  static async open(file, fps, frames, size) {
-    const pictures = new VideoPictures(file, fps, frames, size);
+  static async open(file, fps, frames, size, samples) {
+    const pictures = new VideoPictures(file, fps, frames, size, samples);
     try {
       await pictures.#load();
     } catch (error) {
@@ -30,14 +31,16 @@ export class VideoPictures {
     return pictures;
   }
 
-  constructor(file, fps, frames, [width, height]) {
+  constructor(file, fps, frames, [width, height], samples) {
     this.fps = fps;
     this.frames = frames;
     this.width = width;
     this.height = height;
+    this.samples = samples;
+    this.read = new Uint8Array(samples.length);
     /** The frame that the video shows; -1: not known. A video that has loaded may have nothing to draw yet. */
     this.shown = -1;
-    this.url = URL.createObjectURL(file);
+    this.url = URL.createObjectURL(new Blob([file], { type: "video/mp4" }));
     this.video = Object.assign(document.createElement("video"), { muted: true, playsInline: true, preload: "auto" });
     const canvas = Object.assign(document.createElement("canvas"), { width, height });
     this.context = canvas.getContext("2d", { willReadFrequently: true, alpha: false });
@@ -65,17 +68,24 @@ export class VideoPictures {
   }
 
   #failure() {
-    const reason = this.video.error?.message || "H.264 in MP4 is needed";
-    return new GeometryVideoError("unsupported", `this browser cannot decode the video: ${reason}`);
+    const reason = this.video.error?.message || "no more is known";
+    const remedy = "a browser with a decoder for H.264 is needed (on Linux, install FFmpeg's: for WebKitGTK gstreamer1.0-libav)";
+    return new GeometryVideoError("unsupported", `this browser cannot decode the video: ${reason}; ${remedy}`);
   }
 
   /** Show a frame and wait until it is there. Pauses. */
   async seek(frame) {
     this.pause();
-    if (this.shown === frame) return;
+    if (this.shown !== frame) await this.#reach(frame);
+  }
+
+  async #reach(frame) {
     const time = (frame + 0.5) / this.fps;
+    const reaching = (this.reaching = {});
     for (let attempt = 0; attempt < 3; attempt++) {
-      if ((await this.#seekTo(frame, time + (attempt * 0.1) / this.fps)) === frame) {
+      const found = await this.#seekTo(frame, time + (attempt * 0.1) / this.fps);
+      if (this.reaching !== reaching) return; // another frame is sought since
+      if (found === frame) {
         this.shown = frame;
         return;
       }
@@ -118,31 +128,72 @@ export class VideoPictures {
   }
 
   /**
-   * Play on from here, `rate` times as fast; `show(frame)` is called for each frame that the browser shows while it is there
-   * to be read, `ended()` at the end if it does not loop.
+   * Play on from here, `rate` times as fast; calls `show(frame)` for each frame that the browser shows while it is there to be
+   * read, `ended()` at the end if it does not loop, `failed(error)` if it cannot go on.
    */
-  async play(show, ended, rate, loop) {
+  async play(on, rate, loop) {
     const { video } = this;
     video.playbackRate = rate;
-    video.loop = loop;
     this.shown = -1;
     const playing = (this.playing = {});
     const next = (_, { mediaTime }) => {
       if (this.playing !== playing) return;
       const frame = Math.min(this.frames - 1, this.#frameAt(mediaTime));
+      if (frame > 0) this.tellsFrames ??= this.#tellsFrames();
+      if (this.tellsFrames === false) {
+        video.pause();
+        this.#playBySeeking(playing, frame, on, rate, loop).catch((error) => this.playing === playing && on.failed(error));
+        return;
+      }
       if (frame !== this.shown) {
         this.shown = frame;
-        show(frame);
+        this.context.drawImage(video, 0, 0);
+        on.show(frame);
       }
-      if (!video.ended && !video.paused) video.requestVideoFrameCallback(next);
+      video.requestVideoFrameCallback(next);
     };
     video.onended = () => {
-      if (this.playing !== playing) return;
+      if (this.playing !== playing || this.tellsFrames === false) return;
+      if (loop) {
+        video.currentTime = 0;
+        video.play().catch((error) => this.playing === playing && on.failed(error));
+        return;
+      }
       this.pause();
-      ended();
+      on.ended();
     };
     video.requestVideoFrameCallback(next);
     await video.play();
+  }
+
+  /** The same by seeking to whatever is due: slower, and exact where it is not known which picture of a playing video is drawn. */
+  async #playBySeeking(playing, first, { show, ended }, rate, loop) {
+    const start = performance.now() - (1000 * first) / (this.fps * rate);
+    while (this.playing === playing) {
+      const due = Math.floor(((performance.now() - start) * this.fps * rate) / 1000);
+      const frame = loop ? due % this.frames : Math.min(due, this.frames - 1);
+      if (frame !== this.shown) {
+        await this.#reach(frame);
+        if (this.playing !== playing) return;
+        this.context.drawImage(this.video, 0, 0);
+        show(frame);
+      }
+      if (!loop && due >= this.frames && this.playing === playing) {
+        this.pause();
+        ended();
+        return;
+      }
+      await new Promise((resolve) => requestAnimationFrame(resolve));
+    }
+  }
+
+  /** Whether pictures tell their times: then the one drawn is the one announced. Firefox' do not, and it draws others too. */
+  #tellsFrames() {
+    if (typeof VideoFrame !== "function") return !("mozHasAudio" in this.video);
+    const picture = new VideoFrame(this.video);
+    const { timestamp } = picture;
+    picture.close();
+    return this.#frameAt(timestamp / 1e6) > 0;
   }
 
   /** Stop playing; the frame shown last stays. */
@@ -158,11 +209,20 @@ export class VideoPictures {
     return Math.floor(time * this.fps + 0.25);
   }
 
-  /** @param {Uint32Array} samples indices of a picture's samples @param {Uint8Array} levels filled with theirs, 16..235 */
-  gather(samples, levels) {
-    this.context.drawImage(this.video, 0, 0);
+  /** `Uint8Array` (V, 3): the levels of the frame shown. */
+  levels() {
+    if (!this.playing) this.context.drawImage(this.video, 0, 0); // else it is drawn already
     const { data } = this.context.getImageData(0, 0, this.width, this.height);
-    for (let i = 0; i < samples.length; i++) levels[i] = LEVELS[data[4 * samples[i]]];
+    let lowest = 255;
+    for (let i = 0; i < this.samples.length; i++) {
+      this.read[i] = OF_GREY[data[4 * this.samples[i]]];
+      lowest = Math.min(lowest, this.read[i]);
+    }
+    if (lowest === 0) {
+      const message = "this browser changes the colours of a video, and has no WebCodecs to read them by; use a newer one";
+      throw new GeometryVideoError("unsupported", message);
+    }
+    return this.read;
   }
 
   close() {

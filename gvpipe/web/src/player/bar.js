@@ -18,7 +18,10 @@ const MARKUP = `
   </select>
   ${button("loop", "Loop (L)", "loop", 'aria-pressed="false"')}
   ${button("wireframe", "Wireframe (W)", "wireframe", 'aria-pressed="false"')}
+  ${button("follow", "Camera follows the mesh (C)", "follow", 'aria-pressed="false"')}
   ${button("view", "Reset the view (R)", "view")}
+  ${button("still", "Save this picture as PNG (P)", "still")}
+  ${button("fullscreen", "Full screen (F)", "fullscreen", 'aria-pressed="false"')}
   <p class="facts"></p>`;
 
 export class Bar {
@@ -78,7 +81,12 @@ export class Bar {
     play.ariaLabel = play.title = playing ? "Pause (space)" : "Play (space)";
   }
 
-  /** @param {"loop"|"wireframe"} name @param {boolean} pressed */
+  /** Leave a button out. @param {string} name */
+  hide(name) {
+    this.root.querySelector(`[data-act="${name}"]`).hidden = true;
+  }
+
+  /** @param {"loop"|"wireframe"|"follow"|"fullscreen"} name @param {boolean} pressed */
   setPressed(name, pressed) {
     this.root.querySelector(`[data-act="${name}"]`).ariaPressed = String(pressed);
   }

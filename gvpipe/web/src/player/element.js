@@ -2,13 +2,16 @@
  * The player as an element: `<geometry-video src="walk.mp4" autoplay loop></geometry-video>`.
  *
  * Attributes: `src` (an address, or `#id` of an element in the page that holds the file as base64 text), `autoplay` (not for
- * those who prefer reduced motion), `loop`, `wireframe`, `speed` (1 is the video's own), `up` ("y", or "z").
+ * those who prefer reduced motion), `loop`, `wireframe`, `follow` (the camera goes with the mesh), `speed` (1 is the video's
+ * own), `up` ("y", or "z").
  * Events: `ready`, `frame` (detail: the frame's number), `ended`, `error` (detail: a `GeometryVideoError`).
  */
 
 import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
 import { Bar, nextSpeed } from "./bar.js";
+import { embedded } from "./embedded.js";
 import { actionOf } from "./keys.js";
+import { isFullscreen, save, toggleFullscreen } from "./outside.js";
 import { Stage } from "./stage.js";
 import style from "./style.css";
 
@@ -23,7 +26,7 @@ const TURN = Math.PI / 18; // by one press of a key
 const ZOOM = 1.15;
 
 export class GeometryVideoElement extends HTMLElement {
-  static observedAttributes = ["src", "loop", "wireframe", "speed"];
+  static observedAttributes = ["src", "loop", "wireframe", "follow", "speed"];
 
   #stage = null;
   #bar;
@@ -52,6 +55,8 @@ export class GeometryVideoElement extends HTMLElement {
     });
     this.#bar.setEnabled(false);
     root.addEventListener("keydown", (event) => this.#onKey(event));
+    if (!document.fullscreenEnabled) this.#bar.hide("fullscreen"); // phones may show films alone so
+    this.addEventListener("fullscreenchange", () => this.#bar.setPressed("fullscreen", isFullscreen(this)));
   }
 
   connectedCallback() {
@@ -68,8 +73,9 @@ export class GeometryVideoElement extends HTMLElement {
 
   attributeChangedCallback(name, before, value) {
     if (name === "src" && before !== value && this.isConnected && value !== null) this.load(value);
-    if (name === "loop" || name === "wireframe") this.#bar.setPressed(name, value !== null);
+    if (["loop", "wireframe", "follow"].includes(name)) this.#bar.setPressed(name, value !== null);
     if (name === "wireframe") this.#stage?.setWireframe(value !== null);
+    if (name === "follow") this.#stage?.setFollowing(value !== null);
     if (name === "speed") this.#bar.setSpeed(this.speed);
     if ((name === "loop" || name === "speed") && !this.paused) this.play(); // with the new value
   }
@@ -106,6 +112,7 @@ export class GeometryVideoElement extends HTMLElement {
       this.#stage ??= openStage(this.shadowRoot.querySelector("canvas"));
       this.#stage.setMesh(video, this.#positions, this.getAttribute("up") ?? "y");
       this.#stage.setWireframe(this.hasAttribute("wireframe"));
+      this.#stage.setFollowing(this.hasAttribute("follow"));
     } catch (error) {
       if (loading === this.#loading) this.#fail(error);
       return undefined;
@@ -134,7 +141,8 @@ export class GeometryVideoElement extends HTMLElement {
         this.#setPaused(true);
         this.dispatchEvent(new CustomEvent("ended"));
       };
-      await video.play(show, { rate: this.speed, loop: this.hasAttribute("loop"), ended });
+      const failed = (error) => video === this.video && this.#fail(error);
+      await video.play(show, { rate: this.speed, loop: this.hasAttribute("loop"), ended, failed });
     } catch (error) {
       if (error.name === "AbortError") return; // paused before the browser had begun
       if (error.name === "NotAllowedError") this.#setPaused(true);
@@ -185,6 +193,16 @@ export class GeometryVideoElement extends HTMLElement {
     sought.then(() => this.play());
   }
 
+  /** The picture as it is now, without its backdrop: a promise of a PNG file as `Blob`, null while there is none. */
+  still() {
+    return this.video ? this.#stage.still() : Promise.resolve(null);
+  }
+
+  async #saveStill() {
+    const name = `${document.title || "geometry-video"}-${this.currentFrame}.png`;
+    save(await this.still(), name);
+  }
+
   #act(name) {
     const actions = {
       play: () => (this.paused ? this.play() : this.pause()),
@@ -196,7 +214,10 @@ export class GeometryVideoElement extends HTMLElement {
       faster: () => this.setAttribute("speed", nextSpeed(this.speed, 1)),
       loop: () => this.toggleAttribute("loop"),
       wireframe: () => this.toggleAttribute("wireframe"),
+      follow: () => this.toggleAttribute("follow"),
       view: () => this.#stage.resetView(),
+      still: () => this.#saveStill(),
+      fullscreen: () => toggleFullscreen(this),
       nearer: () => this.#stage.zoom(1 / ZOOM),
       farther: () => this.#stage.zoom(ZOOM),
       "turn-left": () => this.#stage.orbit(-TURN, 0),
@@ -255,16 +276,5 @@ function openStage(canvas) {
     return new Stage(canvas);
   } catch {
     throw new GeometryVideoError("unsupported", "this browser offers no WebGL to draw with");
-  }
-}
-
-/** The file that an element of the page holds as base64 text. */
-function embedded(selector) {
-  const holder = document.getElementById(selector.slice(1));
-  if (!holder) throw new GeometryVideoError("load", `the page has no element ${selector}`);
-  try {
-    return Uint8Array.from(atob(holder.textContent.trim()), (character) => character.charCodeAt(0));
-  } catch {
-    throw new GeometryVideoError("corrupt", `the element ${selector} does not hold base64 text`);
   }
 }

@@ -13,6 +13,9 @@ const KEYS = {
   l: "loop",
   w: "wireframe",
   r: "view",
+  c: "follow",
+  p: "still",
+  f: "fullscreen",
 };
 const SHIFTED = { ArrowLeft: "turn-left", ArrowRight: "turn-right", ArrowUp: "turn-up", ArrowDown: "turn-down" };
 

@@ -24,6 +24,7 @@ import { Normals } from "./normals.js";
 
 const FIELD_OF_VIEW = 35; // degrees, of the shorter side
 const MARGIN = 1.06; // around what is framed
+const FOLLOWING_ROOM = 1.15; // around a mesh that is followed, which may stretch out later
 const AZIMUTH = Math.PI / 7; // of the first view: from the front, a little from the right and from above
 const ELEVATION = Math.PI / 12;
 const MAX_PIXEL_RATIO = 2;
@@ -46,6 +47,7 @@ export class Stage {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener("change", () => this.requestRender());
     this.controls.addEventListener("start", () => (this.isFramed = false));
+    this.isFollowing = false; // whether the camera goes where the mesh goes
     this.isFramed = false; // whether the view is still the first one, which follows the picture's shape
     this.geometry = null;
     this.pending = 0;
@@ -63,6 +65,9 @@ export class Stage {
     const dynamic = () => new BufferAttribute(new Float32Array(positions.length), 3).setUsage(DynamicDrawUsage);
     this.geometry = new BufferGeometry().setAttribute("position", dynamic()).setAttribute("normal", dynamic());
     this.normals = new Normals(video.indices, video.basePoints, positions);
+    const all = Uint32Array.from({ length: video.vertexCount }, (_, v) => v);
+    this.used = video.triangleCount ? Uint32Array.from(new Set(video.indices)) : all; // which vertices are drawn
+    this.middle = new Vector3();
     this.objects = [];
     if (video.triangleCount) {
       this.geometry.setIndex(new BufferAttribute(video.indices, 1));
@@ -93,6 +98,7 @@ export class Stage {
       position.array[i + 1] = (positions[i + 1] - centre[1]) * scale;
       position.array[i + 2] = (positions[i + 2] - centre[2]) * scale;
     }
+    if (this.isFollowing) this.#follow(this.#findMiddle());
     this.normals.compute(position.array, normal.array);
     position.needsUpdate = normal.needsUpdate = true;
     this.requestRender();
@@ -111,15 +117,24 @@ export class Stage {
     this.requestRender();
   }
 
-  /** Look at the whole motion from the front. */
+  /** Whether the camera goes where the mesh goes; it then frames the mesh as it is now, and else the whole motion. */
+  setFollowing(isFollowing) {
+    if (this.isFollowing === isFollowing) return;
+    this.isFollowing = isFollowing;
+    if (this.geometry) this.resetView();
+  }
+
+  /** Look from the front at the whole motion, or at the mesh that is followed. */
   resetView() {
     const upright = this.camera.up.z ? [0, -1, 0, 0, 0, 1] : [0, 0, 1, 0, 1, 0];
     const front = new Vector3(...upright.slice(0, 3));
     const up = new Vector3(...upright.slice(3));
     const direction = front.multiplyScalar(Math.cos(ELEVATION)).addScaledVector(up, Math.sin(ELEVATION));
     direction.applyAxisAngle(up, AZIMUTH);
-    this.camera.position.copy(direction).multiplyScalar(this.#distance(direction));
-    this.controls.target.set(0, 0, 0);
+    this.middle = this.isFollowing ? this.#findMiddle() : new Vector3();
+    const half = this.isFollowing ? this.#findReach(this.middle) : this.halfBox;
+    this.camera.position.copy(direction).multiplyScalar(this.#distance(direction, half)).add(this.middle);
+    this.controls.target.copy(this.middle);
     this.controls.update();
     this.isFramed = true;
     this.requestRender();
@@ -150,6 +165,12 @@ export class Stage {
     });
   }
 
+  /** The picture drawn anew, as a promise of a PNG file. */
+  still() {
+    this.renderer.render(this.scene, this.camera); // what was drawn before is gone once it is on the screen
+    return new Promise((resolve) => this.renderer.domElement.toBlob(resolve, "image/png"));
+  }
+
   clear() {
     for (const object of this.objects ?? []) {
       this.scene.remove(object);
@@ -169,14 +190,42 @@ export class Stage {
     this.renderer.dispose();
   }
 
+  /** The mean of the vertices drawn, in the scene. */
+  #findMiddle() {
+    const { array } = this.geometry.attributes.position;
+    const sum = [0, 0, 0];
+    for (const v of this.used) for (let axis = 0; axis < 3; axis++) sum[axis] += array[3 * v + axis];
+    return new Vector3(...sum).divideScalar(this.used.length || 1);
+  }
+
+  /** How far the mesh reaches from a point, along each axis, with room to move. */
+  #findReach(point) {
+    const { array } = this.geometry.attributes.position;
+    const reach = [0, 0, 0];
+    for (const v of this.used) {
+      for (let axis = 0; axis < 3; axis++) {
+        reach[axis] = Math.max(reach[axis], Math.abs(array[3 * v + axis] - point.getComponent(axis)));
+      }
+    }
+    return reach.map((value) => FOLLOWING_ROOM * value);
+  }
+
+  #follow(middle) {
+    const step = middle.clone().sub(this.middle);
+    this.middle = middle;
+    this.camera.position.add(step);
+    this.controls.target.add(step);
+    this.camera.updateMatrixWorld();
+  }
+
   #moved() {
     this.isFramed = false;
     this.controls.update();
     this.requestRender();
   }
 
-  /** From where, looking along -direction, the box of the motion just fits. */
-  #distance(direction) {
+  /** From where, looking along -direction, a box of these half sides about the target just fits. */
+  #distance(direction, halfSides) {
     const view = this.camera.clone();
     view.position.copy(direction);
     view.lookAt(0, 0, 0);
@@ -185,7 +234,7 @@ export class Stage {
     const vertical = Math.tan((view.fov * Math.PI) / 360);
     let distance = 0;
     for (let corner = 0; corner < 8; corner++) {
-      const point = new Vector3(...this.halfBox.map((half, axis) => (corner & (1 << axis) ? half : -half)));
+      const point = new Vector3(...halfSides.map((half, axis) => (corner & (1 << axis) ? half : -half)));
       const [x, y, z] = axes.map((axis) => axis.dot(point));
       distance = Math.max(distance, z + Math.abs(y) / vertical, z + Math.abs(x) / (vertical * view.aspect));
     }

@@ -1,0 +1,186 @@
+/**
+ * The pictures of a geometry video by WebCodecs: groups of pictures are decoded ahead and kept, a clock says which is due.
+ *
+ * Every frame has its number, so seeking and looping are exact in every browser. The clock stands still while a picture that
+ * is due is not there yet; a page too slow for every picture gets those that are due, and none is queued.
+ */
+
+import { AGAIN, GeometryVideoError } from "./format/errors.js";
+import { GroupDecoder } from "./group_decoder.js";
+import { readTrack } from "./track.js";
+
+const KEPT_BYTES = 64 * 2 ** 20; // of decoded levels
+const KEPT_GROUPS = 3; // at least: what is shown, what comes next, and one of before
+const AHEAD = 1; // s, decoded ahead of what plays
+const LONGEST_STEP = 1000; // ms that the clock goes on at once: a hidden page is asked for nothing
+
+export class DecodedPictures {
+  /**
+   * @param {Uint8Array} file @param {number} fps @param {number} frames
+   * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
+   * @returns {Promise<DecodedPictures>} its first group decoded
+   * @throws {GeometryVideoError} kind "unsupported": this browser's WebCodecs cannot decode it
+   */
+  static async open(file, fps, frames, size, samples) {
+    const track = readTrack(file);
+    const found = track.groups.reduce((sum, group) => sum + group.length, 0);
+    if (found !== frames) {
+      throw new GeometryVideoError("corrupt", `its video has ${found} frames, the header says ${frames}; ${AGAIN}`);
+    }
+    const pictures = new DecodedPictures(track, fps, frames, size, samples);
+    try {
+      await pictures.seek(0);
+    } catch (error) {
+      pictures.close();
+      throw error;
+    }
+    return pictures;
+  }
+
+  constructor(track, fps, frames, size, samples) {
+    this.fps = fps;
+    this.frames = frames;
+    this.shown = -1;
+    this.decoder = new GroupDecoder(track, size, samples);
+    this.groupBytes = (samples.length * frames) / track.groups.length;
+    this.samples = track.groups;
+    /** Of each frame its group. */
+    this.groupOf = new Uint32Array(frames);
+    track.groups.forEach((group, g) => group.forEach(({ frame }) => (this.groupOf[frame] = g)));
+    this.kept = new Map(); // group -> Group, the one asked for last at the end
+    this.turn = Promise.resolve(); // one group after the other
+  }
+
+  /** `Uint8Array` (V, 3): the levels of the frame shown. */
+  levels() {
+    return this.current;
+  }
+
+  /** Show a frame and wait until it is there. Pauses. */
+  async seek(frame) {
+    this.pause();
+    if (this.shown === frame) return;
+    this.current = await this.#group(this.groupOf[frame]).picture(frame);
+    this.shown = frame;
+  }
+
+  /**
+   * Play on from here, `rate` times as fast; calls `show(frame)` for each frame that is due, `ended()` at the end if it does
+   * not loop, `failed(error)` if it cannot go on.
+   */
+  async play({ show, ended, failed }, rate, loop) {
+    const playing = (this.playing = {});
+    let position = Math.max(0, this.shown); // frames since the start
+    let before = performance.now();
+    this.shown = -1; // it is shown again, at once
+    await this.#group(this.groupOf[Math.floor(position)]).picture(Math.floor(position));
+    const tick = (now) => {
+      if (this.playing !== playing) return;
+      const next = position + (Math.min(Math.max(0, now - before), LONGEST_STEP) * rate * this.fps) / 1000;
+      before = now;
+      const isOver = !loop && next >= this.frames;
+      const frame = loop ? Math.floor(next) % this.frames : Math.min(Math.floor(next), this.frames - 1);
+      const group = this.#group(this.groupOf[frame]);
+      if (group.error) {
+        this.pause();
+        failed(group.error);
+        return;
+      }
+      const levels = group.levels.get(frame);
+      if (levels) {
+        position = loop ? next % this.frames : next;
+        if (frame !== this.shown) {
+          [this.shown, this.current] = [frame, levels];
+          show(frame);
+        }
+        if (isOver && this.playing === playing) {
+          this.pause();
+          ended();
+          return;
+        }
+        this.#decodeAhead(this.groupOf[frame], AHEAD * this.fps * rate);
+      }
+      requestAnimationFrame(tick);
+    };
+    before = performance.now();
+    requestAnimationFrame(tick);
+  }
+
+  /** Stop playing; the frame shown last stays. */
+  pause() {
+    this.playing = null;
+  }
+
+  close() {
+    this.playing = null;
+    this.isClosed = true;
+    this.decoder.close();
+    this.kept.clear();
+  }
+
+  /** Have the groups decoded that follow one: the next, and more up to `frames` and half of what is kept. */
+  #decodeAhead(group, frames) {
+    const most = Math.min(this.samples.length - 1, KEPT_BYTES / 2 / this.groupBytes);
+    for (let i = 1, ahead = 0; i === 1 || (i <= most && ahead < frames); i++) {
+      const next = (group + i) % this.samples.length;
+      this.#group(next);
+      ahead += this.samples[next].length;
+    }
+  }
+
+  /** A group that is decoded, or will be. */
+  #group(number) {
+    let group = this.kept.get(number);
+    if (group && !group.error) {
+      this.kept.delete(number);
+    } else {
+      group ??= this.#decode(number);
+    }
+    this.kept.set(number, group);
+    for (const [old, { isDone }] of this.kept) {
+      if (this.kept.size <= KEPT_GROUPS || this.kept.size * this.groupBytes <= KEPT_BYTES) break;
+      if (isDone) this.kept.delete(old);
+    }
+    return group;
+  }
+
+  #decode(number) {
+    const group = new Group();
+    this.turn = this.turn.then(async () => {
+      if (this.isClosed) return;
+      try {
+        await this.decoder.decode(this.samples[number], (frame, levels) => group.add(frame, levels));
+      } catch (error) {
+        group.fail(error);
+      }
+      group.isDone = true;
+    });
+    return group;
+  }
+}
+
+/** The levels of a group's frames, as they come. */
+class Group {
+  levels = new Map();
+  waiting = new Map(); // frame -> what to call
+  error = null;
+  isDone = false;
+
+  picture(frame) {
+    if (this.error) return Promise.reject(this.error);
+    if (this.levels.has(frame)) return Promise.resolve(this.levels.get(frame));
+    return new Promise((resolve, reject) => this.waiting.set(frame, [...(this.waiting.get(frame) ?? []), { resolve, reject }]));
+  }
+
+  add(frame, levels) {
+    this.levels.set(frame, levels);
+    for (const { resolve } of this.waiting.get(frame) ?? []) resolve(levels);
+    this.waiting.delete(frame);
+  }
+
+  fail(error) {
+    this.error = error;
+    for (const { reject } of [...this.waiting.values()].flat()) reject(error);
+    this.waiting.clear();
+  }
+}

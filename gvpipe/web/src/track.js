@@ -1,0 +1,187 @@
+/**
+ * The H.264 track of an MP4 file: its samples, and what a decoder must know. For `VideoDecoder`, which reads no files.
+ *
+ * Reads one track whose samples lie in one file, as gvpipe writes it; a frame's number is its rank by presentation time, so
+ * edit lists and offsets of composition times do not matter.
+ */
+
+import { AGAIN, GeometryVideoError } from "./format/errors.js";
+
+const CONTAINERS = ["moov", "trak", "mdia", "minf", "stbl"];
+const VISUAL_ENTRY = 78; // bytes of a visual sample entry before its boxes
+
+/**
+ * @typedef {object} Sample one coded picture
+ * @property {Uint8Array} data
+ * @property {number} frame 0..frames - 1, in the order of presentation
+ *
+ * @typedef {object} Track
+ * @property {string} codec as `VideoDecoder` names it
+ * @property {Uint8Array} description `AVCDecoderConfigurationRecord`
+ * @property {Sample[][]} groups of pictures, which decode alone, in the order of decoding
+ *
+ * @param {Uint8Array} file a whole MP4 file
+ * @returns {Track}
+ * @throws {GeometryVideoError} its tables do not fit each other
+ */
+export function readTrack(file) {
+  try {
+    return parseTrack(new Tables(file));
+  } catch (error) {
+    if (error instanceof RangeError || error instanceof TypeError) throw broken("its tables end too early");
+    throw error;
+  }
+}
+
+function parseTrack(tables) {
+  const { codec, description } = tables.configuration();
+  const sizes = tables.sizes();
+  const places = tables.places(sizes);
+  const frames = ranks(tables.times(sizes.length));
+  const keys = tables.keys(sizes.length);
+  const groups = [];
+  for (let i = 0; i < sizes.length; i++) {
+    if (keys.has(i)) groups.push([]);
+    if (!groups.length) throw broken("it does not start with a key frame");
+    groups.at(-1).push({ data: tables.file.subarray(places[i], places[i] + sizes[i]), frame: frames[i] });
+  }
+  return { codec, description, groups };
+}
+
+/** Of each time its place among all. */
+function ranks(times) {
+  const order = [...times.keys()].sort((a, b) => times[a] - times[b]);
+  const result = new Uint32Array(times.length);
+  order.forEach((sample, rank) => (result[sample] = rank));
+  return result;
+}
+
+class Tables {
+  constructor(file) {
+    this.file = file;
+    this.view = new DataView(file.buffer, file.byteOffset, file.byteLength);
+    this.boxes = new Map(); // kind -> [start, end] of its content
+    this.#walk(0, file.length);
+  }
+
+  #walk(position, end) {
+    while (position + 8 <= end) {
+      let size = this.view.getUint32(position);
+      let start = position + 8;
+      if (size === 1) {
+        size = this.#u64(start);
+        start += 8;
+      } else if (size === 0) {
+        size = end - position;
+      }
+      const kind = String.fromCharCode(...this.file.subarray(position + 4, position + 8));
+      if (size < start - position || position + size > end) throw broken(`its ${kind} box has an impossible size`);
+      if (CONTAINERS.includes(kind)) {
+        if (kind === "trak" && this.boxes.has("trak")) throw broken("it has several tracks");
+        this.#walk(start, position + size);
+      }
+      this.boxes.set(kind, [start, position + size]);
+      position += size;
+    }
+  }
+
+  #u64(position) {
+    return this.view.getUint32(position) * 2 ** 32 + this.view.getUint32(position + 4);
+  }
+
+  /** Where a table's rows begin, and their number, after `skip` bytes; rows of `width` bytes must be there. */
+  #rows(kind, width, skip = 4) {
+    if (!this.boxes.has(kind)) throw broken(`its ${kind} box is missing`);
+    const [start, end] = this.boxes.get(kind);
+    const count = this.view.getUint32(start + skip);
+    const first = start + skip + 4;
+    if (first + count * width > end) throw broken(`its ${kind} box is too short`);
+    return { first, count };
+  }
+
+  configuration() {
+    const { first } = this.#rows("stsd", 8);
+    const kind = String.fromCharCode(...this.file.subarray(first + 4, first + 8));
+    if (kind !== "avc1") throw broken(`its video is ${kind}, not H.264`);
+    const end = first + this.view.getUint32(first);
+    for (let position = first + 8 + VISUAL_ENTRY; position + 8 <= end; ) {
+      const size = this.view.getUint32(position);
+      if (size < 8 || position + size > end) break;
+      if (String.fromCharCode(...this.file.subarray(position + 4, position + 8)) === "avcC" && size >= 15) {
+        const description = this.file.slice(position + 8, position + size);
+        const hex = [...description.subarray(1, 4)].map((byte) => byte.toString(16).padStart(2, "0"));
+        return { codec: `avc1.${hex.join("")}`, description };
+      }
+      position += size;
+    }
+    throw broken("its decoder's configuration is missing");
+  }
+
+  /** Bytes of each sample. */
+  sizes() {
+    const common = this.view.getUint32((this.boxes.get("stsz") ?? [NaN])[0] + 4);
+    const { first, count } = this.#rows("stsz", common ? 0 : 4, 8);
+    if (!count || count > this.file.length) throw broken(`it has ${count} pictures`);
+    return Uint32Array.from({ length: count }, (_, i) => common || this.view.getUint32(first + 4 * i));
+  }
+
+  /** Where each sample begins. */
+  places(sizes) {
+    const wide = this.boxes.has("co64");
+    const chunks = this.#rows(wide ? "co64" : "stco", wide ? 8 : 4);
+    const runs = this.#rows("stsc", 12);
+    const places = new Float64Array(sizes.length);
+    let [sample, run] = [0, -1];
+    for (let chunk = 0; chunk < chunks.count && sample < sizes.length; chunk++) {
+      while (run + 1 < runs.count && this.view.getUint32(runs.first + 12 * (run + 1)) <= chunk + 1) run++;
+      const inChunk = this.view.getUint32(runs.first + 12 * run + 4);
+      let place = wide ? this.#u64(chunks.first + 8 * chunk) : this.view.getUint32(chunks.first + 4 * chunk);
+      for (let i = 0; i < inChunk && sample < sizes.length; i++, sample++) {
+        places[sample] = place;
+        place += sizes[sample];
+        if (place > this.file.length) throw broken("a picture lies outside of it");
+      }
+    }
+    if (sample < sizes.length) throw broken("its pictures have no place");
+    return places;
+  }
+
+  /** When each sample is shown, in the track's units. */
+  times(count) {
+    const durations = this.#runs("stts", count);
+    const shifts = this.boxes.has("ctts") ? this.#runs("ctts", count) : new Float64Array(count);
+    const times = new Float64Array(count);
+    let time = 0;
+    for (let i = 0; i < count; i++) {
+      times[i] = time + shifts[i];
+      time += durations[i];
+    }
+    return times;
+  }
+
+  #runs(kind, count) {
+    const { first, count: n } = this.#rows(kind, 8);
+    const values = new Float64Array(count);
+    let sample = 0;
+    for (let row = 0; row < n && sample < count; row++) {
+      const length = this.view.getUint32(first + 8 * row);
+      const value = this.view.getInt32(first + 8 * row + 4);
+      const end = Math.min(count, sample + length);
+      values.fill(value, sample, end);
+      sample = end;
+    }
+    if (sample < count) throw broken(`its ${kind} box is too short`);
+    return values;
+  }
+
+  /** Numbers of the samples that decode alone. */
+  keys(count) {
+    if (!this.boxes.has("stss")) return new Set(Array.from({ length: count }, (_, i) => i));
+    const { first, count: n } = this.#rows("stss", 4);
+    return new Set(Array.from({ length: n }, (_, i) => this.view.getUint32(first + 4 * i) - 1));
+  }
+}
+
+function broken(what) {
+  return new GeometryVideoError("corrupt", `its video cannot be read: ${what}; ${AGAIN}`);
+}

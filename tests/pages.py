@@ -1,0 +1,87 @@
+"""Pages that tests open in a browser, scripts that run there, and what they must give."""
+
+from __future__ import annotations
+
+import base64
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import gvpipe
+from gvpipe.sequence import MeshSequence
+
+BUNDLE = Path(gvpipe.__file__).parent / "web" / "bundle"
+MODULE_PAGE = """<!doctype html><link rel="icon" href="data:,"><script type="module">
+import { GeometryVideo, GeometryVideoError } from "./geometry-video.js";
+Object.assign(window, { GeometryVideo, GeometryVideoError });
+</script>"""
+PLAYER_PAGE = """<!doctype html><link rel="icon" href="data:,">
+<style>html, body { margin: 0; height: 100% } geometry-video { height: 100%; --backdrop: #ff00ff }</style>
+<script type="module" src="player.js"></script><geometry-video></geometry-video>"""
+LOAD = """const ready = new Promise((resolve, reject) => {
+      element.addEventListener("ready", resolve, { once: true });
+      element.addEventListener("error", (event) => reject(event.detail), { once: true });
+    });
+    element.src = args[0];
+    await ready;"""
+TEXT = """const text = (array) => {
+      let binary = "";
+      for (const byte of new Uint8Array(array.buffer)) binary += String.fromCharCode(byte);
+      return btoa(binary);
+    };"""
+FRAMES = f"""{TEXT} const video = await GeometryVideo.load(args[0]);
+    const frames = [];
+    const filled = () => new Float32Array(3 * video.vertexCount).fill(NaN);
+    for (const k of args[1]) frames.push(text(await video.frame(k, filled())));
+    const {{ indices, bounds, fps, frameCount, vertexCount, triangleCount, byteLength }} = video;
+    video.close();
+    return {{ frames, indices: text(indices), bounds, fps, counts: [frameCount, vertexCount, triangleCount], byteLength }};"""
+
+
+def write_pages(folder: Path) -> None:
+    """Put both bundles and a page for each into a folder: ``module.html`` and ``player.html``."""
+    for bundle in BUNDLE.glob("*.js"):
+        shutil.copy(bundle, folder)
+    (folder / "module.html").write_text(MODULE_PAGE)
+    (folder / "player.html").write_text(PLAYER_PAGE)
+
+
+def run(browser: Any, body: str, *arguments: Any) -> Any:
+    """What the body of an asynchronous function returns; ``args`` are its arguments."""
+    script = f"""const [args, done] = [[...arguments].slice(0, -1), arguments[arguments.length - 1]];
+        (async () => {{ {body} }})().then((value) => done({{ value }}), (error) =>
+          done({{ error: `${{error}}\\n${{error.stack}}` }}))"""
+    result = browser.execute_async_script(script, *arguments)
+    assert "error" not in result, result["error"]
+    return result.get("value")
+
+
+def points(text: str) -> npt.NDArray[np.float32]:
+    """``(V, 3)`` of what `TEXT` makes of a ``Float32Array``."""
+    return np.frombuffer(base64.b64decode(text), "<f4").reshape(-1, 3)
+
+
+def check_frames(module: Callable[..., Any], path: Path, reference: MeshSequence | None = None, count: int = 12) -> None:
+    """Positions that JavaScript rebuilds are Python's, bit for bit; frames in random order, frame 0 and the last among them.
+
+    Of a ``reference`` that another machine wrote, sums that cancel may differ.
+    """
+    with gvpipe.open(path) as video:
+        order = np.random.default_rng(7).permutation(len(video))
+        visited = [*order[:count].tolist(), len(video) - 1, 0]
+        result = module(FRAMES, path.name, visited)
+        assert result["counts"] == [len(video), video.shape[1], len(video.faces)]
+        assert result["fps"] == video.fps
+        assert result["byteLength"] == path.stat().st_size
+        indices = np.frombuffer(base64.b64decode(result["indices"]), "<u4").reshape(-1, 3)
+        assert np.array_equal(indices, video.faces)
+        for k, text in zip(visited, result["frames"], strict=True):
+            found = points(text)
+            assert np.array_equal(found, video[k]), f"frame {k}"
+            if reference:
+                wanted = reference.read(k, k + 1)[0]
+                assert np.abs(found - wanted).max() <= np.spacing(np.abs(wanted).max()), f"frame {k}"
