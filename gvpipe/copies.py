@@ -79,9 +79,21 @@ def _encode_corners(corners: Ints, point_faces: Ints, points: Ints, n_points: in
     copies[by_use] = np.arange(len(points)) - starts[points[by_use]]
     where, is_first = _shared_corners(point_faces, counts)
     differences = np.diff(copies[corners.ravel()[where]], prepend=0)
-    differences[is_first] = 0  # a point's first corner uses its first copy
     contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_COPIES)
-    return copies, encode_integers(counts - 1), encode_integers(differences, contexts)
+    return copies, encode_integers(counts - 1), encode_integers(_filled(differences, contexts, is_first), contexts)
+
+
+def _filled(differences: Ints, contexts: Ints, is_first: Ints) -> Ints:
+    """The differences, those of points' first corners replaced by what costs least: the most frequent one of their context.
+
+    A point's first corner uses its first copy, so decoders ignore its difference.
+    """
+    result = differences.copy()
+    for context in np.unique(contexts):
+        own = contexts == context
+        values, times = np.unique(differences[own & ~is_first], return_counts=True)
+        result[own & is_first] = values[times.argmax()] if len(values) else 0
+    return result
 
 
 def _decode_corners(counts_data: bytes, data: bytes, point_faces: Ints, n_points: int) -> tuple[Ints, Ints]:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from gvpipe.bare_mesh import BareMesh, decode_mesh, encode_mesh
 from gvpipe.codec import Memo, Progress
 from gvpipe.connectivity import EncodedMesh
+from gvpipe.quality import error_of
 from gvpipe.sequence import MeshSequence
-
-COARSEST, DECADES = 10.0, 2 * 4 / 3  # aimed error at quality 0, percent of the spread, and decades down to quality 100
+from gvpipe.vertex_errors import Spread
 
 Float64 = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class CodedPoints:
         coded: the mesh's sections.
         mesh: as the decoder will have it.
         members: ``(P,)`` a given vertex of each of the mesh's points.
-        spread: root mean square distance of vertices from their frame's centre, model units.
+        spread: of the vertices, model units (`gvpipe.vertex_errors.Spread`).
     """
 
     coded: EncodedMesh
@@ -37,8 +37,8 @@ class CodedPoints:
     spread: float
 
     def aimed_error(self, quality: float) -> float:
-        """Root mean square error of a vertex, model units: a Karni-Gotsman error of ``10 ** (1 - quality / 37.5)`` percent."""
-        return self.spread * COARSEST * 10 ** -(DECADES * quality / 100) / 100
+        """Root mean square error of a vertex, model units, that a quality asks for (`gvpipe.quality`)."""
+        return self.spread * error_of(quality) / 100
 
 
 def code_points(sequence: MeshSequence, reorder: bool, memo: Memo, report: Progress) -> CodedPoints:
@@ -54,21 +54,18 @@ def code_points(sequence: MeshSequence, reorder: bool, memo: Memo, report: Progr
 
 
 def survey(sequence: MeshSequence, report: Progress) -> tuple[NDArray[np.int64], float]:
-    """Points ``(V,)`` of vertices, equal where trajectories are, and the root mean square distance from the frames' centres."""
+    """Points ``(V,)`` of vertices, equal where trajectories are, and the vertices' spread, model units."""
     points = np.zeros(sequence.n_vertices, np.int64)
-    squared, largest = 0.0, 0.0
+    spread = Spread()
     for first, block in sequence.chunks():
-        frames = block.astype(np.float64)
-        squared += float(((frames - frames.mean(axis=1, keepdims=True)) ** 2).sum())
-        largest = max(largest, float(np.abs(block).max()))
+        spread.add(block)
         rows = np.ascontiguousarray((block + np.float32(0)).swapaxes(0, 1)).reshape(sequence.n_vertices, -1)  # no minus zero
         _, ids = np.unique(rows.view(np.dtype((np.void, rows.shape[1] * 4))).ravel(), return_inverse=True)
         _, points = np.unique(points * sequence.n_vertices + ids, return_inverse=True)
         report("read", (first + len(block)) / sequence.n_frames)
     _, first_vertex = np.unique(points, return_index=True)
     points = np.argsort(np.argsort(first_vertex))[points]  # numbered as their first vertices are
-    spread = np.sqrt(squared / (sequence.n_frames * sequence.n_vertices))
-    return points.astype(np.int64), float(spread) or largest * 1e-3 or 1.0
+    return points.astype(np.int64), spread.value
 
 
 def read_trajectories(sequence: MeshSequence, start: int, stop: int, members: NDArray[np.int64]) -> Float64:

@@ -39,6 +39,7 @@ MAX_COMPONENTS = 1 << 14
 MAX_SCALE = 8 * 64  # scales run from 2**-64 to 2**64 steps
 PER_OCTAVE = 8
 PER_STEP_OCTAVE = 1024  # steps are 0.07 % apart
+BLOCK = 1024  # vertices rebuilt at a time
 LEAST_OUTSIDE = 0.2  # part of a basis' errors that is taken to lie outside its span, at least
 
 Float64 = NDArray[np.float64]
@@ -232,6 +233,16 @@ def fit_coefficients(trajectories: Float64, basis: Basis) -> Float64:
     gram[np.diag_indices_from(gram)] += 1e-12
     fitted: Float64 = cho_solve(cho_factor(gram), projected.T).T
     return np.ascontiguousarray(fitted)
+
+
+def squared_errors(trajectories: Float64, basis: Basis, coefficients: Float64) -> Float64:
+    """Squared errors ``(V,)``, summed over frames, of ``trajectories (V, 3F)`` from a basis and ``coefficients (V, R)``."""
+    result = np.empty(len(trajectories))
+    for first in range(0, len(result), BLOCK):
+        block = slice(first, first + BLOCK)
+        left = trajectories[block] - basis.mean - coefficients[block] @ basis.vectors.T
+        result[block] = np.einsum("vf,vf->v", left, left)
+    return result
 
 
 def _scales(levels: NDArray[np.int64], n_points: int, step: float) -> Float64:

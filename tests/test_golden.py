@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sequences import held, partly_still, waving
+from sequences import held, partly_still, patched, waving
 
 import gvpipe
 from gvpipe.codec import codec_class
@@ -32,6 +32,7 @@ CURRENT: dict[str, tuple[str, dict[str, object]]] = {
         {"prediction": "blended", "transform": "klt", "profile": "precise", "placement": "charts", "reorder": True},
     ),
     "pca-2-still": ("pca", {"segment": 7}),
+    "pdct-2-seams": ("pdct", {"clusters": 3, "segment": 7, "kept": 0.3}),
     "pdct-2-still": ("pdct", {"clusters": 3, "segment": 7}),
 }
 
@@ -42,7 +43,11 @@ def test_golden_file_decodes_to_the_same_positions(name: str, request: pytest.Fi
     if request.config.getoption("--write-golden") and name in CURRENT:
         codec, settings = CURRENT[name]
         assert f"{name}-".startswith(f"{codec}-{codec_class(codec).version}-")
-        sequence = held(partly_still(), [2, *[1] * 18, 3]) if name.endswith("-still") else waving(8, 12)
+        sequence = waving(8, 12)
+        if name.endswith("-still"):
+            sequence = held(partly_still(), [2, *[1] * 18, 3])
+        elif name.endswith("-seams"):
+            sequence = patched()
         gvpipe.encode(sequence, video, codec, **settings)
         gvpipe.write(gvpipe.decode(video), expected)
     decoded, wanted = gvpipe.decode(video), gvpipe.read(expected)

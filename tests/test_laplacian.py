@@ -88,9 +88,10 @@ def test_the_geometric_operator_needs_fewer_bits_than_connectivity_alone_and_pre
 
 
 def test_more_and_finer_anchors_bound_the_drift() -> None:
+    """At one step, which a given number of components leaves as it is."""
     sequence = moving()
     coarse, dense, fine = (
-        compare(sequence, decoded(Laplacian(quality=50, **settings).encode(sequence), sequence))
+        compare(sequence, decoded(Laplacian(quality=50, components=12, **settings).encode(sequence), sequence))
         for settings in ({"anchors": 400}, {"anchors": 16}, {"anchors": 4, "anchor_ratio": 0.5})
     )
     assert fine.kg < dense.kg < coarse.kg  # type: ignore[operator]

@@ -12,6 +12,7 @@ from gvcodecs.pca import Pca
 from gvcodecs.pca.reader import PcaReader
 from gvpipe.bitstream import Bitstream
 from gvpipe.errors import FormatError, InputError, SettingError
+from gvpipe.quality import error_of
 from gvpipe.sequence import MeshSequence
 
 
@@ -70,7 +71,7 @@ def test_round_trip_meets_the_error_aimed_at(shape: tuple[np.ndarray, np.ndarray
     sequence = make(*shape)
     bitstream = Pca(quality=60, predictor=predictor).encode(sequence)
     reader = Pca.reader(bitstream)
-    assert kg(sequence.read(0, 12), reader.read(0, 12)) < 1.3 * 10 ** (1 - 60 / 37.5)
+    assert kg(sequence.read(0, 12), reader.read(0, 12)) < 1.2 * error_of(60)
     assert rotated(reader.faces) == rotated(sequence.faces)
 
 

@@ -20,8 +20,10 @@ from gvcodecs.pdct.local_frames import local_frames
 from gvcodecs.pdct.seed_coding import decode_seeds, encode_seeds
 from gvpipe.binary import Cursor
 from gvpipe.bitstream import Bitstream
+from gvpipe.codec import Memo
 from gvpipe.errors import CorruptFile, FormatError, GvpipeError, InputError, NotGeometryVideo, TruncatedFile
 from gvpipe.sequence import MeshSequence
+from gvpipe.welding import find_points
 
 
 def decode(bitstream: Bitstream) -> np.ndarray:
@@ -148,16 +150,47 @@ def stream(sequence: MeshSequence, **chosen: object) -> bytes:
 
 
 @pytest.mark.parametrize("packet", [1, 700, 1 << 20])
-def test_a_stream_gives_the_frames_of_a_file(packet: int) -> None:
+def test_a_stream_gives_its_frames_whatever_the_packets(packet: int) -> None:
     sequence = waving(8, 20)
-    data = stream(sequence, segment=5)  # even cuts: the file's clips are the same
-    reader = StreamReader()
+    data = stream(sequence, segment=5)
+    whole, reader = StreamReader(), StreamReader()
     frames = [frame for at in range(0, len(data), packet) for frame in reader.feed(data[at : at + packet])]
     reader.close()
-    assert np.array_equal(np.stack(frames), decode(Pdct(segment=5).encode(sequence)))
+    assert np.array_equal(np.stack(frames), np.stack(list(whole.feed(data))))
+    diagonal = np.linalg.norm(np.ptp(sequence.read(0, 1)[0], axis=0))
+    assert error(sequence, np.stack(frames)) < 1e-3 * diagonal
     assert reader.faces is not None
     assert len(reader.faces) == len(sequence.faces)
     assert reader.fps == sequence.fps
+
+
+def test_a_stream_aims_at_about_the_error_of_a_file() -> None:
+    sequence = waving(14, 24)
+    for quality in (50, 75):
+        frames = np.stack(list(StreamReader().feed(stream(sequence, segment=12, quality=quality))))
+        assert 0.5 < error(sequence, frames) / error(sequence, decode(Pdct(quality=quality).encode(sequence))) < 2
+
+
+def soup(sequence: MeshSequence) -> MeshSequence:
+    """Every triangle with vertices of its own, and a moving vertex that no triangle uses."""
+    frames = sequence.read(0, sequence.n_frames)
+    corners = np.concatenate([frames[:, sequence.faces.ravel()], frames[:, :1] + np.float32(0.5)], axis=1)
+    return MeshSequence(corners, np.arange(sequence.faces.size).reshape(-1, 3).astype(np.int32), sequence.fps)
+
+
+@pytest.mark.parametrize("reorder", [False, True])
+def test_vertices_of_one_trajectory_are_one_point(reorder: bool) -> None:
+    one = waving(14, 16)
+    sequence, memo = soup(one), Memo()
+    bitstream = Pdct(reorder=reorder).encode(sequence, memo=memo)
+    assert memo.permutation is not None
+    own = sequence.reordered(memo.permutation, sequence.faces)
+    decoded, points = decode(bitstream), find_points(own)
+    assert points.max() + 1 == one.n_vertices + 1
+    members = np.unique(points, return_index=True)[1]
+    assert np.array_equal(decoded, decoded[:, members[points]])
+    welded = Pdct(reorder=reorder).encode(one)
+    assert len(bitstream.section("clip.0")) < 1.1 * len(welded.section("clip.0"))
 
 
 def test_frames_come_as_soon_as_their_clip() -> None:
@@ -252,7 +285,7 @@ def test_hostile_clips_raise_package_errors() -> None:
         changed[int(rng.integers(len(clip)) ** rng.choice([1.0, 0.7]))] = rng.integers(256)
         sections = {**bitstream.sections, "clip.0": bytes(changed)}
         try:
-            decoded = decode(Bitstream("pdct", 1, 12, 64, 98, 24.0, bitstream.header, sections))
+            decoded = decode(Bitstream("pdct", 2, 12, 64, 98, 24.0, bitstream.header, sections))
         except GvpipeError as caught:
             assert isinstance(caught, CorruptFile)
             continue

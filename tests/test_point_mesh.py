@@ -195,3 +195,15 @@ def test_copies_are_numbered_by_first_use() -> None:
     assert coded.permutation.tolist() == [3, 1, 0, 2, 4, 5]
     found, _ = decode_copies(coded.counts, coded.copies, coded.order, points[faces], 3)
     assert found.tolist() == [[0, 4, 5], [1, 4, 5], [0, 4, 5]]
+
+
+def test_soups_cost_hardly_more_than_their_points() -> None:
+    """Each corner uses the next copy of its point: one number says so of all, as first corners have it too."""
+    point_faces = np.array([(0, i, i + 1) for i in range(1, 400)])
+    points = np.sort(point_faces.ravel())
+    order = np.argsort(point_faces.ravel(), kind="stable")
+    faces = np.argsort(order).reshape(-1, 3)
+    coded = encode_copies(faces, points, point_faces, 401, reorder=True)
+    assert len(coded.copies) < 30
+    found, _ = decode_copies(coded.counts, coded.copies, coded.order, point_faces, 401)
+    assert np.array_equal(found, faces)

@@ -38,12 +38,11 @@ PICTURES: list[tuple[str, dict[str, object]]] = [
 ]
 
 
-def variants(picture_reason: str, weak: tuple[str, ...] = ()) -> pytest.MarkDecorator:
+def variants(picture_reason: str) -> pytest.MarkDecorator:
     """All codecs, in several profiles; those that may fail for now are marked so."""
     cases = []
     for codec, settings in PLAIN + PICTURES:
-        lacks = codec == "mcgv" or codec in weak
-        marks = [pytest.mark.xfail(strict=False, reason=picture_reason)] if lacks else []
+        marks = [pytest.mark.xfail(strict=False, reason=picture_reason)] if codec == "mcgv" else []
         cases.append(pytest.param(codec, settings, id=" ".join([codec, *map(str, settings.values())]), marks=marks))
     return pytest.mark.parametrize(("codec", "settings"), cases)
 
@@ -86,7 +85,7 @@ def test_still_vertices_stand_still(codec: str, settings: dict[str, object], bou
 
 
 @pytest.mark.parametrize("bound", [None, "0.2%"], ids=["", "max-error"])
-@variants("it codes vertices that coincide one by one", weak=("pdct",))
+@variants("it codes vertices that coincide one by one")
 def test_coincident_vertices_coincide(codec: str, settings: dict[str, object], bound: str | None, tmp_path: Path) -> None:
     sequence = with_copies()
     frames = encode(sequence, tmp_path, codec, settings, max_error=bound)[:]
@@ -149,7 +148,7 @@ def test_awkward_inputs(codec: str, settings: dict[str, object], name: str, few:
 @pytest.mark.parametrize(("codec", "settings"), PLAIN)
 def test_files_without_stillness_keep_their_version(codec: str, settings: dict[str, object]) -> None:
     bitstream = encode_sequence(codec_class(codec)(**settings), waving(7, 9))
-    assert bitstream.version == 1
+    assert bitstream.version == (2 if codec == "pdct" else 1)  # pdct's version 2 also codes points
     assert not {"still", "holds"} & set(bitstream.sections)
 
 

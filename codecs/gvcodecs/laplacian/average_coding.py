@@ -35,7 +35,7 @@ def encode_average(points: Float64, surface: Surface, header: Header) -> tuple[b
     unit = unit or float(np.abs(points).max(initial=0)) or 1.0
     own = _own_header(header)
     domain = build_domain(surface, None, own)
-    anchors, deltas = encode_coefficients((points - points.mean(axis=0)) / unit, header.average_step, domain, own)
+    anchors, deltas, _ = encode_coefficients((points - points.mean(axis=0)) / unit, header.average_step, domain, own)
     data = varint(len(anchors)) + anchors + deltas
     return data, decode_average(data, surface, header)
 

@@ -17,16 +17,16 @@ Float64 = NDArray[np.float64]
 
 def encode_coefficients(
     coefficients: Float64, step: float, domain: Domain, header: Header, given: Float64 | None = None
-) -> tuple[bytes, bytes]:
-    """Code ``coefficients (P, R)`` with the deltas' ``step``; return the bytes of anchors and of deltas.
+) -> tuple[bytes, bytes, Float64]:
+    """Code ``coefficients (P, R)`` with the deltas' ``step``; return the bytes of anchors and deltas, and what they decode to.
 
     ``given (P, R)`` has the coefficients of the points that stand still, which are those in ``coefficients``.
     """
     wanted = domain.system.deltas(coefficients)[domain.delta_points]
     deltas, rounded = encode_rows(wanted, step, domain.deltas, _predictor(header))
     anchored = domain.system.fit_anchors(domain.delta_points, rounded, coefficients)
-    anchors, _ = encode_rows(anchored, step * header.anchor_ratio, domain.anchors.rows, given=_of_anchors(given, domain))
-    return anchors, deltas
+    anchors, sent = encode_rows(anchored, step * header.anchor_ratio, domain.anchors.rows, given=_of_anchors(given, domain))
+    return anchors, deltas, domain.system.solve(domain.delta_points, rounded, sent)
 
 
 def decode_coefficients(

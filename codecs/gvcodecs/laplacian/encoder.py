@@ -7,16 +7,18 @@ prediction of delta trajectories (`delta_rows`), range coding (`gvpipe.row_codin
 
 Points that never move have a position in place of a trajectory (`gvpipe.still_points`); they are anchors that cost nothing.
 
-Frames are read three times: for size and points, for the average, then segment by segment.
+Frames are read for size and points, for the average, then segment by segment in each encode of the loop.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gvcodecs.laplacian.anchors import ANCHOR_CHOICES
 from gvcodecs.laplacian.average import average_mesh
@@ -37,15 +39,16 @@ from gvcodecs.laplacian.format import (
 )
 from gvcodecs.laplacian.operators import OPERATORS
 from gvcodecs.laplacian.reader import LaplacianReader
+from gvpipe.aiming import NEAR, Aimed, Anchor, first_step, mend, step_between
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.segments import MAX_SEGMENT, cut
 from gvpipe.sequence import MeshSequence
 from gvpipe.still_points import SECTION, StillPoints, code_still
 from gvpipe.trajectories import CodedPoints, code_points, read_trajectories
-from gvpipe.trajectory_basis import MAX_COMPONENTS, reduce_trajectories
+from gvpipe.trajectory_basis import MAX_COMPONENTS, reduce_trajectories, squared_errors
 
-AIM = 2.0  # squared error aimed at, in that of `pca` at the same quality
+FIRST = 1.0  # of the error wanted, asked of `reduce_trajectories` in a first encode, before drift is known
 NOISE = 3.0  # squared error that rounding of deltas leaves, in that of coefficients rounded alike, about
 POINT_COST, ROW_COST = 0.1, 5.0  # of a component: deltas cost little, so that components are paid for by their basis
 
@@ -54,9 +57,9 @@ POINT_COST, ROW_COST = 0.1, 5.0  # of a component: deltas cost little, so that c
 class Laplacian(Settings):
     """Settings of the geometric-Laplacian codec.
 
-    Quality aims at a Karni-Gotsman error of ``1.4 * 10 ** (1 - quality / 37.5)`` percent, 1.4 times that of `pca`, which takes
-    about the same step: errors are small between neighbours and grow from anchor to anchor, and the perceived one is what bits
-    are spent on. On thin parts and small meshes they grow further.
+    Errors are small between neighbours and grow from anchor to anchor, on thin parts and small meshes the most. So the error
+    that quality asks for (`gvpipe.quality`) is met by a loop: encode, measure, mend the step. A given number of ``components``
+    sets the error itself, and the step is not mended.
 
     Raises:
         SettingError: a value out of its range.
@@ -100,12 +103,21 @@ class Laplacian(Settings):
         """
         report = progress or (lambda stage, done: None)
         memo = memo or Memo()
+        start = self._start(sequence, memo, report)
+        wanted = start.shared.aimed_error(self.quality)
+        anchors = memo("anchors", list[Anchor])
+        known = step_between(anchors, wanted)
+        if known is not None or not start.still.n_moving or self.components:
+            return self._code(sequence, start, known or FIRST * wanted, report).bitstream
+        aimed = mend(lambda asked: self._code(sequence, start, asked, report), first_step(anchors, wanted, FIRST), wanted)
+        if aimed.error > wanted / NEAR:  # else the step hardly matters, and tells nothing of other errors
+            anchors.append(Anchor(aimed.step, aimed.error))
+        return aimed.bitstream
+
+    def _start(self, sequence: MeshSequence, memo: Memo, report: Progress) -> _Start:
+        """What does not depend on the step: mesh and average as coded, what coefficients are coded with; and still points."""
         shared = code_points(sequence, self.reorder, memo, report)
-        mesh, wanted = shared.mesh, shared.aimed_error(self.quality)
-        bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
-        n_segments = len(bounds) - 1
-        held, still = code_still(sequence, shared, AIM**0.5 * wanted, memo)
-        sections = {"mesh": shared.coded.mesh, "order": shared.coded.order, **({SECTION: held} if held else {})}
+        held, still = code_still(sequence, shared, shared.aimed_error(self.quality), memo)
         header = Header(
             self.operator,
             self.delta_prediction,
@@ -115,45 +127,75 @@ class Laplacian(Settings):
             float(self.average_step),
             float(self.anchor_ratio),
             float(self.basis_ratio),
-            n_segments,
+            len(cut(sequence.n_frames, self.segment, MAX_SEGMENTS)) - 1,
             (),
         )
         if header.needs_average:
             report("average", 0)
-        data, domain = memo("domain", lambda: _prepare(sequence, shared, header, still))
-        if data is not None:
-            sections[NAME] = data
-        steps, moving = [], shared.members[~still.flags]
-        for s, (start, stop) in enumerate(pairwise(bounds) if still.n_moving else []):
-            report("segments", s / n_segments)
-            trajectories = read_trajectories(sequence, start, stop, moving)
-            error = AIM * wanted**2 * still.n_moving * (stop - start)
+        average, domain = memo("domain", lambda: _prepare(sequence, shared, header, still))
+        sections = {"mesh": shared.coded.mesh, "order": shared.coded.order, **({SECTION: held} if held else {})}
+        return _Start(shared, still, header, domain, {**sections, **({} if average is None else {NAME: average})})
+
+    def _code(self, sequence: MeshSequence, start: _Start, asked: float, report: Progress) -> Aimed:
+        """Code with the step that would leave the error ``asked`` if nothing drifted, and tell the error that is left."""
+        still, header = start.still, start.header
+        moving = start.shared.members[~still.flags]
+        sections, steps, squared = dict(start.sections), [], start.still_error(sequence)
+        bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
+        for s, (first, stop) in enumerate(pairwise(bounds) if still.n_moving else []):
+            report("segments", s / header.segments)
+            trajectories = read_trajectories(sequence, first, stop, moving)
+            error = asked**2 * still.n_moving * (stop - first)
             most = still.most_components
             reduced = reduce_trajectories(
                 trajectories, error, self.components, self.basis_ratio, POINT_COST, ROW_COST, NOISE, most
             )
             given = still.given(reduced.decoded)
-            sections[f"basis.{s}"] = reduced.basis
             coefficients = still.join(reduced.coefficients, given)
-            anchors, deltas = encode_coefficients(coefficients, reduced.step, domain, header, given)
-            sections[f"anchors.{s}"], sections[f"deltas.{s}"] = anchors, deltas
+            anchors, deltas, decoded = encode_coefficients(coefficients, reduced.step, start.domain, header, given)
+            sections |= {f"basis.{s}": reduced.basis, f"anchors.{s}": anchors, f"deltas.{s}": deltas}
             steps.append(reduced.step)
+            errors = squared_errors(trajectories, reduced.decoded, decoded[~still.flags])
+            squared += float(errors @ start.copies[~still.flags])
         report("segments", 1)
-        return Bitstream(
+        bitstream = Bitstream(
             codec=self.id,
-            version=self.version if still.n_moving < mesh.n_points else 1,
+            version=self.version if SECTION in sections else 1,
             n_frames=sequence.n_frames,
             n_vertices=sequence.n_vertices,
-            n_triangles=len(mesh.faces),
+            n_triangles=len(start.shared.mesh.faces),
             fps=float(sequence.fps),
-            header={**header.to_json(), "steps": steps or [1.0] * n_segments},
+            header={**header.to_json(), "steps": steps or [1.0] * header.segments},
             sections=sections,
         )
+        return Aimed(bitstream, asked, math.sqrt(squared / (sequence.n_frames * sequence.n_vertices)))
 
     @classmethod
     def reader(cls, bitstream: Bitstream) -> FrameReader:
         """Open a ``laplacian`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         return LaplacianReader(bitstream)
+
+
+@dataclass(frozen=True)
+class _Start:
+    """What encodes with different steps share; ``sections`` are those that no step changes."""
+
+    shared: CodedPoints
+    still: StillPoints
+    header: Header
+    domain: Domain
+    sections: dict[str, bytes]
+
+    @property
+    def copies(self) -> NDArray[np.int64]:
+        """``(P,)`` how many vertices each point has."""
+        return np.bincount(self.shared.mesh.points, minlength=self.shared.mesh.n_points)
+
+    def still_error(self, sequence: MeshSequence) -> float:
+        """Squared error of the still points' vertices, summed over all frames, squared model units."""
+        flags = self.still.flags
+        off = sequence.read(0, 1)[0, self.shared.members[flags]].astype(np.float64) - self.still.positions[flags]
+        return sequence.n_frames * float(np.square(off).sum(axis=1) @ self.copies[flags])
 
 
 def _prepare(sequence: MeshSequence, shared: CodedPoints, header: Header, still: StillPoints) -> tuple[bytes | None, Domain]:

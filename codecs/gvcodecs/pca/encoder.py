@@ -30,12 +30,14 @@ from gvpipe.still_points import SECTION, StillPoints, code_still
 from gvpipe.trajectories import code_points, read_trajectories
 from gvpipe.trajectory_basis import MAX_COMPONENTS, Reduced, reduce_trajectories
 
+LEFT = 0.93  # part of the error asked of `reduce_trajectories` that is left: small coefficients err by less than steps do
+
 
 @dataclass(frozen=True)
 class Pca(Settings):
     """Settings of the trajectory PCA codec.
 
-    Quality aims at a Karni-Gotsman error of ``10 ** (1 - quality / 37.5)`` percent: 0.1 at 75, 0.02 at 100.
+    The error that quality asks for (`gvpipe.quality`) is met without a loop: how it follows from the step is known well.
 
     Raises:
         SettingError: a value out of its range.
@@ -80,7 +82,7 @@ class Pca(Settings):
         for s, (start, stop) in enumerate(pairwise(bounds) if still.n_moving else []):
             report("segments", s / n_segments)
             trajectories = read_trajectories(sequence, start, stop, moving)
-            error = wanted**2 * still.n_moving * (stop - start)
+            error = (wanted / LEFT) ** 2 * still.n_moving * (stop - start)
             reduced = reduce_trajectories(trajectories, error, self.components, most=still.most_components)
             steps.append(reduced.step)
             sections[f"basis.{s}"] = reduced.basis

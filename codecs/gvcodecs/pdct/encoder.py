@@ -1,50 +1,61 @@
 """The predictive DCT codec: settings, and the way from a sequence to a bitstream.
 
 Amjoun and Strasser, "Predictive-DCT Coding for 3D Mesh Sequences Compression", 2008. The steps, each a module of its own: base
-frame (`gvpipe.connectivity`), `clustering`, `local_frames` with `seed_coding`, closed loop (`clip`), `delta_coding`.
+frame and points (`gvpipe.point_mesh`), `clustering`, `local_frames` with `seed_coding`, closed loop (`clip`), `delta_coding`.
 
-Frames are read once, a clip at a time; `stream` codes the same clips from frames that come one by one.
+Vertices that share a trajectory are one point, coded once, so that they coincide in every decoded frame. Frames are read for
+points and spread, then a clip at a time in each encode of the loop that meets the error; `stream` codes such clips from frames
+that come one by one, without points and without the loop.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.pdct.clip import MAX_CLUSTERS, Quantiser, encode_clip
-from gvcodecs.pdct.clustering import find_clusters
+from gvcodecs.pdct.clustering import Clusters, find_clusters
 from gvcodecs.pdct.dictionary import Surface
-from gvcodecs.pdct.format import MAX_CLIPS, VERSION_STILL, Header, surface_of
+from gvcodecs.pdct.format import MAX_CLIPS, VERSION_POINTS, Header, surface_of_points
 from gvcodecs.pdct.reader import PdctReader
 from gvcodecs.pdct.stillness import SECTION, encode_still
+from gvpipe.aiming import NEAR, Aimed, Anchor, first_step, mend, root_mean_square, step_between
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
-from gvpipe.connectivity import BaseMesh, EncodedMesh, decode_base, encode_base
+from gvpipe.connectivity import EncodedMesh
+from gvpipe.point_mesh import PointMesh, decode_points, encode_points
+from gvpipe.quality import error_of
 from gvpipe.quantize import Lattice
 from gvpipe.segments import MAX_SEGMENT, cut
-from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.sequence import Float32, MeshSequence
 from gvpipe.stillness import find_still
+from gvpipe.vertex_errors import measure_spread
+from gvpipe.welding import find_points
 
-COARSEST, DECADES = 0.03, 2.4  # step at quality 0, part of frame 0's diagonal, and decades down to quality 100
+FIRST = 1.8  # steps by the root mean square error that they leave, in a first encode
+OPEN = 0.5  # steps by the error, percent of the diagonal of a stream's frame 0, that stands in for the spread
+STILL = 2.0  # steps of still vertices by the error that they leave: rounding leaves step / sqrt(12) on each of three axes
 PER_CLUSTER, AUTO = 200, (20, 64)  # vertices per cluster, and the range of the automatic count
-SMALLEST = 1e-9  # step, part of a clip's diagonal: a frame 0 that is one point tells nothing of size
+SMALLEST = 1e-9  # step, part of a clip's diagonal
 
 
 @dataclass(frozen=True)
 class Pdct(Settings):
     """Settings of the predictive DCT codec.
 
-    Quality sets the step of the delta coefficients, ``0.03 * 10 ** (-2.4 * quality / 100)`` of frame 0's bounding-box diagonal.
+    The error that quality asks for (`gvpipe.quality`) is met by a loop: encode, measure, mend the step of the delta
+    coefficients. With ``kept``, which sets the error itself, the step is not mended.
 
     Raises:
         SettingError: a value out of its range.
     """
 
     id: ClassVar[str] = "pdct"
-    version: ClassVar[int] = VERSION_STILL
+    version: ClassVar[int] = VERSION_POINTS
     summary: ClassVar[str] = "predictive DCT in local coordinate frames: streams frame by frame, short clips"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.holds`)
 
@@ -76,80 +87,106 @@ class Pdct(Settings):
     def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
         """Code a sequence; raises `InputError` where a frame cannot be read."""
         report = progress or (lambda stage, done: None)
-        report("base", 0)
         memo = memo or Memo()
-        still = memo("still", lambda: find_still(sequence))
-        base = SharedBase(sequence.read(0, 1)[0], sequence.faces, self, memo, still)
-        memo.permutation = base.coded.permutation
-        bounds = cut(sequence.n_frames, self.clip_frames, MAX_CLIPS)
-        n_clips = len(bounds) - 1
-        sections = {"mesh": base.coded.mesh, "order": base.coded.order, **({SECTION: base.still} if base.still else {})}
-        for c in range(n_clips if base.n_moving else 0):
-            report("clips", c / n_clips)
-            sections[f"clip.{c}"] = base.encode(sequence.read(bounds[c], bounds[c + 1]), memo, f"clip.{c}")
-        report("clips", 1)
-        return Bitstream(
-            codec=self.id,
-            version=self.version if base.still else 1,
-            n_frames=sequence.n_frames,
-            n_vertices=sequence.n_vertices,
-            n_triangles=len(base.mesh.faces),
-            fps=float(sequence.fps),
-            header=Header(n_clips, base.lattice).to_json(),
-            sections=sections,
-        )
+        report("base", 0)
+        wanted = error_of(self.quality) / 100 * memo("spread", lambda: measure_spread(sequence))
+        start = self._start(sequence, wanted, memo)
+        anchors = memo("anchors", list[Anchor])
+        known = step_between(anchors, wanted)
+        if known is not None or not len(start.surface.walk) or self.kept:
+            return self._code(sequence, start, known or FIRST * wanted, memo, report)
+        own = sequence.reordered(start.coded.permutation, start.mesh.faces)
+
+        def attempt(step: float) -> Aimed:
+            bitstream = self._code(sequence, start, step, memo, report)
+            report("measure", 0)
+            return Aimed(bitstream, step, root_mean_square(own, self.reader(bitstream)))
+
+        aimed = mend(attempt, first_step(anchors, wanted, FIRST), wanted)
+        if aimed.error > wanted / NEAR:  # else the step hardly matters, and tells nothing of other errors
+            anchors.append(Anchor(aimed.step, aimed.error))
+        return aimed.bitstream
 
     @classmethod
     def reader(cls, bitstream: Bitstream) -> FrameReader:
         """Open a ``pdct`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         return PdctReader(bitstream)
 
+    def open_step(self, diagonal: float) -> float:
+        """The step, model units, where only a frame's ``diagonal`` is known, as in streams."""
+        return OPEN * error_of(self.quality) / 100 * diagonal
 
-class SharedBase:
-    """Frame 0 and connectivity, coded, and the coder of clips that start from them.
+    def find_clusters(self, frames: Float32, surface: Surface) -> Clusters:
+        """The clusters of a clip, ``frames (n, P, 3)``, in the order of points that ``surface`` has."""
+        n_clusters = self.clusters or min(max(len(surface.base) // PER_CLUSTER, AUTO[0]), AUTO[1])
+        return find_clusters(frames, surface.faces, n_clusters)
 
-    Where vertices are flagged as ``still (V,)``, ``still`` has their section, and clips leave them out.
+    def encode_clip(self, frames: Float32, surface: Surface, clusters: Clusters, step: float) -> bytes:
+        """Code a clip, ``frames (n, P, 3)``, in the order of points that ``surface`` has, with a step, model units."""
+        step = max(step, SMALLEST * diagonal_of(frames)) or SMALLEST
+        return encode_clip(frames, surface, Quantiser(step, float(self.fineness), self.kept), clusters, self.seed_bits)
+
+    def _start(self, sequence: MeshSequence, wanted: float, memo: Memo) -> _Start:
+        """Code points and connectivity, and still points to an error wanted, model units."""
+        still = memo("still", lambda: find_still(sequence))
+        points = memo("points", lambda: find_points(sequence))
+        first = sequence.read(0, 1)[0]
+        members = np.unique(points, return_index=True)[1]
+        lattice = Lattice.over(first, self.base_bits)
+        coded = memo("base", lambda: encode_points(lattice.quantise(first[members]), sequence.faces, points, self.reorder))
+        memo.permutation = coded.permutation
+        mesh = decode_points(coded.mesh, coded.order)
+        sources, surface = coded.permutation[mesh.members], surface_of_points(mesh, lattice)
+        sections = {"mesh": coded.mesh, "order": coded.order}
+        flags = still[sources]  # vertices of one trajectory move, or stand still, together
+        if flags.any():
+            sections[SECTION] = encode_still(flags, first[sources], surface, STILL * wanted)
+        return _Start(coded, mesh, lattice, sources, surface.without(np.flatnonzero(flags)), sections)
+
+    def _code(self, sequence: MeshSequence, start: _Start, step: float, memo: Memo, report: Progress) -> Bitstream:
+        """Code with a step, model units."""
+        bounds = cut(sequence.n_frames, self.clip_frames, MAX_CLIPS)
+        n_clips, sections = len(bounds) - 1, dict(start.sections)
+        for c in range(n_clips if len(start.surface.walk) else 0):
+            report("clips", c / n_clips)
+            frames = np.ascontiguousarray(sequence.read(bounds[c], bounds[c + 1])[:, start.sources])
+            clusters = memo(f"clip.{c}", partial(self.find_clusters, frames, start.surface))
+            sections[f"clip.{c}"] = self.encode_clip(frames, start.surface, clusters, step)
+        report("clips", 1)
+        return Bitstream(
+            codec=self.id,
+            version=self.version,
+            n_frames=sequence.n_frames,
+            n_vertices=sequence.n_vertices,
+            n_triangles=len(start.mesh.faces),
+            fps=float(sequence.fps),
+            header=Header(n_clips, start.lattice).to_json(),
+            sections=sections,
+        )
+
+
+@dataclass(frozen=True)
+class _Start:
+    """What encodes with different steps share.
+
+    Args:
+        coded: the mesh's sections.
+        mesh: as the decoder will have it.
+        lattice: of the base frame.
+        sources: ``(P,)`` the given vertex of each point.
+        surface: of the points that move.
+        sections: those that no step changes.
     """
 
-    def __init__(
-        self,
-        frame: Float32,
-        faces: Int32,
-        settings: Pdct,
-        memo: Memo | None = None,
-        still: NDArray[np.bool_] | None = None,
-    ) -> None:
-        self._settings, memo = settings, memo or Memo()
-        self.lattice = Lattice.over(frame, settings.base_bits)
-        self.coded: EncodedMesh = memo("base", lambda: encode_base(self.lattice.quantise(frame), faces, settings.reorder))
-        self.mesh: BaseMesh = decode_base(self.coded.mesh, self.coded.order)
-        self._surface: Surface = surface_of(self.mesh, self.lattice)
-        self._diagonal = _diagonal(frame)
-        self.still = b""
-        if still is not None and still.any():
-            ordered = still[self.coded.permutation]
-            self.still = encode_still(ordered, frame[self.coded.permutation], self._surface, self._step(self._diagonal or 1.0))
-            self._surface = self._surface.without(np.flatnonzero(ordered))
-
-    def encode(self, frames: Float32, memo: Memo | None = None, name: str = "clip") -> bytes:
-        """Code a clip, ``(n, V, 3)`` in the given order of vertices, model units; ``memo`` keeps its clusters by its name."""
-        settings = self._settings
-        ordered = np.ascontiguousarray(frames[:, self.coded.permutation])
-        own = _diagonal(frames.reshape(-1, 3))
-        diagonal = max(self._diagonal or own, SMALLEST * own) or 1.0
-        quantiser = Quantiser(self._step(diagonal), float(settings.fineness), settings.kept)
-        n_clusters = settings.clusters or min(max(len(self.mesh.points) // PER_CLUSTER, AUTO[0]), AUTO[1])
-        clusters = (memo or Memo())(name, lambda: find_clusters(ordered, self._surface.faces, n_clusters))
-        return encode_clip(ordered, self._surface, quantiser, clusters, settings.seed_bits)
-
-    @property
-    def n_moving(self) -> int:
-        """How many vertices move."""
-        return len(self._surface.walk)
-
-    def _step(self, diagonal: float) -> float:
-        return diagonal * COARSEST * 10 ** (-DECADES * self._settings.quality / 100)
+    coded: EncodedMesh
+    mesh: PointMesh
+    lattice: Lattice
+    sources: NDArray[np.int64]
+    surface: Surface
+    sections: dict[str, bytes]
 
 
-def _diagonal(points: NDArray[np.floating]) -> float:
+def diagonal_of(frames: Float32) -> float:
+    """Of the bounding box of ``frames (..., V, 3)``, model units."""
+    points = frames.reshape(-1, 3)
     return float(np.linalg.norm(points.max(axis=0).astype(np.float64) - points.min(axis=0)))

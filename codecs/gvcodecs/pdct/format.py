@@ -1,13 +1,14 @@
 """The sections of a ``pdct`` bitstream, and the header that tells how to read them.
 
 ============  ===========================================================================
-``mesh``      base frame (frame 0) on its lattice and connectivity (`gvpipe.connectivity`)
-``order``     vertex order, empty if the codec's own (`gvpipe.vertex_order`)
-``still``     vertices that never move, and their positions (`stillness`); absent if all move
+``mesh``      base frame (frame 0) of the points, on its lattice, and connectivity (`gvpipe.point_mesh`)
+``order``     vertex order, empty if the codec's own (`gvpipe.copies`)
+``still``     points that never move, and their positions (`stillness`); absent if all move
 ``clip.N``    frames of clip N (`clip`); clip c starts at frame ``c * F // clips``
 ============  ===========================================================================
 
-Version 1 has no section ``still``; files without one are still written as version 1. Where no vertex moves, there are no clips.
+Version 1 has no section ``still``, and every vertex is a point: ``mesh`` and ``order`` are those of `gvpipe.connectivity`.
+If no point moves, there are no clips.
 """
 
 from __future__ import annotations
@@ -22,10 +23,11 @@ from gvcodecs.pdct.dictionary import Surface
 from gvpipe.bitstream import Bitstream
 from gvpipe.connectivity import BaseMesh
 from gvpipe.errors import CorruptFile
+from gvpipe.point_mesh import PointMesh
 from gvpipe.quantize import Lattice
 from gvpipe.segments import read_segments
 
-VERSION_STILL = 2  # of files with a section `still` or `holds`
+VERSION_POINTS = 2  # vertices that share a trajectory are one point; sections `still` and `holds`
 MAX_CLIPS = 4000
 
 
@@ -60,5 +62,10 @@ def check_lattice(values: Any) -> Lattice:
 
 
 def surface_of(mesh: BaseMesh, lattice: Lattice) -> Surface:
-    """What all clips share, from the decoded base frame; signals follow the codec's order, a walk over the surface."""
+    """What all clips share where every vertex is a point; signals follow the codec's order, a walk over the surface."""
     return Surface(lattice.place(mesh.points), mesh.faces, np.argsort(mesh.visits))
+
+
+def surface_of_points(mesh: PointMesh, lattice: Lattice) -> Surface:
+    """What all clips share, from the decoded base frame; points are numbered along the walk."""
+    return Surface(lattice.place(mesh.lattice), mesh.point_faces, np.arange(len(mesh.lattice)))

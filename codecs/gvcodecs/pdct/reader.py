@@ -5,12 +5,14 @@ from __future__ import annotations
 from bisect import bisect_right
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gvcodecs.pdct.clip import decode_clip
-from gvcodecs.pdct.format import Header, surface_of
+from gvcodecs.pdct.format import VERSION_POINTS, Header, surface_of, surface_of_points
 from gvcodecs.pdct.stillness import SECTION, decode_still
 from gvpipe.bitstream import Bitstream
 from gvpipe.connectivity import read_base
+from gvpipe.point_mesh import read_points
 from gvpipe.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
 
@@ -24,10 +26,16 @@ class PdctReader:
 
     def __init__(self, bitstream: Bitstream) -> None:
         header = Header.of(bitstream)
-        self._bitstream, self._mesh = bitstream, read_base(bitstream)
-        surface = surface_of(self._mesh, header.base)
+        self._bitstream = bitstream
+        self._point: NDArray[np.int64] | None = None  # (V,) of each vertex; None: every vertex is one
+        if bitstream.version < VERSION_POINTS:
+            base = read_base(bitstream)
+            self._faces, surface = base.faces, surface_of(base, header.base)
+        else:
+            mesh = read_points(bitstream)
+            self._faces, self._point, surface = mesh.faces, mesh.point, surface_of_points(mesh, header.base)
         self._still = decode_still(bitstream.section(SECTION), surface) if SECTION in bitstream.sections else None
-        self._surface = surface if self._still is None else surface.without(self._still.vertices)
+        self._surface = surface if self._still is None else surface.without(self._still.points)
         self._bounds = segment_starts(bitstream.n_frames, header.clips)
         self._clip: tuple[int, Float32] = (-1, np.zeros((0, 0, 3), np.float32))
 
@@ -39,7 +47,7 @@ class PdctReader:
     @property
     def faces(self) -> Int32:
         """``(T, 3) int32`` triangles."""
-        return self._mesh.faces
+        return self._faces
 
     def group(self, frame: int) -> tuple[int, int]:
         """``(start, stop)`` of the clip that a frame lies in."""
@@ -52,14 +60,14 @@ class PdctReader:
         Raises:
             CorruptFile: a clip does not decode.
         """
-        result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
+        result = np.empty((stop - start, len(self._surface.base), 3), np.float32)
         for c, (begin, end) in enumerate(zip(self._bounds[:-1], self._bounds[1:], strict=True)):
             first, last = max(start, begin), min(stop, end)
             if first < last and len(self._surface.walk):
                 result[first - start : last - start] = self._decode(c)[first - begin : last - begin]
         if self._still is not None:
-            result[:, self._still.vertices] = self._still.positions
-        return result
+            result[:, self._still.points] = self._still.positions
+        return result if self._point is None else np.ascontiguousarray(result[:, self._point])
 
     def _decode(self, c: int) -> Float32:
         if self._clip[0] != c:

@@ -1,9 +1,9 @@
-"""Vertices that never move: the base frame has nearly their position, and a few bits refine it, once for all clips.
+"""Points that never move: the base frame has nearly their position, and a few bits refine it, once for all clips.
 
 A clip codes neither cluster nor deltas of them, and the file's reader puts them where this section says::
 
     section = [float64] step, [varint] bytes, flags (`gvpipe.stillness`) along the walk, [integers] position less the base's, in
-              steps: x of all still vertices along the walk, then y, then z
+              steps: x of all still points along the walk, then y, then z
 """
 
 from __future__ import annotations
@@ -29,43 +29,43 @@ Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class StillVertices:
+class StillPoints:
     """Args:
-    vertices: ``(S,)``, in the order of the walk.
+    points: ``(S,)``, in the order of the walk.
     positions: ``(S, 3) float32``, model units.
     """
 
-    vertices: NDArray[np.intp]
+    points: NDArray[np.intp]
     positions: Float32
 
 
 def encode_still(still: NDArray[np.bool_], frame: Float32, surface: Surface, step: float) -> bytes:
-    """Code the vertices that ``still (V,)`` flags, in the order of vertices that ``surface`` has.
+    """Code the points that ``still (P,)`` flags, in the order of points that ``surface`` has.
 
     Args:
         still: one at least is set.
-        frame: ``(V, 3)`` any frame, model units.
-        surface: with all vertices on its walk.
+        frame: ``(P, 3)`` any frame, model units.
+        surface: with all points on its walk.
         step: what differences from the base frame are rounded to, model units.
     """
-    vertices = surface.walk[still[surface.walk]]
+    points = surface.walk[still[surface.walk]]
     step = float(np.clip(step, SMALLEST_STEP, LARGEST_STEP))
-    off = np.rint((frame[vertices].astype(np.float64) - surface.base[vertices]) / step).astype(np.int64)
+    off = np.rint((frame[points].astype(np.float64) - surface.base[points]) / step).astype(np.int64)
     flags = encode_flags(still[surface.walk])
     return HEAD.pack(step) + varint(len(flags)) + flags + encode_integers(off.T)
 
 
-def decode_still(data: bytes, surface: Surface) -> StillVertices:
+def decode_still(data: bytes, surface: Surface) -> StillPoints:
     """Mirror of `encode_still`; raises `CorruptFile` if the bytes are not what it writes."""
     cursor = Cursor(data, SECTION)
     (step,) = cursor.struct(HEAD)
     if not SMALLEST_STEP <= step <= LARGEST_STEP:  # NaN neither
         raise cursor.corrupt(f"its step is {step}")
     flags = decode_flags(cursor.take(cursor.varint(cursor.left, "a length")), len(surface.walk), SECTION)
-    vertices = surface.walk[flags]
-    off = decode_integers(cursor.rest(), 3 * len(vertices), name=SECTION).reshape(3, -1).T
+    points = surface.walk[flags]
+    off = decode_integers(cursor.rest(), 3 * len(points), name=SECTION).reshape(3, -1).T
     with np.errstate(over="ignore"):
-        positions = (surface.base[vertices] + step * off).astype(np.float32)
+        positions = (surface.base[points] + step * off).astype(np.float32)
     if not np.isfinite(positions).all():
         raise cursor.corrupt("a position is larger than float32 can hold")
-    return StillVertices(vertices, positions)
+    return StillPoints(points, positions)

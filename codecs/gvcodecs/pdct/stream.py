@@ -1,7 +1,8 @@
 """Frames in, bytes out, one clip at a time; and bytes in, frames out.
 
 For sources that have no end yet (simulations, capture) and sinks that cannot wait for it. Encoder and reader hold one clip. The
-clips are those of a file (`clip`), of exactly N frames each but for the last::
+clips are coded as those of a file (`clip`), of exactly N frames each but for the last. What only the whole sequence tells is
+missing: every vertex is coded by itself, still or not, and the step follows from quality and frame 0's diagonal alone::
 
     stream = "gvpdct\\r\\n", [u16] version, [u32 x 3] V, T, bytes of order, [u64] bytes of mesh, [5 x float64] frames per
              second, lattice of the base frame (origin, step), mesh, order, clips, [u32] 0
@@ -13,16 +14,18 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.pdct.clip import decode_clip
 from gvcodecs.pdct.dictionary import Surface
-from gvcodecs.pdct.encoder import Pdct, SharedBase
+from gvcodecs.pdct.encoder import Pdct, diagonal_of
 from gvcodecs.pdct.format import check_lattice, surface_of
-from gvpipe.connectivity import BaseMesh, decode_base
+from gvpipe.connectivity import BaseMesh, EncodedMesh, decode_base, encode_base
 from gvpipe.errors import CorruptFile, InputError, NewerVersion, NotGeometryVideo, TruncatedFile
+from gvpipe.quantize import Lattice
 from gvpipe.segments import MAX_SEGMENT
 from gvpipe.sequence import Float32, Int32, check_finite
 
@@ -47,7 +50,7 @@ class StreamEncoder:
     def __init__(self, faces: NDArray[np.integer], settings: Pdct | None = None, fps: float = 30.0) -> None:
         self._faces, self._fps = np.asarray(faces, np.int32).reshape(-1, 3), float(fps)
         self._settings = settings or Pdct()
-        self._base: SharedBase | None = None
+        self._base: _Base | None = None
         self._frames: list[Float32] = []
         self._count = 0
         self._is_closed = False
@@ -68,10 +71,10 @@ class StreamEncoder:
         if self._base is None:
             if self._faces.size and not 0 <= self._faces.min() <= self._faces.max() < len(positions):
                 raise InputError(f"triangles name vertices up to {self._faces.max()}; there are {len(positions)}")
-            self._base = SharedBase(positions, self._faces, self._settings)
+            self._base = _Base.of(positions, self._faces, self._settings)
             head = self._head(self._base, len(positions))
-        elif len(positions) != len(self._base.mesh.points):
-            raise InputError(f"frame {self._count} has {len(positions)} vertices, the first {len(self._base.mesh.points)}")
+        elif len(positions) != len(self._base.surface.base):
+            raise InputError(f"frame {self._count} has {len(positions)} vertices, the first {len(self._base.surface.base)}")
         self._frames.append(positions)
         self._count += 1
         return head + (self._flush() if len(self._frames) == self._settings.clip_frames else b"")
@@ -85,7 +88,7 @@ class StreamEncoder:
         self._is_closed = True
         return (self._flush() if self._frames else b"") + END
 
-    def _head(self, base: SharedBase, n_vertices: int) -> bytes:
+    def _head(self, base: _Base, n_vertices: int) -> bytes:
         mesh, order = base.coded.mesh, base.coded.order
         lattice = (*base.lattice.origin, base.lattice.step)
         numbers = HEAD.pack(VERSION, n_vertices, len(self._faces), len(order), len(mesh), self._fps, *lattice)
@@ -93,10 +96,30 @@ class StreamEncoder:
 
     def _flush(self) -> bytes:
         assert self._base is not None
-        data = self._base.encode(np.stack(self._frames))
+        base, settings = self._base, self._settings
+        frames = np.ascontiguousarray(np.stack(self._frames)[:, base.coded.permutation])
+        step = settings.open_step(base.diagonal or diagonal_of(frames))
+        data = settings.encode_clip(frames, base.surface, settings.find_clusters(frames, base.surface), step)
         head = CLIP.pack(len(self._frames), zlib.crc32(data), len(data))
         self._frames = []
         return head + data
+
+
+@dataclass(frozen=True)
+class _Base:
+    """Frame 0 and connectivity, coded; ``diagonal`` of frame 0, model units."""
+
+    lattice: Lattice
+    coded: EncodedMesh
+    surface: Surface
+    diagonal: float
+
+    @classmethod
+    def of(cls, frame: Float32, faces: Int32, settings: Pdct) -> _Base:
+        """Code a mesh with positions ``frame (V, 3)`` and triangles ``faces (T, 3)``."""
+        lattice = Lattice.over(frame, settings.base_bits)
+        coded = encode_base(lattice.quantise(frame), faces, settings.reorder)
+        return cls(lattice, coded, surface_of(decode_base(coded.mesh, coded.order), lattice), diagonal_of(frame))
 
 
 class StreamReader:
