@@ -23,7 +23,6 @@ from gvpipe.stillness import decode_flags, encode_flags
 
 SECTION = "still"
 HEAD = struct.Struct("<d")
-MOST = 1 << 38  # steps
 
 Float64 = NDArray[np.float64]
 
