@@ -17,7 +17,8 @@ from gvpipe.vertex_errors import measure_spread
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 QUALITIES = (50, 75, 90)
-NAMES = sorted(path.stem for path in DATA.glob("*.npz"))
+SMALL = "dembones_bone", "fox_run", "kaykit_spin", "morph_wave", "walking_cat"  # docs/rate-control.md has the others
+NAMES = [name for name in SMALL if (DATA / f"{name}.npz").exists()]
 MADE = {
     "waving": waving(24, 24),
     "partly still": patched(20, 16),
