@@ -8,8 +8,8 @@ many frames each of them is shown for::
 
 Why around the codecs and not inside them: repeated frames are then identical bit for bit in every codec, and cost nothing else.
 
-A codec asks for it by a class attribute ``holds = True``. Those whose frames are pictures of a video do not: a browser plays
-these by the video's clock.
+A codec asks for it by a class attribute ``holds = True``. Where its frames are pictures of a video, that has D of them, and
+other players run through these at the sequence's frame rate.
 """
 
 from __future__ import annotations

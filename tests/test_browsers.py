@@ -14,7 +14,7 @@ import numpy as np
 import pages
 import pytest
 from PIL import Image
-from sequences import waving
+from sequences import held, waving
 
 import gvpipe
 
@@ -22,7 +22,9 @@ FILES: dict[str, dict[str, Any]] = {  # several groups of pictures, with B-frame
     "affine": {"prediction": "affine", "preset": "slow", "gop": 8, "clusters": 3, "quality": 90},
     "blended": {"prediction": "blended", "preset": "slow", "gop": 32},
     "plain": {"prediction": "affine", "preset": "ultrafast", "gop": 4, "clusters": 3},
+    "held": {"prediction": "blended", "preset": "slow", "gop": 5},
 }
+LENGTHS = {"held": [2] * 13 + [14]}  # frames that each picture is shown for, 1 if not given
 DECODERS = {"webcodecs": "", "video": "delete window.VideoDecoder;"}
 SEEN: dict[str, list[str]] = {}  # of each kind of file, what the first browser made of it
 
@@ -47,7 +49,8 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]
     folder = tmp_path_factory.mktemp("site")
     pages.write_pages(folder)
     for kind, settings in FILES.items():
-        gvpipe.encode(waving(12, 40), folder / f"{kind}.mp4", **settings)
+        lengths = LENGTHS.get(kind, [1] * 40)
+        gvpipe.encode(held(waving(12, len(lengths)), lengths), folder / f"{kind}.mp4", **settings)
     with browsers.served(folder) as address:
         yield folder, address
 
@@ -113,13 +116,14 @@ LOOPS = f"""{pages.TEXT} const video = await GeometryVideo.load(args[0]);
     return {{ frames, wrong, seconds }};"""
 
 
+@pytest.mark.parametrize("kind", ["affine", "held"])
 @pytest.mark.parametrize("decoder", DECODERS)
 def test_two_whole_loops(
-    decoder: str, name: str, module: Callable[..., Any], record_property: Callable[[str, object], None]
+    decoder: str, kind: str, name: str, module: Callable[..., Any], record_property: Callable[[str, object], None]
 ) -> None:
     """Each frame shown in two loops has that frame's positions, bit by bit; none comes twice in a loop."""
     _skip_inexact(name, decoder)
-    result = module(DECODERS[decoder] + LOOPS, "affine.mp4")
+    result = module(DECODERS[decoder] + LOOPS, f"{kind}.mp4")
     frames = result["frames"]
     (turn,) = np.flatnonzero(np.diff(frames) < 0) + 1
     loops = [frames[:turn], frames[turn:]]
@@ -128,12 +132,13 @@ def test_two_whole_loops(
     assert not result["wrong"], (result["wrong"], frames)
     assert result["seconds"] > 0.8 * 2 * 40 / 24
     rate = len(frames) / result["seconds"]
-    print(f"{name}, {decoder}: {rate:.1f} unique frames per second of 24")
+    print(f"{name}, {decoder}, {kind}: {rate:.1f} unique frames per second of 24")
     record_property("frames per second", rate)
     assert rate > 4  # on a busy machine; idle, all of them
 
 
-def test_seeks_in_the_player(player: Callable[..., Any]) -> None:
+@pytest.mark.parametrize("kind", ["affine", "held"])
+def test_seeks_in_the_player(kind: str, player: Callable[..., Any]) -> None:
     """Of seeks in a row the last counts; after a pause, the picture is the frame that the player names."""
     shown = player(
         f"""{pages.LOAD}
@@ -145,7 +150,7 @@ def test_seeks_in_the_player(player: Callable[..., Any]) -> None:
         frames.push(element.currentFrame);
         await element.seek(element.currentFrame + 1);
         return [...frames, element.currentFrame];""",
-        "affine.mp4",
+        f"{kind}.mp4",
     )
     assert shown[0] == 9 and shown[1] >= 14 and shown[2] == min(39, shown[1] + 1)
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from itertools import product
 from pathlib import Path
 from typing import Any
 
+import av
 import numpy as np
 import pytest
 from sequences import awkward, held, partly_still, waving
 
 import gvpipe
-from gvpipe.codec import LevelReader, Memo, codec_class, encode_sequence, open_reader
+from gvpipe.codec import GroupReader, LevelReader, Memo, codec_class, encode_sequence, open_reader
 from gvpipe.errors import CorruptFile
 from gvpipe.holds import Holds, find_holds, read_holds
 from gvpipe.sequence import MeshSequence
@@ -19,7 +21,6 @@ from gvpipe.stillness import decode_flags, encode_flags, find_still
 
 AWKWARD = awkward()
 MORPH_WAVE = Path(__file__).parents[2] / "shared" / "data" / "morph_wave.npz"
-MCGV = "mcgv signals neither stillness nor repeated frames yet"
 PLAIN: list[tuple[str, dict[str, object]]] = [
     ("pca", {}),
     ("pca", {"predictor": "lsp", "segment": 7}),
@@ -38,12 +39,11 @@ PICTURES: list[tuple[str, dict[str, object]]] = [
 ]
 
 
-def variants(picture_reason: str) -> pytest.MarkDecorator:
-    """All codecs, in several profiles; those that may fail for now are marked so."""
+def variants() -> pytest.MarkDecorator:
+    """All codecs, in several profiles, with and without a bound."""
     cases = []
     for codec, settings in PLAIN + PICTURES:
-        marks = [pytest.mark.xfail(strict=False, reason=picture_reason)] if codec == "mcgv" else []
-        cases.append(pytest.param(codec, settings, id=" ".join([codec, *map(str, settings.values())]), marks=marks))
+        cases.append(pytest.param(codec, settings, id=" ".join([codec, *map(str, settings.values())])))
     return pytest.mark.parametrize(("codec", "settings"), cases)
 
 
@@ -69,7 +69,7 @@ def assert_random_access(video: gvpipe.Player, path: Path) -> None:
 
 
 @pytest.mark.parametrize("bound", [None, "0.2%"], ids=["", "max-error"])
-@variants(MCGV)
+@variants()
 def test_still_vertices_stand_still(codec: str, settings: dict[str, object], bound: str | None, tmp_path: Path) -> None:
     sequence = partly_still()
     still = find_still(sequence)
@@ -85,7 +85,7 @@ def test_still_vertices_stand_still(codec: str, settings: dict[str, object], bou
 
 
 @pytest.mark.parametrize("bound", [None, "0.2%"], ids=["", "max-error"])
-@variants("it codes vertices that coincide one by one")
+@variants()
 def test_coincident_vertices_coincide(codec: str, settings: dict[str, object], bound: str | None, tmp_path: Path) -> None:
     sequence = with_copies()
     frames = encode(sequence, tmp_path, codec, settings, max_error=bound)[:]
@@ -94,7 +94,7 @@ def test_coincident_vertices_coincide(codec: str, settings: dict[str, object], b
 
 
 @pytest.mark.parametrize("bound", [None, "0.2%"], ids=["", "max-error"])
-@variants(MCGV)
+@variants()
 def test_repeated_frames_are_identical(codec: str, settings: dict[str, object], bound: str | None, tmp_path: Path) -> None:
     lengths = [3, 1, 1, 2, 1, 1, 1, 9, 1, 1, 4]
     sequence = held(waving(9, len(lengths)), lengths)
@@ -107,7 +107,7 @@ def test_repeated_frames_are_identical(codec: str, settings: dict[str, object], 
 
 
 @pytest.mark.parametrize("target", [{"target_rmse": 1e-3}, {"max_error": "0.1%"}], ids=["rmse", "max-error"])
-@pytest.mark.parametrize(("codec", "settings"), PLAIN)
+@pytest.mark.parametrize(("codec", "settings"), PLAIN + PICTURES)
 def test_repeated_frames_cost_nearly_nothing(
     codec: str, settings: dict[str, object], target: dict[str, Any], tmp_path: Path
 ) -> None:
@@ -145,6 +145,35 @@ def test_awkward_inputs(codec: str, settings: dict[str, object], name: str, few:
     assert np.abs(decoded.astype(np.float64) - frames).max() <= 0.02 * extent + 1e-6 * np.abs(frames).max()
 
 
+@pytest.mark.parametrize(("codec", "settings"), PICTURES)
+def test_pictures_are_of_distinct_frames(codec: str, settings: dict[str, object], tmp_path: Path) -> None:
+    """The video lacks repeated frames, and corrections, segments and groups of pictures are of distinct ones."""
+    lengths = [2, 1, 7, 1, 1, 3, 1, 1, 4]
+    sequence = held(waving(9, len(lengths)), lengths)
+    every = {"segment": 4, **({"gop": 3} if settings.get("image") != "jpeg" else {})}
+    video = encode(sequence, tmp_path, codec, {**settings, **every}, max_error="0.2%")
+    sections = {name: data for name, data in video.bitstream.sections.items() if name != "holds"}
+    few = dataclasses.replace(video.bitstream, n_frames=len(lengths), sections=sections)
+    distinct = open_reader(few)
+    assert np.array_equal(video[:], np.repeat(distinct.read(0, len(lengths)), lengths, axis=0))
+    assert gvpipe.info(tmp_path / "a.mp4").frames == len(video) == sum(lengths)
+    with av.open(tmp_path / "a.mp4") as mp4:
+        n_pictures = sum(1 for _ in mp4.decode(video=0))
+    assert settings.get("transform") == "klt" or n_pictures == len(lengths)
+    if isinstance(distinct, GroupReader):
+        starts = [0, *np.cumsum(lengths).tolist()]
+        reader = open_reader(video.bitstream)
+        assert isinstance(reader, GroupReader)
+        for d in range(len(lengths)):
+            start, stop = distinct.group(d)
+            assert reader.group(starts[d]) == reader.group(starts[d + 1] - 1) == (starts[start], starts[stop])
+
+
+def test_mcgv_without_repeated_frames_is_as_without_holds() -> None:
+    codec, sequence = codec_class("mcgv")(preset="fast"), partly_still()
+    assert encode_sequence(codec, sequence) == codec.encode(sequence)
+
+
 @pytest.mark.parametrize(("codec", "settings"), PLAIN)
 def test_files_without_stillness_keep_their_version(codec: str, settings: dict[str, object]) -> None:
     bitstream = encode_sequence(codec_class(codec)(**settings), waving(7, 9))
@@ -152,7 +181,7 @@ def test_files_without_stillness_keep_their_version(codec: str, settings: dict[s
     assert not {"still", "holds"} & set(bitstream.sections)
 
 
-@pytest.mark.parametrize(("codec", "settings"), PLAIN)
+@pytest.mark.parametrize(("codec", "settings"), PLAIN + PICTURES)
 def test_nothing_moves_at_all(codec: str, settings: dict[str, object], tmp_path: Path) -> None:
     """One distinct frame; and, where a codec is asked directly, nothing but still vertices."""
     sequence = held(waving(9, 1), [15])
@@ -245,10 +274,8 @@ def test_wrong_holds_are_refused(lengths: list[int]) -> None:
         read_holds(type(bitstream)(**{**vars(wrong), "n_frames": 10}))
 
 
-@pytest.mark.parametrize("codec", ["pca", "laplacian", "pdct"])
+@pytest.mark.parametrize("codec", ["pca", "laplacian", "pdct", "mcgv"])
 def test_damaged_sections_raise_format_errors_only(codec: str) -> None:
-    import dataclasses
-
     from gvpipe.errors import FormatError
 
     bitstream = encode_sequence(codec_class(codec)(), held(partly_still(), [2, *[1] * 19]))

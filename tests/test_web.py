@@ -19,16 +19,17 @@ import pages
 import pytest
 from pages import FRAMES, LOAD, check_frames, run
 from PIL import Image
-from sequences import awkward, patched, waving
+from sequences import awkward, held, patched, waving
 
 import gvpipe
 from gvcodecs.mcgv import format as sections
 from gvcodecs.mcgv.surface import read_surface
 from gvpipe.bitstream import Bitstream
-from gvpipe.codec import open_reader
+from gvpipe.codec import make_codec, open_reader
 from gvpipe.container import read_file, write_file
 from gvpipe.corrections import Bound, encode_corrections
 from gvpipe.errors import CorruptFile
+from gvpipe.holds import Holds, add_holds
 from gvpipe.sequence import MeshSequence
 
 pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())
@@ -46,6 +47,7 @@ KINDS: dict[str, dict[str, Any]] = {  # how vertices move, and where their pixel
     "outliers": {"prediction": "affine", "clusters": 1, "quality": 100},
 }
 LARGEST_ERROR = 0.001  # model units, of the file with corrections
+LENGTHS = [2] * 13 + [9]  # frames that each picture is shown for, where frames repeat
 
 Mask = npt.NDArray[np.bool_]
 
@@ -122,7 +124,10 @@ def test_frames_of_seams_and_still_vertices_equal_pythons(
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_frames_of_what_never_moves_equal_pythons(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
-    path = _encode(site, patched(still=1.0), **KINDS[kind])
+    """One distinct frame; and, where the codec is asked directly, nothing but still points."""
+    sequence, path = patched(still=1.0), site[0] / "x.mp4"
+    check_frames(module, _encode(site, sequence, **KINDS[kind]))
+    write_file(make_codec("mcgv", {**FAST, **KINDS[kind]}).encode(sequence), path)
     assert "still" in read_file(path).sections
     check_frames(module, path)
 
@@ -154,6 +159,18 @@ def test_frames_are_corrected(module: Callable[..., Any], site: tuple[Path, str]
     plain = open_reader(kinds["patched"]).read(0, 12)
     before, after = (np.linalg.norm(sequence.positions - p, axis=2).max() for p in (plain, found))
     assert after <= LARGEST_ERROR < before
+
+
+@pytest.mark.parametrize("bound", [None, "0.1%"], ids=["", "max-error"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_repeated_frames_equal_pythons(
+    kind: str, bound: str | None, module: Callable[..., Any], site: tuple[Path, str]
+) -> None:
+    """Every frame twice, the last held: the file codes each once, and so do its segments and corrections."""
+    sequence = held(waving(9, len(LENGTHS)), LENGTHS)
+    path = _encode(site, sequence, segment=6, max_error=bound, **KINDS[kind])
+    assert {"holds", *(["corrections"] if bound else [])} <= set(read_file(path).sections)
+    check_frames(module, path, count=sum(LENGTHS))
 
 
 def test_frames_of_golden_files(module: Callable[..., Any], site: tuple[Path, str]) -> None:
@@ -203,6 +220,33 @@ def test_module_plays_every_frame_that_is_due(module: Callable[..., Any], site: 
     assert frames == sorted(set(frames))
     assert len(frames) >= 8  # of 24; on an idle machine all
     assert matches == len(frames)
+
+
+@pytest.mark.parametrize("decoder", ["", "delete window.VideoDecoder;"], ids=["webcodecs", "video"])
+def test_repeated_frames_play_in_order(decoder: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    """From a frame sought to the end, at the sequence's own pace; each with its own positions."""
+    path = _encode(site, held(waving(10, len(LENGTHS)), LENGTHS))
+    shown, wrong, seconds, after = module(
+        decoder
+        + """const video = await GeometryVideo.load(args[0]);
+        const wanted = [];
+        for (let k = 0; k < video.frameCount; k++) wanted.push(await video.frame(k));
+        const same = (positions, k) => positions.every((x, i) => x === wanted[k][i]);
+        await video.frame(5);
+        const [shown, wrong] = [[], []];
+        const start = performance.now();
+        const show = (positions, k) => (shown.push(k), same(positions, k) || wrong.push(k));
+        await new Promise((resolve, reject) => video.play(show, { ended: resolve, failed: reject }).catch(reject));
+        const seconds = (performance.now() - start) / 1000;
+        const after = [];
+        for (const k of [34, 26, 25, 0, 13, 12]) after.push(same(await video.frame(k), k));
+        return [shown, wrong, seconds, after];""",
+        path.name,
+    )
+    assert shown == sorted(set(shown)) and shown[0] in range(5, 12) and shown[-1] == sum(LENGTHS) - 1, shown
+    assert len(shown) >= 10  # of 30; on an idle machine all
+    assert not wrong and all(after), (wrong, after)
+    assert seconds > 0.8 * 30 / 24
 
 
 def test_overlapping_requests_are_answered_in_turn(module: Callable[..., Any], site: tuple[Path, str]) -> None:
@@ -328,6 +372,8 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Bitstream]:
     bound = Bound.of(LARGEST_ERROR, float(np.abs(sequence.positions).max()))
     section, _ = encode_corrections(sequence, open_reader(plain), bound)
     found["corrected"] = dataclasses.replace(plain, sections={**plain.sections, "corrections": section})
+    gvpipe.encode(held(waving(9, len(LENGTHS)), LENGTHS), path, **FAST)
+    found["held"] = read_file(path)
     return found
 
 
@@ -384,6 +430,7 @@ def test_settings_out_of_range_are_noticed(
         ("patched", "order"),
         ("patched", "still"),
         ("patched", "weights"),
+        ("held", "holds"),
     ],
 )
 def test_hostile_sections_give_one_clear_error(
@@ -414,6 +461,19 @@ def test_hostile_sections_give_one_clear_error(
     assert outcomes[2] == "corrupt"  # cut short
     differing = [(i, found, python) for i, (found, python) in enumerate(zip(outcomes, wanted, strict=True)) if found != python]
     assert not differing, differing  # JavaScript refuses what Python refuses
+
+
+@pytest.mark.parametrize("lengths", [[5, 0, 7], [3, 4], [14, -2], [1] * 13, [1 << 38, 5], [12], [6, 6], []], ids=str)
+def test_wrong_holds_are_refused(
+    lengths: list[int], module: Callable[..., Any], site: tuple[Path, str], kinds: dict[str, Bitstream]
+) -> None:
+    """Runs that do not add up to the header's frames, or that are not of as many pictures as the video has."""
+    plain = kinds["blended"]
+    wrong = add_holds(plain, Holds(np.array(lengths, np.int64)), plain.version)
+    path = site[0] / "holds.mp4"
+    write_file(dataclasses.replace(wrong, n_frames=plain.n_frames), path)
+    assert _outcome(path) == "corrupt"
+    assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", path.name) == "corrupt"
 
 
 def _outcome(path: Path) -> str:

@@ -93,6 +93,7 @@ class Mcgv(Settings):
     id: ClassVar[str] = "mcgv"
     version: ClassVar[int] = 3
     summary: ClassVar[str] = "multi-chart geometry video: residual images of a blended affine prediction, as H.264 or JPEG"
+    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.holds`)
 
     quality: float = 75.0  # 0..100, higher is better
     image: str = "h264"  # h264: predictive; jpeg: every frame decodes alone

@@ -42,7 +42,7 @@ class McgvReader:
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
         self._video = VideoReader(bitstream.video, self._header.profile, self._header.width, 3 * self._header.height)
         if self._video.n_frames != bitstream.n_frames:
-            raise CorruptFile(f"the video has {self._video.n_frames} frames, the header says {bitstream.n_frames}")
+            raise CorruptFile(f"the video has {self._video.n_frames} pictures in place of {bitstream.n_frames}")
         if self._header.outliers != (SECTION in bitstream.sections):
             raise CorruptFile(f"header and section {SECTION!r} do not fit; get the file again from its source")
 

@@ -1,7 +1,7 @@
 /**
- * The pictures of a geometry video by WebCodecs: groups of pictures are decoded ahead and kept, a clock says which is due.
+ * The pictures of a geometry video by WebCodecs: groups of pictures are decoded ahead and kept, a clock says which frame is due.
  *
- * Every frame has its number, so seeking and looping are exact in every browser. The clock stands still while a picture that
+ * A picture is shown for one frame or more (`format/holds.js`). Every picture has its number, so seeking and looping are exact in every browser. The clock stands still while a picture that
  * is due is not there yet; a page too slow for every picture gets those that are due, and none is queued.
  */
 
@@ -16,18 +16,18 @@ const LONGEST_STEP = 1000; // ms that the clock goes on at once: a hidden page i
 
 export class DecodedPictures {
   /**
-   * @param {Uint8Array} file @param {number} fps @param {number} frames
+   * @param {Uint8Array} file @param {number} fps @param {import("./format/holds.js").Holds} holds
    * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
    * @returns {Promise<DecodedPictures>} its first group decoded
    * @throws {GeometryVideoError} kind "unsupported": this browser's WebCodecs cannot decode it
    */
-  static async open(file, fps, frames, size, samples) {
+  static async open(file, fps, holds, size, samples) {
     const track = readTrack(file);
     const found = track.groups.reduce((sum, group) => sum + group.length, 0);
-    if (found !== frames) {
-      throw new GeometryVideoError("corrupt", `its video has ${found} frames, the header says ${frames}; ${AGAIN}`);
+    if (found !== holds.distinct) {
+      throw new GeometryVideoError("corrupt", `its video has ${found} pictures in place of ${holds.distinct}; ${AGAIN}`);
     }
-    const pictures = new DecodedPictures(track, fps, frames, size, samples);
+    const pictures = new DecodedPictures(track, fps, holds, size, samples);
     try {
       await pictures.seek(0);
     } catch (error) {
@@ -37,16 +37,18 @@ export class DecodedPictures {
     return pictures;
   }
 
-  constructor(track, fps, frames, size, samples) {
+  constructor(track, fps, holds, size, samples) {
     this.fps = fps;
-    this.frames = frames;
+    this.holds = holds;
+    this.frames = holds.frames;
+    /** The frame shown. */
     this.shown = -1;
     this.decoder = new GroupDecoder(track, size, samples);
-    this.groupBytes = (samples.length * frames) / track.groups.length;
+    this.groupBytes = (samples.length * holds.distinct) / track.groups.length;
     this.samples = track.groups;
-    /** Of each frame its group. */
-    this.groupOf = new Uint32Array(frames);
-    track.groups.forEach((group, g) => group.forEach(({ frame }) => (this.groupOf[frame] = g)));
+    /** Of each picture its group. */
+    this.groupOf = new Uint32Array(holds.distinct);
+    track.groups.forEach((group, g) => group.forEach(({ picture }) => (this.groupOf[picture] = g)));
     this.kept = new Map(); // group -> Group, the one asked for last at the end
     this.turn = Promise.resolve(); // one group after the other
   }
@@ -60,7 +62,7 @@ export class DecodedPictures {
   async seek(frame) {
     this.pause();
     if (this.shown === frame) return;
-    this.current = await this.#group(this.groupOf[frame]).picture(frame);
+    this.current = await this.#picture(this.holds.distinctOf(frame));
     this.shown = frame;
   }
 
@@ -73,20 +75,21 @@ export class DecodedPictures {
     let position = Math.max(0, this.shown); // frames since the start
     let before = performance.now();
     this.shown = -1; // it is shown again, at once
-    await this.#group(this.groupOf[Math.floor(position)]).picture(Math.floor(position));
+    await this.#picture(this.holds.distinctOf(Math.floor(position)));
     const tick = (now) => {
       if (this.playing !== playing) return;
       const next = position + (Math.min(Math.max(0, now - before), LONGEST_STEP) * rate * this.fps) / 1000;
       before = now;
       const isOver = !loop && next >= this.frames;
       const frame = loop ? Math.floor(next) % this.frames : Math.min(Math.floor(next), this.frames - 1);
-      const group = this.#group(this.groupOf[frame]);
+      const picture = this.holds.distinctOf(frame);
+      const group = this.#group(this.groupOf[picture]);
       if (group.error) {
         this.pause();
         failed(group.error);
         return;
       }
-      const levels = group.levels.get(frame);
+      const levels = group.levels.get(picture);
       if (levels) {
         position = loop ? next % this.frames : next;
         if (frame !== this.shown) {
@@ -98,7 +101,7 @@ export class DecodedPictures {
           ended();
           return;
         }
-        this.#decodeAhead(this.groupOf[frame], AHEAD * this.fps * rate);
+        this.#decodeAhead(this.groupOf[picture], AHEAD * this.fps * rate);
       }
       requestAnimationFrame(tick);
     };
@@ -118,14 +121,19 @@ export class DecodedPictures {
     this.kept.clear();
   }
 
-  /** Have the groups decoded that follow one: the next, and more up to `frames` and half of what is kept. */
-  #decodeAhead(group, frames) {
+  /** Have the groups decoded that follow one: the next, and more up to so many pictures and half of what is kept. */
+  #decodeAhead(group, pictures) {
     const most = Math.min(this.samples.length - 1, KEPT_BYTES / 2 / this.groupBytes);
-    for (let i = 1, ahead = 0; i === 1 || (i <= most && ahead < frames); i++) {
+    for (let i = 1, ahead = 0; i === 1 || (i <= most && ahead < pictures); i++) {
       const next = (group + i) % this.samples.length;
       this.#group(next);
       ahead += this.samples[next].length;
     }
+  }
+
+  /** A picture's levels, when they are there. */
+  #picture(picture) {
+    return this.#group(this.groupOf[picture]).picture(picture);
   }
 
   /** A group that is decoded, or will be. */
@@ -149,7 +157,7 @@ export class DecodedPictures {
     this.turn = this.turn.then(async () => {
       if (this.isClosed) return;
       try {
-        await this.decoder.decode(this.samples[number], (frame, levels) => group.add(frame, levels));
+        await this.decoder.decode(this.samples[number], (picture, levels) => group.add(picture, levels));
       } catch (error) {
         group.fail(error);
       }
@@ -159,23 +167,24 @@ export class DecodedPictures {
   }
 }
 
-/** The levels of a group's frames, as they come. */
+/** The levels of a group's pictures, as they come. */
 class Group {
   levels = new Map();
-  waiting = new Map(); // frame -> what to call
+  waiting = new Map(); // picture -> what to call
   error = null;
   isDone = false;
 
-  picture(frame) {
+  picture(number) {
     if (this.error) return Promise.reject(this.error);
-    if (this.levels.has(frame)) return Promise.resolve(this.levels.get(frame));
-    return new Promise((resolve, reject) => this.waiting.set(frame, [...(this.waiting.get(frame) ?? []), { resolve, reject }]));
+    if (this.levels.has(number)) return Promise.resolve(this.levels.get(number));
+    const others = this.waiting.get(number) ?? [];
+    return new Promise((resolve, reject) => this.waiting.set(number, [...others, { resolve, reject }]));
   }
 
-  add(frame, levels) {
-    this.levels.set(frame, levels);
-    for (const { resolve } of this.waiting.get(frame) ?? []) resolve(levels);
-    this.waiting.delete(frame);
+  add(number, levels) {
+    this.levels.set(number, levels);
+    for (const { resolve } of this.waiting.get(number) ?? []) resolve(levels);
+    this.waiting.delete(number);
   }
 
   fail(error) {

@@ -8,7 +8,9 @@
 
 import { readContainer } from "./format/boxes.js";
 import { GeometryVideoError } from "./format/errors.js";
+import { readHolds } from "./format/holds.js";
 import { readPayload } from "./format/payload.js";
+import { checkCodec } from "./mcgv/header.js";
 import { McgvReader } from "./mcgv/reader.js";
 import { openPictures } from "./pictures.js";
 
@@ -29,10 +31,11 @@ export class GeometryVideo {
     let pictures = null;
     try {
       const payload = await readPayload(readContainer(file));
-      const reader = await McgvReader.open(payload);
-      const { fps, frames } = payload.header;
-      pictures = await openPictures(file, fps, frames, reader.pictureSize, reader.samples);
-      return new GeometryVideo(payload.header, file.length, reader, pictures);
+      checkCodec(payload.header);
+      const holds = readHolds(payload);
+      const reader = await McgvReader.open(holds.distinctPayload(payload));
+      pictures = await openPictures(file, payload.header.fps, holds, reader.pictureSize, reader.samples);
+      return new GeometryVideo(payload.header, file.length, holds, reader, pictures);
     } catch (error) {
       pictures?.close();
       if (!(error instanceof RangeError)) throw error; // an array that the browser cannot give
@@ -40,11 +43,12 @@ export class GeometryVideo {
     }
   }
 
+  #holds;
   #reader;
   #pictures;
   #queue = Promise.resolve();
 
-  constructor(header, byteLength, reader, pictures) {
+  constructor(header, byteLength, holds, reader, pictures) {
     this.frameCount = header.frames;
     this.fps = header.fps;
     this.vertexCount = header.vertices;
@@ -57,6 +61,7 @@ export class GeometryVideo {
     this.basePoints = reader.basePoints;
     /** `{min, max}`: the box that the motion stays in, model units. */
     this.bounds = reader.bounds();
+    this.#holds = holds;
     this.#reader = reader;
     this.#pictures = pictures;
   }
@@ -116,7 +121,7 @@ export class GeometryVideo {
   }
 
   #read(k, positions) {
-    this.#reader.rebuild(k, this.#pictures.levels(), positions);
+    this.#reader.rebuild(this.#holds.distinctOf(k), this.#pictures.levels(), positions);
     return positions;
   }
 }

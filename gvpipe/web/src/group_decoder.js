@@ -1,5 +1,5 @@
 /**
- * Groups of pictures by `VideoDecoder`: exact samples and frame numbers, whatever a browser's `<video>` makes of them.
+ * Groups of pictures by `VideoDecoder`: exact samples and numbers, whatever a browser's `<video>` makes of them.
  *
  * Where the decoder gives luma, that is read; where it gives grey as red, green and blue (Firefox), a table goes back.
  */
@@ -9,7 +9,7 @@ import { OF_GREY, OF_LUMA } from "./levels.js";
 
 const LUMA = ["I420", "I420A", "NV12"];
 const COLOURS = ["BGRX", "BGRA", "RGBX", "RGBA"];
-const TICK = 1000; // microseconds of a frame, for the decoder; so that its rounding changes no number
+const TICK = 1000; // microseconds of a picture, for the decoder; so that its rounding changes no number
 const QUEUED = 6; // pictures that the decoder has not begun
 const TAKEN = 4; // pictures decoded and not yet read: large ones fill the memory
 
@@ -33,7 +33,7 @@ export class GroupDecoder {
 
   /**
    * @param {import("./track.js").Sample[]} group
-   * @param {(frame: number, levels: Uint8Array) => void} give called for each picture, with the levels of `samples`
+   * @param {(picture: number, levels: Uint8Array) => void} give called for each picture, with the levels of `samples`
    * @throws {GeometryVideoError} this browser has no decoder for it, or the group is damaged
    */
   async decode(group, give) {
@@ -44,9 +44,9 @@ export class GroupDecoder {
     this.count = () => given++;
     if (this.decoder?.state !== "configured") this.#open(); // at first, and after the browser has taken it away
     const { decoder } = this;
-    for (const [i, { data, frame }] of group.entries()) {
+    for (const [i, { data, picture }] of group.entries()) {
       if (decoder.state !== "configured") break;
-      decoder.decode(new EncodedVideoChunk({ type: i ? "delta" : "key", timestamp: TICK * frame, data }));
+      decoder.decode(new EncodedVideoChunk({ type: i ? "delta" : "key", timestamp: TICK * picture, data }));
       if (decoder.decodeQueueSize > QUEUED && "ondequeue" in decoder) {
         await Promise.race([new Promise((resolve) => decoder.addEventListener("dequeue", resolve, { once: true })), failed]);
       }

@@ -1,7 +1,7 @@
 /**
  * The H.264 track of an MP4 file: its samples, and what a decoder must know. For `VideoDecoder`, which reads no files.
  *
- * Reads one track whose samples lie in one file, as gvpipe writes it; a frame's number is its rank by presentation time, so
+ * Reads one track whose samples lie in one file, as gvpipe writes it; a picture's number is its rank by presentation time, so
  * edit lists and offsets of composition times do not matter.
  */
 
@@ -13,7 +13,7 @@ const VISUAL_ENTRY = 78; // bytes of a visual sample entry before its boxes
 /**
  * @typedef {object} Sample one coded picture
  * @property {Uint8Array} data
- * @property {number} frame 0..frames - 1, in the order of presentation
+ * @property {number} picture its number, in the order of presentation
  *
  * @typedef {object} Track
  * @property {string} codec as `VideoDecoder` names it
@@ -37,13 +37,13 @@ function parseTrack(tables) {
   const { codec, description } = tables.configuration();
   const sizes = tables.sizes();
   const places = tables.places(sizes);
-  const frames = ranks(tables.times(sizes.length));
+  const numbers = ranks(tables.times(sizes.length));
   const keys = tables.keys(sizes.length);
   const groups = [];
   for (let i = 0; i < sizes.length; i++) {
     if (keys.has(i)) groups.push([]);
     if (!groups.length) throw broken("it does not start with a key frame");
-    groups.at(-1).push({ data: tables.file.subarray(places[i], places[i] + sizes[i]), frame: frames[i] });
+    groups.at(-1).push({ data: tables.file.subarray(places[i], places[i] + sizes[i]), picture: numbers[i] });
   }
   return { codec, description, groups };
 }

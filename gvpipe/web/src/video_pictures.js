@@ -6,7 +6,8 @@
  *
  * Chromium plays: the video's clock leads, and whoever draws late gets the picture of that moment. It loops by seeking. Firefox
  * announces other pictures than it draws while it plays (and times that go on growing where the element loops by itself), so
- * there every frame that is due is sought.
+ * there every frame that is due is sought. So it is in every browser where frames repeat: the video has each picture once, and its
+ * clock knows no holds (`format/holds.js`).
  */
 
 import { GeometryVideoError } from "./format/errors.js";
@@ -16,12 +17,12 @@ const SHOWN_WITHIN = 1000; // ms after `seeked` in which the browser says what i
 
 export class VideoPictures {
   /**
-   * @param {Uint8Array} file @param {number} fps @param {number} frames
+   * @param {Uint8Array} file @param {number} fps @param {import("./format/holds.js").Holds} holds
    * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
    * @returns {Promise<VideoPictures>}
    */
-  static async open(file, fps, frames, size, samples) {
-    const pictures = new VideoPictures(file, fps, frames, size, samples);
+  static async open(file, fps, holds, size, samples) {
+    const pictures = new VideoPictures(file, fps, holds, size, samples);
     try {
       await pictures.#load();
     } catch (error) {
@@ -31,14 +32,18 @@ export class VideoPictures {
     return pictures;
   }
 
-  constructor(file, fps, frames, [width, height], samples) {
+  constructor(file, fps, holds, [width, height], samples) {
     this.fps = fps;
-    this.frames = frames;
+    this.holds = holds;
+    this.frames = holds.frames;
+    this.repeats = holds.distinct < holds.frames;
+    /** The frame shown last, where frames repeat. */
+    this.frame = 0;
     this.width = width;
     this.height = height;
     this.samples = samples;
     this.read = new Uint8Array(samples.length);
-    /** The frame that the video shows; -1: not known. A video that has loaded may have nothing to draw yet. */
+    /** The picture that the video shows; -1: not known. A video that has loaded may have nothing to draw yet. */
     this.shown = -1;
     this.url = URL.createObjectURL(new Blob([file], { type: "video/mp4" }));
     this.video = Object.assign(document.createElement("video"), { muted: true, playsInline: true, preload: "auto" });
@@ -62,8 +67,9 @@ export class VideoPictures {
       throw new GeometryVideoError("corrupt", `its video is ${found} pixels; ${this.width}x${this.height} are needed`);
     }
     const found = video.duration * this.fps; // in units of a thousandth of a second
-    if (!(Math.abs(found - this.frames) <= 1 + 0.002 * this.fps)) {
-      throw new GeometryVideoError("corrupt", `its video lasts ${found.toFixed(1)} frames, the header says ${this.frames}`);
+    const { distinct } = this.holds;
+    if (!(Math.abs(found - distinct) <= 1 + 0.002 * this.fps)) {
+      throw new GeometryVideoError("corrupt", `its video lasts ${found.toFixed(1)} pictures in place of ${distinct}`);
     }
   }
 
@@ -76,25 +82,27 @@ export class VideoPictures {
   /** Show a frame and wait until it is there. Pauses. */
   async seek(frame) {
     this.pause();
-    if (this.shown !== frame) await this.#reach(frame);
+    this.frame = frame;
+    const picture = this.holds.distinctOf(frame);
+    if (this.shown !== picture) await this.#reach(picture);
   }
 
-  async #reach(frame) {
-    const time = (frame + 0.5) / this.fps;
+  async #reach(picture) {
+    const time = (picture + 0.5) / this.fps;
     const reaching = (this.reaching = {});
     for (let attempt = 0; attempt < 3; attempt++) {
-      const found = await this.#seekTo(frame, time + (attempt * 0.1) / this.fps);
-      if (this.reaching !== reaching) return; // another frame is sought since
-      if (found === frame) {
-        this.shown = frame;
+      const found = await this.#seekTo(picture, time + (attempt * 0.1) / this.fps);
+      if (this.reaching !== reaching) return; // another one is sought since
+      if (found === picture) {
+        this.shown = picture;
         return;
       }
     }
-    throw new GeometryVideoError("unsupported", `this browser does not show frame ${frame} when it is asked for`);
+    throw new GeometryVideoError("unsupported", `this browser does not show picture ${picture} when it is asked for`);
   }
 
-  /** Seek, and return the frame that the browser then says it shows; where it says nothing, the one asked for. */
-  #seekTo(frame, time) {
+  /** Seek, and return the picture that the browser then says it shows; where it says nothing, the one asked for. */
+  #seekTo(picture, time) {
     const { video } = this;
     this.shown = -1;
     return new Promise((resolve, reject) => {
@@ -109,14 +117,14 @@ export class VideoPictures {
       const failed = () => finish(reject, this.#failure());
       const seeked = () => {
         arrived = true;
-        if (shown === frame) return finish(resolve, frame);
-        const late = () => finish(resolve, shown < 0 || document.hidden ? frame : shown);
+        if (shown === picture) return finish(resolve, picture);
+        const late = () => finish(resolve, shown < 0 || document.hidden ? picture : shown);
         timer = setTimeout(late, SHOWN_WITHIN);
         return undefined;
       };
       const presented = (_, { mediaTime }) => {
-        shown = this.#frameAt(mediaTime); // perhaps still the frame from before the seek
-        if (arrived && shown === frame) return finish(resolve, frame);
+        shown = this.#pictureAt(mediaTime); // perhaps still the one from before the seek
+        if (arrived && shown === picture) return finish(resolve, picture);
         handle = video.requestVideoFrameCallback(presented);
         return undefined;
       };
@@ -133,16 +141,22 @@ export class VideoPictures {
    */
   async play(on, rate, loop) {
     const { video } = this;
+    const playing = (this.playing = {});
+    const playBySeeking = (first) =>
+      this.#playBySeeking(playing, first, on, rate, loop).catch((error) => this.playing === playing && on.failed(error));
+    if (this.repeats) {
+      playBySeeking(this.frame);
+      return;
+    }
     video.playbackRate = rate;
     this.shown = -1;
-    const playing = (this.playing = {});
     const next = (_, { mediaTime }) => {
       if (this.playing !== playing) return;
-      const frame = Math.min(this.frames - 1, this.#frameAt(mediaTime));
+      const frame = Math.min(this.frames - 1, this.#pictureAt(mediaTime));
       if (frame > 0) this.tellsFrames ??= this.#tellsFrames();
       if (this.tellsFrames === false) {
         video.pause();
-        this.#playBySeeking(playing, frame, on, rate, loop).catch((error) => this.playing === playing && on.failed(error));
+        playBySeeking(frame);
         return;
       }
       if (frame !== this.shown) {
@@ -169,13 +183,18 @@ export class VideoPictures {
   /** The same by seeking to whatever is due: slower, and exact where it is not known which picture of a playing video is drawn. */
   async #playBySeeking(playing, first, { show, ended }, rate, loop) {
     const start = performance.now() - (1000 * first) / (this.fps * rate);
+    let before = this.repeats ? -1 : this.shown;
     while (this.playing === playing) {
       const due = Math.floor(((performance.now() - start) * this.fps * rate) / 1000);
       const frame = loop ? due % this.frames : Math.min(due, this.frames - 1);
-      if (frame !== this.shown) {
-        await this.#reach(frame);
-        if (this.playing !== playing) return;
+      if (frame !== before) {
+        const picture = this.holds.distinctOf(frame);
+        if (picture !== this.shown) {
+          await this.#reach(picture);
+          if (this.playing !== playing) return;
+        }
         this.context.drawImage(this.video, 0, 0);
+        this.frame = before = frame;
         show(frame);
       }
       if (!loop && due >= this.frames && this.playing === playing) {
@@ -193,19 +212,20 @@ export class VideoPictures {
     const picture = new VideoFrame(this.video);
     const { timestamp } = picture;
     picture.close();
-    return this.#frameAt(timestamp / 1e6) > 0;
+    return this.#pictureAt(timestamp / 1e6) > 0;
   }
 
   /** Stop playing; the frame shown last stays. */
   pause() {
     if (!this.playing) return;
     this.playing = null;
+    if (this.repeats) return; // it never played
     this.video.pause();
     this.shown = -1; // the browser may have gone on to the next picture since
   }
 
-  /** Browsers tell when the frame begins, rounded either way, or (Firefox) the time sought inside it. */
-  #frameAt(time) {
+  /** Browsers tell when the picture begins, rounded either way, or (Firefox) the time sought inside it. */
+  #pictureAt(time) {
     return Math.floor(time * this.fps + 0.25);
   }
 

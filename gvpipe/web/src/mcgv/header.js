@@ -12,6 +12,19 @@ const MAX_SIDE = 16384;
 const LARGE = 1e39;
 const SMALL = 1e-60;
 
+/** Throw unless the payload is of this codec, in a version that it can read. */
+export function checkCodec(header) {
+  if (header.codec !== CODEC) {
+    throw new GeometryVideoError("unsupported", `it was coded by '${header.codec}'; gvpipe export-html converts it`);
+  }
+  if (header.version > VERSION) {
+    throw new GeometryVideoError(
+      "newer",
+      `version ${header.version} of codec ${CODEC}, this player has ${VERSION}; a newer player is needed`,
+    );
+  }
+}
+
 /**
  * @typedef {object} Header
  * @property {"blended"|"affine"} prediction how the clusters move the slots
@@ -23,19 +36,10 @@ const SMALL = 1e-60;
  * @property {number} transformStep @property {number} residualStep model units
  * @property {boolean} outliers whether residuals exceed the pictures' levels
  *
- * @param {object} header of the payload
+ * @param {object} header of the payload, of this codec
  * @returns {Header}
  */
 export function readHeader(header) {
-  if (header.codec !== CODEC) {
-    throw new GeometryVideoError("unsupported", `it was coded by '${header.codec}'; gvpipe export-html converts it`);
-  }
-  if (header.version > VERSION) {
-    throw new GeometryVideoError(
-      "newer",
-      `version ${header.version} of codec ${CODEC}, this player has ${VERSION}; a newer player is needed`,
-    );
-  }
   const settings = header.settings;
   if (settings.transform !== undefined) {
     throw new GeometryVideoError("unsupported", "it holds trajectory images; gvpipe export-html converts it");

@@ -1,4 +1,7 @@
-/** From an `mcgv` bitstream and the levels of its pictures to positions, any frame in any order. Mirrors the codec's reader. */
+/**
+ * From an `mcgv` bitstream and the levels of its pictures to positions, any frame in any order. Mirrors the codec's reader.
+ * Frames are distinct ones here (`format/holds.js`).
+ */
 
 import { AGAIN, GeometryVideoError, corrupt } from "../format/errors.js";
 import { Moves } from "../format/moves.js";
