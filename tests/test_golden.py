@@ -31,6 +31,8 @@ CURRENT: dict[str, tuple[str, dict[str, object]]] = {
         "mcgv",
         {"prediction": "blended", "transform": "klt", "profile": "precise", "placement": "charts", "reorder": True},
     ),
+    "mcgv-3-seams": ("mcgv", {"gop": 5, "placement": "halves"}),
+    "mcgv-3-still": ("mcgv", {"gop": 5, "segment": 7}),
     "pca-2-still": ("pca", {"segment": 7}),
     "pdct-2-seams": ("pdct", {"clusters": 3, "segment": 7, "kept": 0.3}),
     "pdct-2-still": ("pdct", {"clusters": 3, "segment": 7}),

@@ -34,7 +34,7 @@ PICTURES: list[tuple[str, dict[str, object]]] = [
     ("mcgv", {}),
     ("mcgv", {"image": "jpeg"}),
     ("mcgv", {"profile": "precise"}),
-    ("mcgv", {"prediction": "blended"}),
+    ("mcgv", {"prediction": "affine"}),
     ("mcgv", {"prediction": "blended", "transform": "klt"}),
 ]
 
