@@ -63,7 +63,7 @@ class BlendedMotion:
         surface: of the base frame.
         layout: the slots' pixels.
         bounds: first frame of every segment, and F.
-        first: transforms of the first segment.
+        first: transforms of the first segment, if they are decoded already.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class BlendedMotion:
         surface: Surface,
         layout: Layout,
         bounds: list[int],
-        first: Trajectories,
+        first: Trajectories | None = None,
     ) -> None:
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
         weights = decode_weights(bitstream.section("weights"), surface.points.neighbours, header.clusters)
@@ -84,7 +84,7 @@ class BlendedMotion:
         self._homogeneous = self._blend.homogeneous[point]
         self._clusters, self._parts = weights.clusters[point], weights.weights[point] / TOTAL
         self._residuals = header.residual_step * header.profile.offsets
-        self._segment = (0, first)
+        self._segment: tuple[int, Trajectories | None] = (0, first)
         self._chunk: tuple[int, int, Float64] = (-1, -1, np.zeros((0, 0, 4, 3)))
 
     def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
@@ -112,7 +112,7 @@ class BlendedMotion:
         """``(n, K, 4, 3)`` of a chunk of a segment's frames: always whole, so that sums do not depend on what else is read."""
         kept, trajectories = self._segment
         n_frames = self._bounds[s + 1] - self._bounds[s]
-        if kept != s:
+        if kept != s or trajectories is None:
             trajectories = decode_transforms(self._bitstream, self._header, s, n_frames)
             self._segment = (s, trajectories)
         transforms = self._blend.transforms(trajectories.rows(chunk * CHUNK, min((chunk + 1) * CHUNK, n_frames)))

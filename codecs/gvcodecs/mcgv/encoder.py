@@ -68,8 +68,8 @@ DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell
 GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
 BAND = {"blended": (0.86, 0.99), "affine": (1.0, 1.1)}  # of the error wanted: the published mode is no finer than asked
 FAR = 0.75, 1.4  # of the error wanted: what a blend is kept for
-FARTHEST = 4.0  # times, a step for another blend
-REUSED = 1.6  # times the step, up to which a blend fitted for another serves
+FARTHEST = math.log(4)  # of the step's logarithm, at once
+REUSED = 0.35  # of the error's logarithm, away from that measured: up to there a blend serves another quality
 MOST_TILED = (
     1 << 15
 )  # points: beyond, xatlas takes longer than all else, and labels of charts are a tenth of a smooth mesh's file
@@ -147,9 +147,11 @@ class Mcgv(Settings):
         memo = memo or Memo()
         wanted = error_of(self.quality) / 100 * memo("spread", lambda: measure_spread(sequence))
         anchors = memo("anchors", list[_Anchor])
-        for anchor in anchors:  # what was measured at another quality serves this one
-            step = anchor.start.step * (wanted / anchor.error) ** (1 / anchor.slope)
-            if not anchor.fitted or max(step / anchor.fitted_step, anchor.fitted_step / step) < REUSED:
+        if anchors:  # what was measured at another quality serves this one
+            anchor = min(anchors, key=lambda anchor: abs(math.log(anchor.error / wanted)))
+            away = math.log(wanted) - math.log(anchor.error)
+            if not anchor.fitted or abs(away) < REUSED:
+                step = anchor.start.step * math.exp(min(max(away / anchor.slope, -FARTHEST), FARTHEST))
                 return self._code(sequence, anchor.start, step, anchor.fitted, memo, report)
         aimed, anchor = self._aim(sequence, wanted, memo, report)
         anchors.append(anchor)
@@ -174,10 +176,11 @@ class Mcgv(Settings):
         if fitted:
             first = measure(encode(step)) / wanted
             if not FAR[0] <= first <= FAR[1]:  # another step wants another blend; the error follows it, then
-                near = dataclasses.replace(start, step=step * min(max(0.9 / max(first, 1e-9), 1 / FARTHEST), FARTHEST))
+                move = min(max(math.log(0.9 / max(first, 1e-9)), -FARTHEST), FARTHEST)
+                near = dataclasses.replace(start, step=step * math.exp(move))
                 fitted, step = self._fit(near, 0.0, memo, report)
         aimed = aim(encode, measure, step, wanted, BAND[self.prediction])
-        return aimed, _Anchor(dataclasses.replace(start, step=aimed.step), fitted, step, aimed.error, aimed.slope)
+        return aimed, _Anchor(dataclasses.replace(start, step=aimed.step), fitted, aimed.error, aimed.slope)
 
     def _code(
         self, sequence: MeshSequence, start: _Start, step: float, fitted: Fitted | None, memo: Memo, report: Progress
@@ -430,11 +433,10 @@ class _Start:
 
 @dataclass(frozen=True)
 class _Anchor:
-    """An encode that was measured: its start and blend, the step that this was fitted for, its error, and `Aimed.slope`."""
+    """An encode that was measured: its start and blend, its error, model units, and `Aimed.slope`."""
 
     start: _Start
     fitted: Fitted | None
-    fitted_step: float
     error: float
     slope: float
 

@@ -64,11 +64,11 @@ class McgvReader:
     def _motion(self) -> Motion:
         bitstream, header = self._bitstream, self._header
         if header.prediction == "blended":
-            with ThreadPoolExecutor(1) as pool:  # transforms decode beside the mesh: most of both is compiled
-                first = pool.submit(decode_transforms, bitstream, header, 0, self._bounds[1])
+            with ThreadPoolExecutor(1) as pool:  # one segment's transforms decode beside the mesh: most of both is compiled
+                only = pool.submit(decode_transforms, bitstream, header, 0, self._bounds[1]) if header.segments == 1 else None
                 surface = self._surface
                 layout = read_layout(bitstream, header, surface)
-                return BlendedMotion(bitstream, header, surface, layout, self._bounds, first.result())
+                return BlendedMotion(bitstream, header, surface, layout, self._bounds, only.result() if only else None)
         surface = self._surface
         if header.placement == "halves":
             clusters = sections.decode_slot_clusters(bitstream.section("clusters"), surface.order, header.clusters)
