@@ -21,7 +21,7 @@ from gvpipe.sequence import MeshSequence
 
 ROUNDS = 3  # encodes at most
 MOST_MOVED = math.log(4)  # of a step's logarithm, at once
-SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: assumed by `aim`, and believed
+SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: assumed at first, and believed
 BAND = 0.9, 1.06  # part of the error wanted that is close enough, for codecs whose errors scatter by a few percent
 NEAR = 2.0  # times, an error beside a measured one for which the step in proportion is believed
 
@@ -44,32 +44,6 @@ class Anchor:
     error: float
 
 
-def aim(
-    encode: Callable[[float], Bitstream],
-    measure: Callable[[Bitstream], float],
-    step: float,
-    wanted: float,
-    band: tuple[float, float],
-    rounds: int = ROUNDS,
-) -> Aimed:
-    """Encode with one step after the other until the error is close enough; return the encode that came closest.
-
-    Args:
-        encode: makes a bitstream with a step, model units.
-        measure: its root mean square error, model units.
-        step: the first.
-        wanted: error.
-        band: least and most part of the error wanted that is close enough.
-        rounds: most encodes.
-    """
-
-    def attempt(step: float) -> Aimed:
-        bitstream = encode(step)
-        return Aimed(bitstream, step, measure(bitstream))
-
-    return mend(attempt, step, wanted, band, SLOPE, rounds)
-
-
 def mend(
     attempt: Callable[[float], Aimed],
     step: float,
@@ -78,9 +52,15 @@ def mend(
     slope: float = 1.0,
     rounds: int = ROUNDS,
 ) -> Aimed:
-    """As `aim`, for encoders that know their error: ``attempt`` makes and measures a bitstream with a step.
+    """Encode with one step after the other until the error is close enough; return the encode that came closest.
 
-    ``slope`` of the error's logarithm over the step's is assumed until two are measured.
+    Args:
+        attempt: makes and measures a bitstream with a step, model units.
+        step: the first.
+        wanted: root mean square error, model units.
+        band: least and most part of it that is close enough.
+        slope: of the error's logarithm over the step's, assumed until two are measured.
+        rounds: most encodes.
     """
     aimed_at = wanted * math.sqrt(band[0] * band[1])
     tried: list[Aimed] = []

@@ -33,10 +33,10 @@ from gvpipe.topology import k_ring
 RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`
 FRAMES = 192  # frames, evenly spaced, that fitting looks at
 DIMENSIONS = 40  # principal coordinates of motions that clusters start from
-TRIAL_PASSES, FIRST_PASSES, LAST_PASSES = 4, 4, 8  # turns of weights and transforms: per trial, for either start, for the best
+TRIAL_PASSES, FIRST_PASSES, LAST_PASSES = 4, 2, 8  # turns of weights and transforms: per trial, for either start, for the best
 FEWEST, MOST = 8, 1024  # clusters tried
 LEAST_POINTS = 8  # per cluster, on average
-MOST_DISTANCES = 4_000_000  # of points from clusters: beyond, k-means takes longer than it is worth
+MOST_DISTANCES = 1_500_000  # of points from clusters: beyond, k-means takes longer than it is worth
 GROWTH = (
     (1000, 4.0),
     (32, 2.0),
@@ -49,12 +49,13 @@ AIM = 0.88  # of the error wanted, what a blend is to leave: coding adds to it
 CLOSE = 0.18  # logarithm of the error left over that
 SLOPE = 0.75  # of its logarithm over the step's
 MOST_MOVED = 3.0  # times, the step at once
+PROMISING = 1.2  # times the cost of the best, up to which another blend goes on
 PATIENCE = 1  # numbers of clusters that may do worse than a smaller one, in a row
 CLUSTER_WORTH = 2.8  # squared steps a frame that a cluster must save
 PATCH = 2  # order of the neighbourhood that an added cluster starts with
 BIT_WORTH = 0.14  # squared steps that a bit of the weights must save
 SAMPLES = 4000  # points that k-means sees
-ROUNDS = 15  # of k-means
+K_MEANS_ROUNDS = 8
 NEGLIGIBLE = 0.1  # part of the noise of rounding to steps: motion below is left out
 TINY = 1e-12  # part of all squared motion: points closer than this to seeds are no seeds
 
@@ -205,7 +206,7 @@ def _find_number(problem: _Problem, clustering: Clustering, starts: list[Fitted]
         last = tried[int(np.argmin(costs))]
         excess = min(costs) / (problem.cluster_price * count)
         count *= next(growth for limit, growth in GROWTH if excess > limit)
-    return best
+    return [fitted for fitted, cost in zip(best, least, strict=True) if cost <= PROMISING * min(least)]
 
 
 def _alternate_all(problem: _Problem, starts: list[Fitted], passes: int) -> list[Fitted]:
@@ -279,7 +280,7 @@ class Clustering:
         parts[:, 0] = TOTAL
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a cluster may run empty: it is dropped
-            centres, _ = kmeans2(self._sample, self._seeds[:n_clusters], iter=ROUNDS, minit="matrix")
+            centres, _ = kmeans2(self._sample, self._seeds[:n_clusters], iter=K_MEANS_ROUNDS, minit="matrix")
         clusters[:, 0] = vq(self._features, centres)[0]
         return _renumber(clusters, parts)
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -42,7 +43,7 @@ from gvcodecs.mcgv.surface import STILL
 from gvcodecs.mcgv.trajectory_encoder import code_trajectories
 from gvcodecs.mcgv.trajectory_header import TRANSFORMS
 from gvcodecs.mcgv.trajectory_reader import TrajectoryReader
-from gvpipe.aiming import Aimed, aim, root_mean_square
+from gvpipe.aiming import SLOPE, Aimed, mend, root_mean_square
 from gvpipe.bitstream import Bitstream
 from gvpipe.blas import one_blas_thread
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
@@ -66,7 +67,7 @@ BASE_STEP = 1.3  # of a base frame, times step / sqrt(frames): measured, docs/co
 FINER = 2**0.25  # times, a lattice that does not
 DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell apart; the others give way
 GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
-BAND = {"blended": (0.86, 0.99), "affine": (1.0, 1.1)}  # of the error wanted: the published mode is no finer than asked
+BAND = {"blended": (0.81, 0.99), "affine": (1.0, 1.1)}  # of the error wanted: the published mode is no finer than asked
 FAR = 0.75, 1.4  # of the error wanted: what a blend is kept for
 FARTHEST = math.log(4)  # of the step's logarithm, at once
 REUSED = 0.35  # of the error's logarithm, away from that measured: up to there a blend serves another quality
@@ -165,21 +166,19 @@ class Mcgv(Settings):
             fitted, step = self._fit(start, wanted, memo, report)
         own = sequence.reordered(start.coded.permutation, start.faces)
 
-        def measure(bitstream: Bitstream) -> float:
-            report("measure", 0)
-            return root_mean_square(own, self.reader(bitstream))
-
         @functools.cache
-        def encode(step: float) -> Bitstream:
-            return self._code(sequence, start, step, fitted, memo, report)
+        def attempt(step: float) -> Aimed:
+            bitstream = self._code(sequence, start, step, fitted, memo, report)
+            report("measure", 0)
+            return Aimed(bitstream, step, root_mean_square(own, self.reader(bitstream)))
 
         if fitted:
-            first = measure(encode(step)) / wanted
+            first = attempt(step).error / wanted
             if not FAR[0] <= first <= FAR[1]:  # another step wants another blend; the error follows it, then
                 move = min(max(math.log(0.9 / max(first, 1e-9)), -FARTHEST), FARTHEST)
                 near = dataclasses.replace(start, step=step * math.exp(move))
                 fitted, step = self._fit(near, 0.0, memo, report)
-        aimed = aim(encode, measure, step, wanted, BAND[self.prediction])
+        aimed = mend(attempt, step, wanted, BAND[self.prediction], SLOPE)
         return aimed, _Anchor(dataclasses.replace(start, step=aimed.step), fitted, aimed.error, aimed.slope)
 
     def _code(
@@ -273,7 +272,7 @@ class Mcgv(Settings):
         layout = self._blended_layout(start, memo, report)
         tiles = {}
         if start.placement == "tiles":
-            tiles = {CHARTS: encode_charts(self._charts(start, memo, report), start.points.neighbours)}
+            tiles = {CHARTS: encode_charts(self._charts(start, memo), start.points.neighbours)}
         if self.transform == "none":
             motion = code_blended(start.sequence, start.base, start.points, fitted, start.bounds, start.step, report)
             motion.sections.update(tiles)
@@ -330,7 +329,13 @@ class Mcgv(Settings):
     def _fit(self, start: _Start, wanted: float, memo: Memo, report: Progress) -> tuple[Fitted, float]:
         """A blend that leaves about a root mean square error of vertices, model units, and the step that fits it."""
         report("segment", 0)
-        return fit_blend(self._motions(start, memo), start.step, self.clusters, wanted / math.sqrt(start.part))
+        motions = self._motions(start, memo)
+        with ThreadPoolExecutor(1) as pool:  # charts beside the blend, whose loops hold no lock
+            charts = pool.submit(self._charts, start, memo) if start.placement == "tiles" else None
+            found = fit_blend(motions, start.step, self.clusters, wanted / math.sqrt(start.part))
+            if charts:
+                charts.result()
+        return found
 
     def _motions(self, start: _Start, memo: Memo) -> Motions:
         return memo(f"motions {start.name}", lambda: Motions(start.sequence, start.base, start.points.neighbours))
@@ -354,12 +359,11 @@ class Mcgv(Settings):
     def _blended_layout(self, start: _Start, memo: Memo, report: Progress) -> Layout:
         """Nothing ties a blend's charts to clusters: few, large ones are best."""
         whole, tiled = np.zeros(start.points.n_points, np.int32), start.placement == "tiles"
-        groups = self._charts(start, memo, report) if tiled else start.points.pieces()
+        groups = self._charts(start, memo) if tiled else start.points.pieces()
         return memo(f"layout {start.name}", lambda: self._layout(start, whole, groups, report))
 
-    def _charts(self, start: _Start, memo: Memo, report: Progress) -> Int64:
+    def _charts(self, start: _Start, memo: Memo) -> Int64:
         """The chart ``(P,)`` of every point, for placement by tiles; as published, charts refine a partition by motion."""
-        report("parameterize", 0)
         n_parts = max(1, start.points.n_points // PART)
         parts = self._motions(start, memo).clustering.start(n_parts).weights.clusters[:, 0]
         return memo(f"charts {start.name}", lambda: number_charts(parameterize(start.base, start.points.faces, parts).chart))
