@@ -461,7 +461,7 @@ class _Coded:
 def _worth(aimed: Aimed) -> float:
     """Bytes, at about equal error: with one blend, they go with the error to the power of about -0.2."""
     bitstream = aimed.bitstream
-    return (sum(map(len, bitstream.sections.values())) + len(bitstream.video)) * aimed.error**0.2
+    return (sum(map(len, bitstream.sections.values())) + len(bitstream.video)) * math.pow(aimed.error, 0.2)
 
 
 def _find_points(sequence: MeshSequence, still: NDArray[np.bool_], tolerance: float) -> NDArray[np.int64]:
