@@ -67,7 +67,8 @@ BASE_STEP = 1.3  # of a base frame, times step / sqrt(frames): measured, docs/co
 FINER = 2**0.25  # times, a lattice that does not
 DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell apart; the others give way
 GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
-BAND = {"blended": (0.81, 0.99), "affine": (1.0, 1.1)}  # of the error wanted: the published mode is no finer than asked
+BAND = {"blended": (0.9, 0.99), "affine": (1.0, 1.1)}  # of the error wanted: the published mode is no finer than asked
+LARGE, FINE = 1_000_000, 0.81  # vertices of all frames, from which on another encode is not made for an error so fine
 FAR = 0.75, 1.4  # of the error wanted: what a blend is kept for
 FARTHEST = math.log(4)  # of the step's logarithm, at once
 REUSED = 0.35  # of the error's logarithm, away from that measured: up to there a blend serves another quality
@@ -181,7 +182,10 @@ class Mcgv(Settings):
             if _worth(first) < _worth(attempt(step)):
                 start, fitted, step = kept
                 memo.permutation = start.coded.permutation
-        aimed = mend(attempt, step, wanted, BAND[self.prediction], SLOPE)
+        low, high = BAND[self.prediction]
+        if sequence.n_frames * sequence.n_vertices > LARGE:
+            low = min(low, FINE)
+        aimed = mend(attempt, step, wanted, (low, high), SLOPE)
         return aimed, _Anchor(dataclasses.replace(start, step=aimed.step), fitted, aimed.error, aimed.slope)
 
     def _code(
