@@ -121,6 +121,8 @@ def encode(
     if sum(value is not None for value in targets.values()) > 1:
         raise click.UsageError("give one of --target-rmse, --target-kg, --target-bpvf and --max-error")
     settings = _parse_pairs(pairs)
+    if quality is not None and "quality" in settings:
+        raise click.UsageError("give --quality or --set quality=, not both")
     given = {"quality": quality, "segment": segment, "reorder": reorder or None}
     settings.update({key: str(value) for key, value in given.items() if value is not None})
     chosen = candidates(

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.sequence import MeshSequence
+from gvpipe.topology import components
 
 ROUNDS = 64  # groups that leave a group one by one, in one chunk; what is left then is told apart exactly
+NEAREST = 8  # places looked at for each, itself among them
 
 Int64 = NDArray[np.int64]
 
@@ -15,14 +17,15 @@ Int64 = NDArray[np.int64]
 def find_points(sequence: MeshSequence, tolerance: float = 0.0) -> Int64:
     """Return ``(V,)`` the point of each vertex, 0..P-1, numbered as their first vertices are.
 
-    Vertices of one point start at one position, and stay within the tolerance of the point's first vertex, or within twice the
-    tolerance if they leave another vertex together in a later chunk. Vertices with one trajectory are always one point.
+    Vertices of one point start at one position, or within the tolerance of others of it. They stay within the tolerance of the
+    point's first vertex, or within twice the tolerance if they leave another vertex together in a later chunk. Vertices with
+    one trajectory are always one point.
 
     Args:
         sequence: the animation.
         tolerance: largest distance, model units.
     """
-    groups = _equal_rows(sequence.read(0, 1)[0])
+    groups = _near_rows(sequence.read(0, 1)[0], tolerance)
     shared = np.flatnonzero(np.bincount(groups)[groups] > 1)  # vertices that are not alone
     for _, block in sequence.chunks():
         if not len(shared):
@@ -31,6 +34,22 @@ def find_points(sequence: MeshSequence, tolerance: float = 0.0) -> Int64:
         shared = shared[np.bincount(groups)[groups[shared]] > 1]
     _, first, number = np.unique(groups, return_index=True, return_inverse=True)
     return np.asarray(np.argsort(np.argsort(first))[number.ravel()], np.int64)
+
+
+def _near_rows(rows: NDArray[np.float32], tolerance: float) -> Int64:
+    """A number for each of ``rows (n, 3)``, equal where they are, and where rows within the tolerance join them."""
+    groups = _equal_rows(rows)
+    if not tolerance > 0:
+        return groups
+    from scipy import sparse
+    from scipy.spatial import KDTree
+
+    places = rows[np.unique(groups, return_index=True)[1]].astype(np.float64)
+    found = KDTree(places).query(places, k=np.arange(1, min(NEAREST, len(places)) + 1))
+    distance, other = np.asarray(found[0]), np.asarray(found[1])
+    start, end = np.nonzero(distance <= tolerance)
+    links = sparse.csr_array((np.ones(len(start)), (start, other[start, end])), shape=(len(places),) * 2)
+    return np.asarray(components(links)[1][groups], np.int64)
 
 
 def _split(frames: NDArray[np.float32], groups: Int64, tolerance: float, free: int) -> Int64:

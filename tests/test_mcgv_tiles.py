@@ -18,6 +18,7 @@ from gvcodecs.mcgv import Mcgv
 from gvcodecs.mcgv.chart_coding import decode_charts, encode_charts, number_charts
 from gvcodecs.mcgv.chart_placement import place_charts
 from gvcodecs.mcgv.placement import choose_size
+from gvpipe.aiming import root_mean_square
 from gvpipe.codec import open_reader
 from gvpipe.errors import CorruptFile, InputError, SettingError
 from gvpipe.quantize import Lattice
@@ -154,12 +155,16 @@ def test_tiles_are_for_blended_prediction() -> None:
 
 @pytest.mark.parametrize("name", ["walking_cat", "fox_run", "morph_wave"])
 def test_tiles_cost_little_more_than_halves(name: str) -> None:
-    """On real sequences: within 5 % of the bytes of halves, where charts take 14 to 27 % more."""
+    """On real sequences: within 5 % of the bytes of halves at equal error, where charts take 14 to 27 % more.
+
+    Errors differ by a few percent; bytes go with them to the power of about -0.7.
+    """
     path = DATA / f"{name}.npz"
     if not path.exists():
         pytest.skip("no ../shared/data")
     sequence, sizes = gvpipe.read(path), []
     for placement in ("halves", "tiles"):
         bitstream = Mcgv(prediction="blended", placement=placement).encode(sequence)
-        sizes.append(sum(map(len, bitstream.sections.values())) + len(bitstream.video))
+        error = root_mean_square(sequence, open_reader(bitstream))
+        sizes.append((sum(map(len, bitstream.sections.values())) + len(bitstream.video)) * error**0.7)
     assert sizes[1] < 1.05 * sizes[0]

@@ -90,14 +90,14 @@ def test_points_are_where_vertices_start_and_go_together() -> None:
     frames[:, 6, 1] = 0.01 * np.arange(5)  # leaves it by less than what counts
     sequence = MeshSequence(frames, np.array([[0, 1, 2]], np.int32), fps=25.0)
     assert find_points(sequence, 0.1).tolist() == [0, 1, 0, 2, 2, 3, 0]
-    assert find_points(sequence, 100.0).tolist() == [0, 1, 0, 0, 0, 0, 0]
+    assert find_points(sequence, 100.0).tolist() == [0] * 7
     assert find_points(sequence).tolist() == [0, 1, 0, 2, 2, 3, 4]
 
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("tolerance", [0.02, 0.3])
 def test_tolerance(tolerance: float, seed: int, frames_of_a_chunk: int | None) -> None:
-    """Vertices of a point start together and stay near its first one; those of one trajectory are one point; fewer points.
+    """Vertices of a point start near its first one and stay there; those of one trajectory are one point; fewer points.
 
     What two chunks tell apart together was near another vertex before: twice the tolerance at most.
     """
@@ -107,7 +107,7 @@ def test_tolerance(tolerance: float, seed: int, frames_of_a_chunk: int | None) -
     points, exact = find_points(MeshSequence(Lazy(frames), NO_FACES), tolerance), brute_force(frames)
     first = np.unique(points, return_index=True)[1]
     assert np.array_equal(first, np.sort(first))
-    assert np.array_equal(frames[0], frames[0, first[points]])
+    assert np.linalg.norm(frames[0] - frames[0, first[points]], axis=1).max() <= tolerance
     apart = np.linalg.norm(frames - frames[:, first[points]], axis=2).max()
     assert apart <= tolerance * (2 if frames_of_a_chunk else 1)
     assert len(np.unique(np.c_[exact, points], axis=0)) == exact.max() + 1
