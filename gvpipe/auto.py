@@ -59,7 +59,7 @@ def choose_codec(codecs: Sequence[Codec], sequence: MeshSequence, target: Target
             except InputError as exc:
                 failures.append(str(exc))
     if not finalists:
-        raise InputError(f"no codec meets the target: {'; '.join(failures)}")
+        raise InputError(f"no codec meets the target: {'; '.join(dict.fromkeys(failures))}")
     best = min(finalists, key=lambda choice: _cost(choice.trial, target))
     others = ", ".join(_describe(choice.trial) for choice in finalists if choice is not best)
     beside = f"; beside it: {others or 'no other codec meets the target'}" if others or failures else ""

@@ -161,7 +161,7 @@ class Mcgv(Settings):
 
     def _aim(self, sequence: MeshSequence, wanted: float, memo: Memo, report: Progress) -> tuple[Aimed, _Anchor]:
         """Code with the step that leaves about the root mean square error wanted, model units."""
-        start, fitted = self._start(sequence, GUESS[self.prediction] * wanted, memo, report), None
+        start, fitted = self._start(sequence, GUESS[self.prediction] * wanted, wanted, memo, report), None
         step = start.step
         if self.prediction == "blended":
             fitted, step = self._fit(start, wanted, memo, report)
@@ -177,7 +177,7 @@ class Mcgv(Settings):
         if fitted and not FAR[0] <= first.error / wanted <= FAR[1]:  # another step wants another blend, and another base
             kept = start, fitted, step
             move = math.log(0.9 * wanted / max(first.error, 1e-9 * wanted))
-            start = self._start(sequence, step * math.exp(min(max(move, -FARTHEST), FARTHEST)), memo, report)
+            start = self._start(sequence, step * math.exp(min(max(move, -FARTHEST), FARTHEST)), wanted, memo, report)
             fitted, step = self._fit(start, 0.0, memo, report)
             if _worth(first) < _worth(attempt(step)):
                 start, fitted, step = kept
@@ -229,14 +229,14 @@ class Mcgv(Settings):
         header = sections.Header.of(bitstream)
         return TrajectoryReader(bitstream, header, header.images) if header.images else McgvReader(bitstream)
 
-    def _start(self, given: MeshSequence, step: float, memo: Memo, report: Progress) -> _Start:
-        """Code the base frame for a step, model units, and see the sequence as the decoder will."""
+    def _start(self, given: MeshSequence, step: float, wanted: float, memo: Memo, report: Progress) -> _Start:
+        """Code the base frame for a step and an error, model units, and see the sequence as the decoder will."""
         report("base", 0)
         first = given.read(0, 1)[0]
         still = memo("still", lambda: find_still(given))
         points = _find_points(given, still, MERGED * step)
         members = np.unique(points, return_index=True)[1]
-        lattice = self._lattice(first[members], BASE_STEP * step / math.sqrt(given.n_frames))
+        lattice = self._lattice(first[members], min(BASE_STEP * step / math.sqrt(given.n_frames), wanted))
         name = f"base {lattice.step} {len(members)}"
         coded = memo(name, lambda: encode_points(self._base_points(lattice, first[members]), given.faces, points, self.reorder))
         memo.permutation = coded.permutation
