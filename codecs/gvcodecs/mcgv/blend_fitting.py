@@ -122,7 +122,7 @@ def fit_blend(motions: Motions, step: float, n_clusters: int, wanted: float = 0.
         wanted: root mean square error of a point, model units, that a blend should leave: the step moves until it does, about.
             0: the step stays.
     """
-    starts = [motions.clustering.start(n_clusters or 1)] * 2
+    starts = [motions.clustering.start(n_clusters or 1)]
     for _ in range(ROUNDS):
         problem = motions.problem(step)
         if not n_clusters:

@@ -371,9 +371,13 @@ class Mcgv(Settings):
 
     def _charts(self, start: _Start, memo: Memo) -> Int64:
         """The chart ``(P,)`` of every point, for placement by tiles; as published, charts refine a partition by motion."""
-        n_parts = max(1, start.points.n_points // PART)
-        parts = self._motions(start, memo).clustering.start(n_parts).weights.clusters[:, 0]
-        return memo(f"charts {start.name}", lambda: number_charts(parameterize(start.base, start.points.faces, parts).chart))
+
+        def find() -> Int64:
+            n_parts = max(1, start.points.n_points // PART)
+            parts = self._motions(start, memo).clustering.start(n_parts).weights.clusters[:, 0]
+            return number_charts(parameterize(start.base, start.points.faces, parts).chart)
+
+        return memo(f"charts {start.name}", find)
 
     @property
     def _video_profile(self) -> Profile:
