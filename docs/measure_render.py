@@ -6,7 +6,7 @@ import sys
 import time
 
 import gvpipe
-from gvpipe.rendering.camera import framing
+from gvpipe.rasterizer.camera import framing
 
 ROUNDS = 5  # the best of which counts: other work only ever slows one down
 

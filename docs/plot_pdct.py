@@ -15,7 +15,7 @@ import numpy as np
 
 import gvpipe
 from gvcodecs.pdct import Pdct
-from gvpipe.metrics import compare
+from gvpipe.metrics.comparison import compare
 from gvpipe.sequence import MeshSequence
 
 matplotlib.use("Agg")

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 import gvpipe
-from gvpipe.rendering.camera import framing
+from gvpipe.rasterizer.camera import framing
 
 SAMPLES = Path(__file__).parents[1] / "samples"
 FRAME, SIZE, VIEW = 30, (400, 310), (62.0, 14.0)

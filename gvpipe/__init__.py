@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gvpipe.api import Info, Report, decode, encode, info, open, read, write
     from gvpipe.errors import GvpipeError
-    from gvpipe.metrics import Comparison, compare
+    from gvpipe.metrics.comparison import Comparison, compare
     from gvpipe.player import Player
-    from gvpipe.rendering.camera import Camera
-    from gvpipe.rendering.pictures import render
-    from gvpipe.rendering.renderer import Renderer
+    from gvpipe.rasterizer.camera import Camera
+    from gvpipe.rasterizer.renderer import Renderer
+    from gvpipe.rendering.films import render
     from gvpipe.sequence import MeshSequence
     from gvpipe.web import ExportReport, export_html
 
@@ -50,11 +50,11 @@ __all__ = [
 _HOMES = {
     "gvpipe.api": ("Info", "Report", "decode", "encode", "info", "open", "read", "write"),
     "gvpipe.errors": ("GvpipeError",),
-    "gvpipe.metrics": ("Comparison", "compare"),
+    "gvpipe.metrics.comparison": ("Comparison", "compare"),
     "gvpipe.player": ("Player",),
-    "gvpipe.rendering.camera": ("Camera",),
-    "gvpipe.rendering.pictures": ("render",),
-    "gvpipe.rendering.renderer": ("Renderer",),
+    "gvpipe.rasterizer.camera": ("Camera",),
+    "gvpipe.rendering.films": ("render",),
+    "gvpipe.rasterizer.renderer": ("Renderer",),
     "gvpipe.sequence": ("MeshSequence",),
     "gvpipe.web": ("ExportReport", "export_html"),
 }

@@ -1,5 +1,5 @@
 """``python -m gvpipe``."""
 
-from gvpipe.cli import main
+from gvpipe.cli.commands import main
 
 main()

@@ -14,18 +14,18 @@ import numpy as np
 
 from gvpipe import notes
 from gvpipe.arguments import StrPath, check_path, show
-from gvpipe.auto import choose_codec, default_target
 from gvpipe.codec import Codec, Progress, encode_sequence, make_codec
-from gvpipe.container import bytes_by_part, write_file
+from gvpipe.container.mp4 import bytes_by_part, write_file
 from gvpipe.errors import InputError, OutputError, SettingError
 from gvpipe.io import read as read_sequence
 from gvpipe.io import write as write_sequence
+from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.player import Player
-from gvpipe.poster import poster_of
-from gvpipe.purposes import candidates, check_purpose, check_serves
-from gvpipe.rate import Target, meet, parse_bound
+from gvpipe.rate_control.codec_choice import choose_codec, default_target
+from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
+from gvpipe.rate_control.search import Target, meet, parse_bound
+from gvpipe.rendering.poster import poster_of
 from gvpipe.sequence import MeshSequence
-from gvpipe.vertex_errors import frame_diagonal
 
 VIDEO_SUFFIXES = (".mp4", ".m4v")
 
@@ -44,7 +44,7 @@ class Report:
     ``seconds`` holds the whole as ``encode``, then each stage; ``not_carried`` names the attributes of the sequence that the
     file does not hold; ``notes`` what a user should know, those attributes among it, a line each; ``sections`` are as in
     `Info`. Where a target was given, or codec ``auto``, ``tried`` holds every encode that was measured
-    (`gvpipe.trials.Trial`), and ``reason`` why the one in the file was chosen.
+    (`gvpipe.rate_control.trials.Trial`), and ``reason`` why the one in the file was chosen.
     """
 
     codec: str
@@ -164,14 +164,14 @@ def encode(
 ) -> Report:
     """Encode a sequence into a geometry video.
 
-    At most one target may be given. Then the quality is searched; see `gvpipe.rate`.
+    At most one target may be given. Then the quality is searched; see `gvpipe.rate_control.search`.
 
     Args:
         source: a sequence, or what `read` takes.
         path: the ``.mp4`` to write; an older file is replaced once the new one is complete.
         codec: its id, with ``settings`` by name, or its settings object. Several, or ``"auto"`` for all that serve the purpose
             with settings that all have: the one with the smallest file that meets the target, by default the KG error of their
-            quality (`gvpipe.quality`). None: ``"auto"`` if a purpose is given, else ``"mcgv"``.
+            quality (`gvpipe.quality_scale`). None: ``"auto"`` if a purpose is given, else ``"mcgv"``.
         progress: called with a stage's name and the part of it that is done.
         fps: overrides the source's frames per second.
         target_rmse: largest root mean square error, as a part of frame 0's diagonal.
@@ -179,7 +179,7 @@ def encode(
         target_bpvf: most bits per vertex and frame, of the whole file.
         max_error: a bound that every vertex of every frame keeps: model units, or a part of the diagonal such as ``"0.05%"``.
         purpose: what the file is for: ``"web"`` (browsers play it as it is), ``"stream"`` (starts at once, jumps fast, in
-            bounded memory) or ``"archive"`` (the smallest); see `gvpipe.purposes`.
+            bounded memory) or ``"archive"`` (the smallest); see `gvpipe.rate_control.purposes`.
 
     Raises:
         InputError: the source, a setting or the path cannot be used, or no quality meets the target.

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.arguments import did_you_mean
-from gvpipe.bitstream import Bitstream
-from gvpipe.corrections import correct
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.corrections.bound import correct
 from gvpipe.errors import NewerVersion, SettingError
-from gvpipe.holds import HeldReader, add_holds, find_holds, read_holds
+from gvpipe.repeated_frames import HeldReader, add_holds, find_holds, read_holds
 from gvpipe.sequence import Float32, Int32, MeshSequence
 
 GROUP = "gvpipe.codecs"
@@ -101,7 +101,8 @@ class FrameReader(Protocol):
 class Codec(Protocol):
     """A codec's settings, and what it does with them.
 
-    A class attribute ``holds = True`` keeps repeated frames away from it (`gvpipe.holds`); its ``version`` then knows of them.
+    A class attribute ``holds = True`` keeps repeated frames away from it (`gvpipe.repeated_frames`); its ``version`` then knows
+    of them.
     """
 
     id: ClassVar[str]
@@ -184,7 +185,8 @@ def codec_class(codec: str) -> type[Any]:
 
 
 def open_reader(bitstream: Bitstream) -> FrameReader:
-    """Open a bitstream with the codec that wrote it: its frames corrected (`gvpipe.corrections`), then held (`gvpipe.holds`).
+    """Open a bitstream with the codec that wrote it: its frames corrected (`gvpipe.corrections.bound`), then held
+    (`gvpipe.repeated_frames`).
 
     Raises:
         NewerVersion: no installed codec has that id, or only an older version of it.
@@ -207,7 +209,8 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
 def encode_sequence(
     codec: Codec, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None
 ) -> Bitstream:
-    """Code a sequence; where the codec lets it (`gvpipe.holds`), frames that repeat the one before are coded by a run length.
+    """Code a sequence; where the codec lets it (`gvpipe.repeated_frames`), frames that repeat the one before are coded by a run
+    length.
 
     Raises:
         InputError: what the codec raises.

@@ -48,8 +48,8 @@ def png(positions: Float32, faces: Int32) -> bytes:
     """Return a PNG picture of ``positions (V, 3)`` from the renderer's usual view; raises `InputError` without triangles."""
     from PIL import Image
 
-    from gvpipe.rendering.camera import framing
-    from gvpipe.rendering.renderer import Renderer
+    from gvpipe.rasterizer.camera import framing
+    from gvpipe.rasterizer.renderer import Renderer
 
     camera = framing(MeshSequence(positions[None], faces))
     picture = Renderer(faces, positions, (SIZE, SIZE), samples=SAMPLES).draw(positions, camera)

@@ -13,9 +13,9 @@ from typing import overload
 import numpy as np
 
 from gvpipe.arguments import check_path
-from gvpipe.bitstream import Bitstream
 from gvpipe.codec import GroupReader, LevelReader, open_reader
-from gvpipe.container import read_file
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.mp4 import read_file
 from gvpipe.errors import FormatError, InputError
 from gvpipe.frame_cache import FrameCache
 from gvpipe.sequence import Float32, Float64, Int32, MeshSequence, describe

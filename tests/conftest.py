@@ -12,7 +12,7 @@ import pytest
 from hypothesis import settings
 
 import gvpipe
-from gvpipe.cli import main
+from gvpipe.cli.commands import main
 from gvpipe.sequence import MeshSequence
 
 settings.register_profile("same", derandomize=True)  # the same examples in every run; --hypothesis-profile=default draws others

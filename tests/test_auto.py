@@ -11,13 +11,13 @@ from conftest import Finished
 from sequences import waving
 
 import gvpipe
-from gvpipe import auto
-from gvpipe.auto import choose_codec
 from gvpipe.codec import Codec, codec_class
 from gvpipe.errors import InputError, SettingError
-from gvpipe.purposes import PURPOSES, candidates, describe
-from gvpipe.quality import error_of
-from gvpipe.rate import Target
+from gvpipe.quality_scale import error_of
+from gvpipe.rate_control import codec_choice
+from gvpipe.rate_control.codec_choice import choose_codec
+from gvpipe.rate_control.purposes import PURPOSES, candidates, describe
+from gvpipe.rate_control.search import Target
 from gvpipe.sequence import MeshSequence
 
 Run = Callable[..., Finished]
@@ -48,7 +48,7 @@ def best_alone(sequence: MeshSequence, folder: Path, **target: float | str) -> d
 def test_the_smallest_is_chosen(
     target: dict[str, float | str], sample: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(auto, "SAMPLE", sample)
+    monkeypatch.setattr(codec_choice, "SAMPLE", sample)
     sequence = waving(16, 30)
     alone = best_alone(sequence, tmp_path, **target)
     report = gvpipe.encode(sequence, tmp_path / "auto.mp4", "auto", **target)  # type: ignore[arg-type]
@@ -130,7 +130,7 @@ def test_codecs_that_cannot_are_passed_over(tmp_path: Path, monkeypatch: pytest.
     """Three need more bits even at quality 0, in the estimate and in the whole."""
     published, jpeg = (codec_class("mcgv")(prediction="affine", image=image) for image in ("h264", "jpeg"))
     for sample in (100, 6):
-        monkeypatch.setattr(auto, "SAMPLE", sample)
+        monkeypatch.setattr(codec_choice, "SAMPLE", sample)
         given = [published, codec_class("pca")(), jpeg, codec_class("pdct")()]
         report = gvpipe.encode(waving(16, 12), tmp_path / "a.mp4", given, target_bpvf=10.0)
         assert report.codec == "pca" and {trial["codec"] for trial in report.tried} == {"pca"}

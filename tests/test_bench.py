@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 from sequences import waving
 
 import gvpipe
-from gvpipe import bench
-from gvpipe.breakdown import group_sections
+from gvpipe.benchmark import sweep
+from gvpipe.benchmark.bd_rate import average_rate_difference, rate_at, tables
+from gvpipe.benchmark.plots import draw, read_peers
+from gvpipe.cli.breakdown import group_sections
 from gvpipe.codec import codec_ids
-from gvpipe.curves import average_rate_difference, rate_at, tables
 from gvpipe.errors import GvpipeError, InputError, SettingError
-from gvpipe.plots import draw, read_peers
 
 Run = Callable[..., Finished]
 PEERS = "seq,codec,bpvf,kg,rmse_rel\nsheet,other,4.0,0.5,1e-3\nsheet,other,9.0,0.05,1e-4\nsheet,exact,96,0,0\n,,x,,\n"
@@ -35,15 +35,15 @@ def sheet(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def report(sheet: Path) -> bench.Report:
-    return bench.run([str(sheet)], ["pca", "pdct"], (30, 80), {"reorder": "true"})
+def report(sheet: Path) -> sweep.Report:
+    return sweep.run([str(sheet)], ["pca", "pdct"], (30, 80), {"reorder": "true"})
 
 
 def power_law(scale: float, power: float, errors: tuple[float, ...]) -> list[dict[str, Any]]:
     return [{"bpvf": scale * e**-power, "kg": e} for e in errors]
 
 
-def test_points_are_what_encoding_gives(report: bench.Report, sheet: Path, tmp_path: Path) -> None:
+def test_points_are_what_encoding_gives(report: sweep.Report, sheet: Path, tmp_path: Path) -> None:
     sequence = gvpipe.read(sheet)
     assert [(c.sequence, c.codec, c.vertices, c.frames) for c in report.curves] == [
         ("sheet", codec, 100, 12) for codec in ("pca", "pdct")
@@ -60,30 +60,30 @@ def test_points_are_what_encoding_gives(report: bench.Report, sheet: Path, tmp_p
             assert point["decode_fps"] == pytest.approx(12 / point["decode_s"])
 
 
-def test_reports_are_read_as_written(report: bench.Report, tmp_path: Path) -> None:
+def test_reports_are_read_as_written(report: sweep.Report, tmp_path: Path) -> None:
     report.write(tmp_path / "r.json")
-    assert bench.Report.read(tmp_path / "r.json") == report
+    assert sweep.Report.read(tmp_path / "r.json") == report
     values = json.loads((tmp_path / "r.json").read_text())
     assert set(values) == {"gvpipe", "machine", "command", "curves"}
     for wrong in ("", "{}", "[]", '{"gvpipe": "1", "machine": {}, "command": [], "curves": [{}]}'):
         (tmp_path / "w.json").write_text(wrong)
         with pytest.raises(InputError, match=r"w\.json"):
-            bench.Report.read(tmp_path / "w.json")
+            sweep.Report.read(tmp_path / "w.json")
     del values["curves"][0]["points"][0]["kg"]
     (tmp_path / "w.json").write_text(json.dumps(values))
     with pytest.raises(InputError, match="kg"):
-        bench.Report.read(tmp_path / "w.json")
+        sweep.Report.read(tmp_path / "w.json")
     with pytest.raises(InputError, match="cannot be read"):
-        bench.Report.read(tmp_path / "none.json")
+        sweep.Report.read(tmp_path / "none.json")
 
 
 def test_settings_are_checked_before_the_work(sheet: Path) -> None:
     with pytest.raises(SettingError, match="no codec"):
-        bench.run([str(sheet)], ["pca", "mp3"])
+        sweep.run([str(sheet)], ["pca", "mp3"])
     with pytest.raises(SettingError, match="quality"):
-        bench.run([str(sheet)], ["pca"], (30, 130))
+        sweep.run([str(sheet)], ["pca"], (30, 130))
     with pytest.raises(InputError, match="none"):
-        bench.run(["none.npz"], ["pca"], (30,))
+        sweep.run(["none.npz"], ["pca"], (30,))
 
 
 def test_a_reader_that_disagrees_with_itself_is_found(sheet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -91,9 +91,9 @@ def test_a_reader_that_disagrees_with_itself_is_found(sheet: Path, tmp_path: Pat
     gvpipe.encode(sequence, tmp_path / "a.mp4", "pca")
     whole = gvpipe.decode(tmp_path / "a.mp4")
     shifted = dataclasses.replace(whole, positions=whole.positions[:] + 1)
-    monkeypatch.setattr(bench.api, "decode", lambda path: shifted)
+    monkeypatch.setattr(sweep.api, "decode", lambda path: shifted)
     with pytest.raises(GvpipeError, match="alone is not"):
-        bench._verify(sequence, tmp_path / "a.mp4")
+        sweep._verify(sequence, tmp_path / "a.mp4")
 
 
 @given(st.floats(0.2, 5), st.floats(0.2, 3), st.floats(0.2, 2))
@@ -123,7 +123,7 @@ def test_points_that_others_beat_do_not_count() -> None:
     assert rate_at([*points, {"bpvf": 9.0, "kg": 0.7}], "kg", 0.7) == rate_at(points, "kg", 0.7)
 
 
-def test_tables_name_every_curve(report: bench.Report) -> None:
+def test_tables_name_every_curve(report: sweep.Report) -> None:
     parts = tables(report.curves).split("\n\n")
     assert [len(part.splitlines()) for part in parts] == [2 + 4, 2 + 2, 2 + 2]
     assert all(len({line.count("|") for line in part.splitlines()}) == 1 for part in parts)
@@ -133,7 +133,7 @@ def test_tables_name_every_curve(report: bench.Report) -> None:
     assert f"| sheet | {difference:+.1f} % |" in parts[2] and f"| mean | {difference:+.1f} % |" in parts[2]
 
 
-def test_plots_need_the_report_alone(report: bench.Report, tmp_path: Path) -> None:
+def test_plots_need_the_report_alone(report: sweep.Report, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     (tmp_path / "peers.csv").write_text(PEERS)
     peers = read_peers(tmp_path / "peers.csv")
@@ -154,7 +154,7 @@ def test_command_line(run: Run, sheet: Path, tmp_path: Path) -> None:
     target = tmp_path / "r.json"
     ended = run("bench", sheet, "--codecs", "pca", "--qualities", "40,70", "--json", target)
     assert (ended.status, ended.err) == (0, "")
-    made = bench.Report.read(target)
+    made = sweep.Report.read(target)
     assert ended.out == tables(made.curves) + "\n"
     assert [p["quality"] for p in made.curves[0].points] == [40, 70]
     assert made.command[1] == "bench"
@@ -168,12 +168,12 @@ def test_command_line(run: Run, sheet: Path, tmp_path: Path) -> None:
 
 
 def test_one_codec_with_several_settings(sheet: Path) -> None:
-    made = bench.run([str(sheet)], ["pca", "pca:segment=4"], [50.0])
+    made = sweep.run([str(sheet)], ["pca", "pca:segment=4"], [50.0])
     assert [(curve.codec, curve.settings["segment"] == 4) for curve in made.curves] == [("pca", False), ("pca:segment=4", True)]
     assert made.curves[0].points[0]["bytes"] != made.curves[1].points[0]["bytes"]
     for codec, missing in (("pca:segment", "ID:KEY=VALUE"), ("pca:segments=4", "segments"), ("pca:segment=0", "segment")):
         with pytest.raises(InputError, match=missing):
-            bench.run([str(sheet)], [codec])
+            sweep.run([str(sheet)], [codec])
 
 
 def test_sections_of_segments_are_one_bar() -> None:
@@ -202,7 +202,7 @@ def test_bars_are_as_long_as_their_share(run: Run, tmp_path: Path) -> None:
 
 def test_every_codec_by_default(sheet: Path) -> None:
     assert set(codec_ids()) >= {"mcgv", "pca", "pdct"}
-    named = bench.default_codecs()
+    named = sweep.default_codecs()
     assert {name.split(":")[0] for name in named} == set(codec_ids()) and len(named) == len(codec_ids()) + 2
     assert {"mcgv", "mcgv:transform=klt", "mcgv:prediction=affine"} <= set(named)
-    assert {curve.codec for curve in bench.run([str(sheet)], codec_ids(), (50,)).curves} == set(codec_ids())
+    assert {curve.codec for curve in sweep.run([str(sheet)], codec_ids(), (50,)).curves} == set(codec_ids())

@@ -419,10 +419,10 @@ def test_full_disk_from_python(run: Run, npz: Path, video: Path, tmp_path: Path,
 
 LIMITED = """
 import os, resource, sys
-from gvpipe.bitstream import Bitstream
-from gvpipe.container import write_file
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.mp4 import write_file
 from gvpipe.errors import OutputError
-from gvpipe.video import PROFILES, VideoWriter
+from gvpipe.media.video import PROFILES, VideoWriter
 import numpy as np
 planes = np.random.default_rng(0).integers(0, 256, (12, 96, 96), dtype=np.uint8)
 with VideoWriter(PROFILES["jpeg"], 96, 96, 25, 4) as writer:

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gvpipe import connectivity
-from gvpipe.connectivity import decode_base, encode_base
+from gvpipe.connectivity import base_mesh
+from gvpipe.connectivity.base_mesh import decode_base, encode_base
 from gvpipe.errors import CorruptFile, InputError
 
 TETRAHEDRON = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
@@ -140,7 +140,7 @@ def test_draco_result_that_differs_is_not_trusted(monkeypatch):
 @pytest.mark.parametrize("name", ["tetrahedron", "open grid", "triangle soup", "shuffled grid"])
 def test_draco_carries_whole_ordinary_meshes(name):
     points, faces = MESHES[name]
-    _, n_loose_points, n_loose_faces, _ = connectivity.HEADER.unpack_from(encode_base(points, faces, True).mesh)
+    _, n_loose_points, n_loose_faces, _ = base_mesh.HEADER.unpack_from(encode_base(points, faces, True).mesh)
     assert (n_loose_points, n_loose_faces) == (0, 0)
 
 
@@ -209,17 +209,17 @@ def test_changed_bytes_do_no_harm(name):
 @given(st.binary(max_size=200), st.binary(max_size=200))
 def test_garbage_does_no_harm(mesh, order):
     decode_or_refuse(mesh, order)
-    decode_or_refuse(connectivity.HEADER.pack(len(mesh) + 11, 0, 0, 0) + connectivity.DRACO_PREFIX + mesh, order)
+    decode_or_refuse(base_mesh.HEADER.pack(len(mesh) + 11, 0, 0, 0) + base_mesh.DRACO_PREFIX + mesh, order)
 
 
 @pytest.mark.parametrize("counts", [(2**32 - 1, 0, 0, 0), (0, 2**32 - 1, 0, 8), (0, 0, 2**32 - 1, 0), (0, 0, 0, 2**32 - 1)])
 def test_counts_are_refused_before_allocation(counts):
     with pytest.raises(CorruptFile, match="corrupt|truncated"):
-        decode_base(connectivity.HEADER.pack(*counts) + bytes(8), b"")
+        decode_base(base_mesh.HEADER.pack(*counts) + bytes(8), b"")
 
 
 def test_draco_counts_are_refused_before_allocation():
     many = b"\xff\xff\xff\xff\x07"
-    draco = connectivity.DRACO_PREFIX + b"\0" + many + many + bytes(40)
+    draco = base_mesh.DRACO_PREFIX + b"\0" + many + many + bytes(40)
     with pytest.raises(CorruptFile, match="elements in"):
-        decode_base(connectivity.HEADER.pack(len(draco), 0, 0, 0) + draco, b"")
+        decode_base(base_mesh.HEADER.pack(len(draco), 0, 0, 0) + draco, b"")

@@ -12,11 +12,11 @@ import pytest
 from sequences import awkward, same_triangles, waving
 
 import gvpipe
-from gvpipe import bitstream as payloads
-from gvpipe import container
 from gvpipe.codec import Codec, codec_class, codec_ids, open_reader
+from gvpipe.container import bitstream as payloads
+from gvpipe.container import mp4
 from gvpipe.errors import CorruptFile, FormatError, NewerVersion, NotGeometryVideo, SettingError, StrippedFile, TruncatedFile
-from gvpipe.metrics import compare
+from gvpipe.metrics.comparison import compare
 from gvpipe.sequence import MeshSequence
 
 # the largest rmse, as a part of frame 0's diagonal, at the default quality: each codec's own statement
@@ -125,7 +125,7 @@ def test_segments_decode_alone(codec: str, settings: dict[str, object], tmp_path
     sequence = waving()
     gvpipe.encode(sequence, tmp_path / "s.mp4", codec, segment=11, **settings)
     assert compare(sequence, gvpipe.decode(tmp_path / "s.mp4")).rmse_diag < BOUNDS[codec]  # type: ignore[operator]
-    bitstream = container.read_file(tmp_path / "s.mp4")
+    bitstream = mp4.read_file(tmp_path / "s.mp4")
     own = {name: data for name, data in bitstream.sections.items() if not name[-1].isdigit() or name.endswith(".2")}
     assert len(own) < len(bitstream.sections)
     alone = open_reader(dataclasses.replace(bitstream, sections=own))
@@ -193,7 +193,7 @@ def test_every_truncated_prefix_is_refused(path: Path, tmp_path: Path) -> None:
 @each_file
 def test_one_flipped_byte_in_each_section_is_refused(path: Path, tmp_path: Path) -> None:
     data = path.read_bytes()
-    bitstream = container.read_file(path)
+    bitstream = mp4.read_file(path)
     targets = {name: data.index(section) for name, section in bitstream.sections.items() if section}
     targets["table"] = payload_start(data) + 24 + len(payloads.MAGIC) + 3
     targets["magic"] = payload_start(data) + 24
@@ -231,7 +231,7 @@ def test_wrong_files_each_have_their_error(path: Path, tmp_path: Path) -> None:
 
 @each_file
 def test_a_newer_codec_version_is_refused(path: Path) -> None:
-    bitstream = container.read_file(path)
+    bitstream = mp4.read_file(path)
     with pytest.raises(NewerVersion, match="upgrade"):
         open_reader(dataclasses.replace(bitstream, version=codec_class(bitstream.codec).version + 1))
     with pytest.raises(NewerVersion, match="upgrade"):
@@ -241,7 +241,7 @@ def test_a_newer_codec_version_is_refused(path: Path) -> None:
 @each_file
 def test_corrupt_sections_raise_format_errors_only(path: Path) -> None:
     """Past the checksums, a reader still treats its sections as hostile."""
-    bitstream = container.read_file(path)
+    bitstream = mp4.read_file(path)
     rng = np.random.default_rng(1)
     for name, section in bitstream.sections.items():
         for _ in range(12 if section else 0):
@@ -258,4 +258,4 @@ def test_corrupt_sections_raise_format_errors_only(path: Path) -> None:
 
 def payload_start(data: bytes) -> int:
     """Where the payload's box starts."""
-    return data.index(container.BOX_UUID.bytes) - 8
+    return data.index(mp4.BOX_UUID.bytes) - 8

@@ -12,21 +12,22 @@ from hypothesis import strategies as st
 from sequences import awkward, waving
 
 import gvpipe
-from gvpipe import container, trials
-from gvpipe.binary import varint
-from gvpipe.bitstream import Bitstream
 from gvpipe.codec import LevelReader, codec_class, codec_ids, open_reader
-from gvpipe.corrections import (
+from gvpipe.container import mp4
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.cursor import varint
+from gvpipe.corrections.bound import (
     SECTION,
     Bound,
     correct,
     encode_corrections,
     find_corrections,
 )
+from gvpipe.corrections.displacements import HEAD, MAX_POSITIONS, Moves, decode_group, encode_group, move
 from gvpipe.errors import CorruptFile, FormatError, InputError
-from gvpipe.moves import HEAD, MAX_POSITIONS, Moves, decode_group, encode_group, move
+from gvpipe.metrics.vertex_errors import frame_diagonal, measure_errors
+from gvpipe.rate_control import trials
 from gvpipe.sequence import Float32, Int32, MeshSequence
-from gvpipe.vertex_errors import frame_diagonal, measure_errors
 
 AWKWARD = awkward()
 each_codec = pytest.mark.parametrize("codec", codec_ids())
@@ -111,7 +112,7 @@ def test_levels_of_detail_stay(tmp_path: Path) -> None:
     """A coarser level is read as if there were no corrections."""
     sequence, path = waving(16, 20), tmp_path / "a.mp4"
     gvpipe.encode(sequence, path, "pca", max_error="0.05%")
-    bitstream = container.read_file(path)
+    bitstream = mp4.read_file(path)
     corrected, bare = open_reader(bitstream), codec_class("pca").reader(bitstream)
     assert isinstance(corrected, LevelReader)
     assert corrected.levels == bare.levels

@@ -21,8 +21,8 @@ from sequences import waving
 import gvpipe
 from gvpipe.codec import codec_class
 from gvpipe.errors import CorruptFile, InputError, OutputError
-from gvpipe.quality import error_of
-from gvpipe.trials import Trial, Trials
+from gvpipe.quality_scale import error_of
+from gvpipe.rate_control.trials import Trial, Trials
 from gvpipe.web.export import MOST_ENCODES, READS
 
 WEB = Path(gvpipe.__file__).parent / "web"

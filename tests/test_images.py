@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gvpipe.errors import CorruptFile
-from gvpipe.images import decode_jpeg, encode_jpeg
+from gvpipe.media.jpeg import decode_jpeg, encode_jpeg
 
 SIZES = [(8, 8), (16, 48), (50, 34), (1, 1), (7, 129)]
 STEPS = [255, 100, 40, 16, 8, 4, 2, 1]

@@ -9,22 +9,22 @@ import pytest
 from scipy import sparse
 from sequences import grid, waving
 
-import gvpipe.row_prediction
+import gvpipe.trajectory.prediction
 from gvcodecs.laplacian import Laplacian
 from gvcodecs.laplacian.anchors import SMALL, choose_anchors
 from gvcodecs.laplacian.average_coding import decode_average, encode_average
 from gvcodecs.laplacian.delta_rows import N_KNOWN, border_order, delta_order, delta_rows
 from gvcodecs.laplacian.domain import build_domain, build_surface
-from gvcodecs.laplacian.format import Header
+from gvcodecs.laplacian.extended_laplacian import MAX_NEIGHBOURS, ExtendedLaplacian, thin_hubs
+from gvcodecs.laplacian.header import Header
 from gvcodecs.laplacian.mesh_scale import edge_lengths, fineness
 from gvcodecs.laplacian.operators import laplacian
-from gvcodecs.laplacian.system import MAX_NEIGHBOURS, ExtendedLaplacian, thin_hubs
-from gvpipe.bitstream import Bitstream
+from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import FormatError, SettingError
-from gvpipe.metrics import compare
-from gvpipe.row_prediction import select_rows
+from gvpipe.mesh.topology import components
+from gvpipe.metrics.comparison import compare
 from gvpipe.sequence import MeshSequence
-from gvpipe.topology import components
+from gvpipe.trajectory.prediction import select_rows
 
 HEADER = Header("mean-value", "kalman", 16, "hierarchy", 0.75, 1 / 16, 1.2, 1.5, 1, (1.0,))
 
@@ -277,13 +277,13 @@ def test_perturbed_predictions_hardly_move_vertices(prediction: str, monkeypatch
     sequence = moving(20, shake=0.02)  # noise teaches weights that mean nothing
     bitstream = Laplacian(quality=80, delta_prediction=prediction).encode(sequence)
     clean = Laplacian.reader(bitstream).read(0, 20).astype(np.float64)
-    original = gvpipe.row_prediction.predict_rows
+    original = gvpipe.trajectory.prediction.predict_rows
 
-    def perturbed(rows: gvpipe.row_prediction.Rows, *rest: object) -> None:
+    def perturbed(rows: gvpipe.trajectory.prediction.Rows, *rest: object) -> None:
         noise = 1 + 1e-12 * np.random.default_rng(5).choice([-1, 1], len(rows.weights))
         original(dataclasses.replace(rows, weights=rows.weights * noise), *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("gvpipe.row_coding.predict_rows", perturbed)
+    monkeypatch.setattr("gvpipe.trajectory.coefficient_coding.predict_rows", perturbed)
     moved = Laplacian.reader(bitstream).read(0, 20).astype(np.float64)
     assert np.abs(clean - moved).max() < 1e-3 * bitstream.header["steps"][0]
 

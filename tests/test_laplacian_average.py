@@ -11,8 +11,8 @@ from gvcodecs.laplacian.alignment import Groups, rotations
 from gvcodecs.laplacian.average import average_mesh
 from gvcodecs.laplacian.edge_shape import EdgeShape, EdgeShapeSum, find_hinges
 from gvcodecs.laplacian.shape_fit import _measure
+from gvpipe.mesh.topology import unique_edges
 from gvpipe.sequence import MeshSequence
-from gvpipe.topology import unique_edges
 
 MESHES = awkward()
 

@@ -8,7 +8,7 @@ import trimesh
 from sequences import awkward, grid
 
 from gvcodecs.laplacian.operators import LEAST, OPERATORS, laplacian
-from gvpipe.topology import adjacency, components
+from gvpipe.mesh.topology import adjacency, components
 
 GEOMETRIC = [operator for operator in OPERATORS if operator != "tutte"]
 MESHES = awkward()

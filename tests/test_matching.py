@@ -7,8 +7,8 @@ import pytest
 from sequences import awkward, waving
 
 from gvpipe.errors import InputError
-from gvpipe.matching import match_vertices
-from gvpipe.metrics import compare
+from gvpipe.metrics.comparison import compare
+from gvpipe.metrics.correspondence import match_vertices
 from gvpipe.sequence import MeshSequence
 
 SEQUENCES = {

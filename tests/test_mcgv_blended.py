@@ -14,23 +14,23 @@ from scipy import sparse
 from sequences import awkward, grid, waving
 
 from gvcodecs.mcgv import Mcgv
-from gvcodecs.mcgv.blend_fitting import Motions, fit_blend
-from gvcodecs.mcgv.blending import INFLUENCES, TOTAL, Blend, BlendFit, Weights, homogeneous
-from gvcodecs.mcgv.points import Points, weld_vertices
-from gvcodecs.mcgv.rebuilding import rebuild_blended
-from gvcodecs.mcgv.separation import keep_apart
-from gvcodecs.mcgv.trajectories import decode_trajectories, encode_trajectories
-from gvcodecs.mcgv.weight_choice import Transforms, choose
-from gvcodecs.mcgv.weight_coding import Prices, decode_weights, earlier_neighbours, encode_weights
-from gvcodecs.mcgv.weight_kernels import MAX_LISTED, cluster_of, list_known, rank_of, share
+from gvcodecs.mcgv.base.distinct_positions import keep_apart
+from gvcodecs.mcgv.base.welded_points import Points, weld_vertices
+from gvcodecs.mcgv.motion.reconstruction_kernels import rebuild_blended
+from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Blend, BlendFit, Weights, homogeneous
+from gvcodecs.mcgv.motion.skinning_coding import decode_trajectories, encode_trajectories
+from gvcodecs.mcgv.motion.skinning_fit import Motions, fit_blend
+from gvcodecs.mcgv.motion.weight_coding import Prices, decode_weights, earlier_neighbours, encode_weights
+from gvcodecs.mcgv.motion.weight_kernels import MAX_LISTED, cluster_of, list_known, rank_of, share
+from gvcodecs.mcgv.motion.weight_selection import Transforms, choose
 from gvpipe.codec import open_reader
-from gvpipe.container import read_file
+from gvpipe.connectivity.welded_mesh import PointMesh
+from gvpipe.container.mp4 import read_file
 from gvpipe.errors import CorruptFile, FormatError, NewerVersion
-from gvpipe.point_mesh import PointMesh
-from gvpipe.quantize import Lattice
+from gvpipe.mesh.lattice import Lattice
+from gvpipe.mesh.topology import adjacency
 from gvpipe.sequence import MeshSequence
-from gvpipe.topology import adjacency
-from gvpipe.welding import find_points
+from gvpipe.trajectory.welding import find_points
 
 GOLDEN = Path(__file__).parent / "golden"
 

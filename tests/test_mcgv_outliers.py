@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from sequences import waving
 
 from gvcodecs.mcgv import Mcgv
-from gvcodecs.mcgv.outliers import SECTION, OutlierWriter
-from gvpipe.bitstream import Bitstream
+from gvcodecs.mcgv.pictures.outliers import SECTION, OutlierWriter
 from gvpipe.codec import open_reader
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.corrections.displacements import MovesReader
 from gvpipe.errors import CorruptFile
-from gvpipe.moves import MovesReader
+from gvpipe.media.video import PROFILES
 from gvpipe.sequence import MeshSequence
-from gvpipe.video import PROFILES
 
 FAST: dict[str, Any] = {"preset": "ultrafast", "gop": 8, "clusters": 12}
 

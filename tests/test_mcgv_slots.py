@@ -10,15 +10,15 @@ import pytest
 from sequences import patched
 
 from gvcodecs.mcgv import Mcgv, trajectory_reader
-from gvcodecs.mcgv import format as sections
+from gvcodecs.mcgv import header as sections
+from gvcodecs.mcgv.base.surface import read_surface
 from gvcodecs.mcgv.reader import read_layout
-from gvcodecs.mcgv.surface import read_surface
-from gvpipe.bitstream import Bitstream
 from gvpipe.codec import open_reader
+from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
 from gvpipe.sequence import MeshSequence
-from gvpipe.stillness import encode_flags, find_still
-from gvpipe.welding import find_points
+from gvpipe.trajectory.still_vertices import encode_flags, find_still
+from gvpipe.trajectory.welding import find_points
 
 FAST: dict[str, Any] = {"preset": "ultrafast", "clusters": 3, "gop": 4, "reorder": False}
 ROUTES: list[dict[str, Any]] = [

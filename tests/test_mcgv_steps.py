@@ -21,26 +21,26 @@ from sequences import waving
 
 import gvpipe
 from gvcodecs.mcgv import Mcgv
-from gvcodecs.mcgv import format as sections
-from gvcodecs.mcgv.packing import Layout, pack
-from gvcodecs.mcgv.padding import Padding
-from gvcodecs.mcgv.parameterization import Atlas, parameterize
-from gvcodecs.mcgv.placement import choose_size, place
-from gvcodecs.mcgv.prediction import AffinePredictor
-from gvcodecs.mcgv.quality import LEVELS, OUTLIERS, QP_STEP, Magnitudes, choose_quantiser
-from gvcodecs.mcgv.segmentation import LocalAffineFit, segment
-from gvcodecs.mcgv.transforms import decode_transforms, dequantise, encode_transforms, quantise
-from gvpipe.binary import Cursor, varint
-from gvpipe.bitstream import ENTRY, MAGIC, PREFIX, Bitstream, pack_payload, unpack_payload
+from gvcodecs.mcgv import header as sections
+from gvcodecs.mcgv.layout.kd_tree import choose_size, place
+from gvcodecs.mcgv.layout.packing import Layout, pack
+from gvcodecs.mcgv.layout.padding import Padding
+from gvcodecs.mcgv.layout.parameterization import Atlas, parameterize
+from gvcodecs.mcgv.motion.affine_coding import decode_transforms, dequantise, encode_transforms, quantise
+from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
+from gvcodecs.mcgv.motion.segmentation import LocalAffineFit, segment
+from gvcodecs.mcgv.pictures.quantiser import LEVELS, OUTLIERS, QP_STEP, Magnitudes, choose_quantiser
 from gvpipe.codec import open_reader
-from gvpipe.entropy import decode_integers, encode_integers
+from gvpipe.container.bitstream import ENTRY, MAGIC, PREFIX, Bitstream, pack_payload, unpack_payload
+from gvpipe.container.cursor import Cursor, varint
+from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile, FormatError, InputError, NewerVersion, TruncatedFile
-from gvpipe.quality import error_of
-from gvpipe.quantize import Lattice
+from gvpipe.media.video import PROFILES
+from gvpipe.mesh.lattice import Lattice
+from gvpipe.mesh.topology import adjacency, components, k_ring, unique_edges, weld
+from gvpipe.metrics.vertex_errors import measure_errors
+from gvpipe.quality_scale import error_of
 from gvpipe.sequence import MeshSequence
-from gvpipe.topology import adjacency, components, k_ring, unique_edges, weld
-from gvpipe.vertex_errors import measure_errors
-from gvpipe.video import PROFILES
 
 calmly = settings(max_examples=120, deadline=None)
 VALUES = st.one_of(st.integers(-20, 20), st.integers(-(2**39) + 1, 2**39 - 1), st.integers(-5000, 5000))

@@ -15,14 +15,14 @@ from test_mcgv_steps import awkward_surfaces, check_layout
 
 import gvpipe
 from gvcodecs.mcgv import Mcgv
-from gvcodecs.mcgv.chart_coding import decode_charts, encode_charts, number_charts
-from gvcodecs.mcgv.chart_placement import place_charts
-from gvcodecs.mcgv.placement import choose_size
-from gvpipe.aiming import root_mean_square
+from gvcodecs.mcgv.layout.chart_coding import decode_charts, encode_charts, number_charts
+from gvcodecs.mcgv.layout.kd_tree import choose_size
+from gvcodecs.mcgv.layout.tiles import place_charts
 from gvpipe.codec import open_reader
 from gvpipe.errors import CorruptFile, InputError, SettingError
-from gvpipe.quantize import Lattice
-from gvpipe.topology import adjacency
+from gvpipe.mesh.lattice import Lattice
+from gvpipe.mesh.topology import adjacency
+from gvpipe.rate_control.step_search import root_mean_square
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 

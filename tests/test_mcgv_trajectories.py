@@ -14,21 +14,21 @@ from sequences import grid, waving
 
 import gvpipe
 from gvcodecs.mcgv import Mcgv
-from gvcodecs.mcgv.blending import INFLUENCES, TOTAL, Blend, BlendFit, Weights
-from gvcodecs.mcgv.trajectory_images import (
+from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Blend, BlendFit, Weights
+from gvcodecs.mcgv.pictures.trajectories import (
     _decode_outliers,
     _encode_outliers,
     count_pictures,
     decode_segment,
     encode_segment,
 )
-from gvpipe.binary import Cursor, varint
 from gvpipe.codec import open_reader
-from gvpipe.container import read_file
-from gvpipe.entropy import encode_integers
+from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.mp4 import read_file
+from gvpipe.entropy.integers import encode_integers
 from gvpipe.errors import CorruptFile, SettingError
+from gvpipe.media.video import VideoReader
 from gvpipe.sequence import MeshSequence
-from gvpipe.video import VideoReader
 
 
 def one_cluster(base: np.ndarray) -> BlendFit:
@@ -177,18 +177,18 @@ def test_settings_that_do_not_go_together_are_refused(wrong: dict[str, Any]) -> 
         {"profile": "jpeg"},
     ],
 )
-def test_headers_are_hostile(wrong: dict[str, Any], klt: gvpipe.bitstream.Bitstream) -> None:
+def test_headers_are_hostile(wrong: dict[str, Any], klt: gvpipe.container.bitstream.Bitstream) -> None:
     with pytest.raises(CorruptFile):
         open_reader(dataclasses.replace(klt, header={**klt.header, **wrong})).read(0, 1)
 
 
-def test_version_1_has_no_transform(klt: gvpipe.bitstream.Bitstream) -> None:
+def test_version_1_has_no_transform(klt: gvpipe.container.bitstream.Bitstream) -> None:
     with pytest.raises(CorruptFile, match="transform"):
         open_reader(dataclasses.replace(klt, version=1))
 
 
 @pytest.fixture(scope="module")
-def klt(tmp_path_factory: pytest.TempPathFactory) -> gvpipe.bitstream.Bitstream:
+def klt(tmp_path_factory: pytest.TempPathFactory) -> gvpipe.container.bitstream.Bitstream:
     """A small file of trajectory images with several pictures."""
     path = tmp_path_factory.mktemp("klt") / "a.mp4"
     gvpipe.encode(waving(8, 12), path, prediction="blended", transform="klt", quality=90)
@@ -198,6 +198,6 @@ def klt(tmp_path_factory: pytest.TempPathFactory) -> gvpipe.bitstream.Bitstream:
 
 
 def _shape(header: Any) -> tuple[Any, int, int]:
-    from gvpipe.video import PROFILES
+    from gvpipe.media.video import PROFILES
 
     return PROFILES[header["profile"]], header["width"], 3 * header["height"]

@@ -12,9 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gvpipe import metrics, sequence
+from gvpipe import sequence
 from gvpipe.errors import InputError
-from gvpipe.metrics import Comparison, compare
+from gvpipe.metrics import comparison
+from gvpipe.metrics.comparison import Comparison, compare
 from gvpipe.sequence import MeshSequence
 
 SAMPLES = Path("/work/shared/data")
@@ -210,7 +211,7 @@ def test_chunks_bound_memory_and_change_nothing(chunk: int, block: int, monkeypa
     other = _noisy(wave, 5)
     whole = compare(wave, other)
     monkeypatch.setattr(sequence, "CHUNK_BYTES", 12 * 20 * chunk)
-    monkeypatch.setattr(metrics, "BLOCK_BYTES", 24 * 20 * block)
+    monkeypatch.setattr(comparison, "BLOCK_BYTES", 24 * 20 * block)
     lazy = _Lazy(other.read(0, 13))
     calls: list[tuple[int, int]] = []
     result = compare(wave, replace(other, positions=lazy), progress=lambda done, total: calls.append((done, total)))

@@ -14,7 +14,7 @@ from conftest import FAST
 from sequences import grid
 
 import gvpipe
-from gvpipe.cli import cli
+from gvpipe.cli.commands import cli
 from gvpipe.errors import InputError, OutputError
 from gvpipe.io.discovery import find_frames, order_list
 from gvpipe.io.pattern import Pattern, match_pattern

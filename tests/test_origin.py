@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from sequences import grid, waving
 
 import gvpipe
-from gvpipe import container
-from gvpipe.bitstream import Bitstream, pack_payload, unpack_payload
 from gvpipe.codec import codec_ids
+from gvpipe.container import mp4
+from gvpipe.container.bitstream import Bitstream, pack_payload, unpack_payload
 from gvpipe.errors import CorruptFile, InputError
 from gvpipe.origin import LOSS, choose_origin, narrow
 from gvpipe.rendering.error_map import ErrorMap
@@ -316,8 +316,8 @@ def test_numbers_that_are_none_are_refused(text: str) -> None:
 
 def test_a_damaged_file_names_itself(far_npz: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     gvpipe.encode(far_npz, tmp_path / "far.mp4")
-    found = container.read_file(tmp_path / "far.mp4")
-    container.write_file(dataclasses.replace(found, origin=(1e39, 0.0, 0.0)), tmp_path / "bad.mp4")
+    found = mp4.read_file(tmp_path / "far.mp4")
+    mp4.write_file(dataclasses.replace(found, origin=(1e39, 0.0, 0.0)), tmp_path / "bad.mp4")
     with pytest.raises(CorruptFile, match=r"bad\.mp4.*origin"):
         gvpipe.open(tmp_path / "bad.mp4")
 

@@ -7,12 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-import gvpipe.row_prediction
+import gvpipe.trajectory.prediction
 from gvcodecs.pca import Pca
 from gvcodecs.pca.reader import PcaReader
-from gvpipe.bitstream import Bitstream
+from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import FormatError, InputError, SettingError
-from gvpipe.quality import error_of
+from gvpipe.quality_scale import error_of
 from gvpipe.sequence import MeshSequence
 
 
@@ -221,13 +221,13 @@ def test_perturbed_predictions_hardly_move_vertices(predictor: str, monkeypatch:
     sequence = make(*TUBE, n_frames=20)
     bitstream = Pca(quality=80, predictor=predictor).encode(sequence)
     clean = Pca.reader(bitstream).read(0, 20).astype(np.float64)
-    original = gvpipe.row_prediction.predict_rows
+    original = gvpipe.trajectory.prediction.predict_rows
 
-    def perturbed(rows: gvpipe.row_prediction.Rows, *rest: object) -> None:
+    def perturbed(rows: gvpipe.trajectory.prediction.Rows, *rest: object) -> None:
         noise = 1 + 1e-12 * np.random.default_rng(5).choice([-1, 1], len(rows.weights))
         original(dataclasses.replace(rows, weights=rows.weights * noise), *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("gvpipe.row_coding.predict_rows", perturbed)
+    monkeypatch.setattr("gvpipe.trajectory.coefficient_coding.predict_rows", perturbed)
     moved = Pca.reader(bitstream).read(0, 20).astype(np.float64)
     assert np.abs(clean - moved).max() < 1e-3 * bitstream.header["steps"][0]
 
@@ -257,7 +257,7 @@ def _with(bitstream: Bitstream, name: str, data: bytes) -> Bitstream:
 
 
 def test_levels_of_non_manifold_meshes_hold_no_degenerate_triangle() -> None:
-    from gvpipe.hierarchy import build_hierarchy, level_faces
+    from gvpipe.mesh.hierarchy import build_hierarchy, level_faces
 
     rng = np.random.default_rng(11)
     for _ in range(150):

@@ -18,12 +18,12 @@ from gvcodecs.pdct.delta_coding import DeltaDecoder, DeltaEncoder, Layout
 from gvcodecs.pdct.labels import decode_labels, encode_labels
 from gvcodecs.pdct.local_frames import local_frames
 from gvcodecs.pdct.seed_coding import decode_seeds, encode_seeds
-from gvpipe.binary import Cursor
-from gvpipe.bitstream import Bitstream
 from gvpipe.codec import Memo
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.cursor import Cursor
 from gvpipe.errors import CorruptFile, FormatError, GvpipeError, InputError, NotGeometryVideo, TruncatedFile
 from gvpipe.sequence import MeshSequence
-from gvpipe.welding import find_points
+from gvpipe.trajectory.welding import find_points
 
 
 def decode(bitstream: Bitstream) -> np.ndarray:

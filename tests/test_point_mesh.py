@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from sequences import awkward, grid, patched, same_triangles
 
-from gvpipe.binary import varint
-from gvpipe.connectivity import encode_base
-from gvpipe.copies import decode_copies, encode_copies
-from gvpipe.entropy import encode_integers
+from gvpipe.connectivity.base_mesh import encode_base
+from gvpipe.connectivity.seams import decode_copies, encode_copies
+from gvpipe.connectivity.welded_mesh import PointMesh, decode_points, encode_points
+from gvpipe.container.cursor import varint
+from gvpipe.entropy.integers import encode_integers
 from gvpipe.errors import CorruptFile
-from gvpipe.point_mesh import PointMesh, decode_points, encode_points
-from gvpipe.quantize import Lattice
+from gvpipe.mesh.lattice import Lattice
 from gvpipe.sequence import MeshSequence
-from gvpipe.welding import find_points
+from gvpipe.trajectory.welding import find_points
 
 Ints = NDArray[Any]
 Mesh = tuple[Ints, Ints, Ints]  # positions of points (P, 3), triangles over vertices (T, 3), the point of each vertex (V,)

@@ -1,4 +1,4 @@
-"""Quality means one error for every codec: `gvpipe.quality`'s scale, over all frames and vertices of a sequence."""
+"""Quality means one error for every codec: `gvpipe.quality_scale`'s scale, over all frames and vertices of a sequence."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import pytest
 from sequences import held, patched, waving
 
 import gvpipe
-from gvpipe.aiming import BAND, Aimed, Anchor, mend, root_mean_square, step_between
-from gvpipe.bitstream import Bitstream
 from gvpipe.codec import codec_class, codec_ids, encode_sequence, open_reader
-from gvpipe.quality import error_of, quality_of
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.metrics.vertex_errors import measure_spread
+from gvpipe.quality_scale import error_of, quality_of
+from gvpipe.rate_control.step_search import BAND, Aimed, Anchor, mend, root_mean_square, step_between
 from gvpipe.sequence import MeshSequence
-from gvpipe.vertex_errors import measure_spread
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 QUALITIES = (50, 75, 90)

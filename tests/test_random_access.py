@@ -8,7 +8,7 @@ import pytest
 from sequences import waving
 
 import gvpipe
-from gvpipe.video import VideoReader
+from gvpipe.media.video import VideoReader
 
 
 @pytest.mark.parametrize(("settings", "wanted"), [({"gop": 8}, [2, 0, 4]), ({"image": "jpeg"}, [17, 18, 20, 3, 39])])

@@ -16,12 +16,12 @@ from sequences import awkward, waving
 
 import gvpipe
 from gvpipe.errors import InputError, OutputError
-from gvpipe.poster import make_poster, paint
-from gvpipe.rendering.camera import UP_AXES, VIEWS, Camera, framing
-from gvpipe.rendering.colours import BACKGROUND, LEVELS, error_colours, srgb_codes, to_linear, to_srgb
+from gvpipe.rasterizer.camera import UP_AXES, VIEWS, Camera, framing
+from gvpipe.rasterizer.colours import BACKGROUND, LEVELS, error_colours, srgb_codes, to_linear, to_srgb
+from gvpipe.rasterizer.renderer import Renderer
 from gvpipe.rendering.error_map import ErrorMap
-from gvpipe.rendering.pictures import Film, parse_size
-from gvpipe.rendering.renderer import Renderer
+from gvpipe.rendering.films import Film, parse_size
+from gvpipe.rendering.poster import make_poster, paint
 from gvpipe.sequence import MeshSequence
 
 Run = Callable[..., Any]
@@ -313,7 +313,7 @@ def test_bands_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     positions, camera = sequence.read(0, 1)[0], framing(sequence)
     pictures = []
     for threads in (1, 2, 3):
-        monkeypatch.setattr("gvpipe.rendering.renderer.THREADS", threads)
+        monkeypatch.setattr("gvpipe.rasterizer.renderer.THREADS", threads)
         pictures.append(Renderer(sequence.faces, positions, (90, 70)).draw(positions, camera))
     assert np.array_equal(pictures[0], pictures[1]) and np.array_equal(pictures[0], pictures[2])
 

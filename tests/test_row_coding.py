@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gvpipe import magnitude_tables, range_kernels
-from gvpipe.bare_mesh import decode_mesh, encode_mesh
-from gvpipe.blocks import BlockDecoder, BlockEncoder
+from gvpipe.connectivity.topology_only import decode_mesh, encode_mesh
+from gvpipe.entropy import parametric_tables, range_decoder
+from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.errors import CorruptFile
-from gvpipe.frame_rows import frame_rows
-from gvpipe.hierarchy import build_hierarchy
-from gvpipe.row_coding import decode_rows, encode_rows
+from gvpipe.mesh.hierarchy import build_hierarchy
+from gvpipe.trajectory.coefficient_coding import decode_rows, encode_rows
+from gvpipe.trajectory.temporal_neighbours import frame_rows
 
 
 def random_mesh(seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -96,14 +96,14 @@ def test_compiled_range_decoder_reads_what_the_library_writes(seed: int) -> None
             model = constriction.stream.model.Categorical(table.astype(float) / float(table.sum()), perfect=False)
             coder.encode(written[-1][2], model)
     words = coder.get_compressed().astype(np.uint32)
-    state = range_kernels.start(words)
+    state = range_decoder.start(words)
     for table, width, value in written:
         if table is None:
-            assert range_kernels.decode_bits(state, words, width) == value
+            assert range_decoder.decode_bits(state, words, width) == value
         else:
-            assert range_kernels.decode_symbol(state, words, range_kernels.edges_of(table)) == value
-    assert range_kernels.may_be_exhausted(state, words)
-    assert len(words) < 3 or not range_kernels.may_be_exhausted(range_kernels.start(words), words)
+            assert range_decoder.decode_symbol(state, words, range_decoder.edges_of(table)) == value
+    assert range_decoder.may_be_exhausted(state, words)
+    assert len(words) < 3 or not range_decoder.may_be_exhausted(range_decoder.start(words), words)
 
 
 def test_a_context_without_a_table_is_corrupt() -> None:
@@ -118,14 +118,14 @@ def test_a_context_without_a_table_is_corrupt() -> None:
 def test_tables_told_by_two_numbers_fit_laplacian_residuals(mean: float) -> None:
     values = np.rint(np.random.default_rng(1).laplace(0, mean, 20000)).astype(int)
     magnitudes = np.bincount(np.where(values >= 0, 2 * values, -2 * values - 1))[:16]
-    counts = np.pad(magnitudes, (0, magnitude_tables.N_TOKENS - len(magnitudes)))
-    zero, ratio, bits = magnitude_tables.best(counts)
+    counts = np.pad(magnitudes, (0, parametric_tables.N_TOKENS - len(magnitudes)))
+    zero, ratio, bits = parametric_tables.best(counts)
     shares = counts[counts > 0] / counts.sum()
     entropy = -(counts.sum() * shares * np.log2(shares)).sum()
     if mean < 2:  # above, the counts cut at token 16 are not a Laplacian
         assert bits < 1.03 * entropy + 100
-    table = magnitude_tables.table(zero, ratio)
-    assert (table > 0).all() and abs(table.sum() - magnitude_tables.TOTAL) < 0.01 * magnitude_tables.TOTAL
+    table = parametric_tables.table(zero, ratio)
+    assert (table > 0).all() and abs(table.sum() - parametric_tables.TOTAL) < 0.01 * parametric_tables.TOTAL
 
 
 @pytest.mark.parametrize("n_frames", [1, 2, 3, 4, 7, 16, 17, 100])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import gvpipe
-from gvpipe.topology import adjacency, components, unique_edges
+from gvpipe.mesh.topology import adjacency, components, unique_edges
 
 SAMPLES = Path(__file__).parents[1] / "samples"
 

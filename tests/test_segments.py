@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from gvpipe.bitstream import Bitstream
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import LARGEST_STEP, MAX_SEGMENT, SMALLEST_STEP, read_segments, read_steps
 from gvpipe.errors import CorruptFile
-from gvpipe.segments import LARGEST_STEP, MAX_SEGMENT, SMALLEST_STEP, read_segments, read_steps
 
 
 def bitstream(n_frames: int, **header: Any) -> Bitstream:

@@ -7,8 +7,8 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 
-from gvpipe import sted
-from gvpipe.metrics import compare
+from gvpipe.metrics import sted
+from gvpipe.metrics.comparison import compare
 from gvpipe.sequence import MeshSequence
 
 

@@ -15,9 +15,9 @@ from sequences import awkward, held, partly_still, waving
 import gvpipe
 from gvpipe.codec import GroupReader, LevelReader, Memo, codec_class, encode_sequence, open_reader
 from gvpipe.errors import CorruptFile
-from gvpipe.holds import Holds, find_holds, read_holds
+from gvpipe.repeated_frames import Holds, find_holds, read_holds
 from gvpipe.sequence import MeshSequence
-from gvpipe.stillness import decode_flags, encode_flags, find_still
+from gvpipe.trajectory.still_vertices import decode_flags, encode_flags, find_still
 
 AWKWARD = awkward()
 MORPH_WAVE = Path(__file__).parents[2] / "shared" / "data" / "morph_wave.npz"
@@ -257,8 +257,8 @@ def test_flags_come_back() -> None:
 
 @pytest.mark.parametrize("lengths", [[3, -1, 3], [2, 0, 3], [4, 2], [1] * 9, [1 << 38, 5]])
 def test_wrong_flags_are_refused(lengths: list[int]) -> None:
-    from gvpipe.binary import varint
-    from gvpipe.entropy import encode_integers
+    from gvpipe.container.cursor import varint
+    from gvpipe.entropy.integers import encode_integers
 
     with pytest.raises(CorruptFile, match="still"):
         decode_flags(varint(len(lengths)) + encode_integers(np.array(lengths)), 5, "still")
@@ -266,7 +266,7 @@ def test_wrong_flags_are_refused(lengths: list[int]) -> None:
 
 @pytest.mark.parametrize("lengths", [[5, 0, 5], [3, 4], [12, -2], [1] * 11, [1 << 38, 5]])
 def test_wrong_holds_are_refused(lengths: list[int]) -> None:
-    from gvpipe.holds import add_holds
+    from gvpipe.repeated_frames import add_holds
 
     bitstream = codec_class("pca")().encode(waving(4, 10))
     wrong = add_holds(bitstream, Holds(np.array(lengths)), 2)

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import gvpipe.sequence
-from gvpipe.binary import varint
-from gvpipe.entropy import encode_integers
+from gvpipe.container.cursor import varint
+from gvpipe.entropy.integers import encode_integers
 from gvpipe.errors import CorruptFile
 from gvpipe.sequence import MeshSequence
-from gvpipe.stillness import decode_flags, encode_flags, find_still
+from gvpipe.trajectory.still_vertices import decode_flags, encode_flags, find_still
 
 NO_FACES = np.zeros((0, 3), np.int32)
 

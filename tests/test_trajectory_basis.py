@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gvpipe.trajectory_basis import Principal, choose_step, count_components, expected_error
+from gvpipe.trajectory.basis import Principal, choose_step, count_components, expected_error
 
 N_POINTS, N_ROWS = 700, 90
 

@@ -22,14 +22,14 @@ from PIL import Image
 from sequences import awkward, held, patched, waving
 
 import gvpipe
-from gvcodecs.mcgv import format as sections
-from gvcodecs.mcgv.surface import read_surface
-from gvpipe.bitstream import Bitstream
+from gvcodecs.mcgv import header as sections
+from gvcodecs.mcgv.base.surface import read_surface
 from gvpipe.codec import make_codec, open_reader
-from gvpipe.container import read_file, write_file
-from gvpipe.corrections import Bound, encode_corrections
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.mp4 import read_file, write_file
+from gvpipe.corrections.bound import Bound, encode_corrections
 from gvpipe.errors import CorruptFile
-from gvpipe.holds import Holds, add_holds
+from gvpipe.repeated_frames import Holds, add_holds
 from gvpipe.sequence import MeshSequence
 
 pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())

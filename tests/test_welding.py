@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import gvpipe.sequence
-from gvpipe import welding
 from gvpipe.sequence import MeshSequence
-from gvpipe.welding import find_points
+from gvpipe.trajectory import welding
+from gvpipe.trajectory.welding import find_points
 
 NO_FACES = np.zeros((0, 3), np.int32)
 

@@ -1,7 +1,8 @@
 """Vertex errors as colours: how far each vertex lies from the reference's, and the legend that tells what a colour means.
 
-Errors are in percent of the reference's frame-0 bounding-box diagonal, as ``rmse_diag`` and ``max_diag`` of `gvpipe.metrics`
-are in parts of it (model units where the diagonal is 0). One scale serves all frames that are drawn together.
+Errors are in percent of the reference's frame-0 bounding-box diagonal, as ``rmse_diag`` and ``max_diag`` of
+`gvpipe.metrics.comparison` are in parts of it (model units where the diagonal is 0). One scale serves all frames that are drawn
+together.
 """
 
 from __future__ import annotations
@@ -12,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.errors import InputError
-from gvpipe.metrics import aligned
-from gvpipe.rendering.camera import sampled, used_vertices
-from gvpipe.rendering.colours import BACKGROUND, error_colours
+from gvpipe.metrics.comparison import aligned
+from gvpipe.metrics.vertex_errors import frame_diagonal
+from gvpipe.rasterizer.camera import sampled, used_vertices
+from gvpipe.rasterizer.colours import BACKGROUND, error_colours
 from gvpipe.sequence import MeshSequence
-from gvpipe.vertex_errors import frame_diagonal
 
 SMALLEST = (160, 120)  # pixels, of a picture with a legend
 INK = (60, 60, 60)

@@ -22,13 +22,13 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.atomic import atomic_path, output_error
-from gvpipe.bitstream import Bitstream
 from gvpipe.codec import Codec, Progress, make_codec
-from gvpipe.container import write_file
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.mp4 import write_file
 from gvpipe.errors import InputError, OutputError
 from gvpipe.player import Player
-from gvpipe.quality import error_of, quality_of
-from gvpipe.trials import Trial, Trials
+from gvpipe.quality_scale import error_of, quality_of
+from gvpipe.rate_control.trials import Trial, Trials
 
 READS = ("mcgv", 3, "h264-8")  # codec, its highest version, profile: what src/mcgv/header.js reads
 SUFFIXES = (".html", ".htm")
@@ -76,8 +76,8 @@ def export_html(
         source: the geometry video, of any codec.
         target: the ``.html`` to write; an older file is replaced once the new one is complete.
         up: the axis that stands upright in the first view, ``y`` or ``z``.
-        quality: 0..100, of the conversion where there is one: the error that it may add (`gvpipe.quality`); `QUALITY` if None.
-        progress: called with a stage's name and the part of it that is done.
+        quality: 0..100, of the conversion where there is one: the error that it may add (`gvpipe.quality_scale`); `QUALITY` if
+        None. progress: called with a stage's name and the part of it that is done.
 
     Raises:
         InputError: there is no such file, or an argument cannot be used.

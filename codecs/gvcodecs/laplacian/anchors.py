@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.hierarchy import Hierarchy
-from gvpipe.row_prediction import Rows, rows_left, select_rows
+from gvpipe.mesh.hierarchy import Hierarchy
 from gvpipe.sequence import Int32
+from gvpipe.trajectory.prediction import Rows, rows_left, select_rows
 
 ANCHOR_CHOICES = ("hierarchy", "walk")
 SMALL = 4  # points of components that are all anchors

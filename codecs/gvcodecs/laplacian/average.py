@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from gvcodecs.laplacian.alignment import Groups, rotations
 from gvcodecs.laplacian.edge_shape import EdgeShapeSum
 from gvcodecs.laplacian.shape_fit import fit_shape
+from gvpipe.mesh.topology import adjacency, components
 from gvpipe.sequence import Int32, MeshSequence
-from gvpipe.topology import adjacency, components
 
 BLOCK = 8  # frames aligned at a time, to the mean of those before
 ALIGNED = 64  # frames aligned at most, evenly spread: they give no more than a start

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from gvcodecs.laplacian.coefficients import decode_coefficients, encode_coefficients
 from gvcodecs.laplacian.domain import Surface, build_domain
-from gvcodecs.laplacian.format import Header
+from gvcodecs.laplacian.header import Header
 from gvcodecs.laplacian.mesh_scale import edge_lengths
-from gvpipe.binary import Cursor, varint
+from gvpipe.container.cursor import Cursor, varint
 from gvpipe.errors import CorruptFile
 
 NAME = "average"

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.laplacian.domain import Domain
-from gvcodecs.laplacian.format import Header
-from gvpipe.row_coding import decode_rows, encode_rows
+from gvcodecs.laplacian.header import Header
+from gvpipe.trajectory.coefficient_coding import decode_rows, encode_rows
 
 Float64 = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ map takes the average mesh's differential coordinates around a point to its delt
 sum of known delta trajectories, with weights that follow from the average mesh alone: ``w = A (A^T A + r I)^-1 delta``.
 
 ``kalman``, the default, starts from these weights (from zero, where there is no average mesh) and lets each decoded component
-correct them for the next one (`gvpipe.row_prediction`). Learned weights may have any size, and along a walk of thousands of
-rows a rounding difference could grow without limit; so points come in the order of the vertex hierarchy, and only those of
+correct them for the next one (`gvpipe.trajectory.prediction`). Learned weights may have any size, and along a walk of thousands
+of rows a rounding difference could grow without limit; so points come in the order of the vertex hierarchy, and only those of
 earlier blocks are known: no chain of predictions is longer than there are blocks. ``none`` codes deltas as they are.
 
 Source: Vasa, Marras, Hormann and Brunnett 2014, section 7. Departures: a ridge r, since flat regions define no map; `kalman`.
@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from gvpipe.hierarchy import Hierarchy
-from gvpipe.row_prediction import Rows
+from gvpipe.mesh.hierarchy import Hierarchy
 from gvpipe.sequence import Int32
+from gvpipe.trajectory.prediction import Rows
 
 DELTA_PREDICTIONS = ("kalman", "rigid", "none")
 N_KNOWN = {"kalman": 20, "rigid": 15, "none": 0}  # known points, at most; 15 is the paper's k
@@ -37,7 +37,7 @@ Float64 = NDArray[np.float64]
 
 def border_order(faces: Int32, n_points: int) -> Int32:
     """All points in the order of a walk over ``faces (T, 3)`` that goes from triangle to triangle, breadth first."""
-    from gvpipe.coarse_walk import walk_coarse
+    from gvpipe.mesh.traversal import walk_coarse
 
     order: Int32 = walk_coarse(faces, np.arange(n_points, dtype=np.int32), n_points)[0]
     return order
@@ -72,7 +72,7 @@ def delta_rows(
         neighbours: ``(P, P)`` adjacency.
         differential: ``(P, 3)`` differential coordinates of the average mesh; zero without one.
     """
-    from gvcodecs.laplacian.kernels import known_around
+    from gvcodecs.laplacian.neighbour_search import known_around
 
     graph = neighbours.sorted_indices()
     starts_of, ends = graph.indptr.astype(np.int32), graph.indices.astype(np.int32)

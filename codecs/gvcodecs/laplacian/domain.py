@@ -10,15 +10,15 @@ from scipy import sparse
 
 from gvcodecs.laplacian.anchors import Anchors, choose_anchors
 from gvcodecs.laplacian.delta_rows import border_order, delta_order, delta_rows
-from gvcodecs.laplacian.format import Header
+from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian, thin_hubs
+from gvcodecs.laplacian.header import Header
 from gvcodecs.laplacian.mesh_scale import fineness
 from gvcodecs.laplacian.operators import laplacian
-from gvcodecs.laplacian.system import ExtendedLaplacian, thin_hubs
-from gvpipe.hierarchy import Hierarchy, build_hierarchy
-from gvpipe.mesh_rows import mesh_rows
-from gvpipe.row_prediction import Rows
+from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy
+from gvpipe.mesh.topology import adjacency, components, unique_edges
 from gvpipe.sequence import Int32
-from gvpipe.topology import adjacency, components, unique_edges
+from gvpipe.trajectory.prediction import Rows
+from gvpipe.trajectory.spatial_neighbours import mesh_rows
 
 Float64 = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.mesh.topology import unique_edges
 from gvpipe.sequence import Float32, Int32
-from gvpipe.topology import unique_edges
 
 Float64 = NDArray[np.float64]
 

@@ -1,11 +1,12 @@
 """The geometric-Laplacian codec: settings, and the way from a sequence to a bitstream.
 
 Vasa, Marras, Hormann and Brunnett, "Compressing dynamic meshes with geometric Laplacians", 2014. The steps, each a module of
-its own: connectivity (`gvpipe.bare_mesh`), average mesh in edge shape space (`average`) and its coding (`average_coding`),
-principal trajectories (`gvpipe.trajectory_basis`), Laplacian (`operators`) with anchors (`anchors`) and its inverse (`system`),
-prediction of delta trajectories (`delta_rows`), range coding (`gvpipe.row_coding`).
+its own: connectivity (`gvpipe.connectivity.topology_only`), average mesh in edge shape space (`average`) and its coding
+(`average_coding`), principal trajectories (`gvpipe.trajectory.basis`), Laplacian (`operators`) with anchors (`anchors`) and its
+inverse (`system`), prediction of delta trajectories (`delta_rows`), range coding (`gvpipe.trajectory.coefficient_coding`).
 
-Points that never move have a position in place of a trajectory (`gvpipe.still_points`); they are anchors that cost nothing.
+Points that never move have a position in place of a trajectory (`gvpipe.trajectory.still_points`); they are anchors that cost
+nothing.
 
 Frames are read for size and points, for the average, then segment by segment in each encode of the loop.
 """
@@ -26,7 +27,7 @@ from gvcodecs.laplacian.average_coding import NAME, encode_average
 from gvcodecs.laplacian.coefficients import encode_coefficients
 from gvcodecs.laplacian.delta_rows import DELTA_PREDICTIONS
 from gvcodecs.laplacian.domain import Domain, build_domain, build_surface
-from gvcodecs.laplacian.format import (
+from gvcodecs.laplacian.header import (
     COARSEST,
     FINEST,
     LEAST_RATIO,
@@ -39,14 +40,14 @@ from gvcodecs.laplacian.format import (
 )
 from gvcodecs.laplacian.operators import OPERATORS
 from gvcodecs.laplacian.reader import LaplacianReader
-from gvpipe.aiming import NEAR, Aimed, Anchor, first_step, mend, step_between
-from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
-from gvpipe.segments import MAX_SEGMENT, cut
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import MAX_SEGMENT, cut
+from gvpipe.rate_control.step_search import NEAR, Aimed, Anchor, first_step, mend, step_between
 from gvpipe.sequence import MeshSequence
-from gvpipe.still_points import SECTION, StillPoints, code_still
-from gvpipe.trajectories import CodedPoints, code_points, read_trajectories
-from gvpipe.trajectory_basis import MAX_COMPONENTS, reduce_trajectories, squared_errors
+from gvpipe.trajectory.basis import MAX_COMPONENTS, reduce_trajectories, squared_errors
+from gvpipe.trajectory.coded_points import CodedPoints, code_points, read_trajectories
+from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
 
 FIRST = 1.0  # of the error wanted, asked of `reduce_trajectories` in a first encode, before drift is known
 NOISE = 3.0  # squared error that rounding of deltas leaves, in that of coefficients rounded alike, about
@@ -58,8 +59,8 @@ class Laplacian(Settings):
     """Settings of the geometric-Laplacian codec.
 
     Errors are small between neighbours and grow from anchor to anchor, on thin parts and small meshes the most. So the error
-    that quality asks for (`gvpipe.quality`) is met by a loop: encode, measure, mend the step. A given number of ``components``
-    sets the error itself, and the step is not mended.
+    that quality asks for (`gvpipe.quality_scale`) is met by a loop: encode, measure, mend the step. A given number of
+    ``components`` sets the error itself, and the step is not mended.
 
     Raises:
         SettingError: a value out of its range.
@@ -68,7 +69,7 @@ class Laplacian(Settings):
     id: ClassVar[str] = "laplacian"
     version: ClassVar[int] = VERSION_STILL
     summary: ClassVar[str] = "trajectory PCA through geometric Laplacians: smallest files at equal perceived distortion"
-    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.holds`)
+    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
 
     quality: float = 75.0  # 0..100, higher is better
     operator: str = "mean-value"  # mean-value, cotangent or tutte

@@ -1,7 +1,7 @@
 """The multi-chart geometry video codec: settings, and the way from a sequence to a bitstream.
 
 Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video: A Compact Representation for 3D Animations", 2007. The steps, each a
-module of its own: base frame (`gvpipe.connectivity`), motion (`blended_motion` or, as published, `segmentation` and
+module of its own: base frame (`gvpipe.connectivity.base_mesh`), motion (`blended_motion` or, as published, `segmentation` and
 `affine_motion`), `placement` (or, as published, `parameterization` and `packing`), and pictures of frames (`frame_images`) or
 of trajectories (`trajectory_encoder`). What they begin with is `_Start`; a route from there ends with `_Coded`.
 
@@ -21,43 +21,43 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gvcodecs.mcgv import format as sections
-from gvcodecs.mcgv.affine_motion import code_affine
-from gvcodecs.mcgv.blend_fitting import Fitted, Motions, fit_blend
-from gvcodecs.mcgv.blended_motion import code_blended
-from gvcodecs.mcgv.chart_coding import SECTION as CHARTS
-from gvcodecs.mcgv.chart_coding import encode_charts, number_charts
-from gvcodecs.mcgv.chart_placement import place_charts
-from gvcodecs.mcgv.frame_images import code_frames, measure_residuals
-from gvcodecs.mcgv.motion import CodedMotion
-from gvcodecs.mcgv.outliers import SECTION, OutlierWriter
-from gvcodecs.mcgv.packing import Layout, pack
-from gvcodecs.mcgv.parameterization import parameterize
-from gvcodecs.mcgv.placement import choose_size, place
-from gvcodecs.mcgv.points import Points
-from gvcodecs.mcgv.quality import Magnitudes, choose_quantiser
+from gvcodecs.mcgv import header as sections
+from gvcodecs.mcgv.base.distinct_positions import keep_apart
+from gvcodecs.mcgv.base.surface import STILL
+from gvcodecs.mcgv.base.welded_points import Points
+from gvcodecs.mcgv.layout.chart_coding import SECTION as CHARTS
+from gvcodecs.mcgv.layout.chart_coding import encode_charts, number_charts
+from gvcodecs.mcgv.layout.kd_tree import choose_size, place
+from gvcodecs.mcgv.layout.packing import Layout, pack
+from gvcodecs.mcgv.layout.parameterization import parameterize
+from gvcodecs.mcgv.layout.tiles import place_charts
+from gvcodecs.mcgv.motion.affine import code_affine
+from gvcodecs.mcgv.motion.blended import code_blended
+from gvcodecs.mcgv.motion.contract import CodedMotion
+from gvcodecs.mcgv.motion.segmentation import segment
+from gvcodecs.mcgv.motion.skinning_fit import Fitted, Motions, fit_blend
+from gvcodecs.mcgv.pictures.frames import code_frames, measure_residuals
+from gvcodecs.mcgv.pictures.outliers import SECTION, OutlierWriter
+from gvcodecs.mcgv.pictures.quantiser import Magnitudes, choose_quantiser
+from gvcodecs.mcgv.pictures.trajectory_encoder import code_trajectories
 from gvcodecs.mcgv.reader import McgvReader
-from gvcodecs.mcgv.segmentation import segment
-from gvcodecs.mcgv.separation import keep_apart
-from gvcodecs.mcgv.surface import STILL
-from gvcodecs.mcgv.trajectory_encoder import code_trajectories
 from gvcodecs.mcgv.trajectory_header import TRANSFORMS
 from gvcodecs.mcgv.trajectory_reader import TrajectoryReader
-from gvpipe.aiming import SLOPE, Aimed, mend, root_mean_square
-from gvpipe.bitstream import Bitstream
 from gvpipe.blas import one_blas_thread
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
-from gvpipe.connectivity import EncodedMesh
+from gvpipe.connectivity.base_mesh import EncodedMesh
+from gvpipe.connectivity.welded_mesh import decode_points, encode_points
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import MAX_SEGMENT, cut
 from gvpipe.errors import SettingError
-from gvpipe.point_mesh import decode_points, encode_points
-from gvpipe.quality import error_of
-from gvpipe.quantize import Lattice
-from gvpipe.segments import MAX_SEGMENT, cut
+from gvpipe.media.video import PROFILES, Profile
+from gvpipe.mesh.lattice import Lattice
+from gvpipe.metrics.vertex_errors import measure_spread
+from gvpipe.quality_scale import error_of
+from gvpipe.rate_control.step_search import SLOPE, Aimed, mend, root_mean_square
 from gvpipe.sequence import Float32, Int32, MeshSequence
-from gvpipe.stillness import encode_flags, find_still
-from gvpipe.vertex_errors import measure_spread
-from gvpipe.video import PROFILES, Profile
-from gvpipe.welding import find_points
+from gvpipe.trajectory.still_vertices import encode_flags, find_still
+from gvpipe.trajectory.welding import find_points
 
 BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
 AFFINE_CLUSTERS, AFFINE_BASE_BITS = 20, 12  # the paper's
@@ -95,7 +95,7 @@ class Mcgv(Settings):
     id: ClassVar[str] = "mcgv"
     version: ClassVar[int] = 3
     summary: ClassVar[str] = "multi-chart geometry video: residual images of a blended affine prediction, as H.264 or JPEG"
-    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.holds`)
+    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
 
     quality: float = 75.0  # 0..100, higher is better
     image: str = "h264"  # h264: predictive; jpeg: every frame decodes alone

@@ -11,23 +11,23 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gvcodecs.mcgv import format as sections
-from gvcodecs.mcgv.affine_motion import AffineMotion
-from gvcodecs.mcgv.blended_motion import BlendedMotion, decode_transforms
-from gvcodecs.mcgv.chart_coding import SECTION as CHARTS
-from gvcodecs.mcgv.chart_coding import decode_charts
-from gvcodecs.mcgv.chart_placement import place_charts
-from gvcodecs.mcgv.motion import Motion
-from gvcodecs.mcgv.outliers import SECTION
-from gvcodecs.mcgv.packing import Layout
-from gvcodecs.mcgv.placement import place
-from gvcodecs.mcgv.surface import Surface, read_surface
-from gvpipe.bitstream import Bitstream
+from gvcodecs.mcgv import header as sections
+from gvcodecs.mcgv.base.surface import Surface, read_surface
+from gvcodecs.mcgv.layout.chart_coding import SECTION as CHARTS
+from gvcodecs.mcgv.layout.chart_coding import decode_charts
+from gvcodecs.mcgv.layout.kd_tree import place
+from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.layout.tiles import place_charts
+from gvcodecs.mcgv.motion.affine import AffineMotion
+from gvcodecs.mcgv.motion.blended import BlendedMotion, decode_transforms
+from gvcodecs.mcgv.motion.contract import Motion
+from gvcodecs.mcgv.pictures.outliers import SECTION
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import segment_starts
+from gvpipe.corrections.displacements import MovesReader, Shared
 from gvpipe.errors import CorruptFile
-from gvpipe.moves import MovesReader, Shared
-from gvpipe.segments import segment_starts
+from gvpipe.media.video import VideoReader
 from gvpipe.sequence import Float32, Int32
-from gvpipe.video import VideoReader
 
 
 class McgvReader:

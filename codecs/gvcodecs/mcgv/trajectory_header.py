@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from gvpipe.bitstream import Bitstream
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import count_longest, read_steps
 from gvpipe.errors import CorruptFile
-from gvpipe.segments import count_longest, read_steps
-from gvpipe.trajectory_basis import MAX_COMPONENTS
+from gvpipe.trajectory.basis import MAX_COMPONENTS
 
 TRANSFORMS = ("none", "klt")
 MAX_FINENESS = 256

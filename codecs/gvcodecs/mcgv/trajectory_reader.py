@@ -12,22 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from gvcodecs.mcgv import format as sections
-from gvcodecs.mcgv.blending import Blend
-from gvcodecs.mcgv.motion import locate
-from gvcodecs.mcgv.packing import Layout
+from gvcodecs.mcgv import header as sections
+from gvcodecs.mcgv.base.surface import Surface, read_surface
+from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.motion.contract import locate
+from gvcodecs.mcgv.motion.skinning import Blend
+from gvcodecs.mcgv.motion.weight_coding import decode_weights
+from gvcodecs.mcgv.pictures.trajectories import PLANES, count_pictures, decode_segment
 from gvcodecs.mcgv.reader import read_layout
-from gvcodecs.mcgv.surface import Surface, read_surface
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
-from gvcodecs.mcgv.trajectory_images import PLANES, count_pictures, decode_segment
-from gvcodecs.mcgv.weight_coding import decode_weights
-from gvpipe.bitstream import Bitstream
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import segment_starts
 from gvpipe.errors import CorruptFile
-from gvpipe.row_coding import MAX_VALUES
-from gvpipe.segments import segment_starts
+from gvpipe.media.video import VideoReader
 from gvpipe.sequence import Float32, Int32
-from gvpipe.trajectory_basis import Basis
-from gvpipe.video import VideoReader
+from gvpipe.trajectory.basis import Basis
+from gvpipe.trajectory.coefficient_coding import MAX_VALUES
 
 MAX_FLOAT32 = float(np.finfo(np.float32).max)
 

@@ -1,12 +1,13 @@
 """The trajectory PCA codec: settings, and the way from a sequence to a bitstream.
 
 Vasa and Skala, "Geometry-Driven Local Neighbourhood Based Predictors for Dynamic Mesh Compression", 2010. The steps, each a
-module of its own: connectivity (`gvpipe.bare_mesh`), principal trajectories and their coding (`gvpipe.trajectory_basis`),
-vertex hierarchy (`gvpipe.hierarchy`), closed-loop prediction (`gvpipe.row_prediction`) and range coding (`gvpipe.row_coding`)
-of feature vectors.
+module of its own: connectivity (`gvpipe.connectivity.topology_only`), principal trajectories and their coding
+(`gvpipe.trajectory.basis`), vertex hierarchy (`gvpipe.mesh.hierarchy`), closed-loop prediction (`gvpipe.trajectory.prediction`)
+and range coding (`gvpipe.trajectory.coefficient_coding`) of feature vectors.
 
 Vertices that share one trajectory (seams, triangle soups) are one point, coded once. Points that never move have a position in
-place of a trajectory (`gvpipe.still_points`). Frames are read twice: for size, points and stillness, then segment by segment.
+place of a trajectory (`gvpipe.trajectory.still_points`). Frames are read twice: for size, points and stillness, then segment by
+segment.
 """
 
 from __future__ import annotations
@@ -17,18 +18,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from gvcodecs.pca.format import MAX_SEGMENTS, VERSION_STILL, Header
+from gvcodecs.pca.header import MAX_SEGMENTS, VERSION_STILL, Header
 from gvcodecs.pca.reader import PcaReader, ordered_rows
-from gvpipe.bitstream import Bitstream
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
-from gvpipe.hierarchy import build_hierarchy
-from gvpipe.row_coding import encode_rows
-from gvpipe.row_prediction import PREDICTORS, Rows, rows_left
-from gvpipe.segments import MAX_SEGMENT, cut
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import MAX_SEGMENT, cut
+from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.sequence import MeshSequence
-from gvpipe.still_points import SECTION, StillPoints, code_still
-from gvpipe.trajectories import code_points, read_trajectories
-from gvpipe.trajectory_basis import MAX_COMPONENTS, Reduced, reduce_trajectories
+from gvpipe.trajectory.basis import MAX_COMPONENTS, Reduced, reduce_trajectories
+from gvpipe.trajectory.coded_points import code_points, read_trajectories
+from gvpipe.trajectory.coefficient_coding import encode_rows
+from gvpipe.trajectory.prediction import PREDICTORS, Rows, rows_left
+from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
 
 LEFT = 0.93  # part of the error asked of `reduce_trajectories` that is left: small coefficients err by less than steps do
 
@@ -37,7 +38,7 @@ LEFT = 0.93  # part of the error asked of `reduce_trajectories` that is left: sm
 class Pca(Settings):
     """Settings of the trajectory PCA codec.
 
-    The error that quality asks for (`gvpipe.quality`) is met without a loop: how it follows from the step is known well.
+    The error that quality asks for (`gvpipe.quality_scale`) is met without a loop: how it follows from the step is known well.
 
     Raises:
         SettingError: a value out of its range.
@@ -46,7 +47,7 @@ class Pca(Settings):
     id: ClassVar[str] = "pca"
     version: ClassVar[int] = VERSION_STILL
     summary: ClassVar[str] = "trajectory PCA with geometric predictors: smallest files, levels of detail"
-    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.holds`)
+    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
 
     quality: float = 75.0  # 0..100, higher is better
     predictor: str = "kalman"  # kalman, or the paper's rbf, lsp, navg

@@ -8,19 +8,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gvcodecs.pca.format import Header
-from gvpipe.bare_mesh import read_mesh
-from gvpipe.bitstream import Bitstream
+from gvcodecs.pca.header import Header
+from gvpipe.connectivity.topology_only import read_mesh
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import segment_starts
 from gvpipe.errors import InputError
-from gvpipe.hierarchy import Hierarchy, build_hierarchy, level_faces
-from gvpipe.mesh_rows import OVERSHOOT, mesh_rows
-from gvpipe.row_coding import decode_rows
-from gvpipe.row_prediction import Rows, rows_left
-from gvpipe.segments import segment_starts
+from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy, level_faces
 from gvpipe.sequence import Float32, Int32
-from gvpipe.still_points import read_still
-from gvpipe.trajectory_basis import decode_basis
-from gvpipe.trajectory_frames import Segment, read_frames
+from gvpipe.trajectory.basis import decode_basis
+from gvpipe.trajectory.coefficient_coding import decode_rows
+from gvpipe.trajectory.prediction import Rows, rows_left
+from gvpipe.trajectory.reconstruction import Segment, read_frames
+from gvpipe.trajectory.spatial_neighbours import OVERSHOOT, mesh_rows
+from gvpipe.trajectory.still_points import read_still
 
 
 class PcaReader:

@@ -35,9 +35,9 @@ from gvcodecs.pdct.labels import decode_labels, encode_labels
 from gvcodecs.pdct.local_frames import local_frames
 from gvcodecs.pdct.momentum import Momentum
 from gvcodecs.pdct.seed_coding import decode_seeds, encode_seeds
-from gvpipe.binary import Cursor, varint
-from gvpipe.entropy import decode_integers, encode_integers, tokenise
-from gvpipe.quantize import Lattice
+from gvpipe.container.cursor import Cursor, varint
+from gvpipe.entropy.integers import decode_integers, encode_integers, tokenise
+from gvpipe.mesh.lattice import Lattice
 from gvpipe.sequence import Float32
 
 HEAD = struct.Struct("<6d")

@@ -2,11 +2,12 @@
 
 What: the three axes of a frame's quantised delta coefficients, in turn; each coefficient's context comes from how large it and
 its neighbours in frequency lately were, and how large it is on the axes before.
-Why not `gvpipe.entropy`: its contexts must be known before a block is decoded, and the best context is what was just decoded.
-All contexts, counts and probabilities are integers or one division of integers, so no rounding can part decoder and encoder.
+Why not `gvpipe.entropy.integers`: its contexts must be known before a block is decoded, and the best context is what was just
+decoded. All contexts, counts and probabilities are integers or one division of integers, so no rounding can part decoder and
+encoder.
 
-A value is folded and cut into a token and raw low bits as in `gvpipe.entropy`. Tables start flat, gain `GAIN` per token and
-halve when they reach `FULL`::
+A value is folded and cut into a token and raw low bits as in `gvpipe.entropy.integers`. Tables start flat, gain `GAIN` per
+token and halve when they reach `FULL`::
 
     section = [varint] W, [W x u32] range-coded tokens, raw low bits, in order of frame, axis, coefficient
 """
@@ -18,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.binary import Cursor, varint
-from gvpipe.entropy import DIRECT, model, tokenise
+from gvpipe.container.cursor import Cursor, varint
+from gvpipe.entropy.integers import DIRECT, model, tokenise
 
 MAX_BITS = 36  # bit length of the largest folded value
 N_TOKENS = DIRECT + 2 * (MAX_BITS - 4)

@@ -17,7 +17,7 @@ from scipy.fft import dct, idct
 
 from gvcodecs.pdct.delta_coding import Layout
 from gvcodecs.pdct.local_frames import local_frames
-from gvpipe.quantize import Lattice
+from gvpipe.mesh.lattice import Lattice
 from gvpipe.sequence import Int32
 
 UNIT = 16  # parts of a step that predictions are kept in

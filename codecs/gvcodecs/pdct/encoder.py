@@ -1,7 +1,8 @@
 """The predictive DCT codec: settings, and the way from a sequence to a bitstream.
 
 Amjoun and Strasser, "Predictive-DCT Coding for 3D Mesh Sequences Compression", 2008. The steps, each a module of its own: base
-frame and points (`gvpipe.point_mesh`), `clustering`, `local_frames` with `seed_coding`, closed loop (`clip`), `delta_coding`.
+frame and points (`gvpipe.connectivity.welded_mesh`), `clustering`, `local_frames` with `seed_coding`, closed loop (`clip`),
+`delta_coding`.
 
 Vertices that share a trajectory are one point, coded once, so that they coincide in every decoded frame. Frames are read for
 points and spread, then a clip at a time in each encode of the loop that meets the error; `stream` codes such clips from frames
@@ -20,21 +21,21 @@ from numpy.typing import NDArray
 from gvcodecs.pdct.clip import MAX_CLUSTERS, Quantiser, encode_clip
 from gvcodecs.pdct.clustering import Clusters, find_clusters
 from gvcodecs.pdct.dictionary import Surface
-from gvcodecs.pdct.format import MAX_CLIPS, VERSION_POINTS, Header, surface_of_points
+from gvcodecs.pdct.header import MAX_CLIPS, VERSION_POINTS, Header, surface_of_points
 from gvcodecs.pdct.reader import PdctReader
-from gvcodecs.pdct.stillness import SECTION, encode_still
-from gvpipe.aiming import NEAR, Aimed, Anchor, first_step, mend, root_mean_square, step_between
-from gvpipe.bitstream import Bitstream
+from gvcodecs.pdct.still_points import SECTION, encode_still
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
-from gvpipe.connectivity import EncodedMesh
-from gvpipe.point_mesh import PointMesh, decode_points, encode_points
-from gvpipe.quality import error_of
-from gvpipe.quantize import Lattice
-from gvpipe.segments import MAX_SEGMENT, cut
+from gvpipe.connectivity.base_mesh import EncodedMesh
+from gvpipe.connectivity.welded_mesh import PointMesh, decode_points, encode_points
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import MAX_SEGMENT, cut
+from gvpipe.mesh.lattice import Lattice
+from gvpipe.metrics.vertex_errors import measure_spread
+from gvpipe.quality_scale import error_of
+from gvpipe.rate_control.step_search import NEAR, Aimed, Anchor, first_step, mend, root_mean_square, step_between
 from gvpipe.sequence import Float32, MeshSequence
-from gvpipe.stillness import find_still
-from gvpipe.vertex_errors import measure_spread
-from gvpipe.welding import find_points
+from gvpipe.trajectory.still_vertices import find_still
+from gvpipe.trajectory.welding import find_points
 
 FIRST = 1.8  # steps by the root mean square error that they leave, in a first encode
 OPEN = 0.5  # steps by the error, percent of the diagonal of a stream's frame 0, that stands in for the spread
@@ -47,7 +48,7 @@ SMALLEST = 1e-9  # step, part of a clip's diagonal
 class Pdct(Settings):
     """Settings of the predictive DCT codec.
 
-    The error that quality asks for (`gvpipe.quality`) is met by a loop: encode, measure, mend the step of the delta
+    The error that quality asks for (`gvpipe.quality_scale`) is met by a loop: encode, measure, mend the step of the delta
     coefficients. With ``kept``, which sets the error itself, the step is not mended.
 
     Raises:
@@ -57,7 +58,7 @@ class Pdct(Settings):
     id: ClassVar[str] = "pdct"
     version: ClassVar[int] = VERSION_POINTS
     summary: ClassVar[str] = "predictive DCT in local coordinate frames: streams frame by frame, short clips"
-    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.holds`)
+    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
 
     quality: float = 75.0  # 0..100, higher is better
     clusters: int = 0  # N, seed triangles per clip, 1..1024; 0: one per 200 vertices, 20..64

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.binary import Cursor, varint
-from gvpipe.entropy import decode_integers, encode_integers
+from gvpipe.container.cursor import Cursor, varint
+from gvpipe.entropy.integers import decode_integers, encode_integers
 
 Int64 = NDArray[np.int64]
 

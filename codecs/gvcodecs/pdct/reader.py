@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.pdct.clip import decode_clip
-from gvcodecs.pdct.format import VERSION_POINTS, Header, surface_of, surface_of_points
-from gvcodecs.pdct.stillness import SECTION, decode_still
-from gvpipe.bitstream import Bitstream
-from gvpipe.connectivity import read_base
-from gvpipe.point_mesh import read_points
-from gvpipe.segments import segment_starts
+from gvcodecs.pdct.header import VERSION_POINTS, Header, surface_of, surface_of_points
+from gvcodecs.pdct.still_points import SECTION, decode_still
+from gvpipe.connectivity.base_mesh import read_base
+from gvpipe.connectivity.welded_mesh import read_points
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import segment_starts
 from gvpipe.sequence import Float32, Int32
 
 

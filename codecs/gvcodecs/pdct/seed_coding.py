@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.binary import Cursor
-from gvpipe.entropy import decode_integers, encode_integers
+from gvpipe.container.cursor import Cursor
+from gvpipe.entropy.integers import decode_integers, encode_integers
 
 ORDERS = (1, 2)
 MAX_CLASS = 63

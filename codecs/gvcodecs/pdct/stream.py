@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 from gvcodecs.pdct.clip import decode_clip
 from gvcodecs.pdct.dictionary import Surface
 from gvcodecs.pdct.encoder import Pdct, diagonal_of
-from gvcodecs.pdct.format import check_lattice, surface_of
-from gvpipe.connectivity import BaseMesh, EncodedMesh, decode_base, encode_base
+from gvcodecs.pdct.header import check_lattice, surface_of
+from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base
+from gvpipe.container.segments import MAX_SEGMENT
 from gvpipe.errors import CorruptFile, InputError, NewerVersion, NotGeometryVideo, TruncatedFile
-from gvpipe.quantize import Lattice
-from gvpipe.segments import MAX_SEGMENT
+from gvpipe.mesh.lattice import Lattice
 from gvpipe.sequence import Float32, Int32, check_finite
 
 MAGIC = b"gvpdct\r\n"

@@ -1,5 +1,5 @@
 /**
- * Triangles and base-frame lattice points. Mirrors `gvpipe.connectivity.decode_base`; `docs/format.md`, section 4: what Draco
+ * Triangles and base-frame lattice points. Mirrors `gvpipe.connectivity.base_mesh.decode_base`; `docs/format.md`, section 4: what Draco
  * carries, then the loose vertices and triangles beside it, all in the user's vertex order in the end.
  */
 

@@ -1,4 +1,4 @@
-/** Range-coded integers that come block by block. Mirrors `gvpipe.blocks.BlockDecoder`; `docs/format.md`, section 6. */
+/** Range-coded integers that come block by block. Mirrors `gvpipe.entropy.block_coder.BlockDecoder`; `docs/format.md`, section 6. */
 
 import { Cursor } from "./cursor.js";
 import { DIRECT, MAX_TOKENS, TABLE_TOTAL, normalised, unfold } from "./integers.js";

@@ -1,6 +1,6 @@
 /**
  * The top-level boxes of an MP4 file: where the payload is, and the tag that tells a stripped file from a foreign one.
- * Mirrors `gvpipe.container`; `docs/format.md`, section 1. The video itself is the browser's affair.
+ * Mirrors `gvpipe.container.mp4`; `docs/format.md`, section 1. The video itself is the browser's affair.
  */
 
 import { crc32 } from "./checksum.js";

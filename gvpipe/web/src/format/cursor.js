@@ -1,6 +1,6 @@
 /**
  * Bounds-checked reading of small binary sections: little-endian fields and varints (LEB128: seven bits a byte, least
- * significant group first, top bit set on all bytes but the last). Mirrors `gvpipe.binary`.
+ * significant group first, top bit set on all bytes but the last). Mirrors `gvpipe.container.cursor`.
  */
 
 import { corrupt } from "./errors.js";

@@ -1,6 +1,6 @@
 /**
  * Draco's decoder (npm package draco3d, WebAssembly inlined in the bundle) behind one function: a stream's keys and triangles
- * as `gvpipe.connectivity` wrote them.
+ * as `gvpipe.connectivity.base_mesh` wrote them.
  */
 
 import createDraco from "draco3d/draco_decoder_nodejs.js";

@@ -1,4 +1,4 @@
-/** Rows of a trajectory basis, one per frame and axis, in an order that interpolates. Mirrors `gvpipe.frame_rows`. */
+/** Rows of a trajectory basis, one per frame and axis, in an order that interpolates. Mirrors `gvpipe.trajectory.temporal_neighbours`. */
 
 const MAX_KNOWN = 6; // frames that predict a frame
 const VARIANCE = 0.02; // prior variance of a weight

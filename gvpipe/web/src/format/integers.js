@@ -1,4 +1,4 @@
-/** Blocks of range-coded integers. Mirrors `gvpipe.entropy.decode_integers`; `docs/format.md`, section 3. */
+/** Blocks of range-coded integers. Mirrors `gvpipe.entropy.integers.decode_integers`; `docs/format.md`, section 3. */
 
 import { Cursor } from "./cursor.js";
 import { RangeDecoder, categoricalEdges } from "./range_decoder.js";

@@ -1,4 +1,4 @@
-/** Frequency tables of integers by two numbers. Mirrors `gvpipe.magnitude_tables`; `docs/format.md`, section 6. */
+/** Frequency tables of integers by two numbers. Mirrors `gvpipe.entropy.parametric_tables`; `docs/format.md`, section 6. */
 
 const DIRECT = 16;
 const N_TOKENS = 40;

@@ -1,5 +1,5 @@
 /**
- * Sparse moves of vertices, in whole multiples of a step. Mirrors the decoding half of `gvpipe.moves`; `docs/format.md`,
+ * Sparse moves of vertices, in whole multiples of a step. Mirrors the decoding half of `gvpipe.corrections.displacements`; `docs/format.md`,
  * section 9.
  */
 

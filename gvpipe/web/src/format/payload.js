@@ -1,4 +1,4 @@
-/** The payload: named sections with checksums, and a JSON header. Mirrors `gvpipe.bitstream`; `docs/format.md`, section 2. */
+/** The payload: named sections with checksums, and a JSON header. Mirrors `gvpipe.container.bitstream`; `docs/format.md`, section 2. */
 
 import { CONTAINER_VERSION, newerContainer } from "./boxes.js";
 import { crc32 } from "./checksum.js";

@@ -1,5 +1,5 @@
 /**
- * Triangles, points on the base frame's lattice, seams and vertex order. Mirrors `gvpipe.point_mesh.decode_points`;
+ * Triangles, points on the base frame's lattice, seams and vertex order. Mirrors `gvpipe.connectivity.welded_mesh.decode_points`;
  * `docs/format.md`, section 5.5.
  */
 

@@ -1,6 +1,6 @@
 /**
  * Rows of coefficients from their residuals, each component predicted from rows known before; the row's earlier components say
- * how. Mirrors the predictor `kalman` of `gvpipe.prediction_kernels`, for rows of vectors (`affine` false), in the same
+ * how. Mirrors the predictor `kalman` of `gvpipe.trajectory.prediction_kernels`, for rows of vectors (`affine` false), in the same
  * order of operations.
  */
 

@@ -1,4 +1,4 @@
-/** Flags as bytes. Mirrors `gvpipe.stillness.decode_flags`; `docs/format.md`, section 5.5. */
+/** Flags as bytes. Mirrors `gvpipe.trajectory.still_vertices.decode_flags`; `docs/format.md`, section 5.5. */
 
 import { Cursor } from "./cursor.js";
 import { decodeIntegers } from "./integers.js";

@@ -1,4 +1,4 @@
-/** Principal trajectories of a segment. Mirrors `gvpipe.trajectory_basis.decode_basis`; `docs/format.md`, section 6. */
+/** Principal trajectories of a segment. Mirrors `gvpipe.trajectory.basis.decode_basis`; `docs/format.md`, section 6. */
 
 import { Cursor } from "./cursor.js";
 import { frameRows } from "./frame_rows.js";

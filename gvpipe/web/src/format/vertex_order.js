@@ -1,6 +1,6 @@
 /**
  * The user's vertex order: a walk in which each vertex is known by its rank in a breadth-first search from the one before.
- * Mirrors `gvpipe.vertex_order.decode_order`; `docs/format.md`, section 4.
+ * Mirrors `gvpipe.connectivity.vertex_order.decode_order`; `docs/format.md`, section 4.
  */
 
 import { Cursor } from "./cursor.js";

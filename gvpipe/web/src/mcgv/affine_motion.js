@@ -1,4 +1,4 @@
-/** The published prediction: one affine transform per cluster and frame. Mirrors `gvcodecs.mcgv.affine_motion`. */
+/** The published prediction: one affine transform per cluster and frame. Mirrors `gvcodecs.mcgv.motion.affine`. */
 
 import { Segments } from "./motion.js";
 import { AffinePredictor } from "./prediction.js";

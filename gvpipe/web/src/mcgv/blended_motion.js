@@ -1,4 +1,4 @@
-/** Blended prediction: weights once, transforms as trajectories. Mirrors `gvcodecs.mcgv.blended_motion`. */
+/** Blended prediction: weights once, transforms as trajectories. Mirrors `gvcodecs.mcgv.motion.blended`. */
 
 import { Blend } from "./blending.js";
 import { Segments } from "./motion.js";

@@ -1,5 +1,5 @@
 /**
- * Blended prediction: points follow weighted means of up to four clusters' affine motions. Mirrors `gvcodecs.mcgv.blending`.
+ * Blended prediction: points follow weighted means of up to four clusters' affine motions. Mirrors `gvcodecs.mcgv.motion.skinning`.
  *
  * A point at p with homogeneous coordinates y is predicted at `p + sum of w_k y @ T_k`; the file holds rows of equal weight,
  * `C_k = L_k^T T_k`, where L_k is the Cholesky factor of the energy that the cluster's rows cause.

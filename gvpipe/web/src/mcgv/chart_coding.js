@@ -1,4 +1,4 @@
-/** The chart of every point. Mirrors `gvcodecs.mcgv.chart_coding.decode_charts` and its kernels; `docs/format.md`, section 5.5. */
+/** The chart of every point. Mirrors `gvcodecs.mcgv.layout.chart_coding.decode_charts` and its kernels; `docs/format.md`, section 5.5. */
 
 import { Cursor } from "../format/cursor.js";
 import { decodeIntegers } from "../format/integers.js";

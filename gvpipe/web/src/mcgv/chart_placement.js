@@ -1,5 +1,5 @@
 /**
- * Placement by tiles: charts become rectangles that fill the plane. Mirrors `gvcodecs.mcgv.chart_placement`, but cell by cell, not
+ * Placement by tiles: charts become rectangles that fill the plane. Mirrors `gvcodecs.mcgv.layout.tiles`, but cell by cell, not
  * level by level; `docs/format.md`, section 5.5.
  */
 

@@ -1,4 +1,4 @@
-/** What the reader of an `mcgv` bitstream must know beside its sections. Mirrors `gvcodecs.mcgv.format.Header`. */
+/** What the reader of an `mcgv` bitstream must know beside its sections. Mirrors `gvcodecs.mcgv.header.Header`. */
 
 import { GeometryVideoError, corrupt } from "../format/errors.js";
 import { checkInteger, checkNumber } from "../format/payload.js";

@@ -1,6 +1,6 @@
 /**
  * Where each slot sits in the picture, and which cluster moves it. Mirrors `decode_pixels`, `decode_clusters` and
- * `decode_slot_clusters` of `gvcodecs.mcgv.format`; `docs/format.md`, section 5.
+ * `decode_slot_clusters` of `gvcodecs.mcgv.header`; `docs/format.md`, section 5.
  */
 
 import { Cursor } from "../format/cursor.js";

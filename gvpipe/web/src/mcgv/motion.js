@@ -1,4 +1,4 @@
-/** What the reader knows of a prediction, whichever it is. Mirrors `gvcodecs.mcgv.motion` and `gvpipe.segments`. */
+/** What the reader knows of a prediction, whichever it is. Mirrors `gvcodecs.mcgv.motion.contract` and `gvpipe.container.segments`. */
 
 import { Recent } from "../format/recent.js";
 

@@ -1,5 +1,5 @@
 /**
- * Placement by halving: each slot's pixel, from the base frame's integers alone. Mirrors `gvcodecs.mcgv.placement`, but cell by
+ * Placement by halving: each slot's pixel, from the base frame's integers alone. Mirrors `gvcodecs.mcgv.layout.kd_tree`, but cell by
  * cell, not level by level; `docs/format.md`, section 5.1. All sums stay below 2^53.
  */
 

@@ -1,4 +1,4 @@
-/** Points: what a blend moves. In files of version 3, the mesh's points that move. Mirrors `gvcodecs.mcgv.points`. */
+/** Points: what a blend moves. In files of version 3, the mesh's points that move. Mirrors `gvcodecs.mcgv.base.welded_points`. */
 
 import { previousEqual } from "../format/points.js";
 

@@ -1,4 +1,4 @@
-/** Piecewise affine prediction from the decoded base frame. Mirrors `gvcodecs.mcgv.prediction`. */
+/** Piecewise affine prediction from the decoded base frame. Mirrors `gvcodecs.mcgv.motion.affine_fit`. */
 
 export class AffinePredictor {
   /**

@@ -1,5 +1,5 @@
 /**
- * What the reader knows of the base frame. Mirrors `gvcodecs.mcgv.surface`.
+ * What the reader knows of the base frame. Mirrors `gvcodecs.mcgv.base.surface`.
  *
  * A *slot* is what a picture has a pixel for. In files of version 3 slots are the points that move: all vertices of a point
  * show one position, and vertices that stand still have neither sample nor motion. Before, every vertex was a slot.

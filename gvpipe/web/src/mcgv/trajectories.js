@@ -1,4 +1,4 @@
-/** A blend's transforms over a segment. Mirrors `gvcodecs.mcgv.trajectories`; `docs/format.md`, section 5. */
+/** A blend's transforms over a segment. Mirrors `gvcodecs.mcgv.motion.skinning_coding`; `docs/format.md`, section 5. */
 
 import { Cursor } from "../format/cursor.js";
 import { decodeRows } from "../format/row_coding.js";

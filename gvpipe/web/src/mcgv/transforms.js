@@ -1,6 +1,6 @@
 /**
  * The clusters' affine transforms of a segment: differences in time, range coded in the context of each series' magnitude.
- * Mirrors `gvcodecs.mcgv.transforms`; `docs/format.md`, section 5.
+ * Mirrors `gvcodecs.mcgv.motion.affine_coding`; `docs/format.md`, section 5.
  */
 
 import { Cursor } from "../format/cursor.js";

@@ -1,4 +1,4 @@
-/** The clusters that points follow. Mirrors `gvcodecs.mcgv.weight_coding.decode_weights`; `docs/format.md`, section 5. */
+/** The clusters that points follow. Mirrors `gvcodecs.mcgv.motion.weight_coding.decode_weights`; `docs/format.md`, section 5. */
 
 import { Cursor } from "../format/cursor.js";
 import { decodeIntegers } from "../format/integers.js";

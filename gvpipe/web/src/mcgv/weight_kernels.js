@@ -1,5 +1,5 @@
 /**
- * What points' weights are predicted from. Mirrors `gvcodecs.mcgv.weight_kernels`.
+ * What points' weights are predicted from. Mirrors `gvcodecs.mcgv.motion.weight_kernels`.
  *
  * A point's list holds the clusters that its known neighbours follow, heaviest first, equal ones by number.
  */

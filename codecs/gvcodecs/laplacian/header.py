@@ -1,0 +1,86 @@
+"""The sections of a ``laplacian`` bitstream, and the header that tells how to read them.
+
+====================  ======================================================================================
+``mesh``, ``order``   triangles, seams and vertex order (`gvpipe.connectivity.topology_only`)
+``still``             points that never move, and their positions (`gvpipe.trajectory.still_points`); absent if all move
+``average``           the average mesh (`average_coding`); absent where nothing needs it
+``basis.N``           mean and principal trajectories of segment N (`gvpipe.trajectory.basis`)
+``anchors.N``         coefficients of the anchors, coarse to fine (`gvpipe.trajectory.coefficient_coding`, `anchors`)
+``deltas.N``          delta trajectories of the other points (`gvpipe.trajectory.coefficient_coding`, `delta_rows`)
+====================  ======================================================================================
+
+Version 1 has no section ``still``; files without one are still written as version 1. Where no point moves, segments have no
+sections.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from gvcodecs.laplacian.anchors import ANCHOR_CHOICES
+from gvcodecs.laplacian.delta_rows import DELTA_PREDICTIONS
+from gvcodecs.laplacian.operators import OPERATORS
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import read_segments, read_steps
+
+MAX_SEGMENTS = 1300  # three sections each, of the 4096 that a bitstream may have
+VERSION_STILL = 2  # of files with a section `still` or `holds`
+MAX_SPACING = 1 << 20  # points per anchor
+LEAST_RATIO, MOST_RATIO = 2.0**-10, 2.0**10  # of steps
+FINEST, COARSEST = 2.0**-20, 1.0  # step of the average, mean edge lengths
+MOST_POWER = 2.0
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a reader must know beside the sections.
+
+    Args:
+        operator: whose deltas are coded.
+        delta_prediction: how they are predicted.
+        anchors: points per anchor.
+        anchor_choice: which points are anchors.
+        edge_power: steps of deltas go with this power of the edge lengths around a point.
+        average_step: quantisation step of the average mesh, mean edge lengths.
+        anchor_ratio, basis_ratio: steps of anchors and of the basis, in steps of deltas.
+        segments: how many; segment s starts at frame ``s * F // segments``.
+        steps: quantisation step of each segment's deltas, model units.
+    """
+
+    operator: str
+    delta_prediction: str
+    anchors: int
+    anchor_choice: str
+    edge_power: float
+    average_step: float
+    anchor_ratio: float
+    basis_ratio: float
+    segments: int
+    steps: tuple[float, ...]
+
+    @property
+    def needs_average(self) -> bool:
+        """Whether there is an average mesh: the combinatorial operator needs none but for section 7's prediction."""
+        return self.operator != "tutte" or self.delta_prediction == "rigid"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the header as JSON values."""
+        return {**asdict(self), "steps": list(self.steps)}
+
+    @classmethod
+    def of(cls, bitstream: Bitstream) -> Header:
+        """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
+        segments = read_segments(bitstream, MAX_SEGMENTS)
+        return cls(
+            bitstream.choice("operator", OPERATORS),
+            bitstream.choice("delta_prediction", DELTA_PREDICTIONS),
+            bitstream.integer("anchors", 1, MAX_SPACING),
+            bitstream.choice("anchor_choice", ANCHOR_CHOICES),
+            float(bitstream.number("edge_power", 0, MOST_POWER)),
+            float(bitstream.number("average_step", FINEST, COARSEST)),
+            float(bitstream.number("anchor_ratio", LEAST_RATIO, MOST_RATIO)),
+            float(bitstream.number("basis_ratio", LEAST_RATIO, MOST_RATIO)),
+            segments,
+            read_steps(bitstream, segments),
+        )

@@ -1,0 +1,1 @@
+"""The base frame: welded points, and which of them move."""

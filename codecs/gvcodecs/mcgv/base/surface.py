@@ -1,0 +1,99 @@
+"""What a reader knows of the base frame: which vertices move, what shares a sample, and what shares a blend.
+
+A *slot* is what a picture has a pixel for. In files of version 3 slots are the points that move: vertices that coincide in
+every frame coincide when decoded, and vertices that stand still have neither sample nor motion. Before, every vertex was a
+slot, and a blend moved vertices at one base position together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.mcgv import header as sections
+from gvcodecs.mcgv.base.welded_points import Points, weld_vertices
+from gvpipe.connectivity.base_mesh import read_base
+from gvpipe.connectivity.welded_mesh import read_points
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.errors import CorruptFile
+from gvpipe.sequence import Float32, Int32
+from gvpipe.trajectory.still_vertices import decode_flags
+
+STILL = "still"  # section: which points never move
+
+Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The base frame, and its S slots.
+
+    Args:
+        faces: ``(T, 3)`` triangles over V vertices.
+        rest: ``(V, 3)`` decoded base positions, model units.
+        vertices: ``(M,)`` the vertices that move, ascending.
+        slot: ``(M,)`` theirs.
+        lattice: ``(S, 3)`` the slots' base positions, lattice units; base: the same in model units.
+        point: ``(S,)`` the point of each slot; members: ``(P,)`` a slot of each point.
+        points: that a blend moves.
+        order: ``(S,)`` slots in the codec's order.
+    """
+
+    faces: Int32
+    rest: Float32
+    vertices: Int64
+    slot: Int64
+    lattice: Int32
+    base: Float64
+    point: Int64
+    members: Int64
+    points: Points
+    order: Int64
+
+    @property
+    def n_slots(self) -> int:
+        """S, the number of slots."""
+        return len(self.lattice)
+
+    def fill_still(self, positions: Float32) -> None:
+        """Fill in the vertices of ``positions (n, V, 3)`` that never move."""
+        if len(self.vertices) < len(self.rest):
+            still = np.ones(len(self.rest), bool)
+            still[self.vertices] = False
+            positions[:, still] = self.rest[still]
+
+
+def read_surface(bitstream: Bitstream, header: sections.Header) -> Surface:
+    """Decode the sections ``mesh``, ``order`` and ``still``; raises `CorruptFile`."""
+    if bitstream.version < 3:
+        base = read_base(bitstream)
+        points, point, members = weld_vertices(base.points, base.faces, base.visits)
+        own, placed = np.arange(len(base.points)), header.base.place(base.points)
+        order = np.argsort(base.visits)
+        rest = placed.astype(np.float32)
+        return Surface(base.faces, rest, own, own, base.points, placed, point, members, points, order)
+    mesh = read_points(bitstream)
+    n_points = len(mesh.lattice)
+    still = decode_flags(bitstream.section(STILL), n_points, STILL) if STILL in bitstream.sections else np.zeros(n_points, bool)
+    moves = np.flatnonzero(~still)
+    if not len(moves):
+        raise CorruptFile("section 'still' is corrupt: one point at least has samples; get the file again from its source")
+    slot = np.cumsum(~still) - 1
+    placed = header.base.place(mesh.lattice)
+    vertices = np.flatnonzero(~still[mesh.point])
+    own = np.arange(len(moves))
+    return Surface(
+        faces=mesh.faces,
+        rest=placed.astype(np.float32)[mesh.point],
+        vertices=vertices,
+        slot=slot[mesh.point[vertices]],
+        lattice=mesh.lattice[moves],
+        base=placed[moves],
+        point=own,
+        members=own,
+        points=Points.moving(mesh, moves),
+        order=own,
+    )

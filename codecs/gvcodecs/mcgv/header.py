@@ -1,0 +1,209 @@
+"""The sections of an ``mcgv`` bitstream, and the header that tells how to read them.
+
+=================  ==========================================================================================
+``mesh``           points on the base frame's lattice, connectivity, seams (`gvpipe.connectivity.welded_mesh`)
+``order``          vertex order, empty if the codec's own (`gvpipe.connectivity.seams`)
+``still``          which points never move (`gvpipe.trajectory.still_vertices`); absent if all do
+``pixels``         [integers] x, then [integers] y of each slot in the codec's order: the differences from the slot
+                   before; y in the context of the magnitude of the difference in x (placement charts)
+``charts``         which chart each point belongs to (`chart_coding`, placement tiles)
+``clusters``       affine: [integers] placement charts: cluster of each block that holds a slot, in raster order,
+                   difference from the block before; halves: of each slot in the codec's order, from the slot before
+``weights``        blended: which clusters each point follows (`weight_coding`)
+``transforms.N``   transforms of segment N (affine: `transforms`, blended: `trajectories`)
+``outliers``       what residuals exceed the pictures' levels by (`outliers`); absent if nothing
+``trajectories.N`` klt, in place of ``transforms.N``: principal trajectories of segment N (`trajectory_images`)
+=================  ==========================================================================================
+
+Slots are the points that move (`surface`). In versions 1 and 2 every vertex is a slot, ``mesh`` and ``order`` are those of
+`gvpipe.connectivity.base_mesh`, and there is no section ``still``. Version 1 knows affine prediction and charts alone.
+
+Source: Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.3: base frame, partition, parametric
+coordinates, transforms, images. With charts the affine partition follows from the pixels, since no block holds two of them;
+by halves the pixels follow from the base frame and the partition (`placement`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.cursor import Cursor, varint
+from gvpipe.entropy.integers import decode_integers, encode_integers
+from gvpipe.errors import CorruptFile
+from gvpipe.media.video import MAX_SIDE, PROFILES, Profile
+from gvpipe.mesh.lattice import Lattice
+from gvpipe.sequence import Int32
+
+PREDICTIONS = ("blended", "affine")
+PLACEMENTS = ("halves", "charts", "tiles")
+MAX_CLUSTERS = 1024
+MAX_SEGMENTS = 1 << 16
+CONTEXTS = 4  # of a pixel's y: 0, 1, 2..3 or more columns from the vertex before
+LARGE = 1e39  # no coordinate or step of a float32 model lies beyond
+SMALL = 1e-60  # no step of a float32 model is smaller
+
+Int64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a reader must know beside the sections; lengths in model units, sides in pixels.
+
+    Args:
+        prediction: of `PREDICTIONS`: how vertices move.
+        placement: of `PLACEMENTS`: how vertices get their pixels.
+        profile: of the video; a picture holds the x, y and z planes, one below the other.
+        block: side of the blocks that hold one chart each.
+        width, height: of one plane.
+        clusters: K.
+        segments: how many; segment s starts at frame ``s * F // segments``.
+        base: lattice of the base frame.
+        transform_step, residual_step: quantisation steps where pictures are frames.
+        outliers: whether residuals exceed the pictures' levels.
+        images: where pictures are coefficients of trajectories.
+    """
+
+    prediction: str
+    placement: str
+    profile: Profile
+    block: int
+    width: int
+    height: int
+    clusters: int
+    segments: int
+    base: Lattice
+    transform_step: float = 1.0
+    residual_step: float = 1.0
+    outliers: bool = False
+    images: TrajectoryHeader | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the header as JSON values."""
+        values = asdict(self)
+        del values["images"]
+        if not self.outliers:
+            del values["outliers"]
+        if self.images:
+            del values["transform_step"], values["residual_step"]
+            values |= self.images.to_json()
+        values["profile"] = self.profile.name
+        values["base"] = [*self.base.origin, self.base.step]
+        return values
+
+    @classmethod
+    def of(cls, bitstream: Bitstream) -> Header:
+        """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
+        words = {"prediction": "affine", "placement": "charts"} if bitstream.version == 1 else bitstream.header
+        prediction, placement = str(words.get("prediction")), str(words.get("placement"))
+        if prediction not in PREDICTIONS or placement not in PLACEMENTS:
+            raise CorruptFile(f"header: no prediction {prediction!r} with placement {placement!r}; one of them is unknown")
+        if placement == "tiles" and prediction != "blended":
+            raise CorruptFile(f"header: no placement {placement!r} with prediction {prediction!r}; get the file again")
+        profile = PROFILES.get(str(bitstream.header.get("profile")))
+        base = bitstream.header.get("base")
+        if profile is None:
+            raise CorruptFile(f"header: no profile {bitstream.header.get('profile')!r}; there are {', '.join(PROFILES)}")
+        if not (isinstance(base, list) and len(base) == 4 and all(isinstance(v, int | float) for v in base)):
+            raise CorruptFile(f"header: base is {base!r}; an origin and a step are needed")
+        if not (base[3] > 0 and all(abs(v) < LARGE for v in base)):  # NaN neither
+            raise CorruptFile(f"header: base is {base!r}, out of range")
+        segments = bitstream.integer("segments", 1, min(MAX_SEGMENTS, bitstream.n_frames))
+        images = TrajectoryHeader.of(bitstream, segments)
+        header = cls(
+            prediction=prediction,
+            placement=placement,
+            profile=profile,
+            block=bitstream.integer("block", 2, 64),
+            width=bitstream.integer("width", 2, MAX_SIDE),
+            height=bitstream.integer("height", 2, MAX_SIDE // 3),
+            clusters=bitstream.integer("clusters", 1, MAX_CLUSTERS),
+            segments=segments,
+            base=Lattice((base[0], base[1], base[2]), base[3]),
+            transform_step=1.0 if images else bitstream.number("transform_step", SMALL, LARGE),
+            residual_step=1.0 if images else bitstream.number("residual_step", SMALL, LARGE),
+            outliers="outliers" in bitstream.header,
+            images=images,
+        )
+        if header.outliers and (bitstream.header["outliers"] is not True or bitstream.version == 1 or images):
+            raise CorruptFile(f"header: no outliers {bitstream.header['outliers']!r} in such a file; get the file again")
+        if images and (prediction != "blended" or profile.codec != "h264"):
+            raise CorruptFile(f"header: no trajectory images with prediction {prediction!r} and profile {profile.name!r}")
+        if header.width % header.block or header.height % header.block:
+            raise CorruptFile(f"header: planes of {header.width}x{header.height} are not whole blocks of {header.block}")
+        if placement != "charts" and header.block not in (8, 16):
+            raise CorruptFile(f"header: blocks of {header.block}; vertices are placed in blocks of 8 or 16")
+        return header
+
+
+def encode_pixels(layout: Layout) -> bytes:
+    """Return the section ``pixels``."""
+    y, x = np.divmod(layout.pixel, layout.width)
+    dx, dy = np.diff(x, prepend=0), np.diff(y, prepend=0)
+    columns = encode_integers(dx)
+    return varint(len(columns)) + columns + encode_integers(dy, _context(dx))
+
+
+def decode_pixels(data: bytes, order: Int64, width: int, height: int) -> Layout:
+    """Mirror of `encode_pixels`, for slots in the codec's ``order (S,)``.
+
+    Raises:
+        CorruptFile: a slot has no pixel of its own inside the plane.
+    """
+    cursor = Cursor(data, "pixels")
+    columns = cursor.take(cursor.varint(cursor.left, "a length"))
+    dx = decode_integers(columns, len(order), name="pixels")
+    dy = decode_integers(cursor.rest(), len(order), _context(dx), "pixels")
+    x, y = np.cumsum(dx), np.cumsum(dy)
+    if ((x < 0) | (x >= width) | (y < 0) | (y >= height)).any():
+        raise cursor.corrupt("a pixel lies outside the plane")
+    pixel = np.empty(len(order), np.int64)
+    pixel[order] = y * width + x
+    if np.bincount(pixel).max(initial=0) > 1:
+        raise cursor.corrupt("two slots share a pixel")
+    return Layout(width, height, pixel)
+
+
+def encode_clusters(clusters: Int32, layout: Layout, block: int) -> bytes:
+    """Return the section ``clusters`` for ``clusters (S,)``, which must be constant inside each block."""
+    _, first = np.unique(_blocks(layout, block), return_index=True)
+    return encode_integers(np.diff(clusters[first], prepend=np.int32(0)))
+
+
+def decode_clusters(data: bytes, layout: Layout, block: int, n_clusters: int) -> Int32:
+    """Mirror of `encode_clusters`: ``(S,) int32``; raises `CorruptFile` for a cluster out of range."""
+    used, block_of = np.unique(_blocks(layout, block), return_inverse=True)
+    by_block = np.cumsum(decode_integers(data, len(used), name="clusters"))
+    if ((by_block < 0) | (by_block >= n_clusters)).any():
+        raise CorruptFile(f"section 'clusters' is corrupt: a cluster is not in 0..{n_clusters - 1}")
+    return np.asarray(by_block[block_of.ravel()], np.int32)
+
+
+def encode_slot_clusters(clusters: Int32) -> bytes:
+    """Return the section ``clusters (S,)`` of placement halves."""
+    return encode_integers(np.diff(clusters, prepend=np.int32(0)))
+
+
+def decode_slot_clusters(data: bytes, order: Int64, n_clusters: int) -> Int32:
+    """Mirror of `encode_slot_clusters`, slots in the codec's ``order (S,)``; raises `CorruptFile` if one is out of range."""
+    ordered = np.cumsum(decode_integers(data, len(order), name="clusters"))
+    if ((ordered < 0) | (ordered >= n_clusters)).any():
+        raise CorruptFile(f"section 'clusters' is corrupt: a cluster is not in 0..{n_clusters - 1}")
+    clusters = np.empty(len(order), np.int32)
+    clusters[order] = ordered
+    return clusters
+
+
+def _context(dx: Int64) -> Int64:
+    return np.asarray(np.minimum(np.abs(dx), CONTEXTS - 1))
+
+
+def _blocks(layout: Layout, block: int) -> Int64:
+    y, x = np.divmod(layout.pixel, layout.width)
+    return np.asarray((y // block) * (layout.width // block) + x // block)

@@ -1,0 +1,1 @@
+"""The layout of a picture: which pixel carries which point."""

@@ -1,0 +1,63 @@
+"""The chart of every point as bytes: most points lie in the chart of their neighbours.
+
+Points are visited in the codec's order. The charts of a point's known neighbours are listed, most frequent first
+(`chart_kernels`); the point tells the rank of its own in that list. One that is not listed is told by number: charts are
+numbered as they first occur::
+
+    section = [varint] length, [integers] rank of each point, in the context of min(known neighbours, 4);
+              [varint] count, [integers] for each point whose rank is its list's length: 0 for a new chart, else how many
+              charts ago its own first occurred
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gvcodecs.mcgv.motion.weight_coding import Known, earlier_neighbours
+from gvpipe.container.cursor import Cursor, varint
+from gvpipe.entropy.integers import decode_integers, encode_integers
+
+SECTION = "charts"
+CONTEXTS = 5
+
+Int64 = NDArray[np.int64]
+
+
+def number_charts(charts: NDArray[np.integer]) -> Int64:
+    """Return ``charts (P,)`` numbered as they first occur."""
+    _, first, own = np.unique(charts, return_index=True, return_inverse=True)
+    return np.asarray(np.argsort(np.argsort(first))[own.ravel()])
+
+
+def encode_charts(charts: Int64, neighbours: sparse.csr_array) -> bytes:
+    """Return the section for ``charts (P,)`` of `number_charts`, points adjacent as in ``neighbours (P, P)``."""
+    from gvcodecs.mcgv.layout.chart_kernels import describe
+
+    known = earlier_neighbours(neighbours)
+    ranks, numbers = np.empty(len(charts), np.int64), np.empty(len(charts), np.int64)
+    count = describe(known.starts, known.near, charts, ranks, numbers)
+    first = encode_integers(ranks, _contexts(known))
+    return varint(len(first)) + first + varint(count) + encode_integers(numbers[:count])
+
+
+def decode_charts(data: bytes, neighbours: sparse.csr_array) -> Int64:
+    """Mirror of `encode_charts`; raises `CorruptFile` where a point's chart makes no sense."""
+    from gvcodecs.mcgv.layout.chart_kernels import restore
+
+    cursor = Cursor(data, SECTION)
+    known = earlier_neighbours(neighbours)
+    n_points = len(known.starts) - 1
+    ranks = decode_integers(cursor.take(cursor.varint(cursor.left, "a length")), n_points, _contexts(known), SECTION)
+    count = cursor.varint(n_points, "the number of charts told by number")
+    numbers = decode_integers(cursor.rest(), count, name=SECTION)
+    charts = np.empty(n_points, np.int64)
+    wrong = restore(known.starts, known.near, ranks, numbers, charts)
+    if wrong >= 0:
+        raise cursor.corrupt(f"the chart of point {wrong} makes no sense")
+    return charts
+
+
+def _contexts(known: Known) -> Int64:
+    return np.asarray(np.minimum(np.diff(known.starts), CONTEXTS - 1))

@@ -1,0 +1,1 @@
+"""Motion prediction: affine transforms per cluster, or skinning weights and transforms."""

@@ -1,0 +1,94 @@
+"""The published prediction in a file: one affine transform per cluster and frame (`prediction`, `transforms`).
+
+Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.2. Every vertex follows the cluster of its block.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.mcgv import header as sections
+from gvcodecs.mcgv.base.surface import Surface
+from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.motion.affine_coding import decode_transforms, dequantise, encode_transforms, quantise
+from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
+from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
+from gvpipe.codec import Progress
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.sequence import Float32, Int32, MeshSequence
+
+Float64 = NDArray[np.float64]
+
+
+def code_affine(
+    sequence: MeshSequence, base: Float64, clusters: Int32, bounds: list[int], step: float, report: Progress
+) -> CodedMotion:
+    """Fit and code the transforms of every segment, for clusters ``(S,)`` and a quantisation step, model units."""
+    predictor = AffinePredictor(base, clusters, int(clusters.max()) + 1)
+    segments = []
+    for s, (start, stop) in enumerate(pairwise(bounds)):
+        fitted = np.concatenate([predictor.fit(block) for _, block in sequence.chunks(start, stop)])
+        segments.append(quantise(fitted, predictor.rest, step))
+        report("transforms", (s + 1) / (len(bounds) - 1))
+
+    def predict(start: int, stop: int) -> Float64:
+        s = locate(bounds, start)
+        lattice = segments[s][start - bounds[s] : stop - bounds[s]]
+        return predictor.predict(dequantise(lattice, predictor.rest, step))
+
+    coded = {f"transforms.{s}": encode_transforms(lattice) for s, lattice in enumerate(segments)}
+    return CodedMotion(predictor.n_clusters, step, coded, predict)
+
+
+class AffineMotion:
+    """Mirror of `code_affine`: frames of a bitstream from its transforms and samples.
+
+    Args:
+        bitstream, header: of the file.
+        surface: of the base frame.
+        clusters: ``(S,)`` cluster of each slot.
+        layout: the slots' pixels.
+        bounds: first frame of every segment, and F.
+    """
+
+    def __init__(
+        self,
+        bitstream: Bitstream,
+        header: sections.Header,
+        surface: Surface,
+        clusters: Int32,
+        layout: Layout,
+        bounds: list[int],
+    ) -> None:
+        self._bitstream, self._header, self._bounds = bitstream, header, bounds
+        predictor = AffinePredictor(surface.base, clusters, header.clusters)
+        self._rest = predictor.rest
+        self._samples = Samples(surface, layout)
+        self._coordinates = predictor.coordinates[self._samples.slots]
+        self._clusters = clusters[self._samples.slots]
+        self._residuals = header.residual_step * header.profile.offsets
+        self._segment: tuple[int, Float64] = (-1, np.zeros((0, 0, 4, 3)))
+
+    def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
+        """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
+        from gvcodecs.mcgv.motion.reconstruction_kernels import rebuild
+
+        s = locate(self._bounds, frame)
+        if self._segment[0] != s:
+            name, n_frames = f"transforms.{s}", self._bounds[s + 1] - self._bounds[s]
+            lattice = decode_transforms(self._bitstream.section(name), n_frames, self._header.clusters, name)
+            self._segment = (s, dequantise(lattice, self._rest, self._header.transform_step))
+        rebuild(
+            samples.reshape(3, -1),
+            self._samples.vertices,
+            self._samples.pixels(samples.shape[1]),
+            self._coordinates,
+            self._clusters,
+            self._segment[1][frame - self._bounds[s]],
+            self._residuals,
+            positions,
+        )

@@ -1,0 +1,130 @@
+"""Blended prediction in a file: weights once, transforms as trajectories segment by segment (`blending`)."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.mcgv import header as sections
+from gvcodecs.mcgv.base.surface import Surface
+from gvcodecs.mcgv.base.welded_points import Points
+from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
+from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit
+from gvcodecs.mcgv.motion.skinning_coding import Trajectories, decode_trajectories, encode_trajectories
+from gvcodecs.mcgv.motion.skinning_fit import Fitted
+from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
+from gvpipe.codec import Progress
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.sequence import Float32, MeshSequence
+
+CHUNK = 16  # frames whose transforms are made at a time
+
+Float64 = NDArray[np.float64]
+
+
+def code_blended(
+    sequence: MeshSequence, base: Float64, points: Points, fitted: Fitted, bounds: list[int], step: float, report: Progress
+) -> CodedMotion:
+    """Code a blend's weights and the transforms of every segment with a quantisation step, model units.
+
+    Args:
+        sequence: the points' animation.
+        base: ``(P, 3)`` their decoded base positions, model units.
+        points: what joins them.
+        fitted: their blend.
+        bounds: first frame of every segment, and F.
+    """
+    fit = BlendFit(Blend(base, fitted.weights, fitted.n_clusters))
+    coded = {"weights": encode_weights(fitted.weights, points.neighbours)}
+    segments: list[Trajectories] = []
+    for s, (start, stop) in enumerate(pairwise(bounds)):
+        rows = [fit.fit(_columns(block - base)) for _, block in sequence.chunks(start, stop)]
+        coded[f"transforms.{s}"], decoded = encode_trajectories(np.hstack(rows), step)
+        segments.append(decoded)
+        report("transforms", (s + 1) / (len(bounds) - 1))
+
+    def predict(start: int, stop: int) -> Float64:
+        s = locate(bounds, start)
+        moved = fit.matrix @ segments[s].rows(start - bounds[s], stop - bounds[s])  # (P, 3n)
+        return np.asarray(base + moved.reshape(len(moved), stop - start, 3).swapaxes(0, 1))
+
+    return CodedMotion(fitted.n_clusters, step, coded, predict)
+
+
+class BlendedMotion:
+    """Mirror of `code_blended`: frames of a bitstream from its transforms and samples.
+
+    Args:
+        bitstream, header: of the file.
+        surface: of the base frame.
+        layout: the slots' pixels.
+        bounds: first frame of every segment, and F.
+        first: transforms of the first segment, if they are decoded already.
+    """
+
+    def __init__(
+        self,
+        bitstream: Bitstream,
+        header: sections.Header,
+        surface: Surface,
+        layout: Layout,
+        bounds: list[int],
+        first: Trajectories | None = None,
+    ) -> None:
+        self._bitstream, self._header, self._bounds = bitstream, header, bounds
+        weights = decode_weights(bitstream.section("weights"), surface.points.neighbours, header.clusters)
+        self._blend = Blend(surface.base[surface.members], weights, header.clusters)
+        self._samples = Samples(surface, layout)
+        self._base = surface.base[self._samples.slots]
+        point = surface.point[self._samples.slots]
+        self._homogeneous = self._blend.homogeneous[point]
+        self._clusters, self._parts = weights.clusters[point], weights.weights[point] / TOTAL
+        self._residuals = header.residual_step * header.profile.offsets
+        self._segment: tuple[int, Trajectories | None] = (0, first)
+        self._chunk: tuple[int, int, Float64] = (-1, -1, np.zeros((0, 0, 4, 3)))
+
+    def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
+        """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
+        from gvcodecs.mcgv.motion.reconstruction_kernels import rebuild_blended
+
+        s = locate(self._bounds, frame)
+        chunk, place = divmod(frame - self._bounds[s], CHUNK)
+        if self._chunk[:2] != (s, chunk):
+            self._chunk = (s, chunk, self._transforms(s, chunk))
+        rebuild_blended(
+            samples.reshape(3, -1),
+            self._samples.vertices,
+            self._samples.pixels(samples.shape[1]),
+            self._base,
+            self._homogeneous,
+            self._clusters,
+            self._parts,
+            self._chunk[2][place],
+            self._residuals,
+            positions,
+        )
+
+    def _transforms(self, s: int, chunk: int) -> Float64:
+        """``(n, K, 4, 3)`` of a chunk of a segment's frames: always whole, so that sums do not depend on what else is read."""
+        kept, trajectories = self._segment
+        n_frames = self._bounds[s + 1] - self._bounds[s]
+        if kept != s or trajectories is None:
+            trajectories = decode_transforms(self._bitstream, self._header, s, n_frames)
+            self._segment = (s, trajectories)
+        transforms = self._blend.transforms(trajectories.rows(chunk * CHUNK, min((chunk + 1) * CHUNK, n_frames)))
+        return np.ascontiguousarray(transforms.reshape(*transforms.shape[:2], -1, 3).transpose(2, 0, 1, 3))
+
+
+def decode_transforms(bitstream: Bitstream, header: sections.Header, s: int, n_frames: int) -> Trajectories:
+    """The transforms of segment s; raises `CorruptFile`."""
+    name = f"transforms.{s}"
+    return decode_trajectories(bitstream.section(name), header.clusters, n_frames, header.transform_step, name)
+
+
+def _columns(frames: Float64) -> Float64:
+    """Displacements ``(n, P, 3)`` as ``(P, 3n)``."""
+    return np.ascontiguousarray(frames.swapaxes(0, 1).reshape(frames.shape[1], -1))

@@ -1,0 +1,72 @@
+"""What encoder and reader know of a prediction, whichever it is: `affine_motion` or `blended_motion`."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.mcgv.base.surface import Surface
+from gvcodecs.mcgv.layout.packing import Layout
+from gvpipe.sequence import Float32
+
+
+@dataclass(frozen=True)
+class CodedMotion:
+    """A prediction as it is coded.
+
+    Args:
+        n_clusters: K.
+        step: quantisation step of the transforms, model units.
+        sections: of the bitstream.
+        predict: ``(n, S, 3)`` positions, model units, of the frames from a first up to another one of the same segment, as the
+            decoder predicts them.
+    """
+
+    n_clusters: int
+    step: float
+    sections: dict[str, bytes]
+    predict: Callable[[int, int], NDArray[np.float64]]
+
+
+class Motion(Protocol):
+    """A prediction as it is decoded; keeps the transforms of the last segment for the next frame."""
+
+    def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
+        """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
+        ...
+
+
+class Samples:
+    """Where the vertices' samples are in a picture.
+
+    Args:
+        surface: whose vertices.
+        layout: the slots' pixels.
+
+    Attributes:
+        vertices, slots: ``(M,)`` the vertices that move, and theirs, in the order of their pixels: going through a picture from
+            one end to the other takes half the time.
+    """
+
+    def __init__(self, surface: Surface, layout: Layout) -> None:
+        pixel = layout.pixel[surface.slot]
+        order = np.argsort(pixel, kind="stable")
+        self.vertices, self.slots = surface.vertices[order], surface.slot[order]
+        self._row, self._column = np.divmod(pixel[order], layout.width)
+        self._line, self._pixels = 0, self._row
+
+    def pixels(self, line: int) -> NDArray[np.int64]:
+        """``(M,)`` where they are in a plane whose lines take ``line`` samples, the plane's width or more."""
+        if line != self._line:
+            self._line, self._pixels = line, self._row * line + self._column
+        return self._pixels
+
+
+def locate(bounds: list[int], frame: int) -> int:
+    """The segment that holds a frame."""
+    return bisect_right(bounds, frame) - 1

@@ -1,0 +1,92 @@
+"""A blend's transforms over a segment as bytes: principal trajectories.
+
+The transforms of a segment, in coordinates of equal weight (`blending`), are a matrix of trajectories ``(4K, 3n)``: smooth in
+time, and alike from cluster to cluster. They are coded as such: a mean, the principal trajectories that pay
+(`gvpipe.trajectory.basis`), and their coefficients. Both with one quantisation step, that of the residual's coefficients: an
+error of either kind is an error of positions, and costs the same::
+
+    section = [varint] length, basis, coefficients (rows of `gvpipe.trajectory.coefficient_coding`, one block, none predicted
+    from another)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.container.cursor import Cursor, varint
+from gvpipe.trajectory.basis import (
+    Basis,
+    count_components,
+    decode_basis,
+    encode_basis,
+    find_principal,
+    fit_coefficients,
+)
+from gvpipe.trajectory.coefficient_coding import decode_rows, encode_rows
+from gvpipe.trajectory.prediction import Rows
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """Decoded trajectories: the transforms' rows in frame f are ``mean[f] + coefficients @ vectors[f].T``.
+
+    Args:
+        basis: mean and vectors of the segment.
+        coefficients: ``(4K, R)``.
+    """
+
+    basis: Basis
+    coefficients: Float64
+
+    def rows(self, start: int, stop: int) -> Float64:
+        """``(4K, 3 (stop - start))`` rows of the segment's frames ``start`` to ``stop``, frame by frame, x y z."""
+        span = slice(3 * start, 3 * stop)
+        return np.asarray(self.coefficients @ self.basis.vectors[span].T + self.basis.mean[span])
+
+
+def encode_trajectories(rows: Float64, step: float) -> tuple[bytes, Trajectories]:
+    """Code ``rows (4K, 3n)`` with a step, model units; return the section and what the decoder will have."""
+    principal = find_principal(rows, rows.size * step * step / 12)
+    n_components = count_components(principal, len(rows), step)
+    head, basis = encode_basis(principal, n_components, len(rows), step)
+    data, decoded = encode_coefficients(fit_coefficients(rows, basis), step)
+    return varint(len(head)) + head + data, Trajectories(basis, decoded)
+
+
+def decode_trajectories(data: bytes, n_clusters: int, n_frames: int, step: float, name: str) -> Trajectories:
+    """Mirror of `encode_trajectories`; raises `CorruptFile` if the bytes are not what it writes."""
+    cursor = Cursor(data, name)
+    head = cursor.take(cursor.varint(cursor.left, "a length"))
+    basis = decode_basis(head, n_frames, 4 * n_clusters, step, name)
+    coefficients = decode_coefficients(cursor.rest(), n_clusters, basis.vectors.shape[1], step, name)
+    return Trajectories(basis, coefficients)
+
+
+def encode_coefficients(coefficients: Float64, step: float) -> tuple[bytes, Float64]:
+    """Code the transforms' ``coefficients (4K, R)``; return the bytes and what the decoder will have."""
+    return encode_rows(coefficients, step, _lone_rows(len(coefficients)))
+
+
+def decode_coefficients(data: bytes, n_clusters: int, n_components: int, step: float, name: str) -> Float64:
+    """Mirror of `encode_coefficients`; raises `CorruptFile` if the bytes are not what it writes."""
+    return decode_rows(data, n_components, step, _lone_rows(4 * n_clusters), name)
+
+
+def _lone_rows(n_rows: int) -> Rows:
+    """Rows in their own order, each predicted as zero: what is left to tell is known from the row's earlier components."""
+    nothing = np.zeros(0)
+    return Rows(
+        order=np.arange(n_rows, dtype=np.int32),
+        starts=np.zeros(n_rows + 1, np.int32),
+        near=nothing.astype(np.int32),
+        weights=nothing,
+        variances=nothing,
+        rings=np.zeros(n_rows, np.int32),
+        blocks=np.array([0, n_rows], np.int32),
+        affine=False,
+    )

@@ -1,0 +1,326 @@
+"""Fitting a blend: clusters of like motion first, then weights and transforms in turns; as many clusters as pay.
+
+Points are clustered by their local affine motions (`segmentation`), each follows its own cluster, and then weights are chosen
+for fixed transforms and transforms fitted to fixed weights, as in skinning decomposition (Le and Deng, "Smooth Skinning
+Decomposition with Rigid Bones", 2012). A point considers the clusters that it and its neighbours follow, so that the cost
+does not depend on how many there are. Weights are chosen closed loop, in the order in which they are coded, for the least of
+squared error and bits.
+
+A cluster costs twelve numbers a frame, and so should save a squared error: numbers of clusters are tried from the smallest up,
+until error and cost together fall no more. K-means is a draw of luck, and sees what is alike, not what a blend lacks. So each
+number is tried twice: by k-means, and by adding clusters to the blend before where its errors are. The best of either kind,
+weights' bits counted, goes on to the end, and the one that costs less there is kept. One number that does worse ends nothing.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gvcodecs.mcgv.motion.segmentation import SEED, local_motions
+from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights, homogeneous, solve_normal
+from gvcodecs.mcgv.motion.weight_coding import Prices, earlier_neighbours, encode_weights
+from gvpipe.mesh.topology import k_ring
+from gvpipe.sequence import Int32, MeshSequence
+
+RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`
+FRAMES = 192  # frames, evenly spaced, that fitting looks at
+DIMENSIONS = 40  # principal coordinates of motions that clusters start from
+TRIAL_PASSES, FIRST_PASSES, LAST_PASSES = 4, 2, 8  # turns of weights and transforms: per trial, for either start, for the best
+FEWEST, MOST = 8, 1024  # clusters tried
+LEAST_POINTS = 8  # per cluster, on average
+MOST_DISTANCES = 1_500_000  # of points from clusters: beyond, k-means takes longer than it is worth
+GROWTH = (
+    (1000, 4.0),
+    (32, 2.0),
+    (0, 2**0.5),
+)  # from one number tried to the next, by how many times its clusters' cost all costs
+ROUNDS = 3  # steps tried
+ROUNDED = 0.025  # squared steps that rounding a number of the transforms leaves: many are of components too small to be coded
+PICTURED = 0.45  # steps, root mean square, that pictures leave of a point's residual
+AIM = 0.88  # of the error wanted, what a blend is to leave: coding adds to it
+CLOSE = 0.18  # logarithm of the error left over that
+SLOPE = 0.75  # of its logarithm over the step's
+MOST_MOVED = 3.0  # times, the step at once
+PROMISING = 1.2  # times the cost of the best, up to which another blend goes on
+PATIENCE = 1  # numbers of clusters that may do worse than a smaller one, in a row
+CLUSTER_WORTH = 2.8  # squared steps a frame that a cluster must save
+PATCH = 2  # order of the neighbourhood that an added cluster starts with
+BIT_WORTH = 0.14  # squared steps that a bit of the weights must save
+SAMPLES = 4000  # points that k-means sees
+K_MEANS_ROUNDS = 8
+NEGLIGIBLE = 0.1  # part of the noise of rounding to steps: motion below is left out
+TINY = 1e-12  # part of all squared motion: points closer than this to seeds are no seeds
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A blend as far as the whole sequence shares it; every cluster has a point."""
+
+    weights: Weights
+    n_clusters: int
+
+
+class Motions:
+    """The points' motions over all frames, as few numbers each, and where clusters start.
+
+    Displacements from the base frame are turned to their principal coordinates: squared errors, least squares and local affine
+    motions are the same in these, and a tenth of the numbers tell nearly all.
+
+    Args:
+        sequence: the points' animation.
+        base: ``(P, 3)`` their decoded base positions, model units.
+        neighbours: their adjacency ``(P, P)``.
+    """
+
+    def __init__(self, sequence: MeshSequence, base: Float64, neighbours: sparse.csr_array) -> None:
+        moved = _displacements(sequence, base)
+        self.base, self.neighbours = base, neighbours
+        self.n_frames, self._scale = sequence.n_frames, sequence.n_frames / (moved.shape[1] / 3)
+        self._columns, self._energies = _principal(moved)
+        self.clustering = Clustering(local_motions(base, k_ring(neighbours, RING), self._columns[:, :DIMENSIONS]))
+
+    def error(self, problem: _Problem, fitted: Fitted, step: float) -> float:
+        """Expected root mean square error of points, model units: what a blend leaves, or pictures where that is less.
+
+        Beside that, what rounding the transforms leaves.
+        """
+        n_points, n_columns = problem.motions.shape
+        left = problem.errors(fitted) + self._energies[n_columns:].sum() / n_points
+        rounded = ROUNDED * min(4 * fitted.n_clusters, n_points) * n_columns * step**2
+        most = (PICTURED * step) ** 2 * self.n_frames / self._scale
+        total = float(np.minimum(left + rounded / n_points, most).sum())
+        return math.sqrt(total * self._scale / (n_points * self.n_frames))
+
+    def problem(self, step: float) -> _Problem:
+        """What is fitted where an error of ``step``, model units, is left."""
+        shown = self.n_frames / self._scale
+        left = np.cumsum(self._energies[::-1])[::-1]  # energy of each component and those after it
+        n = max(1, int((left > NEGLIGIBLE * len(self.base) * 3 * shown * step**2 / 12).sum()))
+        price = step**2 * shown
+        return _Problem(
+            self.base, self._columns[:, :n].copy(), self.neighbours, BIT_WORTH * step**2 / self._scale, CLUSTER_WORTH * price
+        )
+
+
+def fit_blend(motions: Motions, step: float, n_clusters: int, wanted: float = 0.0) -> tuple[Fitted, float]:
+    """Fit a blend; return it, and the quantisation step it was fitted for.
+
+    Args:
+        motions: of the points.
+        step: quantisation step of positions, model units: what an error is worth.
+        n_clusters: K, about; 0: as many as pay.
+        wanted: root mean square error of a point, model units, that a blend should leave: the step moves until it does, about.
+            0: the step stays.
+    """
+    starts = [motions.clustering.start(n_clusters or 1)]
+    for _ in range(ROUNDS):
+        problem = motions.problem(step)
+        if not n_clusters:
+            starts = _find_number(problem, motions.clustering, starts)
+        starts = _alternate_all(problem, starts, FIRST_PASSES)
+        best = min(starts, key=problem.cost)
+        left = motions.error(problem, best, step)
+        if not wanted or not left > 0 or abs(math.log(AIM * wanted / left)) < CLOSE:
+            break
+        step *= min(max((AIM * wanted / left) ** (1 / SLOPE), 1 / MOST_MOVED), MOST_MOVED)
+    return _alternate(problem, best, LAST_PASSES), step
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """What is fitted.
+
+    Args:
+        base: ``(P, 3)``.
+        motions: ``(P, m)`` principal coordinates of displacements.
+        neighbours: of the points.
+        price, cluster_price: of a bit, and of a cluster: squared model units.
+    """
+
+    base: Float64
+    motions: Float64
+    neighbours: sparse.csr_array
+    price: float
+    cluster_price: float
+
+    @cached_property
+    def homogeneous(self) -> Float64:
+        """``(P, 4)`` base positions and 1."""
+        return homogeneous(self.base)
+
+    def solve(self, fitted: Fitted) -> Float64:
+        """Transforms ``(K, 4, m)`` of least squared error, in homogeneous coordinates."""
+        from gvcodecs.mcgv.motion.skinning_fit_kernels import add_normal
+
+        size = 4 * fitted.n_clusters
+        normal, right = np.zeros((size, size)), np.zeros((size, self.motions.shape[1]))
+        parts = fitted.weights.weights / TOTAL
+        add_normal(fitted.weights.clusters, parts, self.homogeneous, self.motions, normal, right)
+        return solve_normal(normal, right)
+
+    def errors(self, fitted: Fitted) -> Float64:
+        """Squared error ``(P,)`` that a blend leaves of each point."""
+        from gvcodecs.mcgv.motion.skinning_fit_kernels import add_errors
+
+        errors = np.empty(len(self.base))
+        parts = fitted.weights.weights / TOTAL
+        add_errors(fitted.weights.clusters, parts, self.homogeneous, self.motions, self.solve(fitted), errors)
+        return errors
+
+    def cost(self, fitted: Fitted) -> float:
+        """Squared error that a blend leaves, and what its weights and clusters cost."""
+        bits = 8 * len(encode_weights(fitted.weights, self.neighbours))
+        return float(self.errors(fitted).sum()) + self.price * bits + self.cluster_price * fitted.n_clusters
+
+
+def _find_number(problem: _Problem, clustering: Clustering, starts: list[Fitted]) -> list[Fitted]:
+    """The blends, of as many clusters as pay, that cost least after a few turns: grown, and from k-means.
+
+    ``starts`` are blends found for another step, or of one cluster: numbers from half of theirs up are tried.
+    """
+    draw, patches = np.random.default_rng(SEED), k_ring(problem.neighbours, PATCH)
+    last = min(starts, key=problem.cost)
+    best, least = [last, last], [np.inf, np.inf]
+    most = min(MOST, len(problem.base) / LEAST_POINTS)
+    count, worse = float(max(FEWEST, starts[0].n_clusters // 2)), 0
+    while count <= most and problem.cluster_price * count < min(least) and worse < PATIENCE:
+        tried = [_grow(problem, last, round(count), patches, draw)]
+        if count * len(problem.base) <= MOST_DISTANCES:
+            tried.append(clustering.start(round(count)))
+        tried = _alternate_all(problem, tried, TRIAL_PASSES)
+        costs = [problem.cost(fitted) for fitted in tried]
+        worse = 0 if min(costs) < min(least) else worse + 1
+        for kind, cost in enumerate(costs):
+            if cost < least[kind]:
+                best[kind], least[kind] = tried[kind], cost
+        last = tried[int(np.argmin(costs))]
+        excess = min(costs) / (problem.cluster_price * count)
+        count *= next(growth for limit, growth in GROWTH if excess > limit)
+    return [fitted for fitted, cost in zip(best, least, strict=True) if cost <= PROMISING * min(least)]
+
+
+def _alternate_all(problem: _Problem, starts: list[Fitted], passes: int) -> list[Fitted]:
+    """`_alternate` from every start, side by side: nearly all of it is compiled, and holds no lock."""
+    with ThreadPoolExecutor(len(starts)) as pool:
+        return list(pool.map(lambda start: _alternate(problem, start, passes), starts))
+
+
+def _grow(problem: _Problem, fitted: Fitted, n_clusters: int, patches: sparse.csr_array, draw: np.random.Generator) -> Fitted:
+    """Give ``patches (P, P)`` of the surface clusters of their own, drawn by the error in them, until there are so many."""
+    clusters, parts = fitted.weights.clusters.copy(), fitted.weights.weights.copy()
+    errors = np.asarray(patches @ problem.errors(fitted))
+    for cluster in range(fitted.n_clusters, n_clusters):
+        total = np.cumsum(errors)
+        if not total[-1] > 0:
+            break
+        point = int(np.searchsorted(total, draw.random() * total[-1], side="right"))
+        patch = patches.indices[patches.indptr[point] : patches.indptr[point + 1]]
+        clusters[patch], parts[patch] = 0, 0
+        clusters[patch, 0], parts[patch, 0] = cluster, TOTAL
+        errors[patch] = 0
+    return _renumber(clusters, parts)
+
+
+def _alternate(problem: _Problem, fitted: Fitted, passes: int) -> Fitted:
+    """Fit transforms, then weights, several times over."""
+    from gvcodecs.mcgv.motion.weight_selection import Transforms, choose
+
+    known = earlier_neighbours(problem.neighbours)
+    ring = problem.neighbours
+    prices = Prices.guess()
+    errors = np.zeros(len(problem.base))
+    for _ in range(passes):
+        transforms = problem.solve(fitted)
+        clusters, parts = fitted.weights.clusters.copy(), fitted.weights.weights.copy()
+        choose(
+            known.starts,
+            known.near,
+            ring.indptr.astype(np.int64),
+            ring.indices.astype(np.int64),
+            problem.homogeneous,
+            problem.motions,
+            Transforms.of(transforms),
+            problem.price,
+            prices.count,
+            prices.gap,
+            prices.change,
+            clusters,
+            parts,
+            errors,
+        )
+        fitted = _renumber(clusters, parts)
+        prices = Prices.learnt(problem.neighbours, fitted.weights)
+    return fitted
+
+
+class Clustering:
+    """K-means of the points' motions for any number of clusters: the first K of one sequence of seeds start it."""
+
+    def __init__(self, features: Float64) -> None:
+        self._features = features
+        self._sample = features[:: max(1, len(features) // SAMPLES)]
+        self._seeds = _seeds(self._sample, MOST)
+
+    def start(self, n_clusters: int) -> Fitted:
+        """Each point follows its own cluster alone, of at most ``n_clusters``."""
+        from scipy.cluster.vq import kmeans2, vq
+
+        clusters = np.zeros((len(self._features), INFLUENCES), np.int32)
+        parts = np.zeros((len(self._features), INFLUENCES), np.int32)
+        parts[:, 0] = TOTAL
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # a cluster may run empty: it is dropped
+            centres, _ = kmeans2(self._sample, self._seeds[:n_clusters], iter=K_MEANS_ROUNDS, minit="matrix")
+        clusters[:, 0] = vq(self._features, centres)[0]
+        return _renumber(clusters, parts)
+
+
+def _seeds(sample: Float64, n: int) -> Float64:
+    """At most ``n`` rows of ``sample``, each drawn with the square of its distance from those before (k-means++)."""
+    draw = np.random.default_rng(SEED)
+    squares = np.square(sample).sum(axis=1)
+    seeds = [int(squares.argmax())]
+    distance = np.full(len(sample), np.inf)
+    while len(seeds) < n:
+        last = seeds[-1]
+        distance = np.minimum(distance, np.maximum(squares + squares[last] - 2 * (sample @ sample[last]), 0))
+        distance[seeds] = 0
+        total = np.cumsum(distance)
+        if not total[-1] > TINY * squares.sum():
+            break
+        seeds.append(int(np.searchsorted(total, draw.random() * total[-1], side="right")))
+    return sample[seeds]
+
+
+def _renumber(clusters: Int32, parts: Int32) -> Fitted:
+    """Number the clusters that points follow from 0."""
+    used, number = np.unique(np.where(parts > 0, clusters, clusters[:, :1]), return_inverse=True)
+    return Fitted(Weights(np.where(parts > 0, number.reshape(clusters.shape), 0).astype(np.int32), parts), len(used))
+
+
+def _displacements(sequence: MeshSequence, base: Float64) -> Float64:
+    """``(P, 3n)`` of at most `FRAMES` frames, evenly spaced."""
+    frames = sequence.sample(FRAMES)
+    return np.ascontiguousarray(np.moveaxis(frames - base, 0, 1).reshape(len(base), -1))
+
+
+def _principal(columns: Float64) -> tuple[Float64, Float64]:
+    """Principal coordinates ``(P, n)`` of rows, and the columns' energies, descending; none is subtracted first."""
+    from scipy.linalg import eigh
+
+    tall = columns.shape[0] >= columns.shape[1]
+    gram = columns.T @ columns if tall else columns @ columns.T
+    energies, vectors = eigh(gram, driver="evr", overwrite_a=True)
+    energies, vectors = np.maximum(energies[::-1], 0.0), vectors[:, ::-1]
+    placed = columns @ vectors if tall else vectors * np.sqrt(energies)
+    return np.ascontiguousarray(placed), energies

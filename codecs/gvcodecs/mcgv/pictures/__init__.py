@@ -1,0 +1,1 @@
+"""The pictures: residuals or trajectory coefficients as planes of a video."""

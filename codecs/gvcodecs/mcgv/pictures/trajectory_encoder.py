@@ -1,0 +1,107 @@
+"""Trajectory images of a whole sequence: blend, segments and their pictures, one segment in memory at a time.
+
+Pictures are coded as intra pictures, since components have nothing in common, all with one quantisation parameter: a plane has
+``FINENESS`` levels per step (`trajectory_images`), and the coder's own quantiser sees a step as one step. Measured on
+chicken, cow, samba and horse_gallop: docs/benchmarks.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.mcgv.base.welded_points import Points
+from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.layout.padding import Padding
+from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
+from gvcodecs.mcgv.motion.skinning_fit import Fitted
+from gvcodecs.mcgv.motion.weight_coding import encode_weights
+from gvcodecs.mcgv.pictures.trajectories import PLANES, count_pictures, encode_segment
+from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
+from gvpipe.codec import Progress
+from gvpipe.media.video import Plane, Profile, VideoWriter
+from gvpipe.sequence import MeshSequence
+
+FINENESS = {"h264-8": 3, "h264-10": 6}  # levels per step: rounding to levels adds a ninth or a thirty-sixth to a step's noise
+FIT_STEP = 1.5  # times the quantisation step: the precision at which the blend is chosen
+LEVEL = {"h264-8": 17, "h264-10": 23}  # x264's quantisation parameter; it codes intra pictures three lower
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CodedTrajectories:
+    """A sequence as trajectory images: its clusters, the header's part, sections, and the video."""
+
+    n_clusters: int
+    header: TrajectoryHeader
+    sections: dict[str, bytes]
+    video: bytes
+
+
+def code_trajectories(
+    sequence: MeshSequence,
+    base: Float64,
+    points: Points,
+    fitted: Fitted,
+    layout: Layout,
+    block: int,
+    bounds: list[int],
+    step: float,
+    profile: Profile,
+    preset: str,
+    report: Progress,
+) -> CodedTrajectories:
+    """Code a sequence, with an error about that of frames coded with a quantisation step, model units.
+
+    Args:
+        sequence: the points' animation.
+        base: ``(P, 3)`` their decoded base positions, model units; points: what joins them.
+        fitted: their blend, fitted for `FIT_STEP` steps.
+        layout: the points' pixels, in blocks of side ``block``.
+        bounds: first frame of every segment, and F.
+        step: quantisation step of positions that leaves the error wanted, model units.
+        profile, preset: of the video.
+    """
+    fit = BlendFit(Blend(base, fitted.weights, fitted.n_clusters))
+    sections = {"weights": encode_weights(fitted.weights, points.neighbours)}
+    fineness = FINENESS[profile.name]
+    largest = profile.amplitude / fineness
+    padding = Padding(layout, block)
+    components, steps = [], []
+    shape = (PLANES * layout.height, layout.width)
+    with VideoWriter(profile, shape[1], shape[0], sequence.fps, LEVEL[profile.name], 1, preset) as writer:
+        for s, (start, stop) in enumerate(pairwise(bounds)):
+            trajectories = _trajectories(sequence, base, start, stop)
+            error = trajectories.size * step * step / 12
+            coded = encode_segment(trajectories, fit, largest, error)
+            sections[f"trajectories.{s}"] = coded.section
+            components.append(len(coded.left))
+            steps.append(coded.step)
+            for picture in _pictures(coded.left * fineness, padding, profile):
+                writer.add(picture)
+            report("video", (s + 1) / (len(bounds) - 1))
+        video = writer.finish()
+    return CodedTrajectories(fitted.n_clusters, TrajectoryHeader(fineness, tuple(components), tuple(steps)), sections, video)
+
+
+def _trajectories(sequence: MeshSequence, base: Float64, start: int, stop: int) -> Float64:
+    """Displacements from the base frame, ``(P, 3n)``, of the frames ``start`` to ``stop``."""
+    result = np.empty((len(base), stop - start, 3))
+    for first, block in sequence.chunks(start, stop):
+        result[:, first - start : first - start + len(block)] = block.swapaxes(0, 1) - base[:, None]
+    return result.reshape(len(base), -1)  # (P, n, 3) -> (P, 3n)
+
+
+def _pictures(levels: Float64, padding: Padding, profile: Profile) -> Iterator[Plane]:
+    """Yield pictures of three padded planes each for ``levels (R, P)``; what a plane cannot hold is at its limit."""
+    for k in range(count_pictures(len(levels))):
+        own = np.zeros((PLANES, levels.shape[1]))
+        part = levels[PLANES * k : PLANES * (k + 1)]
+        own[: len(part)] = np.clip(part, -profile.amplitude, profile.amplitude)
+        planes = np.clip(np.rint(padding.fill(own, 0.0)) + profile.middle, profile.low, profile.high).astype(profile.dtype)
+        yield planes.reshape(-1, planes.shape[2])

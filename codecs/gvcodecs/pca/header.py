@@ -1,0 +1,51 @@
+"""The sections of a ``pca`` bitstream, and the header that tells how to read them.
+
+====================  ======================================================================================
+``mesh``, ``order``   triangles, seams and vertex order (`gvpipe.connectivity.topology_only`)
+``still``             points that never move, and their positions (`gvpipe.trajectory.still_points`); absent if all move
+``basis.N``           mean and principal trajectories of segment N (`gvpipe.trajectory.basis`)
+``coefficients.N``    feature vectors of segment N, coarse to fine (`coefficient_coding` of `gvpipe.trajectory`)
+====================  ======================================================================================
+
+Version 1 has no section ``still``; files without one are still written as version 1. Where no point moves, segments have no
+sections.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import read_segments, read_steps
+from gvpipe.trajectory.prediction import PREDICTORS
+
+MAX_SEGMENTS = 2000  # two sections each, of the 4096 that a bitstream may have
+VERSION_STILL = 2  # of files with a section `still` or `holds`
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a reader must know beside the sections.
+
+    Args:
+        predictor: of the coefficients.
+        beta: exponent of the radial function (rbf).
+        segments: how many; segment s starts at frame ``s * F // segments``.
+        steps: quantisation step of each segment, model units; 1 where no point moves.
+    """
+
+    predictor: str
+    beta: float
+    segments: int
+    steps: tuple[float, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the header as JSON values."""
+        return {"predictor": self.predictor, "beta": self.beta, "segments": self.segments, "steps": list(self.steps)}
+
+    @classmethod
+    def of(cls, bitstream: Bitstream) -> Header:
+        """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
+        predictor, segments = bitstream.choice("predictor", PREDICTORS), read_segments(bitstream, MAX_SEGMENTS)
+        return cls(predictor, float(bitstream.number("beta", 0.1, 1.99)), segments, read_steps(bitstream, segments))

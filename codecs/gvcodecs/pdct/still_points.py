@@ -1,0 +1,71 @@
+"""Points that never move: the base frame has nearly their position, and a few bits refine it, once for all clips.
+
+A clip codes neither cluster nor deltas of them, and the file's reader puts them where this section says::
+
+    section = [float64] step, [varint] bytes, flags (`gvpipe.trajectory.still_vertices`) along the walk, [integers] position
+    less the base's, in
+              steps: x of all still points along the walk, then y, then z
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvcodecs.pdct.dictionary import Surface
+from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.segments import LARGEST_STEP, SMALLEST_STEP
+from gvpipe.entropy.integers import decode_integers, encode_integers
+from gvpipe.sequence import Float32
+from gvpipe.trajectory.still_vertices import decode_flags, encode_flags
+
+SECTION = "still"
+HEAD = struct.Struct("<d")
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StillPoints:
+    """Args:
+    points: ``(S,)``, in the order of the walk.
+    positions: ``(S, 3) float32``, model units.
+    """
+
+    points: NDArray[np.intp]
+    positions: Float32
+
+
+def encode_still(still: NDArray[np.bool_], frame: Float32, surface: Surface, step: float) -> bytes:
+    """Code the points that ``still (P,)`` flags, in the order of points that ``surface`` has.
+
+    Args:
+        still: one at least is set.
+        frame: ``(P, 3)`` any frame, model units.
+        surface: with all points on its walk.
+        step: what differences from the base frame are rounded to, model units.
+    """
+    points = surface.walk[still[surface.walk]]
+    step = float(np.clip(step, SMALLEST_STEP, LARGEST_STEP))
+    off = np.rint((frame[points].astype(np.float64) - surface.base[points]) / step).astype(np.int64)
+    flags = encode_flags(still[surface.walk])
+    return HEAD.pack(step) + varint(len(flags)) + flags + encode_integers(off.T)
+
+
+def decode_still(data: bytes, surface: Surface) -> StillPoints:
+    """Mirror of `encode_still`; raises `CorruptFile` if the bytes are not what it writes."""
+    cursor = Cursor(data, SECTION)
+    (step,) = cursor.struct(HEAD)
+    if not SMALLEST_STEP <= step <= LARGEST_STEP:  # NaN neither
+        raise cursor.corrupt(f"its step is {step}")
+    flags = decode_flags(cursor.take(cursor.varint(cursor.left, "a length")), len(surface.walk), SECTION)
+    points = surface.walk[flags]
+    off = decode_integers(cursor.rest(), 3 * len(points), name=SECTION).reshape(3, -1).T
+    with np.errstate(over="ignore"):
+        positions = (surface.base[points] + step * off).astype(np.float32)
+    if not np.isfinite(positions).all():
+        raise cursor.corrupt("a position is larger than float32 can hold")
+    return StillPoints(points, positions)

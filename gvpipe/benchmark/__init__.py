@@ -1,0 +1,1 @@
+"""Rate-distortion sweeps, their comparison and their plots."""

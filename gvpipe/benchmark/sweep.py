@@ -1,0 +1,229 @@
+"""Rate and distortion over a sweep of qualities, with times, memory, and every round trip verified.
+
+Each sequence and codec has a process of its own, so that its peak memory is its own; a few frames are encoded first, so that no
+time holds imports or compilation. A point is a whole file: encoded, decoded, compared with its source, and some frames read
+at random and compared with the whole. The result is one JSON object, `Report.to_json`; plots and tables need nothing else::
+
+    {"gvpipe": version, "machine": {...}, "command": [...], "curves": [{"sequence", "vertices", "triangles", "frames",
+     "codec", "settings", "peak_mb", "points": [{"quality", "bytes", "bpvf", measures of `gvpipe.metrics.comparison`,
+     "encode_s", "decode_s", "decode_fps", "frame_ms", "sections"}]}]}
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import multiprocessing
+import os
+import platform
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import gvpipe
+from gvpipe import api
+from gvpipe.atomic import atomic_path, output_error
+from gvpipe.codec import codec_class, codec_ids
+from gvpipe.errors import GvpipeError, InputError
+from gvpipe.metrics.comparison import compare
+from gvpipe.rate_control.purposes import VARIANTS
+
+QUALITIES = (0.0, 20.0, 40.0, 60.0, 75.0, 90.0, 100.0)
+MEASURED = {
+    "mcgv": ({"prediction": "affine"},)
+}  # as published: not the default, and too large for `gvpipe.rate_control.codec_choice`
+WARM_FRAMES = 3
+FRAMES_AT_RANDOM = 16
+MEASURES = ("rmse", "rmse_diag", "max", "max_diag", "kg", "da", "sted", "hausdorff")
+POINT_KEYS = ("quality", "bytes", "bpvf", "rmse_diag", "max_diag", "kg", "sted", "encode_s", "decode_fps")  # that tables use
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One codec's points on one sequence, in order of quality; ``peak_mb`` is None where the system does not tell."""
+
+    sequence: str
+    vertices: int
+    triangles: int
+    frames: int
+    codec: str
+    settings: dict[str, Any]
+    peak_mb: float | None
+    points: list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Report:
+    """All curves, and what they were made with."""
+
+    gvpipe: str
+    machine: dict[str, Any]
+    command: list[str]
+    curves: list[Curve]
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the JSON file; raises `OutputError` if that fails."""
+        with atomic_path(path) as temporary:
+            temporary.write_text(json.dumps(dataclasses.asdict(self), indent=1, allow_nan=False) + "\n", "utf-8")
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Report:
+        """Mirror of `write`; raises `InputError` for anything that it does not write."""
+        try:
+            values = json.loads(Path(path).read_text("utf-8"))
+            curves = [Curve(**curve) for curve in values["curves"]]
+            for curve in curves:
+                for point in curve.points:
+                    if any(not isinstance(point[key], int | float | None) for key in POINT_KEYS):
+                        raise ValueError(f"a point of {curve.sequence} is not made of numbers")
+            return cls(str(values["gvpipe"]), dict(values["machine"]), list(values["command"]), curves)
+        except OSError as exc:
+            raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check the path") from exc
+        except (ValueError, TypeError, KeyError) as exc:
+            raise InputError(f"{path} is not what `gvpipe bench --json` writes ({exc}); make it anew") from exc
+
+
+def default_codecs() -> list[str]:
+    """What is measured unless codecs are named: all, with the settings that compete, and as published."""
+    found = []
+    for name in codec_ids():
+        for own in (*VARIANTS.get(name, ({},)), *MEASURED.get(name, ())):
+            found.append(":".join([name, *(f"{key}={value}" for key, value in own.items())]))
+    return found
+
+
+def run(
+    sources: Sequence[str],
+    codecs: Sequence[str],
+    qualities: Sequence[float] = QUALITIES,
+    texts: Mapping[str, str] | None = None,
+    report: Callable[[str, float], None] | None = None,
+) -> Report:
+    """Measure every codec on every sequence.
+
+    Args:
+        sources: what `gvpipe.read` takes.
+        codecs: ids; one with settings of its own is ``id:key=value:key=value``, and is told apart by that text.
+        qualities: of every curve.
+        texts: settings for all codecs, as on the command line.
+        report: told before each curve which it is and what part of all is done.
+
+    Raises:
+        InputError: a sequence or a setting cannot be used; a round trip does not give back what went in.
+    """
+    texts = dict(texts or {})
+    for codec in codecs:  # before hours of work, not after
+        _settings(codec, qualities, texts)
+    curves: list[Curve] = []
+    for source in sources:
+        for codec in codecs:
+            if report:
+                report(f"{name_of(source)} {codec}", len(curves) / (len(sources) * len(codecs)))
+            curves.append(_in_own_process(source, codec, list(qualities), texts))
+    return Report(gvpipe.__version__, describe_machine(), ["gvpipe", *sys.argv[1:]], curves)
+
+
+def measure_curve(source: str, codec: str, qualities: list[float], texts: dict[str, str]) -> Curve:
+    """Measure one codec on one sequence, in this process."""
+    sequence = api.read(source)
+    settings = _settings(codec, sorted(qualities), texts)
+    points = []
+    with tempfile.TemporaryDirectory() as folder:
+        warm = Path(folder) / "warm.mp4"
+        api.encode(sequence.part(0, min(WARM_FRAMES, sequence.n_frames)), warm, settings[0])
+        api.decode(warm)
+        paths = [Path(folder) / f"{i}.mp4" for i in range(len(settings))]
+        for chosen, path in zip(settings, paths, strict=True):
+            points.append(_time(sequence, chosen, path))
+        peak = _peak_mb()  # before the comparison, which has memory of its own
+        for point, path in zip(points, paths, strict=True):
+            point.update(_verify(sequence, path))
+    rest = {key: value for key, value in dataclasses.asdict(settings[0]).items() if key != "quality"}
+    shape = (sequence.n_vertices, len(sequence.faces), sequence.n_frames)
+    return Curve(name_of(source), *shape, codec, rest, peak, points)
+
+
+def describe_machine() -> dict[str, Any]:
+    """What times depend on."""
+    model = ""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        model = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
+    except OSError:  # not Linux
+        model = platform.processor()
+    return {"cpu": model, "cpus": os.cpu_count(), "system": platform.system(), "python": platform.python_version()}
+
+
+def name_of(source: str) -> str:
+    """A sequence's name in tables: its file's, without folder and extension."""
+    return Path(source).stem or source
+
+
+def _settings(codec: str, qualities: Sequence[float], texts: Mapping[str, str]) -> list[Any]:
+    """A codec's settings at each quality; raises `InputError` for what it does not have."""
+    name, *pairs = codec.split(":")
+    if any("=" not in pair for pair in pairs):
+        raise InputError(f"codec {codec!r}: ID or ID:KEY=VALUE is needed, such as mcgv:prediction=affine")
+    own = dict(pair.split("=", 1) for pair in pairs)
+    return [codec_class(name).from_texts({**texts, **own, "quality": str(quality)}) for quality in qualities]
+
+
+def _in_own_process(source: str, codec: str, qualities: list[float], texts: dict[str, str]) -> Curve:
+    context = multiprocessing.get_context("spawn")
+    try:
+        with ProcessPoolExecutor(1, mp_context=context) as pool:
+            return pool.submit(measure_curve, source, codec, qualities, texts).result()
+    except BrokenProcessPool as exc:
+        raise InputError(f"measuring {codec} on {source} ended early, as when memory runs out; measure fewer frames") from exc
+    except OSError as exc:
+        raise output_error(tempfile.gettempdir(), exc) from exc
+
+
+def _time(sequence: gvpipe.MeshSequence, codec: Any, path: Path) -> dict[str, Any]:
+    made = api.encode(sequence, path, codec)
+    started = time.perf_counter()
+    api.decode(path)
+    seconds = time.perf_counter() - started
+    return {
+        "quality": codec.quality,
+        "bytes": made.bytes,
+        "bpvf": made.bpvf,
+        "encode_s": made.seconds["encode"],
+        "decode_s": seconds,
+        "decode_fps": sequence.n_frames / seconds,
+        "sections": made.sections,
+    }
+
+
+def _verify(sequence: gvpipe.MeshSequence, path: Path) -> dict[str, Any]:
+    """Measures of the decoded file, and the milliseconds of a frame at random; raises `GvpipeError` if reading disagrees."""
+    decoded = api.decode(path)
+    video = api.open(path)
+    picked = np.random.default_rng(0).integers(0, sequence.n_frames, FRAMES_AT_RANDOM).tolist()
+    seconds = []
+    for frame in picked:
+        started = time.perf_counter()
+        positions = video[frame]
+        seconds.append(time.perf_counter() - started)
+        if not np.array_equal(positions, decoded.read(frame, frame + 1)[0]):
+            raise GvpipeError(f"{sequence.name}: frame {frame} alone is not what decoding the whole gives; please report it")
+    values = compare(sequence, decoded).to_json()  # raises unless vertices and triangles are the same
+    return {**{key: values[key] for key in MEASURES}, "frame_ms": 1000 * float(np.median(seconds))}
+
+
+def _peak_mb() -> float | None:
+    """Peak resident memory of this process, 2**20 bytes."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1 << 20 if sys.platform == "darwin" else 1 << 10)

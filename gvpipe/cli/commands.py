@@ -1,0 +1,451 @@
+"""The command line: parse, call the library, print. Results go to standard output, everything else to standard error.
+
+What is printed, and how much of it, is `gvpipe.cli.console`'s; ``-`` in place of a file's name is `gvpipe.cli.pipes`'.
+
+Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gvpipe import __version__
+from gvpipe.cli.console import Output, is_verbose, output_options, print_options
+from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, shown, source_path, target_path
+from gvpipe.errors import GvpipeError
+
+if TYPE_CHECKING:
+    from gvpipe.codec import Progress
+    from gvpipe.sequence import MeshSequence
+    from gvpipe.web import ExportReport
+
+CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+VIDEO_SUFFIXES = (".mp4", ".m4v")
+
+
+def main() -> None:
+    """Run the command line and exit."""
+    try:
+        status = cli(standalone_mode=False, prog_name="gvpipe")
+    except GvpipeError as exc:
+        status = _fail(_one_line(exc), 1)
+    except click.UsageError as exc:
+        exc.show()
+        status = 2
+    except click.ClickException as exc:
+        exc.show()
+        status = 1
+    except (click.Abort, KeyboardInterrupt):
+        status = _fail("interrupted; nothing was written", 130)
+    except MemoryError:
+        status = _fail("not enough memory; encode fewer frames or vertices at a time, or give the sequence as frame files", 1)
+    except BrokenPipeError:  # the reader of our output left, as `| head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = 1
+    except OSError as exc:  # files' own errors are GvpipeErrors already: what is left is our output, as on a full disk
+        status = _fail(f"cannot print the result: {exc.strerror or exc}; free some space or print elsewhere", 1)
+    except Exception as exc:
+        if is_verbose(sys.argv[1:]):
+            traceback.print_exc()
+        status = _fail(f"unexpected {type(exc).__name__}: {_one_line(exc)}; report what --verbose prints", 1)
+    sys.exit(status or 0)
+
+
+@click.group(context_settings=CONTEXT)
+@click.version_option(__version__, prog_name="gvpipe")
+def cli() -> None:
+    """Turn animated triangle meshes into small MP4 geometry videos, and back."""
+
+
+@cli.command()
+@click.argument("sources", metavar="INPUT...", nargs=-1, required=True)
+@click.argument("target", metavar="OUTPUT.mp4")
+@click.option("--codec", help="See `gvpipe codecs`; auto: the one with the smallest file. [default: mcgv; with --for, auto]")
+@click.option(
+    "--for",
+    "purpose",
+    type=click.Choice(["web", "archive", "stream"]),
+    help="What the file is for: browsers play it; the smallest; starts at once and jumps fast. [default: archive]",
+)
+@click.option(
+    "--quality",
+    type=float,
+    help="0-100, higher is better; with --target-bpvf and --max-error, where the search begins. [default: 75]",
+)
+@click.option("--target-rmse", type=float, metavar="X", help="Largest rmse, as a part of the diagonal, such as 1e-4.")
+@click.option("--target-kg", type=float, metavar="X", help="Largest KG error, percent, such as 0.1.")
+@click.option("--target-bpvf", type=float, metavar="X", help="Most bits per vertex and frame.")
+@click.option("--max-error", metavar="E", help="Bound for every vertex: model units, or 0.05% of the diagonal.")
+@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the codec; repeat for more.")
+@click.option("--segment", type=int, help="Most frames per segment. [default: 500]")
+@click.option("--fps", type=float, help="Frames per second, instead of the input's.")
+@click.option("--reorder", is_flag=True, help="Let the codec choose the vertex order: smaller.")
+@output_options
+def encode(
+    sources: tuple[str, ...],
+    target: str,
+    codec: str | None,
+    purpose: str | None,
+    quality: float | None,
+    target_rmse: float | None,
+    target_kg: float | None,
+    target_bpvf: float | None,
+    max_error: str | None,
+    pairs: tuple[str, ...],
+    segment: int | None,
+    fps: float | None,
+    reorder: bool,
+    out: Output,
+) -> None:
+    """Encode a mesh sequence as a geometry video.
+
+    INPUT is an .npz (vertices (F,V,3), faces (T,3), fps), a folder of frame files (OBJ, PLY, STL, OFF, GLB), a glob
+    ('walk/*.obj', or without the quotes), a pattern (walk/%04d.obj, walk/####.obj, 'walk/$F4.obj'), a geometry video, or - for
+    an .npz or a geometry video on standard input. OUTPUT - is standard output.
+    """
+    from gvpipe import api
+    from gvpipe.codec import codec_class
+    from gvpipe.rate_control.purposes import candidates
+
+    if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
+        message = f"{len(sources) + 1} files are given, and the last, {target}, is no .mp4; end with the output's name"
+        raise click.UsageError(message, click.get_current_context())
+    if len(sources) > 1 and PIPE in sources:
+        raise click.UsageError("- is one input among others; give it alone", click.get_current_context())
+    targets = {"target_rmse": target_rmse, "target_kg": target_kg, "target_bpvf": target_bpvf, "max_error": max_error}
+    if sum(value is not None for value in targets.values()) > 1:
+        raise click.UsageError("give one of --target-rmse, --target-kg, --target-bpvf and --max-error")
+    settings = _parse_pairs(pairs)
+    if quality is not None and "quality" in settings:
+        raise click.UsageError("give --quality or --set quality=, not both")
+    given = {"quality": quality, "segment": segment, "reorder": reorder or None}
+    settings.update({key: str(value) for key, value in given.items() if value is not None})
+    chosen = candidates(
+        codec,
+        purpose,
+        lambda name, own: codec_class(name).from_texts({**{key: str(value) for key, value in own.items()}, **settings}),
+        frozenset(settings),
+    )
+    with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
+        source = first if len(sources) == 1 else list(sources)
+        report = api.encode(source, path, chosen, progress, fps, **targets)  # type: ignore[arg-type]  # by name
+    out = out.carrying(target)
+    for note in report.notes:
+        out.note(note)
+    out.json(report.to_json())
+    shape = f"{report.frames} frames, {report.vertices} vertices"
+    name = shown(sources[0], STDIN) + (f" and {len(sources) - 1} more" if len(sources) > 1 else "")
+    size = f"{_size(report.bytes)}, {report.bpvf:.3f} bits per vertex and frame"
+    out.text(f"{name} ({shape}) -> {shown(target, STDOUT)} ({size})")
+    seconds = dict(report.seconds)
+    stages = ", ".join(f"{name} {value:.1f}" for name, value in seconds.items() if name != "encode" and value >= 0.05)
+    out.text(f"{seconds['encode']:.1f} s: {stages}")
+    for tried in report.tried:
+        keys = [key for key in ("bpvf", "rmse_diag", "kg", "max_diag") if tried[key] is not None]
+        measures = ", ".join(f"{key} {tried[key]:.4g}" for key in keys)
+        out.text(f"  {tried['codec']} at quality {tried['quality']:.4g}: {tried['bytes']} bytes, {measures}")
+    if report.reason:
+        out.text(report.reason)
+    _print_sections(out, report.sections, report.vertices * report.frames)
+
+
+@cli.command()
+@click.argument("source", metavar="FILE.mp4")
+@click.argument("target", metavar="OUTPUT")
+@click.option("--start", type=int, default=0, show_default=True, help="First frame.")
+@click.option("--stop", type=int, help="Frame after the last. [default: the end]")
+@click.option("--lod", type=int, default=0, show_default=True, help="Level of detail: 0 the mesh, higher is coarser.")
+@click.option("--local", is_flag=True, help="Leave out the origin of a mesh far from the world's: float32 positions near 0.")
+@output_options
+def decode(source: str, target: str, start: int, stop: int | None, lod: int, local: bool, out: Output) -> None:
+    """Decode a geometry video.
+
+    OUTPUT is an .npz, or a pattern of frame files such as out/%04d.obj (also .ply, .stl, .off, .glb), or - for an .npz on
+    standard output. FILE - is a geometry video on standard input.
+    """
+    from gvpipe import api, notes
+    from gvpipe.sequence import MeshSequence
+
+    out = out.carrying(target)
+    with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
+        player = api.open(given)
+        start, stop = api.frame_range(player, start, stop)
+        level = player.level(lod)
+        part = _Part(level, start, stop, progress)
+        sequence = MeshSequence(part, level.faces, player.fps, name=given, origin=player.origin)
+        api.write(sequence.local() if local else sequence, path, start)
+    noticed = [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
+    for note in noticed:
+        out.note(note)
+    values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": player.fps}
+    values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces), "lod": lod}
+    out.json({**values, "origin": [0.0, 0.0, 0.0] if local else player.origin.tolist(), "notes": noticed})
+    shape = f"{stop - start} frames, {sequence.n_vertices} vertices"
+    out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")
+
+
+@cli.command()
+@click.argument("source", metavar="FILE.mp4")
+@output_options
+def info(source: str, out: Output) -> None:
+    """Tell what a geometry video (- for standard input) holds and where its bytes go."""
+    from gvpipe import api, notes
+
+    with source_path(source) as path, out.progress():
+        found = api.info(path)
+    out.json(found.to_json())
+    low, high = found.bounding_box["min"], found.bounding_box["max"]
+    place = f", relative to {notes.show_origin(found.origin)}" if any(found.origin) else ""
+    out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}")
+    out.text(f"{found.vertices} vertices, {found.triangles} triangles, {found.frames} frames at {found.fps:g} fps")
+    out.text("frame 0 lies in " + " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True)) + place)
+    if len(found.levels) > 1:
+        out.text("levels of detail, vertices: " + ", ".join(f"{lod}: {count}" for lod, count in enumerate(found.levels)))
+    out.text(f"{_size(found.bytes)}, {found.bpvf:.3f} bits per vertex and frame:")
+    _print_sections(out, found.sections, found.vertices * found.frames)
+
+
+@cli.command()
+@click.argument("reference", metavar="REFERENCE")
+@click.argument("distorted", metavar="DISTORTED")
+@output_options
+def compare(reference: str, distorted: str, out: Output) -> None:
+    """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos, one may be - for standard input."""
+    from gvpipe import api
+    from gvpipe.metrics import comparison
+
+    if reference == distorted == PIPE:
+        raise click.UsageError("both are -, and there is one standard input", click.get_current_context())
+    with source_path(reference) as one, source_path(distorted) as other, out.progress() as progress:
+        result = comparison.compare(
+            api.read(one), api.read(other), lambda done, of: progress("compare", done / of) if progress else None
+        )
+    values = result.to_json()
+    out.json(values)
+    for name, value in values.items():
+        if name != "frames":
+            out.text(f"{name:<14} {'not defined' if value is None else format(value, '.6g')}")
+
+
+@cli.command("export-html")
+@click.argument("source", metavar="FILE.mp4")
+@click.argument("target", metavar="OUT.html")
+@click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="The axis that stands upright.")
+@click.option("--quality", type=float, help="0-100, of a conversion: the error that it may add. [default: 90]")
+@output_options
+def export_html(source: str, target: str, up: str, quality: float | None, out: Output) -> None:
+    """Write a web page of one file that plays a geometry video, without a network.
+
+    Browsers read codec mcgv in its web profile; other files are converted, which adds an error that is told: KG 0.044 or less
+    by default.
+    """
+    from gvpipe import web
+
+    with source_path(source) as path, out.progress() as progress:
+        report = web.export_html(path, target, up, quality, progress)
+    out.json(report.to_json())
+    size = f"{_size(report.bytes)}, {_size(report.video_bytes)} of which are the geometry video"
+    out.text(f"{shown(source, STDIN)} -> {target} ({size})")
+    _tell_conversion(out, report)
+
+
+@cli.command()
+@click.argument("source", metavar="FILE.mp4")
+@click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="The axis that stands upright.")
+@output_options
+def play(source: str, up: str, out: Output) -> None:
+    """Play a geometry video in your browser; print the path of the page where there is none."""
+    import tempfile
+    from pathlib import Path
+
+    from gvpipe import web
+    from gvpipe.web.browser import open_page
+
+    with source_path(source) as path, out.progress() as progress:
+        page = Path(tempfile.mkdtemp(prefix="gvpipe-")) / f"{Path(path).stem}.html"  # stays: the browser reads it later
+        report = web.export_html(path, page, up, None, progress)
+    _tell_conversion(out, report)
+    is_open = open_page(page)
+    out.json({"page": str(page), "opened": is_open, **report.to_json()})
+    out.text(f"{shown(source, STDIN)} plays in your browser" if is_open else page)
+
+
+@cli.command()
+@click.argument("source", metavar="FILE.mp4|SEQUENCE")
+@click.argument("target", metavar="OUT.png|.gif|.mp4")
+@click.option("--frame", type=int, help="Only this frame; negative counts from the end. [default: 0 for .png, else all]")
+@click.option("--size", default="512", show_default=True, metavar="N|WxH", help="Pixels.")
+@click.option(
+    "--view", default="three-quarter", show_default=True, help="front, back, left, right, top, bottom or AZIMUTH,ELEVATION."
+)
+@click.option("--up", type=click.Choice(["x", "y", "z"]), default="y", show_default=True, help="The axis that is up.")
+@click.option("--turntable", is_flag=True, help="Let the camera go once around.")
+@click.option("--follow", is_flag=True, help="Let the camera go with the mesh.")
+@click.option("--error-of", "error_of", metavar="REFERENCE", help="Colour each vertex by its distance from REFERENCE's.")
+@click.option("--error-max", type=float, metavar="PERCENT", help="Where the colours end. [default: the largest error drawn]")
+@click.option("--shading", type=click.Choice(["smooth", "flat"]), default="smooth", show_default=True)
+@output_options
+def render(source: str, target: str, size: str, out: Output, **options: Any) -> None:
+    """Paint a geometry video or a sequence as a picture or a film; needs no display and no GPU."""
+    from gvpipe.rendering.films import parse_size, render
+
+    pixels = parse_size(size)
+    with source_path(source) as path, out.progress() as progress:
+        render(path, target, size=pixels, progress=progress, **options)
+    n_bytes = os.path.getsize(target)
+    out.json({"output": target, "width": pixels[0], "height": pixels[1], "bytes": n_bytes})
+    out.text(f"{shown(source, STDIN)} -> {target} ({pixels[0]}x{pixels[1]}, {_size(n_bytes)})")
+
+
+@cli.command()
+@click.argument("sources", metavar="SEQUENCES...", nargs=-1, required=True)
+@click.option(
+    "--codecs",
+    "codec_list",
+    metavar="ID,ID...",
+    help="What to measure, ID or ID:KEY=VALUE. [default: all, mcgv in 3 ways]",
+)
+@click.option("--qualities", metavar="Q,Q...", help="Qualities to measure. [default: 0,20,40,60,75,90,100]")
+@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting for all these codecs; repeat for more.")
+@click.option("--kg", default="1,0.3,0.1", show_default=True, metavar="KG,KG...", help="Errors at which to tell rates.")
+@click.option("--sted", metavar="STED,STED...", help="The same for this measure.")
+@click.option("--json", "target", metavar="OUT.json", help="Write all results to this file.")
+@click.option("--plot", "report", metavar="OUT.json", help="Measure nothing: draw these results into the folder given.")
+@click.option("--peers", metavar="RESULTS.csv", help="With --plot: other codecs' results to draw beside.")
+@print_options
+def bench(
+    sources: tuple[str, ...],
+    codec_list: str | None,
+    qualities: str | None,
+    pairs: tuple[str, ...],
+    kg: str,
+    sted: str | None,
+    target: str | None,
+    report: str | None,
+    peers: str | None,
+    out: Output,
+) -> None:
+    """Measure rate, distortion, times and memory of codecs, every round trip verified; or draw such results.
+
+    \b
+    gvpipe bench a.npz b.npz --json out.json
+    gvpipe bench a.npz --codecs mcgv,mcgv:prediction=affine,pca
+    gvpipe bench --plot out.json plots/
+    """
+    from gvpipe.benchmark import sweep as benches
+    from gvpipe.benchmark.bd_rate import tables
+
+    if report is not None:
+        from gvpipe.benchmark import plots
+
+        if len(sources) != 1:
+            raise click.UsageError("--plot OUT.json needs one folder to draw into")
+        drawn = plots.draw(benches.Report.read(report), sources[0], plots.read_peers(peers) if peers else None)
+        out.text("\n".join(map(str, drawn)))
+        return
+    chosen = [name.strip() for name in codec_list.split(",")] if codec_list else benches.default_codecs()
+    wanted = _parse_numbers("--qualities", qualities) if qualities else list(benches.QUALITIES)
+    levels = {"kg": _parse_numbers("--kg", kg), **({"sted": _parse_numbers("--sted", sted)} if sted else {})}
+    with out.progress() as progress:
+        made = benches.run(sources, chosen, wanted, _parse_pairs(pairs), progress)
+    if target:
+        made.write(target)
+    out.text(tables(made.curves, levels))
+
+
+@cli.command()
+@output_options
+def codecs(out: Output) -> None:
+    """List the codecs and their settings, and the settings that --codec auto tries beside the defaults."""
+    import dataclasses
+
+    from gvpipe.codec import codec_class, codec_ids
+    from gvpipe.rate_control.purposes import VARIANTS
+
+    with out.progress():
+        found = {name: codec_class(name) for name in codec_ids()}
+    settings = {name: {field.name: field.default for field in dataclasses.fields(codec)} for name, codec in found.items()}
+    variants = {name: [own for own in VARIANTS.get(name, ()) if own] for name in found}
+    values = [
+        {"id": name, "version": codec.version, "summary": codec.summary, "settings": settings[name], "variants": variants[name]}
+        for name, codec in found.items()
+    ]
+    out.json({"codecs": values})
+    for name, codec in found.items():
+        defaults = " ".join(f"{key}={value}" for key, value in settings[name].items())
+        out.text(f"{name}: {codec.summary}; {defaults}")
+        for own in variants[name]:
+            out.text(f"  --codec auto tries too: {' '.join(f'{key}={value}' for key, value in own.items())}")
+
+
+class _Part:
+    """Some frames of a sequence, which tell how far they have been read."""
+
+    def __init__(self, sequence: MeshSequence, start: int, stop: int, progress: Progress | None) -> None:
+        self._sequence, self._start, self._progress = sequence, start, progress
+        self.shape = (stop - start, sequence.n_vertices, 3)
+
+    def __getitem__(self, key: slice, /) -> Any:
+        first, last, _ = key.indices(self.shape[0])
+        if self._progress:
+            self._progress("decode", last / self.shape[0])
+        return self._sequence.read(self._start + first, self._start + last)
+
+
+def _parse_numbers(option: str, text: str) -> list[float]:
+    try:
+        return [float(number) for number in text.split(",")]
+    except ValueError as exc:
+        raise click.UsageError(f"{option} {text}: numbers with commas between are needed") from exc
+
+
+def _parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:
+    settings = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals:
+            raise click.UsageError(f"--set {pair}: KEY=VALUE is needed, such as --set clusters=30")
+        settings[key.strip()] = value.strip()
+    return settings
+
+
+def _tell_conversion(out: Output, report: ExportReport) -> None:
+    """Say on standard error what the page shows instead of the file's own frames."""
+    if report.converted:
+        values = (report.rmse_diag, report.max_diag, report.kg)
+        rmse, largest, kg = ("not defined" if v is None else f"{v:.1e}" for v in values)
+        out.note(
+            f"browsers cannot read {report.converted}; the page holds a conversion to mcgv, web profile, which adds an "
+            f"error of rmse {rmse}, at most {largest}, of the diagonal (KG {kg} %)"
+        )
+
+
+def _print_sections(out: Output, sections: dict[str, int], n_samples: int) -> None:
+    from rich.console import Console
+
+    from gvpipe.cli.breakdown import section_table
+
+    console = Console(file=sys.stdout, width=100, color_system=None)
+    with console.capture() as captured:
+        console.print(section_table(sections, n_samples))
+    text = "\n".join(line.rstrip() for line in captured.get().splitlines())
+    encoding = sys.stdout.encoding or "utf-8"
+    out.text(text.encode(encoding, "replace").decode(encoding))
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e6:.2f} MB" if count >= 1e6 else f"{count / 1e3:.1f} kB"
+
+
+def _one_line(exc: Exception) -> str:
+    return " ".join(str(exc).split())
+
+
+def _fail(message: str, status: int) -> int:
+    click.echo(f"Error: {message}", err=True)
+    return status

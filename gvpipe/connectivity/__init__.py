@@ -1,0 +1,1 @@
+"""Connectivity coding: triangles, seams and vertex order to bytes and back."""

@@ -1,0 +1,243 @@
+"""Triangles, vertex order and base-frame lattice positions of a mesh <-> bytes, exactly.
+
+Draco's Edgebreaker (Rossignac, Edgebreaker: Connectivity compression for triangle meshes, 1999) carries connectivity
+and positions. Alone it is not lossless: it renumbers vertices, merges those with equal attributes, splits
+non-manifold ones, and drops degenerate triangles and unreferenced vertices. So positions go in as integers, an
+occurrence number tells apart vertices that share a lattice position, the decoder merges what was split, and whatever
+does not come back from a trial decode (in the worst case everything) is sent beside it as *loose* vertices and faces.
+
+Mesh stream: [4 x 32 bits] Draco bytes, loose vertices, loose faces, bytes of the loose vertices; then the Draco
+stream, the loose vertices and the loose faces, each table as deflated byte planes of row differences.
+Codec order: Draco's vertices by first appearance after merging, then the loose ones. Order stream: vertex_order.py.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.errors import CorruptFile, InputError
+from gvpipe.mesh.unique_rows import decode_table, encode_table, row_ids, smallest_first, used_vertices
+from gvpipe.sequence import Int32
+
+Ints = npt.NDArray[Any]
+
+HEADER = struct.Struct("<4I")
+COMPRESSION_LEVEL = 10  # Draco's best; 20 ms for 10k vertices
+MAX_DRACO_COORDINATE = (1 << 22) - 1  # Draco's time and memory grow with the range: 31 bits take 90 s for 81 vertices
+DRACO_PREFIX = b"DRACO\x02\x02\x01\x01\x00\x00"  # version 2.2, triangular mesh, Edgebreaker, no metadata
+MAX_PER_BYTE = 1024  # no allocation beyond what this many bytes can honestly hold; deflate's own limit is near
+GENERIC = 4  # draco::GeometryAttribute::GENERIC
+
+
+@dataclass(frozen=True)
+class EncodedMesh:
+    mesh: bytes
+    order: bytes  # empty: decode in the codec's order
+    permutation: Ints  # (V,) int64: decoded vertex i is the given vertex permutation[i]
+
+
+@dataclass(frozen=True)
+class BaseMesh:
+    points: Int32  # (V, 3), lattice units
+    faces: Int32  # (T, 3)
+    visits: Ints  # (V,) int64: vertex v is the codec's vertex visits[v]; the codec's order walks over the surface
+
+
+def encode_base(points: Ints, faces: Ints, reorder: bool) -> EncodedMesh:
+    """Code lattice points (V, 3) int in [0, 2^31) and triangles (T, 3) int.
+
+    `reorder` lets the decoder see the codec's vertex order. Triangles may come back in another order, and rotated.
+    """
+    points, faces = np.asarray(points), np.asarray(faces)
+    n_vertices = len(points)
+    if points.shape != (n_vertices, 3) or faces.shape != (len(faces), 3):
+        raise InputError(f"points {points.shape} and faces {faces.shape}: both must have three columns")
+    if n_vertices > MAX_VERTICES:
+        raise InputError(f"{n_vertices} vertices: at most {MAX_VERTICES}")
+    if points.size and (points.min() < 0 or points.max() >= 1 << 31):
+        raise InputError(f"points span {points.min()}..{points.max()}: lattice coordinates lie in 0..2^31 - 1")
+    if faces.size and (faces.min() < 0 or faces.max() >= n_vertices):
+        raise InputError(f"faces index {faces.min()}..{faces.max()}, vertices are 0..{n_vertices - 1}")
+    points, faces = points.astype(np.int64), faces.astype(np.int64)
+
+    try:
+        mesh, permutation = _encode_mesh(points, faces, _encode_draco(points, _proper(points, faces)))
+    except (ValueError, CorruptFile):
+        mesh, permutation = _encode_mesh(points, faces, b"")
+    if reorder:
+        return EncodedMesh(mesh, b"", permutation)
+    codec_points, codec_faces = _decode_mesh(mesh)
+    order = encode_order(np.argsort(permutation), codec_points, codec_faces)
+    return EncodedMesh(mesh, order, np.arange(n_vertices))
+
+
+def decode_base(mesh: bytes, order: bytes) -> BaseMesh:
+    """Mirror of `encode_base`. Raises CorruptFile for anything malformed."""
+    points, faces = _decode_mesh(mesh)
+    visits = np.arange(len(points))
+    if order:
+        visits = decode_order(order, points, faces)
+        points, faces = points[visits], np.argsort(visits)[faces]
+    return BaseMesh(points.astype(np.int32), faces.astype(np.int32), visits)
+
+
+def read_base(bitstream: Bitstream) -> BaseMesh:
+    """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
+    base = decode_base(bitstream.section("mesh"), bitstream.section("order"))
+    bitstream.check_size(len(base.points), len(base.faces))
+    return base
+
+
+def _encode_draco(points: Ints, faces: Ints) -> bytes:
+    """The Draco stream, or nothing where there is nothing that Draco could carry. Raises ValueError if it fails."""
+    import DracoPy
+
+    # Draco visits components in the order of their first triangles. The vertex order is cheaper to code when
+    # components follow it, backwards because Draco's decoder rebuilds the mesh from its end.
+    faces = faces[np.argsort(-faces.max(axis=1, initial=0), kind="stable")]
+    used = used_vertices(faces, len(points))
+    if not len(used) or points.max() > MAX_DRACO_COORDINATE:
+        return b""
+    occurrence = _occurrences(points[used])
+    distinct = {0: occurrence[:, None].astype(np.uint32)} if occurrence.any() else None
+    try:
+        return bytes(
+            DracoPy.encode(
+                points[used].astype(np.uint32),  # an integer dtype: Draco then keeps positions as they are
+                np.searchsorted(used, faces).astype(np.uint32),
+                compression_level=COMPRESSION_LEVEL,
+                generic_attributes=distinct,  # a number as key: a name would add metadata
+            )
+        )
+    except Exception as exc:  # DracoPy's own and bare ones; each means: not this way
+        raise ValueError("Draco cannot encode this mesh") from exc
+
+
+def _encode_mesh(points: Ints, faces: Ints, draco: bytes) -> tuple[bytes, Ints]:
+    """The mesh stream and its codec order: whatever the Draco stream does not give back is added as loose rows."""
+    keys, draco_faces = _decode_draco(draco)
+    carried = _find_vertices(points, used_vertices(_proper(points, faces), len(points)), keys)
+    is_loose = np.ones(len(points), bool)
+    is_loose[carried] = False
+    permutation = np.concatenate([carried, np.flatnonzero(is_loose)])
+    codec_index = np.argsort(permutation)
+
+    canonical = np.concatenate([smallest_first(codec_index[faces]), smallest_first(draco_faces)])
+    ids, representatives = row_ids(canonical)
+    missing = np.bincount(ids[: len(faces)], minlength=len(representatives))
+    missing -= np.bincount(ids[len(faces) :], minlength=len(representatives))
+    if (missing < 0).any():
+        raise ValueError("Draco returned triangles that the mesh does not have")
+    loose_faces = canonical[np.repeat(representatives, missing)]
+
+    loose_points = encode_table(points[is_loose])
+    header = HEADER.pack(len(draco), int(is_loose.sum()), len(loose_faces), len(loose_points))
+    return header + draco + loose_points + encode_table(loose_faces), permutation
+
+
+def _proper(points: Ints, faces: Ints) -> Ints:
+    """The triangles with three different lattice positions; Draco drops the others, and prints if no triangle is left."""
+    place = row_ids(points)[0][faces]
+    proper: Ints = faces[(place != np.roll(place, 1, axis=1)).all(axis=1)]
+    return proper
+
+
+def _find_vertices(points: Ints, used: Ints, keys: Ints) -> Ints:
+    """The vertex that each key (position, occurrence), as decoded, stands for."""
+    own_keys = np.c_[points[used], _occurrences(points[used])]
+    ids, representatives = row_ids(np.concatenate([own_keys, keys]))
+    found = representatives[ids[len(used) :]]
+    if (found >= len(used)).any():
+        raise ValueError("Draco returned vertices that the mesh does not have")
+    vertices: Ints = used[found]
+    return vertices
+
+
+def _decode_draco(draco: bytes) -> tuple[Ints, Ints]:
+    """Keys (n, 4) int64 of distinct vertices (position, occurrence), and triangles over them."""
+    import DracoPy
+
+    if not draco:
+        return np.zeros((0, 4), np.int64), np.zeros((0, 3), np.int64)
+    check_draco_header(draco)
+    try:
+        decoded = DracoPy.decode(draco)
+        points, attributes = decoded.points, decoded.attributes
+        faces = decoded.faces.astype(np.int64)
+    except Exception as exc:  # DracoPy's own, TypeError, bare ones; each means: corrupt
+        raise CorruptFile("section 'mesh' is corrupt: Draco cannot decode it") from exc
+    if points is None or points.dtype != np.uint32 or points.shape[1:] != (3,) or len(attributes) > 2:
+        raise CorruptFile("section 'mesh' is corrupt: unexpected Draco attributes")
+    occurrence = np.zeros((len(points), 1), np.int64)
+    for attribute in attributes:
+        if attribute["attribute_type"] == GENERIC:
+            occurrence = np.asarray(attribute["data"])
+    if occurrence.shape != (len(points), 1) or occurrence.dtype.kind not in "iu":
+        raise CorruptFile("section 'mesh' is corrupt: unexpected Draco attributes")
+    keys = np.c_[points, occurrence].astype(np.int64)
+    if faces.size and (faces.min() < 0 or faces.max() >= len(keys)):
+        raise CorruptFile("section 'mesh' is corrupt: a triangle names a vertex that does not exist")
+    if keys.size and keys.max() >= 1 << 31:
+        raise CorruptFile("section 'mesh' is corrupt: lattice coordinate out of range")
+
+    ids, representatives = row_ids(keys)  # merge what Draco split
+    by_appearance = np.argsort(representatives)
+    return keys[representatives[by_appearance]], np.argsort(by_appearance)[ids][faces]
+
+
+def check_draco_header(draco: bytes) -> None:
+    """Refuse counts that the stream cannot hold before Draco allocates for them."""
+    if not draco.startswith(DRACO_PREFIX):
+        raise CorruptFile("section 'mesh' is corrupt: not the kind of Draco stream that is written here")
+    position = len(DRACO_PREFIX) + 1  # skip the traversal type
+    for _ in ("vertices", "faces"):
+        count = shift = 0
+        while True:
+            if position >= len(draco) or shift > 28:
+                raise CorruptFile("section 'mesh' is corrupt: truncated Draco header")
+            byte = draco[position]
+            position += 1
+            count |= (byte & 127) << shift
+            shift += 7
+            if byte < 128:
+                break
+        if count > MAX_PER_BYTE * len(draco):
+            raise CorruptFile(f"section 'mesh' is corrupt: {count} elements in {len(draco)} bytes")
+
+
+def _decode_mesh(mesh: bytes) -> tuple[Ints, Ints]:
+    if len(mesh) < HEADER.size:
+        raise CorruptFile(f"section 'mesh' of {len(mesh)} bytes: truncated")
+    bytes_draco, n_loose_points, n_loose_faces, bytes_points = HEADER.unpack_from(mesh)
+    end_draco = HEADER.size + bytes_draco
+    end_points = end_draco + bytes_points
+    if end_points > len(mesh):
+        raise CorruptFile(f"section 'mesh' of {len(mesh)} bytes, its header promises {end_points} and more: truncated")
+    keys, draco_faces = _decode_draco(mesh[HEADER.size : end_draco])
+    points = np.concatenate([keys[:, :3], decode_table(mesh[end_draco:end_points], n_loose_points)])
+    faces = np.concatenate([draco_faces, decode_table(mesh[end_points:], n_loose_faces)])
+    if len(points) > MAX_VERTICES:
+        raise CorruptFile(f"section 'mesh' is corrupt: {len(points)} vertices, at most {MAX_VERTICES}")
+    if points.size and points.min() < 0:
+        raise CorruptFile("section 'mesh' is corrupt: lattice coordinate out of range")
+    if faces.size and (faces.min() < 0 or faces.max() >= len(points)):
+        raise CorruptFile("section 'mesh' is corrupt: a triangle names a vertex that does not exist")
+    return points, faces
+
+
+def _occurrences(rows: Ints) -> Ints:
+    """For each row, how many equal rows come before it."""
+    ids, _ = row_ids(rows)
+    order = np.argsort(ids, kind="stable")
+    place = np.arange(len(rows))
+    is_first = np.diff(ids[order], prepend=-1) > 0
+    occurrences = np.empty(len(rows), np.int64)
+    occurrences[order] = place - np.maximum.accumulate(np.where(is_first, place, 0))
+    return occurrences

@@ -1,0 +1,178 @@
+"""Triangles, seams and vertex order of a mesh <-> bytes, without any position.
+
+Codecs that code all positions themselves need connectivity alone. Draco's Edgebreaker gives it for 2.3 bits per vertex once
+positions say nothing: they go in as distinct tiny floats that all quantise to one value at one bit, so that Draco keeps
+vertices apart and spends next to nothing on them. A second, private run with telling positions shows in which order they come
+out.
+
+Vertices at one place in every frame (*copies* of one *point*: seams, triangle soups) are welded first, so that Draco, and
+everything after it, sees one surface; each corner then says which copy it uses.
+
+Mesh stream: [6 x 32 bits] bytes of Draco, merges, loose triangles, copies; loose triangles; points. Then these in that order:
+Draco; *merges* [integers]: how many Draco vertices come between one that is a second copy of an earlier one (Draco splits at
+non-manifold places), and how far back that one is; loose triangles, deflated as in `connectivity`; the streams of `copies`.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.connectivity.base_mesh import COMPRESSION_LEVEL, MAX_PER_BYTE, EncodedMesh, check_draco_header
+from gvpipe.connectivity.seams import decode_copies, encode_copies
+from gvpipe.connectivity.vertex_order import MAX_VERTICES
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.cursor import Cursor, varint
+from gvpipe.entropy.integers import decode_integers, encode_integers
+from gvpipe.errors import CorruptFile
+from gvpipe.mesh.unique_rows import decode_table, encode_table, row_ids, smallest_first, used_vertices
+from gvpipe.sequence import Int32
+
+HEADER = struct.Struct("<6I")
+
+Ints = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class BareMesh:
+    """Args:
+    faces: ``(T, 3) int32`` triangles over V vertices.
+    points: ``(V,) int64`` the point of each vertex.
+    point_faces: ``(T, 3) int32`` the same triangles over P points, which are numbered as Draco walks over the surface.
+    """
+
+    faces: Int32
+    points: Ints
+    point_faces: Int32
+    n_points: int
+
+
+def encode_mesh(faces: Int32, points: Ints, reorder: bool) -> EncodedMesh:
+    """Code triangles ``(T, 3)`` over V vertices, of which those with equal ``points (V,)``, 0..P-1, are copies.
+
+    ``reorder`` lets the decoder see the codec's vertex order. Triangles may come back in another order, and rotated.
+    """
+    faces, points = faces.astype(np.int64), points.astype(np.int64)
+    n_points = int(points.max()) + 1
+    point_faces = points[faces]
+    try:
+        draco, came_from = _encode_draco(point_faces)
+        parts, place = _place_points(point_faces, n_points, draco, came_from)
+    except (ValueError, CorruptFile):
+        parts, place = _place_points(point_faces, n_points, b"", np.zeros(0, np.int64))
+    coded = encode_copies(faces, place[points], _point_faces(*parts), n_points, reorder)
+    head = HEADER.pack(*(len(part) for part in parts[:2]), len(parts[2]), len(coded.counts), parts[3], n_points)
+    return EncodedMesh(head + b"".join([*parts[:3], coded.counts, coded.copies]), coded.order, coded.permutation)
+
+
+def decode_mesh(mesh: bytes, order: bytes, n_vertices: int) -> BareMesh:
+    """Mirror of `encode_mesh`, for a mesh of at most ``n_vertices``. Raises CorruptFile for anything malformed."""
+    cursor = Cursor(mesh, "mesh")
+    bytes_draco, bytes_merges, bytes_loose, bytes_counts, n_loose, n_points = cursor.struct(HEADER)
+    if n_points > min(MAX_VERTICES, n_vertices) or n_loose > MAX_PER_BYTE * len(mesh):
+        raise cursor.corrupt(f"{n_points} points and {n_loose} loose triangles in {len(mesh)} bytes")
+    draco, merges, loose = cursor.take(bytes_draco), cursor.take(bytes_merges), cursor.take(bytes_loose)
+    point_faces = _point_faces(draco, merges, loose, n_loose)
+    if point_faces.size and (point_faces.min() < 0 or point_faces.max() >= n_points):
+        raise cursor.corrupt("a triangle names a point that does not exist")
+    faces, points = decode_copies(cursor.take(bytes_counts), cursor.rest(), order, point_faces, n_points)
+    return BareMesh(faces.astype(np.int32), points, point_faces.astype(np.int32), n_points)
+
+
+def read_mesh(bitstream: Bitstream) -> BareMesh:
+    """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
+    mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"), bitstream.n_vertices)
+    bitstream.check_size(len(mesh.points), len(mesh.faces))
+    return mesh
+
+
+def _encode_draco(faces: Ints) -> tuple[bytes, Ints]:
+    """The Draco stream of the triangles with three different points, and the point of each vertex that it decodes to.
+
+    Raises ValueError where Draco fails.
+    """
+    import DracoPy
+
+    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    faces = faces[np.argsort(-faces.max(axis=1, initial=0), kind="stable")]  # as in `connectivity`: vertex orders follow
+    used = used_vertices(faces, int(faces.max(initial=-1)) + 1)
+    if not len(used):
+        return b"", np.zeros(0, np.int64)
+    number = np.arange(len(used))
+    silent = np.zeros((len(used), 3), np.float32)
+    silent[:, 0] = (1 + number % 1024) * 2.0**-30
+    silent[:, 1] = (1 + number // 1024) * 2.0**-40
+    silent[0] = 1
+    telling = np.c_[number, 0 * number, 0 * number].astype(np.uint32)
+    corners = np.searchsorted(used, faces).astype(np.uint32)
+    try:
+        draco = bytes(DracoPy.encode(silent, corners, quantization_bits=1, compression_level=COMPRESSION_LEVEL))
+        told = DracoPy.decode(DracoPy.encode(telling, corners, compression_level=COMPRESSION_LEVEL))
+        same = np.array_equal(told.faces, DracoPy.decode(draco).faces)
+    except Exception as exc:  # DracoPy's own and bare ones; each means: not this way
+        raise ValueError("Draco cannot encode this mesh") from exc
+    if not same:
+        raise ValueError("Draco's order depends on positions")
+    return draco, used[told.points[:, 0].astype(np.int64)]
+
+
+def _place_points(faces: Ints, n_points: int, draco: bytes, came_from: Ints) -> tuple[tuple[bytes, bytes, bytes, int], Ints]:
+    """The streams of triangles over points, and the codec's number of each point ``(P,)``."""
+    _, first, inverse = np.unique(came_from, return_index=True, return_inverse=True)
+    again = np.flatnonzero(first[inverse] != np.arange(len(came_from)))  # Draco vertices whose point came before
+    back = again - first[inverse][again]
+    merges = varint(len(again)) + encode_integers(np.stack([np.diff(again, prepend=-1) - 1, back])) if len(again) else b""
+    known = came_from[np.sort(first)]
+    is_left = np.ones(n_points, bool)
+    is_left[known] = False
+    place = np.argsort(np.concatenate([known, np.flatnonzero(is_left)]))
+    rows = np.concatenate([smallest_first(place[faces]), smallest_first(_point_faces(draco, merges, b"", 0))])
+    ids, representatives = row_ids(rows)
+    missing = np.bincount(ids[: len(faces)], minlength=len(representatives))
+    missing -= np.bincount(ids[len(faces) :], minlength=len(representatives))
+    if (missing < 0).any():
+        raise ValueError("Draco returned triangles that the mesh does not have")
+    loose = rows[np.repeat(representatives, missing)]
+    return (draco, merges, encode_table(loose), len(loose)), place
+
+
+def _point_faces(draco: bytes, merges: bytes, loose: bytes, n_loose: int) -> Ints:
+    """Triangles over points, smallest point first: Draco's with its split vertices merged, then the loose ones."""
+    faces, n_vertices = _decode_draco(draco)
+    stands_for = np.arange(n_vertices)
+    if merges:
+        cursor = Cursor(merges, "mesh")
+        n_merges = cursor.varint(n_vertices, "the number of merges")
+        gaps, back = decode_integers(cursor.rest(), 2 * n_merges, name="mesh").reshape(2, -1)
+        if not n_merges or ((gaps < 0) | (gaps >= n_vertices)).any():
+            raise CorruptFile("section 'mesh' is corrupt: a merge names a vertex that does not exist")
+        again = np.cumsum(gaps + 1) - 1
+        if (back <= 0).any() or again[-1] >= n_vertices or (back > again).any():
+            raise CorruptFile("section 'mesh' is corrupt: a merge names a vertex that does not exist")
+        stands_for[again] = again - back
+        is_new = np.ones(n_vertices, bool)
+        is_new[again] = False
+        if not is_new[stands_for[again]].all():
+            raise CorruptFile("section 'mesh' is corrupt: a merge names a merged vertex")
+        stands_for = (np.cumsum(is_new) - 1)[stands_for]
+    return np.concatenate([smallest_first(stands_for[faces]), decode_table(loose, n_loose)])
+
+
+def _decode_draco(draco: bytes) -> tuple[Ints, int]:
+    import DracoPy
+
+    if not draco:
+        return np.zeros((0, 3), np.int64), 0
+    check_draco_header(draco)
+    try:
+        decoded = DracoPy.decode(draco)
+        faces, n_vertices = decoded.faces.astype(np.int64), len(decoded.points)
+    except Exception as exc:  # DracoPy's own, TypeError, bare ones; each means: corrupt
+        raise CorruptFile("section 'mesh' is corrupt: Draco cannot decode it") from exc
+    if faces.size and (faces.min() < 0 or faces.max() >= n_vertices):
+        raise CorruptFile("section 'mesh' is corrupt: a triangle names a vertex that does not exist")
+    return faces, n_vertices

@@ -1,0 +1,277 @@
+"""The vertex order of a mesh <-> bytes, given its triangles in the codec's order.
+
+Connectivity coders renumber vertices, so giving users their own order back means sending a permutation. Real orders
+are walks over the surface (strips, rings, files written face by face): the vertices are visited here in the user's
+order, and each is coded by its rank in a breadth-first search that starts from the vertex before it and counts only
+vertices not visited yet. Vertices that share a lattice position count as neighbours, so that seams and triangle soups
+are walked too. What the search does not reach is coded as a plain choice among the vertices left.
+
+Bitstream: [19 x 8 bits] symbol weights, see `_weights`; then 32-bit little-endian range coder words holding
+V rank symbols (one categorical model), followed by the low bits of the symbols that have any (uniform models).
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gvpipe.errors import CorruptFile, InputError
+from gvpipe.mesh.unique_rows import sort_rows
+
+Ints = npt.NDArray[Any]
+
+REACH = 256  # most vertices that one search looks at: 1024 saves 0.3 bit per vertex on samba, and takes twice the time
+EXACT_RANKS = 8  # ranks below this have a symbol of their own; above, two symbols per octave and the rest as plain bits
+ESCAPE = EXACT_RANKS + 2 * 5  # the last symbol, after five octaves (8..255): not found within REACH
+N_SYMBOLS = ESCAPE + 1
+SHORT_ROW = 64  # neighbours that are sorted in place
+MAX_VERTICES = (1 << 24) - 1  # constriction's largest uniform alphabet
+
+
+def encode_order(visits: Ints, points: Ints, faces: Ints) -> bytes:
+    """Code `visits` (V,), where visits[v] is the codec's index of the user's vertex v.
+
+    `points` (V, 3) int, lattice units, and `faces` (T, 3) int are the mesh in the codec's order.
+    """
+    import constriction
+
+    n_vertices = len(points)
+    if n_vertices > MAX_VERTICES:
+        raise InputError(f"{n_vertices} vertices: a vertex order holds at most {MAX_VERTICES}; use reorder=True")
+    ranks = np.full(n_vertices, -1, np.int64)
+    jumps = np.zeros(n_vertices, np.int64)
+    _compiled_walk()(*_neighbours(points, faces), REACH, ranks, jumps, visits.astype(np.int64), False)
+
+    symbols, low, sizes = _split(ranks, jumps)
+    table = _quantised(np.bincount(symbols, minlength=N_SYMBOLS))
+    coder = constriction.stream.queue.RangeEncoder()
+    if n_vertices:
+        coder.encode(symbols, constriction.stream.model.Categorical(_weights(table), perfect=False))
+    has_low = sizes > 1
+    if has_low.any():
+        coder.encode(low[has_low], constriction.stream.model.Uniform(), sizes[has_low])
+    words: Ints = coder.get_compressed()
+    return bytes(table.tobytes() + words.astype("<u4").tobytes())
+
+
+def decode_order(data: bytes, points: Ints, faces: Ints) -> Ints:
+    """The inverse of `encode_order`: visits (V,) int64, always a permutation, or CorruptFile.
+
+    A range coder cannot tell every change of its bytes: lengths and checksums are the container's.
+    """
+    import constriction
+
+    n_vertices = len(points)
+    if len(data) < N_SYMBOLS or (len(data) - N_SYMBOLS) % 4 or n_vertices > MAX_VERTICES:
+        raise CorruptFile(f"vertex order of {len(data)} bytes for {n_vertices} vertices: not a vertex order")
+    table = np.frombuffer(data, np.uint8, N_SYMBOLS)
+    if n_vertices and not table.any():
+        raise CorruptFile("vertex order with an empty symbol table")
+    coder = constriction.stream.queue.RangeDecoder(np.frombuffer(data, "<u4", offset=N_SYMBOLS).astype(np.uint32))
+    try:
+        symbols = np.zeros(0, np.int32)
+        if n_vertices:
+            symbols = coder.decode(constriction.stream.model.Categorical(_weights(table), perfect=False), n_vertices)
+        sizes = _sizes(symbols)
+        low = np.zeros(n_vertices, np.int32)
+        has_low = sizes > 1
+        if has_low.any():
+            low[has_low] = coder.decode(constriction.stream.model.Uniform(), sizes[has_low])
+    except (AssertionError, ValueError) as exc:
+        raise CorruptFile("section 'order' is corrupt: the range coder ran out of step") from exc
+    if not coder.maybe_exhausted():
+        raise CorruptFile("section 'order' is corrupt: bytes left over")
+    ranks, jumps = _joined(symbols, low)
+    visits = np.zeros(n_vertices, np.int64)
+    n_done = _compiled_walk()(*_neighbours(points, faces), REACH, ranks, jumps, visits, True)
+    if n_done != n_vertices:
+        raise CorruptFile(f"section 'order' is corrupt: no vertex has the rank sent for vertex {n_done}")
+    return visits
+
+
+def _split(ranks: Ints, jumps: Ints) -> tuple[Ints, Ints, Ints]:
+    """Ranks (-1: escape, then the jump counts) -> symbols, low parts, sizes of the low parts' alphabets; all int32."""
+    octave = np.frexp(ranks.astype(np.float64))[1] - 1  # exact floor(log2)
+    low_bits = np.maximum(octave - 1, 0)
+    high = ranks >> low_bits  # 2 or 3 from EXACT_RANKS up
+    symbols = np.where(ranks < EXACT_RANKS, ranks, EXACT_RANKS + 2 * (octave - 3) + high - 2)
+    symbols = np.where(ranks < 0, ESCAPE, symbols).astype(np.int32)
+    low = np.where(ranks < 0, jumps, ranks - (high << low_bits)).astype(np.int32)
+    return symbols, low, _sizes(symbols)
+
+
+def _joined(symbols: Ints, low: Ints) -> tuple[Ints, Ints]:
+    above = symbols.astype(np.int64) - EXACT_RANKS
+    ranks = np.where(above < 0, symbols, ((2 + (above & 1)) << np.maximum(2 + above // 2, 0)) + low)
+    return np.where(symbols == ESCAPE, -1, ranks), np.where(symbols == ESCAPE, low, 0).astype(np.int64)
+
+
+def _sizes(symbols: Ints) -> Ints:
+    above = np.maximum(symbols - EXACT_RANKS, 0)
+    sizes = np.where(symbols < EXACT_RANKS, 1, 4 << (above // 2))
+    n_left = len(symbols) - np.arange(len(symbols))
+    return np.where(symbols == ESCAPE, n_left, sizes).astype(np.int32)
+
+
+def _quantised(counts: Ints) -> Ints:
+    """Counts -> one byte each: 3 bits of mantissa, 5 of exponent, rounded down; within 12 % of the count."""
+    shift = np.maximum(np.frexp(counts.astype(np.float64))[1] - 4, 0)
+    mantissa = counts >> shift
+    table: Ints = np.where(mantissa < 8, mantissa, mantissa - 8 + 8 * (shift + 1)).astype(np.uint8)
+    return table
+
+
+def _weights(table: Ints) -> npt.NDArray[np.float64]:
+    """Integers held in float64, so that every machine builds the same model."""
+    code = table.astype(np.int64)
+    return np.where(code < 8, code, (8 + code % 8) << np.maximum(code // 8 - 1, 0)).astype(np.float64)
+
+
+def _neighbours(points: Ints, faces: Ints) -> tuple[Ints, Ints]:
+    """Rows of neighbours (starts (V + 1,), neighbours (E,)), nearest first: triangle edges, and vertices at one point."""
+    rows = np.ascontiguousarray(points, np.int64)
+    by_point = sort_rows(rows)
+    same = (rows[by_point[1:]] == rows[by_point[:-1]]).all(axis=1)
+    twins = np.c_[by_point[1:], by_point[:-1]][same]
+    starts, neighbours = _compiled_rows()(rows, np.ascontiguousarray(faces, np.int64), twins)
+    return starts, neighbours
+
+
+def _rows(points: Ints, faces: Ints, twins: Ints) -> tuple[Ints, Ints]:
+    """The rows of `_neighbours`: each sorted by squared distance, then by number; nobody twice."""
+    n_vertices = len(points)
+    starts = np.zeros(n_vertices + 1, np.int64)
+    for t in range(len(faces)):
+        for k in range(3):
+            starts[faces[t, k] + 1] += 2
+    for t in range(len(twins)):
+        starts[twins[t, 0] + 1] += 1
+        starts[twins[t, 1] + 1] += 1
+    starts = np.cumsum(starts)
+    neighbours = np.empty(starts[-1], np.int64)
+    end = starts[:-1].copy()
+    for t in range(len(faces)):
+        for k in range(3):
+            here = faces[t, k]
+            neighbours[end[here]] = faces[t, (k + 1) % 3]
+            neighbours[end[here] + 1] = faces[t, (k + 2) % 3]
+            end[here] += 2
+    for t in range(len(twins)):
+        for k in range(2):
+            neighbours[end[twins[t, k]]] = twins[t, 1 - k]
+            end[twins[t, k]] += 1
+    kept = 0
+    distance = np.empty(SHORT_ROW, np.int64)
+    for v in range(n_vertices):
+        row = neighbours[starts[v] : end[v]]
+        n = len(row)
+        if n <= SHORT_ROW:  # insertion sort: no allocation
+            for i in range(n):
+                y = row[i]
+                dx, dy, dz = points[y, 0] - points[v, 0], points[y, 1] - points[v, 1], points[y, 2] - points[v, 2]
+                d = dx * dx + dy * dy + dz * dz  # may wrap round beyond 30 bits, at both ends alike
+                j = i
+                while j > 0 and (distance[j - 1] > d or (distance[j - 1] == d and row[j - 1] > y)):
+                    distance[j], row[j] = distance[j - 1], row[j - 1]
+                    j -= 1
+                distance[j], row[j] = d, y
+        else:
+            row = np.sort(row)
+            apart = points[row] - points[v]
+            row = row[np.argsort((apart * apart).sum(axis=1), kind="mergesort")]
+        starts[v] = kept
+        for i in range(n):
+            if i == 0 or row[i] != row[i - 1]:
+                neighbours[kept] = row[i]
+                kept += 1
+    starts[n_vertices] = kept
+    return starts, neighbours[:kept].copy()
+
+
+def _walk(starts: Ints, neighbours: Ints, reach: int, ranks: Ints, jumps: Ints, visits: Ints, decoding: bool) -> int:
+    """Fill ranks and jumps from visits, or (decoding) visits from them; one body, so that the two cannot differ.
+
+    Returns the number of vertices done; fewer than V means that a rank or a jump points nowhere.
+    """
+    n_vertices = len(starts) - 1
+    visited = np.zeros(n_vertices, np.bool_)
+    seen_by = np.full(n_vertices, -1, np.int64)  # the last search that saw a vertex
+    queue = np.empty(min(reach, n_vertices) + 1, np.int64)
+    left = np.arange(n_vertices)  # the vertices not visited, in the order that removals by swapping leave
+    place = np.arange(n_vertices)
+    first_left = 0
+    for v in range(n_vertices):
+        target = -1
+        if not decoding:
+            target = visits[v]
+        if decoding and ranks[v] < 0:
+            if jumps[v] >= n_vertices - v:
+                return v
+            target = left[jumps[v]]
+        else:
+            head = tail = rank = 0
+            seed = first_left
+            if v > 0:
+                queue[0] = visits[v - 1]
+                seen_by[visits[v - 1]] = v
+                tail = 1
+            found = False
+            while not found and tail < reach:
+                if head == tail:  # the component is exhausted: go on with the first vertex left in the codec's order
+                    while seed < n_vertices and seed - first_left < reach and (visited[seed] or seen_by[seed] == v):
+                        seed += 1
+                    if seed == n_vertices or seed - first_left >= reach:
+                        break
+                    begin, end = -1, 0
+                else:
+                    begin, end = starts[queue[head]], starts[queue[head] + 1]
+                for k in range(begin, end):
+                    y = seed if begin < 0 else neighbours[k]
+                    if tail == reach:
+                        break
+                    if seen_by[y] == v:
+                        continue
+                    seen_by[y] = v
+                    queue[tail] = y
+                    tail += 1
+                    if visited[y]:
+                        continue
+                    if (decoding and rank == ranks[v]) or y == target:
+                        target = y
+                        found = True
+                        break
+                    rank += 1
+                if begin >= 0:
+                    head += 1
+            if not found and decoding:
+                return v
+            if not decoding:
+                ranks[v] = rank if found else -1
+                jumps[v] = place[target]
+        visits[v] = target
+        visited[target] = True
+        hole = place[target]
+        last = left[n_vertices - 1 - v]
+        left[hole] = last
+        place[last] = hole
+        while first_left < n_vertices and visited[first_left]:
+            first_left += 1
+    return n_vertices
+
+
+@functools.cache
+def _compiled_rows() -> Callable[..., tuple[Ints, Ints]]:
+    from gvpipe.compiled import compiled
+
+    return compiled(_rows)
+
+
+@functools.cache
+def _compiled_walk() -> Callable[..., int]:
+    from gvpipe.compiled import compiled
+
+    return compiled(_walk)

@@ -1,0 +1,86 @@
+"""Triangles, lattice positions of points, seams and vertex order of a mesh <-> bytes.
+
+Vertices that share a trajectory are one *point*: seams, hard edges and triangle soups become the surfaces that they draw, and
+are coded once. The mesh over points, with positions, is that of `connectivity`; `copies` tells which vertex each corner uses.
+
+Mesh stream: [varint] length, mesh of points (`connectivity`, codec order); [varint] length, counts; differences (`copies`).
+Order stream: `copies`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gvpipe.connectivity.base_mesh import EncodedMesh, decode_base, encode_base
+from gvpipe.connectivity.seams import decode_copies, encode_copies
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.cursor import Cursor, varint
+from gvpipe.mesh.topology import adjacency
+from gvpipe.mesh.unique_rows import smallest_first
+from gvpipe.sequence import Int32
+
+Ints = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class PointMesh:
+    """A mesh and its points, numbered as the coder walks over the surface.
+
+    Args:
+        faces: ``(T, 3)`` triangles over V vertices.
+        point: ``(V,)`` the point of each vertex.
+        lattice: ``(P, 3)`` positions of the points, lattice units.
+        point_faces: ``(T, 3)`` the triangles over points.
+    """
+
+    faces: Int32
+    point: NDArray[np.int64]
+    lattice: Int32
+    point_faces: Int32
+
+    @cached_property
+    def members(self) -> NDArray[np.int64]:
+        """``(P,)`` the first vertex of each point."""
+        return np.asarray(np.unique(self.point, return_index=True)[1])
+
+    @cached_property
+    def neighbours(self) -> sparse.csr_array:
+        """The points' symmetric adjacency ``(P, P)``."""
+        return adjacency(self.point_faces, len(self.lattice))
+
+
+def encode_points(lattice: Ints, faces: Ints, points: Ints, reorder: bool) -> EncodedMesh:
+    """Code a mesh of ``points (V,)``, 0..P-1, at ``lattice (P, 3)`` with triangles ``faces (T, 3)`` over V vertices.
+
+    ``reorder`` lets the decoder see the codec's vertex order. Triangles may come back in another order, and rotated.
+    """
+    faces, points = faces.astype(np.int64), points.astype(np.int64)
+    base = encode_base(lattice, points[faces], reorder=True)
+    place = np.argsort(base.permutation)
+    point_faces = smallest_first(decode_base(base.mesh, b"").faces.astype(np.int64))
+    coded = encode_copies(faces, place[points], point_faces, len(lattice), reorder)
+    mesh = varint(len(base.mesh)) + base.mesh + varint(len(coded.counts)) + coded.counts + coded.copies
+    return EncodedMesh(mesh, coded.order, coded.permutation)
+
+
+def decode_points(mesh: bytes, order: bytes) -> PointMesh:
+    """Mirror of `encode_points`. Raises CorruptFile for anything malformed."""
+    cursor = Cursor(mesh, "mesh")
+    base = decode_base(cursor.take(cursor.varint(cursor.left, "a length")), b"")
+    point_faces = smallest_first(base.faces.astype(np.int64))
+    counts = cursor.take(cursor.varint(cursor.left, "a length"))
+    faces, point = decode_copies(counts, cursor.rest(), order, point_faces, len(base.points))
+    return PointMesh(faces.astype(np.int32), point, base.points, point_faces.astype(np.int32))
+
+
+def read_points(bitstream: Bitstream) -> PointMesh:
+    """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
+    mesh = decode_points(bitstream.section("mesh"), bitstream.section("order"))
+    bitstream.check_size(len(mesh.point), len(mesh.faces))
+    return mesh

@@ -1,0 +1,231 @@
+"""Bitstream to MP4 file and back. Knows MP4 boxes, no codec.
+
+The file is the video as any player opens it, plus one ``uuid`` box with the payload after everything else, where
+players skip it and no sample offset moves, plus one short metadata tag. The tag survives remuxing and the box does not: so
+a file that lost its box says so. The tag is a comment, because FFmpeg drops names that it does not know unless told to
+keep them. The payload repeats the tag's content id and holds a checksum of the video's samples, so that a box or a video
+from another file is noticed::
+
+    tag     = "comment" -> "gvpipe <container version> <content id>"
+    box     = [u32 big-endian] size, "uuid", [16 bytes] UUID, payload     (64-bit size form above 4 GiB)
+    content id = first 16 bytes, in hex, of the SHA-256 over the codec's sections in order
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import struct
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import IO, Any
+from uuid import UUID
+
+from gvpipe.atomic import atomic_path
+from gvpipe.container.bitstream import VERSION, Bitstream, pack_payload, unpack_payload
+from gvpipe.errors import CorruptFile, InputError, NewerVersion, NotGeometryVideo, StrippedFile, TruncatedFile
+
+BOX_UUID = UUID("6a1f0c52-3d7b-4e0e-9c55-67e4f0a7d1b9")
+TAG = "comment"
+TAG_PREFIX = "gvpipe "
+BOX = struct.Struct(">I4s")
+LARGE = struct.Struct(">Q")
+MAX_BOXES = 1 << 16
+AGAIN = "get the file again from its source"
+
+
+def write_file(bitstream: Bitstream, path: str | os.PathLike[str], check: Callable[[Bitstream], None] | None = None) -> int:
+    """Write ``bitstream`` as an MP4 file, all of it or nothing, and return its size in bytes.
+
+    Args:
+        bitstream: with its video.
+        path: of the file.
+        check: looks at what the finished file holds, before it takes its name; if it raises, nothing is left.
+
+    Raises:
+        OutputError: the file cannot be written; an older file of that name is left as it was.
+    """
+    video, box = _pack(bitstream)
+    with atomic_path(path) as temporary:
+        with open(temporary, "wb") as file:
+            file.write(video)
+            file.write(box)
+        if check is not None:
+            check(read_file(temporary))
+    return len(video) + len(box)
+
+
+def file_size(bitstream: Bitstream) -> int:
+    """Bytes of the file that `write_file` would write."""
+    return sum(map(len, _pack(bitstream)))
+
+
+def read_file(path: str | os.PathLike[str]) -> Bitstream:
+    """Read and check the bitstream of an MP4 file.
+
+    Raises:
+        InputError: there is no such file, or it cannot be read.
+        NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile: see `gvpipe.errors`.
+    """
+    path = Path(path)
+    try:
+        with open(path, "rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            return _read(file, size)
+    except (NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile) as exc:
+        raise type(exc)(f"{path}: {exc}") from exc
+    except IsADirectoryError as exc:
+        raise InputError(f"{path} is a folder; a geometry video (.mp4) is needed") from exc
+    except FileNotFoundError as exc:
+        raise InputError(f"{path}: no such file; check the path") from exc
+    except OSError as exc:
+        raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check its permissions") from exc
+
+
+def bytes_by_part(bitstream: Bitstream, size: int) -> dict[str, int]:
+    """Bytes of the codec's sections, of the video's samples and of everything else in a file of ``size`` bytes."""
+    parts = {name: len(data) for name, data in bitstream.sections.items()}
+    parts["video"] = _inspect(io.BytesIO(bitstream.video)).n_bytes
+    return {**parts, "container": size - sum(parts.values())}
+
+
+def _pack(bitstream: Bitstream) -> tuple[bytes, bytes]:
+    """The two parts of a file: the video with its tag, the box with the payload."""
+    identity = _content_id(bitstream)
+    payload = pack_payload(bitstream, {"id": identity, "video_crc32": _inspect(io.BytesIO(bitstream.video)).checksum})
+    return _remux(bitstream.video, f"{VERSION} {identity}"), _box(payload)
+
+
+def _read(file: IO[bytes], size: int) -> Bitstream:
+    video_end, payload_range = _find_payload(file, size)
+    file.seek(0)
+    video = file.read(video_end)
+    track = _inspect(io.BytesIO(video))
+    tag = track.tag
+    if payload_range is None:
+        if tag:
+            raise StrippedFile(f"its geometry was stripped, as remuxing or re-encoding does; {AGAIN}")
+        raise NotGeometryVideo("an MP4 file, but not one that gvpipe wrote; encode a sequence to make one")
+    version = tag.partition(" ")[0]
+    if version.isascii() and version.isdecimal() and len(version) < 10 and int(version) > VERSION:
+        raise NewerVersion(f"container version {version}, this gvpipe reads up to {VERSION}; upgrade gvpipe")
+    file.seek(payload_range[0])
+    bitstream, container = unpack_payload(file.read(payload_range[1] - payload_range[0]))
+    identity = _content_id(bitstream)
+    if container.get("id") != identity or (tag and tag.split()[-1] != identity):
+        raise CorruptFile(f"its geometry belongs to another file; {AGAIN}")
+    if container.get("video_crc32") != track.checksum:
+        raise CorruptFile(f"its video is damaged, or was re-encoded; {AGAIN}")
+    return replace(bitstream, video=video)
+
+
+def _find_payload(file: IO[bytes], size: int) -> tuple[int, tuple[int, int] | None]:
+    """Walk the top-level boxes: where the video ends, and the payload's range if there is one."""
+    position, found = 0, None
+    kinds: list[bytes] = []
+    while position < size:
+        file.seek(position)
+        head = file.read(BOX.size)
+        if position == 0 and head[4:8] != b"ftyp"[: max(0, len(head) - 4)]:
+            raise NotGeometryVideo("not an MP4 file; a geometry video (.mp4) is needed")
+        if len(head) < BOX.size:
+            if found:
+                raise CorruptFile(f"{len(head)} stray bytes follow its last box; {AGAIN}")
+            raise TruncatedFile(f"it ends inside a box header at byte {position}; {AGAIN}")
+        length, kind = BOX.unpack(head)
+        start = position + BOX.size
+        if length == 1:
+            large = file.read(LARGE.size)
+            length = LARGE.unpack(large)[0] if len(large) == LARGE.size else size + 1
+            start += LARGE.size
+        elif length == 0:
+            length = size - position
+        if position + length > size and kind.isalnum():
+            raise TruncatedFile(f"its {kind.decode('ascii')} box ends {position + length - size} bytes past its end; {AGAIN}")
+        if not kind.isalnum() or length < start - position or position + length > size or len(kinds) > MAX_BOXES:
+            raise CorruptFile(f"the box at byte {position} has an impossible size of {length}; {AGAIN}")
+        if kind == b"uuid":
+            file.seek(start)
+            if file.read(16) == BOX_UUID.bytes:
+                if found:
+                    raise CorruptFile(f"it holds two geometries; {AGAIN}")
+                found = (position, (start + 16, position + length))
+        kinds.append(kind)
+        position += length
+    if not kinds:
+        raise TruncatedFile(f"the file is empty; {AGAIN}")
+    for kind in (b"moov", b"mdat"):
+        if kind not in kinds:
+            raise TruncatedFile(f"its {kind.decode('ascii')} box is missing; {AGAIN}")
+    return (found[0], found[1]) if found else (size, None)
+
+
+def _box(payload: bytes) -> bytes:
+    size = BOX.size + 16 + len(payload)
+    if size < 1 << 32:
+        return BOX.pack(size, b"uuid") + BOX_UUID.bytes + payload
+    return BOX.pack(1, b"uuid") + LARGE.pack(size + LARGE.size) + BOX_UUID.bytes + payload
+
+
+def _content_id(bitstream: Bitstream) -> str:
+    digest = hashlib.sha256()
+    for name, data in bitstream.sections.items():
+        digest.update(name.encode() + b"\0" + struct.pack("<Q", len(data)) + data)
+    return digest.hexdigest()[:32]
+
+
+def _remux(video: bytes, tag: str) -> bytes:
+    """Copy the video's one track, unchanged, into a file that carries the tag and whose index comes first.
+
+    In memory, where the video is already: a file that PyAV writes itself stays open, and its disk space taken, if the
+    last write to it fails.
+    """
+    import av
+
+    options = {"movflags": "+faststart+use_metadata_tags", "fflags": "+bitexact"}
+    result = io.BytesIO()
+
+    def reopen(name: str, flags: int, more: dict[str, str]) -> IO[bytes]:
+        return io.BytesIO(result.getvalue())  # FFmpeg reads the file again to move the index to the front
+
+    with (
+        av.open(io.BytesIO(video), "r", format="mp4") as source,
+        av.open(result, "w", format="mp4", options=options, io_open=reopen) as target,
+    ):
+        target.metadata[TAG] = TAG_PREFIX + tag
+        track = source.streams.video[0]
+        copy = target.add_stream_from_template(track)
+        for packet in source.demux(track):
+            if packet.size:
+                packet.stream = copy
+                target.mux(packet)
+    return result.getvalue()
+
+
+@dataclass(frozen=True)
+class _Track:
+    """gvpipe's tag ("" if there is none), and the CRC-32 and size of the samples of the video tracks."""
+
+    tag: str
+    checksum: int
+    n_bytes: int
+
+
+def _inspect(video: IO[bytes]) -> _Track:
+    import av
+
+    checksum = n_bytes = 0
+    try:
+        with av.open(video, "r", format="mp4") as container:
+            comment = str(container.metadata.get(TAG, "")).strip()
+            tag = comment.removeprefix(TAG_PREFIX) if comment.startswith(TAG_PREFIX) else ""
+            tracks: list[Any] = list(container.streams.video)
+            for packet in container.demux(tracks) if tracks else ():
+                checksum = zlib.crc32(bytes(packet), checksum)
+                n_bytes += packet.size
+    except (av.FFmpegError, UnicodeDecodeError, ValueError) as exc:
+        raise CorruptFile(f"its video cannot be read ({exc}); {AGAIN}") from exc
+    return _Track(tag, checksum, n_bytes)

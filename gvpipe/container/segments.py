@@ -1,0 +1,46 @@
+"""Segments: the runs of frames that a codec codes apart from each other, so that each decodes alone.
+
+A header tells how many there are, and the quantisation step of each where a codec chooses it by segment; what it tells is
+checked against the number of frames here.
+"""
+
+from __future__ import annotations
+
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.errors import CorruptFile
+
+MAX_SEGMENT = 100_000  # frames
+SMALLEST_STEP, LARGEST_STEP = 2.0**-131, 2.0**129  # model units; no step of a float32 model lies beyond
+
+
+def count_segments(n_frames: int, most: int) -> int:
+    """How many segments of at most ``most`` frames a sequence needs."""
+    return -(-n_frames // most)
+
+
+def count_longest(n_frames: int, segments: int) -> int:
+    """Frames of the longest of so many segments."""
+    return -(-n_frames // segments)
+
+
+def segment_starts(n_frames: int, segments: int) -> list[int]:
+    """First frame of every segment, and F at the end: even cuts."""
+    return [s * n_frames // segments for s in range(segments + 1)]
+
+
+def cut(n_frames: int, longest: int, most: int) -> list[int]:
+    """First frame of every segment, and F: of at most ``longest`` frames, unless that takes more than ``most`` segments."""
+    return segment_starts(n_frames, min(count_segments(n_frames, longest), most))
+
+
+def read_segments(bitstream: Bitstream, most: int, key: str = "segments") -> int:
+    """How many segments a header tells of; raises `CorruptFile` if above ``most``, or if one is empty or too long."""
+    segments = bitstream.integer(key, 1, min(most, bitstream.n_frames))
+    if count_longest(bitstream.n_frames, segments) > MAX_SEGMENT:
+        raise CorruptFile(f"header: {bitstream.n_frames} frames in {segments} {key}; at most {MAX_SEGMENT} each are allowed")
+    return segments
+
+
+def read_steps(bitstream: Bitstream, segments: int) -> tuple[float, ...]:
+    """Quantisation step of each segment, model units; raises `CorruptFile` for values out of range."""
+    return tuple(map(float, bitstream.numbers("steps", segments, SMALLEST_STEP, LARGEST_STEP)))

@@ -1,0 +1,1 @@
+"""Entropy coding: integers to range-coded bytes and back."""

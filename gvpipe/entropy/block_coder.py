@@ -1,0 +1,160 @@
+"""Range coding of integers that come in blocks, each coded in the light of the blocks before it.
+
+What: one range-coded stream and one set of frequency tables for a sequence of blocks; a block's contexts may depend on anything
+decoded before, so the reader asks block by block and may stop early.
+Why: `gvpipe.entropy.integers` needs all contexts before the first value. Values are folded to tokens as there; a token's low
+bits go through the range coder too, right after their block, so that a prefix decodes without the rest::
+
+    stream = [varint] context count C, C tables, then 32-bit words to the end
+    table  = [varint] kind: 0 the context is empty; 1 two bytes follow, zero and ratio (`gvpipe.entropy.parametric_tables`);
+             N + 1: N x [varint] frequency (0..4096); whichever is shorter with what it codes
+    block  = tokens, context after context, each context's in order; then low bits in order, at most 16 at a time
+
+All models are tables of integers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.container.cursor import Cursor, varint
+from gvpipe.entropy import parametric_tables
+from gvpipe.entropy.integers import MAX_BITS, MAX_TOKENS, TABLE_TOTAL, model, tokenise
+
+CHUNK = 16  # low bits coded at a time
+PARAMETRIC = 1  # kind of a table told by two numbers
+
+Int64 = NDArray[np.int64]
+
+
+class BlockEncoder:
+    """Collects blocks; tables are known, and bytes made, when all are there."""
+
+    def __init__(self, n_contexts: int) -> None:
+        self._n_contexts = n_contexts
+        self._blocks: list[tuple[list[tuple[int, Int64]], Int64, Int64]] = []
+        self._counts = np.zeros((n_contexts, MAX_TOKENS), np.int64)
+
+    def add(self, values: NDArray[np.integer], contexts: NDArray[np.integer]) -> None:
+        """Append a block of ``values (n,)``, magnitude below 2**39, in ``contexts (n,)``, 0..C-1."""
+        tokens, low, n_low = tokenise(values.astype(np.int64))
+        groups = []
+        for context, where in _groups(contexts):
+            groups.append((context, tokens[where]))
+            self._counts[context] += np.bincount(tokens[where], minlength=MAX_TOKENS)
+        has_low = n_low > 0
+        self._blocks.append((groups, low[has_low], n_low[has_low]))
+
+    def finish(self) -> bytes:
+        """Return the stream of all blocks."""
+        import constriction
+
+        head, models = [varint(self._n_contexts)], []
+        for counts in self._counts:
+            described, table = _describe(counts)
+            head.append(described)
+            models.append(model(table) if len(table) > 1 else None)  # None: nothing to tell
+        coder = constriction.stream.queue.RangeEncoder()
+        for groups, low, n_low in self._blocks:
+            for context, tokens in groups:
+                if models[context] is not None:
+                    coder.encode(tokens.astype(np.int32), models[context])
+            for shift in range(0, MAX_BITS, CHUNK):
+                more = n_low > shift
+                if not more.any():
+                    break
+                sizes = 1 << np.minimum(n_low[more] - shift, CHUNK)
+                pieces = (low[more] >> shift) & (sizes - 1)
+                coder.encode(pieces.astype(np.int32), constriction.stream.model.Uniform(), sizes.astype(np.int32))
+        return b"".join([*head, coder.get_compressed().astype("<u4").tobytes()])
+
+
+class BlockDecoder:
+    """Mirror of `BlockEncoder`, as compiled loops: most blocks are small.
+
+    Attributes:
+        state, words, edges, sizes: what kernels need (`gvpipe.entropy.block_kernels`).
+
+    Raises:
+        CorruptFile: the stream's tables are not what the encoder writes.
+    """
+
+    def __init__(self, data: bytes, n_contexts: int, name: str) -> None:
+        from gvpipe.entropy import range_decoder
+
+        self._cursor = Cursor(data, name)
+        if self._cursor.varint(n_contexts, "the context count") != n_contexts:
+            raise self._cursor.corrupt("its context count does not fit its content")
+        tables = [self._table() for _ in range(n_contexts)]
+        self.sizes = np.array([len(table) for table in tables], np.int64)
+        self.edges = np.zeros((n_contexts, int(self.sizes.max(initial=0)) + 1), np.uint64)
+        for edges, table in zip(self.edges, tables, strict=True):
+            edges[: len(table) + 1] = range_decoder.edges_of(table)
+        if self._cursor.left % 4:
+            raise self._cursor.corrupt("its words are not whole")
+        self.words = self._cursor.array("<u4", self._cursor.left // 4).astype(np.uint32)
+        self.state = range_decoder.start(self.words)
+
+    def take(self, contexts: NDArray[np.integer]) -> Int64:
+        """Return the next block's values, ``(n,)``, for its ``contexts (n,)``; raises `CorruptFile` if they do not decode."""
+        from gvpipe.entropy.block_kernels import take_block
+
+        values = np.zeros(len(contexts), np.int64)
+        self.check(take_block(self.state, self.words, self.edges, self.sizes, contexts.astype(np.int64), values))
+        return values
+
+    def check(self, status: int) -> None:
+        """Raise `CorruptFile` if a kernel's status tells of an error."""
+        from gvpipe.entropy.block_kernels import NO_TABLE
+
+        if status == NO_TABLE:
+            raise self._cursor.corrupt("a context is used that has no table")
+        if status:
+            raise self._cursor.corrupt("its range-coded data do not decode")
+
+    def _table(self) -> Int64:
+        """The next context's frequencies; none if it is empty."""
+        kind = self._cursor.varint(MAX_TOKENS + 1, "a table's kind")
+        if kind == PARAMETRIC:
+            zero, ratio = self._cursor.take(2)
+            if ratio >= len(parametric_tables.RATIOS):
+                raise self._cursor.corrupt(f"a table has ratio {ratio}")
+            return parametric_tables.table(zero, ratio)
+        frequencies = [self._cursor.varint(TABLE_TOTAL, "a frequency") for _ in range(kind - 1)]
+        if frequencies and not frequencies[-1]:
+            raise self._cursor.corrupt("a frequency table ends in zero")
+        return np.array(frequencies, np.int64)
+
+    def end(self) -> None:
+        """Check that no word is left."""
+        from gvpipe.entropy import range_decoder
+
+        if not range_decoder.may_be_exhausted(self.state, self.words):
+            raise self._cursor.corrupt("range-coded data are left over")
+
+
+def _describe(counts: Int64) -> tuple[bytes, Int64]:
+    """Choose a context's table for tokens of these counts; return its bytes and its frequencies."""
+    if not counts.any():
+        return varint(0), np.zeros(0, np.int64)
+    size = int(np.flatnonzero(counts)[-1]) + 1
+    counts = counts[:size]
+    frequencies = np.where(counts > 0, np.maximum(1, counts * TABLE_TOTAL // int(counts.sum())), 0)
+    described = varint(size + 1) + b"".join(varint(int(f)) for f in frequencies)
+    if size < 2 or size > parametric_tables.N_TOKENS:
+        return described, frequencies
+    used = counts > 0
+    bits = -(counts[used] * np.log2(frequencies[used] / frequencies.sum())).sum() + 8 * len(described)
+    zero, ratio, bits_parametric = parametric_tables.best(np.pad(counts, (0, parametric_tables.N_TOKENS - size)))
+    if bits_parametric + 8 * 3 < bits:
+        return varint(PARAMETRIC) + bytes([zero, ratio]), parametric_tables.table(zero, ratio)
+    return described, frequencies
+
+
+def _groups(contexts: NDArray[np.integer]) -> list[tuple[int, NDArray[np.intp]]]:
+    """Contexts that occur, ascending, and the positions of each one's values, in order."""
+    order = np.argsort(contexts, kind="stable")
+    ordered = contexts[order]
+    bounds = np.flatnonzero(np.diff(ordered)) + 1
+    return [(int(contexts[part[0]]), part) for part in np.split(order, bounds)] if len(order) else []

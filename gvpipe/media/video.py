@@ -1,0 +1,379 @@
+"""Greyscale planes to a video track and back, by PyAV.
+
+Three profiles, each one luma picture per frame, chroma neutral:
+
+- ``h264-8``: H.264 High, yuv420p, limited range, samples 16..235: what a browser gives back bit by bit from a canvas;
+- ``h264-10``: H.264 High 10, yuv420p10, samples 64..940, for players in Python;
+- ``jpeg``: one greyscale JPEG per frame, samples 0..255, every frame a key frame.
+
+`write_film` and `hold_picture` make what people look at rather than data: films in colour and stills.
+
+A video is an MP4 file in memory with this one track. H.264 is coded in closed groups of pictures (GOPs), so that any frame
+costs at most its group. x264 runs on one thread because its output depends on their number.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from bisect import bisect_right
+from collections import deque
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.errors import CorruptFile
+from gvpipe.media.jpeg import decode_jpeg, encode_jpeg
+
+if TYPE_CHECKING:
+    import av
+
+B_FRAMES = 8  # between two others, at most
+AHEAD = 2  # groups of pictures decoded ahead of the reader
+MAX_SIDE = 16384  # pixels, of a picture that is read
+QP_RANGE = (1, 51)  # 0 would be lossless, which is another H.264 profile that browsers do not read
+# measured on chicken, cow and samba (docs/benchmarks.md): psycho-visual choices and the deblocking filter only cost here, since
+# blocks are separate charts; long pyramids of B-frames (`B_FRAMES`) suit residuals that change slowly; nothing moves in the
+# pictures, so neither partitions nor more references pay, and both cost decoding time
+X264 = {
+    "no-psy": 1,
+    "aq-mode": 0,
+    "no-deblock": 1,
+    "partitions": "none",
+    "ref": 1,
+    "b-adapt": 2,
+    "scenecut": 0,
+    "threads": 1,
+    "log-level": 0,
+}
+X264["8x8dct"] = 1  # makes the profile High with every preset, ultrafast too
+FILM = {"preset": "medium", "crf": "20"}  # of pictures that people look at
+
+Plane = NDArray[np.uint8] | NDArray[np.uint16]
+
+
+@dataclass(frozen=True)
+class Profile:
+    """How planes become pictures: sample depth and the levels that carry data."""
+
+    name: str
+    codec: str
+    pixel_format: str
+    depth: int
+    low: int
+    high: int
+
+    @property
+    def middle(self) -> int:
+        """The level of a zero: what H.264 predicts where it knows nothing, so that still blocks cost nothing."""
+        return 1 << (self.depth - 1)
+
+    @property
+    def amplitude(self) -> int:
+        """Levels on either side of the middle."""
+        return min(self.high - self.middle, self.middle - self.low)
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of a plane."""
+        return np.dtype(np.uint8 if self.depth == 8 else np.uint16)
+
+    def clip(self, samples: NDArray[np.integer]) -> NDArray[np.integer]:
+        """Samples as everyone takes them: coarse quantisers overshoot, and a browser's canvas clips to the limited range."""
+        clipped: NDArray[np.integer] = np.clip(samples, self.low, self.high)
+        return clipped
+
+    @property
+    def offsets(self) -> NDArray[np.float64]:
+        """Levels above the middle of every value that a sample's dtype can hold, clipped."""
+        return self.clip(np.arange(np.iinfo(self.dtype).max + 1)).astype(np.float64) - self.middle
+
+
+PROFILES = {
+    p.name: p
+    for p in (
+        Profile("h264-8", "h264", "yuv420p", 8, 16, 235),
+        Profile("h264-10", "h264", "yuv420p10le", 10, 64, 940),
+        Profile("jpeg", "mjpeg", "gray", 8, 0, 255),
+    )
+}
+
+
+class VideoWriter:
+    """Codes planes one after the other; a context manager.
+
+    Args:
+        profile: one of `PROFILES`.
+        width, height: of a plane, pixels, even.
+        fps: frames per second.
+        quality: H.264: the quantisation parameter, 1..51 (10 bit: 1..63); JPEG: the quantisation step, 1..255 levels.
+        gop: H.264: frames per group of pictures.
+        preset: x264's.
+        b_frames: H.264: pictures predicted from both sides between two others, at most. They take fewer bits, but every
+            picture of the file then takes 8 bytes more in its tables.
+    """
+
+    def __init__(
+        self,
+        profile: Profile,
+        width: int,
+        height: int,
+        fps: float,
+        quality: int,
+        gop: int = 32,
+        preset: str = "slow",
+        b_frames: int = B_FRAMES,
+    ) -> None:
+        import av
+
+        self._profile, self._shape, self._quality = profile, (height, width), quality
+        self._count = 0
+        self._file = io.BytesIO()
+        self._container = av.open(self._file, "w", format="mp4", options={"fflags": "+bitexact"})
+        rate = Fraction(fps).limit_denominator(1001) or Fraction(1, 1001)
+        self._time_base = 1 / rate
+        if profile.codec == "mjpeg":
+            self._stream: Any = self._container.add_mux_stream("mjpeg", rate, width=width, height=height)
+            self._stream.time_base = self._time_base
+            return
+        self._stream = self._container.add_stream("libx264", rate, options=x264_options(quality, gop, preset, b_frames))
+        self._stream.width, self._stream.height = width, height
+        self._stream.pix_fmt = profile.pixel_format
+        context = self._stream.codec_context
+        context.time_base = self._time_base
+        context.color_range = 1  # limited
+        context.colorspace = context.color_primaries = context.color_trc = 1  # BT.709, so that no player guesses
+        self._plain = _Plain(self._stream)
+
+    def add(self, plane: Plane) -> None:
+        """Append one ``(height, width)`` plane of the profile's dtype."""
+        if plane.shape != self._shape or plane.dtype != self._profile.dtype:
+            raise ValueError(f"a plane of {plane.shape} {plane.dtype}; {self._shape} {self._profile.dtype} is needed")
+        if self._profile.codec == "mjpeg":
+            self._container.mux(self._jpeg_packet(plane))
+        else:
+            self._container.mux(self._plain(self._stream.encode(self._picture(plane))))
+        self._count += 1
+
+    def finish(self) -> bytes:
+        """Return the finished MP4 file."""
+        if self._profile.codec != "mjpeg":
+            self._container.mux(self._plain(self._stream.encode(None)))
+        self._container.close()
+        return self._file.getvalue()
+
+    def __enter__(self) -> VideoWriter:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._container.close()
+
+    def _jpeg_packet(self, plane: Plane) -> av.Packet[Any]:
+        import av
+
+        packet = av.Packet(encode_jpeg(np.ascontiguousarray(plane, np.uint8), self._quality))
+        packet.stream = self._stream
+        packet.time_base = self._time_base
+        packet.pts = packet.dts = self._count
+        packet.duration = 1
+        packet.is_keyframe = True
+        return packet
+
+    def _picture(self, plane: Plane) -> av.VideoFrame:
+        import av
+
+        height, width = self._shape
+        neutral = np.full((height // 2, width), 1 << (self._profile.depth - 1), plane.dtype)
+        picture = av.VideoFrame.from_ndarray(np.concatenate([plane, neutral]), format=self._profile.pixel_format)
+        picture.pts, picture.time_base = self._count, self._time_base
+        return picture
+
+
+class VideoReader:
+    """Random access to the planes of a video; decodes no more than the group of pictures that a frame lies in.
+
+    Args:
+        data: an MP4 file.
+        profile: that it was written with.
+        width, height: of a plane.
+
+    Raises:
+        CorruptFile: no such video track.
+    """
+
+    def __init__(self, data: bytes, profile: Profile, width: int, height: int) -> None:
+        self.profile, self.shape = profile, (height, width)
+        self._packets, self._extradata = _demux(data, profile, width, height)
+        starts = [i for i, packet in enumerate(self._packets) if packet.is_keyframe]
+        if not starts or starts[0] != 0:
+            raise CorruptFile("the video does not start with a key frame; get the file again from its source")
+        self._groups = list(zip(starts, [*starts[1:], len(self._packets)], strict=True))
+        self._cached: tuple[int, list[Plane]] = (-1, [])
+        self._pool = ThreadPoolExecutor(AHEAD)
+
+    @property
+    def n_frames(self) -> int:
+        """Frames in the track."""
+        return len(self._packets)
+
+    def group(self, frame: int) -> tuple[int, int]:
+        """``(first, last + 1)`` of the group of pictures that a frame lies in."""
+        return self._groups[bisect_right(self._groups, (frame, self.n_frames)) - 1]
+
+    def read(self, start: int, stop: int) -> Iterator[tuple[int, list[Plane]]]:
+        """Yield ``(first frame, planes)`` for the frames ``start`` to ``stop``, one group of pictures at a time.
+
+        Planes are read-only and as the decoder left them: samples are yet to be clipped (`Profile.clip`), and lines may go on
+        beyond the plane's width.
+        Where several groups are asked for, decoding starts with the call and runs ahead of the iteration, on other threads.
+
+        Raises:
+            CorruptFile: while iterating: a group does not decode to its number of planes.
+        """
+        wanted = [g for g, (first, last) in enumerate(self._groups) if first < stop and last > start]
+        ahead = AHEAD if len(wanted) > 1 else 0
+        pending = deque(self._pool.submit(self._decode, group) for group in wanted[:ahead])
+        return self._collect(start, stop, wanted, pending)
+
+    def _collect(
+        self, start: int, stop: int, wanted: list[int], pending: deque[Future[list[Plane]]]
+    ) -> Iterator[tuple[int, list[Plane]]]:
+        ahead = len(pending)
+        for i, group in enumerate(wanted):
+            planes = pending.popleft().result() if ahead else self._decode(group)
+            if ahead and i + ahead < len(wanted):
+                pending.append(self._pool.submit(self._decode, wanted[i + ahead]))
+            first, last = self._groups[group]
+            low, high = max(start, first), min(stop, last)
+            yield low, planes[low - first : high - first]
+
+    def _decode(self, group: int) -> list[Plane]:
+        number, planes = self._cached
+        if number != group:
+            first, last = self._groups[group]
+            packets = self._packets[first:last]
+            if self.profile.codec == "mjpeg":
+                planes = [decode_jpeg(bytes(packet), *self.shape) for packet in packets]
+            else:
+                planes = self._decode_h264(packets)
+            self._cached = (group, planes)
+        return planes
+
+    def _decode_h264(self, packets: list[av.Packet[Any]]) -> list[Plane]:
+        import av
+
+        decoder = av.CodecContext.create("h264", "r")
+        decoder.extradata = self._extradata
+        decoder.thread_count = 1
+        try:
+            pictures: list[Any] = []
+            for packet in packets:
+                pictures += decoder.decode(av.Packet(bytes(packet)))
+            pictures += decoder.decode(None)
+        except av.FFmpegError as exc:
+            raise CorruptFile(f"the video does not decode ({exc}); get the file again from its source") from exc
+        wanted = (self.profile.pixel_format, *self.shape)
+        if len(pictures) != len(packets) or any((p.format.name, p.height, p.width) != wanted for p in pictures):
+            raise CorruptFile("the video does not decode to the pictures that the header tells of; get the file again")
+        return [self._luma(picture) for picture in pictures]
+
+    def _luma(self, picture: Any) -> Plane:
+        height = self.shape[0]
+        plane = picture.planes[0]
+        rows = np.frombuffer(plane, self.profile.dtype).reshape(-1, plane.line_size // self.profile.dtype.itemsize)
+        return rows[:height]  # the decoder's own memory: a copy costs half as much as decoding
+
+
+def write_film(path: Path, pictures: Iterable[NDArray[np.uint8]], fps: float) -> None:
+    """Write an MP4 film of ``(height, width, 3)`` sRGB pictures with even sides; x264 codes them for the eye."""
+    import av
+
+    rate = Fraction(fps).limit_denominator(1001) or Fraction(1, 1001)
+    with av.open(os.fspath(path), "w", format="mp4", options={"fflags": "+bitexact", "movflags": "+faststart"}) as container:
+        stream = container.add_stream("libx264", rate, options={**FILM, "x264-params": "threads=1:log-level=0"})
+        stream.pix_fmt = "yuv420p"
+        context = stream.codec_context
+        context.time_base = 1 / rate
+        context.color_range = 1  # limited
+        context.colorspace = context.color_primaries = 1  # BT.709
+        context.color_trc = 13  # sRGB
+        for k, picture in enumerate(pictures):
+            if k == 0:
+                stream.height, stream.width = picture.shape[:2]
+            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+            frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+            frame.pts, frame.time_base = k, 1 / rate
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+
+
+def hold_picture(plane: NDArray[np.uint8], fps: float, n_frames: int, quality: int) -> bytes:
+    """Return an MP4 file of one ``h264-8`` plane with even sides that lasts ``n_frames``."""
+    import av
+
+    profile, rate = PROFILES["h264-8"], Fraction(fps).limit_denominator(1001) or Fraction(1, 1001)
+    height, width = plane.shape
+    neutral = np.full((height // 2, width), profile.middle, np.uint8)
+    file = io.BytesIO()
+    with av.open(file, "w", format="mp4", options={"fflags": "+bitexact"}) as container:
+        stream = container.add_stream("libx264", rate, options=x264_options(quality, 1, "slow"))
+        stream.width, stream.height, stream.pix_fmt = width, height, profile.pixel_format
+        stream.codec_context.time_base = 1 / rate
+        picture = av.VideoFrame.from_ndarray(np.concatenate([plane, neutral]), format=profile.pixel_format)
+        picture.pts, picture.time_base = 0, 1 / rate
+        for packet in _Plain(stream)([*stream.encode(picture), *stream.encode(None)]):
+            packet.duration = n_frames
+            container.mux(packet)
+    return file.getvalue()
+
+
+class _Plain:
+    """Takes out what decoders do not need: x264 tells all of its options in the first picture, 0.6 KB."""
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+        self._filter: Any = None
+
+    def __call__(self, packets: Iterable[av.Packet[Any]]) -> list[av.Packet[Any]]:
+        import av
+
+        result: list[av.Packet[Any]] = []
+        for packet in packets:
+            if self._filter is None:  # not before x264 has made the stream's parameters
+                self._filter = av.BitStreamFilterContext("filter_units=remove_types=6", self._stream)
+            result += self._filter.filter(packet)
+        for packet in result:
+            packet.stream = self._stream
+        return result
+
+
+def x264_options(quality: int, gop: int, preset: str, b_frames: int = B_FRAMES) -> dict[str, str]:
+    """Options of PyAV's ``libx264``: a quantisation parameter, frames per group of pictures, preset, and B-frames in a row."""
+    settings = {"qp": quality, "keyint": gop, "min-keyint": gop, "bframes": b_frames, **X264}
+    return {"preset": preset, "x264-params": ":".join(f"{key}={value}" for key, value in settings.items())}
+
+
+def _demux(data: bytes, profile: Profile, width: int, height: int) -> tuple[list[av.Packet[Any]], bytes | None]:
+    import av
+
+    try:
+        with av.open(io.BytesIO(data), "r", format="mp4") as container:
+            if len(container.streams.video) != 1:
+                raise CorruptFile(f"the file has {len(container.streams.video)} video tracks; one is needed")
+            stream = container.streams.video[0]
+            context = stream.codec_context
+            if context is None:
+                raise CorruptFile("the video is of no known kind; get the file again from its source")
+            found = (context.name, context.width, context.height)
+            if found != (profile.codec, width, height) or max(width, height) > MAX_SIDE:
+                raise CorruptFile(f"the video is {found}; {(profile.codec, width, height)} is needed")
+            return [packet for packet in container.demux(stream) if packet.size], context.extradata
+    except (av.FFmpegError, IndexError, ValueError) as exc:
+        raise CorruptFile(f"the video track cannot be read ({exc}); get the file again from its source") from exc

@@ -1,0 +1,1 @@
+"""Triangles and what follows from them: adjacency, vertex hierarchy, traversal, lattice."""

@@ -1,0 +1,60 @@
+"""Vertex adjacency and what follows from it: k-rings, connected components.
+
+Everything is a sparse matrix or an array over all vertices at once; a *k-ring* of a vertex is every vertex that a path of
+at most k edges reaches, the vertex itself included.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from gvpipe.mesh.unique_rows import row_ids
+from gvpipe.sequence import Int32
+
+
+def unique_edges(faces: Int32) -> Int32:
+    """Return ``(E, 2)`` sorted vertex pairs, each once; collapsed sides of degenerate triangles are no edges."""
+    pairs = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    keys = np.sort(pairs[:, 0].astype(np.int64) << 32 | pairs[:, 1])  # far faster than np.unique
+    keys = keys[np.diff(keys, prepend=-1) > 0]
+    return np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1).astype(faces.dtype)
+
+
+def adjacency(faces: Int32, n_vertices: int) -> sparse.csr_array:
+    """Return the symmetric ``(V, V)`` vertex adjacency of ``faces (T, 3)``, entries 1, diagonal empty."""
+    edges = unique_edges(faces)
+    rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
+    return sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n_vertices, n_vertices))
+
+
+def k_ring(neighbours: sparse.csr_array, k: int) -> sparse.csr_array:
+    """Return the ``(V, V)`` matrix whose row v holds 1 for every vertex of v's k-ring, v included."""
+    one_ring = neighbours + sparse.eye_array(neighbours.shape[0], format="csr")
+    ring = one_ring
+    for _ in range(k - 1):
+        ring = sparse.csr_array(ring @ one_ring)
+        ring.data[:] = 1.0
+    return sparse.csr_array(ring)
+
+
+def components(neighbours: sparse.csr_array) -> tuple[int, NDArray[np.int32]]:
+    """Return the number of connected components and each vertex's component ``(V,)``."""
+    count, labels = csgraph.connected_components(neighbours, directed=False)
+    return int(count), labels
+
+
+def weld(points: NDArray[np.generic]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Find equal rows of ``points (V, n)``: files often split a surface's vertices at seams, or store every triangle alone.
+
+    Returns:
+        ``(P,)`` the first vertex of each distinct point and ``(V,)`` the point of each vertex.
+    """
+    if points.dtype.kind == "i":
+        found, first = row_ids(points)
+        return first, found
+    _, first, inverse = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    return first, inverse.ravel()

@@ -1,0 +1,1 @@
+"""Error measures between a reference sequence and a decoded one."""

@@ -1,0 +1,126 @@
+"""How far a distorted sequence is from its reference, in the measures that the field reports.
+
+`compare` walks both sequences once, a block of frames at a time, so that neither needs to fit in memory. Formulas,
+units, sources and limits of every number are in ``docs/metrics.md``; STED is in `gvpipe.metrics.sted`, the surface distance
+in `gvpipe.metrics.hausdorff`.
+
+Sources: Z. Karni and C. Gotsman, Compression of soft-body animation sequences, 2004 (``kg``); M. Sattler, R. Sarlette
+and R. Klein, Simple and efficient compression of animation sequences, 2005 (``da``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.arguments import show
+from gvpipe.errors import InputError
+from gvpipe.mesh.topology import unique_edges
+from gvpipe.metrics.correspondence import canonical_triangles, match_vertices
+from gvpipe.metrics.hausdorff import Hausdorff
+from gvpipe.metrics.sted import Sted
+from gvpipe.metrics.vertex_errors import BLOCK_BYTES, VertexErrors, frame_diagonal, ratio
+from gvpipe.sequence import MeshSequence
+
+Float64 = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The distances between two sequences; ``None`` where a quotient has no meaning (see `docs/metrics.md`).
+
+    Model units: ``rmse``, ``max``, ``hausdorff`` and both values per frame. Fractions of the reference's frame-0
+    bounding-box diagonal: ``rmse_diag``, ``max_diag``. Percent: ``kg`` and ``da``. Without unit: the ``sted`` values.
+    """
+
+    rmse: float
+    rmse_diag: float | None
+    max: float
+    max_diag: float | None
+    kg: float | None
+    da: float | None
+    sted: float | None
+    sted_spatial: float | None
+    sted_temporal: float | None
+    hausdorff: float | None
+    frames: list[dict[str, float]]
+
+    def to_json(self) -> dict[str, object]:
+        """The same values under the same names, ready for `json.dumps`; what is not defined is ``null``."""
+        return asdict(self)
+
+
+def compare(reference: MeshSequence, distorted: MeshSequence, progress: Progress | None = None) -> Comparison:
+    """Measure ``distorted`` against ``reference``, vertex by vertex, frame by frame.
+
+    Args:
+        reference: the original; lengths are divided by its size.
+        distorted: as many frames and vertices, the same triangles in any order.
+        progress: called with (frames done, frames in all) after each block.
+
+    Raises:
+        InputError: the two differ in their number of frames or vertices or in their triangles, so that no vertex of
+            one answers to a vertex of the other.
+    """
+    for role, given in (("reference", reference), ("distorted", distorted)):
+        if not isinstance(given, MeshSequence):
+            raise TypeError(f"compare's {role} is {show(given)}; a MeshSequence is needed, such as gvpipe.read(path)")
+    distorted = aligned(reference, distorted)
+    n_frames = reference.n_frames
+    edges = unique_edges(reference.faces)
+    diagonal = frame_diagonal(reference)
+    sted = Sted(edges, reference.n_vertices, diagonal)
+    hausdorff = Hausdorff(reference.faces, edges, reference.n_vertices)
+    errors = VertexErrors()
+    step = max(1, BLOCK_BYTES // (24 * reference.n_vertices))
+    apart = distorted.origin - reference.origin
+    for first, chunk in reference.exact_chunks():
+        other = distorted.read_exact(first, first + len(chunk)) + apart
+        for start in range(0, len(chunk), step):
+            a, b = chunk[start : start + step], other[start : start + step]  # (n, V, 3), n frames
+            distance = np.linalg.norm(a - b, axis=2)  # (n, V)
+            errors.add(a, distance)
+            sted.add(a, b)
+            hausdorff.add(a, b, distance)
+            if progress is not None:
+                progress(first + start + len(a), n_frames)
+    found = errors.result(diagonal)
+    spatial, temporal = sted.spatial(), sted.temporal()
+    return Comparison(
+        **asdict(found),
+        da=ratio(100 * errors.mean.mean(), diagonal),
+        sted=sted.combined(),
+        sted_spatial=spatial,
+        sted_temporal=temporal,
+        hausdorff=hausdorff.result(),
+        frames=[{"rmse": float(r), "max": float(m)} for r, m in zip(errors.rmse, errors.largest, strict=True)],
+    )
+
+
+def aligned(reference: MeshSequence, distorted: MeshSequence) -> MeshSequence:
+    """Return ``distorted`` in the reference's vertex order, or raise `InputError` if the two do not belong together."""
+    counts = (
+        ("frames", reference.n_frames, distorted.n_frames),
+        ("vertices", reference.n_vertices, distorted.n_vertices),
+        ("triangles", len(reference.faces), len(distorted.faces)),
+    )
+    for what, ours, theirs in counts:
+        if ours != theirs:
+            raise InputError(
+                f"{reference.name} has {ours} {what}, {distorted.name} has {theirs}; equal numbers are needed, since "
+                "vertices are compared by index"
+            )
+    if np.array_equal(canonical_triangles(reference.faces), canonical_triangles(distorted.faces)):
+        return distorted
+    pairing = match_vertices(reference, distorted)
+    if pairing is None:
+        raise InputError(
+            f"{reference.name} and {distorted.name} both have {reference.n_vertices} vertices and "
+            f"{len(reference.faces)} triangles, but not the same triangles, in whatever vertex order; compare a sequence with "
+            "what was made from it"
+        )
+    return distorted.reordered(np.argsort(pairing), reference.faces)

@@ -1,0 +1,132 @@
+"""How far vertices are from where they were: root mean square, largest, and Karni-Gotsman error.
+
+The part of `gvpipe.metrics.comparison` that rate control needs too. Formulas, units and limits are in ``docs/metrics.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.sequence import Float32, MeshSequence
+
+BLOCK_BYTES = 4 << 20  # float64 positions of one side worked on at a time: the temporaries of a block stay in cache
+
+LEAST_SPREAD = 1e-3  # of the largest coordinate, for a sequence of one point
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Errors:
+    """``rmse`` and ``max`` in model units, ``_diag`` as parts of frame 0's diagonal, ``kg`` in percent; None: no meaning."""
+
+    rmse: float
+    rmse_diag: float | None
+    max: float
+    max_diag: float | None
+    kg: float | None
+
+
+class VertexErrors:
+    """Sums over blocks of frames: per-frame values, and the two Frobenius norms of the Karni-Gotsman error."""
+
+    def __init__(self) -> None:
+        self._rmse: list[Float64] = []  # each (n,), model units
+        self._mean: list[Float64] = []
+        self._largest: list[Float64] = []
+        self._squared_error = 0.0
+        self._squared_spread = 0.0
+
+    def add(self, a: Float64, distance: Float64) -> None:
+        """Take frames ``a (n, V, 3)`` of the reference and their vertices' distances ``(n, V)``, model units."""
+        squared = np.einsum("fv,fv->f", distance, distance)
+        self._rmse.append(np.sqrt(squared / distance.shape[1]))
+        self._mean.append(distance.mean(axis=1))
+        self._largest.append(distance.max(axis=1))
+        self._squared_error += float(squared.sum())
+        centred = a - a.mean(axis=1, keepdims=True)
+        self._squared_spread += float(np.einsum("fvc,fvc->", centred, centred))
+
+    @property
+    def rmse(self) -> Float64:
+        """Root mean square distance of each frame ``(F,)``."""
+        return np.concatenate(self._rmse)
+
+    @property
+    def mean(self) -> Float64:
+        """Mean distance of each frame ``(F,)``."""
+        return np.concatenate(self._mean)
+
+    @property
+    def largest(self) -> Float64:
+        """Largest distance of each frame ``(F,)``."""
+        return np.concatenate(self._largest)
+
+    def result(self, diagonal: float) -> Errors:
+        """The errors over all frames; ``diagonal`` is that of the reference's frame 0."""
+        rmse, largest = float(self.rmse.mean()), float(self.largest.max())
+        kg = ratio(100 * math.sqrt(self._squared_error), math.sqrt(self._squared_spread))
+        return Errors(rmse, ratio(rmse, diagonal), largest, ratio(largest, diagonal), kg)
+
+
+def measure_errors(reference: MeshSequence, read: Callable[[int, int], Float32]) -> Errors:
+    """Errors of the frames that ``read(start, stop)`` returns, relative to the reference's origin, frame by frame."""
+    errors = VertexErrors()
+    step = max(1, BLOCK_BYTES // (24 * reference.n_vertices))
+    for first, chunk in reference.exact_chunks():
+        other = read(first, first + len(chunk))
+        for start in range(0, len(chunk), step):
+            a = chunk[start : start + step]
+            errors.add(a, np.linalg.norm(a - other[start : start + step], axis=2))
+    return errors.result(frame_diagonal(reference))
+
+
+class Spread:
+    """Root mean square distance, model units, of vertices from their frame's centre, over blocks of frames.
+
+    Of one vertex, or vertices at one place: of all frames' from their centre, or a part of the coordinates if none moves.
+    """
+
+    def __init__(self) -> None:
+        self._squared, self._largest, self._n_positions = 0.0, 0.0, 0
+        self._centres: list[Float64] = []  # each (n, 3)
+
+    def add(self, block: Float32) -> None:
+        """Take frames ``block (n, V, 3)``."""
+        frames = block.astype(np.float64)
+        self._centres.append(frames.mean(axis=1))
+        self._squared += float(np.square(frames - self._centres[-1][:, None]).sum())
+        self._largest = max(self._largest, float(np.abs(block).max()))
+        self._n_positions += block.shape[0] * block.shape[1]
+
+    @property
+    def value(self) -> float:
+        """The spread; above 0."""
+        path = np.concatenate(self._centres)
+        moved = float(np.sqrt(np.square(path - path.mean(axis=0)).sum(axis=1).mean()))
+        return math.sqrt(self._squared / self._n_positions) or moved or self._largest * LEAST_SPREAD or 1.0
+
+
+def measure_spread(sequence: MeshSequence) -> float:
+    """The spread of a sequence, model units (`Spread`)."""
+    spread = Spread()
+    for _, block in sequence.chunks():
+        spread.add(block)
+    return spread.value
+
+
+def frame_diagonal(reference: MeshSequence) -> float:
+    """Diagonal of frame 0's bounding box, model units."""
+    return float(np.linalg.norm(np.ptp(reference.read_exact(0, 1)[0], axis=0)))
+
+
+def ratio(value: float, size: float) -> float | None:
+    """``value / size``; against size 0 no error stays 0 and any other has no meaning."""
+    if size > 0:
+        return float(value / size)
+    return 0.0 if value == 0 else None

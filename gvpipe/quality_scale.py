@@ -1,0 +1,28 @@
+"""What quality means, for every codec: the Karni-Gotsman error that it aims at.
+
+=======  ====  ====  ====  =====  ====
+quality  25    50    75    90     100
+error    3.5   0.7   0.14  0.044  0.02
+=======  ====  ====  ====  =====  ====
+
+Errors in percent (`gvpipe.metrics.vertex_errors`). The logarithm falls evenly, by a factor of 5 in 25 up to quality 75, and of
+7 above.
+"""
+
+from __future__ import annotations
+
+import math
+
+MIDDLE, ERROR = 75.0, 0.14  # a quality and its error, percent
+BELOW, ABOVE = math.log(5) / 25, math.log(7) / 25  # fall of the logarithm per unit of quality
+
+
+def error_of(quality: float) -> float:
+    """The Karni-Gotsman error, percent, of a quality, 0..100."""
+    return ERROR * math.exp((MIDDLE - quality) * (BELOW if quality < MIDDLE else ABOVE))
+
+
+def quality_of(error: float) -> float:
+    """The quality, 0..100, that aims at a Karni-Gotsman error, percent, above 0."""
+    fall = math.log(ERROR / error)
+    return min(max(MIDDLE + fall / (BELOW if fall < 0 else ABOVE), 0.0), 100.0)

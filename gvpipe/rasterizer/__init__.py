@@ -1,0 +1,1 @@
+"""A software rasterizer: one mesh and a camera in, one picture out."""

@@ -1,0 +1,133 @@
+"""The painter: a mesh and a camera in, a picture out, on the CPU.
+
+A frame passes through four steps: corners are projected, a z-buffer finds the triangle of every sample, normals are summed in
+picture axes, and each pixel is shaded once for every triangle in it. The picture is cut in bands that threads paint beside
+each other; a pixel's value does not depend on the bands.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.errors import InputError
+from gvpipe.mesh.topology import weld
+from gvpipe.rasterizer.camera import Camera
+from gvpipe.rasterizer.colours import BACK, BACKGROUND, FRONT, error_colours, srgb_codes, to_linear
+from gvpipe.sequence import Float32, Int32
+
+SHADINGS = ("smooth", "flat")
+SIZE_RANGE = (16, 8192)  # pixels, of either side
+SAMPLES_RANGE = (1, 8)  # per pixel and axis
+THREADS = min(4, os.cpu_count() or 1)
+RAMP = 256  # steps of a colour map
+
+Picture = NDArray[np.uint8]
+
+
+class Renderer:
+    """Paints frames of one mesh. It keeps its buffers, so an instance serves one thread at a time.
+
+    Args:
+        faces: ``(T, 3) int32``, counter-clockwise seen from outside.
+        base: ``(V, 3)``, one frame; vertices at one point of it share a normal, so that seams do not show.
+        size: width and height, pixels, 16..8192.
+        shading: ``"smooth"`` or ``"flat"``.
+        samples: per pixel and axis, 1..8; 1 is quickest, 3 looks smooth.
+
+    Raises:
+        InputError: a value out of its range.
+    """
+
+    def __init__(
+        self, faces: Int32, base: Float32, size: tuple[int, int] = (512, 512), shading: str = "smooth", samples: int = 2
+    ) -> None:
+        if not all(SIZE_RANGE[0] <= side <= SIZE_RANGE[1] for side in size):
+            raise InputError(f"a picture of {size[0]}x{size[1]}; sides of {SIZE_RANGE[0]} to {SIZE_RANGE[1]} pixels can be")
+        if shading not in SHADINGS:
+            raise InputError(f"shading {shading!r}; {' or '.join(SHADINGS)} is needed")
+        if not SAMPLES_RANGE[0] <= samples <= SAMPLES_RANGE[1]:
+            raise InputError(f"{samples} samples per pixel and axis; {SAMPLES_RANGE[0]} to {SAMPLES_RANGE[1]} are possible")
+        self.size, self._samples, self._smooth = size, samples, shading == "smooth"
+        self._faces = np.ascontiguousarray(faces, np.int32)
+        first, point = weld(base) if self._smooth else (np.zeros(0, np.intp), np.zeros(len(base), np.intp))
+        self._points = point.astype(np.int32)[self._faces]
+        n_vertices, (width, height) = len(base), size
+        self._seen = np.zeros((n_vertices, 3))
+        self._snapped = np.zeros((n_vertices, 2), np.int64)
+        self._nearness = np.zeros(n_vertices)
+        self._of_faces, self._of_points = np.zeros((len(faces), 3)), np.zeros((len(first), 3))
+        self._depths = np.zeros((height * samples, width * samples), np.float32)
+        self._triangles = np.zeros(self._depths.shape, np.int32)
+        self._codes = srgb_codes()
+        self._front, self._back, self._background = to_linear(FRONT), to_linear(BACK), to_linear(BACKGROUND)
+        self._ramp = to_linear(error_colours(np.linspace(0, 1, RAMP)))
+        self._pool = ThreadPoolExecutor(THREADS)
+
+    def draw(self, positions: Float32, camera: Camera, values: NDArray[np.floating] | None = None) -> Picture:
+        """Return the picture ``(height, width, 3) uint8``, sRGB.
+
+        Args:
+            positions: ``(V, 3)``, model units.
+            values: ``(V,)`` in 0..1, shown in the colours of `gvpipe.rasterizer.colours.error_colours`.
+        """
+        from gvpipe.rasterizer.raster_kernels import rasterise
+        from gvpipe.rasterizer.shading_kernels import GLOSS, face_normals, shade, vertex_normals
+
+        self._project(positions, camera)
+        face_normals(self._faces, self._seen, self._of_faces)
+        if self._smooth:
+            vertex_normals(self._points, self._of_faces, self._of_points)
+        shown = np.zeros(0) if values is None else np.ascontiguousarray(values, np.float64)
+        width, height = self.size
+        picture = np.empty((height, width, 3), np.uint8)
+        samples = self._samples
+
+        def paint(top: int, bottom: int) -> None:
+            rasterise(
+                self._faces, self._snapped, self._nearness, top * samples, bottom * samples, self._depths, self._triangles
+            )
+            shade(
+                self._triangles, samples, top, bottom, self._faces, self._points, self._seen, self._snapped,
+                self._nearness, camera.distance, self._of_faces, self._of_points, self._smooth, shown, self._ramp,
+                0.0 if len(shown) else GLOSS, self._front, self._back, self._background, self._codes, picture,
+            )  # fmt: skip
+
+        self._in_bands(paint)
+        return picture
+
+    def visible(self, positions: Float32, camera: Camera) -> NDArray[np.int32]:
+        """Return the triangle that each sample sees, -1 for none: ``(height * samples, width * samples) int32``."""
+        from gvpipe.rasterizer.raster_kernels import rasterise
+
+        self._project(positions, camera)
+        samples = self._samples
+        self._in_bands(
+            lambda top, bottom: rasterise(
+                self._faces, self._snapped, self._nearness, top * samples, bottom * samples, self._depths, self._triangles
+            )
+        )
+        return self._triangles.copy()
+
+    def _project(self, positions: Float32, camera: Camera) -> None:
+        from gvpipe.rasterizer.raster_kernels import project
+
+        if positions.shape != self._seen.shape:
+            raise InputError(f"positions of shape {positions.shape}; {self._seen.shape} is needed")
+        width, height = (side * self._samples for side in self.size)
+        focal = height / 2 / np.tan(np.radians(camera.field_of_view) / 2)
+        project(
+            np.ascontiguousarray(positions, np.float32), np.ascontiguousarray(camera.rotation),
+            np.array(camera.target, np.float64), float(camera.distance), float(focal), width, height,
+            self._seen, self._snapped, self._nearness,
+        )  # fmt: skip
+
+    def _in_bands(self, paint: Callable[[int, int], None]) -> None:
+        # several bands per thread, since some are empty
+        edges = np.linspace(0, self.size[1], 2 * THREADS + 1 if THREADS > 1 else 2).round().astype(int).tolist()
+        list(self._pool.map(lambda band: paint(*band), pairwise(edges)))

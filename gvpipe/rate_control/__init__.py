@@ -1,0 +1,1 @@
+"""Rate control: the quality, and the codec, that meets a target."""

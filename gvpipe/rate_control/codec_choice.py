@@ -1,0 +1,101 @@
+"""The codec, with its settings, that meets a target with the smallest file.
+
+Every candidate first meets the target roughly on the sequence's first frames. The estimate for the whole: what all frames share
+as it is, what belongs to frames (sections named ``NAME.N``, the video) times as many, and more or less as the error is off.
+Those that promise about the smallest file then encode all frames, and the smallest file is kept; for a target in bits, the one
+with the smallest error. Estimates of one codec with several settings are wrong alike where the first frames tell little, so two
+codecs encode a longer sequence.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
+
+from gvpipe.codec import Codec, Progress
+from gvpipe.errors import InputError
+from gvpipe.quality_scale import error_of
+from gvpipe.rate_control.purposes import describe
+from gvpipe.rate_control.search import Choice, Target, meet
+from gvpipe.rate_control.trials import Trial
+from gvpipe.sequence import MeshSequence
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+SAMPLE = 100  # frames of an estimate
+ELASTICITY = 0.45  # bytes that belong to frames go with the error to about minus this power
+CLOSE = 1.08  # times the best estimate: another that may turn out smaller
+FEW = 2  # candidates that need no estimate
+MOST = 3  # candidates that encode all frames, where there are estimates
+
+
+def default_target(codecs: Sequence[Codec]) -> Target:
+    """Without another target: the KG error that the candidates' quality asks for."""
+    return Target("kg", error_of(max(codec.quality for codec in codecs)))
+
+
+def choose_codec(codecs: Sequence[Codec], sequence: MeshSequence, target: Target, progress: Progress | None = None) -> Choice:
+    """Encode with the candidates that promise most, and choose; ``tried`` holds the encodes of the whole sequence.
+
+    Raises:
+        InputError: no codec meets the target; the message tells why.
+    """
+    ranking, estimates, n_finalists = list(codecs), "", len(codecs)
+    if len(codecs) > FEW:
+        costs = sorted((_estimate(codec, sequence, target, progress) for codec in codecs), key=lambda item: item[0])
+        chosen = _finalists(costs, sequence.n_frames > SAMPLE)
+        ranking = [*chosen, *(codec for _, codec in costs if codec not in chosen)]
+        n_finalists = len(chosen)
+        unit = "KG" if target.measure == "bpvf" else "bytes"
+        estimates = f"; estimates ({unit}): {', '.join(f'{describe(codec)} {cost:.4g}' for cost, codec in costs)}"
+    finalists: list[Choice] = []
+    failures = []
+    for codec in ranking:
+        if len(finalists) < n_finalists:
+            try:
+                finalists.append(meet(target, codec, sequence, progress))
+            except InputError as exc:
+                failures.append(str(exc))
+    if not finalists:
+        raise InputError(f"no codec meets the target: {'; '.join(dict.fromkeys(failures))}")
+    best = min(finalists, key=lambda choice: _cost(choice.trial, target))
+    others = ", ".join(_describe(choice.trial) for choice in finalists if choice is not best)
+    beside = f"; beside it: {others or 'no other codec meets the target'}" if others or failures else ""
+    reason = f"{_describe(best.trial)}; {best.reason}{beside}{estimates}"
+    return Choice(best.trial, best.trials, [trial for choice in finalists for trial in choice.tried], reason)
+
+
+def _finalists(costs: list[tuple[float, Codec]], is_part: bool) -> list[Codec]:
+    """Candidates that are to encode all frames; estimates come sorted, of all frames or of a part of them."""
+    close = [codec for cost, codec in costs if cost <= CLOSE * costs[0][0]][:MOST]
+    rival = next((codec for _, codec in costs if codec.id != close[0].id), None)
+    if is_part and rival and rival not in close:
+        close = [*close[: MOST - 1], rival]
+    return close
+
+
+def _estimate(codec: Codec, sequence: MeshSequence, target: Target, progress: Progress | None) -> tuple[float, Codec]:
+    """What the codec would come to, infinity if it does not meet the target, and its settings with the quality that did."""
+    n_sample = min(SAMPLE, sequence.n_frames)
+    try:
+        trial = meet(target, codec, sequence.part(0, n_sample), progress, is_rough=True).trial
+    except InputError:
+        return float("inf"), codec
+    quality = trial.codec.quality
+    better = cast("Codec", dataclasses.replace(cast("DataclassInstance", codec), quality=quality))
+    if target.measure == "bpvf":
+        return _cost(trial, target) * (trial.bpvf / target.value) ** (1 / ELASTICITY), better
+    shared = sum(len(data) for name, data in trial.bitstream.sections.items() if not name[-1].isdigit())
+    off = 1.0 if target.measure == "max" else target.of(trial) / target.value
+    return shared + (trial.bytes - shared) * off**ELASTICITY * sequence.n_frames / n_sample, better
+
+
+def _cost(trial: Trial, target: Target) -> float:
+    """What is to be small: bytes, or the error that they buy."""
+    return (trial.errors.kg or 0.0) if target.measure == "bpvf" else float(trial.bytes)
+
+
+def _describe(trial: Trial) -> str:
+    return f"{describe(trial.codec)} {trial.bytes} bytes"

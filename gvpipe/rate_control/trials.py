@@ -1,0 +1,136 @@
+"""Encodes of one sequence at several qualities, each measured: the size of its whole file and the errors of its frames.
+
+The bitstream is decoded as any reader would, in memory. What does not depend on quality is worked out once
+(`gvpipe.codec.Memo`). Given a bound, every trial is corrected to keep it (`gvpipe.corrections.bound`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from gvpipe.codec import Codec, FrameReader, Memo, Progress, encode_sequence, open_reader
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.mp4 import file_size
+from gvpipe.corrections.bound import SECTION, Bound, encode_corrections
+from gvpipe.errors import InputError
+from gvpipe.metrics.vertex_errors import Errors, measure_errors
+from gvpipe.rendering.poster import poster_of
+from gvpipe.repeated_frames import HeldReader
+from gvpipe.sequence import MeshSequence
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One encode.
+
+    Args:
+        codec: with the quality tried.
+        bytes: of the whole file.
+        bpvf: the same in bits per vertex and frame.
+        errors: of the decoded frames.
+        bitstream: with its poster, ready to be written.
+    """
+
+    codec: Codec
+    bytes: int
+    bpvf: float
+    errors: Errors
+    bitstream: Bitstream
+
+    @property
+    def corrections(self) -> int:
+        """Bytes of the corrections."""
+        return len(self.bitstream.sections.get(SECTION, b""))
+
+    def to_json(self) -> dict[str, Any]:
+        """What was tried and what came of it, as JSON values."""
+        return {
+            "codec": self.codec.id,
+            "quality": self.codec.quality,
+            "bytes": self.bytes,
+            "bpvf": self.bpvf,
+            "rmse_diag": self.errors.rmse_diag,
+            "kg": self.errors.kg,
+            "max_diag": self.errors.max_diag,
+            "corrections": self.corrections,
+        }
+
+
+class Trials:
+    """Tries a codec's settings at one quality after the other.
+
+    Args:
+        codec: its settings; their quality counts for nothing.
+        sequence: to encode.
+        bound: largest distance of a vertex from where it was, model units; None: whatever the quality gives.
+        progress: told of the stages of every encode.
+    """
+
+    def __init__(
+        self, codec: Codec, sequence: MeshSequence, bound: float | None = None, progress: Progress | None = None
+    ) -> None:
+        self.codec = codec
+        self._sequence, self._bound, self._progress = sequence, bound, progress
+        self._memo = Memo()
+
+    def __call__(self, quality: float) -> Trial:
+        """Encode at a quality, and measure."""
+        memo, report = self._memo, self._progress or (lambda stage, done: None)
+        codec = cast("Codec", dataclasses.replace(cast("DataclassInstance", self.codec), quality=quality))
+        bitstream = encode_sequence(codec, self._sequence, self._progress, memo)
+        if not bitstream.video:
+            bitstream = dataclasses.replace(bitstream, video=memo("poster", lambda: poster_of(self._sequence)))
+        report("measure", 0.0)
+        reader = open_reader(bitstream)
+        reference = self._in_reader_order(reader)
+        if self._bound is None:
+            errors = measure_errors(reference, reader.read)
+        else:
+            bound = Bound.of(self._bound, memo("coordinate", lambda: _largest_coordinate(self._sequence)))
+            bitstream, errors = _correct(bitstream, reference, reader, bound)
+        size = file_size(bitstream)
+        report("measure", 1.0)
+        return Trial(codec, size, 8 * size / (bitstream.n_vertices * bitstream.n_frames), errors, bitstream)
+
+    def check(self, bitstream: Bitstream) -> None:
+        """Decode what a finished file holds, if there is a bound, and raise `InputError` if a vertex is out of it."""
+        if self._bound is None:
+            return
+        reader = open_reader(bitstream)
+        largest = measure_errors(self._in_reader_order(reader), reader.read).max
+        if not largest <= self._bound:
+            raise InputError(
+                f"a vertex of the finished file is {largest:g} off, {self._bound:g} were allowed; nothing was written; "
+                "please report it, and allow more meanwhile"
+            )
+
+    def _in_reader_order(self, reader: FrameReader) -> MeshSequence:
+        """The sequence with its vertices in the order of the reader's."""
+        sequence, permutation = self._sequence, self._memo.permutation
+        assert permutation is not None, "an encoder must tell its memo the permutation"
+        return sequence.reordered(permutation, reader.faces)
+
+
+def _correct(bitstream: Bitstream, reference: MeshSequence, reader: FrameReader, bound: Bound) -> tuple[Bitstream, Errors]:
+    """Add what corrections the bound needs; return the bitstream, and the errors that are left."""
+    if not isinstance(reader, HeldReader):
+        section, errors = encode_corrections(reference, reader, bound)
+        return _with(bitstream, section), errors
+    section, _ = encode_corrections(reader.holds.distinct(reference), reader.distinct, bound)  # repeated frames: once
+    bitstream = _with(bitstream, section)
+    return bitstream, measure_errors(reference, open_reader(bitstream).read)
+
+
+def _with(bitstream: Bitstream, section: bytes) -> Bitstream:
+    return dataclasses.replace(bitstream, sections={**bitstream.sections, SECTION: section}) if section else bitstream
+
+
+def _largest_coordinate(sequence: MeshSequence) -> float:
+    return max(float(np.abs(block).max()) for _, block in sequence.chunks())

@@ -1,0 +1,1 @@
+"""Trajectory coding: a principal basis, and coefficients predicted from causal neighbours."""

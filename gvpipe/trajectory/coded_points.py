@@ -1,0 +1,76 @@
+"""Sequences as trajectories: points that vertices share, their mesh and spread, and blocks of trajectories.
+
+Vertices with one trajectory (seams, triangle soups) are one point, coded once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.codec import Memo, Progress
+from gvpipe.connectivity.base_mesh import EncodedMesh
+from gvpipe.connectivity.topology_only import BareMesh, decode_mesh, encode_mesh
+from gvpipe.metrics.vertex_errors import Spread
+from gvpipe.quality_scale import error_of
+from gvpipe.sequence import MeshSequence
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CodedPoints:
+    """A sequence's mesh as it is coded, and the points whose trajectories are still to be.
+
+    Args:
+        coded: the mesh's sections.
+        mesh: as the decoder will have it.
+        members: ``(P,)`` a given vertex of each of the mesh's points.
+        spread: of the vertices, model units (`gvpipe.metrics.vertex_errors.Spread`).
+    """
+
+    coded: EncodedMesh
+    mesh: BareMesh
+    members: NDArray[np.int64]
+    spread: float
+
+    def aimed_error(self, quality: float) -> float:
+        """Root mean square error of a vertex, model units, that a quality asks for (`gvpipe.quality_scale`)."""
+        return self.spread * error_of(quality) / 100
+
+
+def code_points(sequence: MeshSequence, reorder: bool, memo: Memo, report: Progress) -> CodedPoints:
+    """Find a sequence's points and code its mesh; ``reorder`` lets the decoder see the codec's vertex order."""
+    report("read", 0)
+    points, spread = memo("survey", lambda: survey(sequence, report))
+    report("mesh", 0)
+    coded = memo("mesh", lambda: encode_mesh(sequence.faces, points, reorder))
+    memo.permutation = coded.permutation
+    mesh = decode_mesh(coded.mesh, coded.order, sequence.n_vertices)
+    _, first = np.unique(mesh.points, return_index=True)
+    return CodedPoints(coded, mesh, coded.permutation[first], spread)
+
+
+def survey(sequence: MeshSequence, report: Progress) -> tuple[NDArray[np.int64], float]:
+    """Points ``(V,)`` of vertices, equal where trajectories are, and the vertices' spread, model units."""
+    points = np.zeros(sequence.n_vertices, np.int64)
+    spread = Spread()
+    for first, block in sequence.chunks():
+        spread.add(block)
+        rows = np.ascontiguousarray((block + np.float32(0)).swapaxes(0, 1)).reshape(sequence.n_vertices, -1)  # no minus zero
+        _, ids = np.unique(rows.view(np.dtype((np.void, rows.shape[1] * 4))).ravel(), return_inverse=True)
+        _, points = np.unique(points * sequence.n_vertices + ids, return_inverse=True)
+        report("read", (first + len(block)) / sequence.n_frames)
+    _, first_vertex = np.unique(points, return_index=True)
+    points = np.argsort(np.argsort(first_vertex))[points]  # numbered as their first vertices are
+    return points.astype(np.int64), spread.value
+
+
+def read_trajectories(sequence: MeshSequence, start: int, stop: int, members: NDArray[np.int64]) -> Float64:
+    """Trajectories of the vertices ``members (P,)`` from frame ``start`` to ``stop``: ``(P, 3n)``, n frames, model units."""
+    result = np.empty((len(members), stop - start, 3))
+    for first, block in sequence.chunks(start, stop):
+        result[:, first - start : first - start + len(block)] = block[:, members].swapaxes(0, 1)
+    return result.reshape(len(members), -1)  # (P, n, 3) -> (P, 3n)

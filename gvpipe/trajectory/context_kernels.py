@@ -1,0 +1,144 @@
+"""The contexts of residuals, the same body in encoder and decoder, and decoding with them.
+
+Kernels of `gvpipe.trajectory.coefficient_coding`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.compiled import compiled
+from gvpipe.entropy.block_kernels import take_block
+from gvpipe.trajectory.coefficient_coding import (
+    FLOOR_NEAR,
+    FLOOR_SPAN,
+    HIGHEST,
+    LONG,
+    LOWEST,
+    N_NEAR,
+    ONE,
+    PER_OCTAVE,
+    POWER_ONE,
+    POWERS,
+    SHORT,
+    Surroundings,
+)
+
+Int64 = NDArray[np.int64]
+
+
+@compiled
+def _log(value: int, around: Surroundings) -> int:
+    """Logarithm to base two, in 1 / PER_OCTAVE, rounded down; of 0 as of 1/64."""
+    if 0 <= value < len(around.logs):
+        return int(around.logs[value])
+    x = 64 * max(value, 0) + 1
+    octave = 0
+    while x >> (octave + 1):
+        octave += 1
+    low, high = PER_OCTAVE * octave, PER_OCTAVE * octave + PER_OCTAVE - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if around.roots[middle] <= x:
+            low = middle
+        else:
+            high = middle - 1
+    return low - 6 * PER_OCTAVE
+
+
+@compiled
+def _find_contexts(
+    first: int,
+    end: int,
+    c: int,
+    residuals: Int64,
+    around: Surroundings,
+    before: Int64,
+    contexts: Int64,
+) -> None:
+    """Fill ``contexts (end - first,)`` of component c in the block of places ``first`` to ``end``.
+
+    Args:
+        residuals: ``(m, R)`` by place, known for the blocks before and for this block's components before c.
+        before: ``(R,)`` mean magnitudes of the block before, in 1 / ONE.
+    """
+    usual = around.usual
+    short_from, long_from = max(0, c - len(SHORT)), max(0, c - len(LONG))
+    usual_short = usual_long = 0
+    for k in range(long_from, c):
+        usual_long += usual[k] * LONG[c - 1 - k]
+        if k >= short_from:
+            usual_short += usual[k] * SHORT[c - 1 - k]
+    fixed = POWERS[0] * _log(usual[c], around) + POWERS[1] * _log(before[c], around)
+    fixed -= POWERS[3] * _log(usual_short + FLOOR_SPAN, around) + POWERS[4] * _log(usual_long + FLOOR_SPAN, around)
+    for i in range(first, end):
+        near = usual[c]
+        if first > 0:
+            count = min(around.rings[i], around.starts[i + 1] - around.starts[i], N_NEAR)
+            total = 0
+            for j in range(around.starts[i], around.starts[i] + count):
+                place = around.place[around.near[j]]
+                if place < first:
+                    total += ONE * abs(residuals[place, c])
+            near = total // max(count, 1)
+        short = long = 0
+        for k in range(long_from, c):
+            magnitude = ONE * abs(residuals[i, k])
+            long += magnitude * LONG[c - 1 - k]
+            if k >= short_from:
+                short += magnitude * SHORT[c - 1 - k]
+        forecast = fixed + POWERS[2] * _log(near + FLOOR_NEAR, around)
+        forecast += POWERS[3] * _log(short + FLOOR_SPAN, around) + POWERS[4] * _log(long + FLOOR_SPAN, around)
+        octaves = forecast // POWER_ONE - 6 * PER_OCTAVE  # ONE is six octaves
+        contexts[i - first] = min(max(octaves // (PER_OCTAVE // 2), LOWEST), HIGHEST) - LOWEST
+
+
+@compiled
+def _mean_magnitudes(residuals: Int64, first: int, end: int, means: Int64) -> None:
+    """Fill ``means (R,)`` of a block, in 1 / ONE, rounded up to one at least."""
+    for c in range(residuals.shape[1]):
+        total = 0
+        for i in range(first, end):
+            total += ONE * abs(residuals[i, c])
+        means[c] = total // max(1, end - first) + 1
+
+
+@compiled
+def find_all_contexts(residuals: Int64, around: Surroundings) -> Int64:
+    """``(m, R)`` contexts of residuals ``(m, R)`` by place that are all known."""
+    contexts = np.zeros(residuals.shape, np.int64)
+    own = np.zeros(len(residuals), np.int64)
+    before = around.usual.copy()
+    for b in range(len(around.blocks) - 1):
+        first, end = around.blocks[b], around.blocks[b + 1]
+        for c in range(residuals.shape[1]):
+            _find_contexts(first, end, c, residuals, around, before, own)
+            contexts[first:end, c] = own[: end - first]
+        _mean_magnitudes(residuals, first, end, before)
+    return contexts
+
+
+@compiled
+def decode_residuals(
+    residuals: Int64,
+    around: Surroundings,
+    state: NDArray[np.uint64],
+    words: NDArray[np.uint32],
+    edges: NDArray[np.uint64],
+    sizes: Int64,
+) -> int:
+    """Fill ``residuals (m, R)``, by place, block by block and component by component; returns what `take_block` returns, and
+    takes what it takes."""
+    own, values = np.zeros(len(residuals), np.int64), np.zeros(len(residuals), np.int64)
+    before = around.usual.copy()
+    for b in range(len(around.blocks) - 1):
+        first, end = around.blocks[b], around.blocks[b + 1]
+        for c in range(residuals.shape[1]):
+            _find_contexts(first, end, c, residuals, around, before, own)
+            status = take_block(state, words, edges, sizes, own[: end - first], values[: end - first])
+            if status:
+                return status
+            residuals[first:end, c] = values[: end - first]
+        _mean_magnitudes(residuals, first, end, before)
+    return 0

@@ -1,0 +1,57 @@
+"""Frames from a decoded basis and coefficients: each costs one product of a small matrix with the coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.errors import CorruptFile
+from gvpipe.sequence import Float32
+from gvpipe.trajectory.basis import Basis
+
+MAX_FLOAT32 = float(np.finfo(np.float32).max)
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A decoded segment: its basis, and the coefficients ``(R, P)`` of its points."""
+
+    basis: Basis
+    coefficients: Float64
+
+
+def read_frames(
+    start: int, stop: int, bounds: list[int], points: NDArray[np.integer], decode: Callable[[int], Segment]
+) -> Float32:
+    """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
+
+    Args:
+        start, stop: of all frames.
+        bounds: first frame of every segment, and F.
+        points: ``(V,)`` the point of each vertex.
+        decode: a segment by its number; asked for those alone that frames are in.
+
+    Raises:
+        CorruptFile: a position is not finite in float32, or a segment does not decode.
+    """
+    result = np.empty((stop - start, len(points), 3), np.float32)
+    buffer = np.empty((3, len(points)))
+    for s, (begin, end) in enumerate(pairwise(bounds)):
+        first, last = max(start, begin), min(stop, end)
+        if first >= last:
+            continue
+        segment = decode(s)
+        for frame in range(first, last):  # one by one, so that a frame's sums do not depend on what else is read
+            rows = slice(3 * (frame - begin), 3 * (frame - begin + 1))
+            placed = segment.basis.vectors[rows] @ segment.coefficients + segment.basis.mean[rows, None]  # (3, P)
+            np.take(placed, points, axis=1, out=buffer)
+            if not np.abs(buffer).max(initial=0) <= MAX_FLOAT32:
+                raise CorruptFile(f"frame {frame} does not decode to finite positions; get the file again from its source")
+            result[frame - start] = buffer.T
+    return result
