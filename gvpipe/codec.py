@@ -12,15 +12,13 @@ from collections.abc import Callable, Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, ClassVar, Protocol, Self, TypeVar, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gvpipe.arguments import did_you_mean
+from gvpipe.arrays import Float32, Int32, Integers
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.corrections.bound import correct
 from gvpipe.errors import NewerVersion, SettingError
 from gvpipe.repeated_frames import HeldReader, add_holds, find_holds, read_holds
-from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 GROUP = "gvpipe.codecs"
 
@@ -42,7 +40,7 @@ class Memo:
 
     def __init__(self) -> None:
         self._results: dict[str, Any] = {}
-        self.permutation: NDArray[np.integer] | None = None
+        self.permutation: Integers | None = None
 
     def __call__(self, stage: str, work: Callable[[], Result]) -> Result:
         """Return the stage's result, from before if there is one."""

@@ -14,7 +14,7 @@ from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 
 import numpy as np
 
-from gvpipe.sequence import Float32
+from gvpipe.arrays import Float32
 
 CACHE_BYTES = 64 << 20  # of decoded positions
 AHEAD_FRAMES = 8  # fetched ahead at least, in whole groups

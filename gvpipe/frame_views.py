@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64, Floats, Frames, Integers
 from gvpipe.origin import narrow, rounding
 
-if TYPE_CHECKING:
-    from gvpipe.sequence import Frames
-
-Float = NDArray[np.floating]
-Read = Callable[[int, int], Float]  # frames start..stop: (n, V, 3)
+Read = Callable[[int, int], Floats]  # frames start..stop: (n, V, 3)
 
 
 class Permuted:
     """Frames in another vertex order: vertex i is vertex ``permutation[i]`` of what ``read`` returns."""
 
-    def __init__(self, read: Read, n_frames: int, permutation: NDArray[np.integer]) -> None:
+    def __init__(self, read: Read, n_frames: int, permutation: Integers) -> None:
         self._read, self._permutation = read, permutation
         self.shape: tuple[int, ...] = (n_frames, len(permutation), 3)
 
-    def __getitem__(self, key: slice, /) -> Float:
+    def __getitem__(self, key: slice, /) -> Floats:
         start, stop, _ = key.indices(self.shape[0])
         return self._read(start, stop)[:, self._permutation]
 
@@ -36,7 +31,7 @@ class Part:
         self._read, self._start = read, start
         self.shape: tuple[int, ...] = (n_frames, n_vertices, 3)
 
-    def __getitem__(self, key: slice, /) -> Float:
+    def __getitem__(self, key: slice, /) -> Floats:
         start, stop, _ = key.indices(self.shape[0])
         return self._read(self._start + start, self._start + stop)
 
@@ -44,12 +39,12 @@ class Part:
 class Narrowed:
     """Frames of float64 as float32 relative to an origin; ``rounding`` is what that moved a coordinate by at most so far."""
 
-    def __init__(self, positions: Frames, origin: NDArray[np.float64]) -> None:
+    def __init__(self, positions: Frames, origin: Float64) -> None:
         self._positions, self._origin = positions, origin
         self.shape: tuple[int, ...] = tuple(positions.shape)
         self.rounding = 0.0
 
-    def __getitem__(self, key: slice, /) -> Float:
+    def __getitem__(self, key: slice, /) -> Floats:
         block = np.asarray(self._positions[key])
         narrowed = narrow(block, self._origin)
         self.rounding = max(self.rounding, rounding(block, narrowed, self._origin))
@@ -59,9 +54,9 @@ class Narrowed:
 class Shifted:
     """Frames moved by ``(3,)``, in float64."""
 
-    def __init__(self, positions: Frames, by: NDArray[np.float64]) -> None:
+    def __init__(self, positions: Frames, by: Float64) -> None:
         self._positions, self._by = positions, by
         self.shape: tuple[int, ...] = tuple(positions.shape)
 
-    def __getitem__(self, key: slice, /) -> Float:
+    def __getitem__(self, key: slice, /) -> Floats:
         return np.asarray(self._positions[key] + self._by, np.float64)

@@ -10,9 +10,10 @@ import html
 import io
 from collections.abc import Mapping
 
+from gvpipe.arrays import Float32, Int32
 from gvpipe.errors import GvpipeError
 from gvpipe.notes import show_origin
-from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 SIZE = 240  # pixels, of both sides
 SAMPLES = 3  # per pixel and axis

@@ -8,15 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
+from gvpipe.arrays import Integers
 
 ROUNDED = 1e-5  # part of the diagonal: what float32 may round without a word
 DEFAULT_FPS = 30.0
 ASSUMED_FPS = f"the input has no frame rate; {DEFAULT_FPS:g} frames per second were assumed (fps, --fps)"
 
 
-def cut(counts: NDArray[np.integer]) -> tuple[str, ...]:
+def cut(counts: Integers) -> tuple[str, ...]:
     """Of polygons, given their numbers of corners ``(N,)``; nothing if all are triangles."""
     larger = counts[counts > 3]
     if not len(larger):

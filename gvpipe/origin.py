@@ -8,19 +8,16 @@ none: theirs is (0, 0, 0) and changes nothing.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.errors import InputError
 
 LOSS = 1e-6  # part of the diagonal: an axis gets an origin if float32 would round it by more
 LARGEST = float(np.finfo(np.float32).max)  # magnitude of an origin's coordinates
 BLOCK = 1 << 20  # coordinates worked on at a time: temporaries stay small beside the array
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
 
 
 def choose_origin(positions: NDArray[np.generic]) -> Float64:
@@ -77,7 +74,7 @@ def as_origin(values: object, name: str) -> Float64:
     return origin.astype(np.float64) + 0.0  # no negative zeros
 
 
-def _blocks(positions: NDArray[Any]) -> Iterator[NDArray[Any]]:
+def _blocks(positions: Array) -> Iterator[Array]:
     """Views of some frames each."""
     step = max(1, BLOCK // max(1, 3 * positions.shape[1]))
     return (positions[start : start + step] for start in range(0, len(positions), step))

@@ -13,12 +13,13 @@ from typing import overload
 import numpy as np
 
 from gvpipe.arguments import check_path
+from gvpipe.arrays import Float32, Float64, Int32
 from gvpipe.codec import GroupReader, LevelReader, open_reader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file
 from gvpipe.errors import FormatError, InputError
 from gvpipe.frame_cache import FrameCache
-from gvpipe.sequence import Float32, Float64, Int32, MeshSequence, describe
+from gvpipe.sequence import MeshSequence, describe
 
 
 class Player:

@@ -21,19 +21,17 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float32, Int32, Int64
 from gvpipe.container.bitstream import MAX_FRAMES, Bitstream
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 if TYPE_CHECKING:
     from gvpipe.codec import FrameReader
 
 SECTION = "holds"
-
-Int64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

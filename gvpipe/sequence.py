@@ -12,31 +12,19 @@ from __future__ import annotations
 import operator
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.arguments import check_number, show
+from gvpipe.arrays import Array, Float32, Float64, Floats, Frames, Int32, Integers
 from gvpipe.errors import InputError
 from gvpipe.frame_views import Narrowed, Part, Permuted, Shifted
 from gvpipe.notes import ASSUMED_FPS, show_origin
 from gvpipe.origin import as_origin, choose_origin, narrow, rounding
 
 CHUNK_BYTES = 16 << 20  # positions handed out at a time by `chunks`: large enough to vectorise, small beside any budget
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Int32 = NDArray[np.int32]
-
-
-class Frames(Protocol):
-    """What positions must offer: a shape, and slices of frames as arrays."""
-
-    @property
-    def shape(self) -> tuple[int, ...]: ...
-
-    def __getitem__(self, key: slice, /) -> NDArray[np.floating]: ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,7 +89,7 @@ class MeshSequence:
                     f"({3 * len(self.faces)}) is needed"
                 )
 
-    def _narrow(self, positions: NDArray[Any]) -> None:
+    def _narrow(self, positions: Array) -> None:
         """Round an array in memory, keep it if that lost anything, and find its origin."""
         narrowed, origin = _as_positions(positions, self.name)
         given = self.origin
@@ -193,7 +181,7 @@ class MeshSequence:
         """By how much float32 moved a coordinate at most, model units; for frames that load later, so far as they did."""
         return max(self._rounding, float(getattr(self.positions, "rounding", 0.0)))
 
-    def reordered(self, permutation: NDArray[np.integer], faces: Int32) -> MeshSequence:
+    def reordered(self, permutation: Integers, faces: Int32) -> MeshSequence:
         """Return the sequence whose vertex i is this one's vertex ``permutation[i]``; frames still load when read."""
         exact = None if self._exact is None else Permuted(self.read_absolute, len(self), permutation)
         return self._derived(Permuted(self.read, len(self), permutation), exact, faces=faces, attributes={})
@@ -233,7 +221,7 @@ class MeshSequence:
         step = max(1, CHUNK_BYTES // (12 * self.n_vertices))
         return ((first, min(first + step, stop)) for first in range(start, stop, step))
 
-    def sample(self, most: int, vertices: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
+    def sample(self, most: int, vertices: Integers | slice = slice(None)) -> Float64:
         """Vertices of at most so many frames, evenly spaced from the first to the last: ``(n, vertices, 3)``, model units."""
         picked = np.unique(np.linspace(0, self.n_frames - 1, most).astype(int))
         return np.concatenate([self.read(i, i + 1)[:, vertices] for i in picked]).astype(np.float64)
@@ -248,7 +236,7 @@ def describe(sequence: MeshSequence) -> str:
     return ", ".join(parts)
 
 
-def check_finite(block: NDArray[np.floating], name: str, first_frame: int = 0) -> None:
+def check_finite(block: Floats, name: str, first_frame: int = 0) -> None:
     """Raise `InputError` naming frame and vertex if ``block (n, V, 3)`` holds a NaN or an infinity."""
     with np.errstate(invalid="ignore"):
         extremes = (block.min(initial=0), block.max(initial=0))  # a NaN shows in both, an infinity in one

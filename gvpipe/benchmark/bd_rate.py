@@ -12,11 +12,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64
 from gvpipe.benchmark.sweep import Curve
 
-Float64 = NDArray[np.float64]
 KG_LEVELS = (1.0, 0.3, 0.1)
 
 

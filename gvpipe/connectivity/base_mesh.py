@@ -15,18 +15,14 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from gvpipe.arrays import Array, Int32
 from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import CorruptFile, InputError
 from gvpipe.mesh.unique_rows import decode_table, encode_table, row_ids, smallest_first, used_vertices
-from gvpipe.sequence import Int32
-
-Ints = npt.NDArray[Any]
 
 HEADER = struct.Struct("<4I")
 COMPRESSION_LEVEL = 10  # Draco's best; 20 ms for 10k vertices
@@ -40,17 +36,17 @@ GENERIC = 4  # draco::GeometryAttribute::GENERIC
 class EncodedMesh:
     mesh: bytes
     order: bytes  # empty: decode in the codec's order
-    permutation: Ints  # (V,) int64: decoded vertex i is the given vertex permutation[i]
+    permutation: Array  # (V,) int64: decoded vertex i is the given vertex permutation[i]
 
 
 @dataclass(frozen=True)
 class BaseMesh:
     points: Int32  # (V, 3), lattice units
     faces: Int32  # (T, 3)
-    visits: Ints  # (V,) int64: vertex v is the codec's vertex visits[v]; the codec's order walks over the surface
+    visits: Array  # (V,) int64: vertex v is the codec's vertex visits[v]; the codec's order walks over the surface
 
 
-def encode_base(points: Ints, faces: Ints, reorder: bool) -> EncodedMesh:
+def encode_base(points: Array, faces: Array, reorder: bool) -> EncodedMesh:
     """Code lattice points (V, 3) int in [0, 2^31) and triangles (T, 3) int.
 
     `reorder` lets the decoder see the codec's vertex order. Triangles may come back in another order, and rotated.
@@ -95,7 +91,7 @@ def read_base(bitstream: Bitstream) -> BaseMesh:
     return base
 
 
-def _encode_draco(points: Ints, faces: Ints) -> bytes:
+def _encode_draco(points: Array, faces: Array) -> bytes:
     """The Draco stream, or nothing where there is nothing that Draco could carry. Raises ValueError if it fails."""
     import DracoPy
 
@@ -120,7 +116,7 @@ def _encode_draco(points: Ints, faces: Ints) -> bytes:
         raise ValueError("Draco cannot encode this mesh") from exc
 
 
-def _encode_mesh(points: Ints, faces: Ints, draco: bytes) -> tuple[bytes, Ints]:
+def _encode_mesh(points: Array, faces: Array, draco: bytes) -> tuple[bytes, Array]:
     """The mesh stream and its codec order: whatever the Draco stream does not give back is added as loose rows."""
     keys, draco_faces = _decode_draco(draco)
     carried = _find_vertices(points, used_vertices(_proper(points, faces), len(points)), keys)
@@ -142,25 +138,25 @@ def _encode_mesh(points: Ints, faces: Ints, draco: bytes) -> tuple[bytes, Ints]:
     return header + draco + loose_points + encode_table(loose_faces), permutation
 
 
-def _proper(points: Ints, faces: Ints) -> Ints:
+def _proper(points: Array, faces: Array) -> Array:
     """The triangles with three different lattice positions; Draco drops the others, and prints if no triangle is left."""
     place = row_ids(points)[0][faces]
-    proper: Ints = faces[(place != np.roll(place, 1, axis=1)).all(axis=1)]
+    proper: Array = faces[(place != np.roll(place, 1, axis=1)).all(axis=1)]
     return proper
 
 
-def _find_vertices(points: Ints, used: Ints, keys: Ints) -> Ints:
+def _find_vertices(points: Array, used: Array, keys: Array) -> Array:
     """The vertex that each key (position, occurrence), as decoded, stands for."""
     own_keys = np.c_[points[used], _occurrences(points[used])]
     ids, representatives = row_ids(np.concatenate([own_keys, keys]))
     found = representatives[ids[len(used) :]]
     if (found >= len(used)).any():
         raise ValueError("Draco returned vertices that the mesh does not have")
-    vertices: Ints = used[found]
+    vertices: Array = used[found]
     return vertices
 
 
-def _decode_draco(draco: bytes) -> tuple[Ints, Ints]:
+def _decode_draco(draco: bytes) -> tuple[Array, Array]:
     """Keys (n, 4) int64 of distinct vertices (position, occurrence), and triangles over them."""
     import DracoPy
 
@@ -212,7 +208,7 @@ def check_draco_header(draco: bytes) -> None:
             raise CorruptFile(f"section 'mesh' is corrupt: {count} elements in {len(draco)} bytes")
 
 
-def _decode_mesh(mesh: bytes) -> tuple[Ints, Ints]:
+def _decode_mesh(mesh: bytes) -> tuple[Array, Array]:
     if len(mesh) < HEADER.size:
         raise CorruptFile(f"section 'mesh' of {len(mesh)} bytes: truncated")
     bytes_draco, n_loose_points, n_loose_faces, bytes_points = HEADER.unpack_from(mesh)
@@ -232,7 +228,7 @@ def _decode_mesh(mesh: bytes) -> tuple[Ints, Ints]:
     return points, faces
 
 
-def _occurrences(rows: Ints) -> Ints:
+def _occurrences(rows: Array) -> Array:
     """For each row, how many equal rows come before it."""
     ids, _ = row_ids(rows)
     order = np.argsort(ids, kind="stable")

@@ -10,18 +10,15 @@ the copy's difference from that point's corner before [integers]. Order stream: 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Array
 from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile
 
 MAX_COPIES = 7  # copies of a point that have contexts of their own
-
-Ints = NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -31,10 +28,10 @@ class CodedCopies:
     counts: bytes
     copies: bytes
     order: bytes  # empty: decode in the codec's order
-    permutation: Ints
+    permutation: Array
 
 
-def encode_copies(faces: Ints, points: Ints, point_faces: Ints, n_points: int, reorder: bool) -> CodedCopies:
+def encode_copies(faces: Array, points: Array, point_faces: Array, n_points: int, reorder: bool) -> CodedCopies:
     """Code which vertices the corners of ``point_faces`` use.
 
     Args:
@@ -58,7 +55,7 @@ def encode_copies(faces: Ints, points: Ints, point_faces: Ints, n_points: int, r
     return CodedCopies(counts, differences, order, np.arange(len(points)))
 
 
-def decode_copies(counts: bytes, copies: bytes, order: bytes, point_faces: Ints, n_points: int) -> tuple[Ints, Ints]:
+def decode_copies(counts: bytes, copies: bytes, order: bytes, point_faces: Array, n_points: int) -> tuple[Array, Array]:
     """Mirror of `encode_copies`: triangles ``(T, 3)`` over vertices, and the point of each vertex ``(V,)``."""
     faces, points = _decode_corners(counts, copies, point_faces, n_points)
     if order:
@@ -67,7 +64,7 @@ def decode_copies(counts: bytes, copies: bytes, order: bytes, point_faces: Ints,
     return faces, points
 
 
-def _encode_corners(corners: Ints, point_faces: Ints, points: Ints, n_points: int) -> tuple[Ints, bytes, bytes]:
+def _encode_corners(corners: Array, point_faces: Array, points: Array, n_points: int) -> tuple[Array, bytes, bytes]:
     """The number of each vertex among its point's copies ``(V,)``, by first use, and the streams that tell it."""
     counts = np.bincount(points, minlength=n_points)
     used, first = np.unique(corners.ravel(), return_index=True)
@@ -83,7 +80,7 @@ def _encode_corners(corners: Ints, point_faces: Ints, points: Ints, n_points: in
     return copies, encode_integers(counts - 1), encode_integers(_filled(differences, contexts, is_first), contexts)
 
 
-def _filled(differences: Ints, contexts: Ints, is_first: Ints) -> Ints:
+def _filled(differences: Array, contexts: Array, is_first: Array) -> Array:
     """The differences, those of points' first corners replaced by what costs least: the most frequent one of their context.
 
     A point's first corner uses its first copy, so decoders ignore its difference.
@@ -96,7 +93,7 @@ def _filled(differences: Ints, contexts: Ints, is_first: Ints) -> Ints:
     return result
 
 
-def _decode_corners(counts_data: bytes, data: bytes, point_faces: Ints, n_points: int) -> tuple[Ints, Ints]:
+def _decode_corners(counts_data: bytes, data: bytes, point_faces: Array, n_points: int) -> tuple[Array, Array]:
     """Mirror of `_encode_corners`: triangles over vertices, and the point of each vertex."""
     counts = 1 + decode_integers(counts_data, n_points, name="mesh")
     if n_points and (counts.min() < 1 or counts.max() > MAX_VERTICES or counts.sum() > MAX_VERTICES):
@@ -111,26 +108,26 @@ def _decode_corners(counts_data: bytes, data: bytes, point_faces: Ints, n_points
     if ((copies < 0) | (copies >= counts[flat])).any():
         raise CorruptFile("section 'mesh' is corrupt: a corner uses a copy that does not exist")
     starts = np.cumsum(counts) - counts
-    faces: Ints = (starts[flat] + copies).reshape(-1, 3)
+    faces: Array = (starts[flat] + copies).reshape(-1, 3)
     return faces, np.repeat(np.arange(n_points), counts)
 
 
-def _shared_corners(point_faces: Ints, counts: Ints) -> tuple[Ints, Ints]:
+def _shared_corners(point_faces: Array, counts: Array) -> tuple[Array, Array]:
     """Corners of points with more than one copy, in order of point and corner; which of them is its point's first."""
     flat = point_faces.ravel()
     where = np.flatnonzero(counts[flat] > 1)
     where = np.asarray(where[np.argsort(flat[where], kind="stable")])
-    is_first: Ints = np.diff(flat[where], prepend=-1) > 0
+    is_first: Array = np.diff(flat[where], prepend=-1) > 0
     return where, is_first
 
 
-def _turned(faces: Ints) -> tuple[Ints, Ints]:
+def _turned(faces: Array) -> tuple[Array, Array]:
     """Triangles with the smallest index first, and where each of their corners was."""
     turns = (faces.argmin(axis=1)[:, None] + np.arange(3)) % 3 if len(faces) else np.zeros((0, 3), np.int64)
     return np.take_along_axis(faces, turns, axis=1), turns
 
 
-def _as_lattice(points: Ints) -> Ints:
+def _as_lattice(points: Array) -> Array:
     """Positions for `vertex_order`, equal where points are."""
-    lattice: Ints = np.c_[points, np.zeros((len(points), 2), np.int64)]
+    lattice: Array = np.c_[points, np.zeros((len(points), 2), np.int64)]
     return lattice

@@ -17,11 +17,10 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Array, Int32
 from gvpipe.connectivity.base_mesh import COMPRESSION_LEVEL, MAX_PER_BYTE, EncodedMesh, check_draco_header
 from gvpipe.connectivity.seams import decode_copies, encode_copies
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
@@ -30,11 +29,8 @@ from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile
 from gvpipe.mesh.unique_rows import decode_table, encode_table, row_ids, smallest_first, used_vertices
-from gvpipe.sequence import Int32
 
 HEADER = struct.Struct("<6I")
-
-Ints = NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -46,12 +42,12 @@ class BareMesh:
     """
 
     faces: Int32
-    points: Ints
+    points: Array
     point_faces: Int32
     n_points: int
 
 
-def encode_mesh(faces: Int32, points: Ints, reorder: bool) -> EncodedMesh:
+def encode_mesh(faces: Int32, points: Array, reorder: bool) -> EncodedMesh:
     """Code triangles ``(T, 3)`` over V vertices, of which those with equal ``points (V,)``, 0..P-1, are copies.
 
     ``reorder`` lets the decoder see the codec's vertex order. Triangles may come back in another order, and rotated.
@@ -90,7 +86,7 @@ def read_mesh(bitstream: Bitstream) -> BareMesh:
     return mesh
 
 
-def _encode_draco(faces: Ints) -> tuple[bytes, Ints]:
+def _encode_draco(faces: Array) -> tuple[bytes, Array]:
     """The Draco stream of the triangles with three different points, and the point of each vertex that it decodes to.
 
     Raises ValueError where Draco fails.
@@ -120,7 +116,7 @@ def _encode_draco(faces: Ints) -> tuple[bytes, Ints]:
     return draco, used[told.points[:, 0].astype(np.int64)]
 
 
-def _place_points(faces: Ints, n_points: int, draco: bytes, came_from: Ints) -> tuple[tuple[bytes, bytes, bytes, int], Ints]:
+def _place_points(faces: Array, n_points: int, draco: bytes, came_from: Array) -> tuple[tuple[bytes, bytes, bytes, int], Array]:
     """The streams of triangles over points, and the codec's number of each point ``(P,)``."""
     _, first, inverse = np.unique(came_from, return_index=True, return_inverse=True)
     again = np.flatnonzero(first[inverse] != np.arange(len(came_from)))  # Draco vertices whose point came before
@@ -140,7 +136,7 @@ def _place_points(faces: Ints, n_points: int, draco: bytes, came_from: Ints) -> 
     return (draco, merges, encode_table(loose), len(loose)), place
 
 
-def _point_faces(draco: bytes, merges: bytes, loose: bytes, n_loose: int) -> Ints:
+def _point_faces(draco: bytes, merges: bytes, loose: bytes, n_loose: int) -> Array:
     """Triangles over points, smallest point first: Draco's with its split vertices merged, then the loose ones."""
     faces, n_vertices = _decode_draco(draco)
     stands_for = np.arange(n_vertices)
@@ -162,7 +158,7 @@ def _point_faces(draco: bytes, merges: bytes, loose: bytes, n_loose: int) -> Int
     return np.concatenate([smallest_first(stands_for[faces]), decode_table(loose, n_loose)])
 
 
-def _decode_draco(draco: bytes) -> tuple[Ints, int]:
+def _decode_draco(draco: bytes) -> tuple[Array, int]:
     import DracoPy
 
     if not draco:

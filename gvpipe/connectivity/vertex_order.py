@@ -14,15 +14,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from gvpipe.arrays import Array, Float64
 from gvpipe.errors import CorruptFile, InputError
 from gvpipe.mesh.unique_rows import sort_rows
-
-Ints = npt.NDArray[Any]
 
 REACH = 256  # most vertices that one search looks at: 1024 saves 0.3 bit per vertex on samba, and takes twice the time
 EXACT_RANKS = 8  # ranks below this have a symbol of their own; above, two symbols per octave and the rest as plain bits
@@ -32,7 +29,7 @@ SHORT_ROW = 64  # neighbours that are sorted in place
 MAX_VERTICES = (1 << 24) - 1  # constriction's largest uniform alphabet
 
 
-def encode_order(visits: Ints, points: Ints, faces: Ints) -> bytes:
+def encode_order(visits: Array, points: Array, faces: Array) -> bytes:
     """Code `visits` (V,), where visits[v] is the codec's index of the user's vertex v.
 
     `points` (V, 3) int, lattice units, and `faces` (T, 3) int are the mesh in the codec's order.
@@ -54,11 +51,11 @@ def encode_order(visits: Ints, points: Ints, faces: Ints) -> bytes:
     has_low = sizes > 1
     if has_low.any():
         coder.encode(low[has_low], constriction.stream.model.Uniform(), sizes[has_low])
-    words: Ints = coder.get_compressed()
+    words: Array = coder.get_compressed()
     return bytes(table.tobytes() + words.astype("<u4").tobytes())
 
 
-def decode_order(data: bytes, points: Ints, faces: Ints) -> Ints:
+def decode_order(data: bytes, points: Array, faces: Array) -> Array:
     """The inverse of `encode_order`: visits (V,) int64, always a permutation, or CorruptFile.
 
     A range coder cannot tell every change of its bytes: lengths and checksums are the container's.
@@ -93,7 +90,7 @@ def decode_order(data: bytes, points: Ints, faces: Ints) -> Ints:
     return visits
 
 
-def _split(ranks: Ints, jumps: Ints) -> tuple[Ints, Ints, Ints]:
+def _split(ranks: Array, jumps: Array) -> tuple[Array, Array, Array]:
     """Ranks (-1: escape, then the jump counts) -> symbols, low parts, sizes of the low parts' alphabets; all int32."""
     octave = np.frexp(ranks.astype(np.float64))[1] - 1  # exact floor(log2)
     low_bits = np.maximum(octave - 1, 0)
@@ -104,34 +101,34 @@ def _split(ranks: Ints, jumps: Ints) -> tuple[Ints, Ints, Ints]:
     return symbols, low, _sizes(symbols)
 
 
-def _joined(symbols: Ints, low: Ints) -> tuple[Ints, Ints]:
+def _joined(symbols: Array, low: Array) -> tuple[Array, Array]:
     above = symbols.astype(np.int64) - EXACT_RANKS
     ranks = np.where(above < 0, symbols, ((2 + (above & 1)) << np.maximum(2 + above // 2, 0)) + low)
     return np.where(symbols == ESCAPE, -1, ranks), np.where(symbols == ESCAPE, low, 0).astype(np.int64)
 
 
-def _sizes(symbols: Ints) -> Ints:
+def _sizes(symbols: Array) -> Array:
     above = np.maximum(symbols - EXACT_RANKS, 0)
     sizes = np.where(symbols < EXACT_RANKS, 1, 4 << (above // 2))
     n_left = len(symbols) - np.arange(len(symbols))
     return np.where(symbols == ESCAPE, n_left, sizes).astype(np.int32)
 
 
-def _quantised(counts: Ints) -> Ints:
+def _quantised(counts: Array) -> Array:
     """Counts -> one byte each: 3 bits of mantissa, 5 of exponent, rounded down; within 12 % of the count."""
     shift = np.maximum(np.frexp(counts.astype(np.float64))[1] - 4, 0)
     mantissa = counts >> shift
-    table: Ints = np.where(mantissa < 8, mantissa, mantissa - 8 + 8 * (shift + 1)).astype(np.uint8)
+    table: Array = np.where(mantissa < 8, mantissa, mantissa - 8 + 8 * (shift + 1)).astype(np.uint8)
     return table
 
 
-def _weights(table: Ints) -> npt.NDArray[np.float64]:
+def _weights(table: Array) -> Float64:
     """Integers held in float64, so that every machine builds the same model."""
     code = table.astype(np.int64)
     return np.where(code < 8, code, (8 + code % 8) << np.maximum(code // 8 - 1, 0)).astype(np.float64)
 
 
-def _neighbours(points: Ints, faces: Ints) -> tuple[Ints, Ints]:
+def _neighbours(points: Array, faces: Array) -> tuple[Array, Array]:
     """Rows of neighbours (starts (V + 1,), neighbours (E,)), nearest first: triangle edges, and vertices at one point."""
     rows = np.ascontiguousarray(points, np.int64)
     by_point = sort_rows(rows)
@@ -141,7 +138,7 @@ def _neighbours(points: Ints, faces: Ints) -> tuple[Ints, Ints]:
     return starts, neighbours
 
 
-def _rows(points: Ints, faces: Ints, twins: Ints) -> tuple[Ints, Ints]:
+def _rows(points: Array, faces: Array, twins: Array) -> tuple[Array, Array]:
     """The rows of `_neighbours`: each sorted by squared distance, then by number; nobody twice."""
     n_vertices = len(points)
     starts = np.zeros(n_vertices + 1, np.int64)
@@ -192,7 +189,7 @@ def _rows(points: Ints, faces: Ints, twins: Ints) -> tuple[Ints, Ints]:
     return starts, neighbours[:kept].copy()
 
 
-def _walk(starts: Ints, neighbours: Ints, reach: int, ranks: Ints, jumps: Ints, visits: Ints, decoding: bool) -> int:
+def _walk(starts: Array, neighbours: Array, reach: int, ranks: Array, jumps: Array, visits: Array, decoding: bool) -> int:
     """Fill ranks and jumps from visits, or (decoding) visits from them; one body, so that the two cannot differ.
 
     Returns the number of vertices done; fewer than V means that a rank or a jump points nowhere.
@@ -264,7 +261,7 @@ def _walk(starts: Ints, neighbours: Ints, reach: int, ranks: Ints, jumps: Ints, 
 
 
 @functools.cache
-def _compiled_rows() -> Callable[..., tuple[Ints, Ints]]:
+def _compiled_rows() -> Callable[..., tuple[Array, Array]]:
     from gvpipe.compiled import compiled
 
     return compiled(_rows)

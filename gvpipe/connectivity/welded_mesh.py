@@ -11,21 +11,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.connectivity.base_mesh import EncodedMesh, decode_base, encode_base
 from gvpipe.connectivity.seams import decode_copies, encode_copies
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.mesh.topology import adjacency
 from gvpipe.mesh.unique_rows import smallest_first
-from gvpipe.sequence import Int32
-
-Ints = NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -40,12 +36,12 @@ class PointMesh:
     """
 
     faces: Int32
-    point: NDArray[np.int64]
+    point: Int64
     lattice: Int32
     point_faces: Int32
 
     @cached_property
-    def members(self) -> NDArray[np.int64]:
+    def members(self) -> Int64:
         """``(P,)`` the first vertex of each point."""
         return np.asarray(np.unique(self.point, return_index=True)[1])
 
@@ -55,7 +51,7 @@ class PointMesh:
         return adjacency(self.point_faces, len(self.lattice))
 
 
-def encode_points(lattice: Ints, faces: Ints, points: Ints, reorder: bool) -> EncodedMesh:
+def encode_points(lattice: Array, faces: Array, points: Array, reorder: bool) -> EncodedMesh:
     """Code a mesh of ``points (V,)``, 0..P-1, at ``lattice (P, 3)`` with triangles ``faces (T, 3)`` over V vertices.
 
     ``reorder`` lets the decoder see the codec's vertex order. Triangles may come back in another order, and rotated.

@@ -10,8 +10,8 @@ import struct
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Array
 from gvpipe.errors import CorruptFile
 
 MAX_VARINT_BYTES = 10
@@ -61,7 +61,7 @@ class Cursor:
         """Return the fields of ``layout``."""
         return layout.unpack(self.take(layout.size))
 
-    def array(self, dtype: str, count: int) -> NDArray[Any]:
+    def array(self, dtype: str, count: int) -> Array:
         """Return ``count`` items of a little-endian ``dtype``."""
         return np.frombuffer(self.take(count * np.dtype(dtype).itemsize), dtype)
 

@@ -18,12 +18,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float32, Float64, Floats, Int32
 from gvpipe.corrections.displacements import MAX_STEPS, Moves, MovesReader, encode_group, encode_moves, most_frames, move
 from gvpipe.errors import InputError
 from gvpipe.metrics.vertex_errors import Errors, VertexErrors, frame_diagonal
-from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 if TYPE_CHECKING:
     from gvpipe.codec import FrameReader
@@ -85,7 +85,7 @@ def encode_corrections(sequence: MeshSequence, reader: FrameReader, bound: Bound
     return encode_moves(bound.step, size, groups), left
 
 
-def find_corrections(wanted: NDArray[np.floating], decoded: Float32, bound: Bound) -> Moves:
+def find_corrections(wanted: Floats, decoded: Float32, bound: Bound) -> Moves:
     """Corrections that bring ``decoded`` within the bound of ``wanted``, both ``(n, V, 3)``, model units."""
     off = _distance(wanted, decoded) > bound.inner
     vertices, frames = np.nonzero(off.T)
@@ -152,5 +152,5 @@ class _Corrected:
         return result
 
 
-def _distance(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
+def _distance(a: Floats, b: Floats) -> Float64:
     return np.asarray(np.linalg.norm(a.astype(np.float64) - b, axis=-1))

@@ -19,18 +19,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.arrays import Float32, Int64
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile
-from gvpipe.sequence import Float32
 
 HEAD = struct.Struct("<d")
 MAX_POSITIONS = 1 << 20  # of a group, unless one frame has more
 SMALL, LARGE = 1e-60, 1e39  # no step of a float32 model lies beyond
 MAX_STEPS = 1 << 38  # magnitude of a move, steps
 NEAR = 3  # magnitudes of the axes before that are told apart, in the contexts of y and z
-
-Int64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

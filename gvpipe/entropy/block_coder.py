@@ -18,14 +18,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.arrays import Int64, Integers
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy import parametric_tables
 from gvpipe.entropy.integers import MAX_BITS, MAX_TOKENS, TABLE_TOTAL, model, tokenise
 
 CHUNK = 16  # low bits coded at a time
 PARAMETRIC = 1  # kind of a table told by two numbers
-
-Int64 = NDArray[np.int64]
 
 
 class BlockEncoder:
@@ -36,7 +35,7 @@ class BlockEncoder:
         self._blocks: list[tuple[list[tuple[int, Int64]], Int64, Int64]] = []
         self._counts = np.zeros((n_contexts, MAX_TOKENS), np.int64)
 
-    def add(self, values: NDArray[np.integer], contexts: NDArray[np.integer]) -> None:
+    def add(self, values: Integers, contexts: Integers) -> None:
         """Append a block of ``values (n,)``, magnitude below 2**39, in ``contexts (n,)``, 0..C-1."""
         tokens, low, n_low = tokenise(values.astype(np.int64))
         groups = []
@@ -96,7 +95,7 @@ class BlockDecoder:
         self.words = self._cursor.array("<u4", self._cursor.left // 4).astype(np.uint32)
         self.state = range_decoder.start(self.words)
 
-    def take(self, contexts: NDArray[np.integer]) -> Int64:
+    def take(self, contexts: Integers) -> Int64:
         """Return the next block's values, ``(n,)``, for its ``contexts (n,)``; raises `CorruptFile` if they do not decode."""
         from gvpipe.entropy.block_kernels import take_block
 
@@ -152,7 +151,7 @@ def _describe(counts: Int64) -> tuple[bytes, Int64]:
     return described, frequencies
 
 
-def _groups(contexts: NDArray[np.integer]) -> list[tuple[int, NDArray[np.intp]]]:
+def _groups(contexts: Integers) -> list[tuple[int, NDArray[np.intp]]]:
     """Contexts that occur, ascending, and the positions of each one's values, in order."""
     order = np.argsort(contexts, kind="stable")
     ordered = contexts[order]

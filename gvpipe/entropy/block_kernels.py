@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Int64, UInt32, UInt64
 from gvpipe.compiled import compiled
 from gvpipe.entropy.block_coder import CHUNK
 from gvpipe.entropy.integers import DIRECT
@@ -12,14 +12,12 @@ from gvpipe.entropy.range_decoder import decode_bits, decode_symbol
 
 NO_TABLE, NO_DATA = 1, 2  # what can be wrong
 
-Int64 = NDArray[np.int64]
-
 
 @compiled
 def take_block(
-    state: NDArray[np.uint64],
-    words: NDArray[np.uint32],
-    edges: NDArray[np.uint64],
+    state: UInt64,
+    words: UInt32,
+    edges: UInt64,
     sizes: Int64,
     contexts: Int64,
     values: Int64,

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.arrays import Int64, Integers
 from gvpipe.container.cursor import Cursor, varint
 
 DIRECT = 16  # values of u that are tokens of their own
@@ -30,10 +31,8 @@ MAX_BITS = 40  # bit length of the largest u
 MAX_TOKENS = DIRECT + 2 * (MAX_BITS - 4)
 MAX_CONTEXTS = 1 << 16
 
-Int64 = NDArray[np.int64]
 
-
-def encode_integers(values: NDArray[np.integer], contexts: NDArray[np.integer] | None = None) -> bytes:
+def encode_integers(values: Integers, contexts: Integers | None = None) -> bytes:
     """Range code ``values`` (any shape, read in C order).
 
     Args:
@@ -56,7 +55,7 @@ def encode_integers(values: NDArray[np.integer], contexts: NDArray[np.integer] |
     return b"".join([*head, varint(len(words)), words.tobytes(), _pack_bits(tokens, extra, n_extra)])
 
 
-def decode_integers(data: bytes, count: int, contexts: NDArray[np.integer] | None = None, name: str = "integers") -> Int64:
+def decode_integers(data: bytes, count: int, contexts: Integers | None = None, name: str = "integers") -> Int64:
     """Mirror of `encode_integers`: ``count`` integers, flat.
 
     Args:
@@ -92,7 +91,7 @@ def decode_integers(data: bytes, count: int, contexts: NDArray[np.integer] | Non
     return _untokenise(tokens, cursor)
 
 
-def _groups(contexts: NDArray[np.integer] | None, count: int) -> list[NDArray[np.intp]]:
+def _groups(contexts: Integers | None, count: int) -> list[NDArray[np.intp]]:
     """Positions of each context's values, in order."""
     if contexts is None:
         return [np.arange(count)]

@@ -12,8 +12,8 @@ from __future__ import annotations
 import functools
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Int64
 from gvpipe.entropy.integers import DIRECT
 
 N_TOKENS = 40  # magnitudes below 2**15
@@ -25,8 +25,6 @@ MEANS = (  # closer where most residuals are
 RATIOS = tuple(4096 * m // (m + 32) for m in MEANS)  # of magnitudes about 1 + m / 32
 TOTAL = 1 << 20  # of a table, about; no token has frequency zero
 ZEROS = 256
-
-Int64 = NDArray[np.int64]
 
 
 @functools.cache

@@ -13,8 +13,8 @@ Source: Bamler, "Understanding Entropy Coding With Asymmetric Numeral Systems", 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Int64, UInt32, UInt64
 from gvpipe.compiled import compiled
 
 PRECISION = 24
@@ -22,9 +22,6 @@ TOTAL = 1 << PRECISION
 WORD = np.uint64(32)
 SHIFT = np.uint64(PRECISION)
 ONE = np.uint64(1)
-
-UInt64 = NDArray[np.uint64]
-UInt32 = NDArray[np.uint32]
 
 
 def start(words: UInt32) -> UInt64:
@@ -39,7 +36,7 @@ def may_be_exhausted(state: UInt64, words: UInt32) -> bool:
     return place == len(words) and (extent == (1 << 64) - 1 or difference < (1 << 33) - 1)
 
 
-def edges_of(table: NDArray[np.int64]) -> UInt64:
+def edges_of(table: Int64) -> UInt64:
     """``(n + 1,)`` edges of constriction's ``Categorical(table / sum, perfect=False)``: every symbol gets one share of 2**24,
     the rest is dealt out in proportion, rounded down at the edges.
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from gvpipe.arrays import Float64, Int32
 from gvpipe.io.gltf import GltfLoader, encode_glb
 from gvpipe.io.mesh import Attributes, Encoder, Loader
 from gvpipe.io.obj import ObjLoader, encode_obj
 from gvpipe.io.off import OffLoader, encode_off
 from gvpipe.io.ply import encode_ply, load_ply
 from gvpipe.io.stl import StlLoader, encode_stl
-from gvpipe.sequence import Float64, Int32
 
 
 @dataclass(frozen=True)

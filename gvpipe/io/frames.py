@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gvpipe.arrays import Float32, Float64
 from gvpipe.errors import InputError
 from gvpipe.io.discovery import find_frames, order_list, sibling_note
 from gvpipe.io.formats import FRAME_FORMATS
@@ -19,7 +20,7 @@ from gvpipe.io.mesh import Loader, Mesh
 from gvpipe.io.spool import Spool
 from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS, given_order
 from gvpipe.origin import choose_origin, narrow, rounding
-from gvpipe.sequence import Float32, Float64, MeshSequence, check_finite
+from gvpipe.sequence import MeshSequence, check_finite
 
 
 class FrameFiles:

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe import notes
+from gvpipe.arrays import Float32, Float64, Int32
 from gvpipe.errors import InputError
 from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, concatenate
-from gvpipe.sequence import Float32, Float64, Int32
 
 MAGIC = b"glTF"
 GLB_HEAD = struct.Struct("<4sIIII")  # magic, version, bytes of the file, bytes and type of the first chunk
@@ -91,7 +91,7 @@ def _check_still(gltf: dict[str, Any], path: Path) -> None:
     raise InputError(f"{path} {found}, which gvpipe does not import yet; export its frames as still files, one file per frame")
 
 
-def _place(geometry: Any, transform: NDArray[np.float64], with_attributes: bool) -> Mesh:
+def _place(geometry: Any, transform: Float64, with_attributes: bool) -> Mesh:
     positions = np.asarray(geometry.vertices)
     faces = as_faces(np.asarray(geometry.faces), len(positions))
     linear = transform[:3, :3]
@@ -103,7 +103,7 @@ def _place(geometry: Any, transform: NDArray[np.float64], with_attributes: bool)
     return Mesh(positions, faces, _attributes(geometry, linear) if with_attributes else {})
 
 
-def _attributes(geometry: Any, linear: NDArray[np.float64]) -> Attributes:
+def _attributes(geometry: Any, linear: Float64) -> Attributes:
     attributes: dict[str, NDArray[np.generic]] = {}
     visual = geometry.visual
     if getattr(visual, "uv", None) is not None:

@@ -9,13 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.sequence import Float32, Int32
+from gvpipe.arrays import Float32, Floats, Int32, Int64, Integers, UInt8
 
 ATTRIBUTES = {"uv": (2,), "normal": (3,), "color": (3, 4)}  # name: columns that are understood
 
 Attributes = Mapping[str, NDArray[np.generic]]
-UInt8 = NDArray[np.uint8]
-Int64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -29,7 +27,7 @@ class Mesh:
         notes: what the loader did that the user should know, a line each; of the first file alone.
     """
 
-    positions: NDArray[np.floating]
+    positions: Floats
     faces: Int32
     attributes: Attributes = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -60,7 +58,7 @@ def fan(counts: Int64) -> Int64:
     return np.stack([first, first + step + 1, first + step + 2], axis=1)
 
 
-def as_faces(values: NDArray[np.integer], n_vertices: int) -> Int32:
+def as_faces(values: Integers, n_vertices: int) -> Int32:
     """Narrow to ``(T, 3) int32``.
 
     Raises:

@@ -9,11 +9,11 @@ from __future__ import annotations
 import zipfile
 import zlib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.arrays import Array
 from gvpipe.atomic import atomic_path
 from gvpipe.errors import InputError
 from gvpipe.io.mesh import ATTRIBUTES, as_color
@@ -77,7 +77,7 @@ def read_npz(path: Path, fps: float | None = None) -> MeshSequence:
     )
 
 
-def _as_vertices(vertices: NDArray[np.generic], path: Path) -> NDArray[Any]:
+def _as_vertices(vertices: NDArray[np.generic], path: Path) -> Array:
     if vertices.ndim != 3 or vertices.shape[2] != 3 or vertices.dtype.kind not in "fiu":
         raise InputError(
             f"{path}: 'vertices' has shape {vertices.shape} and type {vertices.dtype}; (frames, vertices, 3) numbers are needed"

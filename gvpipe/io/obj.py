@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe import notes
-from gvpipe.io.mesh import Attributes, Encoder, Int64, Mesh, UInt8, as_color, as_faces, fan, per_vertex
+from gvpipe.arrays import Bool, Float32, Float64, Floats, Int32, Int64, UInt8
+from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, fan, per_vertex
 from gvpipe.io.text import (
     clean_lines,
     count_tokens,
@@ -30,7 +31,6 @@ from gvpipe.io.text import (
     parse_integers,
     token_starts,
 )
-from gvpipe.sequence import Float32, Float64, Int32
 
 
 class ObjLoader:
@@ -91,8 +91,8 @@ class _Lines:
         padded = np.concatenate([self._text, np.full(3, ord("\n"), np.uint8)])
         self._heads = np.stack([padded[self._starts + i] for i in range(3)])  # (3, lines)
 
-    def _is_kind(self, keyword: bytes) -> NDArray[np.bool_]:
-        chosen: NDArray[np.bool_] = self._heads[len(keyword)] <= ord(" ")
+    def _is_kind(self, keyword: bytes) -> Bool:
+        chosen: Bool = self._heads[len(keyword)] <= ord(" ")
         for head, letter in zip(self._heads, keyword, strict=False):
             chosen &= head == letter
         return chosen
@@ -107,7 +107,7 @@ class _Lines:
             text[starts + i] = ord(" ")
         return text, starts
 
-    def table(self, keyword: bytes) -> tuple[NDArray[np.float64], Int64]:
+    def table(self, keyword: bytes) -> tuple[Float64, Int64]:
         """All numbers on the lines with a keyword, and how many each line has."""
         text, starts = self.of_kind(keyword)
         values, counts = parse_floats(text.tobytes()), count_tokens(text, starts)
@@ -120,13 +120,13 @@ class _Lines:
         return np.cumsum(self._is_kind(counted))[self._is_kind(keyword)].astype(np.int64)
 
 
-def _columns(values: NDArray[np.float64], counts: Int64, n_columns: int) -> NDArray[np.float64]:
+def _columns(values: Float64, counts: Int64, n_columns: int) -> Float64:
     """The first columns of lines that may differ in length: ``(lines, n_columns)``."""
     short = np.flatnonzero(counts < n_columns)
     if len(short):
         raise ValueError(f"entry {short[0] + 1} has {counts[short[0]]} numbers, and {n_columns} are needed")
     first = np.cumsum(counts) - counts
-    columns: NDArray[np.float64] = values[first[:, None] + np.arange(n_columns)]
+    columns: Float64 = values[first[:, None] + np.arange(n_columns)]
     return columns
 
 
@@ -165,9 +165,7 @@ def _resolve(raw: Int64, parsed: _Faces, seen: Int64) -> Int64:
     return (raw - 1)[parsed.triangles]
 
 
-def _attributes(
-    lines: _Lines, parsed: _Faces, faces: Int32, values: NDArray[np.float64], counts: Int64
-) -> dict[str, NDArray[np.generic]]:
+def _attributes(lines: _Lines, parsed: _Faces, faces: Int32, values: Float64, counts: Int64) -> dict[str, NDArray[np.generic]]:
     """Texture coordinates, normals (zeros for corners that have none) and the colours of the ``v`` lines given."""
     attributes: dict[str, NDArray[np.generic]] = {}
     for name, keyword, width, raw in (("uv", b"vt", 2, parsed.vt), ("normal", b"vn", 3, parsed.vn)):
@@ -185,7 +183,7 @@ def _attributes(
     return attributes
 
 
-def _fits(faces: Int32, positions: NDArray[np.floating]) -> bool:
+def _fits(faces: Int32, positions: Floats) -> bool:
     return int(faces.max()) < len(positions)
 
 

@@ -10,12 +10,11 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvpipe import notes
-from gvpipe.io.mesh import Attributes, Encoder, Int64, Mesh, as_color, as_faces, fan
+from gvpipe.arrays import Float32, Float64, Int32, Int64
+from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, fan
 from gvpipe.io.text import clean_lines, count_tokens, format_positions, format_rows, line_spans, parse_floats, parse_integers
-from gvpipe.sequence import Float32, Float64, Int32
 
 HEADER = re.compile(rb"\s*(ST)?(C)?(N)?OFF\b")
 
@@ -60,7 +59,7 @@ class OffLoader:
         return Mesh(positions, faces, colors, notes.cut(n_corners))
 
 
-def _parse_rows(text: bytes) -> tuple[NDArray[np.float64], Int64, Int64]:
+def _parse_rows(text: bytes) -> tuple[Float64, Int64, Int64]:
     """All numbers of some lines, how many each line has, and where each begins."""
     array = np.frombuffer(text, np.uint8)
     values, counts = parse_floats(text), count_tokens(array, line_spans(array)[0])
@@ -81,7 +80,7 @@ def _parse_faces(text: bytes, n_vertices: int) -> tuple[Int32, Int64]:
     return as_faces(values[at].astype(np.int64)[triangles], n_vertices), n_corners
 
 
-def _colors(values: NDArray[np.float64], counts: Int64, first: Int64) -> Attributes:
+def _colors(values: Float64, counts: Int64, first: Int64) -> Attributes:
     """The last four columns, or three where rows are too short for four."""
     if (counts != counts[0]).any() or counts[0] < 6:
         return {}

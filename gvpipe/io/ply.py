@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe import notes
-from gvpipe.io.mesh import Attributes, Encoder, Int64, Mesh, as_color, as_faces, per_vertex
-from gvpipe.sequence import Float32, Float64, Int32
+from gvpipe.arrays import Array, Float32, Float64, Int32, Int64
+from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, per_vertex
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 NORMAL_NAMES = ("nx", "ny", "nz")
@@ -88,7 +88,7 @@ def _attributes(vertex: dict[str, Any], face: dict[str, Any], faces: Int32) -> d
     return attributes
 
 
-def _stack(columns: dict[str, Any], names: tuple[str, ...]) -> NDArray[Any]:
+def _stack(columns: dict[str, Any], names: tuple[str, ...]) -> Array:
     return np.stack([np.asarray(columns[name]).reshape(-1) for name in names], axis=1)
 
 

@@ -13,7 +13,7 @@ from io import FileIO
 
 import numpy as np
 
-from gvpipe.sequence import Float32
+from gvpipe.arrays import Float32
 
 
 class Spool:

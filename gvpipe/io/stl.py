@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from gvpipe.arrays import Float32, Float64, Int32, Int64
 from gvpipe.errors import InputError
-from gvpipe.io.mesh import Attributes, Encoder, Int64, Mesh, as_faces
+from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_faces
 from gvpipe.origin import choose_origin, narrow
-from gvpipe.sequence import Float32, Float64, Int32, check_finite
+from gvpipe.sequence import check_finite
 
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 HEADER_BYTES = 80

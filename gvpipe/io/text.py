@@ -12,8 +12,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.io.mesh import Int64, UInt8
-from gvpipe.sequence import Float32, Float64
+from gvpipe.arrays import Bool, Float32, Float64, Int64, UInt8
 
 
 def clean_lines(data: bytes) -> bytes:
@@ -37,7 +36,7 @@ def line_spans(text: UInt8) -> tuple[Int64, Int64]:
     return np.concatenate([[0], ends[:-1]]).astype(np.int64), ends.astype(np.int64)
 
 
-def token_starts(text: UInt8) -> NDArray[np.bool_]:
+def token_starts(text: UInt8) -> Bool:
     """True at the first character of every run of characters other than blanks."""
     solid = text > ord(" ")
     solid[1:] &= text[:-1] <= ord(" ")
@@ -51,7 +50,7 @@ def count_tokens(text: UInt8, starts: Int64) -> Int64:
     return np.add.reduceat(token_starts(text), starts, dtype=np.int64)
 
 
-def parse_floats(text: bytes) -> NDArray[np.float64]:
+def parse_floats(text: bytes) -> Float64:
     """All numbers of a text, in order.
 
     Raises:

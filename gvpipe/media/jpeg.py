@@ -10,13 +10,11 @@ from __future__ import annotations
 import io
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import UInt8
 from gvpipe.errors import CorruptFile
 
 END_OF_IMAGE = b"\xff\xd9"
-
-UInt8 = NDArray[np.uint8]
 
 
 def encode_jpeg(plane: UInt8, step: int) -> bytes:

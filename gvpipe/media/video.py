@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64, Integers, UInt8
 from gvpipe.errors import CorruptFile
 from gvpipe.media.jpeg import decode_jpeg, encode_jpeg
 
@@ -56,7 +57,7 @@ X264 = {
 X264["8x8dct"] = 1  # makes the profile High with every preset, ultrafast too
 FILM = {"preset": "medium", "crf": "20"}  # of pictures that people look at
 
-Plane = NDArray[np.uint8] | NDArray[np.uint16]
+Plane = UInt8 | NDArray[np.uint16]
 
 
 @dataclass(frozen=True)
@@ -85,13 +86,13 @@ class Profile:
         """Of a plane."""
         return np.dtype(np.uint8 if self.depth == 8 else np.uint16)
 
-    def clip(self, samples: NDArray[np.integer]) -> NDArray[np.integer]:
+    def clip(self, samples: Integers) -> Integers:
         """Samples as everyone takes them: coarse quantisers overshoot, and a browser's canvas clips to the limited range."""
-        clipped: NDArray[np.integer] = np.clip(samples, self.low, self.high)
+        clipped: Integers = np.clip(samples, self.low, self.high)
         return clipped
 
     @property
-    def offsets(self) -> NDArray[np.float64]:
+    def offsets(self) -> Float64:
         """Levels above the middle of every value that a sample's dtype can hold, clipped."""
         return self.clip(np.arange(np.iinfo(self.dtype).max + 1)).astype(np.float64) - self.middle
 
@@ -291,7 +292,7 @@ class VideoReader:
         return rows[:height]  # the decoder's own memory: a copy costs half as much as decoding
 
 
-def write_film(path: Path, pictures: Iterable[NDArray[np.uint8]], fps: float) -> None:
+def write_film(path: Path, pictures: Iterable[UInt8], fps: float) -> None:
     """Write an MP4 film of ``(height, width, 3)`` sRGB pictures with even sides; x264 codes them for the eye."""
     import av
 
@@ -314,7 +315,7 @@ def write_film(path: Path, pictures: Iterable[NDArray[np.uint8]], fps: float) ->
         container.mux(stream.encode(None))
 
 
-def hold_picture(plane: NDArray[np.uint8], fps: float, n_frames: int, quality: int) -> bytes:
+def hold_picture(plane: UInt8, fps: float, n_frames: int, quality: int) -> bytes:
     """Return an MP4 file of one ``h264-8`` plane with even sides that lasts ``n_frames``."""
     import av
 

@@ -5,17 +5,12 @@ Corner ``3 t + k`` is vertex k of triangle t. Everything is an integer.
 
 from __future__ import annotations
 
-from typing import Any
-
-from numpy.typing import NDArray
-
+from gvpipe.arrays import Array
 from gvpipe.compiled import compiled
-
-Ints = NDArray[Any]
 
 
 @compiled
-def link(corner: int, vertex: int, head: Ints, after: Ints, before: Ints) -> None:
+def link(corner: int, vertex: int, head: Array, after: Array, before: Array) -> None:
     after[corner] = head[vertex]
     before[corner] = -1
     if head[vertex] >= 0:
@@ -24,7 +19,7 @@ def link(corner: int, vertex: int, head: Ints, after: Ints, before: Ints) -> Non
 
 
 @compiled
-def unlink(corner: int, vertex: int, head: Ints, after: Ints, before: Ints) -> None:
+def unlink(corner: int, vertex: int, head: Array, after: Array, before: Array) -> None:
     if before[corner] >= 0:
         after[before[corner]] = after[corner]
     else:
@@ -34,7 +29,7 @@ def unlink(corner: int, vertex: int, head: Ints, after: Ints, before: Ints) -> N
 
 
 @compiled
-def find_ring(v: int, tri: Ints, head: Ints, after: Ints, ring: Ints, sides: Ints) -> tuple[int, bool]:
+def find_ring(v: int, tri: Array, head: Array, after: Array, ring: Array, sides: Array) -> tuple[int, bool]:
     """Chain the far sides of v's triangles: ring size and whether it closes; size 0: v cannot be removed."""
     n = 0
     c = head[v]
@@ -88,7 +83,7 @@ def find_ring(v: int, tri: Ints, head: Ints, after: Ints, ring: Ints, sides: Int
 
 
 @compiled
-def has_edge(a: int, b: int, tri: Ints, head: Ints, after: Ints, degree: Ints) -> bool:
+def has_edge(a: int, b: int, tri: Array, head: Array, after: Array, degree: Array) -> bool:
     if min(degree[a], degree[b]) > 256:
         return True
     if degree[b] < degree[a]:
@@ -106,15 +101,15 @@ def has_edge(a: int, b: int, tri: Ints, head: Ints, after: Ints, degree: Ints) -
 def fill_hole(
     n: int,
     closed: bool,
-    ring: Ints,
-    degree: Ints,
-    regular: Ints,
-    tri: Ints,
-    head: Ints,
-    after: Ints,
-    polygon: Ints,
-    gain: Ints,
-    new: Ints,
+    ring: Array,
+    degree: Array,
+    regular: Array,
+    tri: Array,
+    head: Array,
+    after: Array,
+    polygon: Array,
+    gain: Array,
+    new: Array,
 ) -> tuple[int, int]:
     """Triangulate the hole by cutting ears, the one first that brings degrees closest to regular.
 

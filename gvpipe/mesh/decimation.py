@@ -12,11 +12,9 @@ Source: Vasa and Skala 2010, section 3.2 (degrees near 6, known to both sides); 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Array
 from gvpipe.compiled import compiled
 from gvpipe.mesh.corner_lists import fill_hole, find_ring, link, unlink
 
@@ -26,13 +24,11 @@ MIN_COARSE = 16  # vertices; decimation stops here at the latest
 REGULAR, REGULAR_BOUNDARY = 6, 3  # triangles around a vertex
 NEVER = 1 << 40  # the cost of what cannot be removed
 
-Ints = NDArray[Any]
-
 
 @compiled
 def decimate(
-    faces: Ints, n_vertices: int, max_waves: int, order: Ints, waves: Ints, starts: Ints, near: Ints, rings: Ints
-) -> tuple[int, int, Ints]:
+    faces: Array, n_vertices: int, max_waves: int, order: Array, waves: Array, starts: Array, near: Array, rings: Array
+) -> tuple[int, int, Array]:
     """Remove vertices wave by wave until none can go, or `MIN_COARSE` are left.
 
     Fills ``order`` with the vertices as they leave, ``waves`` with the bounds of waves in it, ``near`` and ``starts`` with what

@@ -22,12 +22,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.sequence import Int32
+from gvpipe.arrays import Int32
 
 MAX_WAVES = 64
 MIN_BLOCK = 48  # vertices; smaller waves are joined to one block, since a block is coded at once
-
-Ints = NDArray[np.int32]
 
 
 @dataclass(frozen=True)
@@ -44,12 +42,12 @@ class Hierarchy:
         waves: ``(B,)`` for each block how many waves are still left out when it is there.
     """
 
-    order: Ints
-    starts: Ints
-    near: Ints
-    rings: Ints
-    blocks: Ints
-    waves: Ints
+    order: Int32
+    starts: Int32
+    near: Int32
+    rings: Int32
+    blocks: Int32
+    waves: Int32
 
 
 def build_hierarchy(faces: Int32, n_vertices: int) -> Hierarchy:
@@ -99,7 +97,7 @@ def _run(faces: Int32, n_vertices: int, max_waves: int) -> tuple[Any, ...]:
     return removed[:n], bounds[: w + 1], starts[: n + 1], near[: starts[n]], rings[:n], left
 
 
-def _joined(bounds: Ints) -> NDArray[np.intp]:
+def _joined(bounds: Int32) -> NDArray[np.intp]:
     """Indices of the bounds that end a block of at least `MIN_BLOCK` vertices; the last one always does."""
     keep, last = [], 0
     for i, bound in enumerate(bounds):

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from gvpipe.arrays import Float64, Floats, Int32, Integers
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Lattice:
     step: float
 
     @classmethod
-    def over(cls, points: NDArray[np.floating], bits: int) -> Lattice:
+    def over(cls, points: Floats, bits: int) -> Lattice:
         """Return the lattice of ``2**bits`` steps along the longest side of the bounding box of ``points (V, 3)``."""
         low = points.min(axis=0).astype(np.float64)
         extent = float((points.max(axis=0).astype(np.float64) - low).max())
@@ -29,15 +30,15 @@ class Lattice:
         return cls((x, y, z), extent / (2**bits - 1) if extent > 0 else 1.0)
 
     @classmethod
-    def spaced(cls, points: NDArray[np.floating], step: float) -> Lattice:
+    def spaced(cls, points: Floats, step: float) -> Lattice:
         """Return the lattice of a step, model units, from the least coordinates of ``points (V, 3)`` on."""
         x, y, z = points.min(axis=0).astype(np.float64).tolist()
         return cls((x, y, z), step if step > 0 else 1.0)
 
-    def quantise(self, points: NDArray[np.floating]) -> NDArray[np.int32]:
+    def quantise(self, points: Floats) -> Int32:
         """Return the nearest lattice indices, ``(V, 3) int32``."""
         return np.rint((points.astype(np.float64) - self.origin) / self.step).astype(np.int32)
 
-    def place(self, indices: NDArray[np.integer]) -> NDArray[np.float64]:
+    def place(self, indices: Integers) -> Float64:
         """Return the lattice points, ``(V, 3)``, model units."""
         return np.asarray(np.asarray(self.origin) + indices * self.step)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from gvpipe.arrays import Int32
 from gvpipe.mesh.unique_rows import row_ids
-from gvpipe.sequence import Int32
 
 
 def unique_edges(faces: Int32) -> Int32:
@@ -41,7 +41,7 @@ def k_ring(neighbours: sparse.csr_array, k: int) -> sparse.csr_array:
     return sparse.csr_array(ring)
 
 
-def components(neighbours: sparse.csr_array) -> tuple[int, NDArray[np.int32]]:
+def components(neighbours: sparse.csr_array) -> tuple[int, Int32]:
     """Return the number of connected components and each vertex's component ``(V,)``."""
     count, labels = csgraph.connected_components(neighbours, directed=False)
     return int(count), labels

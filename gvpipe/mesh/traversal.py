@@ -5,19 +5,15 @@ The walk goes from triangle to triangle, breadth first, component after componen
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Array
 from gvpipe.compiled import compiled
 from gvpipe.mesh.corner_lists import link
 
-Ints = NDArray[Any]
-
 
 @compiled
-def queue_fan(v: int, tail: int, head: Ints, after: Ints, queued: Ints, queue: Ints) -> int:
+def queue_fan(v: int, tail: int, head: Array, after: Array, queued: Array, queue: Array) -> int:
     """Append the triangles around v that were never queued; returns the queue's new end."""
     c = head[v]
     while c >= 0:
@@ -30,7 +26,7 @@ def queue_fan(v: int, tail: int, head: Ints, after: Ints, queued: Ints, queue: I
 
 
 @compiled
-def walk_coarse(tri: Ints, coarse: Ints, n_vertices: int) -> tuple[Ints, Ints, Ints]:
+def walk_coarse(tri: Array, coarse: Array, n_vertices: int) -> tuple[Array, Array, Array]:
     """Order the coarse mesh's vertices so that each follows a triangle it can be extrapolated from, where there is one."""
     n_tri = len(tri)
     head = np.full(n_vertices, -1, np.int32)

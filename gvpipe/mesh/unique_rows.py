@@ -6,27 +6,24 @@ A table of n rows of three is stored as deflated byte planes of row differences;
 from __future__ import annotations
 
 import zlib
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from gvpipe.arrays import Array
 from gvpipe.errors import CorruptFile
 
-Ints = npt.NDArray[Any]
 
-
-def used_vertices(faces: Ints, n_vertices: int) -> Ints:
+def used_vertices(faces: Array, n_vertices: int) -> Array:
     return np.flatnonzero(np.bincount(faces.ravel(), minlength=n_vertices))
 
 
-def encode_table(rows: Ints) -> bytes:
+def encode_table(rows: Array) -> bytes:
     differences = np.diff(rows, axis=0, prepend=0).astype("<i4")
     planes = differences.view(np.uint8).reshape(len(rows), 12).T
     return zlib.compress(planes.tobytes(), 9) if len(rows) else b""
 
 
-def decode_table(data: bytes, n_rows: int) -> Ints:
+def decode_table(data: bytes, n_rows: int) -> Array:
     inflate = zlib.decompressobj()
     try:
         planes = inflate.decompress(data, 12 * n_rows + 1) if n_rows else b""
@@ -38,7 +35,7 @@ def decode_table(data: bytes, n_rows: int) -> Ints:
     return differences.astype(np.int64).cumsum(axis=0)
 
 
-def row_ids(rows: Ints) -> tuple[Ints, Ints]:
+def row_ids(rows: Array) -> tuple[Array, Array]:
     """A number for each row, equal where rows are, and the first row that has each number."""
     order = sort_rows(rows)
     ordered = rows[order]
@@ -49,7 +46,7 @@ def row_ids(rows: Ints) -> tuple[Ints, Ints]:
     return ids, order[is_new]  # a stable sort: the first of equals has the smallest index
 
 
-def sort_rows(rows: Ints) -> Ints:
+def sort_rows(rows: Array) -> Array:
     """The order ``(n,)`` of rows by their last number, then the one before, and so on; equal rows stay in order."""
     bits = int(rows.max(initial=0)).bit_length()
     if rows.shape[1] * bits >= 64 or rows.min(initial=0) < 0:
@@ -60,7 +57,7 @@ def sort_rows(rows: Ints) -> Ints:
     return np.argsort(keys, kind="stable")
 
 
-def smallest_first(faces: Ints) -> Ints:
+def smallest_first(faces: Array) -> Array:
     """Rotate each triangle so that its smallest index leads; winding stays."""
     turns = faces.argmin(axis=1)[:, None] if len(faces) else np.zeros((0, 1), np.int64)
     return np.take_along_axis(faces, (turns + np.arange(3)) % 3, axis=1)

@@ -14,7 +14,6 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvpipe.arguments import show
 from gvpipe.errors import InputError
@@ -25,7 +24,6 @@ from gvpipe.metrics.sted import Sted
 from gvpipe.metrics.vertex_errors import BLOCK_BYTES, VertexErrors, frame_diagonal, ratio
 from gvpipe.sequence import MeshSequence
 
-Float64 = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 

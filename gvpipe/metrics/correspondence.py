@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from gvpipe.arrays import Bool, Float64, Int32, Int64, Integers
 from gvpipe.mesh.unique_rows import row_ids, smallest_first
-from gvpipe.sequence import Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 FRAMES = 24  # evenly spaced frames whose positions make a vertex' path
 ROUNDS = 50
@@ -40,23 +41,23 @@ def match_vertices(reference: MeshSequence, distorted: MeshSequence) -> Index | 
     return None
 
 
-def canonical_triangles(faces: NDArray[np.integer]) -> NDArray[np.integer]:
+def canonical_triangles(faces: Integers) -> Integers:
     """Triangles turned so that the smallest index leads (winding kept), in lexicographic order."""
-    turned: NDArray[np.integer] = smallest_first(faces)
+    turned: Integers = smallest_first(faces)
     return turned[np.lexsort(turned.T[::-1])]
 
 
-def _paths(sequence: MeshSequence, shift: NDArray[np.float64] | float = 0.0) -> NDArray[np.float64]:
+def _paths(sequence: MeshSequence, shift: Float64 | float = 0.0) -> Float64:
     return (sequence.sample(FRAMES) + shift).swapaxes(0, 1).reshape(sequence.n_vertices, -1)
 
 
-def _turned(faces: NDArray[np.integer]) -> tuple[NDArray[np.integer], NDArray[np.intp]]:
+def _turned(faces: Integers) -> tuple[Integers, NDArray[np.intp]]:
     """Triangles from their smallest index on, and the corners' places in the given ones ``(T, 3)``."""
     turn = (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3 if len(faces) else np.zeros((0, 3), np.intp)
     return np.take_along_axis(faces, turn, axis=1), turn
 
 
-def _follow_votes(place: Index, ours: NDArray[np.integer], theirs: Int32, n_points: int) -> Index:
+def _follow_votes(place: Index, ours: Integers, theirs: Int32, n_points: int) -> Index:
     """One round: corners that already sit in the reference's triangles have the say."""
     agreeing = _occurs_in(place[theirs], ours)
     triangles = np.bincount(theirs.ravel(), minlength=len(place))
@@ -75,13 +76,13 @@ def _follow_votes(place: Index, ours: NDArray[np.integer], theirs: Int32, n_poin
     return np.asarray(votes.argmax(axis=1), np.intp).ravel()
 
 
-def _occurs_in(faces: NDArray[np.integer], others: NDArray[np.integer]) -> NDArray[np.bool_]:
+def _occurs_in(faces: Integers, others: Integers) -> Bool:
     """Which triangles are among the others, ``(T,)``."""
     ids = row_ids(np.concatenate([smallest_first(others), smallest_first(faces)]))[0]
     return np.isin(ids[len(others) :], ids[: len(others)])
 
 
-def _directed_edges(faces: NDArray[np.integer], n_points: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _directed_edges(faces: Integers, n_points: int) -> tuple[Int64, Int64]:
     """Keys of the directed edges ``(3T,)``, and the corner opposite each."""
     start, end, third = (faces[:, turn].T.ravel().astype(np.int64) for turn in ([0, 1, 2], [1, 2, 0], [2, 0, 1]))
     return start * n_points + end, third

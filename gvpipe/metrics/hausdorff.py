@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from gvpipe.sequence import Int32
+from gvpipe.arrays import Float64, Int32, Integers
 
 FIRST_BATCH = 64  # samples searched before the best distance is looked at again; doubles from batch to batch
 MAX_BATCH = 4096
@@ -31,7 +31,6 @@ NEAREST = 8  # triangles by centroid that give a first bound in the full search
 ROUNDING = 1e-12  # relative slack of a search radius, so that no triangle is lost to float64 rounding
 RADIUS_STEP = 2.0  # triangles are searched in groups whose radii differ by at most this factor
 
-Float64 = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 
@@ -104,7 +103,7 @@ class _Surface:
         self._tree: cKDTree | None = None
         self._groups: list[tuple[float, Index, cKDTree]] = []
 
-    def nearest_of(self, points: Float64, triangles: Index, counts: NDArray[np.integer]) -> Float64:
+    def nearest_of(self, points: Float64, triangles: Index, counts: Integers) -> Float64:
         """Distance of each point to the nearest of its own triangles, ``counts`` of them each, never 0 of them."""
         squared = np.empty(len(triangles))
         owner = np.repeat(np.arange(len(points)), counts)
@@ -183,7 +182,7 @@ def _tree(centroids: Float64) -> cKDTree:
     return cKDTree(centroids, balanced_tree=False, compact_nodes=False)  # a third of the time to build
 
 
-def _batches(counts: NDArray[np.integer], limit: int) -> Iterator[slice]:
+def _batches(counts: Integers, limit: int) -> Iterator[slice]:
     """Slices of consecutive items whose counts sum to about ``limit`` at most (one item may exceed it)."""
     cuts = np.flatnonzero(np.diff(np.cumsum(counts) // limit)) + 1
     for start, stop in pairwise([0, *cuts.tolist(), len(counts)]):

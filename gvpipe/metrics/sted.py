@@ -13,18 +13,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-from gvpipe.sequence import Int32
+from gvpipe.arrays import Float64, Int32
 
 RING_DISTANCE = 1  # d: an edge belongs to vertex v if both its ends are at most this many edges from v
 WINDOW = 5  # w: consecutive temporal edges whose deviation is taken together (6 frames: 0.2 s at 30 fps)
 TIME_STEP = 0.002  # dt: length of the temporal edge of a vertex at rest, as a fraction of the diagonal
 TEMPORAL_WEIGHT = 1.0  # c: weight of the temporal part beside the spatial part
 SHORTEST = 1e-7  # edges below this fraction of the diagonal are rounding noise in float32 and are left out
-
-Float64 = NDArray[np.float64]
 
 
 class Sted:

@@ -10,15 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gvpipe.sequence import Float32, MeshSequence
+from gvpipe.arrays import Float32, Float64
+from gvpipe.sequence import MeshSequence
 
 BLOCK_BYTES = 4 << 20  # float64 positions of one side worked on at a time: the temporaries of a block stay in cache
 
 LEAST_SPREAD = 1e-3  # of the largest coordinate, for a sequence of one point
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

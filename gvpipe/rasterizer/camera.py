@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float32, Float64, Int32
 from gvpipe.errors import InputError
-from gvpipe.sequence import Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 VIEWS = {  # azimuth and elevation, degrees
     "three-quarter": (35.0, 18.0),
@@ -34,8 +34,6 @@ UP_AXES = {
 MARGIN = 0.06  # of half the picture, left free around what is framed
 SAMPLED_FRAMES = 64  # frames looked at to frame a motion
 TURN_VIEWS = 24  # azimuths looked at to frame a whole turn: between two of them a width changes by less than the margin
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -163,7 +161,7 @@ def used_vertices(sequence: MeshSequence) -> Int32:
     return np.unique(sequence.faces)
 
 
-def middle_of(positions: NDArray[np.float32], used: Int32) -> Float64:
+def middle_of(positions: Float32, used: Int32) -> Float64:
     """``(3,)`` mean of the vertices that triangles use; moves evenly where a bounding box' centre would twitch."""
     mean: Float64 = positions[used].mean(axis=0, dtype=np.float64)
     return mean

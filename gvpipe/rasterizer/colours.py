@@ -8,10 +8,8 @@ hue and saturation readable against the legend.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float64 = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
+from gvpipe.arrays import Float64, Floats, UInt8
 
 LEVELS = 4096  # of linear light that are told apart: the darkest sRGB steps are 1/3295 wide
 BACKGROUND = (0.95, 0.95, 0.95)  # sRGB, 0..1, as all here
@@ -22,24 +20,24 @@ ERRORS = np.array(
 )
 
 
-def to_linear(srgb: NDArray[np.floating] | tuple[float, ...]) -> Float64:
+def to_linear(srgb: Floats | tuple[float, ...]) -> Float64:
     """Linear light of sRGB values, both 0..1 (IEC 61966-2-1)."""
     values = np.asarray(srgb, np.float64)
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
 
-def to_srgb(linear: NDArray[np.floating]) -> Float64:
+def to_srgb(linear: Floats) -> Float64:
     """sRGB values of linear light, both 0..1."""
     values = np.asarray(linear, np.float64)
     return np.where(values <= 0.0031308, values * 12.92, 1.055 * np.maximum(values, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
-def srgb_codes() -> Bytes:
+def srgb_codes() -> UInt8:
     """``(LEVELS,)`` the sRGB byte of each level of linear light."""
     return np.rint(255 * to_srgb(np.linspace(0, 1, LEVELS))).astype(np.uint8)
 
 
-def error_colours(values: NDArray[np.floating]) -> Float64:
+def error_colours(values: Floats) -> Float64:
     """sRGB colours ``(..., 3)`` of errors ``(...)`` as parts of the largest; what lies outside 0..1 is clipped."""
     places = np.linspace(0, 1, len(ERRORS))
     return np.stack([np.interp(values, places, ERRORS[:, channel]) for channel in range(3)], axis=-1)

@@ -7,11 +7,9 @@ A triangle with a corner behind the eye, or a million samples outside the pictur
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Array
 from gvpipe.compiled import compiled
 
 SNAP_BITS = 8
@@ -19,8 +17,6 @@ SNAP = 1 << SNAP_BITS
 HALF = SNAP // 2
 FARTHEST = float(1 << 20)  # samples: keeps products of two differences of snapped corners within 60 bits
 NEAREST = 1e-3  # of the distance: what is nearer to the eye counts as behind it
-
-Array = NDArray[Any]
 
 
 @compiled

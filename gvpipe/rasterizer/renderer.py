@@ -13,21 +13,18 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float32, Floats, Int32, UInt8
 from gvpipe.errors import InputError
 from gvpipe.mesh.topology import weld
 from gvpipe.rasterizer.camera import Camera
 from gvpipe.rasterizer.colours import BACK, BACKGROUND, FRONT, error_colours, srgb_codes, to_linear
-from gvpipe.sequence import Float32, Int32
 
 SHADINGS = ("smooth", "flat")
 SIZE_RANGE = (16, 8192)  # pixels, of either side
 SAMPLES_RANGE = (1, 8)  # per pixel and axis
 THREADS = min(4, os.cpu_count() or 1)
 RAMP = 256  # steps of a colour map
-
-Picture = NDArray[np.uint8]
 
 
 class Renderer:
@@ -69,7 +66,7 @@ class Renderer:
         self._ramp = to_linear(error_colours(np.linspace(0, 1, RAMP)))
         self._pool = ThreadPoolExecutor(THREADS)
 
-    def draw(self, positions: Float32, camera: Camera, values: NDArray[np.floating] | None = None) -> Picture:
+    def draw(self, positions: Float32, camera: Camera, values: Floats | None = None) -> UInt8:
         """Return the picture ``(height, width, 3) uint8``, sRGB.
 
         Args:
@@ -101,7 +98,7 @@ class Renderer:
         self._in_bands(paint)
         return picture
 
-    def visible(self, positions: Float32, camera: Camera) -> NDArray[np.int32]:
+    def visible(self, positions: Float32, camera: Camera) -> Int32:
         """Return the triangle that each sample sees, -1 for none: ``(height * samples, width * samples) int32``."""
         from gvpipe.rasterizer.raster_kernels import rasterise
 

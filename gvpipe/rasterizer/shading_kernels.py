@@ -8,15 +8,12 @@ coded as sRGB at the end. Kernels only: they import numba.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Array
 from gvpipe.compiled import compiled
 from gvpipe.rasterizer.raster_kernels import HALF, SNAP
-
-Array = NDArray[Any]
 
 # picture axes: right, up, towards the eye
 KEY = (-0.46, 0.62, 0.635)  # the light, from the upper left

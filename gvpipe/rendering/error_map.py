@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64, UInt8
 from gvpipe.errors import InputError
 from gvpipe.metrics.comparison import aligned
 from gvpipe.metrics.vertex_errors import frame_diagonal
@@ -21,8 +21,6 @@ from gvpipe.sequence import MeshSequence
 
 SMALLEST = (160, 120)  # pixels, of a picture with a legend
 INK = (60, 60, 60)
-
-Picture = NDArray[np.uint8]
 
 
 class ErrorMap:
@@ -47,18 +45,18 @@ class ErrorMap:
         used = used_vertices(self.sequence)  # what no triangle uses cannot be seen
         self.largest = largest or max(float(self.errors(frame)[used].max()) for frame in sampled(frames))
 
-    def errors(self, frame: int) -> NDArray[np.float64]:
+    def errors(self, frame: int) -> Float64:
         """``(V,)`` distances, percent of the diagonal."""
         original, here = (side.read_exact(frame, frame + 1)[0] for side in (self._reference, self.sequence))
         apart = self.sequence.origin - self._reference.origin
-        distance: NDArray[np.float64] = np.linalg.norm(here + apart - original, axis=1)
+        distance: Float64 = np.linalg.norm(here + apart - original, axis=1)
         return distance / self._unit
 
-    def values(self, frame: int) -> NDArray[np.float64]:
+    def values(self, frame: int) -> Float64:
         """``(V,)`` errors as parts of the scale's end; where there is no error at all, zeros."""
         return self.errors(frame) / (self.largest or 1.0)
 
-    def legend(self, size: tuple[int, int]) -> Picture:
+    def legend(self, size: tuple[int, int]) -> UInt8:
         """Return a colour bar with its numbers, a strip for the left edge of a picture of ``size``.
 
         Raises:

@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64, Int32, UInt8
 from gvpipe.atomic import atomic_path
 from gvpipe.errors import InputError
 from gvpipe.rasterizer.camera import Camera, framing, middle_of, used_vertices
 from gvpipe.rasterizer.renderer import Renderer
 from gvpipe.rendering.error_map import ErrorMap
-from gvpipe.sequence import Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 if TYPE_CHECKING:
     from gvpipe.codec import Progress
@@ -33,9 +33,6 @@ STILL_SAMPLES, FILM_SAMPLES = 3, 2  # per pixel and axis
 TURN_SECONDS = 4.0  # a turntable's shortest turn
 GIF_FPS = 50.0  # browsers slow down GIFs that are faster
 PALETTE_FRAMES = 6  # pictures that a GIF's one palette is made from
-
-Picture = NDArray[np.uint8]
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -48,7 +45,7 @@ class Film:
     renderer: Renderer
     turntable: bool = False
     errors: ErrorMap | None = None
-    legend: Picture | None = None  # a strip at the left
+    legend: UInt8 | None = None  # a strip at the left
     follow: bool = False  # whether the camera goes with the mesh
 
     def __len__(self) -> int:
@@ -75,7 +72,7 @@ class Film:
     def _middle(self, frame: int) -> Float64:
         return middle_of(self.sequence.read(frame, frame + 1)[0], self._used)
 
-    def __getitem__(self, k: int) -> Picture:
+    def __getitem__(self, k: int) -> UInt8:
         frame = self.frames[k]
         values = self.errors.values(frame) if self.errors else None
         picture = self.renderer.draw(self.sequence.read(frame, frame + 1)[0], self.camera_of(k), values)
@@ -177,7 +174,7 @@ def _frames(sequence: MeshSequence, frame: int | None, suffix: str, turntable: b
     return frames * max(1, math.ceil(TURN_SECONDS * sequence.fps / len(frames))) if turntable else frames
 
 
-def _painted(film: Film, progress: Progress | None, step: int = 1) -> Iterator[Picture]:
+def _painted(film: Film, progress: Progress | None, step: int = 1) -> Iterator[UInt8]:
     for k in range(0, len(film), step):
         yield film[k]
         if progress:

@@ -6,12 +6,12 @@ Frame 0 from the renderer's usual view, in grey; one H.264 picture held for the 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float32, Int32, UInt8
 from gvpipe.media.video import PROFILES, hold_picture
 from gvpipe.rasterizer.camera import framing
 from gvpipe.rasterizer.renderer import Renderer
-from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 SIZE = 160  # pixels, of both sides
 SAMPLES = 3  # per pixel and axis
@@ -29,12 +29,12 @@ def make_poster(positions: Float32, faces: Int32, fps: float, n_frames: int) -> 
     return hold_picture(paint(positions, faces), fps, n_frames, QP)
 
 
-def paint(positions: Float32, faces: Int32) -> NDArray[np.uint8]:
+def paint(positions: Float32, faces: Int32) -> UInt8:
     """Return a ``(SIZE, SIZE)`` picture, levels 16..235; the y axis is up. Without triangles it is empty."""
     profile = PROFILES["h264-8"]
     if not len(faces):
         return np.full((SIZE, SIZE), profile.high, np.uint8)
     camera = framing(MeshSequence(positions[None], faces))
     grey = Renderer(faces, positions, (SIZE, SIZE), samples=SAMPLES).draw(positions, camera) @ LUMA
-    plane: NDArray[np.uint8] = np.rint(profile.low + (profile.high - profile.low) / 255 * grey).astype(np.uint8)
+    plane: UInt8 = np.rint(profile.low + (profile.high - profile.low) / 255 * grey).astype(np.uint8)
     return plane

@@ -25,8 +25,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64, Int64
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_rows, encode_rows
@@ -41,8 +41,6 @@ PER_OCTAVE = 8
 PER_STEP_OCTAVE = 1024  # steps are 0.07 % apart
 BLOCK = 1024  # vertices rebuilt at a time
 LEAST_OUTSIDE = 0.2  # part of a basis' errors that is taken to lie outside its span, at least
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -245,7 +243,7 @@ def squared_errors(trajectories: Float64, basis: Basis, coefficients: Float64) -
     return result
 
 
-def _scales(levels: NDArray[np.int64], n_points: int, step: float) -> Float64:
+def _scales(levels: Int64, n_points: int, step: float) -> Float64:
     """Scales of the mean's column and of the others."""
     return np.concatenate([[np.sqrt(n_points)], step * 2.0 ** (levels / PER_OCTAVE)])
 

@@ -8,16 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64, Int64
 from gvpipe.codec import Memo, Progress
 from gvpipe.connectivity.base_mesh import EncodedMesh
 from gvpipe.connectivity.topology_only import BareMesh, decode_mesh, encode_mesh
 from gvpipe.metrics.vertex_errors import Spread
 from gvpipe.quality_scale import error_of
 from gvpipe.sequence import MeshSequence
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -33,7 +31,7 @@ class CodedPoints:
 
     coded: EncodedMesh
     mesh: BareMesh
-    members: NDArray[np.int64]
+    members: Int64
     spread: float
 
     def aimed_error(self, quality: float) -> float:
@@ -53,7 +51,7 @@ def code_points(sequence: MeshSequence, reorder: bool, memo: Memo, report: Progr
     return CodedPoints(coded, mesh, coded.permutation[first], spread)
 
 
-def survey(sequence: MeshSequence, report: Progress) -> tuple[NDArray[np.int64], float]:
+def survey(sequence: MeshSequence, report: Progress) -> tuple[Int64, float]:
     """Points ``(V,)`` of vertices, equal where trajectories are, and the vertices' spread, model units."""
     points = np.zeros(sequence.n_vertices, np.int64)
     spread = Spread()
@@ -68,7 +66,7 @@ def survey(sequence: MeshSequence, report: Progress) -> tuple[NDArray[np.int64],
     return points.astype(np.int64), spread.value
 
 
-def read_trajectories(sequence: MeshSequence, start: int, stop: int, members: NDArray[np.int64]) -> Float64:
+def read_trajectories(sequence: MeshSequence, start: int, stop: int, members: Int64) -> Float64:
     """Trajectories of the vertices ``members (P,)`` from frame ``start`` to ``stop``: ``(P, 3n)``, n frames, model units."""
     result = np.empty((len(members), stop - start, 3))
     for first, block in sequence.chunks(start, stop):

@@ -20,8 +20,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64, Int64
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.entropy.integers import decode_integers, encode_integers
@@ -41,9 +41,6 @@ N_CONTEXTS = HIGHEST - LOWEST + 1
 N_NEAR = 6  # rows near that count
 LARGEST = 1 << 36  # magnitude of a residual, in steps; sums of its forecasts stay below 2**58
 MAX_VALUES = 1 << 27  # of a section: rows times components
-
-Int64 = NDArray[np.int64]
-Float64 = NDArray[np.float64]
 
 
 class Surroundings(NamedTuple):

@@ -6,8 +6,8 @@ Kernels of `gvpipe.trajectory.coefficient_coding`.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Int64, UInt32, UInt64
 from gvpipe.compiled import compiled
 from gvpipe.entropy.block_kernels import take_block
 from gvpipe.trajectory.coefficient_coding import (
@@ -24,8 +24,6 @@ from gvpipe.trajectory.coefficient_coding import (
     SHORT,
     Surroundings,
 )
-
-Int64 = NDArray[np.int64]
 
 
 @compiled
@@ -123,9 +121,9 @@ def find_all_contexts(residuals: Int64, around: Surroundings) -> Int64:
 def decode_residuals(
     residuals: Int64,
     around: Surroundings,
-    state: NDArray[np.uint64],
-    words: NDArray[np.uint32],
-    edges: NDArray[np.uint64],
+    state: UInt64,
+    words: UInt32,
+    edges: UInt64,
     sizes: Int64,
 ) -> int:
     """Fill ``residuals (m, R)``, by place, block by block and component by component; returns what `take_block` returns, and

@@ -24,13 +24,10 @@ import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from gvpipe.arrays import Bool, Float64, Int32, Int64
 
 PREDICTORS = ("navg", "lsp", "rbf", "kalman")
-
-Int32 = NDArray[np.int32]
-Int64 = NDArray[np.int64]
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -57,7 +54,7 @@ class Rows:
     affine: bool
 
 
-def select_rows(rows: Rows, keep: NDArray[np.bool_]) -> Rows:
+def select_rows(rows: Rows, keep: Bool) -> Rows:
     """The rows whose place in the order ``keep (n,)`` marks, renumbered by place; what they know must be marked, too."""
     left = _keep_places(rows, keep)
     number = np.zeros(len(keep), np.int32)
@@ -65,12 +62,12 @@ def select_rows(rows: Rows, keep: NDArray[np.bool_]) -> Rows:
     return dataclasses.replace(left, order=np.arange(len(left.order), dtype=np.int32), near=number[left.near])
 
 
-def rows_left(rows: Rows, given: NDArray[np.bool_]) -> Rows:
+def rows_left(rows: Rows, given: Bool) -> Rows:
     """The rows that are left to be coded if those that ``given (n,)`` marks are known beforehand; rows keep their numbers."""
     return _keep_places(rows, ~given[rows.order])
 
 
-def _keep_places(rows: Rows, keep: NDArray[np.bool_]) -> Rows:
+def _keep_places(rows: Rows, keep: Bool) -> Rows:
     counts = np.diff(rows.starts)
     wanted = np.repeat(keep, counts)
     return Rows(

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Array, Float64
 from gvpipe.compiled import compiled
 
 LSP, RBF, KALMAN = 1, 2, 3  # places in PREDICTORS
@@ -18,12 +16,9 @@ NUGGET = 16  # of rbf, in units of step**beta: what quantisation adds to the rad
 EVERY = 4  # rbf's weights are solved for each of the first components, then for every fourth: distances hardly change
 FIRST = 12
 
-Ints = NDArray[Any]
-Floats = NDArray[np.float64]
-
 
 @compiled
-def solve(a: Floats, b: Floats, n: int) -> None:
+def solve(a: Float64, b: Float64, n: int) -> None:
     """Solve the positive definite system of the first n unknowns in place (Cholesky)."""
     for i in range(n):
         for j in range(i + 1):
@@ -47,7 +42,7 @@ def solve(a: Floats, b: Floats, n: int) -> None:
 
 
 @compiled
-def radial_weights(squared: Floats, own: Floats, n: int, beta: float, nugget: float, a: Floats, w: Floats) -> None:
+def radial_weights(squared: Float64, own: Float64, n: int, beta: float, nugget: float, a: Float64, w: Float64) -> None:
     """Weights of rbf interpolation: equation 11 with its side condition used to eliminate the first row.
 
     With lambda_1 = -(lambda_2 + ...) the system in the others is positive definite, for 0 < beta < 2, and so is its sum with
@@ -70,19 +65,19 @@ def radial_weights(squared: Floats, own: Floats, n: int, beta: float, nugget: fl
 
 @compiled
 def predict(
-    order: Ints,
-    starts: Ints,
-    near: Ints,
-    weights: Floats,
-    variances: Floats,
-    rings: Ints,
+    order: Array,
+    starts: Array,
+    near: Array,
+    weights: Float64,
+    variances: Float64,
+    rings: Array,
     affine: bool,
     step: float,
     predictor: int,
     beta: float,
-    residuals: Ints,
-    decoded: Floats,
-    target: Floats,
+    residuals: Array,
+    decoded: Float64,
+    target: Float64,
 ) -> None:
     """See `gvpipe.trajectory.prediction.predict_rows`.
 

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float32, Float64, Integers
 from gvpipe.errors import CorruptFile
-from gvpipe.sequence import Float32
 from gvpipe.trajectory.basis import Basis
 
 MAX_FLOAT32 = float(np.finfo(np.float32).max)
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -26,9 +23,7 @@ class Segment:
     coefficients: Float64
 
 
-def read_frames(
-    start: int, stop: int, bounds: list[int], points: NDArray[np.integer], decode: Callable[[int], Segment]
-) -> Float32:
+def read_frames(start: int, stop: int, bounds: list[int], points: Integers, decode: Callable[[int], Segment]) -> Float32:
     """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
 
     Args:

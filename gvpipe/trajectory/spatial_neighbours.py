@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from gvpipe.arrays import Int32
 from gvpipe.mesh.hierarchy import Hierarchy
-from gvpipe.sequence import Int32
 from gvpipe.trajectory.prediction import Rows
 
 OVERSHOOT = 0.2

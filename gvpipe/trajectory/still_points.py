@@ -15,26 +15,24 @@ import struct
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Bool, Float32, Float64, Int32, Integers
 from gvpipe.codec import Memo
 from gvpipe.connectivity.topology_only import BareMesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.container.segments import LARGEST_STEP, SMALLEST_STEP
 from gvpipe.errors import CorruptFile
-from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import Basis, fit_coefficients
 from gvpipe.trajectory.coded_points import CodedPoints
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_rows, encode_rows
 from gvpipe.trajectory.prediction import Rows
 from gvpipe.trajectory.spatial_neighbours import walk_rows
-from gvpipe.trajectory.still_vertices import Flags, decode_flags, encode_flags, find_still
+from gvpipe.trajectory.still_vertices import decode_flags, encode_flags, find_still
 
 SECTION = "still"
 HEAD = struct.Struct("<d3f")
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class StillPoints:
         positions: ``(P, 3) float32``, model units, of the still ones; the others' mean nothing.
     """
 
-    flags: Flags
+    flags: Bool
     positions: Float32
 
     @property
@@ -83,7 +81,7 @@ class StillPoints:
         result[~self.flags] = moving
         return result
 
-    def place(self, frames: Float32, points: NDArray[np.integer]) -> None:
+    def place(self, frames: Float32, points: Integers) -> None:
         """Give the still vertices of ``frames (n, V, 3)`` their positions; ``points (V,)`` are the vertices' points."""
         where = self.flags[points]
         frames[:, where] = self.positions[points[where]]
@@ -110,7 +108,7 @@ def no_still(n_points: int) -> StillPoints:
     return StillPoints(np.zeros(n_points, bool), np.zeros((n_points, 3), np.float32))
 
 
-def encode_still(flags: Flags, positions: Float64, error: float, point_faces: Int32) -> tuple[bytes, StillPoints]:
+def encode_still(flags: Bool, positions: Float64, error: float, point_faces: Int32) -> tuple[bytes, StillPoints]:
     """Code the still points; return the bytes and what the decoder will have.
 
     Args:
@@ -146,14 +144,14 @@ def decode_still(data: bytes, point_faces: Int32, n_points: int) -> StillPoints:
     return still
 
 
-def _still_rows(flags: Flags, point_faces: Int32) -> Rows:
+def _still_rows(flags: Bool, point_faces: Int32) -> Rows:
     """Rows of the still points, numbered among themselves, along a walk over the triangles between them."""
     number = np.cumsum(flags) - 1
     between = point_faces[flags[point_faces].all(axis=1)]
     return walk_rows(number[between].astype(np.int32), int(flags.sum()))
 
 
-def _place(flags: Flags, indices: Float64, step: float, origin: Float32) -> StillPoints:
+def _place(flags: Bool, indices: Float64, step: float, origin: Float32) -> StillPoints:
     positions = np.zeros((len(flags), 3), np.float32)
     with np.errstate(over="ignore"):
         positions[flags] = (origin + step * indices).astype(np.float32)

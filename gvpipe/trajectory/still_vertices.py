@@ -3,7 +3,7 @@
 A vertex is still if it has one position in all frames, each coordinate compared exactly. A codec that signals still vertices
 codes one position of each and returns it in every frame: nothing shimmers, and stillness costs hardly a bit.
 
-Flags are coded as run lengths, since still vertices are neighbours along the surface::
+Bool are coded as run lengths, since still vertices are neighbours along the surface::
 
     flags = [varint] m, [integers] m lengths: moving, still, moving, ...; the first may be 0; the last run is left out
 """
@@ -11,16 +11,14 @@ Flags are coded as run lengths, since still vertices are neighbours along the su
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Bool
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.sequence import MeshSequence
 
-Flags = NDArray[np.bool_]
 
-
-def find_still(sequence: MeshSequence) -> Flags:
+def find_still(sequence: MeshSequence) -> Bool:
     """Flags ``(V,)`` of the vertices that stand still in all frames; none of a sequence of one frame, where nothing can move.
 
     Frames are read once, a chunk at a time, and no further than to the chunk in which the last vertex has moved.
@@ -35,13 +33,13 @@ def find_still(sequence: MeshSequence) -> Flags:
     return still
 
 
-def encode_flags(flags: Flags) -> bytes:
+def encode_flags(flags: Bool) -> bytes:
     """Code ``flags (n,)``."""
     ends = np.flatnonzero(np.diff(flags, prepend=False))
     return varint(len(ends)) + encode_integers(np.diff(ends, prepend=0))
 
 
-def decode_flags(data: bytes, n: int, name: str) -> Flags:
+def decode_flags(data: bytes, n: int, name: str) -> Bool:
     """Mirror of `encode_flags`: ``(n,)``; raises `CorruptFile`, naming the section, for bytes that it does not write."""
     cursor = Cursor(data, name)
     n_runs = cursor.varint(n, "the number of runs")

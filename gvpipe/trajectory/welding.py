@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float32, Int64
 from gvpipe.mesh.topology import components
 from gvpipe.sequence import MeshSequence
 
 ROUNDS = 64  # groups that leave a group one by one, in one chunk; what is left then is told apart exactly
 NEAREST = 8  # places looked at for each, itself among them
-
-Int64 = NDArray[np.int64]
 
 
 def find_points(sequence: MeshSequence, tolerance: float = 0.0) -> Int64:
@@ -36,7 +34,7 @@ def find_points(sequence: MeshSequence, tolerance: float = 0.0) -> Int64:
     return np.asarray(np.argsort(np.argsort(first))[number.ravel()], np.int64)
 
 
-def _near_rows(rows: NDArray[np.float32], tolerance: float) -> Int64:
+def _near_rows(rows: Float32, tolerance: float) -> Int64:
     """A number for each of ``rows (n, 3)``, equal where they are, and where rows within the tolerance join them."""
     groups = _equal_rows(rows)
     if not tolerance > 0:
@@ -52,7 +50,7 @@ def _near_rows(rows: NDArray[np.float32], tolerance: float) -> Int64:
     return np.asarray(components(links)[1][groups], np.int64)
 
 
-def _split(frames: NDArray[np.float32], groups: Int64, tolerance: float, free: int) -> Int64:
+def _split(frames: Float32, groups: Int64, tolerance: float, free: int) -> Int64:
     """Groups ``(n,)`` of vertices that also stay together in ``frames (F, n, 3)``; new ones are numbered from ``free``."""
     groups = groups.copy()
     left = np.arange(len(groups))
@@ -71,7 +69,7 @@ def _split(frames: NDArray[np.float32], groups: Int64, tolerance: float, free: i
     return groups
 
 
-def _equal_rows(rows: NDArray[np.float32]) -> Int64:
+def _equal_rows(rows: Float32) -> Int64:
     """A number for each of ``rows (n, m)``, equal where they are; minus zero is zero."""
     keys = np.ascontiguousarray(rows + np.float32(0))
     return np.asarray(

@@ -6,9 +6,8 @@ W. Kabsch, "A solution for the best rotation to relate two sets of vectors", 197
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float64 = NDArray[np.float64]
+from gvpipe.arrays import Float64, Integers
 
 
 class Groups:
@@ -18,7 +17,7 @@ class Groups:
         labels: ``(V,)`` the group of each vertex, 0..K-1, none empty.
     """
 
-    def __init__(self, labels: NDArray[np.integer]) -> None:
+    def __init__(self, labels: Integers) -> None:
         self.labels = labels
         self._order = np.argsort(labels, kind="stable")
         self.sizes = np.bincount(labels)

@@ -16,17 +16,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Bool, Int32, Integers
 from gvpipe.mesh.hierarchy import Hierarchy
-from gvpipe.sequence import Int32
 from gvpipe.trajectory.prediction import Rows, rows_left, select_rows
 
 ANCHOR_CHOICES = ("hierarchy", "walk")
 SMALL = 4  # points of components that are all anchors
 MIN_BLOCK = 48  # rows coded at once, at least
-
-Int64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -39,7 +36,7 @@ class Anchors:
 
     points: Int32
     rows: Rows
-    is_free: NDArray[np.bool_]
+    is_free: Bool
 
 
 def choose_anchors(
@@ -48,8 +45,8 @@ def choose_anchors(
     hierarchy: Hierarchy,
     rows: Rows,
     walk: Int32,
-    component_of: NDArray[np.integer],
-    is_still: NDArray[np.bool_] | None = None,
+    component_of: Integers,
+    is_still: Bool | None = None,
 ) -> Anchors:
     """Choose about one anchor per ``spacing`` points.
 

@@ -17,18 +17,16 @@ Source: Vasa, Marras, Hormann and Brunnett, "Compressing dynamic meshes with geo
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.laplacian.alignment import Groups, rotations
 from gvcodecs.laplacian.edge_shape import EdgeShapeSum
 from gvcodecs.laplacian.shape_fit import fit_shape
+from gvpipe.arrays import Float64, Int32
 from gvpipe.mesh.topology import adjacency, components
-from gvpipe.sequence import Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 BLOCK = 8  # frames aligned at a time, to the mean of those before
 ALIGNED = 64  # frames aligned at most, evenly spread: they give no more than a start
-
-Float64 = NDArray[np.float64]
 
 
 def average_mesh(sequence: MeshSequence, faces: Int32, start: int = 0, stop: int | None = None) -> Float64:

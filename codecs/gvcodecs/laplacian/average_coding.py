@@ -12,20 +12,18 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.laplacian.coefficients import decode_coefficients, encode_coefficients
 from gvcodecs.laplacian.domain import Surface, build_domain
 from gvcodecs.laplacian.header import Header
 from gvcodecs.laplacian.mesh_scale import edge_lengths
+from gvpipe.arrays import Float64
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.errors import CorruptFile
 
 NAME = "average"
 SPACING = 256  # points per anchor
 FARTHEST = 1e9  # mean edge lengths: what a decoded coordinate may have
-
-Float64 = NDArray[np.float64]
 
 
 def encode_average(points: Float64, surface: Surface, header: Header) -> tuple[bytes, Float64]:

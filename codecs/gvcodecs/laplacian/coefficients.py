@@ -5,14 +5,10 @@ Deltas come first: they do not depend on the anchors' values, which are chosen t
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gvcodecs.laplacian.domain import Domain
 from gvcodecs.laplacian.header import Header
+from gvpipe.arrays import Float64
 from gvpipe.trajectory.coefficient_coding import decode_rows, encode_rows
-
-Float64 = NDArray[np.float64]
 
 
 def encode_coefficients(

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.mesh.hierarchy import Hierarchy
-from gvpipe.sequence import Int32
 from gvpipe.trajectory.prediction import Rows
 
 DELTA_PREDICTIONS = ("kalman", "rigid", "none")
@@ -32,8 +32,6 @@ BLOCK = 512  # rows of the walk that are entropy coded at once
 N_RING = 6  # known rows whose magnitudes count for a row's contexts
 TINY = 1e-30
 
-Float64 = NDArray[np.float64]
-
 
 def border_order(faces: Int32, n_points: int) -> Int32:
     """All points in the order of a walk over ``faces (T, 3)`` that goes from triangle to triangle, breadth first."""
@@ -43,9 +41,7 @@ def border_order(faces: Int32, n_points: int) -> Int32:
     return order
 
 
-def delta_order(
-    prediction: str, hierarchy: Hierarchy, walk: Int32, has_deltas: NDArray[np.bool_]
-) -> tuple[Int32, Int32, Int32]:
+def delta_order(prediction: str, hierarchy: Hierarchy, walk: Int32, has_deltas: Bool) -> tuple[Int32, Int32, Int32]:
     """Return points in their order ``(n,)``, bounds of blocks, and for each place which places before it are known ``(n,)``."""
     if prediction == "kalman":
         keep = has_deltas[hierarchy.order]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from gvcodecs.laplacian.anchors import Anchors, choose_anchors
@@ -14,13 +13,11 @@ from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian, thin_hubs
 from gvcodecs.laplacian.header import Header
 from gvcodecs.laplacian.mesh_scale import fineness
 from gvcodecs.laplacian.operators import laplacian
+from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy
 from gvpipe.mesh.topology import adjacency, components, unique_edges
-from gvpipe.sequence import Int32
 from gvpipe.trajectory.prediction import Rows
 from gvpipe.trajectory.spatial_neighbours import mesh_rows
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -64,9 +61,7 @@ def build_surface(point_faces: Int32, n_points: int) -> Surface:
     return Surface(faces, unique_edges(faces), adjacency(faces, n_points), hierarchy, mesh_rows(hierarchy))
 
 
-def build_domain(
-    surface: Surface, average: Float64 | None, header: Header, is_still: NDArray[np.bool_] | None = None
-) -> Domain:
+def build_domain(surface: Surface, average: Float64 | None, header: Header, is_still: Bool | None = None) -> Domain:
     """Set up the coding of coefficients.
 
     Args:

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Array
 from gvpipe.compiled import compiled
 
 COLLAPSED = 0.01  # height over edge of faces whose vote counts half
 TINY = 1e-300
 
-Ints = NDArray[Any]
-Floats = NDArray[Any]
-
 
 @compiled
-def add_lengths(frames: Floats, edges: Ints, lengths: Floats) -> None:
+def add_lengths(frames: Array, edges: Array, lengths: Array) -> None:
     """Add the lengths of ``edges (E, 2)`` in ``frames (n, V, 3)`` to ``lengths (E,)``."""
     for f in range(len(frames)):
         points = frames[f]
@@ -30,7 +25,7 @@ def add_lengths(frames: Floats, edges: Ints, lengths: Floats) -> None:
 
 
 @compiled
-def add_votes(frames: Floats, hinges: Ints, votes: Floats) -> None:
+def add_votes(frames: Array, hinges: Array, votes: Array) -> None:
     """Add cosine, sine and trust of ``hinges (H, 4)`` in ``frames (n, V, 3)`` to ``votes (H, 3)``."""
     for f in range(len(frames)):
         points = frames[f]

@@ -13,12 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float32, Float64, Int32
 from gvpipe.mesh.topology import unique_edges
-from gvpipe.sequence import Float32, Int32
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,6 @@ from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.laplacian.anchors import ANCHOR_CHOICES
 from gvcodecs.laplacian.average import average_mesh
@@ -40,6 +39,7 @@ from gvcodecs.laplacian.header import (
 )
 from gvcodecs.laplacian.operators import OPERATORS
 from gvcodecs.laplacian.reader import LaplacianReader
+from gvpipe.arrays import Int64
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, cut
@@ -188,7 +188,7 @@ class _Start:
     sections: dict[str, bytes]
 
     @property
-    def copies(self) -> NDArray[np.int64]:
+    def copies(self) -> Int64:
         """``(P,)`` how many vertices each point has."""
         return np.bincount(self.shared.mesh.points, minlength=self.shared.mesh.n_points)
 

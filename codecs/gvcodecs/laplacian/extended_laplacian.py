@@ -18,17 +18,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-from gvpipe.sequence import Int32
+from gvpipe.arrays import Bool, Float64, Int32
 
 MAX_NEIGHBOURS = 64  # of a row
 COLUMNS = 32  # solved at once
 FITTING_STEPS = 2  # of conjugate gradients: a third saves under 1 % of the bytes, and costs two solutions
 TINY = 1e-300  # divides where there is nothing to fit
-
-Float64 = NDArray[np.float64]
 
 
 def thin_hubs(operator: sparse.csr_array) -> sparse.csr_array:
@@ -64,9 +61,7 @@ class ExtendedLaplacian:
     is_free: ``(A,)`` the anchors whose values the encoder may choose; all if None.
     """
 
-    def __init__(
-        self, operator: sparse.csr_array, anchors: Int32, weight: float, is_free: NDArray[np.bool_] | None = None
-    ) -> None:
+    def __init__(self, operator: sparse.csr_array, anchors: Int32, weight: float, is_free: Bool | None = None) -> None:
         from scipy.sparse.linalg import splu
 
         self._operator, self._anchors, self._weight = operator, anchors, weight

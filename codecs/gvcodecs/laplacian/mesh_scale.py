@@ -6,13 +6,10 @@ The eye, and STED, see errors relative to the edges around them: where the mesh 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gvpipe.sequence import Int32
+from gvpipe.arrays import Float64, Int32
 
 SPAN = 20.0  # a point's mean edge length is held to within this factor of the mesh' mean
-
-Float64 = NDArray[np.float64]
 
 
 def edge_lengths(points: Float64, edges: Int32) -> Float64:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Array
 from gvpipe.compiled import compiled
-
-Ints = NDArray[Any]
 
 
 @compiled
-def known_around(order: Ints, limits: Ints, starts: Ints, neighbours: Ints, most: int, reach: int) -> tuple[Ints, Ints]:
+def known_around(order: Array, limits: Array, starts: Array, neighbours: Array, most: int, reach: int) -> tuple[Array, Array]:
     """Bounds ``(n + 1,)`` and vertices: for each vertex of the order up to ``most`` that are known, nearest first.
 
     Args:

@@ -24,10 +24,9 @@ given as its integers, which no machine rounds.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-from gvpipe.sequence import Int32
+from gvpipe.arrays import Float64, Int32
 
 OPERATORS = ("mean-value", "cotangent", "tutte")
 LEAST = 0.2  # least weight, in mean weights of its row; 0.01 needs up to 3 % more bits at equal errors of edges
@@ -35,8 +34,6 @@ SHORTEST = 1e-3  # least length that divides, in root mean square edge lengths
 FLATTEST = 1e-3  # least sine that divides
 STRAIGHTEST = 1e-6  # least 1 + cosine that divides
 FAINTEST = 1e-6  # least mean weight of a row, in that of all rows: below it says nothing
-
-Float64 = NDArray[np.float64]
 
 
 def laplacian(points: Float64, faces: Int32, operator: str = "mean-value") -> sparse.csr_array:

@@ -12,11 +12,11 @@ from gvcodecs.laplacian.average_coding import NAME, decode_average
 from gvcodecs.laplacian.coefficients import decode_coefficients
 from gvcodecs.laplacian.domain import Domain, Surface, build_domain, build_surface
 from gvcodecs.laplacian.header import Header
+from gvpipe.arrays import Float32, Int32
 from gvpipe.connectivity.topology_only import read_mesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import CorruptFile
-from gvpipe.sequence import Float32, Int32
 from gvpipe.trajectory.basis import decode_basis
 from gvpipe.trajectory.reconstruction import Segment, read_frames
 from gvpipe.trajectory.still_points import read_still

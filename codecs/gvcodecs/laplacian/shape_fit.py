@@ -14,10 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from gvcodecs.laplacian.edge_shape import EdgeShape
+from gvpipe.arrays import Float64, Integers
 
 BENDING = 0.1  # squared relative length error that a squared radian weighs as much as
 SHORTEST = 2e-2  # least length that divides, in mean edge lengths
@@ -27,8 +27,6 @@ GAIN = 0.02  # part of its squared error by which a component must still improve
 EXACT = 1e-12  # squared error of an edge that is none: a sequence that does not move starts there
 DAMPING, RELAX, TIGHTEN = 1e-3, 0.1, 10.0  # first damping, in diagonal entries, and its factors after a step taken or refused
 LEAST = 1e-9  # on the diagonal, for vertices without edges
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,7 @@ class _State:
     jacobian: sparse.csr_array
 
 
-def fit_shape(shape: EdgeShape, start: Float64, labels: NDArray[np.integer]) -> Float64:
+def fit_shape(shape: EdgeShape, start: Float64, labels: Integers) -> Float64:
     """Return points ``(V, 3)`` near ``start`` whose edge shape comes closest to ``shape``, model units.
 
     Components ``labels (V,)`` share a factorisation and nothing else: each is damped, and its steps taken or refused, alone.

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.distinct_positions import keep_apart
@@ -43,6 +42,7 @@ from gvcodecs.mcgv.pictures.trajectory_encoder import code_trajectories
 from gvcodecs.mcgv.reader import McgvReader
 from gvcodecs.mcgv.trajectory_header import TRANSFORMS
 from gvcodecs.mcgv.trajectory_reader import TrajectoryReader
+from gvpipe.arrays import Bool, Float32, Float64, Int32, Int64, Integers
 from gvpipe.blas import one_blas_thread
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.connectivity.base_mesh import EncodedMesh
@@ -55,7 +55,7 @@ from gvpipe.mesh.lattice import Lattice
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of
 from gvpipe.rate_control.step_search import SLOPE, Aimed, mend, root_mean_square
-from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.still_vertices import encode_flags, find_still
 from gvpipe.trajectory.welding import find_points
 
@@ -79,9 +79,6 @@ PART = 250  # points of a part by motion that charts refine: xatlas takes more t
 MERGED = 1 / 16  # steps that vertices of one point may be apart: far below the errors that follow
 AUTO = "auto"
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -391,7 +388,7 @@ class Mcgv(Settings):
             return "charts"
         return "tiles" if n_points <= MOST_TILED else "halves"
 
-    def _layout(self, start: _Start, partition: Int32, groups: NDArray[np.integer], report: Progress) -> Layout:
+    def _layout(self, start: _Start, partition: Int32, groups: Integers, report: Progress) -> Layout:
         """The points' pixels: charts keep to the parts of ``partition (P,)``, the others part ``groups (P,)`` first."""
         block, size, lattice = BLOCKS[self.image], self._plane_size(), start.points_lattice
         if start.placement != "charts":
@@ -472,7 +469,7 @@ def _worth(aimed: Aimed) -> float:
     return (sum(map(len, bitstream.sections.values())) + len(bitstream.video)) * math.pow(aimed.error, 0.2)
 
 
-def _find_points(sequence: MeshSequence, still: NDArray[np.bool_], tolerance: float) -> NDArray[np.int64]:
+def _find_points(sequence: MeshSequence, still: Bool, tolerance: float) -> Int64:
     """``(V,)`` the point of each vertex; a vertex that stands still shares none with one that moves."""
     ids = np.column_stack([find_points(sequence, tolerance), still])
     _, first, number = np.unique(ids, axis=0, return_index=True, return_inverse=True)

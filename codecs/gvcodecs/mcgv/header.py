@@ -29,17 +29,16 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv.layout.packing import Layout
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
+from gvpipe.arrays import Int32, Int64
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import MAX_SIDE, PROFILES, Profile
 from gvpipe.mesh.lattice import Lattice
-from gvpipe.sequence import Int32
 
 PREDICTIONS = ("blended", "affine")
 PLACEMENTS = ("halves", "charts", "tiles")
@@ -48,8 +47,6 @@ MAX_SEGMENTS = 1 << 16
 CONTEXTS = 4  # of a pixel's y: 0, 1, 2..3 or more columns from the vertex before
 LARGE = 1e39  # no coordinate or step of a float32 model lies beyond
 SMALL = 1e-60  # no step of a float32 model is smaller
-
-Int64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.surface import Surface, read_surface
@@ -22,12 +21,12 @@ from gvcodecs.mcgv.motion.affine import AffineMotion
 from gvcodecs.mcgv.motion.blended import BlendedMotion, decode_transforms
 from gvcodecs.mcgv.motion.contract import Motion
 from gvcodecs.mcgv.pictures.outliers import SECTION
+from gvpipe.arrays import Float32, Int32, Integers
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.corrections.displacements import MovesReader, Shared
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import VideoReader
-from gvpipe.sequence import Float32, Int32
 
 
 class McgvReader:
@@ -105,9 +104,7 @@ class McgvReader:
         return MovesReader(bitstream.section(SECTION), bitstream.n_frames, surface.n_slots, SECTION, shared)
 
 
-def read_layout(
-    bitstream: Bitstream, header: sections.Header, surface: Surface, groups: NDArray[np.integer] | None = None
-) -> Layout:
+def read_layout(bitstream: Bitstream, header: sections.Header, surface: Surface, groups: Integers | None = None) -> Layout:
     """The slots' pixels in a file; by halves, ``groups (S,)`` belong together, connected pieces if not given.
 
     Raises:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from gvcodecs.mcgv import header as sections
@@ -21,17 +20,15 @@ from gvcodecs.mcgv.motion.weight_coding import decode_weights
 from gvcodecs.mcgv.pictures.trajectories import PLANES, count_pictures, decode_segment
 from gvcodecs.mcgv.reader import read_layout
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
+from gvpipe.arrays import Float32, Float64, Int32
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import VideoReader
-from gvpipe.sequence import Float32, Int32
 from gvpipe.trajectory.basis import Basis
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES
 
 MAX_FLOAT32 = float(np.finfo(np.float32).max)
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

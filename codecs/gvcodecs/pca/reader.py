@@ -6,15 +6,14 @@ The first frame of a segment costs its whole decoding; each after that one produ
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.pca.header import Header
+from gvpipe.arrays import Float32, Int32
 from gvpipe.connectivity.topology_only import read_mesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import InputError
 from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy, level_faces
-from gvpipe.sequence import Float32, Int32
 from gvpipe.trajectory.basis import decode_basis
 from gvpipe.trajectory.coefficient_coding import decode_rows
 from gvpipe.trajectory.prediction import Rows, rows_left
@@ -114,7 +113,7 @@ class PcaReader:
         n_moving = int((~self._still.flags[self._alive(lod)]).sum())
         return int(np.searchsorted(self._rows.blocks, n_moving))
 
-    def _alive(self, lod: int) -> NDArray[np.int32]:
+    def _alive(self, lod: int) -> Int32:
         """Points of a level, ascending."""
         return np.sort(self._hierarchy.order[: self._hierarchy.blocks[-1 - lod]])
 

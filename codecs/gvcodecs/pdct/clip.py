@@ -26,7 +26,6 @@ import struct
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.pdct.clustering import Clusters
 from gvcodecs.pdct.delta_coding import DeltaDecoder, DeltaEncoder
@@ -35,10 +34,10 @@ from gvcodecs.pdct.labels import decode_labels, encode_labels
 from gvcodecs.pdct.local_frames import local_frames
 from gvcodecs.pdct.momentum import Momentum
 from gvcodecs.pdct.seed_coding import decode_seeds, encode_seeds
+from gvpipe.arrays import Float32, Float64, Int64
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers, tokenise
 from gvpipe.mesh.lattice import Lattice
-from gvpipe.sequence import Float32
 
 HEAD = struct.Struct("<6d")
 MAX_CLUSTERS = 1024
@@ -47,9 +46,6 @@ SMALL = 1e-60  # no step of a float32 model is smaller
 LARGEST = float(np.finfo(np.float32).max)
 RIDGE = 1e-6  # of the affine fit
 LAMBDA = 0.14  # squared steps that a bit is worth; 0.1155 by theory at a high rate
-
-Int64 = NDArray[np.int64]
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -13,17 +13,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.pdct.local_frames import local_frames
-from gvpipe.sequence import Float32, Int32
+from gvpipe.arrays import Float32, Float64, Int32, Int64
 
 SAMPLES = 24  # frames, evenly spaced, that clustering looks at
 THIN = 1e-4  # a triangle whose height is below this part of its longest side is degenerate
 BLOCK = 1 << 14  # vertices compared with all seeds at a time
-
-Int64 = NDArray[np.int64]
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64, Int64, UInt8, UInt32
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import DIRECT, model, tokenise
 
@@ -32,9 +33,6 @@ KINDS = 2  # of coefficients: affine, DCT
 N_BANDS = 16  # contexts of a clip's first frame: octaves of frequency
 N_STEADY = KINDS * (len(SLOW_LEVELS) + 1) * N_RECENT
 N_CONTEXTS = N_STEADY + KINDS * N_BANDS
-
-Int64 = NDArray[np.int64]
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ class DeltaEncoder:
 
         self.contexts = Contexts(layout)
         self._coder = constriction.stream.queue.RangeEncoder()
-        self._raw: list[NDArray[np.uint8]] = []
+        self._raw: list[UInt8] = []
 
     def add_axis(self, contexts: Int64, values: Int64) -> None:
         """Code one axis of a frame: ``values (C,)`` in ``contexts (C,)``."""
@@ -111,7 +109,7 @@ class DeltaEncoder:
 
     def finish(self) -> bytes:
         """Return the section."""
-        words: NDArray[np.uint32] = self._coder.get_compressed().astype("<u4")
+        words: UInt32 = self._coder.get_compressed().astype("<u4")
         raw = np.packbits(np.concatenate(self._raw)).tobytes() if self._raw else b""
         return varint(len(words)) + words.tobytes() + raw
 

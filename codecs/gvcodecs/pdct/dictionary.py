@@ -12,19 +12,15 @@ import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import dct, idct
 
 from gvcodecs.pdct.delta_coding import Layout
 from gvcodecs.pdct.local_frames import local_frames
+from gvpipe.arrays import Float64, Int32, Int64, Integers
 from gvpipe.mesh.lattice import Lattice
-from gvpipe.sequence import Int32
 
 UNIT = 16  # parts of a step that predictions are kept in
 FINE_PART = 16  # the lowest 1/16 of a cluster's frequencies can have a finer step
-
-Int64 = NDArray[np.int64]
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -41,7 +37,7 @@ class Surface:
     faces: Int32
     walk: Int64
 
-    def without(self, still: NDArray[np.integer]) -> Surface:
+    def without(self, still: Integers) -> Surface:
         """The surface whose walk leaves out the vertices ``still``."""
         return dataclasses.replace(self, walk=self.walk[~np.isin(self.walk, still)])
 

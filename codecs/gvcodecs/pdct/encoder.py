@@ -16,7 +16,6 @@ from functools import partial
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.pdct.clip import MAX_CLUSTERS, Quantiser, encode_clip
 from gvcodecs.pdct.clustering import Clusters, find_clusters
@@ -24,6 +23,7 @@ from gvcodecs.pdct.dictionary import Surface
 from gvcodecs.pdct.header import MAX_CLIPS, VERSION_POINTS, Header, surface_of_points
 from gvcodecs.pdct.reader import PdctReader
 from gvcodecs.pdct.still_points import SECTION, encode_still
+from gvpipe.arrays import Float32, Int64
 from gvpipe.codec import FrameReader, Memo, Progress, Settings
 from gvpipe.connectivity.base_mesh import EncodedMesh
 from gvpipe.connectivity.welded_mesh import PointMesh, decode_points, encode_points
@@ -33,7 +33,7 @@ from gvpipe.mesh.lattice import Lattice
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of
 from gvpipe.rate_control.step_search import NEAR, Aimed, Anchor, first_step, mend, root_mean_square, step_between
-from gvpipe.sequence import Float32, MeshSequence
+from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.still_vertices import find_still
 from gvpipe.trajectory.welding import find_points
 
@@ -182,7 +182,7 @@ class _Start:
     coded: EncodedMesh
     mesh: PointMesh
     lattice: Lattice
-    sources: NDArray[np.int64]
+    sources: Int64
     surface: Surface
     sections: dict[str, bytes]
 

@@ -7,12 +7,10 @@ section = [varint] runs R, [varint] length of the next block, [integers] R lengt
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Int64
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
-
-Int64 = NDArray[np.int64]
 
 
 def encode_labels(labels: Int64, n_clusters: int) -> bytes:

@@ -10,12 +10,11 @@ has a frame. Decoder and encoder both see points of an integer lattice, where "c
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float64 = NDArray[np.float64]
+from gvpipe.arrays import Float64, Floats, Integers
 
 
-def local_frames(triangles: NDArray[np.floating] | NDArray[np.integer]) -> tuple[Float64, Float64]:
+def local_frames(triangles: Floats | Integers) -> tuple[Float64, Float64]:
     """Return origins ``(..., 3)`` and axes ``(..., 3, 3)``, rows x, y, z, of ``triangles (..., 3, 3)``, rows the vertices."""
     p1, p2, p3 = (triangles[..., i, :].astype(np.float64) for i in range(3))
     edge = p2 - p1

@@ -8,14 +8,12 @@ throughout: both sides have the same weights for ever.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.pdct.dictionary import Dictionary
+from gvpipe.arrays import Int64
 
 MEMORY = 3  # a group's sums lose 1/8 per frame
 LIMIT = 1 << 18  # larger deltas count as this in the least squares, so that sums fit 64 bits
-
-Int64 = NDArray[np.int64]
 
 
 class Momentum:

@@ -5,16 +5,15 @@ from __future__ import annotations
 from bisect import bisect_right
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.pdct.clip import decode_clip
 from gvcodecs.pdct.header import VERSION_POINTS, Header, surface_of, surface_of_points
 from gvcodecs.pdct.still_points import SECTION, decode_still
+from gvpipe.arrays import Float32, Int32, Int64
 from gvpipe.connectivity.base_mesh import read_base
 from gvpipe.connectivity.welded_mesh import read_points
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
-from gvpipe.sequence import Float32, Int32
 
 
 class PdctReader:
@@ -27,7 +26,7 @@ class PdctReader:
     def __init__(self, bitstream: Bitstream) -> None:
         header = Header.of(bitstream)
         self._bitstream = bitstream
-        self._point: NDArray[np.int64] | None = None  # (V,) of each vertex; None: every vertex is one
+        self._point: Int64 | None = None  # (V,) of each vertex; None: every vertex is one
         if bitstream.version < VERSION_POINTS:
             base = read_base(bitstream)
             self._faces, surface = base.faces, surface_of(base, header.base)

@@ -12,16 +12,14 @@ Differences start from the base frame: frames -1 and -2 of every clip are the ba
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Int64
 from gvpipe.container.cursor import Cursor
 from gvpipe.entropy.integers import decode_integers, encode_integers
 
 ORDERS = (1, 2)
 MAX_CLASS = 63
 MAX_COORDINATE = 1 << 30  # lattice steps from the lattice's origin
-
-Int64 = NDArray[np.int64]
 
 
 def encode_seeds(points: Int64, base: Int64) -> bytes:

@@ -16,16 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.pdct.dictionary import Surface
+from gvpipe.arrays import Bool, Float32
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.container.segments import LARGEST_STEP, SMALLEST_STEP
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.sequence import Float32
 from gvpipe.trajectory.still_vertices import decode_flags, encode_flags
 
 SECTION = "still"
 HEAD = struct.Struct("<d")
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -39,7 +37,7 @@ class StillPoints:
     positions: Float32
 
 
-def encode_still(still: NDArray[np.bool_], frame: Float32, surface: Surface, step: float) -> bytes:
+def encode_still(still: Bool, frame: Float32, surface: Surface, step: float) -> bytes:
     """Code the points that ``still (P,)`` flags, in the order of points that ``surface`` has.
 
     Args:

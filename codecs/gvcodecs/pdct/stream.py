@@ -17,17 +17,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.pdct.clip import decode_clip
 from gvcodecs.pdct.dictionary import Surface
 from gvcodecs.pdct.encoder import Pdct, diagonal_of
 from gvcodecs.pdct.header import check_lattice, surface_of
+from gvpipe.arrays import Float32, Floats, Int32, Integers
 from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base
 from gvpipe.container.segments import MAX_SEGMENT
 from gvpipe.errors import CorruptFile, InputError, NewerVersion, NotGeometryVideo, TruncatedFile
 from gvpipe.mesh.lattice import Lattice
-from gvpipe.sequence import Float32, Int32, check_finite
+from gvpipe.sequence import check_finite
 
 MAGIC = b"gvpdct\r\n"
 VERSION = 1
@@ -47,7 +47,7 @@ class StreamEncoder:
         fps: frames per second.
     """
 
-    def __init__(self, faces: NDArray[np.integer], settings: Pdct | None = None, fps: float = 30.0) -> None:
+    def __init__(self, faces: Integers, settings: Pdct | None = None, fps: float = 30.0) -> None:
         self._faces, self._fps = np.asarray(faces, np.int32).reshape(-1, 3), float(fps)
         self._settings = settings or Pdct()
         self._base: _Base | None = None
@@ -55,7 +55,7 @@ class StreamEncoder:
         self._count = 0
         self._is_closed = False
 
-    def add(self, frame: NDArray[np.floating]) -> bytes:
+    def add(self, frame: Floats) -> bytes:
         """Take the next frame, ``(V, 3)``, model units.
 
         Raises:

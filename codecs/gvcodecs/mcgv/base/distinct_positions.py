@@ -10,15 +10,12 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Bool, Float32, Float64, Int32, Int64
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.mesh.unique_rows import row_ids
-from gvpipe.sequence import Float32, Int32
 
 NEAR = np.array([d for d in itertools.product(range(-1, 2), repeat=3) if any(d)], np.int64)  # (26, 3), lexicographic
-
-Int64 = NDArray[np.int64]
 
 
 def keep_apart(lattice: Lattice, first: Float32) -> Int32:
@@ -47,14 +44,14 @@ def keep_apart(lattice: Lattice, first: Float32) -> Int32:
     return points.astype(np.int32)
 
 
-def _first_at(points: Int64, rank: NDArray[np.float64]) -> Int64:
+def _first_at(points: Int64, rank: Float64) -> Int64:
     """Of the rows at each of ``points (n, 3)``, the one of the lowest ``rank (n,)``, then the first."""
     ids = row_ids(points)[0]
     order = np.lexsort((rank, ids))
     return np.asarray(order[np.diff(ids[order], prepend=-1) > 0])
 
 
-def _contains(points: Int64, wanted: Int64) -> NDArray[np.bool_]:
+def _contains(points: Int64, wanted: Int64) -> Bool:
     """Which of the rows ``wanted (m, 3)`` are among ``points (n, 3)``."""
     ids = row_ids(np.concatenate([points, wanted]))[0]
     held = np.zeros(len(ids), bool)

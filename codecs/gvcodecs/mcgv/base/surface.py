@@ -10,21 +10,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.welded_points import Points, weld_vertices
+from gvpipe.arrays import Float32, Float64, Int32, Int64
 from gvpipe.connectivity.base_mesh import read_base
 from gvpipe.connectivity.welded_mesh import read_points
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
-from gvpipe.sequence import Float32, Int32
 from gvpipe.trajectory.still_vertices import decode_flags
 
 STILL = "still"  # section: which points never move
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

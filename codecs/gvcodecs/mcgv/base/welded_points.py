@@ -8,14 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from gvpipe.arrays import Int32, Int64, Integers
 from gvpipe.connectivity.welded_mesh import PointMesh
 from gvpipe.mesh.topology import adjacency, components, weld
-from gvpipe.sequence import Int32
-
-Int64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -50,7 +47,7 @@ class Points:
         return components(self.neighbours)[1]
 
 
-def weld_vertices(lattice: NDArray[np.integer], faces: Int32, visits: Int64) -> tuple[Points, Int64, Int64]:
+def weld_vertices(lattice: Integers, faces: Int32, visits: Int64) -> tuple[Points, Int64, Int64]:
     """Weld vertices at ``lattice (V, 3)``, as files before version 3 do; ``visits (V,)`` are their places in the codec's order.
 
     Returns:

@@ -12,20 +12,18 @@ numbered as they first occur::
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from gvcodecs.mcgv.motion.weight_coding import Known, earlier_neighbours
+from gvpipe.arrays import Int64, Integers
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 
 SECTION = "charts"
 CONTEXTS = 5
 
-Int64 = NDArray[np.int64]
 
-
-def number_charts(charts: NDArray[np.integer]) -> Int64:
+def number_charts(charts: Integers) -> Int64:
     """Return ``charts (P,)`` numbered as they first occur."""
     _, first, own = np.unique(charts, return_index=True, return_inverse=True)
     return np.asarray(np.argsort(np.argsort(first))[own.ravel()])

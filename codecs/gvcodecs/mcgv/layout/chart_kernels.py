@@ -7,13 +7,11 @@ them), most frequent first; of equal ones, that of the neighbour of highest numb
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Int64
 from gvpipe.compiled import compiled
 
 MAX_NEAR = 8  # known neighbours that count: the last ones
-
-Int64 = NDArray[np.int64]
 
 
 @compiled

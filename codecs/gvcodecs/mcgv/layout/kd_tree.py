@@ -20,9 +20,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv.layout.packing import Layout
+from gvpipe.arrays import Bool, Int64, Integers
 from gvpipe.errors import CorruptFile, InputError
 
 COMMON = 90  # a multiple of every direction's squared length
@@ -31,8 +31,6 @@ MOMENT_BITS = 10  # of deviations in second moments: their sums stay exact in a 
 SPREAD = 2  # groups are moved apart by this many times their distance from the middle
 MAX_COORDINATE = 1 << 20  # of points: no finer lattice is ever chosen
 MAX_RATIO = 3.0  # of the sides of an automatic plane
-
-Int64 = NDArray[np.int64]
 
 
 def _directions() -> Int64:
@@ -72,7 +70,7 @@ def choose_size(n_vertices: int, block: int) -> tuple[int, int]:
     return int(widths[best]) * block, int(heights[best]) * block
 
 
-def place(points: NDArray[np.integer], groups: NDArray[np.integer] | None, width: int, height: int, block: int) -> Layout:
+def place(points: Integers, groups: Integers | None, width: int, height: int, block: int) -> Layout:
     """Give each vertex a pixel.
 
     Args:
@@ -92,7 +90,7 @@ def place(points: NDArray[np.integer], groups: NDArray[np.integer] | None, width
     return Layout(width, height, fill(cells, np.arange(len(points)), spread, width, block, moment_shift(spread)))
 
 
-def check_room(points: NDArray[np.integer], width: int, height: int) -> None:
+def check_room(points: Integers, width: int, height: int) -> None:
     """Raise what `place` raises, for ``points (V, 3)`` on their lattice."""
     if points.max(initial=0) >= MAX_COORDINATE:
         raise CorruptFile("section 'mesh' is corrupt: its lattice is too fine for placement by halves; get the file again")
@@ -121,7 +119,7 @@ def moment_shift(points: Int64) -> int:
     return max(0, int(points.max()).bit_length() - MOMENT_BITS)
 
 
-def _spread(points: Int64, groups: NDArray[np.integer] | None) -> Int64:
+def _spread(points: Int64, groups: Integers | None) -> Int64:
     """Move groups apart, so that cuts run between them first; all coordinates from 0."""
     if groups is not None:
         counts = np.maximum(np.bincount(groups), 1)
@@ -161,7 +159,7 @@ def _halve(cells: Cells, order: Int64, points: Int64, shift: int | None, block: 
     return halves, order
 
 
-def _turn(cells: Cells, order: Int64, points: Int64, shift: int, wide: NDArray[np.bool_]) -> tuple[Int64, Int64]:
+def _turn(cells: Cells, order: Int64, points: Int64, shift: int, wide: Bool) -> tuple[Int64, Int64]:
     """Return the cells' directions ``(n, 3)`` across and down, after a look at their points."""
     across, down = cells.across.copy(), cells.down.copy()
     frames = np.flatnonzero((cells.side == FRAME).all(axis=1))

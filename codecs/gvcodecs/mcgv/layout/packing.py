@@ -20,14 +20,12 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from gvcodecs.mcgv.layout.parameterization import Atlas
+from gvpipe.arrays import Bool, Float64, Int64
 from gvpipe.errors import InputError
 
 WINDOWS = (1, 2, 4, 8, 16)  # half-widths of the window of pixels that a vertex may take, tried in turn
 SLACK = 0.35  # part of a block that a chart gives up rather than open another row of blocks
 FIT_ROUNDS = 8  # densities tried to fit a given image size
-
-Float64 = NDArray[np.float64]
-Pixels = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ class Layout:
 
     width: int
     height: int
-    pixel: Pixels
+    pixel: Int64
 
 
 def pack(atlas: Atlas, block: int, density: float, size: tuple[int, int] | None) -> Layout:
@@ -83,7 +81,7 @@ def pack(atlas: Atlas, block: int, density: float, size: tuple[int, int] | None)
     return best
 
 
-def _place(uv: Float64, fill: float, block: int, density: float) -> Pixels:
+def _place(uv: Float64, fill: float, block: int, density: float) -> Int64:
     """Return ``(n, 2)`` distinct integer places (x, y) of one chart, in a rectangle of whole blocks from (0, 0)."""
     sides = np.maximum(uv.max(axis=0), 1e-12)
     sides = np.maximum(sides, sides.max() / len(uv))  # no chart is thinner than one pixel
@@ -104,7 +102,7 @@ def _place(uv: Float64, fill: float, block: int, density: float) -> Pixels:
     return np.column_stack([columns, rows])
 
 
-def _assign(wanted: Float64, size: Pixels, half: int) -> Pixels | None:
+def _assign(wanted: Float64, size: Int64, half: int) -> Int64 | None:
     """Assign ``wanted (n, 2)`` to distinct pixels inside ``size``, each within ``half`` of its nearest; None if too crowded."""
     nearest = np.rint(wanted).astype(np.int64)
     offsets = np.stack(np.meshgrid(np.arange(-half, half + 1), np.arange(-half, half + 1)), axis=-1).reshape(-1, 2)
@@ -125,7 +123,7 @@ def _assign(wanted: Float64, size: Pixels, half: int) -> Pixels | None:
     return result
 
 
-def _lay(pieces: list[Pixels], parts: list[NDArray[np.intp]], block: int, size: tuple[int, int] | None) -> Layout | None:
+def _lay(pieces: list[Int64], parts: list[NDArray[np.intp]], block: int, size: tuple[int, int] | None) -> Layout | None:
     """Put the charts' occupied blocks into the image, largest first, each in the first free place; None if they do not fit."""
     stamps = [_stamp(piece // block) for piece in pieces]
     total = sum(int(stamp.sum()) for stamp in stamps)
@@ -152,7 +150,7 @@ def _lay(pieces: list[Pixels], parts: list[NDArray[np.intp]], block: int, size: 
     return Layout(width * block, height * block, pixel)
 
 
-def _stamp(blocks: Pixels) -> NDArray[np.bool_]:
+def _stamp(blocks: Int64) -> Bool:
     stamp = np.zeros((int(blocks[:, 1].max()) + 1, int(blocks[:, 0].max()) + 1), bool)
     stamp[blocks[:, 1], blocks[:, 0]] = True
     return stamp

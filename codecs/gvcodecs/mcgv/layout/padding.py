@@ -14,9 +14,9 @@ system per block; each is inverted once, and what is left per frame and axis is 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv.layout.packing import Layout
+from gvpipe.arrays import Float64, Floats, Int64
 
 
 class Padding:
@@ -34,7 +34,7 @@ class Padding:
             weights = -np.linalg.solve(laplacian[np.ix_(~fixed, ~fixed)], laplacian[np.ix_(~fixed, fixed)])
             self._blocks.append((own[~fixed], vertex[own[fixed]], weights))
 
-    def fill(self, values: NDArray[np.floating], background: float) -> NDArray[np.float64]:
+    def fill(self, values: Floats, background: float) -> Float64:
         """Return planes ``(n, height, width)`` for vertex values ``(n, V)``; blocks without a vertex are ``background``."""
         columns = np.ascontiguousarray(values.T, dtype=np.float64)  # (V, n): a block's vertices are rows
         planes = np.full((self._layout.width * self._layout.height, len(values)), background)
@@ -44,13 +44,13 @@ class Padding:
         return planes.T.reshape(len(values), self._layout.height, self._layout.width)
 
 
-def _pixels_by_block(width: int, height: int, block: int) -> NDArray[np.int64]:
+def _pixels_by_block(width: int, height: int, block: int) -> Int64:
     """Row-major pixel indices ``(blocks, block**2)``."""
     index = np.arange(width * height).reshape(height // block, block, width // block, block)
     return index.swapaxes(1, 2).reshape(-1, block * block)
 
 
-def _laplacian(block: int) -> NDArray[np.float64]:
+def _laplacian(block: int) -> Float64:
     """The matrix ``(block**2, block**2)`` of psi: neighbour counts on the diagonal, -1 for neighbours."""
     y, x = np.divmod(np.arange(block * block), block)
     near = np.maximum(np.abs(y[:, None] - y), np.abs(x[:, None] - x)) == 1  # 8-connectivity

@@ -14,17 +14,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.mesh.topology import adjacency
-from gvpipe.sequence import Int32
 
 MAX_COST = 8.0  # xatlas' limit for growing a chart (its default is 2): fewer, larger charts cost fewer blocks
 SMALL_CHART = 12  # points; a chart below dissolves into a neighbour
 UNASSIGNED = 0xFFFFFFFF
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -68,7 +65,7 @@ def parameterize(base: Float64, faces: Int32, clusters: Int32) -> Atlas:
     return Atlas(chart, uv, _fill(chart, uv, faces))
 
 
-def _xatlas(unit: Float64, faces: Int32, clusters: Int32, n_clusters: int) -> tuple[NDArray[np.int64], Float64]:
+def _xatlas(unit: Float64, faces: Int32, clusters: Int32, n_clusters: int) -> tuple[Int64, Float64]:
     """Return ``(P,)`` charts, -1 where there is none, and ``(P, 2)`` places."""
     import xatlas
 
@@ -109,9 +106,7 @@ def _xatlas(unit: Float64, faces: Int32, clusters: Int32, n_clusters: int) -> tu
     return chart, uv
 
 
-def _absorb(
-    chart: NDArray[np.int64], uv: Float64, neighbours: sparse.csr_array, clusters: Int32
-) -> tuple[NDArray[np.int64], Float64]:
+def _absorb(chart: Int64, uv: Float64, neighbours: sparse.csr_array, clusters: Int32) -> tuple[Int64, Float64]:
     """Dissolve charts of few points into the neighbouring chart of their cluster, each point among its neighbours there.
 
     xatlas leaves many slivers along the clusters' rims; each would cost a whole block. Packing finds the points free pixels.

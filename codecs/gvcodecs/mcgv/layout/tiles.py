@@ -16,7 +16,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv.layout.kd_tree import (
     DIRECTIONS,
@@ -29,11 +28,10 @@ from gvcodecs.mcgv.layout.kd_tree import (
     widest_pairs,
 )
 from gvcodecs.mcgv.layout.packing import Layout
+from gvpipe.arrays import Int64, Integers
 
-Int64 = NDArray[np.int64]
 
-
-def place_charts(points: NDArray[np.integer], charts: NDArray[np.integer], width: int, height: int, block: int) -> Layout:
+def place_charts(points: Integers, charts: Integers, width: int, height: int, block: int) -> Layout:
     """Give each vertex a pixel.
 
     Args:
@@ -76,7 +74,7 @@ class _Cuts:
     first: Int64
 
 
-def _centres(points: Int64, charts: NDArray[np.integer]) -> Int64:
+def _centres(points: Int64, charts: Integers) -> Int64:
     """Means ``(C, 3)`` of the charts' points, rounded down."""
     counts = np.bincount(charts)
     sums = np.zeros((len(counts), 3), np.int64)
@@ -84,7 +82,7 @@ def _centres(points: Int64, charts: NDArray[np.integer]) -> Int64:
     return np.asarray(sums // counts[:, None])
 
 
-def _sort(cells: Cells, order: Int64, centres: Int64, charts: NDArray[np.integer], shift: int) -> Int64:
+def _sort(cells: Cells, order: Int64, centres: Int64, charts: Integers, shift: int) -> Int64:
     """Sort the cells' vertices by their charts, and these along the direction in which their ``centres (C, 3)`` spread most.
 
     A chart's vertices stand together in every cell, so that whole runs are sorted.
@@ -104,7 +102,7 @@ def _sort(cells: Cells, order: Int64, centres: Int64, charts: NDArray[np.integer
     return np.asarray(order[np.repeat(shifts, counts) + np.arange(len(order))])
 
 
-def _choose_cuts(cells: Cells, charts: NDArray[np.integer]) -> _Cuts:
+def _choose_cuts(cells: Cells, charts: Integers) -> _Cuts:
     """Choose one cut for each cell of several charts; ``charts (V,)`` are those of its sorted vertices.
 
     The halves of a cut are rectangles; unless both hold their vertices, a chart is torn. The cut nearest to the middle is

@@ -6,10 +6,8 @@ Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.2. Eve
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.surface import Surface
@@ -17,11 +15,10 @@ from gvcodecs.mcgv.layout.packing import Layout
 from gvcodecs.mcgv.motion.affine_coding import decode_transforms, dequantise, encode_transforms, quantise
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
 from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
+from gvpipe.arrays import Array, Float32, Float64, Int32
 from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.sequence import Float32, Int32, MeshSequence
-
-Float64 = NDArray[np.float64]
+from gvpipe.sequence import MeshSequence
 
 
 def code_affine(
@@ -73,7 +70,7 @@ class AffineMotion:
         self._residuals = header.residual_step * header.profile.offsets
         self._segment: tuple[int, Float64] = (-1, np.zeros((0, 0, 4, 3)))
 
-    def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
+    def rebuild(self, frame: int, samples: Array, positions: Float32) -> None:
         """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
         from gvcodecs.mcgv.motion.reconstruction_kernels import rebuild
 

@@ -13,16 +13,13 @@ Differences start from the rest transforms: frame -1, -2 and -3 of every segment
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64, Int64
 from gvpipe.container.cursor import Cursor
 from gvpipe.entropy.integers import decode_integers, encode_integers
 
 ORDERS = (1, 2, 3)
 MAX_CLASS = 63
-
-Int64 = NDArray[np.int64]
-Float64 = NDArray[np.float64]
 
 
 def quantise(transforms: Float64, rest: Float64, step: float) -> Int64:
@@ -72,7 +69,7 @@ def _difference(series: Int64, order: int) -> Int64:
     return series
 
 
-def _magnitude_class(series: Int64) -> NDArray[np.int64]:
+def _magnitude_class(series: Int64) -> Int64:
     """Two classes an octave of the mean magnitude; ``(n, m) -> (m,)``."""
     mean = np.abs(series).mean(axis=0)
     return np.asarray(np.clip(np.rint(2 * np.log2(mean + 0.5) + 2), 0, MAX_CLASS), np.int64)

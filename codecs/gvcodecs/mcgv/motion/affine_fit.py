@@ -17,13 +17,10 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gvpipe.sequence import Int32
+from gvpipe.arrays import Float64, Floats, Int32
 
 FLAT = 1e-4  # a cluster thinner than this part of its radius counts as flat: that direction stays unused
-
-Float64 = NDArray[np.float64]
 
 
 class AffinePredictor:
@@ -66,7 +63,7 @@ class AffinePredictor:
         """``(K, 4, 3)`` the transforms that leave the base frame as it is."""
         return self._rest
 
-    def fit(self, frames: NDArray[np.floating]) -> Float64:
+    def fit(self, frames: Floats) -> Float64:
         """Equation 2 by pseudo-inverse: ``(n, K, 4, 3)`` transforms for ``frames (n, V, 3)``, model units."""
         result = np.repeat(self._rest[None], len(frames), axis=0)
         moved = np.moveaxis(frames, 1, 0)[self._order].reshape(len(self._order), -1)  # (V, 3n), cluster after cluster

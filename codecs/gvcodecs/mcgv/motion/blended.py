@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.surface import Surface
@@ -17,13 +15,12 @@ from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import Trajectories, decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.motion.skinning_fit import Fitted
 from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
+from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.sequence import Float32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 CHUNK = 16  # frames whose transforms are made at a time
-
-Float64 = NDArray[np.float64]
 
 
 def code_blended(
@@ -87,7 +84,7 @@ class BlendedMotion:
         self._segment: tuple[int, Trajectories | None] = (0, first)
         self._chunk: tuple[int, int, Float64] = (-1, -1, np.zeros((0, 0, 4, 3)))
 
-    def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
+    def rebuild(self, frame: int, samples: Array, positions: Float32) -> None:
         """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
         from gvcodecs.mcgv.motion.reconstruction_kernels import rebuild_blended
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv.base.surface import Surface
 from gvcodecs.mcgv.layout.packing import Layout
-from gvpipe.sequence import Float32
+from gvpipe.arrays import Array, Float32, Float64, Int64
 
 
 @dataclass(frozen=True)
@@ -30,13 +29,13 @@ class CodedMotion:
     n_clusters: int
     step: float
     sections: dict[str, bytes]
-    predict: Callable[[int, int], NDArray[np.float64]]
+    predict: Callable[[int, int], Float64]
 
 
 class Motion(Protocol):
     """A prediction as it is decoded; keeps the transforms of the last segment for the next frame."""
 
-    def rebuild(self, frame: int, samples: NDArray[Any], positions: Float32) -> None:
+    def rebuild(self, frame: int, samples: Array, positions: Float32) -> None:
         """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
         ...
 
@@ -60,7 +59,7 @@ class Samples:
         self._row, self._column = np.divmod(pixel[order], layout.width)
         self._line, self._pixels = 0, self._row
 
-    def pixels(self, line: int) -> NDArray[np.int64]:
+    def pixels(self, line: int) -> Int64:
         """``(M,)`` where they are in a plane whose lines take ``line`` samples, the plane's width or more."""
         if line != self._line:
             self._line, self._pixels = line, self._row * line + self._column

@@ -6,26 +6,20 @@ as long as its positions take to be written: no prediction, sample or coordinate
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
-
+from gvpipe.arrays import Array, Float32, Float64, Int32, Int64
 from gvpipe.compiled import compiled
-
-Float64 = NDArray[np.float64]
 
 
 @compiled
 def rebuild(
-    samples: NDArray[Any],
-    vertices: NDArray[np.int64],
-    pixels: NDArray[np.int64],
+    samples: Array,
+    vertices: Int64,
+    pixels: Int64,
     coordinates: Float64,
-    clusters: NDArray[np.int32],
+    clusters: Int32,
     transforms: Float64,
     residuals: Float64,
-    positions: NDArray[np.float32],
+    positions: Float32,
 ) -> None:
     """Fill ``positions (V, 3) float32``, model units, of one frame.
 
@@ -48,16 +42,16 @@ def rebuild(
 
 @compiled
 def rebuild_blended(
-    samples: NDArray[Any],
-    vertices: NDArray[np.int64],
-    pixels: NDArray[np.int64],
+    samples: Array,
+    vertices: Int64,
+    pixels: Int64,
     base: Float64,
     homogeneous: Float64,
-    clusters: NDArray[np.int32],
+    clusters: Int32,
     parts: Float64,
     transforms: Float64,
     residuals: Float64,
-    positions: NDArray[np.float32],
+    positions: Float32,
 ) -> None:
     """Fill ``positions (V, 3) float32``, model units, of one frame of blended motion (`blending`).
 

@@ -21,12 +21,12 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
+from gvpipe.arrays import Float64, Int32, Integers
 from gvpipe.mesh.topology import k_ring
-from gvpipe.sequence import Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 RING = 3  # order of the neighbourhood, the paper's
 DIMENSIONS = 40  # principal coordinates of the motion vectors that k-means sees
@@ -37,8 +37,6 @@ SEED = 2007
 REFINE_ROUNDS = 5
 REFINE_FRAMES = 160  # frames, evenly spaced, that refinement looks at
 CHUNK_FLOATS = 8 << 20  # motion coefficients held at a time
-
-Float64 = NDArray[np.float64]
 
 
 def segment(sequence: MeshSequence, base: Float64, neighbours: sparse.csr_array, n_clusters: int) -> Int32:
@@ -170,6 +168,6 @@ def _k_means(features: Float64, n_clusters: int) -> Int32:
     return _relabel(best)
 
 
-def _relabel(labels: NDArray[np.integer]) -> Int32:
+def _relabel(labels: Integers) -> Int32:
     """Number the labels that occur from 0."""
     return np.asarray(np.unique(labels, return_inverse=True)[1], np.int32).ravel()

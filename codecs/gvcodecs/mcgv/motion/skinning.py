@@ -19,18 +19,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-from gvpipe.sequence import Int32
+from gvpipe.arrays import Float64, Int32
 
 INFLUENCES = 4  # most clusters that a point follows
 TOTAL = 64  # weights are integers that add up to this
 FLAT = 1e-6  # of a cluster's energy: what directions in which it has no extent count for
 LEAST_ENERGY = 1e-9  # of a cluster that no point follows
 RIDGE = 1e-6
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.trajectory.basis import (
     Basis,
@@ -27,8 +27,6 @@ from gvpipe.trajectory.basis import (
 )
 from gvpipe.trajectory.coefficient_coding import decode_rows, encode_rows
 from gvpipe.trajectory.prediction import Rows
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -21,14 +21,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from gvcodecs.mcgv.motion.segmentation import SEED, local_motions
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights, homogeneous, solve_normal
 from gvcodecs.mcgv.motion.weight_coding import Prices, earlier_neighbours, encode_weights
+from gvpipe.arrays import Float64, Int32
 from gvpipe.mesh.topology import k_ring
-from gvpipe.sequence import Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`
 FRAMES = 192  # frames, evenly spaced, that fitting looks at
@@ -58,8 +58,6 @@ SAMPLES = 4000  # points that k-means sees
 K_MEANS_ROUNDS = 8
 NEGLIGIBLE = 0.1  # part of the noise of rounding to steps: motion below is left out
 TINY = 1e-12  # part of all squared motion: points closer than this to seeds are no seeds
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

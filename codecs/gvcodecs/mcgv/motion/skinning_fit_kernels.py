@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64, Int32
 from gvpipe.compiled import compiled
-
-Int32 = NDArray[np.int32]
-Float64 = NDArray[np.float64]
 
 
 @compiled

@@ -8,16 +8,13 @@ takes. A cluster's *rank* is its place in the list; clusters that are not listed
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL
+from gvpipe.arrays import Int32, Int64
 from gvpipe.compiled import compiled
 
 MAX_NEAR = 8  # known neighbours that count: the last ones
 MAX_LISTED = INFLUENCES * MAX_NEAR
-
-Int32 = NDArray[np.int32]
-Int64 = NDArray[np.int64]
 
 
 @compiled

@@ -9,19 +9,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL
 from gvcodecs.mcgv.motion.weight_kernels import MAX_LISTED, expect, list_known, rank_of, share
+from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.compiled import compiled
 
 MAX_CANDIDATES = 10  # clusters that a fit considers
 LEAST_GAIN = 1e-3  # of the error: a further cluster must gain this much to be tried
 RIDGE = 1e-7  # of a system's trace: clusters may move alike
-
-Int32 = NDArray[np.int32]
-Int64 = NDArray[np.int64]
-Float64 = NDArray[np.float64]
 
 
 class Transforms(NamedTuple):

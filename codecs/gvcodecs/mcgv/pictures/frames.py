@@ -6,20 +6,18 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv.layout.packing import Layout
 from gvcodecs.mcgv.layout.padding import Padding
 from gvcodecs.mcgv.motion.contract import CodedMotion
 from gvcodecs.mcgv.pictures.outliers import OutlierWriter
 from gvcodecs.mcgv.pictures.quantiser import Magnitudes, Quantiser
+from gvpipe.arrays import Float64
 from gvpipe.codec import Progress
 from gvpipe.media.video import B_FRAMES, Plane, Profile, VideoWriter
 from gvpipe.sequence import MeshSequence
 
 SMALL = 60, 2000  # bytes a frame, and of a file's own: B-frames save a third of the pictures' at best, and cost 8 each
-
-Float64 = NDArray[np.float64]
 
 
 def measure_residuals(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> Magnitudes:

@@ -11,14 +11,12 @@ Departure: Mamou, Zaharia and Preteux ("Multi-Chart Geometry Video", 2007, secti
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64, Int64
 from gvpipe.corrections.displacements import Moves, encode_group, encode_moves, most_frames
 from gvpipe.media.video import Profile
 
 SECTION = "outliers"
-
-Float64 = NDArray[np.float64]
 
 
 class OutlierWriter:
@@ -35,7 +33,7 @@ class OutlierWriter:
     def __init__(self, profile: Profile, level: float, step: float, group: int, n_vertices: int) -> None:
         self._low, self._high = profile.low - profile.middle, profile.high - profile.middle
         self._level, self._step, self._group = level, step, min(group, most_frames(n_vertices))
-        self._found: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]] = []  # of the group begun
+        self._found: list[tuple[Int64, Int64, Int64]] = []  # of the group begun
         self._n_frames = 0
         self._groups: list[bytes] = []
 

@@ -13,8 +13,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gvpipe.arrays import Float64
 from gvpipe.media.video import QP_RANGE, Profile
 
 QP_STEP = 0.625  # H.264's quantiser step at QP 0, levels of an orthonormal transform; it doubles every 6 QP
@@ -40,7 +40,7 @@ class Magnitudes:
         self.largest = 0.0
         self._counts = np.zeros(1 << (63 - BINS), np.int64)
 
-    def add(self, residual: NDArray[np.float64]) -> None:
+    def add(self, residual: Float64) -> None:
         """Count coordinates of any shape."""
         magnitudes = np.abs(residual).ravel()
         self.largest = max(self.largest, float(magnitudes.max(initial=0.0)))

@@ -26,11 +26,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from gvcodecs.mcgv.motion.skinning import BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import decode_coefficients, encode_coefficients
+from gvpipe.arrays import Float64, Int64
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import InputError
@@ -38,9 +38,6 @@ from gvpipe.trajectory.basis import Basis, decode_basis, reduce_trajectories
 
 PLANES = 3  # to a picture
 MAX_OUTLIER = 1 << 38  # steps
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

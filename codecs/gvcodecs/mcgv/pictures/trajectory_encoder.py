@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv.base.welded_points import Points
 from gvcodecs.mcgv.layout.packing import Layout
@@ -22,6 +21,7 @@ from gvcodecs.mcgv.motion.skinning_fit import Fitted
 from gvcodecs.mcgv.motion.weight_coding import encode_weights
 from gvcodecs.mcgv.pictures.trajectories import PLANES, count_pictures, encode_segment
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
+from gvpipe.arrays import Float64
 from gvpipe.codec import Progress
 from gvpipe.media.video import Plane, Profile, VideoWriter
 from gvpipe.sequence import MeshSequence
@@ -29,8 +29,6 @@ from gvpipe.sequence import MeshSequence
 FINENESS = {"h264-8": 3, "h264-10": 6}  # levels per step: rounding to levels adds a ninth or a thirty-sixth to a step's noise
 FIT_STEP = 1.5  # times the quantisation step: the precision at which the blend is chosen
 LEVEL = {"h264-8": 17, "h264-10": 23}  # x264's quantisation parameter; it codes intra pictures three lower
-
-Float64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
