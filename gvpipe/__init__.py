@@ -14,13 +14,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gvpipe.api import Info, Report, decode, encode, info, open, read, write
+    from gvpipe.api import Info, Report, decode, encode, info, open, read, render, write
     from gvpipe.errors import GvpipeError
     from gvpipe.metrics.comparison import Comparison, compare
     from gvpipe.player import Player
     from gvpipe.rasterizer.camera import Camera
     from gvpipe.rasterizer.renderer import Renderer
-    from gvpipe.rendering.films import render
     from gvpipe.sequence import MeshSequence
     from gvpipe.web import ExportReport, export_html
 
@@ -48,12 +47,11 @@ __all__ = [
 ]
 
 _HOMES = {
-    "gvpipe.api": ("Info", "Report", "decode", "encode", "info", "open", "read", "write"),
+    "gvpipe.api": ("Info", "Report", "decode", "encode", "info", "open", "read", "render", "write"),
     "gvpipe.errors": ("GvpipeError",),
     "gvpipe.metrics.comparison": ("Comparison", "compare"),
     "gvpipe.player": ("Player",),
     "gvpipe.rasterizer.camera": ("Camera",),
-    "gvpipe.rendering.films": ("render",),
     "gvpipe.rasterizer.renderer": ("Renderer",),
     "gvpipe.sequence": ("MeshSequence",),
     "gvpipe.web": ("ExportReport", "export_html"),

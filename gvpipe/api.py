@@ -1,4 +1,4 @@
-"""The functions behind ``gvpipe.encode``, ``decode``, ``open``, ``read``, ``write``, ``info``, and the command line."""
+"""The functions of the package, from ``gvpipe.encode`` to ``gvpipe.render``, which the command line calls too."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from gvpipe import notes
 from gvpipe.arguments import StrPath, check_path, show
-from gvpipe.codec import Codec, Progress, encode_sequence, make_codec
+from gvpipe.codec import Codec, Progress
 from gvpipe.container.mp4 import bytes_by_part, write_file
 from gvpipe.errors import InputError, OutputError, SettingError
 from gvpipe.io import read as read_sequence
@@ -24,6 +24,7 @@ from gvpipe.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
 from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
 from gvpipe.rate_control.search import Target, meet, parse_bound
+from gvpipe.registry import encode_sequence, make_codec
 from gvpipe.rendering.poster import poster_of
 from gvpipe.sequence import MeshSequence
 
@@ -31,6 +32,8 @@ VIDEO_SUFFIXES = (".mp4", ".m4v")
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
+
+    from gvpipe.rasterizer.camera import Camera
 
 Source = StrPath | Sequence[StrPath]
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
@@ -257,6 +260,69 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0)
 def open(path: StrPath) -> Player:
     """Open a geometry video for random access; see `Player`; raises TypeError for what is no path."""
     return Player(path)
+
+
+def render(
+    source: MeshSequence | StrPath,
+    path: StrPath,
+    *,
+    frame: int | None = None,
+    size: int | tuple[int, int] = 512,
+    view: str | tuple[float, float] = "three-quarter",
+    up: str = "y",
+    turntable: bool = False,
+    follow: bool = False,
+    error_of: MeshSequence | StrPath | None = None,
+    error_max: float | None = None,
+    shading: str = "smooth",
+    camera: Camera | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Paint a sequence, or a geometry video, as ``.png``, ``.gif`` or ``.mp4``.
+
+    Args:
+        source: a sequence, or what `gvpipe.read` takes.
+        path: the file to write; an older one is replaced once the new one is complete.
+        frame: the only frame to paint, negative from the end; by default the first for a PNG, all for a film.
+        size: pixels, one number for a square or ``(width, height)``; even for MP4.
+        view: ``"three-quarter"``, ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``, ``"bottom"`` or
+            ``(azimuth, elevation)`` in degrees.
+        up: the world's axis that is up: ``"x"``, ``"y"`` or ``"z"``.
+        turntable: let the camera go once around.
+        follow: let the camera go with the mesh, which then stays in the middle of the picture.
+        error_of: a reference; colours then show each vertex' distance from it, with a legend.
+        error_max: where the colours end, percent of the reference's diagonal, instead of at the largest error drawn.
+        shading: ``"smooth"`` or ``"flat"``.
+        camera: instead of the one that frames the whole motion from ``view``.
+        progress: called with ``"render"`` and the part that is done.
+
+    Raises:
+        InputError: a value that cannot be, a sequence without triangles, a reference that does not fit.
+        OutputError: the file cannot be written; no part of it is left.
+    """
+    from gvpipe.rendering.films import check_output, write_pictures
+
+    target = Path(path)
+    pixels = (size, size) if isinstance(size, int) else size
+    check_output(target, pixels, turntable, error_max)
+    for given in (source, error_of):
+        if given is not None and _is_among(path, given):
+            raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
+    write_pictures(
+        source if isinstance(source, MeshSequence) else read(source),
+        target,
+        frame=frame,
+        size=pixels,
+        view=view,
+        up=up,
+        turntable=turntable,
+        follow=follow,
+        reference=error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of),
+        error_max=error_max,
+        shading=shading,
+        camera=camera,
+        progress=progress,
+    )
 
 
 def info(path: StrPath) -> Info:

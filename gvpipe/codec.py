@@ -1,26 +1,20 @@
-"""What a codec is, and how gvpipe finds them.
+"""What a codec is: the protocols of codecs and of their readers, and the base class of their settings.
 
-A codec is a frozen dataclass of its settings with an ``id``, a ``summary``, ``encode`` and ``reader``. Packages register
-theirs as an entry point in the group ``gvpipe.codecs``; nothing is imported before it is asked for by id.
+A codec is a frozen dataclass of its settings with an ``id``, a ``summary``, ``encode`` and ``reader``. `gvpipe.registry` finds
+the codecs that are installed.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Callable, Iterable, Mapping
-from importlib.metadata import EntryPoint, entry_points
 from typing import Any, ClassVar, Protocol, Self, TypeVar, runtime_checkable
 
 from gvpipe.arguments import did_you_mean
 from gvpipe.arrays import Float32, Int32, Integers
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.corrections.bound import correct
-from gvpipe.errors import NewerVersion, SettingError
-from gvpipe.repeated_frames import HeldReader, add_holds, find_holds, read_holds
+from gvpipe.errors import SettingError
 from gvpipe.sequence import MeshSequence
-
-GROUP = "gvpipe.codecs"
 
 Progress = Callable[[str, float], None]
 """Called with a stage's name and the part of it that is done, 0..1; stages come one after the other."""
@@ -152,82 +146,10 @@ class Settings:
             raise SettingError(f"{name} is {value!r}; one of {', '.join(choices)} is needed{did_you_mean(value, choices)}")
 
 
-def make_codec(codec: str, settings: Mapping[str, Any], also: Iterable[str] = ()) -> Codec:
-    """Return a codec's settings object; raises `SettingError` for an unknown one, naming the nearest of these and ``also``."""
-    chosen = codec_class(codec)
-    names = [field.name for field in dataclasses.fields(chosen)]
-    for key in settings:
-        check_name(key, names, also)
-    made: Codec = chosen(**settings)
-    return made
-
-
 def check_name(key: str, names: Iterable[str], also: Iterable[str] = ()) -> None:
     """Raise `SettingError` unless ``key`` is one of the settings' names; it may have been meant for one of ``also``."""
     if key not in names:
         raise SettingError(f"no setting {key!r}; there are {', '.join(names)}{did_you_mean(key, [*names, *also])}")
-
-
-def codec_ids() -> list[str]:
-    """Ids of the codecs that are installed, sorted."""
-    return sorted(_entries())
-
-
-@functools.cache
-def codec_class(codec: str) -> type[Any]:
-    """Return the class of the codec with that id; raises `SettingError` if there is none."""
-    if codec not in _entries():
-        raise SettingError(f"no codec {codec!r}; there are {', '.join(codec_ids())}{did_you_mean(codec, codec_ids())}")
-    loaded: type[Any] = _entries()[codec].load()
-    return loaded
-
-
-def open_reader(bitstream: Bitstream) -> FrameReader:
-    """Open a bitstream with the codec that wrote it: its frames corrected (`gvpipe.corrections.bound`), then held
-    (`gvpipe.repeated_frames`).
-
-    Raises:
-        NewerVersion: no installed codec has that id, or only an older version of it.
-        CorruptFile: its sections are not what that codec writes.
-    """
-    if bitstream.codec not in _entries():
-        raise NewerVersion(f"it was made by codec {bitstream.codec!r}, which this gvpipe does not have; upgrade gvpipe")
-    codec = codec_class(bitstream.codec)
-    if bitstream.version > codec.version:
-        raise NewerVersion(
-            f"it was made by version {bitstream.version} of codec {bitstream.codec!r}, this gvpipe has version "
-            f"{codec.version}; upgrade gvpipe"
-        )
-    holds = read_holds(bitstream) if _is_held(codec) else None
-    distinct = bitstream if holds is None else dataclasses.replace(bitstream, n_frames=holds.n_distinct)
-    reader = correct(distinct, codec.reader(distinct))
-    return reader if holds is None else HeldReader(reader, holds)
-
-
-def encode_sequence(
-    codec: Codec, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None
-) -> Bitstream:
-    """Code a sequence; where the codec lets it (`gvpipe.repeated_frames`), frames that repeat the one before are coded by a run
-    length.
-
-    Raises:
-        InputError: what the codec raises.
-    """
-    memo = memo or Memo()
-    holds = memo("holds", lambda: find_holds(sequence)) if _is_held(codec) else None
-    if holds is None:
-        return codec.encode(sequence, progress, memo)
-    return add_holds(codec.encode(holds.distinct(sequence), progress, memo), holds, codec.version)
-
-
-@functools.cache
-def _entries() -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group=GROUP)}
-
-
-def _is_held(codec: Codec | type[Any]) -> bool:
-    """Whether repeated frames are coded around the codec."""
-    return bool(getattr(codec, "holds", False))
 
 
 def _parse(key: str, text: str, kind: type) -> Any:

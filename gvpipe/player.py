@@ -14,12 +14,13 @@ import numpy as np
 
 from gvpipe.arguments import check_path
 from gvpipe.arrays import Float32, Float64, Int32
-from gvpipe.codec import GroupReader, LevelReader, open_reader
+from gvpipe.codec import GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file
 from gvpipe.errors import FormatError, InputError
 from gvpipe.frame_cache import FrameCache
-from gvpipe.sequence import MeshSequence, describe
+from gvpipe.registry import open_reader
+from gvpipe.sequence import MeshSequence, describe, numbers_of
 
 
 class Player:
@@ -114,7 +115,7 @@ class Player:
         return f"<Player {self.path}: codec {self.bitstream.codec}, {describe(self.sequence())}>"
 
     def _repr_html_(self) -> str:
-        from gvpipe.notebook import card, numbers_of
+        from gvpipe.notebook import card
 
         sequence = self.sequence()
         numbers = numbers_of(sequence)

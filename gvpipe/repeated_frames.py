@@ -18,18 +18,15 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gvpipe.arrays import Float32, Int32, Int64
+from gvpipe.codec import FrameReader, GroupReader, LevelReader
 from gvpipe.container.bitstream import MAX_FRAMES, Bitstream
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.sequence import MeshSequence
-
-if TYPE_CHECKING:
-    from gvpipe.codec import FrameReader
 
 SECTION = "holds"
 
@@ -106,8 +103,6 @@ class HeldReader:
     group: Callable[[int], tuple[int, int]]
 
     def __init__(self, distinct: FrameReader, holds: Holds) -> None:
-        from gvpipe.codec import GroupReader, LevelReader
-
         self.distinct, self.holds, self._starts = distinct, holds, holds.starts
         if isinstance(distinct, LevelReader):
             self.levels, self.level_faces = distinct.levels, distinct.level_faces
@@ -126,8 +121,6 @@ class HeldReader:
 
     def read(self, start: int, stop: int, lod: int = 0) -> Float32:
         """Return frames of a level: ``(stop - start, V, 3) float32``, model units."""
-        from gvpipe.codec import LevelReader
-
         shown = self._shown(np.arange(start, stop))
         first, end = (int(shown[0]), int(shown[-1]) + 1) if len(shown) else (0, 0)
         if lod and isinstance(self.distinct, LevelReader):
@@ -137,8 +130,6 @@ class HeldReader:
         return frames if len(frames) == len(shown) else frames[shown - first]
 
     def _group(self, frame: int) -> tuple[int, int]:
-        from gvpipe.codec import GroupReader
-
         assert isinstance(self.distinct, GroupReader)
         start, stop = self.distinct.group(int(self._shown(np.array([frame]))[0]))
         return int(self._starts[start]), int(self._starts[stop])

@@ -146,7 +146,7 @@ class MeshSequence:
         return f"<MeshSequence {self.name}: {describe(self)}>"
 
     def _repr_html_(self) -> str:
-        from gvpipe.notebook import card, numbers_of
+        from gvpipe.notebook import card
 
         return card(self.name, numbers_of(self), self)
 
@@ -234,6 +234,20 @@ def describe(sequence: MeshSequence) -> str:
     if sequence.origin.any():
         parts.append(f"origin ({show_origin(sequence.origin)})")
     return ", ".join(parts)
+
+
+def numbers_of(sequence: MeshSequence) -> dict[str, str]:
+    """The numbers that every sequence has, by name, as text."""
+    numbers = {
+        "frames": f"{sequence.n_frames} at {sequence.fps:g} per second, {sequence.n_frames / sequence.fps:.4g} s",
+        "vertices": str(sequence.n_vertices),
+        "triangles": str(len(sequence.faces)),
+    }
+    if sequence.attributes:
+        numbers["attributes"] = ", ".join(sequence.attributes)
+    if sequence.origin.any():
+        numbers["origin"] = show_origin(sequence.origin)
+    return numbers
 
 
 def check_finite(block: Floats, name: str, first_frame: int = 0) -> None:

@@ -20,8 +20,8 @@ from gvpipe.benchmark import sweep
 from gvpipe.benchmark.bd_rate import average_rate_difference, rate_at, tables
 from gvpipe.benchmark.plots import draw, read_peers
 from gvpipe.cli.breakdown import group_sections
-from gvpipe.codec import codec_ids
 from gvpipe.errors import GvpipeError, InputError, SettingError
+from gvpipe.registry import codec_ids
 
 Run = Callable[..., Finished]
 PEERS = "seq,codec,bpvf,kg,rmse_rel\nsheet,other,4.0,0.5,1e-3\nsheet,other,9.0,0.05,1e-4\nsheet,exact,96,0,0\n,,x,,\n"

@@ -21,8 +21,8 @@ import numpy as np
 import pytest
 
 import gvpipe
-from gvpipe.codec import codec_class, codec_ids
 from gvpipe.errors import CorruptFile, FormatError, NotGeometryVideo, StrippedFile, TruncatedFile
+from gvpipe.registry import codec_class, codec_ids
 from gvpipe.sequence import MeshSequence
 
 FAST = ("--set", "preset=ultrafast", "--set", "clusters=3", "--set", "gop=4")

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from sequences import awkward, waving
 
 import gvpipe
-from gvpipe.codec import LevelReader, codec_class, codec_ids, open_reader
+from gvpipe.codec import LevelReader
 from gvpipe.container import mp4
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import varint
@@ -27,6 +27,7 @@ from gvpipe.corrections.displacements import HEAD, MAX_POSITIONS, Moves, decode_
 from gvpipe.errors import CorruptFile, FormatError, InputError
 from gvpipe.metrics.vertex_errors import frame_diagonal, measure_errors
 from gvpipe.rate_control import trials
+from gvpipe.registry import codec_class, codec_ids, open_reader
 from gvpipe.sequence import Float32, Int32, MeshSequence
 
 AWKWARD = awkward()

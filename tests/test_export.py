@@ -19,10 +19,10 @@ from conftest import Finished
 from sequences import waving
 
 import gvpipe
-from gvpipe.codec import codec_class
 from gvpipe.errors import CorruptFile, InputError, OutputError
 from gvpipe.quality_scale import error_of
 from gvpipe.rate_control.trials import Trial, Trials
+from gvpipe.registry import codec_class
 from gvpipe.web.export import MOST_ENCODES, READS
 
 WEB = Path(gvpipe.__file__).parent / "web"

@@ -13,7 +13,7 @@ import pytest
 from sequences import held, partly_still, patched, waving
 
 import gvpipe
-from gvpipe.codec import codec_class
+from gvpipe.registry import codec_class
 
 GOLDEN = Path(__file__).parent / "golden"
 CURRENT: dict[str, tuple[str, dict[str, object]]] = {

@@ -23,12 +23,12 @@ from gvcodecs.mcgv.motion.skinning_fit import Motions, fit_blend
 from gvcodecs.mcgv.motion.weight_coding import Prices, decode_weights, earlier_neighbours, encode_weights
 from gvcodecs.mcgv.motion.weight_kernels import MAX_LISTED, cluster_of, list_known, rank_of, share
 from gvcodecs.mcgv.motion.weight_selection import Transforms, choose
-from gvpipe.codec import open_reader
 from gvpipe.connectivity.welded_mesh import PointMesh
 from gvpipe.container.mp4 import read_file
 from gvpipe.errors import CorruptFile, FormatError, NewerVersion
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.mesh.topology import adjacency
+from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.welding import find_points
 

@@ -15,11 +15,11 @@ from sequences import waving
 
 from gvcodecs.mcgv import Mcgv
 from gvcodecs.mcgv.pictures.outliers import SECTION, OutlierWriter
-from gvpipe.codec import open_reader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.corrections.displacements import MovesReader
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import PROFILES
+from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence
 
 FAST: dict[str, Any] = {"preset": "ultrafast", "gop": 8, "clusters": 12}

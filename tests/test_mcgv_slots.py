@@ -13,9 +13,9 @@ from gvcodecs.mcgv import Mcgv, trajectory_reader
 from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.surface import read_surface
 from gvcodecs.mcgv.reader import read_layout
-from gvpipe.codec import open_reader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
+from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.still_vertices import encode_flags, find_still
 from gvpipe.trajectory.welding import find_points

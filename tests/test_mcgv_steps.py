@@ -30,7 +30,6 @@ from gvcodecs.mcgv.motion.affine_coding import decode_transforms, dequantise, en
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
 from gvcodecs.mcgv.motion.segmentation import LocalAffineFit, segment
 from gvcodecs.mcgv.pictures.quantiser import LEVELS, OUTLIERS, QP_STEP, Magnitudes, choose_quantiser
-from gvpipe.codec import open_reader
 from gvpipe.container.bitstream import ENTRY, MAGIC, PREFIX, Bitstream, pack_payload, unpack_payload
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
@@ -40,6 +39,7 @@ from gvpipe.mesh.lattice import Lattice
 from gvpipe.mesh.topology import adjacency, components, k_ring, unique_edges, weld
 from gvpipe.metrics.vertex_errors import measure_errors
 from gvpipe.quality_scale import error_of
+from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence
 
 calmly = settings(max_examples=120, deadline=None)

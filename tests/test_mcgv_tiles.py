@@ -18,11 +18,11 @@ from gvcodecs.mcgv import Mcgv
 from gvcodecs.mcgv.layout.chart_coding import decode_charts, encode_charts, number_charts
 from gvcodecs.mcgv.layout.kd_tree import choose_size
 from gvcodecs.mcgv.layout.tiles import place_charts
-from gvpipe.codec import open_reader
 from gvpipe.errors import CorruptFile, InputError, SettingError
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.mesh.topology import adjacency
 from gvpipe.rate_control.step_search import root_mean_square
+from gvpipe.registry import open_reader
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 

@@ -16,8 +16,8 @@ import pytest
 from PIL import Image
 
 import gvpipe
-from gvpipe.codec import codec_class
 from gvpipe.errors import GvpipeError, InputError, SettingError
+from gvpipe.registry import codec_class
 from gvpipe.sequence import MeshSequence
 
 Run = Callable[..., Any]

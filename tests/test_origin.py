@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 from sequences import grid, waving
 
 import gvpipe
-from gvpipe.codec import codec_ids
 from gvpipe.container import mp4
 from gvpipe.container.bitstream import Bitstream, pack_payload, unpack_payload
 from gvpipe.errors import CorruptFile, InputError
 from gvpipe.origin import LOSS, choose_origin, narrow
+from gvpipe.registry import codec_ids
 from gvpipe.rendering.error_map import ErrorMap
 from gvpipe.sequence import MeshSequence
 

@@ -13,9 +13,9 @@ from sequences import waving
 
 import gvpipe
 from gvpipe import frame_cache
-from gvpipe.codec import codec_ids
 from gvpipe.errors import CorruptFile
 from gvpipe.frame_cache import FrameCache
+from gvpipe.registry import codec_ids
 
 N_FRAMES = 60
 GROUP = 8

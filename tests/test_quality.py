@@ -8,11 +8,11 @@ import pytest
 from sequences import held, patched, waving
 
 import gvpipe
-from gvpipe.codec import codec_class, codec_ids, encode_sequence, open_reader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of, quality_of
 from gvpipe.rate_control.step_search import BAND, Aimed, Anchor, mend, root_mean_square, step_between
+from gvpipe.registry import codec_class, codec_ids, encode_sequence, open_reader
 from gvpipe.sequence import MeshSequence
 
 DATA = Path(__file__).parents[2] / "shared" / "data"

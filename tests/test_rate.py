@@ -14,13 +14,14 @@ from hypothesis import strategies as st
 from sequences import awkward, waving
 
 import gvpipe
-from gvpipe.codec import Memo, codec_class, codec_ids, open_reader
+from gvpipe.codec import Memo
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import InputError, SettingError
 from gvpipe.metrics.vertex_errors import Errors
 from gvpipe.rate_control.search import MOST_ENCODES, MOST_SCATTERED, TOLERANCE, Target, find_quality, find_smallest, parse_bound
 from gvpipe.rate_control.step_search import root_mean_square
 from gvpipe.rate_control.trials import Trial
+from gvpipe.registry import codec_class, codec_ids, open_reader
 from gvpipe.sequence import MeshSequence
 
 EMPTY = Bitstream("none", 1, 1, 1, 0, 30.0)

@@ -13,8 +13,9 @@ import pytest
 from sequences import awkward, held, partly_still, waving
 
 import gvpipe
-from gvpipe.codec import GroupReader, LevelReader, Memo, codec_class, encode_sequence, open_reader
+from gvpipe.codec import GroupReader, LevelReader, Memo
 from gvpipe.errors import CorruptFile
+from gvpipe.registry import codec_class, encode_sequence, open_reader
 from gvpipe.repeated_frames import Holds, find_holds, read_holds
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.still_vertices import decode_flags, encode_flags, find_still

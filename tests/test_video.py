@@ -13,7 +13,8 @@ import pytest
 from numpy.typing import NDArray
 
 from gvpipe.errors import CorruptFile
-from gvpipe.media.video import PROFILES, Profile, VideoReader, VideoWriter, hold_picture
+from gvpipe.media.film import hold_picture
+from gvpipe.media.video import PROFILES, Profile, VideoReader, VideoWriter
 
 H264 = [PROFILES["h264-8"], PROFILES["h264-10"]]
 ALL = list(PROFILES.values())

@@ -24,11 +24,11 @@ from sequences import awkward, held, patched, waving
 import gvpipe
 from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.surface import read_surface
-from gvpipe.codec import make_codec, open_reader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file, write_file
 from gvpipe.corrections.bound import Bound, encode_corrections
 from gvpipe.errors import CorruptFile
+from gvpipe.registry import make_codec, open_reader
 from gvpipe.repeated_frames import Holds, add_holds
 from gvpipe.sequence import MeshSequence
 

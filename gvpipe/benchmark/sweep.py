@@ -31,10 +31,10 @@ import numpy as np
 import gvpipe
 from gvpipe import api
 from gvpipe.atomic import atomic_path, output_error
-from gvpipe.codec import codec_class, codec_ids
 from gvpipe.errors import GvpipeError, InputError
 from gvpipe.metrics.comparison import compare
 from gvpipe.rate_control.purposes import VARIANTS
+from gvpipe.registry import codec_class, codec_ids
 
 QUALITIES = (0.0, 20.0, 40.0, 60.0, 75.0, 90.0, 100.0)
 MEASURED = {

@@ -109,8 +109,8 @@ def encode(
     an .npz or a geometry video on standard input. OUTPUT - is standard output.
     """
     from gvpipe import api
-    from gvpipe.codec import codec_class
     from gvpipe.rate_control.purposes import candidates
+    from gvpipe.registry import codec_class
 
     if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
         message = f"{len(sources) + 1} files are given, and the last, {target}, is no .mp4; end with the output's name"
@@ -292,11 +292,12 @@ def play(source: str, up: str, out: Output) -> None:
 @output_options
 def render(source: str, target: str, size: str, out: Output, **options: Any) -> None:
     """Paint a geometry video or a sequence as a picture or a film; needs no display and no GPU."""
-    from gvpipe.rendering.films import parse_size, render
+    from gvpipe import api
+    from gvpipe.rendering.films import parse_size
 
     pixels = parse_size(size)
     with source_path(source) as path, out.progress() as progress:
-        render(path, target, size=pixels, progress=progress, **options)
+        api.render(path, target, size=pixels, progress=progress, **options)
     n_bytes = os.path.getsize(target)
     out.json({"output": target, "width": pixels[0], "height": pixels[1], "bytes": n_bytes})
     out.text(f"{shown(source, STDIN)} -> {target} ({pixels[0]}x{pixels[1]}, {_size(n_bytes)})")
@@ -364,8 +365,8 @@ def codecs(out: Output) -> None:
     """List the codecs and their settings, and the settings that --codec auto tries beside the defaults."""
     import dataclasses
 
-    from gvpipe.codec import codec_class, codec_ids
     from gvpipe.rate_control.purposes import VARIANTS
+    from gvpipe.registry import codec_class, codec_ids
 
     with out.progress():
         found = {name: codec_class(name) for name in codec_ids()}

@@ -6,7 +6,7 @@ The step is the largest whose nearest lattice point always lies within the bound
 
 Section ``corrections`` is that of `gvpipe.corrections.displacements`.
 
-Whatever codec made a bitstream, `gvpipe.codec.open_reader` wraps its reader in `correct`. Levels of detail above 0 are other
+Whatever codec made a bitstream, `gvpipe.registry.open_reader` wraps its reader in `correct`. Levels of detail above 0 are other
 meshes and stay as they are.
 """
 
@@ -15,19 +15,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gvpipe.arrays import Float32, Float64, Floats, Int32
+from gvpipe.codec import FrameReader, GroupReader, LevelReader
+from gvpipe.container.bitstream import Bitstream
 from gvpipe.corrections.displacements import MAX_STEPS, Moves, MovesReader, encode_group, encode_moves, most_frames, move
 from gvpipe.errors import InputError
 from gvpipe.metrics.vertex_errors import Errors, VertexErrors, frame_diagonal
 from gvpipe.sequence import MeshSequence
-
-if TYPE_CHECKING:
-    from gvpipe.codec import FrameReader
-    from gvpipe.container.bitstream import Bitstream
 
 SECTION = "corrections"
 GROUP = 64  # frames, fewer where that would be too many positions
@@ -123,8 +120,6 @@ class _Corrected:
     group: Callable[[int], tuple[int, int]]
 
     def __init__(self, reader: FrameReader, moves: MovesReader) -> None:
-        from gvpipe.codec import GroupReader, LevelReader
-
         self._reader, self._moves = reader, moves
         if isinstance(reader, LevelReader):
             self.levels, self.level_faces = reader.levels, reader.level_faces
@@ -143,8 +138,6 @@ class _Corrected:
 
     def read(self, start: int, stop: int, lod: int = 0) -> Float32:
         """Return frames of a level: ``(stop - start, V, 3) float32``, model units; levels above 0 stay as they are."""
-        from gvpipe.codec import LevelReader
-
         if lod and isinstance(self._reader, LevelReader):
             return self._reader.read(start, stop, lod=lod)
         result = self._reader.read(start, stop)

@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 from gvpipe.arrays import Int64, Integers
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy import parametric_tables
-from gvpipe.entropy.integers import MAX_BITS, MAX_TOKENS, TABLE_TOTAL, model, tokenise
+from gvpipe.entropy.tokens import CHUNK, MAX_BITS, MAX_TOKENS, TABLE_TOTAL, model, tokenise
 
-CHUNK = 16  # low bits coded at a time
 PARAMETRIC = 1  # kind of a table told by two numbers
 
 

@@ -6,9 +6,8 @@ import numpy as np
 
 from gvpipe.arrays import Int64, UInt32, UInt64
 from gvpipe.compiled import compiled
-from gvpipe.entropy.block_coder import CHUNK
-from gvpipe.entropy.integers import DIRECT
 from gvpipe.entropy.range_decoder import decode_bits, decode_symbol
+from gvpipe.entropy.tokens import CHUNK, DIRECT
 
 NO_TABLE, NO_DATA = 1, 2  # what can be wrong
 

@@ -14,7 +14,7 @@ import functools
 import numpy as np
 
 from gvpipe.arrays import Int64
-from gvpipe.entropy.integers import DIRECT
+from gvpipe.entropy.tokens import DIRECT
 
 N_TOKENS = 40  # magnitudes below 2**15
 RATIO_BITS = 12

@@ -6,8 +6,6 @@ Three profiles, each one luma picture per frame, chroma neutral:
 - ``h264-10``: H.264 High 10, yuv420p10, samples 64..940, for players in Python;
 - ``jpeg``: one greyscale JPEG per frame, samples 0..255, every frame a key frame.
 
-`write_film` and `hold_picture` make what people look at rather than data: films in colour and stills.
-
 A video is an MP4 file in memory with this one track. H.264 is coded in closed groups of pictures (GOPs), so that any frame
 costs at most its group. x264 runs on one thread because its output depends on their number.
 """
@@ -15,14 +13,12 @@ costs at most its group. x264 runs on one thread because its output depends on t
 from __future__ import annotations
 
 import io
-import os
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
-from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -55,7 +51,6 @@ X264 = {
     "log-level": 0,
 }
 X264["8x8dct"] = 1  # makes the profile High with every preset, ultrafast too
-FILM = {"preset": "medium", "crf": "20"}  # of pictures that people look at
 
 Plane = UInt8 | NDArray[np.uint16]
 
@@ -151,7 +146,7 @@ class VideoWriter:
         context.time_base = self._time_base
         context.color_range = 1  # limited
         context.colorspace = context.color_primaries = context.color_trc = 1  # BT.709, so that no player guesses
-        self._plain = _Plain(self._stream)
+        self._plain = PlainPackets(self._stream)
 
     def add(self, plane: Plane) -> None:
         """Append one ``(height, width)`` plane of the profile's dtype."""
@@ -292,50 +287,7 @@ class VideoReader:
         return rows[:height]  # the decoder's own memory: a copy costs half as much as decoding
 
 
-def write_film(path: Path, pictures: Iterable[UInt8], fps: float) -> None:
-    """Write an MP4 film of ``(height, width, 3)`` sRGB pictures with even sides; x264 codes them for the eye."""
-    import av
-
-    rate = Fraction(fps).limit_denominator(1001) or Fraction(1, 1001)
-    with av.open(os.fspath(path), "w", format="mp4", options={"fflags": "+bitexact", "movflags": "+faststart"}) as container:
-        stream = container.add_stream("libx264", rate, options={**FILM, "x264-params": "threads=1:log-level=0"})
-        stream.pix_fmt = "yuv420p"
-        context = stream.codec_context
-        context.time_base = 1 / rate
-        context.color_range = 1  # limited
-        context.colorspace = context.color_primaries = 1  # BT.709
-        context.color_trc = 13  # sRGB
-        for k, picture in enumerate(pictures):
-            if k == 0:
-                stream.height, stream.width = picture.shape[:2]
-            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
-            frame.pts, frame.time_base = k, 1 / rate
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
-
-
-def hold_picture(plane: UInt8, fps: float, n_frames: int, quality: int) -> bytes:
-    """Return an MP4 file of one ``h264-8`` plane with even sides that lasts ``n_frames``."""
-    import av
-
-    profile, rate = PROFILES["h264-8"], Fraction(fps).limit_denominator(1001) or Fraction(1, 1001)
-    height, width = plane.shape
-    neutral = np.full((height // 2, width), profile.middle, np.uint8)
-    file = io.BytesIO()
-    with av.open(file, "w", format="mp4", options={"fflags": "+bitexact"}) as container:
-        stream = container.add_stream("libx264", rate, options=x264_options(quality, 1, "slow"))
-        stream.width, stream.height, stream.pix_fmt = width, height, profile.pixel_format
-        stream.codec_context.time_base = 1 / rate
-        picture = av.VideoFrame.from_ndarray(np.concatenate([plane, neutral]), format=profile.pixel_format)
-        picture.pts, picture.time_base = 0, 1 / rate
-        for packet in _Plain(stream)([*stream.encode(picture), *stream.encode(None)]):
-            packet.duration = n_frames
-            container.mux(packet)
-    return file.getvalue()
-
-
-class _Plain:
+class PlainPackets:
     """Takes out what decoders do not need: x264 tells all of its options in the first picture, 0.6 KB."""
 
     def __init__(self, stream: Any) -> None:

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from gvpipe.arrays import Float32, Float64, Int32
 from gvpipe.errors import InputError
-from gvpipe.sequence import MeshSequence
 
 VIEWS = {  # azimuth and elevation, degrees
     "three-quarter": (35.0, 18.0),
@@ -34,6 +34,20 @@ UP_AXES = {
 MARGIN = 0.06  # of half the picture, left free around what is framed
 SAMPLED_FRAMES = 64  # frames looked at to frame a motion
 TURN_VIEWS = 24  # azimuths looked at to frame a whole turn: between two of them a width changes by less than the margin
+
+
+class Animation(Protocol):
+    """What is framed: a `gvpipe.MeshSequence`, or what has as much of it."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def faces(self) -> Int32: ...
+
+    def __len__(self) -> int: ...
+
+    def read(self, start: int, stop: int) -> Float32: ...
 
 
 @dataclass(frozen=True)
@@ -96,7 +110,7 @@ def parse_view(text: str) -> tuple[float, float]:
 
 
 def framing(
-    sequence: MeshSequence,
+    sequence: Animation,
     frames: Sequence[int] | None = None,
     view: str | tuple[float, float] = "three-quarter",
     up: str = "y",
@@ -150,7 +164,7 @@ def sampled(frames: Sequence[int]) -> list[int]:
     return [frames[i] for i in picks]
 
 
-def used_vertices(sequence: MeshSequence) -> Int32:
+def used_vertices(sequence: Animation) -> Int32:
     """The vertices that triangles use, in order.
 
     Raises:
@@ -167,7 +181,7 @@ def middle_of(positions: Float32, used: Int32) -> Float64:
     return mean
 
 
-def _reach(sequence: MeshSequence, frames: Sequence[int], normals: Float64, follow: bool) -> Float64:
+def _reach(sequence: Animation, frames: Sequence[int], normals: Float64, follow: bool) -> Float64:
     """How far the vertices reach along each of ``normals (n, 3)``, from the origin or from their middle: ``(n,)``."""
     used = used_vertices(sequence)
     reach = np.full(len(normals), -np.inf)

@@ -11,8 +11,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
 
 from gvpipe.arguments import did_you_mean
-from gvpipe.codec import Codec, codec_ids
+from gvpipe.codec import Codec
 from gvpipe.errors import SettingError
+from gvpipe.registry import codec_ids
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from gvpipe.codec import Codec, FrameReader, Memo, Progress, encode_sequence, open_reader
+from gvpipe.codec import Codec, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import file_size
 from gvpipe.corrections.bound import SECTION, Bound, encode_corrections
 from gvpipe.errors import InputError
 from gvpipe.metrics.vertex_errors import Errors, measure_errors
+from gvpipe.registry import encode_sequence, open_reader
 from gvpipe.rendering.poster import poster_of
 from gvpipe.repeated_frames import HeldReader
 from gvpipe.sequence import MeshSequence

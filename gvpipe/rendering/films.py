@@ -8,25 +8,21 @@ Frames are painted one at a time, and the file appears once it is complete.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gvpipe.arrays import Float64, Int32, UInt8
 from gvpipe.atomic import atomic_path
+from gvpipe.codec import Progress
 from gvpipe.errors import InputError
 from gvpipe.rasterizer.camera import Camera, framing, middle_of, used_vertices
 from gvpipe.rasterizer.renderer import Renderer
 from gvpipe.rendering.error_map import ErrorMap
 from gvpipe.sequence import MeshSequence
-
-if TYPE_CHECKING:
-    from gvpipe.codec import Progress
 
 SUFFIXES = (".png", ".gif", ".mp4")
 STILL_SAMPLES, FILM_SAMPLES = 3, 2  # per pixel and axis
@@ -79,61 +75,33 @@ class Film:
         return picture if self.legend is None else np.concatenate([self.legend, picture], axis=1)
 
 
-def render(
-    source: MeshSequence | str | os.PathLike[str],
-    path: str | os.PathLike[str],
+def write_pictures(
+    sequence: MeshSequence,
+    path: Path,
     *,
-    frame: int | None = None,
-    size: int | tuple[int, int] = 512,
-    view: str | tuple[float, float] = "three-quarter",
-    up: str = "y",
-    turntable: bool = False,
-    follow: bool = False,
-    error_of: MeshSequence | str | os.PathLike[str] | None = None,
-    error_max: float | None = None,
-    shading: str = "smooth",
-    camera: Camera | None = None,
-    progress: Progress | None = None,
+    frame: int | None,
+    size: tuple[int, int],
+    view: str | tuple[float, float],
+    up: str,
+    turntable: bool,
+    follow: bool,
+    reference: MeshSequence | None,
+    error_max: float | None,
+    shading: str,
+    camera: Camera | None,
+    progress: Progress | None,
 ) -> None:
-    """Paint a sequence, or a geometry video, as ``.png``, ``.gif`` or ``.mp4``.
-
-    Args:
-        source: a sequence, or what `gvpipe.read` takes.
-        path: the file to write; an older one is replaced once the new one is complete.
-        frame: the only frame to paint, negative from the end; by default the first for a PNG, all for a film.
-        size: pixels, one number for a square or ``(width, height)``; even for MP4.
-        view: ``"three-quarter"``, ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``, ``"bottom"`` or
-            ``(azimuth, elevation)`` in degrees.
-        up: the world's axis that is up: ``"x"``, ``"y"`` or ``"z"``.
-        turntable: let the camera go once around.
-        follow: let the camera go with the mesh, which then stays in the middle of the picture.
-        error_of: a reference; colours then show each vertex' distance from it, with a legend.
-        error_max: where the colours end, percent of the reference's diagonal, instead of at the largest error drawn.
-        shading: ``"smooth"`` or ``"flat"``.
-        camera: instead of the one that frames the whole motion from ``view``.
-        progress: called with ``"render"`` and the part that is done.
+    """Paint a sequence as ``.png``, ``.gif`` or ``.mp4``; the arguments are those of `gvpipe.render`.
 
     Raises:
         InputError: a value that cannot be, a sequence without triangles, a reference that does not fit.
         OutputError: the file cannot be written; no part of it is left.
     """
-    from gvpipe import api
-
-    target = Path(path)
-    suffix = _checked_suffix(target, turntable)
-    width, height = (size, size) if isinstance(size, int) else size
-    if suffix == ".mp4" and (width % 2 or height % 2):
-        raise InputError(f"a picture of {width}x{height}; MP4 needs even sides")
-    if error_max is not None and not (np.isfinite(error_max) and error_max > 0):
-        raise InputError(f"the colours' end is {error_max} percent of the diagonal; a number above 0 is needed")
-    sources = [given for given in (source, error_of) if given is not None and not isinstance(given, MeshSequence)]
-    if os.path.exists(target) and any(os.path.exists(given) and os.path.samefile(given, target) for given in sources):
-        raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
-    sequence = source if isinstance(source, MeshSequence) else api.read(source)
+    suffix = check_output(path, size, turntable, error_max)
+    width, height = size
     frames = _frames(sequence, frame, suffix, turntable)
     errors, legend, across = None, None, width
-    if error_of is not None:
-        reference = error_of if isinstance(error_of, MeshSequence) else api.read(error_of)
+    if reference is not None:
         errors = ErrorMap(reference, sequence, frames, error_max)
         sequence, legend = errors.sequence, errors.legend((width, height))
         across -= legend.shape[1]
@@ -143,6 +111,17 @@ def render(
     film = Film(sequence, frames, camera, renderer, turntable, errors, legend, follow)
     with atomic_path(path) as temporary:
         WRITERS[suffix](film, temporary, progress)
+
+
+def check_output(path: Path, size: tuple[int, int], turntable: bool, error_max: float | None) -> str:
+    """Return the path's suffix; raises `InputError` for a file or picture that cannot be made."""
+    suffix = _checked_suffix(path, turntable)
+    width, height = size
+    if suffix == ".mp4" and (width % 2 or height % 2):
+        raise InputError(f"a picture of {width}x{height}; MP4 needs even sides")
+    if error_max is not None and not (np.isfinite(error_max) and error_max > 0):
+        raise InputError(f"the colours' end is {error_max} percent of the diagonal; a number above 0 is needed")
+    return suffix
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -207,7 +186,7 @@ def _write_gif(film: Film, path: Path, progress: Progress | None) -> None:
 
 
 def _write_mp4(film: Film, path: Path, progress: Progress | None) -> None:
-    from gvpipe.media.video import write_film
+    from gvpipe.media.film import write_film
 
     write_film(path, _painted(film, progress), film.sequence.fps)
 

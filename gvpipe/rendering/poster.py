@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from gvpipe.arrays import Float32, Int32, UInt8
-from gvpipe.media.video import PROFILES, hold_picture
+from gvpipe.media.film import hold_picture
+from gvpipe.media.video import PROFILES
 from gvpipe.rasterizer.camera import framing
 from gvpipe.rasterizer.renderer import Renderer
 from gvpipe.sequence import MeshSequence

@@ -14,55 +14,20 @@ logarithms; in half octaves it is the context, which picks one of `N_CONTEXTS` f
 
 from __future__ import annotations
 
-import functools
-import math
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int64
+from gvpipe.arrays import Float64
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile, InputError
+from gvpipe.trajectory.contexts import MAX_LEVEL, N_CONTEXTS, ONE, level_bounds, surroundings_of
 from gvpipe.trajectory.prediction import Rows, predict_rows
 
-SHORT = (16, 10, 6, 4)  # weights of a row's earlier components, the latest first
-LONG = (16, 14, 13, 12, 11, 10, 9, 8, 7, 6, 6, 5, 5, 4, 4, 3)
-ONE = 64  # fixed point of magnitudes
-PER_OCTAVE = 16  # of integer logarithms
-MAX_LEVEL = 160
-FLOOR_SPAN, FLOOR_NEAR = 128, 16  # added to sums of magnitudes: what nothing is taken for
-POWERS = (12, 4, 4, 8, 7)  # of the component's mean, the block before, the rows near, the short and the long span
-POWER_ONE = 20
-LOWEST, HIGHEST = -10, 16  # contexts, half octaves above magnitude one
-N_CONTEXTS = HIGHEST - LOWEST + 1
-N_NEAR = 6  # rows near that count
 LARGEST = 1 << 36  # magnitude of a residual, in steps; sums of its forecasts stay below 2**58
 MAX_VALUES = 1 << 27  # of a section: rows times components
-
-
-class Surroundings(NamedTuple):
-    """What contexts depend on beside residuals, for kernels.
-
-    Args:
-        blocks: ``(B + 1,)`` bounds of the blocks that are coded.
-        place: ``(n,)`` of each row in the order.
-        starts, near, rings: of `Rows`.
-        usual: ``(R,)`` magnitudes of the components, in 1 / ONE.
-        roots: ``2 ** (i / 16)`` rounded down.
-        logs: of the smallest numbers, in 1 / PER_OCTAVE: looked up, not searched for.
-    """
-
-    blocks: Int64
-    place: Int64
-    starts: Int64
-    near: Int64
-    rings: Int64
-    usual: Int64
-    roots: Int64
-    logs: Int64
 
 
 def encode_rows(
@@ -90,8 +55,8 @@ def encode_rows(
     if largest >= LARGEST:
         raise InputError(f"a residual has {largest} quantisation steps, at most {LARGEST} fit; ask for a lower quality")
     means = np.abs(residuals).sum(axis=0) * ONE // max(1, len(residuals))
-    levels = np.searchsorted(_level_bounds(), means + 1, side="right") - 1
-    contexts = find_all_contexts(residuals, _surroundings(rows, len(target), levels, len(rows.blocks) - 1))
+    levels = np.searchsorted(level_bounds(), means + 1, side="right") - 1
+    contexts = find_all_contexts(residuals, surroundings_of(rows, len(target), levels, len(rows.blocks) - 1))
     coder = BlockEncoder(N_CONTEXTS)
     for first, end in pairwise(rows.blocks.tolist()):
         for c in range(target.shape[1]):
@@ -129,7 +94,7 @@ def decode_rows(
     wanted = len(rows.blocks) - 1 if n_blocks is None else n_blocks
     residuals = np.zeros((int(rows.blocks[wanted]), n_components), np.int64)
     decoded = np.zeros((len(rows.order), n_components)) if given is None else given.copy()
-    around = _surroundings(rows, len(decoded), levels, wanted)
+    around = surroundings_of(rows, len(decoded), levels, wanted)
     coder.check(decode_residuals(residuals, around, coder.state, coder.words, coder.edges, coder.sizes))
     if n_blocks is None:
         coder.end()
@@ -137,39 +102,3 @@ def decode_rows(
         raise CorruptFile(f"section {name!r} is corrupt: a residual is out of range; get the file again from its source")
     predict_rows(rows, step, residuals, decoded, None, predictor, beta)
     return decoded
-
-
-def _surroundings(rows: Rows, n_rows: int, levels: Int64, n_blocks: int) -> Surroundings:
-    place = np.full(n_rows, len(rows.order), np.int64)  # given rows: behind all blocks, so that they count for 0
-    place[rows.order] = np.arange(len(rows.order))
-    arrays = (
-        rows.blocks[: n_blocks + 1],
-        place,
-        rows.starts,
-        rows.near,
-        rows.rings,
-        _level_bounds()[levels],
-        _roots(),
-        _logs(),
-    )
-    return Surroundings(*(np.ascontiguousarray(array, np.int64) for array in arrays))
-
-
-@functools.cache
-def _roots() -> Int64:
-    """2 ** (i / 16) rounded down, exactly: four nested integer square roots."""
-    roots = [math.isqrt(math.isqrt(math.isqrt(math.isqrt(1 << i)))) for i in range(PER_OCTAVE * 62)]
-    return np.array(roots, np.int64)
-
-
-@functools.cache
-def _logs() -> Int64:
-    """Logarithms of 0 to 2**14 to base two, in 1 / PER_OCTAVE, rounded down; of 0 as of 1/64."""
-    logs: Int64 = np.searchsorted(_roots(), 64 * np.arange(1 << 14) + 1, side="right") - 1 - 6 * PER_OCTAVE
-    return logs
-
-
-@functools.cache
-def _level_bounds() -> Int64:
-    """2 ** (level / 4) rounded down, exactly."""
-    return np.array([math.isqrt(math.isqrt(1 << level)) for level in range(MAX_LEVEL + 1)], np.int64)

@@ -10,7 +10,7 @@ import numpy as np
 from gvpipe.arrays import Int64, UInt32, UInt64
 from gvpipe.compiled import compiled
 from gvpipe.entropy.block_kernels import take_block
-from gvpipe.trajectory.coefficient_coding import (
+from gvpipe.trajectory.contexts import (
     FLOOR_NEAR,
     FLOOR_SPAN,
     HIGHEST,

@@ -22,13 +22,14 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.atomic import atomic_path, output_error
-from gvpipe.codec import Codec, Progress, make_codec
+from gvpipe.codec import Codec, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import write_file
 from gvpipe.errors import InputError, OutputError
 from gvpipe.player import Player
 from gvpipe.quality_scale import error_of, quality_of
 from gvpipe.rate_control.trials import Trial, Trials
+from gvpipe.registry import make_codec
 
 READS = ("mcgv", 3, "h264-8")  # codec, its highest version, profile: what src/mcgv/header.js reads
 SUFFIXES = (".html", ".htm")

@@ -36,7 +36,8 @@ from gvcodecs.pdct.momentum import Momentum
 from gvcodecs.pdct.seed_coding import decode_seeds, encode_seeds
 from gvpipe.arrays import Float32, Float64, Int64
 from gvpipe.container.cursor import Cursor, varint
-from gvpipe.entropy.integers import decode_integers, encode_integers, tokenise
+from gvpipe.entropy.integers import decode_integers, encode_integers
+from gvpipe.entropy.tokens import tokenise
 from gvpipe.mesh.lattice import Lattice
 
 HEAD = struct.Struct("<6d")

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from gvpipe.arrays import Float64, Int64, UInt8, UInt32
 from gvpipe.container.cursor import Cursor, varint
-from gvpipe.entropy.integers import DIRECT, model, tokenise
+from gvpipe.entropy.tokens import DIRECT, model, tokenise
 
 MAX_BITS = 36  # bit length of the largest folded value
 N_TOKENS = DIRECT + 2 * (MAX_BITS - 4)

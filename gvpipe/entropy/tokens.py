@@ -1,0 +1,62 @@
+"""Tokens: integers of any size as symbols of a small alphabet, and low bits.
+
+A value ``x`` is folded to ``u = 2x`` (x >= 0) or ``-2x - 1`` (x < 0). ``u < 16`` is its own token. Above that, the token
+signals the bit length of ``u`` and its second highest bit; the bits below follow raw.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gvpipe.arrays import Int64
+from gvpipe.container.cursor import Cursor
+
+DIRECT = 16  # values of u that are tokens of their own
+TABLE_TOTAL = 4096  # frequencies are scaled to about this total
+MAX_BITS = 40  # bit length of the largest u
+MAX_TOKENS = DIRECT + 2 * (MAX_BITS - 4)
+CHUNK = 16  # low bits that the range coder takes at a time
+
+
+def model(table: Int64) -> Any:
+    """The library's model of a table of frequencies, two at least."""
+    import constriction
+
+    # integer / integer is one correctly rounded operation: the same on every machine
+    return constriction.stream.model.Categorical(table.astype(np.float64) / float(table.sum()), perfect=False)
+
+
+def tokenise(values: Int64) -> tuple[Int64, Int64, Int64]:
+    """Tokens of ``values (n,)``, the low bits that they leave out, and how many these are.
+
+    Raises:
+        ValueError: a value is too large.
+    """
+    u = np.where(values >= 0, 2 * values, -2 * values - 1)
+    if u.size and int(u.max()) >= 1 << MAX_BITS:
+        raise ValueError(f"a value of {int(np.abs(values).max())} does not fit the entropy coder ({MAX_BITS - 1} bits)")
+    bits = np.frexp(u.astype(np.float64))[1].astype(np.int64)  # exact: u < 2**53
+    n_extra = np.where(u < DIRECT, 0, bits - 2)
+    second = (u >> n_extra) & 1
+    tokens = np.where(u < DIRECT, u, DIRECT + 2 * (bits - 5) + second)
+    return tokens, u & ((1 << n_extra) - 1), n_extra
+
+
+def untokenise(tokens: Int64, cursor: Cursor) -> Int64:
+    bits = (tokens - DIRECT) // 2 + 5
+    n_extra = np.where(tokens < DIRECT, 0, bits - 2)
+    total = int(n_extra.sum())
+    packed = cursor.take((total + 7) // 8)
+    cursor.end()
+    u = np.where(tokens < DIRECT, tokens, (2 + (tokens & 1)) << n_extra)
+    large = np.flatnonzero(tokens >= DIRECT)
+    large = large[np.argsort(tokens[large].astype(np.uint8), kind="stable")]
+    width = n_extra[large]
+    start = np.cumsum(width) - width
+    raw = np.frombuffer(packed + bytes(8), np.uint8)
+    eight = raw[(start >> 3)[:, None] + np.arange(8)].view(">u8")[:, 0].astype(np.uint64)  # from each value's first byte on
+    bits_left = (64 - (start & 7) - width).astype(np.uint64)
+    u[large] |= (eight >> bits_left).astype(np.int64) & ((1 << width) - 1)
+    return np.where(u & 1, -((u + 1) >> 1), u >> 1)

@@ -1,0 +1,82 @@
+"""The context model of coefficients' residuals: its constants, its inputs and its tables of logarithms."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from gvpipe.arrays import Int64
+from gvpipe.trajectory.prediction import Rows
+
+SHORT = (16, 10, 6, 4)  # weights of a row's earlier components, the latest first
+LONG = (16, 14, 13, 12, 11, 10, 9, 8, 7, 6, 6, 5, 5, 4, 4, 3)
+ONE = 64  # fixed point of magnitudes
+PER_OCTAVE = 16  # of integer logarithms
+MAX_LEVEL = 160
+FLOOR_SPAN, FLOOR_NEAR = 128, 16  # added to sums of magnitudes: what nothing is taken for
+POWERS = (12, 4, 4, 8, 7)  # of the component's mean, the block before, the rows near, the short and the long span
+POWER_ONE = 20
+LOWEST, HIGHEST = -10, 16  # contexts, half octaves above magnitude one
+N_CONTEXTS = HIGHEST - LOWEST + 1
+N_NEAR = 6  # rows near that count
+
+
+class Surroundings(NamedTuple):
+    """What contexts depend on beside residuals, for kernels.
+
+    Args:
+        blocks: ``(B + 1,)`` bounds of the blocks that are coded.
+        place: ``(n,)`` of each row in the order.
+        starts, near, rings: of `Rows`.
+        usual: ``(R,)`` magnitudes of the components, in 1 / ONE.
+        roots: ``2 ** (i / 16)`` rounded down.
+        logs: of the smallest numbers, in 1 / PER_OCTAVE: looked up, not searched for.
+    """
+
+    blocks: Int64
+    place: Int64
+    starts: Int64
+    near: Int64
+    rings: Int64
+    usual: Int64
+    roots: Int64
+    logs: Int64
+
+
+def surroundings_of(rows: Rows, n_rows: int, levels: Int64, n_blocks: int) -> Surroundings:
+    place = np.full(n_rows, len(rows.order), np.int64)  # given rows: behind all blocks, so that they count for 0
+    place[rows.order] = np.arange(len(rows.order))
+    arrays = (
+        rows.blocks[: n_blocks + 1],
+        place,
+        rows.starts,
+        rows.near,
+        rows.rings,
+        level_bounds()[levels],
+        _roots(),
+        _logs(),
+    )
+    return Surroundings(*(np.ascontiguousarray(array, np.int64) for array in arrays))
+
+
+@functools.cache
+def _roots() -> Int64:
+    """2 ** (i / 16) rounded down, exactly: four nested integer square roots."""
+    roots = [math.isqrt(math.isqrt(math.isqrt(math.isqrt(1 << i)))) for i in range(PER_OCTAVE * 62)]
+    return np.array(roots, np.int64)
+
+
+@functools.cache
+def _logs() -> Int64:
+    """Logarithms of 0 to 2**14 to base two, in 1 / PER_OCTAVE, rounded down; of 0 as of 1/64."""
+    logs: Int64 = np.searchsorted(_roots(), 64 * np.arange(1 << 14) + 1, side="right") - 1 - 6 * PER_OCTAVE
+    return logs
+
+
+@functools.cache
+def level_bounds() -> Int64:
+    """2 ** (level / 4) rounded down, exactly."""
+    return np.array([math.isqrt(math.isqrt(1 << level)) for level in range(MAX_LEVEL + 1)], np.int64)
