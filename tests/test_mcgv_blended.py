@@ -14,13 +14,14 @@ from scipy import sparse
 from sequences import awkward, grid, waving
 
 from gvcodecs.mcgv import Mcgv
+from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.base.distinct_positions import keep_apart
 from gvcodecs.mcgv.base.welded_points import Points, weld_vertices
 from gvcodecs.mcgv.motion.reconstruction_kernels import rebuild_blended
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Blend, BlendFit, Weights, homogeneous
 from gvcodecs.mcgv.motion.skinning_coding import decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.motion.skinning_fit import Motions, fit_blend
-from gvcodecs.mcgv.motion.weight_coding import Prices, decode_weights, earlier_neighbours, encode_weights
+from gvcodecs.mcgv.motion.weight_coding import Prices, decode_weights, encode_weights
 from gvcodecs.mcgv.motion.weight_kernels import MAX_LISTED, cluster_of, list_known, rank_of, share
 from gvcodecs.mcgv.motion.weight_selection import Transforms, choose
 from gvpipe.connectivity.welded_mesh import PointMesh
@@ -48,7 +49,7 @@ def sheet(n: int = 12) -> tuple[Float64, sparse.csr_array]:
 def random_weights(neighbours: sparse.csr_array, n_clusters: int, seed: int, own: float = 0.4) -> Weights:
     """Weights that some points have of their own and the others from their lists, as a file may hold them."""
     draw = np.random.default_rng(seed)
-    known = earlier_neighbours(neighbours)
+    known = causal_neighbours(neighbours)
     n_points = len(known.starts) - 1
     clusters, parts = np.zeros((n_points, INFLUENCES), np.int32), np.zeros((n_points, INFLUENCES), np.int32)
     listed, sums, shares = np.zeros(MAX_LISTED, np.int64), np.zeros(MAX_LISTED, np.int64), np.zeros(INFLUENCES, np.int64)
@@ -176,7 +177,7 @@ def test_choice_finds_the_weights_of_a_blend() -> None:
     base, neighbours, weights, motions = blended()
     blend = Blend(base, weights, 3)
     transforms = blend.transforms(BlendFit(blend).fit(motions))
-    known, ring = earlier_neighbours(neighbours), neighbours
+    known, ring = causal_neighbours(neighbours), neighbours
     guess = Prices.guess()
     # every point knows all clusters, and starts from weights that are wrong
     clusters, parts = weights.clusters.copy(), weights.weights[::-1].copy()

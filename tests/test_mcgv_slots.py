@@ -10,8 +10,8 @@ import pytest
 from sequences import patched
 
 from gvcodecs.mcgv import Mcgv, trajectory_reader
-from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.surface import read_surface
+from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.reader import read_layout
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
@@ -39,7 +39,7 @@ def decode(stream: Bitstream) -> np.ndarray:
 def test_points_stay_whole_and_still_vertices_still(settings: dict[str, Any]) -> None:
     sequence = patched()
     stream = Mcgv(**{**FAST, **settings}).encode(sequence)
-    header = sections.Header.of(stream)
+    header = Header.of(stream)
     surface = read_surface(stream, header)
     frames, source = decode(stream), np.asarray(sequence.positions[:])
     points, still = find_points(sequence), find_still(sequence)
@@ -58,7 +58,7 @@ def test_points_stay_whole_and_still_vertices_still(settings: dict[str, Any]) ->
 def test_of_what_never_moves_one_point_has_samples(settings: dict[str, Any]) -> None:
     sequence = patched(still=1.0)
     stream = Mcgv(**{**FAST, **settings}).encode(sequence)
-    header = sections.Header.of(stream)
+    header = Header.of(stream)
     assert read_surface(stream, header).n_slots == 1
     frames = decode(stream)
     assert np.abs(frames - sequence.positions[:1]).max() <= 2 * header.base.step
@@ -68,7 +68,7 @@ def test_one_frame_has_samples_for_all_points() -> None:
     sequence = MeshSequence(np.asarray(patched().positions[:1]), patched().faces)
     stream = Mcgv(**FAST).encode(sequence)
     assert "still" not in stream.sections
-    assert read_surface(stream, sections.Header.of(stream)).n_slots == len(np.unique(find_points(sequence)))
+    assert read_surface(stream, Header.of(stream)).n_slots == len(np.unique(find_points(sequence)))
 
 
 @pytest.mark.parametrize("settings", [ROUTES[0], ROUTES[2], ROUTES[5]], ids=str)
@@ -94,7 +94,7 @@ def test_planes_must_hold_the_slots() -> None:
     stream = Mcgv(**FAST, prediction="blended").encode(patched(24, 4))
     assert 256 < stream.header["width"] * stream.header["height"] < stream.n_vertices
     assert np.isfinite(decode(stream)).all()
-    header = sections.Header.of(stream)
+    header = Header.of(stream)
     with pytest.raises(CorruptFile, match="do not hold"):
         read_layout(stream, dataclasses.replace(header, width=16, height=16), read_surface(stream, header))
 
@@ -102,7 +102,7 @@ def test_planes_must_hold_the_slots() -> None:
 def test_components_are_limited_by_slots(monkeypatch: pytest.MonkeyPatch) -> None:
     """By what an encoder counts: with copies there are more vertices."""
     stream = Mcgv(**FAST, prediction="blended", transform="klt").encode(patched())
-    header = sections.Header.of(stream)
+    header = Header.of(stream)
     assert header.images is not None
     most = max(header.images.components) * read_surface(stream, header).n_slots
     assert 0 < most < max(header.images.components) * stream.n_vertices

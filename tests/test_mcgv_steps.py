@@ -21,9 +21,17 @@ from sequences import waving
 
 import gvpipe
 from gvcodecs.mcgv import Mcgv
-from gvcodecs.mcgv import header as sections
+from gvcodecs.mcgv.layout.coding import (
+    decode_clusters,
+    decode_pixels,
+    decode_slot_clusters,
+    encode_clusters,
+    encode_pixels,
+    encode_slot_clusters,
+)
 from gvcodecs.mcgv.layout.kd_tree import choose_size, place
-from gvcodecs.mcgv.layout.packing import Layout, pack
+from gvcodecs.mcgv.layout.layout import Layout
+from gvcodecs.mcgv.layout.packing import pack
 from gvcodecs.mcgv.layout.padding import Padding
 from gvcodecs.mcgv.layout.parameterization import Atlas, parameterize
 from gvcodecs.mcgv.motion.affine_coding import decode_transforms, dequantise, encode_transforms, quantise
@@ -263,12 +271,12 @@ def test_layout_invariants(name: str, block: int) -> None:
         assert np.array_equal(layout.pixel, pack(parameterize(points, faces, labels), block, 1.5, None).pixel)
         order = np.random.default_rng(1).permutation(len(points))  # the codec's, which files have before version 3
         walked = dataclasses.replace(layout, pixel=layout.pixel[order])
-        back = sections.decode_pixels(sections.encode_pixels(walked), order, layout.width, layout.height)
+        back = decode_pixels(encode_pixels(walked), order, layout.width, layout.height)
         assert np.array_equal(back.pixel, layout.pixel)
-        coded = sections.encode_slot_clusters(labels[order])
-        assert np.array_equal(sections.decode_slot_clusters(coded, order, 4), labels)
-        coded = sections.encode_clusters(labels, layout, block)
-        assert np.array_equal(sections.decode_clusters(coded, layout, block, 4), labels)
+        coded = encode_slot_clusters(labels[order])
+        assert np.array_equal(decode_slot_clusters(coded, order, 4), labels)
+        coded = encode_clusters(labels, layout, block)
+        assert np.array_equal(decode_clusters(coded, layout, block, 4), labels)
 
 
 def check_layout(layout: Layout, chart: NDArray[Any], block: int) -> None:

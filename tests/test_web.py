@@ -22,8 +22,8 @@ from PIL import Image
 from sequences import awkward, held, patched, waving
 
 import gvpipe
-from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.surface import read_surface
+from gvcodecs.mcgv.header import Header
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file, write_file
 from gvpipe.corrections.bound import Bound, encode_corrections
@@ -115,7 +115,7 @@ def test_frames_of_seams_and_still_vertices_equal_pythons(
     """Slots are fewer than vertices: pixels, weights and outliers are theirs, and some vertices have none."""
     path = _encode(site, patched(), reorder=reorder, **KINDS[kind])
     bitstream = read_file(path)
-    header = sections.Header.of(bitstream)
+    header = Header.of(bitstream)
     surface = read_surface(bitstream, header)
     assert surface.n_slots < len(surface.vertices) < bitstream.n_vertices
     assert header.outliers or kind != "outliers"

@@ -20,14 +20,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.distinct_positions import keep_apart
 from gvcodecs.mcgv.base.surface import STILL
 from gvcodecs.mcgv.base.welded_points import Points
+from gvcodecs.mcgv.header import MAX_CLUSTERS, PLACEMENTS, PREDICTIONS, Header
 from gvcodecs.mcgv.layout.chart_coding import SECTION as CHARTS
 from gvcodecs.mcgv.layout.chart_coding import encode_charts, number_charts
+from gvcodecs.mcgv.layout.coding import encode_clusters, encode_pixels, encode_slot_clusters
 from gvcodecs.mcgv.layout.kd_tree import choose_size, place
-from gvcodecs.mcgv.layout.packing import Layout, pack
+from gvcodecs.mcgv.layout.layout import Layout
+from gvcodecs.mcgv.layout.packing import pack
 from gvcodecs.mcgv.layout.parameterization import parameterize
 from gvcodecs.mcgv.layout.tiles import place_charts
 from gvcodecs.mcgv.motion.affine import code_affine
@@ -116,10 +118,10 @@ class Mcgv(Settings):
         self.check_choice("image", ("h264", "jpeg"))
         self.check_choice("profile", ("web", "precise"))
         self.check_choice("preset", PRESETS)
-        self.check_choice("prediction", sections.PREDICTIONS)
+        self.check_choice("prediction", PREDICTIONS)
         self.check_choice("transform", TRANSFORMS)
-        self.check_choice("placement", (AUTO, *sections.PLACEMENTS))
-        self.check_range(0, sections.MAX_CLUSTERS, "clusters")
+        self.check_choice("placement", (AUTO, *PLACEMENTS))
+        self.check_range(0, MAX_CLUSTERS, "clusters")
         self.check_range(8, 24, "transform_bits")
         self.check_range(0, 20, "base_bits")
         self.check_range(1, 16, "density")
@@ -194,7 +196,7 @@ class Mcgv(Settings):
         return self._bitstream(sequence, start, coded)
 
     def _bitstream(self, sequence: MeshSequence, start: _Start, coded: _Coded) -> Bitstream:
-        header = sections.Header(
+        header = Header(
             prediction=self.prediction,
             placement=start.placement,
             profile=self._video_profile,
@@ -207,7 +209,7 @@ class Mcgv(Settings):
         )
         placed = {STILL: start.still} if start.still else {}
         if start.placement == "charts":
-            placed["pixels"] = sections.encode_pixels(coded.layout)
+            placed["pixels"] = encode_pixels(coded.layout)
         return Bitstream(
             codec=self.id,
             version=self.version,
@@ -223,7 +225,7 @@ class Mcgv(Settings):
     @classmethod
     def reader(cls, bitstream: Bitstream) -> FrameReader:
         """Open an ``mcgv`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
-        header = sections.Header.of(bitstream)
+        header = Header.of(bitstream)
         return TrajectoryReader(bitstream, header, header.images) if header.images else McgvReader(bitstream)
 
     def _start(self, given: MeshSequence, step: float, wanted: float, memo: Memo, report: Progress) -> _Start:
@@ -354,9 +356,9 @@ class Mcgv(Settings):
         layout = self._layout(start, clusters, clusters, report)
         motion = code_affine(sequence, start.base, clusters, start.bounds, step, report)
         motion.sections["clusters"] = (
-            sections.encode_slot_clusters(clusters)
+            encode_slot_clusters(clusters)
             if start.placement == "halves"
-            else sections.encode_clusters(clusters, layout, BLOCKS[self.image])
+            else encode_clusters(clusters, layout, BLOCKS[self.image])
         )
         return motion, layout
 

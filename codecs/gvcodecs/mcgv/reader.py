@@ -10,12 +10,13 @@ from functools import cached_property
 
 import numpy as np
 
-from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.surface import Surface, read_surface
+from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.chart_coding import SECTION as CHARTS
 from gvcodecs.mcgv.layout.chart_coding import decode_charts
+from gvcodecs.mcgv.layout.coding import decode_clusters, decode_pixels, decode_slot_clusters
 from gvcodecs.mcgv.layout.kd_tree import place
-from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.tiles import place_charts
 from gvcodecs.mcgv.motion.affine import AffineMotion
 from gvcodecs.mcgv.motion.blended import BlendedMotion, decode_transforms
@@ -37,7 +38,7 @@ class McgvReader:
     """
 
     def __init__(self, bitstream: Bitstream) -> None:
-        self._header, self._bitstream = sections.Header.of(bitstream), bitstream
+        self._header, self._bitstream = Header.of(bitstream), bitstream
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
         self._video = VideoReader(bitstream.video, self._header.profile, self._header.width, 3 * self._header.height)
         if self._video.n_frames != bitstream.n_frames:
@@ -70,11 +71,11 @@ class McgvReader:
                 return BlendedMotion(bitstream, header, surface, layout, self._bounds, only.result() if only else None)
         surface = self._surface
         if header.placement == "halves":
-            clusters = sections.decode_slot_clusters(bitstream.section("clusters"), surface.order, header.clusters)
+            clusters = decode_slot_clusters(bitstream.section("clusters"), surface.order, header.clusters)
             layout = read_layout(bitstream, header, surface, clusters)
         else:
             layout = read_layout(bitstream, header, surface)
-            clusters = sections.decode_clusters(bitstream.section("clusters"), layout, header.block, header.clusters)
+            clusters = decode_clusters(bitstream.section("clusters"), layout, header.block, header.clusters)
         return AffineMotion(bitstream, header, surface, clusters, layout, self._bounds)
 
     def group(self, frame: int) -> tuple[int, int]:
@@ -104,7 +105,7 @@ class McgvReader:
         return MovesReader(bitstream.section(SECTION), bitstream.n_frames, surface.n_slots, SECTION, shared)
 
 
-def read_layout(bitstream: Bitstream, header: sections.Header, surface: Surface, groups: Integers | None = None) -> Layout:
+def read_layout(bitstream: Bitstream, header: Header, surface: Surface, groups: Integers | None = None) -> Layout:
     """The slots' pixels in a file; by halves, ``groups (S,)`` belong together, connected pieces if not given.
 
     Raises:
@@ -118,4 +119,4 @@ def read_layout(bitstream: Bitstream, header: sections.Header, surface: Surface,
     if header.placement == "tiles":
         charts = decode_charts(bitstream.section(CHARTS), surface.points.neighbours)
         return place_charts(surface.lattice, charts[surface.point], header.width, header.height, header.block)
-    return sections.decode_pixels(bitstream.section("pixels"), surface.order, header.width, header.height)
+    return decode_pixels(bitstream.section("pixels"), surface.order, header.width, header.height)

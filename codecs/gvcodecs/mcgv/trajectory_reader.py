@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.surface import Surface, read_surface
-from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.header import Header
+from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.motion.contract import locate
 from gvcodecs.mcgv.motion.skinning import Blend
 from gvcodecs.mcgv.motion.weight_coding import decode_weights
@@ -62,7 +62,7 @@ class TrajectoryReader:
         CorruptFile: here or later: a section does not hold what it must.
     """
 
-    def __init__(self, bitstream: Bitstream, header: sections.Header, images: TrajectoryHeader) -> None:
+    def __init__(self, bitstream: Bitstream, header: Header, images: TrajectoryHeader) -> None:
         self._bitstream, self._header, self._images = bitstream, header, images
         self._bounds = segment_starts(bitstream.n_frames, header.segments)
         counts = [count_pictures(n) for n in images.components]

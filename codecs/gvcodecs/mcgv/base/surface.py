@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.welded_points import Points, weld_vertices
+from gvcodecs.mcgv.header import Header
 from gvpipe.arrays import Float32, Float64, Int32, Int64
 from gvpipe.connectivity.base_mesh import read_base
 from gvpipe.connectivity.welded_mesh import read_points
@@ -62,7 +62,7 @@ class Surface:
             positions[:, still] = self.rest[still]
 
 
-def read_surface(bitstream: Bitstream, header: sections.Header) -> Surface:
+def read_surface(bitstream: Bitstream, header: Header) -> Surface:
     """Decode the sections ``mesh``, ``order`` and ``still``; raises `CorruptFile`."""
     if bitstream.version < 3:
         base = read_base(bitstream)

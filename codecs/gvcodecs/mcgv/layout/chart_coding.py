@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from gvcodecs.mcgv.motion.weight_coding import Known, earlier_neighbours
+from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighbours
 from gvpipe.arrays import Int64, Integers
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
@@ -33,7 +33,7 @@ def encode_charts(charts: Int64, neighbours: sparse.csr_array) -> bytes:
     """Return the section for ``charts (P,)`` of `number_charts`, points adjacent as in ``neighbours (P, P)``."""
     from gvcodecs.mcgv.layout.chart_kernels import describe
 
-    known = earlier_neighbours(neighbours)
+    known = causal_neighbours(neighbours)
     ranks, numbers = np.empty(len(charts), np.int64), np.empty(len(charts), np.int64)
     count = describe(known.starts, known.near, charts, ranks, numbers)
     first = encode_integers(ranks, _contexts(known))
@@ -45,7 +45,7 @@ def decode_charts(data: bytes, neighbours: sparse.csr_array) -> Int64:
     from gvcodecs.mcgv.layout.chart_kernels import restore
 
     cursor = Cursor(data, SECTION)
-    known = earlier_neighbours(neighbours)
+    known = causal_neighbours(neighbours)
     n_points = len(known.starts) - 1
     ranks = decode_integers(cursor.take(cursor.varint(cursor.left, "a length")), n_points, _contexts(known), SECTION)
     count = cursor.varint(n_points, "the number of charts told by number")
@@ -57,5 +57,5 @@ def decode_charts(data: bytes, neighbours: sparse.csr_array) -> Int64:
     return charts
 
 
-def _contexts(known: Known) -> Int64:
+def _contexts(known: CausalNeighbours) -> Int64:
     return np.asarray(np.minimum(np.diff(known.starts), CONTEXTS - 1))

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.layout.layout import Layout
 from gvpipe.arrays import Bool, Int64, Integers
 from gvpipe.errors import CorruptFile, InputError
 

@@ -11,14 +11,13 @@ that decoding needs no resampling and loses nothing; all other pixels are free f
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.parameterization import Atlas
 from gvpipe.arrays import Bool, Float64, Int64
 from gvpipe.errors import InputError
@@ -26,20 +25,6 @@ from gvpipe.errors import InputError
 WINDOWS = (1, 2, 4, 8, 16)  # half-widths of the window of pixels that a vertex may take, tried in turn
 SLACK = 0.35  # part of a block that a chart gives up rather than open another row of blocks
 FIT_ROUNDS = 8  # densities tried to fit a given image size
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Where each slot sits in a plane of ``height x width`` pixels.
-
-    Args:
-        width, height: of one plane, pixels, multiples of the block size.
-        pixel: ``(S,)`` row-major index of each slot's pixel, all distinct.
-    """
-
-    width: int
-    height: int
-    pixel: Int64
 
 
 def pack(atlas: Atlas, block: int, density: float, size: tuple[int, int] | None) -> Layout:

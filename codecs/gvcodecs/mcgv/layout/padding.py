@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.layout.layout import Layout
 from gvpipe.arrays import Float64, Floats, Int64
 
 

@@ -27,7 +27,7 @@ from gvcodecs.mcgv.layout.kd_tree import (
     spreads,
     widest_pairs,
 )
-from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.layout.layout import Layout
 from gvpipe.arrays import Int64, Integers
 
 

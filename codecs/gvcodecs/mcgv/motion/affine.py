@@ -9,9 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.surface import Surface
-from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.header import Header
+from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.motion.affine_coding import decode_transforms, dequantise, encode_transforms, quantise
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
 from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
@@ -55,7 +55,7 @@ class AffineMotion:
     def __init__(
         self,
         bitstream: Bitstream,
-        header: sections.Header,
+        header: Header,
         surface: Surface,
         clusters: Int32,
         layout: Layout,

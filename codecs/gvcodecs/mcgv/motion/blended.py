@@ -6,10 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvcodecs.mcgv import header as sections
 from gvcodecs.mcgv.base.surface import Surface
 from gvcodecs.mcgv.base.welded_points import Points
-from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.header import Header
+from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
 from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import Trajectories, decode_trajectories, encode_trajectories
@@ -66,7 +66,7 @@ class BlendedMotion:
     def __init__(
         self,
         bitstream: Bitstream,
-        header: sections.Header,
+        header: Header,
         surface: Surface,
         layout: Layout,
         bounds: list[int],
@@ -116,7 +116,7 @@ class BlendedMotion:
         return np.ascontiguousarray(transforms.reshape(*transforms.shape[:2], -1, 3).transpose(2, 0, 1, 3))
 
 
-def decode_transforms(bitstream: Bitstream, header: sections.Header, s: int, n_frames: int) -> Trajectories:
+def decode_transforms(bitstream: Bitstream, header: Header, s: int, n_frames: int) -> Trajectories:
     """The transforms of segment s; raises `CorruptFile`."""
     name = f"transforms.{s}"
     return decode_trajectories(bitstream.section(name), header.clusters, n_frames, header.transform_step, name)

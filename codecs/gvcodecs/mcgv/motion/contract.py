@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from gvcodecs.mcgv.base.surface import Surface
-from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.layout.layout import Layout
 from gvpipe.arrays import Array, Float32, Float64, Int64
 
 

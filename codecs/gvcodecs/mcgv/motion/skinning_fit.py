@@ -23,9 +23,10 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
+from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.motion.segmentation import SEED, local_motions
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights, homogeneous, solve_normal
-from gvcodecs.mcgv.motion.weight_coding import Prices, earlier_neighbours, encode_weights
+from gvcodecs.mcgv.motion.weight_coding import Prices, encode_weights
 from gvpipe.arrays import Float64, Int32
 from gvpipe.mesh.topology import k_ring
 from gvpipe.sequence import MeshSequence
@@ -233,7 +234,7 @@ def _alternate(problem: _Problem, fitted: Fitted, passes: int) -> Fitted:
     """Fit transforms, then weights, several times over."""
     from gvcodecs.mcgv.motion.weight_selection import Transforms, choose
 
-    known = earlier_neighbours(problem.neighbours)
+    known = causal_neighbours(problem.neighbours)
     ring = problem.neighbours
     prices = Prices.guess()
     errors = np.zeros(len(problem.base))

@@ -1,10 +1,10 @@
 """The points' weights as bytes: most follow their neighbours, the others say how they differ.
 
-Points are visited in the codec's order. A point's known neighbours give a list of clusters, heaviest first (`weight_kernels`).
+Points are visited in the codec's order. A point's causal neighbours give a list of clusters, heaviest first (`weight_kernels`).
 It follows what the list suggests, or clusters of its own: their ranks in the list (clusters that are not listed come
 last, by number), and weights against those that the list expects::
 
-    section = [varint] length, [integers] own clusters of each point (0: those of its list), in the context of min(known
+    section = [varint] length, [integers] own clusters of each point (0: those of its list), in the context of min(causal
               neighbours, 3); [varint] length, [integers] gaps between ranks, in the context of the place, 0..3;
               [integers] weights less the expected ones, all of a point's but the last, in the context of the place
 """
@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighbours
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights
 from gvpipe.arrays import Float64, Int64
 from gvpipe.container.cursor import Cursor, varint
@@ -24,28 +25,13 @@ from gvpipe.entropy.integers import decode_integers, encode_integers
 COUNT_CONTEXTS = 4
 
 
-@dataclass(frozen=True)
-class Known:
-    """Each point's neighbours of lower number: ``starts (P + 1,)`` bounds in ``near``, ascending."""
-
-    starts: Int64
-    near: Int64
-
-
-def earlier_neighbours(neighbours: sparse.csr_array) -> Known:
-    """Return the known neighbours of all points, for their symmetric adjacency ``(P, P)``."""
-    lower = sparse.csr_array(sparse.tril(neighbours, -1))
-    lower.sort_indices()
-    return Known(lower.indptr.astype(np.int64), lower.indices.astype(np.int64))
-
-
 def encode_weights(weights: Weights, neighbours: sparse.csr_array) -> bytes:
     """Return the section ``weights``."""
-    known = earlier_neighbours(neighbours)
-    counts, gaps, changes = _described(weights, known)
+    causal = causal_neighbours(neighbours)
+    counts, gaps, changes = _described(weights, causal)
     slots = np.broadcast_to(np.arange(INFLUENCES), gaps.shape)
     own, changed = slots < counts[:, None], slots < counts[:, None] - 1
-    first = encode_integers(counts, _count_contexts(known))
+    first = encode_integers(counts, _count_contexts(causal))
     second = encode_integers(gaps[own], slots[own])
     third = encode_integers(changes[changed], slots[changed])
     return varint(len(first)) + first + varint(len(second)) + second + third
@@ -56,9 +42,9 @@ def decode_weights(data: bytes, neighbours: sparse.csr_array, n_clusters: int) -
     from gvcodecs.mcgv.motion.weight_kernels import restore
 
     cursor = Cursor(data, "weights")
-    known = earlier_neighbours(neighbours)
-    n_points = len(known.starts) - 1
-    counts = decode_integers(cursor.take(cursor.varint(cursor.left, "a length")), n_points, _count_contexts(known), "weights")
+    causal = causal_neighbours(neighbours)
+    n_points = len(causal.starts) - 1
+    counts = decode_integers(cursor.take(cursor.varint(cursor.left, "a length")), n_points, _count_contexts(causal), "weights")
     if ((counts < 0) | (counts > INFLUENCES)).any():
         raise cursor.corrupt("a point follows more than four clusters")
     slots = np.broadcast_to(np.arange(INFLUENCES), (n_points, INFLUENCES))
@@ -69,7 +55,7 @@ def decode_weights(data: bytes, neighbours: sparse.csr_array, n_clusters: int) -
     if ((gaps < 0) | (gaps >= n_clusters)).any() or (np.abs(changes) >= TOTAL).any():
         raise cursor.corrupt("a rank or a weight is out of range")
     clusters, parts = np.zeros((n_points, INFLUENCES), np.int32), np.zeros((n_points, INFLUENCES), np.int32)
-    wrong = restore(known.starts, known.near, n_clusters, counts, gaps, changes, clusters, parts)
+    wrong = restore(causal.starts, causal.near, n_clusters, counts, gaps, changes, clusters, parts)
     if wrong >= 0:
         raise cursor.corrupt(f"the weights of point {wrong} make no sense")
     return Weights(clusters, parts)
@@ -97,7 +83,7 @@ class Prices:
     @classmethod
     def learnt(cls, neighbours: sparse.csr_array, weights: Weights) -> Prices:
         """Prices by how often numbers occur."""
-        counts, gaps, changes = _described(weights, earlier_neighbours(neighbours))
+        counts, gaps, changes = _described(weights, causal_neighbours(neighbours))
         guess = cls.guess()
         slots = np.arange(INFLUENCES)
         own, changed = slots < counts[:, None], slots < counts[:, None] - 1
@@ -111,15 +97,15 @@ def _bits(values: Int64, prior: Float64) -> Float64:
     return np.asarray(-np.log2(frequencies / frequencies.sum()))
 
 
-def _described(weights: Weights, known: Known) -> tuple[Int64, Int64, Int64]:
+def _described(weights: Weights, causal: CausalNeighbours) -> tuple[Int64, Int64, Int64]:
     from gvcodecs.mcgv.motion.weight_kernels import describe
 
     n_points = len(weights.clusters)
     counts = np.zeros(n_points, np.int64)
     gaps, changes = np.full((n_points, INFLUENCES), -1, np.int64), np.zeros((n_points, INFLUENCES), np.int64)
-    describe(known.starts, known.near, weights.clusters, weights.weights, counts, gaps, changes)
+    describe(causal.starts, causal.near, weights.clusters, weights.weights, counts, gaps, changes)
     return counts, gaps, changes
 
 
-def _count_contexts(known: Known) -> Int64:
-    return np.asarray(np.minimum(np.diff(known.starts), COUNT_CONTEXTS - 1))
+def _count_contexts(causal: CausalNeighbours) -> Int64:
+    return np.asarray(np.minimum(np.diff(causal.starts), COUNT_CONTEXTS - 1))

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding import Padding
 from gvcodecs.mcgv.motion.contract import CodedMotion
 from gvcodecs.mcgv.pictures.outliers import OutlierWriter

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from gvcodecs.mcgv.base.welded_points import Points
-from gvcodecs.mcgv.layout.packing import Layout
+from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding import Padding
 from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
 from gvcodecs.mcgv.motion.skinning_fit import Fitted
