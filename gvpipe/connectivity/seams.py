@@ -16,7 +16,7 @@ import numpy as np
 from gvpipe.arrays import Array
 from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import corrupt_section
 
 MAX_COPIES = 7  # copies of a point that have contexts of their own
 
@@ -107,7 +107,7 @@ def _decode_corners(counts_data: bytes, data: bytes, point_faces: Array, n_point
     """Mirror of `_encode_corners`: triangles over vertices, and the point of each vertex."""
     counts = 1 + decode_integers(counts_data, n_points, name="mesh")
     if n_points and (counts.min() < 1 or counts.max() > MAX_VERTICES or counts.sum() > MAX_VERTICES):
-        raise CorruptFile("section 'mesh' is corrupt: a number of copies is out of range")
+        raise corrupt_section("mesh", "a number of copies is out of range")
     where, is_first = _shared_corners(point_faces, counts)
     contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_COPIES)
     total = np.cumsum(decode_integers(data, len(where), contexts, "mesh"))
@@ -116,7 +116,7 @@ def _decode_corners(counts_data: bytes, data: bytes, point_faces: Array, n_point
     copies[where] = total - total[begin] if len(where) else 0
     flat = point_faces.ravel()
     if ((copies < 0) | (copies >= counts[flat])).any():
-        raise CorruptFile("section 'mesh' is corrupt: a corner uses a copy that does not exist")
+        raise corrupt_section("mesh", "a corner uses a copy that does not exist")
     starts = np.cumsum(counts) - counts
     faces: Array = (starts[flat] + copies).reshape(-1, 3)
     return faces, np.repeat(np.arange(n_points), counts)

@@ -28,7 +28,7 @@ from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import CorruptFile, corrupt_section
 from gvpipe.mesh.unique_rows import decode_table, encode_table, row_ids, smallest_first, used_vertices
 
 HEADER = struct.Struct("<6I")
@@ -164,15 +164,15 @@ def _merge(faces: Array, n_vertices: int, merges: bytes) -> Array:
         n_merges = cursor.varint(n_vertices, "the number of merges")
         gaps, back = decode_integers(cursor.rest(), 2 * n_merges, name="mesh").reshape(2, -1)
         if not n_merges or ((gaps < 0) | (gaps >= n_vertices)).any():
-            raise CorruptFile("section 'mesh' is corrupt: a merge names a vertex that does not exist")
+            raise corrupt_section("mesh", "a merge names a vertex that does not exist")
         again = np.cumsum(gaps + 1) - 1
         if (back <= 0).any() or again[-1] >= n_vertices or (back > again).any():
-            raise CorruptFile("section 'mesh' is corrupt: a merge names a vertex that does not exist")
+            raise corrupt_section("mesh", "a merge names a vertex that does not exist")
         stands_for[again] = again - back
         is_new = np.ones(n_vertices, bool)
         is_new[again] = False
         if not is_new[stands_for[again]].all():
-            raise CorruptFile("section 'mesh' is corrupt: a merge names a merged vertex")
+            raise corrupt_section("mesh", "a merge names a merged vertex")
         stands_for = (np.cumsum(is_new) - 1)[stands_for]
     merged: Array = stands_for[faces]
     return merged
@@ -188,7 +188,7 @@ def _decode_draco(draco: bytes) -> tuple[Array, int]:
         decoded = DracoPy.decode(draco)
         faces, n_vertices = decoded.faces.astype(np.int64), len(decoded.points)
     except Exception as exc:  # DracoPy's own, TypeError, bare ones; each means: corrupt
-        raise CorruptFile("section 'mesh' is corrupt: Draco cannot decode it") from exc
+        raise corrupt_section("mesh", "Draco cannot decode it") from exc
     if faces.size and (faces.min() < 0 or faces.max() >= n_vertices):
-        raise CorruptFile("section 'mesh' is corrupt: a triangle names a vertex that does not exist")
+        raise corrupt_section("mesh", "a triangle names a vertex that does not exist")
     return faces, n_vertices

@@ -19,7 +19,7 @@ from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.connectivity.base_mesh import EncodedMesh, decode_base, encode_base
 from gvpipe.connectivity.seams import decode_copies, encode_copies
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.mesh.topology import adjacency
 from gvpipe.mesh.unique_rows import smallest_first
 
@@ -62,7 +62,7 @@ def encode_points(lattice: Array, faces: Array, points: Array, reorder: bool) ->
     place = np.argsort(streams.permutation)
     point_faces = smallest_first(base.faces.astype(np.int64))
     coded = encode_copies(faces, place[points], point_faces, len(lattice), reorder)
-    mesh = varint(len(streams.mesh)) + streams.mesh + varint(len(coded.counts)) + coded.counts + coded.copies
+    mesh = pack_block(base.mesh) + pack_block(coded.counts) + coded.copies
     decoded = PointMesh(coded.faces.astype(np.int32), coded.points, base.points, point_faces.astype(np.int32))
     return EncodedMesh(mesh, coded.order, coded.permutation), decoded
 
@@ -70,9 +70,9 @@ def encode_points(lattice: Array, faces: Array, points: Array, reorder: bool) ->
 def decode_points(mesh: bytes, order: bytes) -> PointMesh:
     """Mirror of `encode_points`. Raises CorruptFile for anything malformed."""
     cursor = Cursor(mesh, "mesh")
-    base = decode_base(cursor.take(cursor.varint(cursor.left, "a length")), b"")
+    base = decode_base(cursor.block(), b"")
     point_faces = smallest_first(base.faces.astype(np.int64))
-    counts = cursor.take(cursor.varint(cursor.left, "a length"))
+    counts = cursor.block()
     faces, point = decode_copies(counts, cursor.rest(), order, point_faces, len(base.points))
     return PointMesh(faces.astype(np.int32), point, base.points, point_faces.astype(np.int32))
 

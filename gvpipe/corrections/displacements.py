@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.arrays import Float32, Int64
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block, varint
+from gvpipe.container.segments import HUGE, TINY
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import corrupt_section
 
 HEAD = struct.Struct("<d")
 MAX_POSITIONS = 1 << 20  # of a group, unless one frame has more
-SMALL, LARGE = 1e-60, 1e39  # no step of a float32 model lies beyond
 MAX_STEPS = 1 << 38  # magnitude of a move, steps
 NEAR = 3  # magnitudes of the axes before that are told apart, in the contexts of y and z
 
@@ -69,7 +69,7 @@ def encode_group(found: Moves, n_frames: int) -> bytes:
         encode_integers(y, _context(x)),
         encode_integers(z, _context(x, y)),
     ]
-    return varint(len(starts)) + b"".join(varint(len(block)) + block for block in blocks)
+    return varint(len(starts)) + b"".join(pack_block(block) for block in blocks)
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class MovesReader:
         self._shared = shared
         cursor = Cursor(data, name)
         (self.step,) = cursor.struct(HEAD)
-        if not SMALL < self.step < LARGE:  # NaN neither
+        if not TINY < self.step < HUGE:  # NaN neither
             raise cursor.corrupt(f"its step is {self.step}")
         self.group = cursor.varint(most_frames(n_vertices), "the frames of a group")
         if not self.group:
@@ -131,7 +131,7 @@ class MovesReader:
             at = places[asked], found.vertices[asked]
             frames[at] = move(frames[at], found.steps[asked], self.step)
             if not np.isfinite(frames[at]).all():
-                raise CorruptFile(f"section {self._name!r} is corrupt: a position is larger than float32 can hold")
+                raise corrupt_section(self._name, "a position is larger than float32 can hold")
 
     def _read(self, number: int) -> Moves:
         last = self._last  # once: other threads may read too
@@ -151,7 +151,7 @@ def decode_group(data: bytes, n_frames: int, n_vertices: int, name: str) -> Move
     n_runs = cursor.varint(n_frames * n_vertices, "the number of runs")
 
     def take(count: int, contexts: Int64 | None = None) -> Int64:
-        return decode_integers(cursor.take(cursor.varint(cursor.left, "a length")), count, contexts, name)
+        return decode_integers(cursor.block(), count, contexts, name)
 
     gaps, lengths = take(n_runs), take(n_runs) + 1
     limit = n_frames * n_vertices

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Float64, Int64
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_rows, encode_rows
 from gvpipe.trajectory.temporal_neighbours import frame_rows
@@ -200,14 +200,14 @@ def encode_basis(principal: Principal, n_components: int, n_points: int, step: f
     data, decoded = encode_rows(columns, _basis_step(step, columns.shape), frame_rows(len(columns) // 3))
     head = encode_integers(np.diff(levels, prepend=0))
     decoded /= scales
-    return varint(n_components) + varint(len(head)) + head + data, Basis(decoded[:, 0], decoded[:, 1:])
+    return varint(n_components) + pack_block(head) + data, Basis(decoded[:, 0], decoded[:, 1:])
 
 
 def decode_basis(data: bytes, n_frames: int, n_points: int, step: float, name: str) -> Basis:
     """Mirror of `encode_basis`; raises `CorruptFile` if the bytes are not what it writes."""
     cursor = Cursor(data, name)
     n_components = cursor.varint(min(MAX_COMPONENTS, 3 * n_frames), "the number of components")
-    head = cursor.take(cursor.varint(cursor.left, "a length"))
+    head = cursor.block()
     levels = np.cumsum(decode_integers(head, n_components, name=name))
     if (np.abs(levels) > MAX_SCALE).any():
         raise cursor.corrupt("a scale is out of range")

@@ -19,10 +19,10 @@ from itertools import pairwise
 import numpy as np
 
 from gvpipe.arrays import Float64
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.errors import InputError, corrupt_section
 from gvpipe.trajectory.contexts import MAX_LEVEL, N_CONTEXTS, ONE, level_bounds, surroundings_of
 from gvpipe.trajectory.prediction import Rows, predict_rows
 
@@ -62,7 +62,7 @@ def encode_rows(
         for c in range(target.shape[1]):
             coder.add(residuals[first:end, c], contexts[first:end, c])
     head = encode_integers(np.diff(levels, prepend=0))
-    return varint(len(head)) + head + coder.finish(), decoded
+    return pack_block(head) + coder.finish(), decoded
 
 
 def decode_rows(
@@ -86,7 +86,7 @@ def decode_rows(
     cursor = Cursor(data, name)
     if len(rows.order) * n_components > MAX_VALUES:  # zeros may cost no bits: believe no counts beyond this
         raise cursor.corrupt(f"{len(rows.order)} rows of {n_components} components")
-    head = cursor.take(cursor.varint(cursor.left, "a length"))
+    head = cursor.block()
     levels = np.cumsum(decode_integers(head, n_components, name=name))
     if ((levels < 0) | (levels > MAX_LEVEL)).any():
         raise cursor.corrupt("a magnitude level is out of range")
@@ -99,6 +99,6 @@ def decode_rows(
     if n_blocks is None:
         coder.end()
     if np.abs(residuals).max(initial=0) >= LARGEST:
-        raise CorruptFile(f"section {name!r} is corrupt: a residual is out of range; get the file again from its source")
+        raise corrupt_section(name, "a residual is out of range")
     predict_rows(rows, step, residuals, decoded, None, predictor, beta)
     return decoded

@@ -20,9 +20,9 @@ from gvpipe.arrays import Bool, Float32, Float64, Int32, Integers
 from gvpipe.codec import Memo
 from gvpipe.connectivity.topology_only import BareMesh
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.segments import LARGEST_STEP, SMALLEST_STEP
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import corrupt_section
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import Basis, fit_coefficients
 from gvpipe.trajectory.coded_points import CodedPoints
@@ -67,7 +67,7 @@ class StillPoints:
             return None
         if basis.vectors.shape[1] > self.most_components:
             size = f"{basis.vectors.shape[1]} components of {len(self.flags)} points"
-            raise CorruptFile(f"section {SECTION!r} is corrupt: {size}; get the file again from its source")
+            raise corrupt_section(SECTION, f"{size}")
         result = np.zeros((len(self.flags), basis.vectors.shape[1]))
         trajectories = np.tile(self.positions[self.flags].astype(np.float64), len(basis.mean) // 3)
         result[self.flags] = fit_coefficients(trajectories, basis)
@@ -125,7 +125,7 @@ def encode_still(flags: Bool, positions: Float64, error: float, point_faces: Int
     indices = np.rint((positions - origin) / step)
     data, _ = encode_rows(indices, 1.0, _still_rows(flags, point_faces), "navg")
     coded = encode_flags(flags)
-    return HEAD.pack(step, *origin.tolist()) + varint(len(coded)) + coded + data, _place(flags, indices, step, origin)
+    return HEAD.pack(step, *origin.tolist()) + pack_block(coded) + data, _place(flags, indices, step, origin)
 
 
 def decode_still(data: bytes, point_faces: Int32, n_points: int) -> StillPoints:
@@ -134,7 +134,7 @@ def decode_still(data: bytes, point_faces: Int32, n_points: int) -> StillPoints:
     step, *origin = cursor.struct(HEAD)
     if not SMALLEST_STEP <= step <= LARGEST_STEP or not np.isfinite(origin).all():  # NaN neither
         raise cursor.corrupt(f"its step is {step}, its origin {origin}")
-    flags = decode_flags(cursor.take(cursor.varint(cursor.left, "a length")), n_points, SECTION)
+    flags = decode_flags(cursor.block(), n_points, SECTION)
     if not flags.any():
         raise cursor.corrupt("no point stands still")
     indices = decode_rows(cursor.rest(), 3, 1.0, _still_rows(flags, point_faces), SECTION, predictor="navg")

@@ -30,6 +30,7 @@ from typing import Any
 
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import HUGE, TINY
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import MAX_SIDE, PROFILES, Profile
 from gvpipe.mesh.lattice import Lattice
@@ -38,8 +39,6 @@ PREDICTIONS = ("blended", "affine")
 PLACEMENTS = ("halves", "charts", "tiles")
 MAX_CLUSTERS = 1024
 MAX_SEGMENTS = 1 << 16
-LARGE = 1e39  # no coordinate or step of a float32 model lies beyond
-SMALL = 1e-60  # no step of a float32 model is smaller
 
 
 @dataclass(frozen=True)
@@ -102,7 +101,7 @@ class Header:
             raise CorruptFile(f"header: no profile {bitstream.header.get('profile')!r}; there are {', '.join(PROFILES)}")
         if not (isinstance(base, list) and len(base) == 4 and all(isinstance(v, int | float) for v in base)):
             raise CorruptFile(f"header: base is {base!r}; an origin and a step are needed")
-        if not (base[3] > 0 and all(abs(v) < LARGE for v in base)):  # NaN neither
+        if not (base[3] > 0 and all(abs(v) < HUGE for v in base)):  # NaN neither
             raise CorruptFile(f"header: base is {base!r}, out of range")
         segments = bitstream.integer("segments", 1, min(MAX_SEGMENTS, bitstream.n_frames))
         images = TrajectoryHeader.of(bitstream, segments)
@@ -116,8 +115,8 @@ class Header:
             clusters=bitstream.integer("clusters", 1, MAX_CLUSTERS),
             segments=segments,
             base=Lattice((base[0], base[1], base[2]), base[3]),
-            transform_step=1.0 if images else bitstream.number("transform_step", SMALL, LARGE),
-            residual_step=1.0 if images else bitstream.number("residual_step", SMALL, LARGE),
+            transform_step=1.0 if images else bitstream.number("transform_step", TINY, HUGE),
+            residual_step=1.0 if images else bitstream.number("residual_step", TINY, HUGE),
             outliers="outliers" in bitstream.header,
             images=images,
         )
