@@ -62,7 +62,7 @@ def encode_points(lattice: Array, faces: Array, points: Array, reorder: bool) ->
     place = np.argsort(streams.permutation)
     point_faces = smallest_first(base.faces.astype(np.int64))
     coded = encode_copies(faces, place[points], point_faces, len(lattice), reorder)
-    mesh = pack_block(base.mesh) + pack_block(coded.counts) + coded.copies
+    mesh = pack_block(streams.mesh) + pack_block(coded.counts) + coded.copies
     decoded = PointMesh(coded.faces.astype(np.int32), coded.points, base.points, point_faces.astype(np.int32))
     return EncodedMesh(mesh, coded.order, coded.permutation), decoded
 
