@@ -49,7 +49,7 @@ def test_hierarchy_orders_every_vertex_after_what_predicts_it(seed: int) -> None
     assert np.array_equal(np.sort(hierarchy.order), np.arange(n_vertices))
     rank = np.argsort(hierarchy.order)
     owner = np.repeat(np.arange(n_vertices), np.diff(hierarchy.starts))
-    assert (rank[hierarchy.near] < owner).all()
+    assert (rank[hierarchy.neighbours] < owner).all()
     assert hierarchy.blocks[0] == 0 and hierarchy.blocks[-1] == n_vertices and (np.diff(hierarchy.blocks) > 0).all()
 
 

@@ -35,9 +35,9 @@ TINY = 1e-30
 
 def border_order(faces: Int32, n_points: int) -> Int32:
     """All points in the order of a walk over ``faces (T, 3)`` that goes from triangle to triangle, breadth first."""
-    from gvpipe.mesh.traversal import walk_coarse
+    from gvpipe.mesh.traversal import traverse
 
-    order: Int32 = walk_coarse(faces, np.arange(n_points, dtype=np.int32), n_points)[0]
+    order: Int32 = traverse(faces, np.arange(n_points, dtype=np.int32), n_points)[0]
     return order
 
 
