@@ -7,7 +7,14 @@ from importlib import import_module
 
 import pytest
 
-MODULES = ["gvpipe.container.cursor", "gvpipe.errors"]
+MODULES = [
+    "gvpipe.container.cursor",
+    "gvpipe.entropy.block_coder",
+    "gvpipe.entropy.grouping",
+    "gvpipe.entropy.integers",
+    "gvpipe.errors",
+    "gvpipe.trajectory.temporal_neighbours",
+]
 
 
 @pytest.mark.parametrize("name", MODULES)

@@ -18,11 +18,11 @@ from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import corrupt_section
 
-MAX_COPIES = 7  # copies of a point that have contexts of their own
+MAX_SEAM_VERTICES = 7  # copies of a point that have contexts of their own
 
 
 @dataclass(frozen=True)
-class CodedCopies:
+class CodedSeams:
     """The streams, and what decoding them returns.
 
     Args:
@@ -41,7 +41,7 @@ class CodedCopies:
     points: Array
 
 
-def encode_copies(faces: Array, points: Array, point_faces: Array, n_points: int, reorder: bool) -> CodedCopies:
+def encode_seams(faces: Array, points: Array, point_faces: Array, n_points: int, reorder: bool) -> CodedSeams:
     """Code which vertices the corners of ``point_faces`` use.
 
     Args:
@@ -60,13 +60,13 @@ def encode_copies(faces: Array, points: Array, point_faces: Array, n_points: int
     permutation = np.lexsort((copies, points))
     rank = np.argsort(permutation)
     if reorder:
-        return CodedCopies(counts, differences, b"", permutation, rank[corners], points[permutation])
+        return CodedSeams(counts, differences, b"", permutation, rank[corners], points[permutation])
     order = encode_order(rank, _as_lattice(points[permutation]), rank[corners])
-    return CodedCopies(counts, differences, order, np.arange(len(points)), corners, points)
+    return CodedSeams(counts, differences, order, np.arange(len(points)), corners, points)
 
 
-def decode_copies(counts: bytes, copies: bytes, order: bytes, point_faces: Array, n_points: int) -> tuple[Array, Array]:
-    """Mirror of `encode_copies`: triangles ``(T, 3)`` over vertices, and the point of each vertex ``(V,)``."""
+def decode_seams(counts: bytes, copies: bytes, order: bytes, point_faces: Array, n_points: int) -> tuple[Array, Array]:
+    """Mirror of `encode_seams`: triangles ``(T, 3)`` over vertices, and the point of each vertex ``(V,)``."""
     faces, points = _decode_corners(counts, copies, point_faces, n_points)
     if order:
         visits = decode_order(order, _as_lattice(points), faces)
@@ -86,7 +86,7 @@ def _encode_corners(corners: Array, point_faces: Array, points: Array, n_points:
     copies[by_use] = np.arange(len(points)) - starts[points[by_use]]
     where, is_first = _shared_corners(point_faces, counts)
     differences = np.diff(copies[corners.ravel()[where]], prepend=0)
-    contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_COPIES)
+    contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_SEAM_VERTICES)
     return copies, encode_integers(counts - 1), encode_integers(_filled(differences, contexts, is_first), contexts)
 
 
@@ -109,7 +109,7 @@ def _decode_corners(counts_data: bytes, data: bytes, point_faces: Array, n_point
     if n_points and (counts.min() < 1 or counts.max() > MAX_VERTICES or counts.sum() > MAX_VERTICES):
         raise corrupt_section("mesh", "a number of copies is out of range")
     where, is_first = _shared_corners(point_faces, counts)
-    contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_COPIES)
+    contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_SEAM_VERTICES)
     total = np.cumsum(decode_integers(data, len(where), contexts, "mesh"))
     begin = np.maximum.accumulate(np.where(is_first, np.arange(len(where)), 0))
     copies = np.zeros(point_faces.size, np.int64)

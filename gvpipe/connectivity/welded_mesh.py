@@ -17,7 +17,7 @@ from scipy import sparse
 
 from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.connectivity.base_mesh import EncodedMesh, decode_base, encode_base
-from gvpipe.connectivity.seams import decode_copies, encode_copies
+from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.mesh.topology import adjacency
@@ -25,7 +25,7 @@ from gvpipe.mesh.unique_rows import smallest_first
 
 
 @dataclass(frozen=True)
-class PointMesh:
+class WeldedMesh:
     """A mesh and its points, numbered as the coder walks over the surface.
 
     Args:
@@ -51,7 +51,7 @@ class PointMesh:
         return adjacency(self.point_faces, len(self.lattice))
 
 
-def encode_points(lattice: Array, faces: Array, points: Array, reorder: bool) -> tuple[EncodedMesh, PointMesh]:
+def encode_points(lattice: Array, faces: Array, points: Array, reorder: bool) -> tuple[EncodedMesh, WeldedMesh]:
     """Code a mesh of ``points (V,)``, 0..P-1, at ``lattice (P, 3)`` with triangles ``faces (T, 3)`` over V vertices.
 
     Returns the streams, and the mesh as decoding returns it. ``reorder`` lets the decoder see the codec's vertex order.
@@ -61,23 +61,23 @@ def encode_points(lattice: Array, faces: Array, points: Array, reorder: bool) ->
     streams, base = encode_base(lattice, points[faces], reorder=True)
     place = np.argsort(streams.permutation)
     point_faces = smallest_first(base.faces.astype(np.int64))
-    coded = encode_copies(faces, place[points], point_faces, len(lattice), reorder)
+    coded = encode_seams(faces, place[points], point_faces, len(lattice), reorder)
     mesh = pack_block(streams.mesh) + pack_block(coded.counts) + coded.copies
-    decoded = PointMesh(coded.faces.astype(np.int32), coded.points, base.points, point_faces.astype(np.int32))
+    decoded = WeldedMesh(coded.faces.astype(np.int32), coded.points, base.points, point_faces.astype(np.int32))
     return EncodedMesh(mesh, coded.order, coded.permutation), decoded
 
 
-def decode_points(mesh: bytes, order: bytes) -> PointMesh:
+def decode_points(mesh: bytes, order: bytes) -> WeldedMesh:
     """Mirror of `encode_points`. Raises CorruptFile for anything malformed."""
     cursor = Cursor(mesh, "mesh")
     base = decode_base(cursor.block(), b"")
     point_faces = smallest_first(base.faces.astype(np.int64))
     counts = cursor.block()
-    faces, point = decode_copies(counts, cursor.rest(), order, point_faces, len(base.points))
-    return PointMesh(faces.astype(np.int32), point, base.points, point_faces.astype(np.int32))
+    faces, point = decode_seams(counts, cursor.rest(), order, point_faces, len(base.points))
+    return WeldedMesh(faces.astype(np.int32), point, base.points, point_faces.astype(np.int32))
 
 
-def read_points(bitstream: Bitstream) -> PointMesh:
+def read_points(bitstream: Bitstream) -> WeldedMesh:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
     mesh = decode_points(bitstream.section("mesh"), bitstream.section("order"))
     bitstream.check_size(len(mesh.point), len(mesh.faces))

@@ -60,7 +60,7 @@ class LaplacianReader:
         if not self._still.n_moving:
             return np.repeat(self._still.positions[None, self._mesh.points], stop - start, axis=0)
         frames = read_frames(start, stop, self._bounds, self._mesh.points, self._decode)
-        self._still.place(frames, self._mesh.points)
+        self._still.overwrite(frames, self._mesh.points)
         return frames
 
     def _build_domain(self, surface: Surface) -> Domain:

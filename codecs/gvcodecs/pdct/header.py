@@ -20,7 +20,7 @@ import numpy as np
 
 from gvcodecs.pdct.dictionary import Surface
 from gvpipe.connectivity.base_mesh import BaseMesh
-from gvpipe.connectivity.welded_mesh import PointMesh
+from gvpipe.connectivity.welded_mesh import WeldedMesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import HUGE, read_segments
 from gvpipe.errors import CorruptFile
@@ -65,6 +65,6 @@ def surface_of(mesh: BaseMesh, lattice: Lattice) -> Surface:
     return Surface(lattice.place(mesh.points), mesh.faces, np.argsort(mesh.visits))
 
 
-def surface_of_points(mesh: PointMesh, lattice: Lattice) -> Surface:
+def surface_of_points(mesh: WeldedMesh, lattice: Lattice) -> Surface:
     """What all clips share, from the decoded base frame; points are numbered along the walk."""
     return Surface(lattice.place(mesh.lattice), mesh.point_faces, np.arange(len(mesh.lattice)))
