@@ -13,6 +13,7 @@ MODULES = [
     "gvpipe.entropy.grouping",
     "gvpipe.entropy.integers",
     "gvpipe.errors",
+    "gvpipe.repeated_frames",
     "gvpipe.trajectory.temporal_neighbours",
 ]
 
