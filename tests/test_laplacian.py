@@ -24,7 +24,7 @@ from gvpipe.errors import FormatError, SettingError
 from gvpipe.mesh.topology import components
 from gvpipe.metrics.comparison import compare
 from gvpipe.sequence import MeshSequence
-from gvpipe.trajectory.prediction import select_vectors
+from gvpipe.trajectory.causal_order import select_vectors
 
 HEADER = Header("mean-value", "kalman", 16, "hierarchy", 0.75, 1 / 16, 1.2, 1.5, 1, (1.0,))
 
@@ -281,7 +281,7 @@ def test_perturbed_predictions_hardly_move_vertices(prediction: str, monkeypatch
     clean = Laplacian.reader(bitstream).read(0, 20).astype(np.float64)
     original = gvpipe.trajectory.prediction.predict_vectors
 
-    def perturbed(causal: gvpipe.trajectory.prediction.CausalOrder, *rest: object) -> None:
+    def perturbed(causal: gvpipe.trajectory.causal_order.CausalOrder, *rest: object) -> None:
         noise = 1 + 1e-12 * np.random.default_rng(5).choice([-1, 1], len(causal.weights))
         original(causal._replace(weights=causal.weights * noise), *rest)  # type: ignore[arg-type]
 

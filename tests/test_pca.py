@@ -223,7 +223,7 @@ def test_perturbed_predictions_hardly_move_vertices(predictor: str, monkeypatch:
     clean = Pca.reader(bitstream).read(0, 20).astype(np.float64)
     original = gvpipe.trajectory.prediction.predict_vectors
 
-    def perturbed(causal: gvpipe.trajectory.prediction.CausalOrder, *rest: object) -> None:
+    def perturbed(causal: gvpipe.trajectory.causal_order.CausalOrder, *rest: object) -> None:
         noise = 1 + 1e-12 * np.random.default_rng(5).choice([-1, 1], len(causal.weights))
         original(causal._replace(weights=causal.weights * noise), *rest)  # type: ignore[arg-type]
 
