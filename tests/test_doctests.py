@@ -13,6 +13,8 @@ MODULES = [
     "gvpipe.entropy.grouping",
     "gvpipe.entropy.integers",
     "gvpipe.errors",
+    "gvpipe.mesh.lattice",
+    "gvpipe.mesh.unique_rows",
     "gvpipe.repeated_frames",
     "gvpipe.trajectory.temporal_neighbours",
 ]

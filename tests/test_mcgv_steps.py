@@ -690,13 +690,13 @@ def test_lattice(seed: int, bits: int, scale: float) -> None:
     lattice = Lattice.over(points, bits)
     indices = lattice.quantise(points)
     assert indices.min() == 0 and indices.max() == 2**bits - 1
-    assert np.abs(lattice.place(indices) - points).max() <= lattice.step / 2 * (1 + 1e-6)
-    assert np.array_equal(lattice.quantise(lattice.place(indices)), indices)
+    assert np.abs(lattice.points_at(indices) - points).max() <= lattice.step / 2 * (1 + 1e-6)
+    assert np.array_equal(lattice.quantise(lattice.points_at(indices)), indices)
 
 
 def test_lattice_of_one_place() -> None:
     lattice = Lattice.over(np.full((3, 3), 7.5), 12)
-    assert np.array_equal(lattice.place(lattice.quantise(np.full((3, 3), 7.5))), np.full((3, 3), 7.5))
+    assert np.array_equal(lattice.points_at(lattice.quantise(np.full((3, 3), 7.5))), np.full((3, 3), 7.5))
 
 
 @pytest.mark.parametrize("k", [1, 2, 3, 5])

@@ -193,7 +193,7 @@ def test_copies_are_numbered_by_first_use() -> None:
     points = np.array([0, 0, 0, 0, 1, 2])
     coded = encode_seams(faces, points, points[faces], 3, reorder=True)
     assert coded.permutation.tolist() == [3, 1, 0, 2, 4, 5]
-    found, _ = decode_seams(coded.counts, coded.copies, coded.order, points[faces], 3)
+    found, _ = decode_seams(coded.counts, coded.corners, coded.order, points[faces], 3)
     assert found.tolist() == [[0, 4, 5], [1, 4, 5], [0, 4, 5]]
 
 
@@ -204,6 +204,6 @@ def test_soups_cost_hardly_more_than_their_points() -> None:
     order = np.argsort(point_faces.ravel(), kind="stable")
     faces = np.argsort(order).reshape(-1, 3)
     coded = encode_seams(faces, points, point_faces, 401, reorder=True)
-    assert len(coded.copies) < 30
-    found, _ = decode_seams(coded.counts, coded.copies, coded.order, point_faces, 401)
+    assert len(coded.corners) < 30
+    found, _ = decode_seams(coded.counts, coded.corners, coded.order, point_faces, 401)
     assert np.array_equal(found, faces)

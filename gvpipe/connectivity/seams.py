@@ -1,10 +1,11 @@
-"""Which vertex each corner of a mesh of points uses: seams and triangle soups as bytes beside a welded mesh.
+"""Which vertex each corner of a welded mesh uses: seams and triangle soups as bytes beside it.
 
-A *point* stands for the vertices that share its trajectory, its *copies*. The mesh over points is coded elsewhere (`bare_mesh`,
-`point_mesh`); here every corner of it names the copy it uses, and the user's order of vertices follows.
+A *point* stands for the vertices that share its trajectory; where these are several, it lies on a *seam*. The mesh over points
+is coded elsewhere (`topology_only`, `welded_mesh`). Here every corner of it names one of its point's vertices by number, and
+the user's order of vertices follows.
 
-Streams: copies of each point less one [integers]; then, for corners of points with more than one, in order of point and corner,
-the copy's difference from that point's corner before [integers]. Order stream: `vertex_order`, points in place of positions.
+Streams: vertices of each point less one [integers]; then, for corners on seams, in order of point and corner, the number's
+difference from that of the point's corner before [integers]. Order stream: `vertex_order`, points in place of positions.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ from gvpipe.arrays import Array
 from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import corrupt_section
+from gvpipe.mesh.unique_rows import corners_from_smallest
 
-MAX_SEAM_VERTICES = 7  # copies of a point that have contexts of their own
+MAX_SEAM_VERTICES = 7  # larger numbers of vertices of a point share a context
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class CodedSeams:
     """The streams, and what decoding them returns.
 
     Args:
-        counts, copies: streams.
+        counts, corners: streams.
         order: stream, empty: decode in the codec's order.
         permutation: ``(V,)`` the given vertex of each decoded one.
         faces: ``(T, 3)`` decoded triangles.
@@ -34,7 +36,7 @@ class CodedSeams:
     """
 
     counts: bytes
-    copies: bytes
+    corners: bytes
     order: bytes
     permutation: Array
     faces: Array
@@ -52,12 +54,13 @@ def encode_seams(faces: Array, points: Array, point_faces: Array, n_points: int,
         reorder: let the decoder see the codec's vertex order.
     """
     # triangles alike over points are matched in order of appearance: which is which does not matter
-    turned, turns = _turned(points[faces])
+    corner_order = corners_from_smallest(points[faces])
+    turned = np.take_along_axis(points[faces], corner_order, axis=1)
     matched = np.empty(len(faces), np.int64)
     matched[np.lexsort(point_faces.T[::-1])] = np.lexsort(turned.T[::-1])
-    corners = np.take_along_axis(faces, turns, axis=1)[matched]  # vertices of the codec's triangles
-    copies, counts, differences = _encode_corners(corners, point_faces, points, n_points)
-    permutation = np.lexsort((copies, points))
+    corners = np.take_along_axis(faces, corner_order, axis=1)[matched]  # vertices of the codec's triangles
+    numbers, counts, differences = _encode_corners(corners, point_faces, points, n_points)
+    permutation = np.lexsort((numbers, points))
     rank = np.argsort(permutation)
     if reorder:
         return CodedSeams(counts, differences, b"", permutation, rank[corners], points[permutation])
@@ -65,9 +68,9 @@ def encode_seams(faces: Array, points: Array, point_faces: Array, n_points: int,
     return CodedSeams(counts, differences, order, np.arange(len(points)), corners, points)
 
 
-def decode_seams(counts: bytes, copies: bytes, order: bytes, point_faces: Array, n_points: int) -> tuple[Array, Array]:
+def decode_seams(counts: bytes, corners: bytes, order: bytes, point_faces: Array, n_points: int) -> tuple[Array, Array]:
     """Mirror of `encode_seams`: triangles ``(T, 3)`` over vertices, and the point of each vertex ``(V,)``."""
-    faces, points = _decode_corners(counts, copies, point_faces, n_points)
+    faces, points = _decode_corners(counts, corners, point_faces, n_points)
     if order:
         visits = decode_order(order, _as_lattice(points), faces)
         points, faces = points[visits], np.argsort(visits)[faces]
@@ -75,25 +78,25 @@ def decode_seams(counts: bytes, copies: bytes, order: bytes, point_faces: Array,
 
 
 def _encode_corners(corners: Array, point_faces: Array, points: Array, n_points: int) -> tuple[Array, bytes, bytes]:
-    """The number of each vertex among its point's copies ``(V,)``, by first use, and the streams that tell it."""
+    """The number ``(V,)`` of each vertex among its point's, by first use, and the streams that signal it."""
     counts = np.bincount(points, minlength=n_points)
     used, first = np.unique(corners.ravel(), return_index=True)
     when = np.full(len(points), corners.size, np.int64)
     when[used] = first
     by_use = np.lexsort((when, points))
     starts = np.cumsum(counts) - counts
-    copies = np.empty(len(points), np.int64)
-    copies[by_use] = np.arange(len(points)) - starts[points[by_use]]
-    where, is_first = _shared_corners(point_faces, counts)
-    differences = np.diff(copies[corners.ravel()[where]], prepend=0)
+    numbers = np.empty(len(points), np.int64)
+    numbers[by_use] = np.arange(len(points)) - starts[points[by_use]]
+    where, is_first = _seam_corners(point_faces, counts)
+    differences = np.diff(numbers[corners.ravel()[where]], prepend=0)
     contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_SEAM_VERTICES)
-    return copies, encode_integers(counts - 1), encode_integers(_filled(differences, contexts, is_first), contexts)
+    return numbers, encode_integers(counts - 1), encode_integers(_filled(differences, contexts, is_first), contexts)
 
 
 def _filled(differences: Array, contexts: Array, is_first: Array) -> Array:
     """The differences, those of points' first corners replaced by what costs least: the most frequent one of their context.
 
-    A point's first corner uses its first copy, so decoders ignore its difference.
+    A point's first corner uses its first vertex, so decoders ignore its difference.
     """
     result = differences.copy()
     for context in np.unique(contexts):
@@ -108,33 +111,27 @@ def _decode_corners(counts_data: bytes, data: bytes, point_faces: Array, n_point
     counts = 1 + decode_integers(counts_data, n_points, name="mesh")
     if n_points and (counts.min() < 1 or counts.max() > MAX_VERTICES or counts.sum() > MAX_VERTICES):
         raise corrupt_section("mesh", "a number of copies is out of range")
-    where, is_first = _shared_corners(point_faces, counts)
+    where, is_first = _seam_corners(point_faces, counts)
     contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_SEAM_VERTICES)
     total = np.cumsum(decode_integers(data, len(where), contexts, "mesh"))
     begin = np.maximum.accumulate(np.where(is_first, np.arange(len(where)), 0))
-    copies = np.zeros(point_faces.size, np.int64)
-    copies[where] = total - total[begin] if len(where) else 0
+    numbers = np.zeros(point_faces.size, np.int64)
+    numbers[where] = total - total[begin] if len(where) else 0
     flat = point_faces.ravel()
-    if ((copies < 0) | (copies >= counts[flat])).any():
+    if ((numbers < 0) | (numbers >= counts[flat])).any():
         raise corrupt_section("mesh", "a corner uses a copy that does not exist")
     starts = np.cumsum(counts) - counts
-    faces: Array = (starts[flat] + copies).reshape(-1, 3)
+    faces: Array = (starts[flat] + numbers).reshape(-1, 3)
     return faces, np.repeat(np.arange(n_points), counts)
 
 
-def _shared_corners(point_faces: Array, counts: Array) -> tuple[Array, Array]:
-    """Corners of points with more than one copy, in order of point and corner; which of them is its point's first."""
+def _seam_corners(point_faces: Array, counts: Array) -> tuple[Array, Array]:
+    """Corners on seams, in order of point and corner, and which of them is its point's first."""
     flat = point_faces.ravel()
     where = np.flatnonzero(counts[flat] > 1)
     where = np.asarray(where[np.argsort(flat[where], kind="stable")])
     is_first: Array = np.diff(flat[where], prepend=-1) > 0
     return where, is_first
-
-
-def _turned(faces: Array) -> tuple[Array, Array]:
-    """Triangles with the smallest index first, and where each of their corners was."""
-    turns = (faces.argmin(axis=1)[:, None] + np.arange(3)) % 3 if len(faces) else np.zeros((0, 3), np.int64)
-    return np.take_along_axis(faces, turns, axis=1), turns
 
 
 def _as_lattice(points: Array) -> Array:

@@ -2,7 +2,7 @@
 
 A residual's magnitude is 0 with probability ``zero / 256``; larger ones fall geometrically, seven eighths of them with a
 ratio and one eighth with a third of that ratio's distance from one: the heavy tail that residuals have. Signs are even. Three
-bytes tell such a table where a table of frequencies takes about twenty, which is a tenth of a small file.
+bytes describe such a table where a table of frequencies takes about twenty, which is a tenth of a small file.
 
 Ratios are integers over 4096, and powers are exact (Python's integers), so that tables are the same everywhere.
 """

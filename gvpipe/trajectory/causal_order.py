@@ -41,7 +41,7 @@ def select_vectors(causal: CausalOrder, keep: Bool) -> CausalOrder:
 
 
 def leave_out(causal: CausalOrder, given: Bool) -> CausalOrder:
-    """Leave out the vectors that ``given (n,)`` marks, which are known beforehand; vectors keep their numbers."""
+    """Leave out the vectors that ``given (n,)`` marks, which are decoded beforehand; vectors keep their numbers."""
     return _keep_ranks(causal, ~given[causal.order])
 
 
