@@ -25,7 +25,7 @@ from gvpipe.benchmark.sweep import Report
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = (DOCS / "benchmarks.md", DOCS / "experiments" / "benchmark-curves-version-2.md")
 CURVES, QUALITY = "curves-version-2", "quality-75"  # files of results
-MARKED = re.compile(r"(<!-- table: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+MARKED = re.compile(r"(<!-- table: ([\w.-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 NAMES = {
     "mcgv:prediction=affine": "`mcgv` affine",
     "mcgv:image=jpeg": "`mcgv` JPEG",
