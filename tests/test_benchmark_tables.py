@@ -22,9 +22,9 @@ def test_tables_are_made_from_results(page: Path) -> None:
     assert TOOL["fill"](text) == text, "run python tools/benchmark_tables.py"
 
 
-def test_every_table_stands_on_one_page() -> None:
+def test_every_table_stands_on_a_page() -> None:
     names = [found[1] for page in TOOL["PAGES"] for found in TOOL["MARKED"].findall(page.read_text("utf-8"))]
-    assert sorted(names) == sorted(TOOL["TABLES"])
+    assert set(names) == set(TOOL["TABLES"])
 
 
 @pytest.mark.parametrize("path", RESULTS, ids=lambda path: path.stem)

@@ -23,7 +23,7 @@ from gvpipe.benchmark.bd_rate import average_rate_difference, rate_at, tables
 from gvpipe.benchmark.sweep import Report
 
 DOCS = Path(__file__).parents[1] / "docs"
-PAGES = (DOCS / "benchmarks.md", DOCS / "experiments" / "benchmark-curves-version-2.md")
+PAGES = (DOCS / "benchmarks.md", DOCS / "codecs" / "mcgv.md", DOCS / "experiments" / "benchmark-curves-version-2.md")
 CURVES, QUALITY = "curves-version-2", "quality-75"  # files of results
 MARKED = re.compile(r"(<!-- table: ([\w.-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 NAMES = {
