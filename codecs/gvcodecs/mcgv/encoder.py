@@ -65,7 +65,7 @@ BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
 AFFINE_CLUSTERS, AFFINE_BASE_BITS = 20, 12  # the paper's
 MOST_SEGMENTS = 4000  # one section each, of the 4096 that a bitstream may have
 BASE_BITS = 8, 16  # bits along a base frame's longest side that are chosen unasked, about
-BASE_STEP = 1.3  # of a base frame, times step / sqrt(frames): measured, docs/codecs/mcgv.md
+BASE_STEP = 1.3  # of a base frame, times step / sqrt(frames): measured, docs/decisions/0084-mcgv-base-lattice.md
 FINER = 2**0.25  # times, a lattice that does not
 DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell apart; the others give way
 GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
@@ -365,7 +365,7 @@ class Mcgv(BaseCodec):
         return PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
 
     def _chosen_placement(self, n_points: int) -> str:
-        """JPEG, which sees no other frame, codes the smoother images of charts for less; see docs/codecs/mcgv.md."""
+        """JPEG, which sees no other frame, codes the smoother images of charts for less (docs/decisions/0091-mcgv-jpeg.md)."""
         if self.placement != AUTO:
             return self.placement
         if self.prediction != "blended" or self.image != "h264":
