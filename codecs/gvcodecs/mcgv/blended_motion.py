@@ -16,7 +16,7 @@ from gvcodecs.mcgv.packing import Layout
 from gvcodecs.mcgv.points import Points
 from gvcodecs.mcgv.surface import Surface
 from gvcodecs.mcgv.trajectories import Trajectories, decode_trajectories, encode_trajectories
-from gvcodecs.mcgv.weight_coding import decode_weights, encode_weights
+from gvcodecs.mcgv.weight_coding import decode_weights, earlier_neighbours, encode_weights
 from gvpipe.bitstream import Bitstream
 from gvpipe.codec import Progress
 from gvpipe.sequence import Float32, MeshSequence
@@ -39,7 +39,7 @@ def code_blended(
         bounds: first frame of every segment, and F.
     """
     fit = BlendFit(Blend(base, fitted.weights, fitted.n_clusters))
-    coded = {"weights": encode_weights(fitted.weights, points.neighbours)}
+    coded = {"weights": encode_weights(fitted.weights, earlier_neighbours(points.neighbours))}
     segments: list[Trajectories] = []
     for s, (start, stop) in enumerate(pairwise(bounds)):
         rows = [fit.fit(_columns(block - base)) for _, block in sequence.chunks(start, stop)]

@@ -21,7 +21,7 @@ from gvcodecs.mcgv.padding import Padding
 from gvcodecs.mcgv.points import Points
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvcodecs.mcgv.trajectory_images import PLANES, count_pictures, encode_segment
-from gvcodecs.mcgv.weight_coding import encode_weights
+from gvcodecs.mcgv.weight_coding import earlier_neighbours, encode_weights
 from gvpipe.codec import Progress
 from gvpipe.sequence import MeshSequence
 from gvpipe.video import Plane, Profile, VideoWriter
@@ -68,7 +68,7 @@ def code_trajectories(
         profile, preset: of the video.
     """
     fit = BlendFit(Blend(base, fitted.weights, fitted.n_clusters))
-    sections = {"weights": encode_weights(fitted.weights, points.neighbours)}
+    sections = {"weights": encode_weights(fitted.weights, earlier_neighbours(points.neighbours))}
     fineness = FINENESS[profile.name]
     largest = profile.amplitude / fineness
     padding = Padding(layout, block)

@@ -42,9 +42,8 @@ def earlier_neighbours(neighbours: sparse.csr_array) -> Known:
     return Known(lower.indptr.astype(np.int64), lower.indices.astype(np.int64))
 
 
-def encode_weights(weights: Weights, neighbours: sparse.csr_array) -> bytes:
+def encode_weights(weights: Weights, known: Known) -> bytes:
     """Return the section ``weights``."""
-    known = earlier_neighbours(neighbours)
     counts, gaps, changes = _described(weights, known)
     slots = np.broadcast_to(np.arange(INFLUENCES), gaps.shape)
     own, changed = slots < counts[:, None], slots < counts[:, None] - 1
@@ -98,9 +97,9 @@ class Prices:
         return cls(np.array([0.5, 3, 3, 3, 3]), np.tile(gap, (INFLUENCES, 1)), np.tile(change, (INFLUENCES, 1)))
 
     @classmethod
-    def learnt(cls, neighbours: sparse.csr_array, weights: Weights) -> Prices:
+    def learnt(cls, known: Known, weights: Weights) -> Prices:
         """Prices by how often numbers occur."""
-        counts, gaps, changes = _described(weights, earlier_neighbours(neighbours))
+        counts, gaps, changes = _described(weights, known)
         guess = cls.guess()
         slots = np.arange(INFLUENCES)
         own, changed = slots < counts[:, None], slots < counts[:, None] - 1
