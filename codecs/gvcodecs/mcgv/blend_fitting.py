@@ -16,10 +16,12 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -289,37 +291,41 @@ class Clustering:
     def __init__(self, features: Float64) -> None:
         self._features = features
         self._sample = features[:: max(1, len(features) // SAMPLES)]
-        self._seeds = _seeds(self._sample, MOST)
+        self._seeds: list[int] = []
+        self._drawn, self._lock = _draw_seeds(self._sample), Lock()
 
     def start(self, n_clusters: int) -> Fitted:
         """Each point follows its own cluster alone, of at most ``n_clusters``."""
         from scipy.cluster.vq import kmeans2, vq
 
+        with self._lock:  # charts start from clusters beside the blend
+            self._seeds += islice(self._drawn, max(0, n_clusters - len(self._seeds)))
+            seeds = self._sample[self._seeds[:n_clusters]]
         clusters = np.zeros((len(self._features), INFLUENCES), np.int32)
         parts = np.zeros((len(self._features), INFLUENCES), np.int32)
         parts[:, 0] = TOTAL
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a cluster may run empty: it is dropped
-            centres, _ = kmeans2(self._sample, self._seeds[:n_clusters], iter=K_MEANS_ROUNDS, minit="matrix")
+            centres, _ = kmeans2(self._sample, seeds, iter=K_MEANS_ROUNDS, minit="matrix")
         clusters[:, 0] = vq(self._features, centres)[0]
         return _renumber(clusters, parts)
 
 
-def _seeds(sample: Float64, n: int) -> Float64:
-    """At most ``n`` rows of ``sample``, each drawn with the square of its distance from those before (k-means++)."""
+def _draw_seeds(sample: Float64) -> Iterator[int]:
+    """Yield rows of ``sample``, each drawn with the square of its distance from those before (k-means++)."""
     draw = np.random.default_rng(SEED)
     squares = np.square(sample).sum(axis=1)
     seeds = [int(squares.argmax())]
     distance = np.full(len(sample), np.inf)
-    while len(seeds) < n:
+    while True:
+        yield seeds[-1]
         last = seeds[-1]
         distance = np.minimum(distance, np.maximum(squares + squares[last] - 2 * (sample @ sample[last]), 0))
         distance[seeds] = 0
         total = np.cumsum(distance)
         if not total[-1] > TINY * squares.sum():
-            break
+            return
         seeds.append(int(np.searchsorted(total, draw.random() * total[-1], side="right")))
-    return sample[seeds]
 
 
 def _renumber(clusters: Int32, parts: Int32) -> Fitted:
