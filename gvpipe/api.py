@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -213,16 +214,17 @@ def encode(
     elif target:
         choice = meet(target, given, sequence, clock)
     if choice:
-        chosen, bitstream = choice.trial.codec, choice.trial.bitstream
+        chosen, encoded = choice.trial.codec, choice.trial.encoded
     else:
         chosen = cast("Codec", given)
-        bitstream = encode_sequence(chosen, sequence, clock)
+        encoded = encode_sequence(chosen, sequence, clock)
+    bitstream = encoded.bitstream
     clock("write", 0.0)
     if not bitstream.video:
         bitstream = dataclasses.replace(bitstream, video=poster_of(sequence))
     x, y, z = sequence.origin.tolist()
     bitstream = dataclasses.replace(bitstream, origin=(x, y, z))
-    size = write_file(bitstream, path, choice.trials.check if choice else None)
+    size = write_file(bitstream, path, partial(choice.trials.check, encoded.permutation) if choice else None)
     clock("", 1.0)
     noticed += notes.rounded(sequence.rounding, frame_diagonal(sequence))
     return Report(

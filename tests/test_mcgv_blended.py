@@ -320,9 +320,9 @@ def test_versions_and_predictions_must_fit() -> None:
     sequence = waving(10, 12)
     published = read_file(GOLDEN / "mcgv-1-h264.mp4")
     assert published.version == 1 and "prediction" not in published.header and "weights" not in published.sections
-    affine = Mcgv(prediction="affine", clusters=3, quality=30).encode(sequence)
+    affine = Mcgv(prediction="affine", clusters=3, quality=30).encode(sequence).bitstream
     assert affine.version == 3 and affine.header["prediction"] == "affine" and "weights" not in affine.sections
-    chosen = Mcgv(prediction="blended", clusters=3).encode(sequence)
+    chosen = Mcgv(prediction="blended", clusters=3).encode(sequence).bitstream
     assert chosen.version == 3 and chosen.header["prediction"] == "blended" and "clusters" not in chosen.sections
     for wrong in (
         dataclasses.replace(published, version=2),
@@ -346,7 +346,7 @@ def test_blends_beat_the_published_prediction() -> None:
     sequence = waving(24, 60)
     sizes, errors = [], []
     for prediction in ("blended", "affine"):
-        stream = Mcgv(prediction=prediction, quality=60).encode(sequence)
+        stream = Mcgv(prediction=prediction, quality=60).encode(sequence).bitstream
         sizes.append(sum(map(len, stream.sections.values())) + len(stream.video))
         decoded = open_reader(stream).read(0, 60)
         errors.append(float(np.square(decoded - np.asarray(sequence.positions[:])).mean()))
@@ -394,7 +394,7 @@ def test_pieces_that_part_are_predicted_each_for_itself() -> None:
     drift = np.linspace(0, 3, 20)[:, None, None] * np.array([1.0, 0, 0.5])
     frames = np.concatenate([left - drift, points + drift], axis=1).astype(np.float32)
     sequence = MeshSequence(frames, np.concatenate([faces, faces + len(points)]).astype(np.int32), fps=25.0)
-    stream = Mcgv(prediction="blended", quality=60).encode(sequence)
+    stream = Mcgv(prediction="blended", quality=60).encode(sequence).bitstream
     extent = float(np.linalg.norm(np.ptp(frames[0], axis=0)))
     errors = np.linalg.norm(open_reader(stream).read(0, 20) - frames, axis=2) / extent
     assert errors.max() < 0.02 and "outliers" not in stream.sections

@@ -637,7 +637,7 @@ def test_hostile_headers() -> None:
 
 def test_hostile_codec_headers(sequence: MeshSequence) -> None:
     """A header that lies, with every checksum right: CorruptFile when it opens or when a frame is read, and no NaN ever."""
-    stream = Mcgv(preset="ultrafast", clusters=3, gop=4).encode(sequence)
+    stream = Mcgv(preset="ultrafast", clusters=3, gop=4).encode(sequence).bitstream
     wanted = open_reader(stream).read(0, 11)
     assert np.isfinite(wanted).all()
     for key, value in stream.header.items():
@@ -674,7 +674,7 @@ def test_any_float32_scale(sequence: MeshSequence, scale: float) -> None:
     """A model of any size that float32 holds comes back at the same relative error."""
     codec = Mcgv(preset="ultrafast", clusters=3, gop=4)
     scaled = MeshSequence((sequence.read(0, 11) * np.float64(scale)).astype(np.float32), sequence.faces)
-    back = open_reader(codec.encode(scaled)).read(0, 11)
+    back = open_reader(codec.encode(scaled).bitstream).read(0, 11)
     kg = measure_errors(sequence, lambda start, stop: (back[start:stop].astype(float) / scale).astype(np.float32)).kg
     assert kg is not None and 0.8 * error_of(75) < kg < 1.2 * error_of(75)
 
@@ -760,9 +760,9 @@ def test_lattices_too_fine_for_halves_are_corrupt() -> None:
 def test_b_frames_only_where_they_pay() -> None:
     """Nearly empty pictures go without: tables that tell their order would cost more than they save."""
     sequence = waving(16, 64)
-    coarse = Mcgv(prediction="blended", quality=40).encode(sequence).video
+    coarse = Mcgv(prediction="blended", quality=40).encode(sequence).bitstream.video
     assert b"ctts" not in coarse
     rng = np.random.default_rng(0)
     noisy = np.asarray(sequence.positions[:]) + rng.normal(0, 0.02, (64, sequence.n_vertices, 3))
-    fine = Mcgv(prediction="affine", quality=75).encode(MeshSequence(noisy.astype(np.float32), sequence.faces)).video
+    fine = Mcgv(prediction="affine", quality=75).encode(MeshSequence(noisy.astype(np.float32), sequence.faces)).bitstream.video
     assert b"ctts" in fine

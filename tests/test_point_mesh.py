@@ -75,7 +75,7 @@ def check_mesh(decoded: PointMesh) -> None:
 
 def check_round_trip(mesh: Mesh, reorder: bool) -> None:
     lattice, faces, points = mesh
-    coded = encode_points(lattice, faces, points, reorder)
+    coded = encode_points(lattice, faces, points, reorder)[0]
     decoded = decode_points(coded.mesh, coded.order)
     check_mesh(decoded)
     source = coded.permutation  # the given vertex of each decoded one
@@ -110,8 +110,8 @@ def test_a_soup_costs_little_more_than_the_surface_that_it_draws() -> None:
     """Less than a bit a corner."""
     places, faces = grid(30)
     lattice = np.rint(4000 * places).astype(np.int32)
-    whole = encode_points(lattice, faces, np.arange(len(places)), reorder=True)
-    soup = encode_points(lattice, np.arange(faces.size).reshape(-1, 3), faces.ravel(), reorder=True)
+    whole = encode_points(lattice, faces, np.arange(len(places)), reorder=True)[0]
+    soup = encode_points(lattice, np.arange(faces.size).reshape(-1, 3), faces.ravel(), reorder=True)[0]
     assert len(soup.mesh) < len(whole.mesh) + faces.size / 8
 
 
@@ -134,7 +134,7 @@ HOSTILE = ["one triangle", "triangle soup", "non-manifold", "unreferenced vertic
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_every_truncated_prefix_is_refused(name: str) -> None:
-    coded = encode_points(*MESHES[name], reorder=False)
+    coded = encode_points(*MESHES[name], reorder=False)[0]
     for cut in range(0, len(coded.mesh), 1 + len(coded.mesh) // 300):
         with pytest.raises(CorruptFile):
             decode_points(coded.mesh[:cut], b"")
@@ -148,7 +148,7 @@ def test_every_truncated_prefix_is_refused(name: str) -> None:
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_changed_bytes_do_no_harm(name: str) -> None:
-    coded = encode_points(*MESHES[name], reorder=False)
+    coded = encode_points(*MESHES[name], reorder=False)[0]
     draw = np.random.default_rng(0)
     refused = 0
     for _ in range(200):
@@ -163,7 +163,7 @@ def test_changed_bytes_do_no_harm(name: str) -> None:
 @given(st.binary(max_size=120), st.binary(max_size=60))
 def test_garbage_does_no_harm(data: bytes, order: bytes) -> None:
     decode_or_refuse(data, order)
-    base = encode_base(np.eye(3, dtype=np.int32), np.array([[0, 1, 2]]), reorder=True).mesh
+    base = encode_base(np.eye(3, dtype=np.int32), np.array([[0, 1, 2]]), reorder=True)[0].mesh
     decode_or_refuse(varint(len(base)) + base + data, order)
     counts = encode_integers(np.array([0, 2, 1]))
     decode_or_refuse(varint(len(base)) + base + varint(len(counts)) + counts + data, order)

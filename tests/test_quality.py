@@ -29,7 +29,7 @@ MADE = {
 
 def part_of_the_error(sequence: MeshSequence, codec: str, quality: float) -> float:
     """The Karni-Gotsman error of an encode, in that of its quality."""
-    bitstream = encode_sequence(codec_class(codec)(quality=quality, reorder=False), sequence)
+    bitstream = encode_sequence(codec_class(codec)(quality=quality, reorder=False), sequence).bitstream
     return 100 * root_mean_square(sequence, open_reader(bitstream)) / measure_spread(sequence) / error_of(quality)
 
 

@@ -1,4 +1,4 @@
-"""The plots in docs/codecs/pdct.md: rate and error of ``pdct`` against cluster count and kept coefficients.
+"""The plots in docs/experiments/pdct-rates.md: rate and error of ``pdct`` against cluster count and kept coefficients.
 
     python tools/plot_pdct.py chicken.npz [FRAMES]
 

@@ -23,12 +23,22 @@ MAX_COPIES = 7  # copies of a point that have contexts of their own
 
 @dataclass(frozen=True)
 class CodedCopies:
-    """The streams, and the given vertex ``permutation (V,)`` of each vertex that decoding returns."""
+    """The streams, and what decoding them returns.
+
+    Args:
+        counts, copies: streams.
+        order: stream, empty: decode in the codec's order.
+        permutation: ``(V,)`` the given vertex of each decoded one.
+        faces: ``(T, 3)`` decoded triangles.
+        points: ``(V,)`` the point of each decoded vertex.
+    """
 
     counts: bytes
     copies: bytes
-    order: bytes  # empty: decode in the codec's order
+    order: bytes
     permutation: Array
+    faces: Array
+    points: Array
 
 
 def encode_copies(faces: Array, points: Array, point_faces: Array, n_points: int, reorder: bool) -> CodedCopies:
@@ -48,11 +58,11 @@ def encode_copies(faces: Array, points: Array, point_faces: Array, n_points: int
     corners = np.take_along_axis(faces, turns, axis=1)[matched]  # vertices of the codec's triangles
     copies, counts, differences = _encode_corners(corners, point_faces, points, n_points)
     permutation = np.lexsort((copies, points))
-    if reorder:
-        return CodedCopies(counts, differences, b"", permutation)
     rank = np.argsort(permutation)
+    if reorder:
+        return CodedCopies(counts, differences, b"", permutation, rank[corners], points[permutation])
     order = encode_order(rank, _as_lattice(points[permutation]), rank[corners])
-    return CodedCopies(counts, differences, order, np.arange(len(points)))
+    return CodedCopies(counts, differences, order, np.arange(len(points)), corners, points)
 
 
 def decode_copies(counts: bytes, copies: bytes, order: bytes, point_faces: Array, n_points: int) -> tuple[Array, Array]:

@@ -51,18 +51,20 @@ class PointMesh:
         return adjacency(self.point_faces, len(self.lattice))
 
 
-def encode_points(lattice: Array, faces: Array, points: Array, reorder: bool) -> EncodedMesh:
+def encode_points(lattice: Array, faces: Array, points: Array, reorder: bool) -> tuple[EncodedMesh, PointMesh]:
     """Code a mesh of ``points (V,)``, 0..P-1, at ``lattice (P, 3)`` with triangles ``faces (T, 3)`` over V vertices.
 
-    ``reorder`` lets the decoder see the codec's vertex order. Triangles may come back in another order, and rotated.
+    Returns the streams, and the mesh as decoding returns it. ``reorder`` lets the decoder see the codec's vertex order.
+    Triangles may come back in another order, and rotated.
     """
     faces, points = faces.astype(np.int64), points.astype(np.int64)
-    base = encode_base(lattice, points[faces], reorder=True)
-    place = np.argsort(base.permutation)
-    point_faces = smallest_first(decode_base(base.mesh, b"").faces.astype(np.int64))
+    streams, base = encode_base(lattice, points[faces], reorder=True)
+    place = np.argsort(streams.permutation)
+    point_faces = smallest_first(base.faces.astype(np.int64))
     coded = encode_copies(faces, place[points], point_faces, len(lattice), reorder)
-    mesh = varint(len(base.mesh)) + base.mesh + varint(len(coded.counts)) + coded.counts + coded.copies
-    return EncodedMesh(mesh, coded.order, coded.permutation)
+    mesh = varint(len(streams.mesh)) + streams.mesh + varint(len(coded.counts)) + coded.counts + coded.copies
+    decoded = PointMesh(coded.faces.astype(np.int32), coded.points, base.points, point_faces.astype(np.int32))
+    return EncodedMesh(mesh, coded.order, coded.permutation), decoded
 
 
 def decode_points(mesh: bytes, order: bytes) -> PointMesh:

@@ -46,9 +46,9 @@ from gvcodecs.mcgv.trajectory_header import TRANSFORMS
 from gvcodecs.mcgv.trajectory_reader import TrajectoryReader
 from gvpipe.arrays import Bool, Float32, Float64, Int32, Int64, Integers
 from gvpipe.blas import one_blas_thread
-from gvpipe.codec import FrameReader, Memo, Progress, Settings
+from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.connectivity.base_mesh import EncodedMesh
-from gvpipe.connectivity.welded_mesh import decode_points, encode_points
+from gvpipe.connectivity.welded_mesh import encode_points
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, cut
 from gvpipe.errors import SettingError
@@ -65,7 +65,7 @@ BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
 AFFINE_CLUSTERS, AFFINE_BASE_BITS = 20, 12  # the paper's
 MOST_SEGMENTS = 4000  # one section each, of the 4096 that a bitstream may have
 BASE_BITS = 8, 16  # bits along a base frame's longest side that are chosen unasked, about
-BASE_STEP = 1.3  # of a base frame, times step / sqrt(frames): measured, docs/codecs/mcgv.md
+BASE_STEP = 1.3  # of a base frame, times step / sqrt(frames): measured, docs/decisions/0084-mcgv-base-lattice.md
 FINER = 2**0.25  # times, a lattice that does not
 DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell apart; the others give way
 GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
@@ -84,7 +84,7 @@ PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "sl
 
 
 @dataclass(frozen=True)
-class Mcgv(Settings):
+class Mcgv(BaseCodec):
     """Settings of the multi-chart geometry video codec.
 
     Raises:
@@ -138,14 +138,7 @@ class Mcgv(Settings):
         self._plane_size()
 
     @one_blas_thread
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
-        """Code a sequence.
-
-        Raises:
-            InputError: a frame cannot be read, or the charts do not fit the size given.
-        """
-        report = progress or (lambda stage, done: None)
-        memo = memo or Memo()
+    def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         wanted = error_of(self.quality) / 100 * memo("spread", lambda: measure_spread(sequence))
         anchors = memo("anchors", list[_Anchor])
         if anchors:  # what was measured at another quality serves this one
@@ -156,7 +149,7 @@ class Mcgv(Settings):
                 return self._code(sequence, anchor.start, step, anchor.fitted, memo, report)
         aimed, anchor = self._aim(sequence, wanted, memo, report)
         anchors.append(anchor)
-        return aimed.bitstream
+        return aimed.encoded
 
     def _aim(self, sequence: MeshSequence, wanted: float, memo: Memo, report: Progress) -> tuple[Aimed, _Anchor]:
         """Code with the step that leaves about the root mean square error wanted, model units."""
@@ -167,10 +160,10 @@ class Mcgv(Settings):
 
         @functools.cache
         def attempt(step: float) -> Aimed:
-            bitstream = self._code(sequence, start, step, fitted, memo, report)
+            encoded = self._code(sequence, start, step, fitted, memo, report)
             report("measure", 0)
             own = sequence.reordered(start.coded.permutation, start.faces)
-            return Aimed(bitstream, step, root_mean_square(own, self.reader(bitstream)))
+            return Aimed(encoded, step, root_mean_square(own, self.reader(encoded.bitstream)))
 
         first = attempt(step)
         if fitted and not FAR[0] <= first.error / wanted <= FAR[1]:  # another step wants another blend, and another base
@@ -180,7 +173,6 @@ class Mcgv(Settings):
             fitted, step = self._fit(start, 0.0, memo, report)
             if _worth(first) < _worth(attempt(step)):
                 start, fitted, step = kept
-                memo.permutation = start.coded.permutation
         low, high = BAND[self.prediction]
         if sequence.n_frames * sequence.n_vertices > LARGE:
             low = min(low, FINE)
@@ -189,13 +181,13 @@ class Mcgv(Settings):
 
     def _code(
         self, sequence: MeshSequence, start: _Start, step: float, fitted: Fitted | None, memo: Memo, report: Progress
-    ) -> Bitstream:
+    ) -> Encoded:
         """Code with a step, model units, and a blend, or as published."""
         start = dataclasses.replace(start, step=step)
         coded = self._blended(start, fitted, memo, report) if fitted else self._affine(start, memo, report)
-        return self._bitstream(sequence, start, coded)
+        return Encoded(self._finish(sequence, start, coded), start.coded.permutation)
 
-    def _bitstream(self, sequence: MeshSequence, start: _Start, coded: _Coded) -> Bitstream:
+    def _finish(self, sequence: MeshSequence, start: _Start, coded: _Coded) -> Bitstream:
         header = Header(
             prediction=self.prediction,
             placement=start.placement,
@@ -210,17 +202,8 @@ class Mcgv(Settings):
         placed = {STILL: start.still} if start.still else {}
         if start.placement == "charts":
             placed["pixels"] = encode_pixels(coded.layout)
-        return Bitstream(
-            codec=self.id,
-            version=self.version,
-            n_frames=sequence.n_frames,
-            n_vertices=sequence.n_vertices,
-            n_triangles=len(sequence.faces),
-            fps=float(sequence.fps),
-            header=header.to_json(),
-            sections={"mesh": start.coded.mesh, "order": start.coded.order, **placed, **coded.sections},
-            video=coded.video,
-        )
+        sections = {"mesh": start.coded.mesh, "order": start.coded.order, **placed, **coded.sections}
+        return self._bitstream(sequence, header.to_json(), sections, coded.video)
 
     @classmethod
     def reader(cls, bitstream: Bitstream) -> FrameReader:
@@ -237,9 +220,8 @@ class Mcgv(Settings):
         members = np.unique(points, return_index=True)[1]
         lattice = self._lattice(first[members], min(BASE_STEP * step / math.sqrt(given.n_frames), wanted))
         name = f"base {lattice.step} {len(members)}"
-        coded = memo(name, lambda: encode_points(self._base_points(lattice, first[members]), given.faces, points, self.reorder))
-        memo.permutation = coded.permutation
-        mesh = decode_points(coded.mesh, coded.order)
+        at = self._base_points(lattice, first[members])
+        coded, mesh = memo(name, lambda: encode_points(at, given.faces, points, self.reorder))
         sources = coded.permutation[mesh.members]  # the given vertex of each point
         moves = np.flatnonzero(~still[sources])
         if not len(moves):  # one point at least has samples
@@ -383,7 +365,7 @@ class Mcgv(Settings):
         return PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
 
     def _chosen_placement(self, n_points: int) -> str:
-        """JPEG, which sees no other frame, codes the smoother images of charts for less; see docs/codecs/mcgv.md."""
+        """JPEG, which sees no other frame, codes the smoother images of charts for less (docs/decisions/0091-mcgv-jpeg.md)."""
         if self.placement != AUTO:
             return self.placement
         if self.prediction != "blended" or self.image != "h264":
@@ -467,7 +449,7 @@ class _Coded:
 
 def _worth(aimed: Aimed) -> float:
     """Bytes, at about equal error: with one blend, they go with the error to the power of about -0.2."""
-    bitstream = aimed.bitstream
+    bitstream = aimed.encoded.bitstream
     return (sum(map(len, bitstream.sections.values())) + len(bitstream.video)) * math.pow(aimed.error, 0.2)
 
 
