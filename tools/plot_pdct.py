@@ -45,7 +45,7 @@ def main() -> None:
 
 def measure(sequence: MeshSequence, settings: Pdct) -> tuple[float, float]:
     """Bits per vertex and frame of all sections, and da."""
-    bitstream = settings.encode(sequence)
+    bitstream = settings.encode(sequence).bitstream
     reader = Pdct.reader(bitstream)
     decoded = MeshSequence(reader.read(0, sequence.n_frames), reader.faces, sequence.fps)
     bits = 8 * sum(map(len, bitstream.sections.values()))
