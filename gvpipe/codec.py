@@ -212,8 +212,7 @@ def encode_sequence(
     Raises:
         InputError: what the codec raises.
     """
-    memo = memo or Memo()
-    holds = memo("holds", lambda: find_holds(sequence)) if _is_held(codec) else None
+    holds = (memo or Memo())("holds", lambda: find_holds(sequence)) if _is_held(codec) else None
     if holds is None:
         return codec.encode(sequence, progress, memo)
     return add_holds(codec.encode(holds.distinct(sequence), progress, memo), holds, codec.version)
