@@ -329,9 +329,12 @@ class Mcgv(Settings):
         members = np.unique(points, return_index=True)[1]
         lattice = self._lattice(first[members], min(_base_step(step, given.n_frames), wanted))
         name = f"base {lattice.step} {len(members)}"
-        coded = memo(name, lambda: encode_points(self._base_points(lattice, first[members]), given.faces, points, self.reorder))
+        coded = memo(
+            name,
+            lambda: encode_points(self._base_points(lattice, first[members]), given.faces, points, self.reorder, across=True),
+        )
         memo.permutation = coded.permutation
-        mesh = decode_points(coded.mesh, coded.order)
+        mesh = decode_points(coded.mesh, coded.order, across=True)
         sources = coded.permutation[mesh.members]  # the given vertex of each point
         moves = np.flatnonzero(~still[sources])
         if not len(moves):  # one point at least has samples
