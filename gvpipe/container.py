@@ -181,7 +181,7 @@ def _remux(video: bytes, tag: str) -> bytes:
     """Copy the video's one track, unchanged, into a file that carries the tag and whose index comes first.
 
     In memory, where the video is already: a file that PyAV writes itself stays open, and its disk space taken, if the
-    last write to it fails. What no player needs is left out: bit rates, the handler's name, and the edit list where every picture
+    last write to it fails. What no player needs is left out: bit rates, the handler's name, the edit list where each picture
     is shown in the order of coding.
     """
     import av

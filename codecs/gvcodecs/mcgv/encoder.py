@@ -79,8 +79,10 @@ MOST_TILED = (
 )  # points: beyond, xatlas takes longer than all else, and labels of charts are a tenth of a smooth mesh's file
 PART = 250  # points of a part by motion that charts refine: xatlas takes more than ten times as long per point for all at once
 SPARED = 0.02  # part of the bytes that pictures must take for an encode without them to be tried
-MOST_LEFT = 1.1  # times the error wanted, that a blend alone may leave at first
-REBASED = 1.25  # times the lattice step of a base frame, another one is tried
+FINER_THAN = 0.95  # part of the error wanted that a blend alone is to leave at the second attempt
+COARSEST = 1.0, 1.3  # times the error wanted, lattice steps of base frames without pictures
+LARGE_BASE = 0.25  # part of the bytes that a base frame must take for the second of them to be tried
+REBASED = 1.2  # times the lattice step of a base frame, another one is tried
 MORE_ROUNDS = 5  # encodes without pictures at most: they take little time
 POSTER = 1200  # bytes that stand in place of pictures, about
 FINE_PART, FINE_COST = 1 / 4, 1.1  # of the error wanted, and times the bytes: files without pictures that get there take it
@@ -197,7 +199,7 @@ class Mcgv(Settings):
             low = min(low, FINE)
         if self._are_pictures_dear(attempt, step, wanted):
             aimed = mend(lambda step: attempt(step, False), step, wanted, (low, high), SLOPE, rounds=MORE_ROUNDS)
-            if aimed.error <= wanted:
+            if aimed.error <= wanted and _worth(aimed) < _worth(attempt(step)):
                 start = dataclasses.replace(start, step=aimed.step, pictures=False)
                 return self._rebased(sequence, aimed, _Anchor(start, fitted, aimed.error, aimed.slope), wanted, memo, report)
         aimed = mend(attempt, step, wanted, (low, high), SLOPE)
@@ -213,21 +215,25 @@ class Mcgv(Settings):
         without = attempt(step, False)
         if _worth(without) > _worth(whole):
             return False
-        if without.error > MOST_LEFT * wanted:
-            without = attempt(step * (wanted / without.error) ** (1 / SLOPE), False)
-        return without.error <= MOST_LEFT * wanted
+        if without.error > wanted:
+            without = attempt(step * (FINER_THAN * wanted / without.error) ** (1 / SLOPE), False)
+        return without.error <= wanted
 
     def _rebased(
         self, sequence: MeshSequence, aimed: Aimed, anchor: _Anchor, wanted: float, memo: Memo, report: Progress
     ) -> tuple[Aimed, _Anchor]:
-        """The same blend and error without pictures, or with the base frame of the step that came out if that is smaller."""
-        if anchor.start.lattice.step * REBASED > min(_base_step(aimed.step, sequence.n_frames), wanted):
-            return aimed, anchor
-        start, fitted = self._restart(sequence, anchor, aimed.step, wanted, memo, report)
-        attempt = functools.partial(self._attempt, sequence, start, fitted=fitted, memo=memo, report=report)
-        other = mend(attempt, aimed.step, wanted, BAND[self.prediction], SLOPE, rounds=MORE_ROUNDS)
-        if other.error <= wanted and _count_bytes(other.bitstream) < _count_bytes(aimed.bitstream):
-            return other, _Anchor(dataclasses.replace(start, step=other.step), fitted, other.error, other.slope)
+        """The same blend and error without pictures, on the base frame that makes the file smallest: coarser ones are tried."""
+        n_bytes = _count_bytes(aimed.bitstream)
+        for coarsest in COARSEST if len(aimed.bitstream.sections["mesh"]) > LARGE_BASE * n_bytes else COARSEST[:1]:
+            lattice_step = min(_base_step(aimed.step, sequence.n_frames), coarsest * wanted)
+            if lattice_step < REBASED * anchor.start.lattice.step:
+                continue
+            start, fitted = self._restart(sequence, anchor, aimed.step, coarsest * wanted, memo, report)
+            attempt = functools.partial(self._attempt, sequence, start, fitted=fitted, memo=memo, report=report)
+            other = mend(attempt, aimed.step, wanted, BAND[self.prediction], SLOPE, rounds=MORE_ROUNDS)
+            if other.error <= wanted and _count_bytes(other.bitstream) < _count_bytes(aimed.bitstream):
+                aimed = other
+                anchor = _Anchor(dataclasses.replace(start, step=other.step), fitted, other.error, other.slope)
         memo.permutation = anchor.start.coded.permutation
         return aimed, anchor
 
