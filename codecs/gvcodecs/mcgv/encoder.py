@@ -69,6 +69,7 @@ BASE_STEP = 1.3  # of a base frame, times step / sqrt(frames): measured, docs/co
 FINER = 2**0.25  # times, a lattice that does not
 DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell apart; the others give way
 GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
+NARROW = 0.935, 0.955  # part of the error wanted, where a target is sought without pictures
 BAND = {"blended": (0.9, 0.99), "affine": (1.0, 1.1)}  # of the error wanted: the published mode is no finer than asked
 LARGE, FINE = 1_000_000, 0.81  # vertices of all frames, from which on another encode is not made for an error so fine
 FAR = 0.75, 1.4  # of the error wanted: what a blend is kept for
@@ -166,6 +167,11 @@ class Mcgv(Settings):
             away = math.log(wanted) - math.log(anchor.error)
             if not anchor.fitted or abs(away) < REUSED:
                 step = anchor.start.step * math.exp(min(max(away / anchor.slope, -FARTHEST), FARTHEST))
+                if not anchor.start.pictures:  # cheap, and the error of base and blend makes it follow the step less
+                    attempt = functools.partial(
+                        self._attempt, sequence, anchor.start, fitted=anchor.fitted, memo=memo, report=report
+                    )
+                    return mend(attempt, step, wanted, NARROW, anchor.slope, rounds=MORE_ROUNDS).bitstream
                 return self._code(sequence, anchor.start, step, anchor.fitted, memo, report)
         aimed, anchor = self._aim(sequence, wanted, memo, report)
         anchors.append(anchor)
