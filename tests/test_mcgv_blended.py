@@ -321,9 +321,9 @@ def test_versions_and_predictions_must_fit() -> None:
     published = read_file(GOLDEN / "mcgv-1-h264.mp4")
     assert published.version == 1 and "prediction" not in published.header and "weights" not in published.sections
     affine = Mcgv(prediction="affine", clusters=3, quality=30).encode(sequence).bitstream
-    assert affine.version == 3 and affine.header["prediction"] == "affine" and "weights" not in affine.sections
+    assert affine.version == 4 and affine.header["prediction"] == "affine" and "weights" not in affine.sections
     chosen = Mcgv(prediction="blended", clusters=3).encode(sequence).bitstream
-    assert chosen.version == 3 and chosen.header["prediction"] == "blended" and "clusters" not in chosen.sections
+    assert chosen.version == 4 and chosen.header["prediction"] == "blended" and "clusters" not in chosen.sections
     for wrong in (
         dataclasses.replace(published, version=2),
         dataclasses.replace(chosen, header={**chosen.header, "prediction": ["blended"]}),
@@ -338,7 +338,7 @@ def test_versions_and_predictions_must_fit() -> None:
         with pytest.raises(FormatError):
             open_reader(wrong).read(0, 1)
     with pytest.raises(NewerVersion):
-        open_reader(dataclasses.replace(chosen, version=4))
+        open_reader(dataclasses.replace(chosen, version=5))
 
 
 def test_blends_beat_the_published_prediction() -> None:

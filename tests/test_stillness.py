@@ -32,9 +32,9 @@ PLAIN: list[tuple[str, dict[str, object]]] = [
     ("pdct", {"clusters": 3, "segment": 7}),
 ]
 PICTURES: list[tuple[str, dict[str, object]]] = [
-    ("mcgv", {}),
-    ("mcgv", {"image": "jpeg"}),
-    ("mcgv", {"profile": "precise"}),
+    ("mcgv", {"placement": "tiles"}),
+    ("mcgv", {"placement": "charts", "image": "jpeg"}),
+    ("mcgv", {"placement": "tiles", "profile": "precise"}),
     ("mcgv", {"prediction": "affine"}),
     ("mcgv", {"prediction": "blended", "transform": "klt"}),
 ]
