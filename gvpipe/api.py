@@ -300,29 +300,27 @@ def render(
         InputError: a value that cannot be, a sequence without triangles, a reference that does not fit.
         OutputError: the file cannot be written; no part of it is left.
     """
-    from gvpipe.rendering.films import check_output, write_pictures
+    from gvpipe.rendering.films import PictureOptions, check_output, write_pictures
 
     target = Path(path)
     pixels = (size, size) if isinstance(size, int) else size
-    check_output(target, pixels, turntable, error_max)
-    for given in (source, error_of):
-        if given is not None and _is_among(path, given):
-            raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
-    write_pictures(
-        source if isinstance(source, MeshSequence) else read(source),
-        target,
+    options = PictureOptions(
         frame=frame,
         size=pixels,
         view=view,
         up=up,
         turntable=turntable,
         follow=follow,
-        reference=error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of),
         error_max=error_max,
         shading=shading,
         camera=camera,
-        progress=progress,
     )
+    check_output(target, options)
+    for given in (source, error_of):
+        if given is not None and _is_among(path, given):
+            raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
+    reference = error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of)
+    write_pictures(source if isinstance(source, MeshSequence) else read(source), target, options, reference, progress)
 
 
 def info(path: StrPath) -> Info:
