@@ -114,6 +114,7 @@ class Codec(Protocol):
     id: ClassVar[str]
     version: ClassVar[int]
     summary: ClassVar[str]
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
     @property
     def quality(self) -> float:

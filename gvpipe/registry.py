@@ -69,6 +69,18 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
     return reader if holds is None else RepeatedFramesReader(reader, holds)
 
 
+def browser_obstacle(bitstream: Bitstream) -> str:
+    """Return what keeps browsers from playing a bitstream, in a few words; ``""`` if they play it.
+
+    Codecs whose files they play answer by a class method of this name; files of all others need a conversion.
+
+    Raises:
+        SettingError: no codec of that id is installed.
+    """
+    ask = getattr(codec_class(bitstream.codec), "browser_obstacle", None)
+    return str(ask(bitstream)) if ask else bitstream.codec
+
+
 def encode_sequence(
     codec: Codec, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None
 ) -> Encoded:

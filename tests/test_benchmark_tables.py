@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from gvpipe.benchmark.bd_rate import rate_at
-from gvpipe.benchmark.sweep import Report
+from gvpipe.benchmark.report import BenchReport
 
 ROOT = Path(__file__).parents[1]
 TOOL: dict[str, Any] = runpy.run_path(str(ROOT / "tools" / "benchmark_tables.py"))
@@ -29,7 +29,7 @@ def test_every_table_stands_on_a_page() -> None:
 
 @pytest.mark.parametrize("path", RESULTS, ids=lambda path: path.stem)
 def test_results_are_reports_of_bench(path: Path) -> None:
-    report = Report.read(path)
+    report = BenchReport.read(path)
     names = [(curve.sequence, curve.codec) for curve in report.curves]
     assert len(set(names)) == len(names)
     for curve in report.curves:

@@ -4,7 +4,7 @@
     python tools/benchmark_tables.py points FILE.json   # every point of one file, to standard output
 
 A table stands between ``<!-- table: NAME -->`` and ``<!-- end -->``, NAME one of `TABLES`. Results have the shape that
-`gvpipe bench --json` writes (`gvpipe.benchmark.sweep.Report`). A file may add to it: ``rates`` and
+`gvpipe bench --json` writes (`gvpipe.benchmark.report.BenchReport`). A file may add to it: ``rates`` and
 ``kg_differences``, ``sted_differences`` where its points are rounded, ``targets`` (encodes to a given error), ``vdmc`` (the
 rates of another codec). What is null was not recorded.
 """
@@ -19,8 +19,9 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from gvpipe.benchmark.bd_rate import average_rate_difference, rate_at, tables
-from gvpipe.benchmark.sweep import Report
+from gvpipe.benchmark.bd_rate import average_rate_difference, rate_at
+from gvpipe.benchmark.report import BenchReport
+from gvpipe.benchmark.tables import tables
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = (DOCS / "benchmarks.md", DOCS / "codecs" / "mcgv.md", DOCS / "experiments" / "benchmark-curves-version-2.md")
@@ -156,7 +157,7 @@ def fill(page: str) -> str:
 def main(arguments: list[str]) -> None:
     """Write the tables, or print the points of a file."""
     if arguments[:1] == ["points"]:
-        print(tables(Report.read(arguments[1]).curves))
+        print(tables(BenchReport.read(arguments[1]).curves))
         return
     for page in PAGES:
         page.write_text(fill(page.read_text("utf-8")), "utf-8")

@@ -24,6 +24,7 @@ import numpy as np
 from gvcodecs.mcgv.base.distinct_positions import keep_apart
 from gvcodecs.mcgv.base.surface import STILL
 from gvcodecs.mcgv.base.welded_points import Points
+from gvcodecs.mcgv.browser import browser_obstacle
 from gvcodecs.mcgv.header import MAX_CLUSTERS, PLACEMENTS, PREDICTIONS, Header
 from gvcodecs.mcgv.layout.chart_coding import SECTION as CHARTS
 from gvcodecs.mcgv.layout.chart_coding import encode_charts, number_charts
@@ -307,6 +308,11 @@ class Mcgv(BaseCodec):
         """Open an ``mcgv`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         header = Header.of(bitstream)
         return TrajectoryReader(bitstream, header, header.images) if header.images else McgvReader(bitstream)
+
+    @classmethod
+    def browser_obstacle(cls, bitstream: Bitstream) -> str:
+        """What keeps browsers from playing a bitstream of this codec; ``""`` if they play it."""
+        return browser_obstacle(bitstream)
 
     def _start(
         self, given: MeshSequence, step: float, wanted: float, memo: Memo, report: Progress, points: Int64 | None = None
