@@ -5,17 +5,18 @@ from __future__ import annotations
 import dataclasses
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gvpipe import notes
 from gvpipe.arguments import StrPath, check_path, show
-from gvpipe.codec import Codec, Progress
+from gvpipe.codec import Codec, Encoded, Progress
+from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import bytes_by_part, write_file
 from gvpipe.errors import InputError, OutputError, SettingError
 from gvpipe.io import read as read_sequence
@@ -25,6 +26,7 @@ from gvpipe.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
 from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
 from gvpipe.rate_control.search import Target, meet, parse_bound
+from gvpipe.rate_control.trials import Trial
 from gvpipe.registry import encode_sequence, make_codec
 from gvpipe.rendering.poster import poster_of
 from gvpipe.sequence import MeshSequence
@@ -32,8 +34,6 @@ from gvpipe.sequence import MeshSequence
 VIDEO_SUFFIXES = (".mp4", ".m4v")
 
 if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
     from gvpipe.rasterizer.camera import Camera
 
 Source = StrPath | Sequence[StrPath]
@@ -45,10 +45,14 @@ KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose")  
 class Report:
     """What an encode did.
 
-    ``seconds`` holds the whole as ``encode``, then each stage; ``not_carried`` names the attributes of the sequence that the
-    file does not hold; ``notes`` what a user should know, those attributes among it, a line each; ``sections`` are as in
-    `Info`. Where a target was given, or codec ``auto``, ``tried`` holds every encode that was measured
-    (`gvpipe.rate_control.trials.Trial`), and ``reason`` why the one in the file was chosen.
+    Args:
+        bpvf: bits per vertex and frame of the whole file.
+        seconds: the whole as ``encode``, then each stage.
+        not_carried: attributes of the sequence that the file does not hold.
+        sections: as in `Info`.
+        tried: where a target was given, or codec ``auto``: every encode that was measured (`gvpipe.rate_control.trials.Trial`).
+        reason: why the encode in the file was chosen among those.
+        notes: what a user should know, a line each.
     """
 
     codec: str
@@ -73,8 +77,16 @@ class Report:
 
 @dataclass(frozen=True)
 class Info:
-    """What a geometry video is: ``bounding_box`` is frame 0's corners, model units, relative to ``origin``; ``sections`` the
-    bytes of every part of the file, which add up to ``bytes``; ``levels`` the vertex counts of its levels of detail."""
+    """What a geometry video is.
+
+    Args:
+        bounding_box: frame 0's corners, model units, relative to ``origin``.
+        bpvf: bits per vertex and frame of the whole file.
+        sections: bytes of every part of the file, which add up to ``bytes``.
+        levels: vertex counts of the levels of detail, the mesh itself first.
+        settings: the bitstream's header.
+        origin: to add to positions, model units.
+    """
 
     codec: str
     version: int
@@ -97,9 +109,10 @@ class Info:
 
 @dataclass
 class _StageClock:
-    """Passes progress on and adds up the seconds of each stage."""
+    """Passes progress on and adds up the seconds of each stage, from ``started`` on."""
 
     progress: Progress | None
+    started: float = field(default_factory=time.perf_counter)
     seconds: dict[str, float] = field(default_factory=dict)
     _stage: str = ""
     _since: float = 0.0
@@ -130,8 +143,7 @@ def read(path: Source, fps: float | None = None) -> MeshSequence:
         if len(path) != 1:
             return read_sequence(path, fps)
         path = path[0]
-    check_path(path, "what gvpipe.read is given", "a list of frame files or ")
-    one = cast("StrPath", path)
+    one = check_path(path, "what gvpipe.read is given", "a list of frame files or ")
     if Path(one).suffix.lower() not in VIDEO_SUFFIXES:
         return read_sequence(one, fps)
     sequence = Player(one).sequence()
@@ -190,58 +202,32 @@ def encode(
         OutputError: the file cannot be written; no part of it is left.
         TypeError: an argument of a type that is none of these.
     """
-    check_path(path, "gvpipe.encode's path")
-    _check_target(Path(path))
-    if not isinstance(source, MeshSequence | list | tuple):
-        check_path(source, "gvpipe.encode's source", "a MeshSequence or ")
-    if _is_among(path, source):
-        raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
-    wanted = _one_of({"rmse": target_rmse, "kg": target_kg, "bpvf": target_bpvf, "max": max_error})
+    _check_output(path)
+    targets = {"target_rmse": target_rmse, "target_kg": target_kg, "target_bpvf": target_bpvf, "max_error": max_error}
+    if sum(value is not None for value in targets.values()) > 1:
+        raise SettingError(f"more than one target is given; choose one of {', '.join(targets)}")
     given = _candidates(codec, settings, purpose)
-    started = time.perf_counter()
-    sequence = source if isinstance(source, MeshSequence) else read(source, fps)
-    if fps is not None:
-        sequence = sequence.with_fps(fps)
-    noticed = list(sequence.notes)
     clock = _StageClock(progress)
-    target = wanted and Target(wanted[0], parse_bound(wanted[1], sequence) if wanted[0] == "max" else cast("float", wanted[1]))
-    if target and target.measure == "max":
-        noticed += notes.loose_bound(target.value, frame_diagonal(sequence))
-    not_carried = sorted(sequence.attributes)
-    choice = None
-    if not isinstance(given, Codec):
-        choice = choose_codec(given, sequence, target or default_target(given), clock)
-    elif target:
-        choice = meet(target, given, sequence, clock)
-    if choice:
-        chosen, encoded = choice.trial.codec, choice.trial.encoded
-    else:
-        chosen = cast("Codec", given)
-        encoded = encode_sequence(chosen, sequence, clock)
-    bitstream = encoded.bitstream
-    clock("write", 0.0)
-    if not bitstream.video:
-        bitstream = dataclasses.replace(bitstream, video=poster_of(sequence))
-    x, y, z = sequence.origin.tolist()
-    bitstream = dataclasses.replace(bitstream, origin=(x, y, z))
-    size = write_file(bitstream, path, partial(choice.trials.check, encoded.permutation) if choice else None)
+    sequence = _open_source(source, path, fps)
+    target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
+    coded = _code(sequence, given, target, clock)
+    size, bitstream = _write(sequence, coded, path, clock)
     clock("", 1.0)
-    noticed += notes.rounded(sequence.rounding, frame_diagonal(sequence))
     return Report(
-        codec=chosen.id,
-        settings=dataclasses.asdict(cast("DataclassInstance", chosen)),
+        codec=coded.codec.id,
+        settings=dataclasses.asdict(coded.codec),
         vertices=bitstream.n_vertices,
         triangles=bitstream.n_triangles,
         frames=bitstream.n_frames,
         fps=bitstream.fps,
         bytes=size,
         bpvf=8 * size / (bitstream.n_vertices * bitstream.n_frames),
-        seconds={"encode": time.perf_counter() - started, **clock.seconds},
-        not_carried=not_carried,
+        seconds={"encode": time.perf_counter() - clock.started, **clock.seconds},
+        not_carried=sorted(sequence.attributes),
         sections=bytes_by_part(bitstream, size),
-        tried=[trial.to_json() for trial in choice.tried] if choice else [],
-        reason=choice.reason if choice else "",
-        notes=[*noticed, *notes.not_carried(not_carried)],
+        tried=[trial.to_json() for trial in coded.tried],
+        reason=coded.reason,
+        notes=_notes(sequence, target),
     )
 
 
@@ -302,33 +288,31 @@ def render(
         InputError: a value that cannot be, a sequence without triangles, a reference that does not fit.
         OutputError: the file cannot be written; no part of it is left.
     """
-    from gvpipe.rendering.films import check_output, write_pictures
+    from gvpipe.rendering.films import PictureOptions, check_output, write_pictures
 
     target = Path(path)
     pixels = (size, size) if isinstance(size, int) else size
-    check_output(target, pixels, turntable, error_max)
-    for given in (source, error_of):
-        if given is not None and _is_among(path, given):
-            raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
-    write_pictures(
-        source if isinstance(source, MeshSequence) else read(source),
-        target,
+    options = PictureOptions(
         frame=frame,
         size=pixels,
         view=view,
         up=up,
         turntable=turntable,
         follow=follow,
-        reference=error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of),
         error_max=error_max,
         shading=shading,
         camera=camera,
-        progress=progress,
     )
+    check_output(target, options)
+    for given in (source, error_of):
+        if given is not None and _is_among(path, given):
+            raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
+    reference = error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of)
+    write_pictures(source if isinstance(source, MeshSequence) else read(source), target, options, reference, progress)
 
 
 def info(path: StrPath) -> Info:
-    """Tell what a geometry video is and where its bytes go.
+    """Return what a geometry video is and where its bytes go.
 
     Raises:
         InputError: no such file.
@@ -363,14 +347,6 @@ def frame_range(player: Player, start: int, stop: int | None) -> tuple[int, int]
     return start, stop
 
 
-def _one_of(targets: dict[str, float | str | None]) -> tuple[str, float | str] | None:
-    """The measure and value of the one target that is given."""
-    given = [(measure, value) for measure, value in targets.items() if value is not None]
-    if len(given) > 1:
-        raise SettingError("more than one target is given; choose one of target_rmse, target_kg, target_bpvf and max_error")
-    return given[0] if given else None
-
-
 def _candidates(
     codec: str | Codec | Sequence[Codec] | None, settings: dict[str, Any], purpose: str | None
 ) -> Codec | Sequence[Codec]:
@@ -379,28 +355,97 @@ def _candidates(
         return candidates(
             codec, purpose, lambda name, own: make_codec(name, {**own, **settings}, KEYWORDS), frozenset(settings)
         )
-    given = codec if isinstance(codec, list | tuple) else [codec]
-    if not given or not all(isinstance(one, Codec) and not isinstance(one, type) for one in given):
+    given = [codec] if isinstance(codec, Codec) else codec
+    if not (isinstance(given, list | tuple) and given) or not all(_is_settings(one) for one in given):
         raise TypeError(f"codec is {show(codec)}; an id such as 'mcgv', a settings object or a list of those is needed")
     check_purpose(purpose)
     for one in given:
-        check_serves(cast("Codec", one), purpose)
+        check_serves(one, purpose)
     if settings:
         names = ", ".join(settings)
         raise SettingError(f"{names} beside a settings object; set it there, or give the codec's id and settings by name")
     return codec
 
 
+def _is_settings(value: object) -> bool:
+    return isinstance(value, Codec) and not isinstance(value, type)
+
+
+def _open_source(source: MeshSequence | Source, path: StrPath, fps: float | None) -> MeshSequence:
+    """The sequence to encode, which must not be the file to write."""
+    if isinstance(source, MeshSequence):
+        return source if fps is None else source.with_fps(fps)
+    if not isinstance(source, list | tuple):
+        check_path(source, "gvpipe.encode's source", "a MeshSequence or ")
+    if _is_among(path, source):
+        raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
+    return read(source, fps)
+
+
+def _target(
+    sequence: MeshSequence, rmse: float | None, kg: float | None, bpvf: float | None, bound: float | str | None
+) -> Target | None:
+    """The one target that is given."""
+    for measure, value in (("rmse", rmse), ("kg", kg), ("bpvf", bpvf)):
+        if value is not None:
+            return Target(measure, value)
+    return None if bound is None else Target("max", parse_bound(bound, sequence))
+
+
+@dataclass(frozen=True)
+class _Coded:
+    """The bitstream to write, its codec, how to check its file, and what was tried for it and why."""
+
+    codec: Codec
+    encoded: Encoded
+    check: Callable[[Bitstream], None] | None = None
+    tried: Sequence[Trial] = ()
+    reason: str = ""
+
+
+def _code(sequence: MeshSequence, given: Codec | Sequence[Codec], target: Target | None, progress: Progress) -> _Coded:
+    """Encode, at the quality that meets the target, with the codec that does so in the smallest file."""
+    if isinstance(given, Codec):
+        if target is None:
+            return _Coded(given, encode_sequence(given, sequence, progress))
+        choice = meet(target, given, sequence, progress)
+    else:
+        choice = choose_codec(given, sequence, target or default_target(given), progress)
+    trial = choice.trial
+    check = partial(choice.trials.check, trial.encoded.permutation)
+    return _Coded(trial.codec, trial.encoded, check, choice.tried, choice.reason)
+
+
+def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progress) -> tuple[int, Bitstream]:
+    """Write the file with its poster and origin; return its bytes and what it holds."""
+    progress("write", 0.0)
+    bitstream = coded.encoded.bitstream
+    if not bitstream.video:
+        bitstream = dataclasses.replace(bitstream, video=poster_of(sequence))
+    x, y, z = sequence.origin.tolist()
+    bitstream = dataclasses.replace(bitstream, origin=(x, y, z))
+    return write_file(bitstream, path, coded.check), bitstream
+
+
+def _notes(sequence: MeshSequence, target: Target | None) -> list[str]:
+    """What a user should know, a line each."""
+    diagonal = frame_diagonal(sequence)
+    loose = notes.loose_bound(target.value, diagonal) if target and target.measure == "max" else ()
+    left_out = notes.not_carried(sorted(sequence.attributes))
+    return [*sequence.notes, *loose, *notes.rounded(sequence.rounding, diagonal), *left_out]
+
+
 def _is_among(path: StrPath, source: MeshSequence | Source) -> bool:
     """Whether the output is one of the inputs."""
     if isinstance(source, MeshSequence) or not os.path.exists(path):
         return False
-    sources = source if isinstance(source, list | tuple) else [cast("StrPath", source)]
+    sources = [source] if isinstance(source, str | os.PathLike) else source
     return any(os.path.exists(one) and os.path.samefile(one, path) for one in sources)
 
 
-def _check_target(path: Path) -> None:
-    """Say what is wrong with the output before the work, not after it."""
+def _check_output(given: StrPath) -> None:
+    """Refuse an output that cannot be written before the work, not after it."""
+    path = Path(check_path(given, "gvpipe.encode's path"))
     if path.suffix.lower() not in VIDEO_SUFFIXES:
         raise InputError(f"{path}: the output is an MP4 file; end its name in .mp4")
     if os.path.isdir(path):  # unlike Path.is_dir, it takes any name, too long ones as well

@@ -13,10 +13,11 @@ from collections.abc import Iterable
 StrPath = str | os.PathLike[str]
 
 
-def check_path(value: object, role: str, instead: str = "") -> None:
-    """Raise TypeError unless ``value`` is a path; ``instead`` names what else is possible, such as ``"a MeshSequence or "``."""
+def check_path(value: object, role: str, instead: str = "") -> StrPath:
+    """Return a path; raise TypeError if ``value`` is none. ``instead`` names alternatives, such as ``"a MeshSequence or "``."""
     if not isinstance(value, str | os.PathLike) or isinstance(os.fspath(value), bytes):
         raise TypeError(f"{role} is {show(value)}; {instead}a path (str or os.PathLike) is needed")
+    return value
 
 
 def check_number(value: object, role: str) -> None:

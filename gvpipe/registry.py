@@ -69,6 +69,18 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
     return reader if holds is None else RepeatedFramesReader(reader, holds)
 
 
+def browser_obstacle(bitstream: Bitstream) -> str:
+    """Return what keeps browsers from playing a bitstream, in a few words; ``""`` if they play it.
+
+    Codecs whose files they play answer by a class method of this name; files of all others need a conversion.
+
+    Raises:
+        SettingError: no codec of that id is installed.
+    """
+    ask = getattr(codec_class(bitstream.codec), "browser_obstacle", None)
+    return str(ask(bitstream)) if ask else bitstream.codec
+
+
 def encode_sequence(
     codec: Codec, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None
 ) -> Encoded:
@@ -77,7 +89,7 @@ def encode_sequence(
     Raises:
         InputError: what the codec raises.
     """
-    memo = memo or Memo()
+    memo = memo or Memo(is_shared=False)
     holds = memo("holds", lambda: find_repeated_frames(sequence)) if _is_held(codec) else None
     if holds is None:
         return codec.encode(sequence, progress, memo)

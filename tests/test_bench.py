@@ -17,8 +17,10 @@ from sequences import waving
 
 import gvpipe
 from gvpipe.benchmark import sweep
-from gvpipe.benchmark.bd_rate import average_rate_difference, rate_at, tables
+from gvpipe.benchmark.bd_rate import average_rate_difference, rate_at
 from gvpipe.benchmark.plots import draw, read_peers
+from gvpipe.benchmark.report import BenchReport
+from gvpipe.benchmark.tables import tables
 from gvpipe.cli.breakdown import group_sections
 from gvpipe.errors import GvpipeError, InputError, SettingError
 from gvpipe.registry import codec_ids
@@ -35,7 +37,7 @@ def sheet(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def report(sheet: Path) -> sweep.Report:
+def report(sheet: Path) -> BenchReport:
     return sweep.run([str(sheet)], ["pca", "pdct"], (30, 80), {"reorder": "true"})
 
 
@@ -43,7 +45,7 @@ def power_law(scale: float, power: float, errors: tuple[float, ...]) -> list[dic
     return [{"bpvf": scale * e**-power, "kg": e} for e in errors]
 
 
-def test_points_are_what_encoding_gives(report: sweep.Report, sheet: Path, tmp_path: Path) -> None:
+def test_points_are_what_encoding_gives(report: BenchReport, sheet: Path, tmp_path: Path) -> None:
     sequence = gvpipe.read(sheet)
     assert [(c.sequence, c.codec, c.vertices, c.frames) for c in report.curves] == [
         ("sheet", codec, 100, 12) for codec in ("pca", "pdct")
@@ -60,21 +62,21 @@ def test_points_are_what_encoding_gives(report: sweep.Report, sheet: Path, tmp_p
             assert point["decode_fps"] == pytest.approx(12 / point["decode_s"])
 
 
-def test_reports_are_read_as_written(report: sweep.Report, tmp_path: Path) -> None:
+def test_reports_are_read_as_written(report: BenchReport, tmp_path: Path) -> None:
     report.write(tmp_path / "r.json")
-    assert sweep.Report.read(tmp_path / "r.json") == report
+    assert BenchReport.read(tmp_path / "r.json") == report
     values = json.loads((tmp_path / "r.json").read_text())
     assert set(values) == {"gvpipe", "machine", "command", "curves"}
     for wrong in ("", "{}", "[]", '{"gvpipe": "1", "machine": {}, "command": [], "curves": [{}]}'):
         (tmp_path / "w.json").write_text(wrong)
         with pytest.raises(InputError, match=r"w\.json"):
-            sweep.Report.read(tmp_path / "w.json")
+            BenchReport.read(tmp_path / "w.json")
     del values["curves"][0]["points"][0]["kg"]
     (tmp_path / "w.json").write_text(json.dumps(values))
     with pytest.raises(InputError, match="kg"):
-        sweep.Report.read(tmp_path / "w.json")
+        BenchReport.read(tmp_path / "w.json")
     with pytest.raises(InputError, match="cannot be read"):
-        sweep.Report.read(tmp_path / "none.json")
+        BenchReport.read(tmp_path / "none.json")
 
 
 def test_settings_are_checked_before_the_work(sheet: Path) -> None:
@@ -123,7 +125,7 @@ def test_points_that_others_beat_do_not_count() -> None:
     assert rate_at([*points, {"bpvf": 9.0, "kg": 0.7}], "kg", 0.7) == rate_at(points, "kg", 0.7)
 
 
-def test_tables_name_every_curve(report: sweep.Report) -> None:
+def test_tables_name_every_curve(report: BenchReport) -> None:
     parts = tables(report.curves).split("\n\n")
     assert [len(part.splitlines()) for part in parts] == [2 + 4, 2 + 2, 2 + 2]
     assert all(len({line.count("|") for line in part.splitlines()}) == 1 for part in parts)
@@ -133,7 +135,7 @@ def test_tables_name_every_curve(report: sweep.Report) -> None:
     assert f"| sheet | {difference:+.1f} % |" in parts[2] and f"| mean | {difference:+.1f} % |" in parts[2]
 
 
-def test_plots_need_the_report_alone(report: sweep.Report, tmp_path: Path) -> None:
+def test_plots_need_the_report_alone(report: BenchReport, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     (tmp_path / "peers.csv").write_text(PEERS)
     peers = read_peers(tmp_path / "peers.csv")
@@ -154,13 +156,17 @@ def test_command_line(run: Run, sheet: Path, tmp_path: Path) -> None:
     target = tmp_path / "r.json"
     ended = run("bench", sheet, "--codecs", "pca", "--qualities", "40,70", "--json", target)
     assert (ended.status, ended.err) == (0, "")
-    made = sweep.Report.read(target)
+    made = BenchReport.read(target)
     assert ended.out == tables(made.curves) + "\n"
     assert [p["quality"] for p in made.curves[0].points] == [40, 70]
     assert made.command[1] == "bench"
-    drawn = run("bench", "--plot", target, tmp_path / "plots")
+    drawn = run("plot", target, tmp_path / "plots")
     assert drawn.out.split() == [str(tmp_path / "plots" / "sheet.png")]
-    assert run("bench", "--plot", target, "a", "b").status == 2
+    assert json.loads(run("plot", target, tmp_path / "plots", "--json").out) == {"plots": drawn.out.split()}
+    assert run("plot", target, "a", "b").status == 2
+    printed = run("bench", sheet, "--codecs", "pca", "--qualities", "40", "--json")
+    assert [point["quality"] for point in json.loads(printed.out)["curves"][0]["points"]] == [40]
+    assert run("bench", "--json", sheet, sheet).status == 2 and sheet.read_bytes()[:2] == b"PK"
     for option in ("--qualities", "--kg", "--sted"):
         assert run("bench", sheet, option, "high").status == 2
     assert run("bench").status == 2

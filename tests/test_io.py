@@ -214,7 +214,7 @@ COLORS = np.random.default_rng(1).integers(0, 256, (37, 4), np.uint8) | np.array
 
 
 @pytest.mark.parametrize("suffix", ["obj", "ply", "off", "glb"])
-@pytest.mark.parametrize("kept", [{"uv"}, {"color"}, {"uv", "color"}], ids="+".join)
+@pytest.mark.parametrize("kept", [{"uv"}, {"color"}, {"uv", "color"}], ids=lambda kept: "+".join(sorted(kept)))
 def test_vertex_attributes(tmp_path: Path, suffix: str, kept: set[str]) -> None:
     attributes = {name: values for name, values in (("uv", UV_VERTEX), ("color", COLORS)) if name in kept}
     sequence = grid(attributes=attributes)
@@ -375,6 +375,58 @@ def test_ply_texture_does_not_split_vertices(tmp_path: Path) -> None:
     assert read.attributes["uv"].tolist() == [[0, 0], [1, 0], [1, 1], [0.5, 0.5], [1, 1], [0, 1]]
 
 
+def test_ply_polygons_keep_their_order(tmp_path: Path) -> None:
+    head = PLY_HEAD.format("ascii", "").replace("face 2", "face 3")
+    (tmp_path / "a.ply").write_text(head + "\r\n".join(PLY_ROWS) + "\r\n4 0 1 2 3\r\n3 0 1 2\r\n3 3 2 1\r\n")
+    assert io.read(tmp_path / "a.ply").faces.tolist() == [[0, 1, 2], [0, 2, 3], [0, 1, 2], [3, 2, 1]]
+
+
+def ply_binary(order: str, faces: list[list[int]]) -> bytes:
+    """A hand-made binary file with a flag before each face and a list behind it; ``order`` is NumPy's letter."""
+    name = "binary_big_endian" if order == ">" else "binary_little_endian"
+    head = PLY_HEAD.format(name, "").replace("property list", "property uchar flag\nproperty list")
+    head = head.replace("face 2", f"face {len(faces)}").replace("end_header", "property list uchar short id\nend_header")
+    rows = np.array([row.split() for row in PLY_ROWS], order + "f4").tobytes()
+    for face in faces:
+        rows += bytes([7, len(face)]) + np.array(face, order + "i4").tobytes() + bytes([1, 0, 0])
+    return head.encode() + rows
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_ply_binary_orders_and_other_properties(tmp_path: Path, order: str) -> None:
+    (tmp_path / "a.ply").write_bytes(ply_binary(order, [[0, 1, 2, 3], [3, 2, 1, 0]]))
+    read = io.read(tmp_path / "a.ply")
+    assert read.read(0, 1)[0].tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    assert read.faces.tolist() == [[0, 1, 2], [0, 2, 3], [3, 2, 1], [3, 1, 0]]
+    assert "2 of 2 faces have more than 3 corners" in read.notes[0]
+
+
+@pytest.mark.parametrize("faces", [[[0, 1, 2], [0, 1, 2, 3], [2, 3, 0]], [[0, 1, 2, 3], [0, 1, 2], [2, 3, 0]]])
+def test_ply_binary_polygons_that_differ_are_refused(tmp_path: Path, faces: list[list[int]]) -> None:
+    (tmp_path / "a.ply").write_bytes(ply_binary("<", faces))
+    with pytest.raises(InputError, match=r"list 'vertex_indices' of element 'face' has lengths \d and \d; in a binary file"):
+        io.read(tmp_path / "a.ply")
+
+
+PLY_WRONG = {
+    "type": ("property float x", "property half x", "its header holds 'property half x', which is not PLY's"),
+    "no y": ("property float y", "property float w", "its vertices lack x, y or z"),
+    "no list": ("property list uchar int vertex_indices", "property int a", "its faces have no list vertex_indices or"),
+    "short list": ("3 0 2 3", "4 0 2 3", "a line of element 'face' has fewer numbers than its properties need"),
+    "negative list": ("3 0 2 3", "-3 0 2 3", "a list of element 'face' has length -3"),
+    "word": ("1 1 0", "1 one 0", "."),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "message"), PLY_WRONG.values(), ids=PLY_WRONG.keys())
+def test_ply_that_is_wrong(tmp_path: Path, old: str, new: str, message: str) -> None:
+    text = PLY_HEAD.format("ascii", "") + "\n".join(PLY_ROWS) + "\n3 0 1 2\n3 0 2 3\n"
+    assert old in text
+    (tmp_path / "a.ply").write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=f"a.ply cannot be read as PLY: {message}"):
+        io.read(tmp_path / "a.ply")
+
+
 def test_off_polygons_keep_their_order(tmp_path: Path) -> None:
     text = (
         "# c\nNOFF 4 3 0 # counts\n"
@@ -427,6 +479,18 @@ def test_glb_scenes_are_joined_with_their_transforms(tmp_path: Path) -> None:
     later = read.read(2, 3)[0].reshape(4, 4, 3)
     for before, after in zip(blocks, later, strict=True):
         assert (abs(after - before) == 2).all()
+
+
+@pytest.mark.parametrize("included", [True, False])
+def test_glb_normals_are_those_of_the_file(tmp_path: Path, included: bool) -> None:
+    import trimesh
+
+    mesh = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], vertex_normals=[[0, 0.6, 0.8]] * 3, process=False)
+    (tmp_path / "a.glb").write_bytes(mesh.export(file_type="glb", include_normals=included))
+    read = io.read(tmp_path / "a.glb")
+    assert set(read.attributes) == ({"normal"} if included else set())
+    for values in read.attributes.values():
+        np.testing.assert_allclose(values, [[0, 0.6, 0.8]] * 3, atol=1e-6)
 
 
 GARBAGE = [("ply", b"hello"), ("stl", b"hello"), ("off", b"hello"), ("glb", b"hello"), ("gltf", b"hello")]

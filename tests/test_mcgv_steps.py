@@ -20,7 +20,7 @@ from scipy.sparse.linalg import spsolve
 from sequences import waving
 
 import gvpipe
-from gvcodecs.mcgv import Mcgv
+from gvcodecs.mcgv import Mcgv, encoder
 from gvcodecs.mcgv.layout.coding import (
     decode_clusters,
     decode_pixels,
@@ -38,6 +38,7 @@ from gvcodecs.mcgv.motion.affine_coding import decode_transforms, dequantise, en
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
 from gvcodecs.mcgv.motion.segmentation import LocalAffineFit, segment
 from gvcodecs.mcgv.pictures.quantiser import LEVELS, OUTLIERS, QP_STEP, Magnitudes, choose_quantiser
+from gvpipe.container import bitstream
 from gvpipe.container.bitstream import ENTRY, MAGIC, PREFIX, Bitstream, pack_payload, unpack_payload
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
@@ -741,13 +742,25 @@ def test_weld() -> None:
     assert all(f == np.flatnonzero((points == points[f]).all(axis=1))[0] for f in first)
 
 
-def test_more_segments_than_sections_are_not_written(tmp_path: Path) -> None:
-    """A bitstream has 4096 sections at most; segments then get longer than was asked for."""
-    away = np.linspace(0, 1, 4200, dtype=np.float32)[:, None, None]
+@pytest.mark.parametrize(
+    ("n_frames", "segments", "n_sections"),
+    [(60, 40, 50), pytest.param(4200, encoder.MOST_SEGMENTS, bitstream.MAX_SECTIONS, marks=pytest.mark.slow)],
+)
+def test_more_segments_than_sections_are_not_written(
+    n_frames: int, segments: int, n_sections: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bitstream has 4096 sections at most; segments then get longer than was asked for.
+
+    Small limits, no farther apart, stand for the real ones.
+    """
+    assert n_sections - segments <= bitstream.MAX_SECTIONS - encoder.MOST_SEGMENTS
+    monkeypatch.setattr(encoder, "MOST_SEGMENTS", segments)
+    monkeypatch.setattr(bitstream, "MAX_SECTIONS", n_sections)
+    away = np.linspace(0, 1, n_frames, dtype=np.float32)[:, None, None]
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
     sequence = MeshSequence(square + away, np.array([[0, 1, 2], [0, 2, 3]], np.int32), 30.0)
     gvpipe.encode(sequence, tmp_path / "a.mp4", segment=1, clusters=1, preset="ultrafast")
-    assert gvpipe.decode(tmp_path / "a.mp4").n_frames == 4200
+    assert gvpipe.decode(tmp_path / "a.mp4").n_frames == n_frames
 
 
 def test_lattices_too_fine_for_halves_are_corrupt() -> None:

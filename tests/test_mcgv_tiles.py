@@ -153,6 +153,7 @@ def test_tiles_are_for_blended_prediction() -> None:
         Mcgv(prediction="affine", placement="tiles")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["walking_cat", "fox_run", "morph_wave"])
 def test_tiles_cost_little_more_than_halves(name: str) -> None:
     """On real sequences: within 5 % of the bytes of halves at equal error, where charts take 14 to 27 % more.

@@ -40,6 +40,7 @@ def test_made_sequences_have_the_error_of_their_quality(codec: str, name: str, q
     assert 0.8 <= part_of_the_error(MADE[name], codec, quality) <= 1.2
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not NAMES, reason="no ../shared/data")
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("codec", codec_ids())

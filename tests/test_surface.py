@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gvpipe.metrics import hausdorff
+from gvpipe.metrics import triangle_search
 from gvpipe.metrics.comparison import compare
 from gvpipe.sequence import Int32, MeshSequence
 
@@ -70,10 +70,10 @@ def test_equals_brute_force(size: float) -> None:
     assert _hausdorff(left, right, faces) == pytest.approx(_brute(left, right, faces), rel=1e-9)
 
 
-@pytest.mark.parametrize("pairs", [hausdorff.MAX_PAIRS, 7])
+@pytest.mark.parametrize("pairs", [triangle_search.MAX_PAIRS, 7])
 def test_equals_brute_force_where_vertices_slide_along_the_surface(pairs: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Corresponding points are far apart but the surfaces are close: only the full search can tell."""
-    monkeypatch.setattr(hausdorff, "MAX_PAIRS", pairs)
+    monkeypatch.setattr(triangle_search, "MAX_PAIRS", pairs)
     rest, faces = _sheet(24, 3)
     left = _rounded(np.stack([rest, rest * [1, 2, 1]]))
     right = _rounded(np.stack([rest[::-1] * [1, 1, 1.01], (rest * [1, 2, 1.05])[::-1]]))
@@ -127,7 +127,7 @@ def test_point_to_triangle_equals_trimesh(seed: int, height: float) -> None:
     triangles = rng.integers(-4, 5, (200, 3, 3)) * [1.0, 1.0, height]  # lattice: many collapsed or touching
     points = rng.integers(-4, 5, (200, 3)).astype(float)
     area = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
-    squared = hausdorff.squared_distances(points, triangles)
+    squared = triangle_search.squared_distances(points, triangles)
     foot = _foot(triangles[area > 0], points[area > 0])
     assert squared[area > 0] == pytest.approx(((foot - points[area > 0]) ** 2).sum(axis=1), abs=1e-9)
     weights = rng.dirichlet(np.ones(3), (200, 50))  # no point of the triangle is nearer, collapsed or not

@@ -1,7 +1,7 @@
 """Rate-distortion plots from a bench report alone: one picture per sequence, KG, rmse and STED against bits, log axes.
 
-Other codecs' results are drawn beside ours, dashed, from a CSV file with a header and the columns ``seq``, ``codec``, ``bpvf``,
-``kg`` and ``rmse_rel`` (rmse as a part of frame 0's diagonal); rows without a number are left out.
+Other codecs' results are drawn beside ours, dashed, from a CSV file with a header. Its columns are ``seq``, ``codec``,
+``bpvf``, ``kg`` and ``rmse_rel`` (rmse as a part of frame 0's diagonal). Rows without a number are left out.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.atomic import atomic_path, output_error
-from gvpipe.benchmark.sweep import Curve, Report
+from gvpipe.benchmark.report import BenchReport, Curve
 from gvpipe.errors import InputError
 
 AXES = {"kg": "KG error, %", "rmse_diag": "rmse, part of the diagonal", "sted": "STED"}
@@ -24,7 +24,7 @@ LEGEND_COLUMNS = 6
 Peers = dict[str, dict[str, list[dict[str, float]]]]  # sequence -> codec -> points
 
 
-def draw(report: Report, folder: str | os.PathLike[str], peers: Peers | None = None) -> list[Path]:
+def draw(report: BenchReport, folder: str | os.PathLike[str], peers: Peers | None = None) -> list[Path]:
     """Draw a PNG file per sequence into ``folder``, which is made if need be, and return their paths.
 
     Raises:

@@ -1,28 +1,22 @@
 """Rate and distortion over a sweep of qualities, with times, memory, and every round trip verified.
 
-Each sequence and codec has a process of its own, so that its peak memory is its own; a few frames are encoded first, so that no
-time holds imports or compilation. A point is a whole file: encoded, decoded, compared with its source, and some frames read
-at random and compared with the whole. The result is one JSON object, `Report.to_json`; plots and tables need nothing else::
-
-    {"gvpipe": version, "machine": {...}, "command": [...], "curves": [{"sequence", "vertices", "triangles", "frames",
-     "codec", "settings", "peak_mb", "points": [{"quality", "bytes", "bpvf", measures of `gvpipe.metrics.comparison`,
-     "encode_s", "decode_s", "decode_fps", "frame_ms", "sections"}]}]}
+Each sequence and codec has a process of its own, so that its peak memory is its own. A few frames are encoded first, so that no
+time holds imports or compilation. A point is a whole file. It is encoded, decoded, and compared with its source; some frames
+are read at random and compared with the whole.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import multiprocessing
 import os
 import platform
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +24,9 @@ import numpy as np
 
 import gvpipe
 from gvpipe import api
-from gvpipe.atomic import atomic_path, output_error
+from gvpipe.atomic import output_error
+from gvpipe.benchmark.report import BenchReport, Curve
+from gvpipe.codec import Progress
 from gvpipe.errors import GvpipeError, InputError
 from gvpipe.metrics.comparison import compare
 from gvpipe.rate_control.purposes import VARIANTS
@@ -43,52 +39,6 @@ MEASURED = {
 WARM_FRAMES = 3
 FRAMES_AT_RANDOM = 16
 MEASURES = ("rmse", "rmse_diag", "max", "max_diag", "kg", "da", "sted", "hausdorff")
-POINT_KEYS = ("quality", "bytes", "bpvf", "rmse_diag", "max_diag", "kg", "sted", "encode_s", "decode_fps")  # that tables use
-
-
-@dataclass(frozen=True)
-class Curve:
-    """One codec's points on one sequence, in order of quality; ``peak_mb`` is None where the system does not tell."""
-
-    sequence: str
-    vertices: int
-    triangles: int
-    frames: int
-    codec: str
-    settings: dict[str, Any]
-    peak_mb: float | None
-    points: list[dict[str, Any]]
-
-
-@dataclass(frozen=True)
-class Report:
-    """All curves, and what they were made with."""
-
-    gvpipe: str
-    machine: dict[str, Any]
-    command: list[str]
-    curves: list[Curve]
-
-    def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the JSON file; raises `OutputError` if that fails."""
-        with atomic_path(path) as temporary:
-            temporary.write_text(json.dumps(dataclasses.asdict(self), indent=1, allow_nan=False) + "\n", "utf-8")
-
-    @classmethod
-    def read(cls, path: str | os.PathLike[str]) -> Report:
-        """Mirror of `write`; raises `InputError` for anything that it does not write."""
-        try:
-            values = json.loads(Path(path).read_text("utf-8"))
-            curves = [Curve(**curve) for curve in values["curves"]]
-            for curve in curves:
-                for point in curve.points:
-                    if any(not isinstance(point[key], int | float | None) for key in POINT_KEYS):
-                        raise ValueError(f"a point of {curve.sequence} is not made of numbers")
-            return cls(str(values["gvpipe"]), dict(values["machine"]), list(values["command"]), curves)
-        except OSError as exc:
-            raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check the path") from exc
-        except (ValueError, TypeError, KeyError) as exc:
-            raise InputError(f"{path} is not what `gvpipe bench --json` writes ({exc}); make it anew") from exc
 
 
 def default_codecs() -> list[str]:
@@ -105,8 +55,8 @@ def run(
     codecs: Sequence[str],
     qualities: Sequence[float] = QUALITIES,
     texts: Mapping[str, str] | None = None,
-    report: Callable[[str, float], None] | None = None,
-) -> Report:
+    progress: Progress | None = None,
+) -> BenchReport:
     """Measure every codec on every sequence.
 
     Args:
@@ -114,7 +64,7 @@ def run(
         codecs: ids; one with settings of its own is ``id:key=value:key=value``, and is told apart by that text.
         qualities: of every curve.
         texts: settings for all codecs, as on the command line.
-        report: told before each curve which it is and what part of all is done.
+        progress: called before each curve with its name and the part of all that is done.
 
     Raises:
         InputError: a sequence or a setting cannot be used; a round trip does not give back what went in.
@@ -125,10 +75,10 @@ def run(
     curves: list[Curve] = []
     for source in sources:
         for codec in codecs:
-            if report:
-                report(f"{name_of(source)} {codec}", len(curves) / (len(sources) * len(codecs)))
+            if progress:
+                progress(f"{name_of(source)} {codec}", len(curves) / (len(sources) * len(codecs)))
             curves.append(_in_own_process(source, codec, list(qualities), texts))
-    return Report(gvpipe.__version__, describe_machine(), ["gvpipe", *sys.argv[1:]], curves)
+    return BenchReport(gvpipe.__version__, describe_machine(), ["gvpipe", *sys.argv[1:]], curves)
 
 
 def measure_curve(source: str, codec: str, qualities: list[float], texts: dict[str, str]) -> Curve:

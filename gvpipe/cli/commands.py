@@ -7,9 +7,12 @@ Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage.
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import sys
 import traceback
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -26,10 +29,13 @@ if TYPE_CHECKING:
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 VIDEO_SUFFIXES = (".mp4", ".m4v")
+COLLECTED = 100_000  # objects made between garbage collections: a command makes cycles by imports, hardly by its work
 
 
 def main() -> None:
     """Run the command line and exit."""
+    gc.set_threshold(COLLECTED)
+    atexit.register(gc.freeze)  # what the process takes along when it ends need not be looked through
     try:
         status = cli(standalone_mode=False, prog_name="gvpipe")
     except GvpipeError as exc:
@@ -315,9 +321,14 @@ def render(source: str, target: str, size: str, out: Output, **options: Any) -> 
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting for all these codecs; repeat for more.")
 @click.option("--kg", default="1,0.3,0.1", show_default=True, metavar="KG,KG...", help="Errors at which to tell rates.")
 @click.option("--sted", metavar="STED,STED...", help="The same for this measure.")
-@click.option("--json", "target", metavar="OUT.json", help="Write all results to this file.")
-@click.option("--plot", "report", metavar="OUT.json", help="Measure nothing: draw these results into the folder given.")
-@click.option("--peers", metavar="RESULTS.csv", help="With --plot: other codecs' results to draw beside.")
+@click.option(
+    "--json",
+    "target",
+    is_flag=False,
+    flag_value=PIPE,
+    metavar="[OUT.json]",
+    help="Write all results to this file, or print one JSON object and nothing else.",
+)
 @print_options
 def bench(
     sources: tuple[str, ...],
@@ -327,36 +338,44 @@ def bench(
     kg: str,
     sted: str | None,
     target: str | None,
-    report: str | None,
-    peers: str | None,
     out: Output,
 ) -> None:
-    """Measure rate, distortion, times and memory of codecs, every round trip verified; or draw such results.
+    """Measure rate, distortion, times and memory of codecs, every round trip verified; `gvpipe plot` draws the results.
 
     \b
     gvpipe bench a.npz b.npz --json out.json
     gvpipe bench a.npz --codecs mcgv,mcgv:prediction=affine,pca
-    gvpipe bench --plot out.json plots/
     """
-    from gvpipe.benchmark import sweep as benches
-    from gvpipe.benchmark.bd_rate import tables
+    from gvpipe.benchmark import sweep
+    from gvpipe.benchmark.tables import tables
 
-    if report is not None:
-        from gvpipe.benchmark import plots
-
-        if len(sources) != 1:
-            raise click.UsageError("--plot OUT.json needs one folder to draw into")
-        drawn = plots.draw(benches.Report.read(report), sources[0], plots.read_peers(peers) if peers else None)
-        out.text("\n".join(map(str, drawn)))
-        return
-    chosen = [name.strip() for name in codec_list.split(",")] if codec_list else benches.default_codecs()
-    wanted = _parse_numbers("--qualities", qualities) if qualities else list(benches.QUALITIES)
+    if target not in (None, PIPE) and not target.lower().endswith(".json"):  # a sequence behind --json is not overwritten
+        raise click.UsageError(f"--json {target}: the results' file ends in .json; put --json last to print them")
+    out = replace(out, as_json=target == PIPE)
+    chosen = [name.strip() for name in codec_list.split(",")] if codec_list else sweep.default_codecs()
+    wanted = _parse_numbers("--qualities", qualities) if qualities else list(sweep.QUALITIES)
     levels = {"kg": _parse_numbers("--kg", kg), **({"sted": _parse_numbers("--sted", sted)} if sted else {})}
     with out.progress() as progress:
-        made = benches.run(sources, chosen, wanted, _parse_pairs(pairs), progress)
-    if target:
+        made = sweep.run(sources, chosen, wanted, _parse_pairs(pairs), progress)
+    if target not in (None, PIPE):
         made.write(target)
+    out.json(made.to_json())
     out.text(tables(made.curves, levels))
+
+
+@cli.command()
+@click.argument("report", metavar="REPORT.json")
+@click.argument("folder", metavar="FOLDER")
+@click.option("--peers", metavar="RESULTS.csv", help="Other codecs' results to draw beside, dashed.")
+@output_options
+def plot(report: str, folder: str, peers: str | None, out: Output) -> None:
+    """Draw what `gvpipe bench --json REPORT.json` measured: one picture per sequence, into FOLDER."""
+    from gvpipe.benchmark import plots
+    from gvpipe.benchmark.report import BenchReport
+
+    drawn = plots.draw(BenchReport.read(report), folder, plots.read_peers(peers) if peers else None)
+    out.json({"plots": [str(path) for path in drawn]})
+    out.text("\n".join(map(str, drawn)))
 
 
 @cli.command()

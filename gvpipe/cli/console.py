@@ -81,7 +81,7 @@ def output_options(command: Command) -> Command:
 
 
 def print_options(command: Command) -> Command:
-    """The same without ``--json``."""
+    """The same without ``--json``, for a command that has its own."""
 
     @click.option("-q", "--quiet", is_flag=True, help="Print no progress, no notes and no text.")
     @click.option("-v", "--verbose", is_flag=True, help="Print the time of each stage; unexpected errors with their traceback.")

@@ -4,8 +4,12 @@ A *point* stands for the vertices that share its trajectory; where these are sev
 is coded elsewhere (`topology_only`, `welded_mesh`). Here every corner of it names one of its point's vertices by number, and
 the user's order of vertices follows.
 
-Streams: vertices of each point less one [integers]; then, for corners on seams, in order of point and corner, the number's
-difference from that of the point's corner before [integers]. Order stream: `vertex_order`, points in place of positions.
+Streams: vertices of each point less one [integers]; then one of two codings of the corners on seams:
+
+- in order of point and corner, the number's difference from that of the point's corner before [integers];
+- across edges (`edge_seams`).
+
+Order stream: `vertex_order`, points in place of positions.
 """
 
 from __future__ import annotations
@@ -15,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Array
+from gvpipe.connectivity.edge_seams import decode_across_edges, encode_across_edges
 from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import corrupt_section
@@ -43,7 +48,9 @@ class CodedSeams:
     points: Array
 
 
-def encode_seams(faces: Array, points: Array, point_faces: Array, n_points: int, reorder: bool) -> CodedSeams:
+def encode_seams(
+    faces: Array, points: Array, point_faces: Array, n_points: int, reorder: bool, across: bool = False
+) -> CodedSeams:
     """Code which vertices the corners of ``point_faces`` use.
 
     Args:
@@ -52,6 +59,7 @@ def encode_seams(faces: Array, points: Array, point_faces: Array, n_points: int,
         point_faces: ``(T, 3)`` the same triangles over points, smallest point first, as the decoder will have them.
         n_points: P.
         reorder: let the decoder see the codec's vertex order.
+        across: code corners across edges (`edge_seams`).
     """
     # triangles alike over points are matched in order of appearance: which is which does not matter
     corner_order = corners_from_smallest(points[faces])
@@ -59,25 +67,29 @@ def encode_seams(faces: Array, points: Array, point_faces: Array, n_points: int,
     matched = np.empty(len(faces), np.int64)
     matched[np.lexsort(point_faces.T[::-1])] = np.lexsort(turned.T[::-1])
     corners = np.take_along_axis(faces, corner_order, axis=1)[matched]  # vertices of the codec's triangles
-    numbers, counts, differences = _encode_corners(corners, point_faces, points, n_points)
+    numbers, counts, stream = _encode_corners(corners, point_faces, points, n_points, across)
     permutation = np.lexsort((numbers, points))
     rank = np.argsort(permutation)
     if reorder:
-        return CodedSeams(counts, differences, b"", permutation, rank[corners], points[permutation])
+        return CodedSeams(counts, stream, b"", permutation, rank[corners], points[permutation])
     order = encode_order(rank, _as_lattice(points[permutation]), rank[corners])
-    return CodedSeams(counts, differences, order, np.arange(len(points)), corners, points)
+    return CodedSeams(counts, stream, order, np.arange(len(points)), corners, points)
 
 
-def decode_seams(counts: bytes, corners: bytes, order: bytes, point_faces: Array, n_points: int) -> tuple[Array, Array]:
+def decode_seams(
+    counts: bytes, corners: bytes, order: bytes, point_faces: Array, n_points: int, across: bool = False
+) -> tuple[Array, Array]:
     """Mirror of `encode_seams`: triangles ``(T, 3)`` over vertices, and the point of each vertex ``(V,)``."""
-    faces, points = _decode_corners(counts, corners, point_faces, n_points)
+    faces, points = _decode_corners(counts, corners, point_faces, n_points, across)
     if order:
         visits = decode_order(order, _as_lattice(points), faces)
         points, faces = points[visits], np.argsort(visits)[faces]
     return faces, points
 
 
-def _encode_corners(corners: Array, point_faces: Array, points: Array, n_points: int) -> tuple[Array, bytes, bytes]:
+def _encode_corners(
+    corners: Array, point_faces: Array, points: Array, n_points: int, across: bool
+) -> tuple[Array, bytes, bytes]:
     """The number ``(V,)`` of each vertex among its point's, by first use, and the streams that signal it."""
     counts = np.bincount(points, minlength=n_points)
     used, first = np.unique(corners.ravel(), return_index=True)
@@ -87,6 +99,8 @@ def _encode_corners(corners: Array, point_faces: Array, points: Array, n_points:
     starts = np.cumsum(counts) - counts
     numbers = np.empty(len(points), np.int64)
     numbers[by_use] = np.arange(len(points)) - starts[points[by_use]]
+    if across:
+        return numbers, encode_integers(counts - 1), encode_across_edges(numbers[corners.ravel()], point_faces, counts)
     where, is_first = _seam_corners(point_faces, counts)
     differences = np.diff(numbers[corners.ravel()[where]], prepend=0)
     contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_SEAM_VERTICES)
@@ -106,23 +120,29 @@ def _filled(differences: Array, contexts: Array, is_first: Array) -> Array:
     return result
 
 
-def _decode_corners(counts_data: bytes, data: bytes, point_faces: Array, n_points: int) -> tuple[Array, Array]:
+def _decode_corners(counts_data: bytes, data: bytes, point_faces: Array, n_points: int, across: bool) -> tuple[Array, Array]:
     """Mirror of `_encode_corners`: triangles over vertices, and the point of each vertex."""
     counts = 1 + decode_integers(counts_data, n_points, name="mesh")
     if n_points and (counts.min() < 1 or counts.max() > MAX_VERTICES or counts.sum() > MAX_VERTICES):
         raise corrupt_section("mesh", "a number of copies is out of range")
+    numbers = decode_across_edges(data, point_faces, counts) if across else _decode_differences(data, point_faces, counts)
+    flat = point_faces.ravel()
+    starts = np.cumsum(counts) - counts
+    faces: Array = (starts[flat] + numbers).reshape(-1, 3)
+    return faces, np.repeat(np.arange(n_points), counts)
+
+
+def _decode_differences(data: bytes, point_faces: Array, counts: Array) -> Array:
+    """The number ``(3T,)`` of each corner's vertex among its point's."""
     where, is_first = _seam_corners(point_faces, counts)
     contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_SEAM_VERTICES)
     total = np.cumsum(decode_integers(data, len(where), contexts, "mesh"))
     begin = np.maximum.accumulate(np.where(is_first, np.arange(len(where)), 0))
     numbers = np.zeros(point_faces.size, np.int64)
     numbers[where] = total - total[begin] if len(where) else 0
-    flat = point_faces.ravel()
-    if ((numbers < 0) | (numbers >= counts[flat])).any():
+    if ((numbers < 0) | (numbers >= counts[point_faces.ravel()])).any():
         raise corrupt_section("mesh", "a corner uses a copy that does not exist")
-    starts = np.cumsum(counts) - counts
-    faces: Array = (starts[flat] + numbers).reshape(-1, 3)
-    return faces, np.repeat(np.arange(n_points), counts)
+    return numbers
 
 
 def _seam_corners(point_faces: Array, counts: Array) -> tuple[Array, Array]:

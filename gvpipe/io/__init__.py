@@ -1,7 +1,7 @@
 """Mesh sequences from files and to files.
 
-A format that holds a whole sequence in one file is one module here and one entry in `READERS` and `WRITERS`; a format
-of single frames is one module and one entry in `formats.FRAME_FORMATS`.
+A format that holds a whole sequence in one file has a module here and an entry in `READERS` and `WRITERS`. A format of single
+frames has a module and an entry in `formats.FRAME_FORMATS`.
 """
 
 from __future__ import annotations

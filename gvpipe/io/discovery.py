@@ -1,11 +1,11 @@
 """Which files are the frames, and in what order.
 
 An input may be a folder, a glob, a pattern, one file or a list of files. File names are compared as text and numbers in
-turn, so that ``frame2`` comes before ``frame10``; the number that varies is the frame number, wherever it stands. What is
+turn, so that ``frame2`` comes before ``frame10``. The number that varies is the frame number, wherever it stands. What is
 not clearly one series without gaps is refused: a sequence put together wrongly plays, but wrongly.
 
-A list is what a shell makes of a glob, sorted as text. So it is ordered like the glob, gaps refused, if its names are one
-numbered series; if they are not, or a file occurs twice, someone chose the order, and it is kept.
+A list is what a shell makes of a glob, sorted as text. If its names are one numbered series, it is ordered like the glob, and
+gaps are refused. If they are not, or a file occurs twice, someone chose the order, and it is kept.
 """
 
 from __future__ import annotations

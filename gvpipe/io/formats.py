@@ -20,8 +20,8 @@ class FrameFormat:
 
     Args:
         loader: makes a loader for one sequence.
-        encoder: makes a writer for one sequence from faces, attributes, the number of vertices and the origin, which it
-            adds to positions; raises `InputError` if the format cannot hold them then. None: read only.
+        encoder: makes a writer for one sequence from faces, attributes, the number of vertices and the origin. The writer
+            adds the origin to positions; `InputError` if the format cannot hold the sums. None: read only.
     """
 
     loader: Callable[[], Loader]

@@ -1,7 +1,7 @@
 """Sequences of frame files, loaded when they are read.
 
-An encoder passes over the frames several times and parsing text is slow, so a parsed frame goes to a temporary file
-and later reads come from there.
+Parsing text is slow, and an encoder passes over the frames several times. So a parsed frame goes to a temporary file, and later
+reads come from there.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """GLB and glTF frames (one still mesh per file), read and written by trimesh.
 
 The meshes of a scene are joined in trimesh's traversal order, which depends on the file alone, each moved by its
-node's transform. trimesh makes one mesh per primitive, so primitives that share a vertex buffer get a copy each: more
-vertices than the file, but the same in every frame.
+node's transform. trimesh makes one mesh per primitive, so primitives that share a vertex buffer get a copy each. That is
+more vertices than the file has, but the same in every frame.
 
 trimesh leaves out animations, skins and morph targets without a word, so files that need them are refused here. Every skin
 is: its still pose is the joints', and to find out whether that equals the bind pose is to apply the skin. Morph targets
@@ -26,6 +26,7 @@ from gvpipe.errors import InputError
 from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, concatenate
 
 MAGIC = b"glTF"
+TRIANGLES = 4  # glTF's mode of primitives; above it strips and fans, below it points and lines
 GLB_HEAD = struct.Struct("<4sIIII")  # magic, version, bytes of the file, bytes and type of the first chunk
 
 
@@ -45,17 +46,20 @@ class GltfLoader:
         import trimesh
 
         data = path.read_bytes()
-        _check_still(_parse_json(data), path)
+        gltf = _parse_json(data)
+        _check_still(gltf, path)
         # trimesh drops texture coordinates together with the materials, so the first file is read with both
         scene: Any = trimesh.load_scene(
             path, file_type="glb" if data.startswith(MAGIC) else "gltf", process=False, skip_materials=not self._is_first
         )
+        with_normals = _has_normals(gltf)
         meshes, n_others = [], 0
         for node in scene.graph.nodes_geometry:
             transform, name = scene.graph[node]
             geometry = scene.geometry[name]
             if isinstance(geometry, trimesh.Trimesh):
-                meshes.append(_place(geometry, np.asarray(transform), self._is_first))
+                attributes = _attributes(geometry, np.asarray(transform), with_normals) if self._is_first else {}
+                meshes.append(_place(geometry, np.asarray(transform), attributes))
             else:
                 n_others += 1
         if not meshes:
@@ -91,7 +95,15 @@ def _check_still(gltf: dict[str, Any], path: Path) -> None:
     raise InputError(f"{path} {found}, which gvpipe does not import yet; export its frames as still files, one file per frame")
 
 
-def _place(geometry: Any, transform: Float64, with_attributes: bool) -> Mesh:
+def _has_normals(gltf: dict[str, Any]) -> bool:
+    """Whether every triangle mesh of the file brings its normals; trimesh would compute those that are missing."""
+    used = {node["mesh"] for node in gltf.get("nodes", []) if "mesh" in node}
+    primitives = [primitive for i in used for primitive in gltf["meshes"][i]["primitives"]]
+    return all("NORMAL" in one["attributes"] for one in primitives if one.get("mode", TRIANGLES) >= TRIANGLES)
+
+
+def _place(geometry: Any, transform: Float64, attributes: Attributes) -> Mesh:
+    """A mesh moved by its node's ``transform (4, 4)``."""
     positions = np.asarray(geometry.vertices)
     faces = as_faces(np.asarray(geometry.faces), len(positions))
     linear = transform[:3, :3]
@@ -100,16 +112,17 @@ def _place(geometry: Any, transform: Float64, with_attributes: bool) -> Mesh:
             positions = positions @ linear.T + transform[:3, 3]
         if np.linalg.det(linear) < 0:
             faces = np.ascontiguousarray(faces[:, ::-1])  # glTF 2.0, 3.7.4: a mirroring node flips the winding
-    return Mesh(positions, faces, _attributes(geometry, linear) if with_attributes else {})
+    return Mesh(positions, faces, attributes)
 
 
-def _attributes(geometry: Any, linear: Float64) -> Attributes:
+def _attributes(geometry: Any, transform: Float64, with_normals: bool) -> Attributes:
+    """Texture coordinates, normals and colours, one per vertex; normals are turned by ``transform (4, 4)``."""
     attributes: dict[str, NDArray[np.generic]] = {}
     visual = geometry.visual
     if getattr(visual, "uv", None) is not None:
         attributes["uv"] = np.asarray(visual.uv, np.float32)
-    if "vertex_normals" in geometry._cache:  # from the file; otherwise trimesh would compute them
-        normals = np.asarray(geometry.vertex_normals) @ np.linalg.pinv(linear)
+    if with_normals:
+        normals = np.asarray(geometry.vertex_normals) @ np.linalg.pinv(transform[:3, :3])
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         attributes["normal"] = (normals / np.where(length > 0, length, 1)).astype(np.float32)
     if visual.kind == "vertex":

@@ -6,7 +6,7 @@ seam's coordinates) but not the dropping, and each material becomes a mesh with 
 It is vectorised: lines are told apart by their first characters, and each kind is parsed in one call. A frame whose
 face lines are byte for byte those of the first frame needs only its ``v`` lines parsed.
 
-Understood: ``v`` (with w, with vertex colours), ``vt``, ``vn``, ``f`` (polygons, relative indices); other lines
+Understood: ``v`` (with w, with vertex colours), ``vt``, ``vn``, ``f`` (polygons, relative indices). Other lines
 (groups, materials, points, lines) change neither positions nor triangles and are skipped.
 """
 
@@ -83,7 +83,7 @@ class _Faces:
 
 
 class _Lines:
-    """The lines of a cleaned text, sorted by their keyword (at most two letters)."""
+    """The lines of a cleaned text, told apart by their keyword (at most two letters)."""
 
     def __init__(self, text: bytes) -> None:
         self._text = np.frombuffer(text, np.uint8)

@@ -1,12 +1,11 @@
-"""PLY frames: read by trimesh, written plainly (binary, little-endian).
+"""PLY frames: text or binary, read from the file's own columns (`gvpipe.io.ply_elements`), written as binary little-endian.
 
-trimesh 5.2 keeps PLY order if it is told not to split vertices along texture seams (`fix_texture=False`). It accepts
-text files that end early, so lengths are checked here, and its attributes come from the raw columns: per corner where
-the file has them per corner. Binary files that mix triangles with larger polygons are beyond it.
+Vertex order is the file's. Attributes are per corner where the file has them per corner.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe import notes
-from gvpipe.arrays import Array, Float32, Float64, Int32, Int64
-from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, per_vertex
+from gvpipe.arrays import Array, Float32, Float64, Int32
+from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, fan, per_vertex
+from gvpipe.io.ply_elements import Columns, Lists, read_elements
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 NORMAL_NAMES = ("nx", "ny", "nz")
@@ -27,69 +27,55 @@ def load_ply(path: Path) -> Mesh:
     """Load one file.
 
     Raises:
-        Exception: the file cannot be read; trimesh raises many kinds, and the caller names the file.
+        OSError, ValueError: the file cannot be read; the caller names it.
     """
-    import trimesh
-
-    loaded: Any = trimesh.load_mesh(
-        path, file_type="ply", process=False, maintain_order=True, fix_texture=False, skip_materials=True
-    )
-    elements = loaded.metadata.get("_ply_raw", {})
+    elements = read_elements(path.read_bytes())
     for name in ("vertex", "face"):
-        element = elements.get(name, {"length": 0})
-        if element["length"] == 0:
+        if not elements.get(name):
             raise ValueError(f"it has no element {name!r}")
-        if any(len(column) != element["length"] for column in _columns(element).values()):
-            raise ValueError(f"it announces {element['length']} of element {name!r} but ends before the last")
-    positions, faces = np.asarray(loaded.vertices), as_faces(loaded.faces, len(loaded.vertices))
-    if len(positions) != elements["vertex"]["length"]:
-        raise ValueError("trimesh changed its number of vertices")
-    counts = _corner_counts(_columns(elements["face"]), len(faces))
-    return Mesh(
-        positions, faces, _attributes(_columns(elements["vertex"]), _columns(elements["face"]), faces), notes.cut(counts)
-    )
+    vertex, face = elements["vertex"], elements["face"]
+    positions = _stack(vertex, tuple("xyz"))
+    if positions is None:
+        raise ValueError("its vertices lack x, y or z")
+    polygons = _polygons(face)
+    faces = as_faces(polygons.values[fan(polygons.lengths)], len(positions))
+    return Mesh(positions, faces, _attributes(vertex, face, faces, len(positions)), notes.cut(polygons.lengths))
 
 
-def _corner_counts(face: dict[str, Any], n_triangles: int) -> Int64:
-    """Corners of each face ``(N,)``; all triangles if its list of vertices has an unusual name."""
-    name = next((name for name in INDEX_NAMES if name in face), None)
-    if name is None:
-        return np.full(n_triangles, 3)
-    column = face[name]["f1"] if face[name].dtype.names else face[name]
-    if column.dtype == object:
-        return np.fromiter(map(len, column), np.int64, len(column))
-    return np.full(len(column), column.reshape(len(column), -1).shape[1])
+def _polygons(face: Columns) -> Lists:
+    """The vertex indices of each face: the list with a usual name, or the only list that there is."""
+    lists = {name: column for name, column in face.items() if isinstance(column, Lists)}
+    usual = [lists[name] for name in INDEX_NAMES if name in lists]
+    if not usual and len(lists) != 1:
+        raise ValueError(f"its faces have no list {' or '.join(INDEX_NAMES)}")
+    return usual[0] if usual else next(iter(lists.values()))
 
 
-def _columns(element: dict[str, Any]) -> dict[str, Any]:
-    """An element's properties by name; trimesh holds text as a dict and binary data as a structured array."""
-    data = element.get("data")
-    if data is None:
-        raise ValueError("an element has no data")
-    return dict(data) if isinstance(data, dict) else {name: data[name] for name in data.dtype.names}
-
-
-def _attributes(vertex: dict[str, Any], face: dict[str, Any], faces: Int32) -> dict[str, NDArray[np.generic]]:
-    n_vertices = len(next(iter(vertex.values())))
+def _attributes(vertex: Columns, face: Columns, faces: Int32, n_vertices: int) -> dict[str, NDArray[np.generic]]:
     attributes: dict[str, NDArray[np.generic]] = {}
-    for names in UV_NAMES:
-        if all(name in vertex for name in names):
-            attributes["uv"] = _stack(vertex, names).astype(np.float32)
-    if "texcoord" in face:  # a list (u, v, u, v, u, v) per triangle
-        corners = face["texcoord"]
-        corners = corners["f1"] if corners.dtype.names else corners
-        if corners.dtype != object and corners.size == faces.size * 2:
-            found = per_vertex(corners.reshape(-1, 2).astype(np.float32), faces, n_vertices)
-            attributes |= {} if found is None else {"uv": found}
-    if all(name in vertex for name in NORMAL_NAMES):
-        attributes["normal"] = _stack(vertex, NORMAL_NAMES).astype(np.float32)
-    if all(name in vertex for name in COLOR_NAMES[:3]):
-        attributes["color"] = as_color(_stack(vertex, tuple(name for name in COLOR_NAMES if name in vertex)))
+    for pair in UV_NAMES:
+        uv = _stack(vertex, pair)
+        if uv is not None:
+            attributes["uv"] = uv.astype(np.float32)
+    corners = face.get("texcoord")  # a list (u, v, u, v, u, v) per triangle
+    if isinstance(corners, Lists) and (corners.lengths == 6).all() and len(corners.values) == faces.size * 2:
+        found = per_vertex(corners.values.reshape(-1, 2).astype(np.float32), faces, n_vertices)
+        attributes |= {} if found is None else {"uv": found}
+    normal = _stack(vertex, NORMAL_NAMES)
+    if normal is not None:
+        attributes["normal"] = normal.astype(np.float32)
+    for names in (COLOR_NAMES, COLOR_NAMES[:3]):
+        color = _stack(vertex, names)
+        if color is not None and "color" not in attributes:
+            attributes["color"] = as_color(color)
     return attributes
 
 
-def _stack(columns: dict[str, Any], names: tuple[str, ...]) -> Array:
-    return np.stack([np.asarray(columns[name]).reshape(-1) for name in names], axis=1)
+def _stack(columns: Columns, names: Sequence[str]) -> Array | None:
+    """Number properties side by side, ``(N, len(names))``; None unless all are there."""
+    found = [columns.get(name) for name in names]
+    numbers = [column for column in found if isinstance(column, np.ndarray)]
+    return np.stack(numbers, axis=1) if len(numbers) == len(names) else None
 
 
 def encode_ply(faces: Int32, attributes: Attributes, n_vertices: int, origin: Float64) -> Encoder:

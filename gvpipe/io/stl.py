@@ -1,8 +1,8 @@
 """STL frames, welded: STL stores three corners per triangle and no vertices.
 
-Corners at exactly equal places in the first frame become one vertex, numbered by first appearance, and the same map
-joins the corners of all other frames. Where corners that were one vertex part later, connectivity is not constant and
-the frame is refused. Reading is trimesh's; writing is one structured array.
+Corners at exactly equal positions in the first frame become one vertex, numbered by first appearance. The same map joins the
+corners of all other frames. Where corners that were one vertex part later, connectivity is not constant and the frame is
+refused. Reading is trimesh's; writing is one structured array.
 """
 
 from __future__ import annotations

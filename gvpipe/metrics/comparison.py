@@ -24,7 +24,8 @@ from gvpipe.metrics.sted import Sted
 from gvpipe.metrics.vertex_errors import BLOCK_BYTES, VertexErrors, frame_diagonal, ratio
 from gvpipe.sequence import MeshSequence
 
-Progress = Callable[[int, int], None]
+FramesDone = Callable[[int, int], None]
+"""Called with the frames done, and the frames in all."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Comparison:
         return asdict(self)
 
 
-def compare(reference: MeshSequence, distorted: MeshSequence, progress: Progress | None = None) -> Comparison:
+def compare(reference: MeshSequence, distorted: MeshSequence, progress: FramesDone | None = None) -> Comparison:
     """Measure ``distorted`` against ``reference``, vertex by vertex, frame by frame.
 
     Args:
@@ -61,8 +62,9 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: Progress
         progress: called with (frames done, frames in all) after each block.
 
     Raises:
-        InputError: the two differ in their number of frames or vertices or in their triangles, so that no vertex of
-            one answers to a vertex of the other.
+        InputError: the two differ in their number of frames or vertices or in their triangles, so that vertices do not
+            correspond.
+        TypeError: one of them is no sequence.
     """
     for role, given in (("reference", reference), ("distorted", distorted)):
         if not isinstance(given, MeshSequence):

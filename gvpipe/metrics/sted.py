@@ -1,7 +1,7 @@
 """STED, the spatio-temporal edge difference, streamed over blocks of frames.
 
-What the eye notices in a moving mesh is not where a vertex is but how the lengths around it change. STED therefore
-looks at relative length differences of edges, and at how much they *vary* locally: a uniform change costs nothing.
+The eye notices how lengths around a vertex change rather than where the vertex is. STED therefore looks at relative length
+differences of edges, and at how much they *vary* locally: a uniform change costs nothing.
 
 Source: L. Vasa and V. Skala, A perception correlated comparison method for dynamic meshes, 2011. The paper was not at
 hand: this follows second-hand descriptions, the four parameters are this module's own choice, and values are not

@@ -1,6 +1,6 @@
 """Where a picture is taken from.
 
-Right-handed world, perspective picture. Azimuth 0 looks at the front, which faces +z when y is up (glTF's convention); a
+Right-handed world, perspective picture. Azimuth 0 looks at the front, which faces +z when y is up (glTF's convention). A
 growing azimuth takes the camera to the object's left-hand side (+x), elevation lifts it. With z up the front faces -y, with x
 up it faces +z: the same picture, the axes renamed by a rotation.
 """
@@ -57,7 +57,8 @@ class Camera:
     Args:
         target: the point in the middle of the picture, model units.
         distance: from the eye to the target, model units, above 0.
-        azimuth, elevation: degrees.
+        azimuth: degrees.
+        elevation: degrees.
         up: the world's axis that is up in the picture, ``"x"``, ``"y"`` or ``"z"``.
         field_of_view: of the picture's height, degrees, between 1 and 120.
 
@@ -119,7 +120,7 @@ def framing(
     *,
     follow: bool = False,
 ) -> Camera:
-    """Return a camera that holds the motion in the picture with a small margin.
+    """Return a camera that holds the whole motion in the picture, with a small margin.
 
     Four planes bound what a camera sees; each is pushed out until the vertices that triangles use, in at most 64 frames, lie
     inside. The planes' slopes are known beforehand, so that one pass over the frames finds target and distance.
@@ -154,8 +155,8 @@ def framing(
     smallest = 1e-6 * float(np.abs(target).max())  # all at one point: any distance will do
     if follow:
         target = target + middle_of(sequence.read(0, 1)[0], used_vertices(sequence))
-    place = (float(target[0]), float(target[1]), float(target[2]))
-    return Camera(place, max(distance, smallest) or 1.0, azimuth, elevation, up)
+    tx, ty, tz = target.tolist()
+    return Camera((tx, ty, tz), max(distance, smallest) or 1.0, azimuth, elevation, up)
 
 
 def sampled(frames: Sequence[int]) -> list[int]:

@@ -1,7 +1,7 @@
 """Colours: sRGB, the materials, and the colour map of errors.
 
-The error map is sequential and darkens evenly, so that it reads in grey and by the colour-blind: no error is the pale grey of
-unglazed clay, then yellow, orange, red, dark purple. Light in pictures that use it has no colour and no gloss, which keeps
+The error map is sequential and darkens evenly, so that it reads in grey and by the colour-blind. No error is the pale grey of
+unglazed clay; then come yellow, orange, red, dark purple. Light in pictures that use it has no colour and no gloss, which keeps
 hue and saturation readable against the legend.
 """
 
@@ -21,13 +21,13 @@ ERRORS = np.array(
 
 
 def to_linear(srgb: Floats | tuple[float, ...]) -> Float64:
-    """Linear light of sRGB values, both 0..1 (IEC 61966-2-1)."""
+    """Linear light of sRGB values, any shape, both 0..1 (IEC 61966-2-1)."""
     values = np.asarray(srgb, np.float64)
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
 
 def to_srgb(linear: Floats) -> Float64:
-    """sRGB values of linear light, both 0..1."""
+    """sRGB values of linear light, any shape, both 0..1."""
     values = np.asarray(linear, np.float64)
     return np.where(values <= 0.0031308, values * 12.92, 1.055 * np.maximum(values, 0.0031308) ** (1 / 2.4) - 0.055)
 
@@ -39,5 +39,5 @@ def srgb_codes() -> UInt8:
 
 def error_colours(values: Floats) -> Float64:
     """sRGB colours ``(..., 3)`` of errors ``(...)`` as parts of the largest; what lies outside 0..1 is clipped."""
-    places = np.linspace(0, 1, len(ERRORS))
-    return np.stack([np.interp(values, places, ERRORS[:, channel]) for channel in range(3)], axis=-1)
+    stops = np.linspace(0, 1, len(ERRORS))
+    return np.stack([np.interp(values, stops, ERRORS[:, channel]) for channel in range(3)], axis=-1)

@@ -1,7 +1,7 @@
 """Which triangle every sample of the picture sees: projection, and a z-buffer filled triangle by triangle.
 
-Corners are snapped to 1/256 of a sample and edges are followed in integers, so that neighbours leave no crack and a picture
-never depends on rounding. Nearness is ``distance / depth``, linear over the picture: 1 at the target, more towards the eye.
+Corners are snapped to 1/256 of a sample and edges are followed in integers. So neighbours leave no crack, and a picture never
+depends on rounding. Nearness is ``distance / depth``, linear over the picture: 1 at the target, more towards the eye.
 A triangle with a corner behind the eye, or a million samples outside the picture, is left out. Kernels only: they import numba.
 """
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from gvpipe.arrays import Array
 from gvpipe.compiled import compiled
+from gvpipe.rasterizer.scene import Projection, View, ZBuffer
 
 SNAP_BITS = 8
 SNAP = 1 << SNAP_BITS
@@ -20,11 +21,10 @@ NEAREST = 1e-3  # of the distance: what is nearer to the eye counts as behind it
 
 
 @compiled
-def project(
-    positions: Array, rotation: Array, target: Array, distance: float, focal: float, width: int, height: int,
-    seen: Array, snapped: Array, nearness: Array,
-) -> None:  # fmt: skip
-    """Fill ``seen (V, 3)``: picture axes, from the target; ``snapped (V, 2)``; ``nearness (V,)``, 0 where it cannot be seen."""
+def project(positions: Array, view: View, projection: Projection) -> None:
+    """Fill ``projection`` with vertices ``positions (V, 3) float32``, model units."""
+    rotation, target, distance, focal = view.rotation, view.target, view.distance, view.focal
+    seen, snapped, nearness = projection.seen, projection.snapped, projection.nearness
     for v in range(len(positions)):
         x = positions[v, 0] - target[0]
         y = positions[v, 1] - target[1]
@@ -34,8 +34,8 @@ def project(
         depth = distance - seen[v, 2]
         nearness[v] = 0.0
         if depth > NEAREST * distance:
-            across = width / 2 + focal * seen[v, 0] / depth
-            down = height / 2 - focal * seen[v, 1] / depth
+            across = view.width / 2 + focal * seen[v, 0] / depth
+            down = view.height / 2 - focal * seen[v, 1] / depth
             if abs(across) < FARTHEST and abs(down) < FARTHEST:
                 nearness[v] = distance / depth
                 snapped[v, 0] = int(np.floor(across * SNAP + 0.5))
@@ -43,8 +43,10 @@ def project(
 
 
 @compiled
-def rasterise(faces: Array, snapped: Array, nearness: Array, top: int, bottom: int, depths: Array, triangles: Array) -> None:
-    """Fill rows ``top`` to ``bottom`` of ``depths (H, W) float32`` and ``triangles (H, W) int32`` (-1: none)."""
+def rasterise(faces: Array, projection: Projection, z_buffer: ZBuffer, top: int, bottom: int) -> None:
+    """Fill rows ``top`` to ``bottom`` of the z-buffer with triangles ``faces (T, 3) int32``."""
+    snapped, nearness = projection.snapped, projection.nearness
+    depths, triangles = z_buffer.depths, z_buffer.triangles
     width = depths.shape[1]
     depths[top:bottom] = 0.0
     triangles[top:bottom] = -1

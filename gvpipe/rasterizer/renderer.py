@@ -1,8 +1,13 @@
 """The painter: a mesh and a camera in, a picture out, on the CPU.
 
-A frame passes through four steps: corners are projected, a z-buffer finds the triangle of every sample, normals are summed in
-picture axes, and each pixel is shaded once for every triangle in it. The picture is cut in bands that threads paint beside
-each other; a pixel's value does not depend on the bands.
+A frame passes through four steps:
+
+1. vertices are projected;
+2. a z-buffer finds the triangle of every sample;
+3. normals are summed in picture axes;
+4. each pixel is shaded, once if all its samples see one triangle, else once for each.
+
+The picture is cut in bands that threads paint beside each other; a pixel's value does not depend on the bands.
 """
 
 from __future__ import annotations
@@ -19,12 +24,14 @@ from gvpipe.errors import InputError
 from gvpipe.mesh.topology import weld
 from gvpipe.rasterizer.camera import Camera
 from gvpipe.rasterizer.colours import BACK, BACKGROUND, FRONT, error_colours, srgb_codes, to_linear
+from gvpipe.rasterizer.scene import Material, Projection, Scene, View, ZBuffer
 
 SHADINGS = ("smooth", "flat")
 SIZE_RANGE = (16, 8192)  # pixels, of either side
 SAMPLES_RANGE = (1, 8)  # per pixel and axis
 THREADS = min(4, os.cpu_count() or 1)
 RAMP = 256  # steps of a colour map
+GLOSS = 0.05  # of the highlight
 
 
 class Renderer:
@@ -55,15 +62,19 @@ class Renderer:
         first, point = weld(base) if self._smooth else (np.zeros(0, np.intp), np.zeros(len(base), np.intp))
         self._points = point.astype(np.int32)[self._faces]
         n_vertices, (width, height) = len(base), size
-        self._seen = np.zeros((n_vertices, 3))
-        self._snapped = np.zeros((n_vertices, 2), np.int64)
-        self._nearness = np.zeros(n_vertices)
-        self._of_faces, self._of_points = np.zeros((len(faces), 3)), np.zeros((len(first), 3))
-        self._depths = np.zeros((height * samples, width * samples), np.float32)
-        self._triangles = np.zeros(self._depths.shape, np.int32)
-        self._codes = srgb_codes()
-        self._front, self._back, self._background = to_linear(FRONT), to_linear(BACK), to_linear(BACKGROUND)
-        self._ramp = to_linear(error_colours(np.linspace(0, 1, RAMP)))
+        self._projection = Projection(np.zeros((n_vertices, 3)), np.zeros((n_vertices, 2), np.int64), np.zeros(n_vertices))
+        shape = (height * samples, width * samples)
+        self._z_buffer = ZBuffer(np.zeros(shape, np.float32), np.zeros(shape, np.int32))
+        self._face_normals, self._point_normals = np.zeros((len(faces), 3)), np.zeros((len(first), 3))
+        self._material = Material(
+            front=to_linear(FRONT),
+            back=to_linear(BACK),
+            background=to_linear(BACKGROUND),
+            gloss=GLOSS,
+            values=np.zeros(0),
+            ramp=to_linear(error_colours(np.linspace(0, 1, RAMP))),
+            codes=srgb_codes(),
+        )
         self._pool = ThreadPoolExecutor(THREADS)
 
     def draw(self, positions: Float32, camera: Camera, values: Floats | None = None) -> UInt8:
@@ -73,56 +84,48 @@ class Renderer:
             positions: ``(V, 3)``, model units.
             values: ``(V,)`` in 0..1, shown in the colours of `gvpipe.rasterizer.colours.error_colours`.
         """
-        from gvpipe.rasterizer.raster_kernels import rasterise
-        from gvpipe.rasterizer.shading_kernels import GLOSS, face_normals, shade, vertex_normals
+        from gvpipe.rasterizer.shading_kernels import face_normals, point_normals, shade
 
         self._project(positions, camera)
-        face_normals(self._faces, self._seen, self._of_faces)
+        face_normals(self._faces, self._projection.seen, self._face_normals)
         if self._smooth:
-            vertex_normals(self._points, self._of_faces, self._of_points)
-        shown = np.zeros(0) if values is None else np.ascontiguousarray(values, np.float64)
+            point_normals(self._points, self._face_normals, self._point_normals)
+        scene = Scene(self._faces, self._points, self._projection, camera.distance, self._face_normals, self._point_normals)
+        material = self._material
+        if values is not None:  # a gloss would hide colours that mean something
+            material = material._replace(values=np.ascontiguousarray(values, np.float64), gloss=0.0)
         width, height = self.size
         picture = np.empty((height, width, 3), np.uint8)
-        samples = self._samples
 
         def paint(top: int, bottom: int) -> None:
-            rasterise(
-                self._faces, self._snapped, self._nearness, top * samples, bottom * samples, self._depths, self._triangles
-            )
-            shade(
-                self._triangles, samples, top, bottom, self._faces, self._points, self._seen, self._snapped,
-                self._nearness, camera.distance, self._of_faces, self._of_points, self._smooth, shown, self._ramp,
-                0.0 if len(shown) else GLOSS, self._front, self._back, self._background, self._codes, picture,
-            )  # fmt: skip
+            self._rasterise(top, bottom)
+            shade(self._z_buffer.triangles, scene, material, top, bottom, picture)
 
         self._in_bands(paint)
         return picture
 
     def visible(self, positions: Float32, camera: Camera) -> Int32:
         """Return the triangle that each sample sees, -1 for none: ``(height * samples, width * samples) int32``."""
-        from gvpipe.rasterizer.raster_kernels import rasterise
-
         self._project(positions, camera)
-        samples = self._samples
-        self._in_bands(
-            lambda top, bottom: rasterise(
-                self._faces, self._snapped, self._nearness, top * samples, bottom * samples, self._depths, self._triangles
-            )
-        )
-        return self._triangles.copy()
+        self._in_bands(self._rasterise)
+        return self._z_buffer.triangles.copy()
 
     def _project(self, positions: Float32, camera: Camera) -> None:
         from gvpipe.rasterizer.raster_kernels import project
 
-        if positions.shape != self._seen.shape:
-            raise InputError(f"positions of shape {positions.shape}; {self._seen.shape} is needed")
+        if positions.shape != self._projection.seen.shape:
+            raise InputError(f"positions of shape {positions.shape}; {self._projection.seen.shape} is needed")
         width, height = (side * self._samples for side in self.size)
         focal = height / 2 / np.tan(np.radians(camera.field_of_view) / 2)
-        project(
-            np.ascontiguousarray(positions, np.float32), np.ascontiguousarray(camera.rotation),
-            np.array(camera.target, np.float64), float(camera.distance), float(focal), width, height,
-            self._seen, self._snapped, self._nearness,
-        )  # fmt: skip
+        rotation, target = np.ascontiguousarray(camera.rotation), np.array(camera.target, np.float64)
+        view = View(rotation, target, float(camera.distance), float(focal), width, height)
+        project(np.ascontiguousarray(positions, np.float32), view, self._projection)
+
+    def _rasterise(self, top: int, bottom: int) -> None:
+        """Fill the z-buffer for rows ``top`` to ``bottom`` of the picture."""
+        from gvpipe.rasterizer.raster_kernels import rasterise
+
+        rasterise(self._faces, self._projection, self._z_buffer, top * self._samples, bottom * self._samples)
 
     def _in_bands(self, paint: Callable[[int, int], None]) -> None:
         # several bands per thread, since some are empty

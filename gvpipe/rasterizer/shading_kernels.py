@@ -14,17 +14,20 @@ import numpy as np
 from gvpipe.arrays import Array
 from gvpipe.compiled import compiled
 from gvpipe.rasterizer.raster_kernels import HALF, SNAP
+from gvpipe.rasterizer.scene import Material, Scene
 
 # picture axes: right, up, towards the eye
 KEY = (-0.46, 0.62, 0.635)  # the light, from the upper left
 KEY_SHARE, SKY_SHARE, EYE_SHARE, AMBIENT = 0.80, 0.14, 0.12, 0.06  # of the light on a surface; full light is a little over 1
 WRAP = 0.25  # how far the key light reaches around the edge: soft shadows
-GLOSS = 0.05
+
+
+Triple = tuple[float, float, float]
 
 
 @compiled
 def face_normals(faces: Array, seen: Array, normals: Array) -> None:
-    """Fill ``normals (T, 3)`` with vectors of twice the triangle's area."""
+    """Fill ``normals (T, 3)``, as long as twice the area of triangles ``faces (T, 3)`` with vertices ``seen (V, 3)``."""
     for t in range(len(faces)):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         ux, uy, uz = seen[b, 0] - seen[a, 0], seen[b, 1] - seen[a, 1], seen[b, 2] - seen[a, 2]
@@ -35,8 +38,11 @@ def face_normals(faces: Array, seen: Array, normals: Array) -> None:
 
 
 @compiled
-def vertex_normals(points: Array, of_faces: Array, normals: Array) -> None:
-    """Fill ``normals (P, 3)``: unit sums of the normals around each point of ``points (T, 3)``; zero where they cancel."""
+def point_normals(points: Array, of_faces: Array, normals: Array) -> None:
+    """Fill ``normals (P, 3)``: unit sums of the normals ``of_faces (T, 3)`` around each point of ``points (T, 3)``.
+
+    The normal is zero where they cancel.
+    """
     normals[:] = 0.0
     for t in range(len(points)):
         for i in range(3):
@@ -50,19 +56,27 @@ def vertex_normals(points: Array, of_faces: Array, normals: Array) -> None:
 
 
 @compiled
-def shade(
-    triangles: Array, samples: int, top: int, bottom: int, faces: Array, points: Array, seen: Array, snapped: Array,
-    nearness: Array, distance: float, of_faces: Array, of_points: Array, smooth: bool, values: Array, ramp: Array,
-    gloss: float, front: Array, back: Array, background: Array, codes: Array, picture: Array,
-) -> None:  # fmt: skip
-    """Fill rows ``top`` to ``bottom`` of ``picture (H, W, 3) uint8`` from ``triangles (samples H, samples W)``.
+def shade(triangles: Array, scene: Scene, material: Material, top: int, bottom: int, picture: Array) -> None:
+    """Fill rows ``top`` to ``bottom`` of ``picture (h, w, 3) uint8``.
 
     Args:
-        values: ``(V,)`` in 0..1, coloured by ``ramp (n, 3)``; empty: ``front`` and ``back`` colour the sides of the surface.
-        codes: sRGB bytes of linear light, from 0 to 1 in even steps.
+        triangles: ``(H, W) int32`` that samples see, whole numbers of them per pixel and axis.
     """
-    colour = np.zeros(3)
-    empty = codes[(background * (len(codes) - 1) + 0.5).astype(np.int64)]
+    # arrays are taken out of their tuples once, and no helper takes one: each of both would cost more than its arithmetic
+    faces, points, distance, of_faces, of_points = (
+        scene.faces,
+        scene.points,
+        scene.distance,
+        scene.face_normals,
+        scene.point_normals,
+    )
+    seen, snapped, nearness = scene.projection.seen, scene.projection.snapped, scene.projection.nearness
+    values, ramp, codes, background = material.values, material.ramp, material.codes, material.background
+    front = (material.front[0], material.front[1], material.front[2])
+    back = (material.back[0], material.back[1], material.back[2])
+    gloss, is_smooth, has_values = material.gloss, len(of_points) > 0, len(values) > 0
+    samples, last = triangles.shape[0] // picture.shape[0], len(codes) - 1
+    empty = codes[(background * last + 0.5).astype(np.int64)]
     for y in range(top, bottom):
         for x in range(picture.shape[1]):
             first = triangles[y * samples, x * samples]
@@ -87,54 +101,75 @@ def shade(
                 else:
                     px, py = (x * samples + j) * SNAP + HALF, (y * samples + i) * SNAP + HALF
                 a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
-                # barycentric weights in the picture, then over the surface
-                wa = float((snapped[b, 0] - px) * (snapped[c, 1] - py) - (snapped[c, 0] - px) * (snapped[b, 1] - py))
-                wb = float((snapped[c, 0] - px) * (snapped[a, 1] - py) - (snapped[a, 0] - px) * (snapped[c, 1] - py))
-                wc = float((snapped[a, 0] - px) * (snapped[b, 1] - py) - (snapped[b, 0] - px) * (snapped[a, 1] - py))
-                wa, wb, wc = wa * nearness[a], wb * nearness[b], wc * nearness[c]
-                total = wa + wb + wc
-                wa, wb, wc = wa / total, wb / total, wc / total
-                gx, gy, gz = of_faces[t, 0], of_faces[t, 1], of_faces[t, 2]
-                outside = (distance - seen[a, 2]) * gz - seen[a, 0] * gx - seen[a, 1] * gy >= 0.0
-                if not outside:
-                    gx, gy, gz = -gx, -gy, -gz
-                nx, ny, nz = gx, gy, gz
-                if smooth:
+                wa, wb, wc = _surface_weights(
+                    (snapped[a, 0] - px, snapped[a, 1] - py, nearness[a]),
+                    (snapped[b, 0] - px, snapped[b, 1] - py, nearness[b]),
+                    (snapped[c, 0] - px, snapped[c, 1] - py, nearness[c]),
+                )
+                flat = (of_faces[t, 0], of_faces[t, 1], of_faces[t, 2])
+                outside = (distance - seen[a, 2]) * flat[2] - seen[a, 0] * flat[0] - seen[a, 1] * flat[1] >= 0.0
+                smooth = flat
+                if is_smooth:
                     pa, pb, pc = points[t, 0], points[t, 1], points[t, 2]
-                    nx = wa * of_points[pa, 0] + wb * of_points[pb, 0] + wc * of_points[pc, 0]
-                    ny = wa * of_points[pa, 1] + wb * of_points[pb, 1] + wc * of_points[pc, 1]
-                    nz = wa * of_points[pa, 2] + wb * of_points[pb, 2] + wc * of_points[pc, 2]
-                    if not outside:  # light the side that is seen
-                        nx, ny, nz = -nx, -ny, -nz
-                    if nx * gx + ny * gy + nz * gz <= 0.0:  # no side is agreed on, as in a soup, or a very sharp corner
-                        nx, ny, nz = gx, gy, gz
-                length = math.sqrt(nx * nx + ny * ny + nz * nz)
-                if length > 0.0:
-                    nx, ny, nz = nx / length, ny / length, nz / length
-                else:
-                    nz = 1.0
-                key = max(0.0, (nx * KEY[0] + ny * KEY[1] + nz * KEY[2] + WRAP) / (1.0 + WRAP))
-                light = AMBIENT + KEY_SHARE * key + SKY_SHARE * (0.5 + 0.5 * ny) + EYE_SHARE * max(0.0, nz)
-                glint = 0.0
-                if gloss > 0.0:
-                    # half way between light and eye, which is taken to be far away
-                    half = (nx * KEY[0] + ny * KEY[1] + nz * (KEY[2] + 1.0)) / math.sqrt(2.0 + 2.0 * KEY[2])
-                    half8 = max(0.0, half) ** 8
-                    glint = gloss * half8 * half8 * half8
-                if len(values):
+                    smooth = (
+                        wa * of_points[pa, 0] + wb * of_points[pb, 0] + wc * of_points[pc, 0],
+                        wa * of_points[pa, 1] + wb * of_points[pb, 1] + wc * of_points[pc, 1],
+                        wa * of_points[pa, 2] + wb * of_points[pb, 2] + wc * of_points[pc, 2],
+                    )
+                light, glint = _illuminate(_seen_normal(smooth, flat, outside), gloss)
+                if has_values:
                     value = wa * values[a] + wb * values[b] + wc * values[c]
                     place = min(max(value, 0.0), 1.0) * (len(ramp) - 1)
                     step = min(int(place), len(ramp) - 2)
-                    for axis in range(3):
-                        colour[axis] = ramp[step, axis] + (place - step) * (ramp[step + 1, axis] - ramp[step, axis])
-                elif outside:
-                    colour[:] = front
+                    part = place - step
+                    red += (ramp[step, 0] + part * (ramp[step + 1, 0] - ramp[step, 0])) * light + glint
+                    green += (ramp[step, 1] + part * (ramp[step + 1, 1] - ramp[step, 1])) * light + glint
+                    blue += (ramp[step, 2] + part * (ramp[step + 1, 2] - ramp[step, 2])) * light + glint
                 else:
-                    colour[:] = back
-                red += colour[0] * light + glint
-                green += colour[1] * light + glint
-                blue += colour[2] * light + glint
-            scale = (len(codes) - 1) / n_shades
-            picture[y, x, 0] = codes[min(int(red * scale + 0.5), len(codes) - 1)]
-            picture[y, x, 1] = codes[min(int(green * scale + 0.5), len(codes) - 1)]
-            picture[y, x, 2] = codes[min(int(blue * scale + 0.5), len(codes) - 1)]
+                    side = front if outside else back
+                    red, green, blue = (
+                        red + side[0] * light + glint,
+                        green + side[1] * light + glint,
+                        blue + side[2] * light + glint,
+                    )
+            scale = last / n_shades
+            picture[y, x, 0] = codes[min(int(red * scale + 0.5), last)]
+            picture[y, x, 1] = codes[min(int(green * scale + 0.5), last)]
+            picture[y, x, 2] = codes[min(int(blue * scale + 0.5), last)]
+
+
+@compiled
+def _surface_weights(a: Triple, b: Triple, c: Triple) -> Triple:
+    """Barycentric weights over the surface, from the corners: across, down (from what is shaded) and nearness."""
+    wa = float(b[0] * c[1] - c[0] * b[1]) * a[2]
+    wb = float(c[0] * a[1] - a[0] * c[1]) * b[2]
+    wc = float(a[0] * b[1] - b[0] * a[1]) * c[2]
+    total = wa + wb + wc
+    return wa / total, wb / total, wc / total
+
+
+@compiled
+def _seen_normal(smooth: Triple, flat: Triple, outside: bool) -> Triple:
+    """The unit normal on the side that is seen, from the interpolated one and the triangle's."""
+    nx, ny, nz = smooth
+    gx, gy, gz = flat
+    if nx * gx + ny * gy + nz * gz <= 0.0:  # no side is agreed on, as in a soup, or a very sharp corner
+        nx, ny, nz = gx, gy, gz
+    if not outside:
+        nx, ny, nz = -nx, -ny, -nz
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    return (nx / length, ny / length, nz / length) if length > 0.0 else (nx, ny, 1.0)
+
+
+@compiled
+def _illuminate(normal: Triple, gloss: float) -> tuple[float, float]:
+    """The light on a surface with this unit normal, and its highlight."""
+    nx, ny, nz = normal
+    key = max(0.0, (nx * KEY[0] + ny * KEY[1] + nz * KEY[2] + WRAP) / (1.0 + WRAP))
+    light = AMBIENT + KEY_SHARE * key + SKY_SHARE * (0.5 + 0.5 * ny) + EYE_SHARE * max(0.0, nz)
+    if gloss <= 0.0:
+        return light, 0.0
+    # half way between light and eye, which is taken to be far away
+    half = (nx * KEY[0] + ny * KEY[1] + nz * (KEY[2] + 1.0)) / math.sqrt(2.0 + 2.0 * KEY[2])
+    half8 = max(0.0, half) ** 8
+    return light, gloss * half8 * half8 * half8

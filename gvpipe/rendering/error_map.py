@@ -1,8 +1,7 @@
-"""Vertex errors as colours: how far each vertex lies from the reference's, and the legend that tells what a colour means.
+"""Vertex errors as colours: how far each vertex lies from the reference's, and the legend of the colours.
 
-Errors are in percent of the reference's frame-0 bounding-box diagonal, as ``rmse_diag`` and ``max_diag`` of
-`gvpipe.metrics.comparison` are in parts of it (model units where the diagonal is 0). One scale serves all frames that are drawn
-together.
+Errors are in percent of the reference's frame-0 bounding-box diagonal, or in model units where the diagonal is 0. One scale
+serves all frames that are drawn together.
 """
 
 from __future__ import annotations
@@ -57,7 +56,7 @@ class ErrorMap:
         return self.errors(frame) / (self.largest or 1.0)
 
     def legend(self, size: tuple[int, int]) -> UInt8:
-        """Return a colour bar with its numbers, a strip for the left edge of a picture of ``size``.
+        """Return a colour bar with its numbers: ``(H, w, 3) uint8``, the left edge of a picture of ``size`` (width, height).
 
         Raises:
             InputError: the picture is too small for it.

@@ -1,14 +1,13 @@
 """A sequence to a picture or a film: which frames, from where, in which file.
 
-PNG is one frame, three samples a pixel and axis. GIF and MP4 play the motion (two samples); a turntable lets the camera go once
-around meanwhile, repeats the motion until the turn lasts `TURN_SECONDS`, and ends one step before its start, so that it loops.
-Frames are painted one at a time, and the file appears once it is complete.
+PNG is one frame, three samples a pixel and axis; GIF and MP4 play the motion, with two samples. A turntable lets the camera go
+once around meanwhile. It repeats the motion until the turn lasts `TURN_SECONDS`, and ends one step before its start, so that it
+loops. Frames are painted one at a time, and the file appears once it is complete.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,18 +21,25 @@ from gvpipe.errors import InputError
 from gvpipe.rasterizer.camera import Camera, framing, middle_of, used_vertices
 from gvpipe.rasterizer.renderer import Renderer
 from gvpipe.rendering.error_map import ErrorMap
+from gvpipe.rendering.picture_files import STILL, WRITERS
 from gvpipe.sequence import MeshSequence
 
-SUFFIXES = (".png", ".gif", ".mp4")
 STILL_SAMPLES, FILM_SAMPLES = 3, 2  # per pixel and axis
 TURN_SECONDS = 4.0  # a turntable's shortest turn
-GIF_FPS = 50.0  # browsers slow down GIFs that are faster
-PALETTE_FRAMES = 6  # pictures that a GIF's one palette is made from
 
 
 @dataclass(frozen=True)
 class Film:
-    """Pictures to paint: the frame and the azimuth of each; ``len``, and ``[k]`` paints the k-th, ``(H, W, 3) uint8``."""
+    """Pictures to paint, one after the other; ``[k]`` paints the k-th, ``(H, W, 3) uint8``, sRGB.
+
+    Args:
+        frames: the frame of each picture.
+        camera: of the first picture.
+        turntable: whether the camera goes once around.
+        errors: whose values the colours show.
+        legend: ``(H, w, 3) uint8``, a strip at the left.
+        follow: whether the camera goes with the mesh.
+    """
 
     sequence: MeshSequence
     frames: list[int]
@@ -41,8 +47,13 @@ class Film:
     renderer: Renderer
     turntable: bool = False
     errors: ErrorMap | None = None
-    legend: UInt8 | None = None  # a strip at the left
-    follow: bool = False  # whether the camera goes with the mesh
+    legend: UInt8 | None = None
+    follow: bool = False
+
+    @property
+    def fps(self) -> float:
+        """Frames per second."""
+        return self.sequence.fps
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -75,52 +86,65 @@ class Film:
         return picture if self.legend is None else np.concatenate([self.legend, picture], axis=1)
 
 
+@dataclass(frozen=True)
+class PictureOptions:
+    """What to paint and how; `gvpipe.render` documents each.
+
+    Args:
+        frame: the only frame to paint, or None.
+        size: width and height of the file's pictures, legend included, pixels.
+        view: a name of `gvpipe.rasterizer.camera.VIEWS`, or azimuth and elevation, degrees.
+        error_max: percent of the reference's diagonal, above 0, or None.
+        camera: in place of the one that frames the whole motion from ``view``.
+
+    Raises:
+        InputError: an ``error_max`` that is not above 0.
+    """
+
+    frame: int | None = None
+    size: tuple[int, int] = (512, 512)
+    view: str | tuple[float, float] = "three-quarter"
+    up: str = "y"
+    turntable: bool = False
+    follow: bool = False
+    error_max: float | None = None
+    shading: str = "smooth"
+    camera: Camera | None = None
+
+    def __post_init__(self) -> None:
+        if self.error_max is not None and not (math.isfinite(self.error_max) and self.error_max > 0):
+            raise InputError(f"the colours' end is {self.error_max} percent of the diagonal; a number above 0 is needed")
+
+
 def write_pictures(
     sequence: MeshSequence,
     path: Path,
-    *,
-    frame: int | None,
-    size: tuple[int, int],
-    view: str | tuple[float, float],
-    up: str,
-    turntable: bool,
-    follow: bool,
-    reference: MeshSequence | None,
-    error_max: float | None,
-    shading: str,
-    camera: Camera | None,
-    progress: Progress | None,
+    options: PictureOptions,
+    reference: MeshSequence | None = None,
+    progress: Progress | None = None,
 ) -> None:
-    """Paint a sequence as ``.png``, ``.gif`` or ``.mp4``; the arguments are those of `gvpipe.render`.
+    """Paint a sequence as ``.png``, ``.gif`` or ``.mp4``; with a reference, in the colours of the errors.
 
     Raises:
         InputError: a value that cannot be, a sequence without triangles, a reference that does not fit.
         OutputError: the file cannot be written; no part of it is left.
     """
-    suffix = check_output(path, size, turntable, error_max)
-    width, height = size
-    frames = _frames(sequence, frame, suffix, turntable)
-    errors, legend, across = None, None, width
-    if reference is not None:
-        errors = ErrorMap(reference, sequence, frames, error_max)
-        sequence, legend = errors.sequence, errors.legend((width, height))
-        across -= legend.shape[1]
-    camera = camera or framing(sequence, None, view, up, across / height, turntable, follow=follow)
-    samples = STILL_SAMPLES if suffix == ".png" else FILM_SAMPLES
-    renderer = Renderer(sequence.faces, sequence.read(0, 1)[0], (across, height), shading, samples)
-    film = Film(sequence, frames, camera, renderer, turntable, errors, legend, follow)
+    suffix = check_output(path, options)
+    film = _plan(sequence, suffix, options, reference)
     with atomic_path(path) as temporary:
         WRITERS[suffix](film, temporary, progress)
 
 
-def check_output(path: Path, size: tuple[int, int], turntable: bool, error_max: float | None) -> str:
-    """Return the path's suffix; raises `InputError` for a file or picture that cannot be made."""
-    suffix = _checked_suffix(path, turntable)
-    width, height = size
+def check_output(path: Path, options: PictureOptions) -> str:
+    """Return the path's suffix; raises `InputError` for a file that cannot be made with these options."""
+    suffix = path.suffix.lower()
+    if suffix not in WRITERS:
+        raise InputError(f"{path}: pictures are written as {', '.join(WRITERS)}; end the name in one of them")
+    if options.turntable and suffix == STILL:
+        raise InputError(f"{path}: a turntable moves; end the name in .gif or .mp4")
+    width, height = options.size
     if suffix == ".mp4" and (width % 2 or height % 2):
         raise InputError(f"a picture of {width}x{height}; MP4 needs even sides")
-    if error_max is not None and not (np.isfinite(error_max) and error_max > 0):
-        raise InputError(f"the colours' end is {error_max} percent of the diagonal; a number above 0 is needed")
     return suffix
 
 
@@ -136,63 +160,26 @@ def parse_size(text: str) -> tuple[int, int]:
     return int(parts[0]), int(parts[-1])
 
 
-def _checked_suffix(path: Path, turntable: bool) -> str:
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise InputError(f"{path}: pictures are written as {', '.join(SUFFIXES)}; end the name in one of them")
-    if turntable and suffix == ".png":
-        raise InputError(f"{path}: a turntable moves; end the name in .gif or .mp4")
-    return suffix
+def _plan(sequence: MeshSequence, suffix: str, options: PictureOptions, reference: MeshSequence | None) -> Film:
+    """Which frames, from where, with which colours."""
+    width, height = options.size
+    frames = _frames(sequence, options.frame, suffix, options.turntable)
+    errors, legend, across = None, None, width
+    if reference is not None:
+        errors = ErrorMap(reference, sequence, frames, options.error_max)
+        sequence, legend = errors.sequence, errors.legend(options.size)
+        across -= legend.shape[1]
+    camera = options.camera or framing(
+        sequence, None, options.view, options.up, across / height, options.turntable, follow=options.follow
+    )
+    samples = STILL_SAMPLES if suffix == STILL else FILM_SAMPLES
+    renderer = Renderer(sequence.faces, sequence.read(0, 1)[0], (across, height), options.shading, samples)
+    return Film(sequence, frames, camera, renderer, options.turntable, errors, legend, options.follow)
 
 
 def _frames(sequence: MeshSequence, frame: int | None, suffix: str, turntable: bool) -> list[int]:
     count = len(sequence)
     if frame is not None and not -count <= frame < count:
         raise InputError(f"{sequence.name}: frame {frame} asked for; there are {count}, 0 to {count - 1} or -{count} to -1")
-    frames = [(frame or 0) % count] if frame is not None or suffix == ".png" else list(range(count))
+    frames = [(frame or 0) % count] if frame is not None or suffix == STILL else list(range(count))
     return frames * max(1, math.ceil(TURN_SECONDS * sequence.fps / len(frames))) if turntable else frames
-
-
-def _painted(film: Film, progress: Progress | None, step: int = 1) -> Iterator[UInt8]:
-    for k in range(0, len(film), step):
-        yield film[k]
-        if progress:
-            progress("render", min(1.0, (k + step) / len(film)))
-
-
-def _write_png(film: Film, path: Path, progress: Progress | None) -> None:
-    from PIL import Image
-
-    for picture in _painted(film, progress):
-        Image.fromarray(picture).save(path, optimize=True)
-
-
-def _write_gif(film: Film, path: Path, progress: Progress | None) -> None:
-    from PIL import Image
-
-    step = math.ceil(film.sequence.fps / GIF_FPS)
-    count = len(range(0, len(film), step))
-    # GIF counts in hundredths of a second: every picture ends at the hundredth nearest to its time
-    ends = np.rint(np.arange(1, count + 1) * step * 100 / film.sequence.fps).astype(int)
-    durations = np.maximum(np.diff(ends, prepend=0), 1) * 10
-    some = np.unique(np.linspace(0, len(film) - 1, PALETTE_FRAMES).round().astype(int)).tolist()
-    palette = Image.fromarray(np.concatenate([film[k] for k in some])).quantize(256, Image.Quantize.MEDIANCUT)
-    pictures = (
-        Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
-        for picture in _painted(film, progress, step)
-    )
-    first = next(pictures)
-    first.save(path, save_all=True, append_images=pictures, duration=durations.tolist(), loop=0, disposal=1)
-
-
-def _write_mp4(film: Film, path: Path, progress: Progress | None) -> None:
-    from gvpipe.media.film import write_film
-
-    write_film(path, _painted(film, progress), film.sequence.fps)
-
-
-WRITERS: dict[str, Callable[[Film, Path, Progress | None], None]] = {
-    ".png": _write_png,
-    ".gif": _write_gif,
-    ".mp4": _write_mp4,
-}

@@ -21,7 +21,7 @@ LUMA = np.array([0.2126, 0.7152, 0.0722])  # BT.709, of sRGB bytes
 
 
 def poster_of(sequence: MeshSequence) -> bytes:
-    """Return the poster of a sequence."""
+    """Return the poster of a sequence, an MP4 file."""
     return make_poster(sequence.read(0, 1)[0], sequence.faces, sequence.fps, sequence.n_frames)
 
 

@@ -3,9 +3,8 @@
 What: page = ``page.html`` with the player's bundle inline and the MP4 file as base64 text, so that it opens from a disk.
 Why: browsers load no modules and fetch no files for a page that is itself a file.
 
-Browsers give back the samples of the web profile alone (8-bit H.264), and the player reads codec ``mcgv``. Whatever else a
-file holds is decoded and encoded anew at a Karni-Gotsman error that is small beside that of files, and the error that this
-adds is measured and reported.
+A codec knows which of its files browsers play (`gvpipe.registry.browser_obstacle`). Any other file is decoded and encoded anew
+at a Karni-Gotsman error that is small beside that of files. The error that this adds is measured and reported.
 """
 
 from __future__ import annotations
@@ -22,16 +21,15 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.atomic import atomic_path, output_error
-from gvpipe.codec import Codec, Progress
-from gvpipe.container.bitstream import Bitstream
+from gvpipe.codec import Progress
 from gvpipe.container.mp4 import write_file
 from gvpipe.errors import InputError, OutputError
 from gvpipe.player import Player
 from gvpipe.quality_scale import error_of, quality_of
+from gvpipe.rate_control.purposes import SERVES, WEB
 from gvpipe.rate_control.trials import Trial, Trials
-from gvpipe.registry import make_codec
+from gvpipe.registry import browser_obstacle, make_codec
 
-READS = ("mcgv", 3, "h264-8")  # codec, its highest version, profile: what src/mcgv/header.js reads
 SUFFIXES = (".html", ".htm")
 AXES = ("y", "z")
 QUALITY = 90.0  # of a conversion: KG 0.044, which makes the error of a file of quality 75 (KG 0.14) 5 % larger
@@ -47,8 +45,9 @@ class ExportReport:
         bytes: of the page.
         video_bytes: of the geometry video in it.
         converted: what the file was if browsers cannot read that, else "".
-        rmse_diag, max_diag: error that the conversion adds, fractions of the frame-0 bounding-box diagonal; 0 without one,
-            None if the diagonal is 0.
+        rmse_diag: root mean square error that the conversion adds, a fraction of the frame-0 bounding-box diagonal; 0 without
+            one, None if the diagonal is 0.
+        max_diag: the same of the largest error.
         kg: the same as Karni-Gotsman error, percent; None if the file's frames are a point each.
     """
 
@@ -78,7 +77,8 @@ def export_html(
         target: the ``.html`` to write; an older file is replaced once the new one is complete.
         up: the axis that stands upright in the first view, ``y`` or ``z``.
         quality: 0..100, of the conversion where there is one: the error that it may add (`gvpipe.quality_scale`); `QUALITY` if
-        None. progress: called with a stage's name and the part of it that is done.
+            None.
+        progress: called with a stage's name and the part of it that is done.
 
     Raises:
         InputError: there is no such file, or an argument cannot be used.
@@ -93,23 +93,25 @@ def export_html(
     if not os.path.isdir(target.parent):
         raise OutputError(f"cannot write {target}: no folder {target.parent}; create it first")
     player = Player(source)
-    if _is_readable(player.bitstream):
+    obstacle = browser_obstacle(player.bitstream)
+    if not obstacle:
         return _write_page(player.path, player.path, target, up)
     trial = _convert(player, QUALITY if quality is None else quality, progress)
-    if not _is_readable(trial.bitstream):
-        raise InputError(f"the web player reads {READS[0]} up to version {READS[1]} only; use an older gvpipe to convert")
+    remaining = browser_obstacle(trial.bitstream)
+    if remaining:
+        raise InputError(f"the web player does not read {remaining} yet; use an older gvpipe to convert")
     x, y, z = player.bitstream.origin
     with _scratch_file() as converted:
         write_file(replace(trial.bitstream, origin=(x, y, z)), converted)
         page = _write_page(player.path, converted, target, up)
     added = trial.errors
-    kind = _kind(player.bitstream)
-    return ExportReport(page.bytes, page.video_bytes, kind, added.rmse_diag, added.max_diag, added.kg)
+    return ExportReport(page.bytes, page.video_bytes, obstacle, added.rmse_diag, added.max_diag, added.kg)
 
 
 def _convert(player: Player, quality: float, progress: Progress | None) -> Trial:
     """Encode a file's frames for browsers, with no more error than the quality's where a few encodes reach that."""
-    codec: Codec = make_codec(READS[0], {"quality": quality})
+    name, settings = next(iter(SERVES[WEB].items()))
+    codec = make_codec(name, {**settings, "quality": quality})
     trials, allowed = Trials(codec, player.sequence(), None, progress), error_of(quality)
     tried: list[Trial] = []
     while len(tried) < MOST_ENCODES:
@@ -119,18 +121,6 @@ def _convert(player: Player, quality: float, progress: Progress | None) -> Trial
             break
         quality = quality_of(error_of(quality) * INSIDE * allowed / trial.errors.kg)
     return min(tried, key=lambda trial: trial.errors.kg or 0.0)
-
-
-def _is_readable(bitstream: Bitstream) -> bool:
-    codec, version, profile = READS
-    header = bitstream.header
-    frames = "transform" not in header  # not trajectory images
-    return bitstream.codec == codec and bitstream.version <= version and header.get("profile") == profile and frames
-
-
-def _kind(bitstream: Bitstream) -> str:
-    parts = [f"{key} {bitstream.header[key]}" for key in ("transform", "profile") if key in bitstream.header]
-    return ", ".join([bitstream.codec, *parts])
 
 
 def _write_page(name: str, video: str | os.PathLike[str], target: Path, up: str) -> ExportReport:

@@ -1,0 +1,18 @@
+"""Which ``mcgv`` bitstreams the web player decodes."""
+
+from __future__ import annotations
+
+from gvpipe.container.bitstream import Bitstream
+
+VERSION = 4  # the highest that src/mcgv/header.js reads
+PROFILE = "h264-8"  # the one that a browser gives back sample by sample
+
+
+def browser_obstacle(bitstream: Bitstream) -> str:
+    """Return what of an ``mcgv`` bitstream keeps browsers from playing it, in a few words; ``""`` if they play it."""
+    header = bitstream.header
+    if bitstream.version > VERSION:
+        return f"{bitstream.codec}, version {bitstream.version}"
+    if header.get("pictures") is False or ("transform" not in header and header.get("profile") == PROFILE):
+        return ""
+    return ", ".join([bitstream.codec, *(f"{key} {header[key]}" for key in ("transform", "profile") if key in header)])
