@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -406,12 +407,13 @@ def _code(sequence: MeshSequence, given: Codec | Sequence[Codec], target: Target
     """Encode, at the quality that meets the target, with the codec that does so in the smallest file."""
     if isinstance(given, Codec):
         if target is None:
-            return _Coded(given, encode_sequence(given, sequence, progress))
+            return _Coded(given, encode_sequence(given, sequence, progress).bitstream)
         choice = meet(target, given, sequence, progress)
     else:
         choice = choose_codec(given, sequence, target or default_target(given), progress)
     trial = choice.trial
-    return _Coded(trial.codec, trial.bitstream, choice.trials.check, choice.tried, choice.reason)
+    check = partial(choice.trials.check, trial.encoded.permutation)
+    return _Coded(trial.codec, trial.bitstream, check, choice.tried, choice.reason)
 
 
 def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progress) -> tuple[int, Bitstream]:

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, ClassVar, Protocol, Self, TypeVar, runtime_checkable
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol, Self, TypeVar, cast, runtime_checkable
 
 from gvpipe.arguments import did_you_mean
 from gvpipe.arrays import Float32, Int32, Integers
@@ -28,13 +29,13 @@ class Memo:
     An encoder wraps the stages that do not look at quality: ``mesh = memo("mesh", lambda: ...)`` works it out once. What is
     kept should be small beside the sequence; frames are read again instead.
 
-    `permutation` ``(V,)`` is the encoder's to set: the sequence's vertex for each vertex that the reader will return, so that
-    the result can be measured against its source.
+    Args:
+        is_shared: whether other encodes follow, as in a search for a quality.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, is_shared: bool = True) -> None:
+        self.is_shared = is_shared
         self._results: dict[str, Any] = {}
-        self.permutation: Integers | None = None
 
     def __call__(self, stage: str, work: Callable[[], Result]) -> Result:
         """Return the stage's result, from before if there is one."""
@@ -42,6 +43,19 @@ class Memo:
             self._results[stage] = work()
         result: Result = self._results[stage]
         return result
+
+
+@dataclass(frozen=True)
+class Encoded:
+    """What an encoder makes.
+
+    Args:
+        bitstream: for the container.
+        permutation: ``(V,)`` the sequence's vertex of each vertex that decoding returns, to measure one against the other.
+    """
+
+    bitstream: Bitstream
+    permutation: Integers
 
 
 @runtime_checkable
@@ -107,7 +121,7 @@ class Codec(Protocol):
         """0..100, higher is better; bytes and error follow it monotonically."""
         ...
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Encoded:
         """Code a sequence; ``memo`` is shared with encodes of the same sequence at another quality."""
         ...
 
@@ -145,6 +159,47 @@ class Settings:
         if getattr(self, name) not in choices:
             value = getattr(self, name)
             raise SettingError(f"{name} is {value!r}; one of {', '.join(choices)} is needed{did_you_mean(value, choices)}")
+
+
+class BaseCodec(Settings):
+    """Base of codecs' dataclasses: what every encode begins and ends with."""
+
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Encoded:
+        """Code a sequence.
+
+        Raises:
+            InputError: a frame cannot be read, or what else the codec refuses.
+        """
+        return self._encode(sequence, progress or _silent, memo or Memo(is_shared=False))
+
+    def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
+        raise NotImplementedError
+
+    def _bitstream(
+        self,
+        sequence: MeshSequence,
+        header: Mapping[str, Any],
+        sections: Mapping[str, bytes],
+        video: bytes = b"",
+        version: int | None = None,
+    ) -> Bitstream:
+        """The bitstream of a sequence; ``version`` is the oldest that reads it, None for the codec's own."""
+        codec = cast("type[Codec]", type(self))
+        return Bitstream(
+            codec=codec.id,
+            version=codec.version if version is None else version,
+            n_frames=sequence.n_frames,
+            n_vertices=sequence.n_vertices,
+            n_triangles=len(sequence.faces),
+            fps=float(sequence.fps),
+            header=dict(header),
+            sections=dict(sections),
+            video=video,
+        )
+
+
+def _silent(stage: str, done: float) -> None:
+    """Progress that nobody follows."""
 
 
 def check_name(key: str, names: Iterable[str], also: Iterable[str] = ()) -> None:

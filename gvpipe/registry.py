@@ -13,7 +13,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from gvpipe.arguments import did_you_mean
-from gvpipe.codec import Codec, FrameReader, Memo, Progress, check_name
+from gvpipe.codec import Codec, Encoded, FrameReader, Memo, Progress, check_name
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.corrections.bound import correct
 from gvpipe.errors import NewerVersion, SettingError
@@ -83,18 +83,18 @@ def browser_obstacle(bitstream: Bitstream) -> str:
 
 def encode_sequence(
     codec: Codec, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None
-) -> Bitstream:
-    """Code a sequence; where the codec lets it (`gvpipe.repeated_frames`), frames that repeat the one before are coded by a run
-    length.
+) -> Encoded:
+    """Code a sequence; where the codec lets it (`gvpipe.repeated_frames`), repeated frames are coded by a run length.
 
     Raises:
         InputError: what the codec raises.
     """
-    memo = memo or Memo()
+    memo = memo or Memo(is_shared=False)
     holds = memo("holds", lambda: find_holds(sequence)) if _is_held(codec) else None
     if holds is None:
         return codec.encode(sequence, progress, memo)
-    return add_holds(codec.encode(holds.distinct(sequence), progress, memo), holds, codec.version)
+    encoded = codec.encode(holds.distinct(sequence), progress, memo)
+    return Encoded(add_holds(encoded.bitstream, holds, codec.version), encoded.permutation)
 
 
 @functools.cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,8 +16,12 @@ import gvpipe
 from gvpipe.cli.commands import main
 from gvpipe.sequence import MeshSequence
 
-settings.register_profile("same", derandomize=True)  # the same examples in every run; --hypothesis-profile=default draws others
+# the same examples in every run, however busy the machine; --hypothesis-profile=default draws others
+settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
+if worker := os.environ.get("PYTEST_XDIST_WORKER"):
+    # numba replaces a function's index and its machine code one after the other, so processes that share them may mix them up
+    os.environ["NUMBA_CACHE_DIR"] = str(Path(__file__).parents[1] / ".pytest_cache" / f"numba-{worker}")
 FAST = {"preset": "ultrafast", "clusters": 3, "gop": 4}  # settings that cost little, for tests of anything but coding
 
 

@@ -26,6 +26,7 @@ FILES: dict[str, dict[str, Any]] = {  # several groups of pictures, with B-frame
 }
 LENGTHS = {"held": [2] * 13 + [14]}  # frames that each picture is shown for, 1 if not given
 DECODERS = {"webcodecs": "", "video": "delete window.VideoDecoder;"}
+pytestmark = pytest.mark.slow
 SEEN: dict[str, list[str]] = {}  # of each kind of file, what the first browser made of it
 
 

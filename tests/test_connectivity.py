@@ -87,7 +87,7 @@ def sorted_faces(faces):
 
 def check_round_trip(points, faces):
     for reorder in (False, True):
-        encoded = encode_base(points, faces, reorder)
+        encoded = encode_base(points, faces, reorder)[0]
         decoded = decode_base(encoded.mesh, encoded.order)
         decoded_points, decoded_faces = decoded.points, decoded.faces
         assert decoded_points.dtype == decoded_faces.dtype == np.int32
@@ -108,7 +108,7 @@ def test_round_trip(points, faces):
 
 @each_mesh
 def test_deterministic(points, faces):
-    first, second = encode_base(points, faces, False), encode_base(points, faces, False)
+    first, second = encode_base(points, faces, False)[0], encode_base(points, faces, False)[0]
     assert (first.mesh, first.order) == (second.mesh, second.order)
 
 
@@ -140,15 +140,15 @@ def test_draco_result_that_differs_is_not_trusted(monkeypatch):
 @pytest.mark.parametrize("name", ["tetrahedron", "open grid", "triangle soup", "shuffled grid"])
 def test_draco_carries_whole_ordinary_meshes(name):
     points, faces = MESHES[name]
-    _, n_loose_points, n_loose_faces, _ = base_mesh.HEADER.unpack_from(encode_base(points, faces, True).mesh)
+    _, n_loose_points, n_loose_faces, _ = base_mesh.HEADER.unpack_from(encode_base(points, faces, True)[0].mesh)
     assert (n_loose_points, n_loose_faces) == (0, 0)
 
 
 def test_walks_cost_little_and_random_orders_no_more_than_plain_indices():
     points, faces = grid(60)
-    assert 8 * len(encode_base(points, faces, False).order) < 1.5 * len(points)
+    assert 8 * len(encode_base(points, faces, False)[0].order) < 1.5 * len(points)
     points, faces = shuffled(grid(60))
-    assert 8 * len(encode_base(points, faces, False).order) < (np.log2(len(points)) + 0.2) * len(points)
+    assert 8 * len(encode_base(points, faces, False)[0].order) < (np.log2(len(points)) + 0.2) * len(points)
 
 
 @pytest.mark.parametrize(
@@ -163,14 +163,14 @@ def test_walks_cost_little_and_random_orders_no_more_than_plain_indices():
 )
 def test_encode_refuses(points, faces):
     with pytest.raises(InputError, match=r"lattice coordinates|faces index|three columns"):
-        encode_base(points, faces, False)
+        encode_base(points, faces, False)[0]
 
 
 @pytest.mark.parametrize(
     "name", ["tetrahedron", "open grid", "triangle soup", "unreferenced between", "duplicated faces", "one vertex"]
 )
 def test_every_truncated_prefix_is_refused(name):
-    encoded = encode_base(*MESHES[name], False)
+    encoded = encode_base(*MESHES[name], False)[0]
     for n_bytes in range(len(encoded.mesh)):
         with pytest.raises(CorruptFile, match="corrupt|truncated"):
             decode_base(encoded.mesh[:n_bytes], b"")
@@ -196,7 +196,7 @@ def decode_or_refuse(mesh, order):
 
 @pytest.mark.parametrize("name", ["tetrahedron", "open grid", "triangle soup", "duplicated faces", "unreferenced between"])
 def test_changed_bytes_do_no_harm(name):
-    encoded = encode_base(*MESHES[name], False)
+    encoded = encode_base(*MESHES[name], False)[0]
     random = np.random.default_rng(0)
     for _ in range(400):
         for mesh, order in ((True, False), (False, True)):

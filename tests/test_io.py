@@ -214,7 +214,7 @@ COLORS = np.random.default_rng(1).integers(0, 256, (37, 4), np.uint8) | np.array
 
 
 @pytest.mark.parametrize("suffix", ["obj", "ply", "off", "glb"])
-@pytest.mark.parametrize("kept", [{"uv"}, {"color"}, {"uv", "color"}], ids="+".join)
+@pytest.mark.parametrize("kept", [{"uv"}, {"color"}, {"uv", "color"}], ids=lambda kept: "+".join(sorted(kept)))
 def test_vertex_attributes(tmp_path: Path, suffix: str, kept: set[str]) -> None:
     attributes = {name: values for name, values in (("uv", UV_VERTEX), ("color", COLORS)) if name in kept}
     sequence = grid(attributes=attributes)

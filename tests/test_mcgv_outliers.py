@@ -37,7 +37,7 @@ def jumping(n_frames: int = 30) -> tuple[MeshSequence, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def stream() -> Bitstream:
-    return Mcgv(quality=90, **FAST).encode(jumping()[0])
+    return Mcgv(quality=90, **FAST).encode(jumping()[0]).bitstream
 
 
 @pytest.mark.parametrize(
@@ -54,8 +54,8 @@ def stream() -> Bitstream:
 def test_outliers_come_back_and_coarsen_nothing(settings: dict[str, Any]) -> None:
     sequence, off = jumping()
     codec = Mcgv(**{**FAST, **settings})
-    stream = codec.encode(sequence)
-    assert stream.header["outliers"] is True and stream.version == 3
+    stream = codec.encode(sequence).bitstream
+    assert stream.header["outliers"] is True and stream.version == 4
     groups = MovesReader(stream.section(SECTION), 30, 144, SECTION)
     assert groups.group == 8
     error = np.abs(open_reader(stream).read(0, 30) - sequence.positions[:]).max(axis=2)
@@ -70,7 +70,7 @@ def test_outliers_come_back_and_coarsen_nothing(settings: dict[str, Any]) -> Non
 
 def test_files_without_outliers_do_not_tell_of_any() -> None:
     for prediction in ("affine", "blended"):
-        stream = Mcgv(quality=40, prediction=prediction, **FAST).encode(waving(12, 10))
+        stream = Mcgv(quality=40, prediction=prediction, **FAST).encode(waving(12, 10)).bitstream
         assert "outliers" not in stream.header and SECTION not in stream.sections
 
 
@@ -79,7 +79,7 @@ def test_no_quality_is_out_of_reach() -> None:
     sequence, _ = jumping(16)
     errors = []
     for quality in (75, 85, 95, 100):
-        frames = open_reader(Mcgv(quality=quality, **FAST).encode(sequence)).read(0, 16)
+        frames = open_reader(Mcgv(quality=quality, **FAST).encode(sequence).bitstream).read(0, 16)
         errors.append(float(np.sqrt(np.mean((frames - sequence.positions[:]) ** 2))))
     assert all(fine < 0.8 * coarse for coarse, fine in pairwise(errors)), errors
 
@@ -98,7 +98,9 @@ def test_frames_that_leap_beyond_all_measure() -> None:
     sequence = waving(12, 8)
     positions = np.array(sequence.positions[:])
     positions[5, ::3] *= np.float32(1e14)
-    frames = open_reader(Mcgv(quality=100, **FAST).encode(dataclasses.replace(sequence, positions=positions))).read(0, 8)
+    frames = open_reader(Mcgv(quality=100, **FAST).encode(dataclasses.replace(sequence, positions=positions)).bitstream).read(
+        0, 8
+    )
     assert np.abs(frames - positions).max() < 0.02 * np.abs(positions).max()
 
 
@@ -137,7 +139,7 @@ def test_headers_and_sections_that_do_not_fit(stream: Bitstream) -> None:
         open_reader(dataclasses.replace(stream, sections=bare))
     with pytest.raises(CorruptFile, match="outliers"):
         open_reader(dataclasses.replace(stream, version=1))
-    images = Mcgv(prediction="blended", transform="klt", **FAST).encode(waving(8, 6))
+    images = Mcgv(prediction="blended", transform="klt", **FAST).encode(waving(8, 6)).bitstream
     header = json.loads(json.dumps({**images.header, "outliers": True}))
     with pytest.raises(CorruptFile, match="outliers"):
         open_reader(dataclasses.replace(images, header=header, sections={**images.sections, SECTION: section}))

@@ -38,7 +38,7 @@ def decode(stream: Bitstream) -> np.ndarray:
 @pytest.mark.parametrize("settings", ROUTES, ids=str)
 def test_points_stay_whole_and_still_vertices_still(settings: dict[str, Any]) -> None:
     sequence = patched()
-    stream = Mcgv(**{**FAST, **settings}).encode(sequence)
+    stream = Mcgv(**{**FAST, **settings}).encode(sequence).bitstream
     header = Header.of(stream)
     surface = read_surface(stream, header)
     frames, source = decode(stream), np.asarray(sequence.positions[:])
@@ -57,7 +57,7 @@ def test_points_stay_whole_and_still_vertices_still(settings: dict[str, Any]) ->
 @pytest.mark.parametrize("settings", ROUTES, ids=str)
 def test_of_what_never_moves_one_point_has_samples(settings: dict[str, Any]) -> None:
     sequence = patched(still=1.0)
-    stream = Mcgv(**{**FAST, **settings}).encode(sequence)
+    stream = Mcgv(**{**FAST, **settings}).encode(sequence).bitstream
     header = Header.of(stream)
     assert read_surface(stream, header).n_slots == 1
     frames = decode(stream)
@@ -66,7 +66,7 @@ def test_of_what_never_moves_one_point_has_samples(settings: dict[str, Any]) -> 
 
 def test_one_frame_has_samples_for_all_points() -> None:
     sequence = MeshSequence(np.asarray(patched().positions[:1]), patched().faces)
-    stream = Mcgv(**FAST).encode(sequence)
+    stream = Mcgv(**FAST).encode(sequence).bitstream
     assert "still" not in stream.sections
     assert read_surface(stream, Header.of(stream)).n_slots == len(np.unique(find_points(sequence)))
 
@@ -74,7 +74,7 @@ def test_one_frame_has_samples_for_all_points() -> None:
 @pytest.mark.parametrize("settings", [ROUTES[0], ROUTES[2], ROUTES[5]], ids=str)
 def test_flags_that_do_not_fit_are_corrupt(settings: dict[str, Any]) -> None:
     """Other points than those that the other sections tell of, all points, or bytes that are no flags."""
-    stream = Mcgv(**{**FAST, **settings}).encode(patched())
+    stream = Mcgv(**{**FAST, **settings}).encode(patched()).bitstream
     n_points = len(np.unique(find_points(patched())))
     assert decode(stream).shape == (12, stream.n_vertices, 3)
     for flags in (np.ones(n_points, bool), np.arange(n_points) % 2 == 0, np.zeros(n_points, bool)):
@@ -91,7 +91,7 @@ def test_flags_that_do_not_fit_are_corrupt(settings: dict[str, Any]) -> None:
 
 def test_planes_must_hold_the_slots() -> None:
     """Not the vertices: those are more."""
-    stream = Mcgv(**FAST, prediction="blended").encode(patched(24, 4))
+    stream = Mcgv(**FAST, prediction="blended").encode(patched(24, 4)).bitstream
     assert 256 < stream.header["width"] * stream.header["height"] < stream.n_vertices
     assert np.isfinite(decode(stream)).all()
     header = Header.of(stream)
@@ -101,7 +101,7 @@ def test_planes_must_hold_the_slots() -> None:
 
 def test_components_are_limited_by_slots(monkeypatch: pytest.MonkeyPatch) -> None:
     """By what an encoder counts: with copies there are more vertices."""
-    stream = Mcgv(**FAST, prediction="blended", transform="klt").encode(patched())
+    stream = Mcgv(**FAST, prediction="blended", transform="klt").encode(patched()).bitstream
     header = Header.of(stream)
     assert header.images is not None
     most = max(header.images.components) * read_surface(stream, header).n_slots

@@ -20,7 +20,7 @@ from scipy.sparse.linalg import spsolve
 from sequences import waving
 
 import gvpipe
-from gvcodecs.mcgv import Mcgv
+from gvcodecs.mcgv import Mcgv, encoder
 from gvcodecs.mcgv.layout.coding import (
     decode_clusters,
     decode_pixels,
@@ -38,6 +38,7 @@ from gvcodecs.mcgv.motion.affine_coding import decode_transforms, dequantise, en
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
 from gvcodecs.mcgv.motion.segmentation import LocalAffineFit, segment
 from gvcodecs.mcgv.pictures.quantiser import LEVELS, OUTLIERS, QP_STEP, Magnitudes, choose_quantiser
+from gvpipe.container import bitstream
 from gvpipe.container.bitstream import ENTRY, MAGIC, PREFIX, Bitstream, pack_payload, unpack_payload
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
@@ -637,7 +638,7 @@ def test_hostile_headers() -> None:
 
 def test_hostile_codec_headers(sequence: MeshSequence) -> None:
     """A header that lies, with every checksum right: CorruptFile when it opens or when a frame is read, and no NaN ever."""
-    stream = Mcgv(preset="ultrafast", clusters=3, gop=4).encode(sequence)
+    stream = Mcgv(preset="ultrafast", clusters=3, gop=4).encode(sequence).bitstream
     wanted = open_reader(stream).read(0, 11)
     assert np.isfinite(wanted).all()
     for key, value in stream.header.items():
@@ -674,7 +675,7 @@ def test_any_float32_scale(sequence: MeshSequence, scale: float) -> None:
     """A model of any size that float32 holds comes back at the same relative error."""
     codec = Mcgv(preset="ultrafast", clusters=3, gop=4)
     scaled = MeshSequence((sequence.read(0, 11) * np.float64(scale)).astype(np.float32), sequence.faces)
-    back = open_reader(codec.encode(scaled)).read(0, 11)
+    back = open_reader(codec.encode(scaled).bitstream).read(0, 11)
     kg = measure_errors(sequence, lambda start, stop: (back[start:stop].astype(float) / scale).astype(np.float32)).kg
     assert kg is not None and 0.8 * error_of(75) < kg < 1.2 * error_of(75)
 
@@ -741,13 +742,25 @@ def test_weld() -> None:
     assert all(f == np.flatnonzero((points == points[f]).all(axis=1))[0] for f in first)
 
 
-def test_more_segments_than_sections_are_not_written(tmp_path: Path) -> None:
-    """A bitstream has 4096 sections at most; segments then get longer than was asked for."""
-    away = np.linspace(0, 1, 4200, dtype=np.float32)[:, None, None]
+@pytest.mark.parametrize(
+    ("n_frames", "segments", "n_sections"),
+    [(60, 40, 50), pytest.param(4200, encoder.MOST_SEGMENTS, bitstream.MAX_SECTIONS, marks=pytest.mark.slow)],
+)
+def test_more_segments_than_sections_are_not_written(
+    n_frames: int, segments: int, n_sections: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bitstream has 4096 sections at most; segments then get longer than was asked for.
+
+    Small limits, no farther apart, stand for the real ones.
+    """
+    assert n_sections - segments <= bitstream.MAX_SECTIONS - encoder.MOST_SEGMENTS
+    monkeypatch.setattr(encoder, "MOST_SEGMENTS", segments)
+    monkeypatch.setattr(bitstream, "MAX_SECTIONS", n_sections)
+    away = np.linspace(0, 1, n_frames, dtype=np.float32)[:, None, None]
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
     sequence = MeshSequence(square + away, np.array([[0, 1, 2], [0, 2, 3]], np.int32), 30.0)
     gvpipe.encode(sequence, tmp_path / "a.mp4", segment=1, clusters=1, preset="ultrafast")
-    assert gvpipe.decode(tmp_path / "a.mp4").n_frames == 4200
+    assert gvpipe.decode(tmp_path / "a.mp4").n_frames == n_frames
 
 
 def test_lattices_too_fine_for_halves_are_corrupt() -> None:
@@ -760,9 +773,9 @@ def test_lattices_too_fine_for_halves_are_corrupt() -> None:
 def test_b_frames_only_where_they_pay() -> None:
     """Nearly empty pictures go without: tables that tell their order would cost more than they save."""
     sequence = waving(16, 64)
-    coarse = Mcgv(prediction="blended", quality=40).encode(sequence).video
+    coarse = Mcgv(prediction="blended", quality=40).encode(sequence).bitstream.video
     assert b"ctts" not in coarse
     rng = np.random.default_rng(0)
     noisy = np.asarray(sequence.positions[:]) + rng.normal(0, 0.02, (64, sequence.n_vertices, 3))
-    fine = Mcgv(prediction="affine", quality=75).encode(MeshSequence(noisy.astype(np.float32), sequence.faces)).video
+    fine = Mcgv(prediction="affine", quality=75).encode(MeshSequence(noisy.astype(np.float32), sequence.faces)).bitstream.video
     assert b"ctts" in fine

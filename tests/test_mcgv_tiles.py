@@ -123,7 +123,7 @@ def test_files_of_tiles_decode(settings: dict[str, object], tmp_path: Path) -> N
     """As exact as files of halves; charts are sent, pixels are not."""
     sequence, errors = waving(14, 20), []
     for placement in ("tiles", "halves"):
-        bitstream = Mcgv(prediction="blended", placement=placement, **settings).encode(sequence)  # type: ignore[arg-type]
+        bitstream = Mcgv(prediction="blended", placement=placement, **settings).encode(sequence).bitstream  # type: ignore[arg-type]
         assert ("charts" in bitstream.sections) == (placement == "tiles") and "pixels" not in bitstream.sections
         decoded = open_reader(bitstream).read(0, 20)
         source = np.asarray(sequence.positions[:])
@@ -142,7 +142,7 @@ def test_awkward_sequences_as_tiles(sequence: gvpipe.MeshSequence, tmp_path: Pat
 
 
 def test_headers_of_tiles_are_checked() -> None:
-    bitstream = Mcgv(prediction="blended", placement="tiles", preset="ultrafast").encode(waving(10, 4))
+    bitstream = Mcgv(prediction="blended", placement="tiles", preset="ultrafast").encode(waving(10, 4)).bitstream
     for changed in ({"prediction": "affine"}, {"block": 4}, {"placement": "tile"}, {"placement": "charts"}):
         with pytest.raises(CorruptFile), contextlib.closing(contextlib.ExitStack()):
             open_reader(dataclasses.replace(bitstream, header={**bitstream.header, **changed})).read(0, 1)
@@ -153,6 +153,7 @@ def test_tiles_are_for_blended_prediction() -> None:
         Mcgv(prediction="affine", placement="tiles")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["walking_cat", "fox_run", "morph_wave"])
 def test_tiles_cost_little_more_than_halves(name: str) -> None:
     """On real sequences: within 5 % of the bytes of halves at equal error, where charts take 14 to 27 % more.
@@ -164,7 +165,7 @@ def test_tiles_cost_little_more_than_halves(name: str) -> None:
         pytest.skip("no ../shared/data")
     sequence, sizes = gvpipe.read(path), []
     for placement in ("halves", "tiles"):
-        bitstream = Mcgv(prediction="blended", placement=placement).encode(sequence)
+        bitstream = Mcgv(prediction="blended", placement=placement).encode(sequence).bitstream
         error = root_mean_square(sequence, open_reader(bitstream))
         sizes.append((sum(map(len, bitstream.sections.values())) + len(bitstream.video)) * error**0.7)
     assert sizes[1] < 1.05 * sizes[0]

@@ -18,7 +18,7 @@ from gvpipe.metrics import comparison
 from gvpipe.metrics.comparison import Comparison, compare
 from gvpipe.sequence import MeshSequence
 
-SAMPLES = Path("/work/shared/data")
+SAMPLES = Path(__file__).parents[2] / "shared" / "data"
 SEEDS = st.integers(0, 2**32 - 1)
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], np.int32)
 VALUES = ("rmse", "rmse_diag", "max", "max_diag", "kg", "da", "sted", "sted_spatial", "sted_temporal", "hausdorff")

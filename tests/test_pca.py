@@ -69,7 +69,7 @@ SHEET, TUBE = grid(14), tube(10, 24)
 @pytest.mark.parametrize("shape", [SHEET, TUBE], ids=["sheet", "tube"])
 def test_round_trip_meets_the_error_aimed_at(shape: tuple[np.ndarray, np.ndarray], predictor: str) -> None:
     sequence = make(*shape)
-    bitstream = Pca(quality=60, predictor=predictor).encode(sequence)
+    bitstream = Pca(quality=60, predictor=predictor).encode(sequence).bitstream
     reader = Pca.reader(bitstream)
     assert kg(sequence.read(0, 12), reader.read(0, 12)) < 1.2 * error_of(60)
     assert rotated(reader.faces) == rotated(sequence.faces)
@@ -79,14 +79,14 @@ def test_error_falls_and_bytes_rise_with_quality() -> None:
     sequence = make(*TUBE)
     results = []
     for quality in (0, 25, 50, 75, 100):
-        bitstream = Pca(quality=quality).encode(sequence)
+        bitstream = Pca(quality=quality).encode(sequence).bitstream
         results.append((sum(map(len, bitstream.sections.values())), -kg(sequence.read(0, 12), decode(bitstream))))
     assert results == sorted(results)
 
 
 def test_reorder_gives_the_same_frames_in_another_order() -> None:
     sequence = make(*TUBE)
-    kept, free = Pca().encode(sequence), Pca(reorder=True).encode(sequence)
+    kept, free = Pca().encode(sequence).bitstream, Pca(reorder=True).encode(sequence).bitstream
     assert not free.section("order")
     a, b = decode(kept), decode(free)
     order_a, order_b = np.lexsort(np.round(a[0], 3).T), np.lexsort(np.round(b[0], 3).T)
@@ -95,12 +95,12 @@ def test_reorder_gives_the_same_frames_in_another_order() -> None:
 
 def test_same_input_same_bytes() -> None:
     sequence = make(*SHEET)
-    assert Pca().encode(sequence).sections == Pca().encode(sequence).sections
+    assert Pca().encode(sequence).bitstream.sections == Pca().encode(sequence).bitstream.sections
 
 
 def test_any_range_of_frames_equals_the_whole_across_segments() -> None:
     sequence = make(*SHEET, n_frames=23)
-    bitstream = Pca(segment=7).encode(sequence)
+    bitstream = Pca(segment=7).encode(sequence).bitstream
     assert sum(name.startswith("basis") for name in bitstream.sections) == 4
     whole, reader = decode(bitstream), Pca.reader(bitstream)
     for start, stop in ((0, 1), (22, 23), (4, 13), (11, 12), (0, 23), (5, 5)):
@@ -109,7 +109,7 @@ def test_any_range_of_frames_equals_the_whole_across_segments() -> None:
 
 def test_levels_of_detail_follow_the_same_motion() -> None:
     sequence = make(*TUBE)
-    bitstream = Pca(quality=80).encode(sequence)
+    bitstream = Pca(quality=80).encode(sequence).bitstream
     reader = PcaReader(bitstream)
     full, counts = reader.read(0, 12), reader.levels
     assert counts[0] == 240 and counts == sorted(counts, reverse=True) and counts[-1] < 120
@@ -167,7 +167,7 @@ def test_awkward_meshes_come_back(name: str, n_frames: int) -> None:
     sequence = make(*AWKWARD[name], n_frames=n_frames)
     original = sequence.read(0, n_frames)
     for predictor in ("kalman", "rbf"):
-        bitstream = Pca(quality=70, predictor=predictor).encode(sequence)
+        bitstream = Pca(quality=70, predictor=predictor).encode(sequence).bitstream
         reader = PcaReader(bitstream)
         spread = np.linalg.norm(original - original.mean(axis=1, keepdims=True), axis=2)
         error = np.linalg.norm(reader.read(0, n_frames) - original, axis=2)
@@ -188,24 +188,24 @@ def _canonical(faces: np.ndarray) -> list[list[int]]:
 def test_still_and_collapsed_sequences_come_back() -> None:
     points, faces = SHEET
     still = MeshSequence(np.repeat(points[None], 30, axis=0), faces)
-    bitstream = Pca().encode(still)
+    bitstream = Pca().encode(still).bitstream
     assert kg(still.read(0, 30), decode(bitstream)) < 0.15
     assert sum(map(len, bitstream.sections.values())) < 2500
     point = MeshSequence(np.full((5, len(points), 3), 7.5), faces)
-    assert np.abs(decode(Pca().encode(point)) - 7.5).max() < 0.01
+    assert np.abs(decode(Pca().encode(point).bitstream) - 7.5).max() < 0.01
     origin = MeshSequence(np.zeros((5, len(points), 3)), faces)
-    assert np.abs(decode(Pca().encode(origin))).max() < 0.01
+    assert np.abs(decode(Pca().encode(origin).bitstream)).max() < 0.01
 
 
 def test_a_soup_costs_little_more_than_its_surface() -> None:
     whole, torn = make(*SHEET), make(*soup(SHEET))
-    sizes = [len(Pca(reorder=True).encode(s).section("coefficients.0")) for s in (whole, torn)]
+    sizes = [len(Pca(reorder=True).encode(s).bitstream.section("coefficients.0")) for s in (whole, torn)]
     assert sizes[1] < 1.1 * sizes[0]
 
 
 def test_components_setting_limits_the_basis() -> None:
     sequence = make(*TUBE)
-    few, many = (Pca(quality=60, components=n).encode(sequence) for n in (2, 30))
+    few, many = (Pca(quality=60, components=n).encode(sequence).bitstream for n in (2, 30))
     assert len(few.section("basis.0")) < len(many.section("basis.0"))
 
 
@@ -219,7 +219,7 @@ def test_settings_are_checked() -> None:
 def test_perturbed_predictions_hardly_move_vertices(predictor: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """DESIGN 6: 1e-12 in every prior weight moves no vertex by more than a thousandth of a step."""
     sequence = make(*TUBE, n_frames=20)
-    bitstream = Pca(quality=80, predictor=predictor).encode(sequence)
+    bitstream = Pca(quality=80, predictor=predictor).encode(sequence).bitstream
     clean = Pca.reader(bitstream).read(0, 20).astype(np.float64)
     original = gvpipe.trajectory.prediction.predict_rows
 
@@ -233,7 +233,7 @@ def test_perturbed_predictions_hardly_move_vertices(predictor: str, monkeypatch:
 
 
 def test_damage_is_noticed_or_harmless() -> None:
-    bitstream = Pca(quality=40, reorder=False).encode(make(*SHEET, n_frames=5))
+    bitstream = Pca(quality=40, reorder=False).encode(make(*SHEET, n_frames=5)).bitstream
     for name, data in bitstream.sections.items():
         for length in {0, 1, len(data) // 2, len(data) - 1} - ({0} if name == "order" else set()):  # no order: reordered
             with pytest.raises(FormatError):
@@ -273,11 +273,11 @@ def test_levels_of_non_manifold_meshes_hold_no_degenerate_triangle() -> None:
 def test_a_cloud_of_points_round_trips() -> None:
     points = np.random.default_rng(2).random((4000, 3))
     sequence = make(points, np.zeros((0, 3), np.int32), 3)
-    assert kg(np.asarray(sequence.positions), decode(Pca().encode(sequence))) < 0.2
+    assert kg(np.asarray(sequence.positions), decode(Pca().encode(sequence).bitstream)) < 0.2
 
 
 def test_counts_beyond_reason_are_refused_before_allocation() -> None:
-    bitstream = Pca().encode(make(*grid(5)))
+    bitstream = Pca().encode(make(*grid(5))).bitstream
     huge = dataclasses.replace(bitstream, n_frames=1 << 24, header={**bitstream.header})
     with pytest.raises(FormatError):
         PcaReader(huge).read(0, 1)

@@ -18,7 +18,6 @@ from gvcodecs.pdct.delta_coding import DeltaDecoder, DeltaEncoder, Layout
 from gvcodecs.pdct.labels import decode_labels, encode_labels
 from gvcodecs.pdct.local_frames import local_frames
 from gvcodecs.pdct.seed_coding import decode_seeds, encode_seeds
-from gvpipe.codec import Memo
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor
 from gvpipe.errors import CorruptFile, FormatError, GvpipeError, InputError, NotGeometryVideo, TruncatedFile
@@ -115,20 +114,20 @@ def test_deltas_come_back(scale: float) -> None:
 
 def test_errors_do_not_grow_within_a_clip() -> None:
     sequence = waving(14, 120)
-    decoded = decode(Pdct(segment=120).encode(sequence))
+    decoded = decode(Pdct(segment=120).encode(sequence).bitstream)
     per_frame = np.sqrt(((sequence.read(0, 120) - decoded) ** 2).sum(axis=2).mean(axis=1))
     assert per_frame[80:].max() < 1.5 * per_frame[:40].max()
 
 
 def test_rigid_motion_costs_next_to_nothing() -> None:
     sequence = two_plates()
-    more, fewer = (sum(map(len, Pdct(clusters=k).encode(sequence).sections.values())) for k in (1, 2))
+    more, fewer = (sum(map(len, Pdct(clusters=k).encode(sequence).bitstream.sections.values())) for k in (1, 2))
     assert fewer < 0.9 * more
 
 
 def test_fewer_kept_coefficients_cost_less_and_lose_more() -> None:
     sequence = waving(20, 20)
-    coded = [Pdct(kept=kept, clusters=4).encode(sequence) for kept in (0.02, 0.1, 0.4, 1.0)]
+    coded = [Pdct(kept=kept, clusters=4).encode(sequence).bitstream for kept in (0.02, 0.1, 0.4, 1.0)]
     sizes = [len(b.sections["clip.0"]) for b in coded]
     errors = [error(sequence, decode(b)) for b in coded]
     assert sizes == sorted(sizes)
@@ -138,7 +137,7 @@ def test_fewer_kept_coefficients_cost_less_and_lose_more() -> None:
 def test_the_seed_triangles_keep_their_precision() -> None:
     """At the coarsest quality, some vertices (the seeds) are still within half a step of 16 bits."""
     sequence = waving()
-    decoded = decode(Pdct(quality=0).encode(sequence))
+    decoded = decode(Pdct(quality=0).encode(sequence).bitstream)
     extent = np.ptp(sequence.read(0, 40), axis=(0, 1)).max()
     worst = np.abs(sequence.read(0, 40) - decoded).max(axis=(0, 2))
     assert (worst < 0.51 * extent / 65535 + 1e-6).sum() >= 3 * 15
@@ -168,7 +167,7 @@ def test_a_stream_aims_at_about_the_error_of_a_file() -> None:
     sequence = waving(14, 24)
     for quality in (50, 75):
         frames = np.stack(list(StreamReader().feed(stream(sequence, segment=12, quality=quality))))
-        assert 0.5 < error(sequence, frames) / error(sequence, decode(Pdct(quality=quality).encode(sequence))) < 2
+        assert 0.5 < error(sequence, frames) / error(sequence, decode(Pdct(quality=quality).encode(sequence).bitstream)) < 2
 
 
 def soup(sequence: MeshSequence) -> MeshSequence:
@@ -181,15 +180,14 @@ def soup(sequence: MeshSequence) -> MeshSequence:
 @pytest.mark.parametrize("reorder", [False, True])
 def test_vertices_of_one_trajectory_are_one_point(reorder: bool) -> None:
     one = waving(14, 16)
-    sequence, memo = soup(one), Memo()
-    bitstream = Pdct(reorder=reorder).encode(sequence, memo=memo)
-    assert memo.permutation is not None
-    own = sequence.reordered(memo.permutation, sequence.faces)
+    sequence = soup(one)
+    encoded = Pdct(reorder=reorder).encode(sequence)
+    bitstream, own = encoded.bitstream, sequence.reordered(encoded.permutation, sequence.faces)
     decoded, points = decode(bitstream), find_points(own)
     assert points.max() + 1 == one.n_vertices + 1
     members = np.unique(points, return_index=True)[1]
     assert np.array_equal(decoded, decoded[:, members[points]])
-    welded = Pdct(reorder=reorder).encode(one)
+    welded = Pdct(reorder=reorder).encode(one).bitstream
     assert len(bitstream.section("clip.0")) < 1.1 * len(welded.section("clip.0"))
 
 
@@ -277,7 +275,7 @@ def test_the_sample_runs(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
 
 def test_hostile_clips_raise_package_errors() -> None:
     sequence = waving(8, 12)
-    bitstream = Pdct().encode(sequence)
+    bitstream = Pdct().encode(sequence).bitstream
     clip = bitstream.sections["clip.0"]
     rng = np.random.default_rng(2)
     for _ in range(200):
@@ -294,12 +292,12 @@ def test_hostile_clips_raise_package_errors() -> None:
 
 def test_clip_names_the_frames_per_clip() -> None:
     sequence = waving(6, 20)
-    assert Pdct(clip=8).encode(sequence).sections == Pdct(segment=8).encode(sequence).sections
+    assert Pdct(clip=8).encode(sequence).bitstream.sections == Pdct(segment=8).encode(sequence).bitstream.sections
 
 
 def test_a_frame_costs_one_clip(monkeypatch: pytest.MonkeyPatch) -> None:
     """Sections of other clips are not looked at."""
-    bitstream = Pdct(clip=8).encode(waving(6, 20))
+    bitstream = Pdct(clip=8).encode(waving(6, 20)).bitstream
     wanted: list[str] = []
     plain = Bitstream.section
     monkeypatch.setattr(Bitstream, "section", lambda self, name: (wanted.append(name), plain(self, name))[1])

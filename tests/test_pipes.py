@@ -6,14 +6,17 @@ import io
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import gvpipe
+from gvpipe.cli import main
 from gvpipe.sequence import MeshSequence
 
+Piped = Callable[..., tuple[int, bytes, str]]
 OPTIONS = ("--set", "preset=ultrafast", "--set", "clusters=3", "--set", "gop=4")
 
 
@@ -21,6 +24,22 @@ def gvpipe_process(*arguments: object, given: bytes = b"") -> tuple[int, bytes, 
     """Status, standard output and standard error of the real process."""
     done = subprocess.run([sys.executable, "-m", "gvpipe", *map(str, arguments)], input=given, capture_output=True)
     return done.returncode, done.stdout, done.stderr.decode()
+
+
+@pytest.fixture
+def piped(capfdbinary: pytest.CaptureFixture[bytes], monkeypatch: pytest.MonkeyPatch) -> Piped:
+    """The same in this process, ten times as fast."""
+
+    def call(*arguments: object, given: bytes = b"") -> tuple[int, bytes, str]:
+        monkeypatch.setattr(sys, "argv", ["gvpipe", *map(str, arguments)])
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(given)))
+        capfdbinary.readouterr()
+        with pytest.raises(SystemExit) as stopped:
+            main()
+        out, err = capfdbinary.readouterr()
+        return int(stopped.value.code or 0), out, err.decode()
+
+    return call
 
 
 @pytest.fixture
@@ -42,21 +61,21 @@ def test_there_and_back(npz: Path, video: Path, tmp_path: Path) -> None:
         assert archive["vertices"].shape == (11, 72, 3)
 
 
-def test_json_goes_beside(npz: Path, tmp_path: Path) -> None:
-    status, encoded, err = gvpipe_process("encode", npz, "-", *OPTIONS, "--json")
+def test_json_goes_beside(piped: Piped, npz: Path, tmp_path: Path) -> None:
+    status, encoded, err = piped("encode", npz, "-", *OPTIONS, "--json")
     assert status == 0 and json.loads(err)["bytes"] == len(encoded)
-    status, encoded, err = gvpipe_process("encode", npz, "-", *OPTIONS, "--quiet")
+    status, encoded, err = piped("encode", npz, "-", *OPTIONS, "--quiet")
     assert status == 0 and err == "" and encoded[4:8] == b"ftyp"
-    status, out, err = gvpipe_process("encode", "-", tmp_path / "o.mp4", *OPTIONS, "--json", given=npz.read_bytes())
+    status, out, err = piped("encode", "-", tmp_path / "o.mp4", *OPTIONS, "--json", given=npz.read_bytes())
     assert status == 0 and err == "" and json.loads(out)["frames"] == 11
 
 
-def test_videos_and_archives_are_told_apart(npz: Path, video: Path) -> None:
-    status, out, _ = gvpipe_process("info", "-", "--json", given=video.read_bytes())
+def test_videos_and_archives_are_told_apart(piped: Piped, npz: Path, video: Path) -> None:
+    status, out, _ = piped("info", "-", "--json", given=video.read_bytes())
     assert status == 0 and json.loads(out)["frames"] == 11
-    status, out, _ = gvpipe_process("compare", "-", video, "--json", given=npz.read_bytes())
+    status, out, _ = piped("compare", "-", video, "--json", given=npz.read_bytes())
     assert status == 0 and json.loads(out)["max"] > 0
-    status, out, _ = gvpipe_process("compare", npz, "-", "--json", given=video.read_bytes())
+    status, out, _ = piped("compare", npz, "-", "--json", given=video.read_bytes())
     assert status == 0 and json.loads(out)["max"] > 0
 
 
@@ -71,15 +90,15 @@ def test_videos_and_archives_are_told_apart(npz: Path, video: Path) -> None:
         (("decode", "-", "-", "--start", 3), b"video", "standard input"),
     ],
 )
-def test_bad_input(arguments: tuple[object, ...], given: bytes, words: str) -> None:
+def test_bad_input(piped: Piped, arguments: tuple[object, ...], given: bytes, words: str) -> None:
     """One line that names the stream and not a temporary file; nothing goes into the pipe."""
-    status, out, err = gvpipe_process(*arguments, given=given)
+    status, out, err = piped(*arguments, given=given)
     assert status == 1 and out == b"" and err.count("\n") == 1 and err.startswith("Error: ")
     assert words in err and "/tmp" not in err
 
 
-def test_one_standard_input() -> None:
-    status, _, err = gvpipe_process("compare", "-", "-")
+def test_one_standard_input(piped: Piped) -> None:
+    status, _, err = piped("compare", "-", "-")
     assert status == 2 and "one standard input" in err
 
 

@@ -31,7 +31,7 @@ def canonical(faces: np.ndarray) -> list[list[int]]:
 @pytest.mark.parametrize("seed", range(25))
 def test_any_mesh_comes_back(seed: int, reorder: bool) -> None:
     faces, points = random_mesh(seed)
-    coded = encode_mesh(faces, points, reorder)
+    coded = encode_mesh(faces, points, reorder)[0]
     mesh = decode_mesh(coded.mesh, coded.order, 1 << 20)
     assert canonical(coded.permutation[mesh.faces]) == canonical(faces)
     assert np.array_equal(mesh.points[mesh.faces], mesh.point_faces)

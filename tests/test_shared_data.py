@@ -13,6 +13,7 @@ DATA = Path(__file__).parents[2] / "shared" / "data"
 NAMES = sorted(path.stem for path in DATA.glob("*.npz"))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not NAMES, reason="no ../shared/data")
 @pytest.mark.parametrize("image", ["h264", "jpeg"])
 @pytest.mark.parametrize("name", NAMES)

@@ -13,7 +13,7 @@ import pytest
 from sequences import awkward, held, partly_still, waving
 
 import gvpipe
-from gvpipe.codec import GroupReader, LevelReader, Memo
+from gvpipe.codec import GroupReader, LevelReader
 from gvpipe.errors import CorruptFile
 from gvpipe.registry import codec_class, encode_sequence, open_reader
 from gvpipe.repeated_frames import Holds, find_holds, read_holds
@@ -32,20 +32,21 @@ PLAIN: list[tuple[str, dict[str, object]]] = [
     ("pdct", {"clusters": 3, "segment": 7}),
 ]
 PICTURES: list[tuple[str, dict[str, object]]] = [
-    ("mcgv", {}),
-    ("mcgv", {"image": "jpeg"}),
-    ("mcgv", {"profile": "precise"}),
+    ("mcgv", {"placement": "tiles"}),
+    ("mcgv", {"placement": "charts", "image": "jpeg"}),
+    ("mcgv", {"placement": "tiles", "profile": "precise"}),
     ("mcgv", {"prediction": "affine"}),
     ("mcgv", {"prediction": "blended", "transform": "klt"}),
 ]
 
 
-def variants() -> pytest.MarkDecorator:
-    """All codecs, in several profiles, with and without a bound."""
-    cases = []
-    for codec, settings in PLAIN + PICTURES:
-        cases.append(pytest.param(codec, settings, id=" ".join([codec, *map(str, settings.values())])))
-    return pytest.mark.parametrize(("codec", "settings"), cases)
+def with_each(name: str, values: tuple[Any, Any]) -> pytest.MarkDecorator:
+    """All codecs, in several profiles, each with one of two values; with the other one in the slow run."""
+    cases = [
+        pytest.param(codec, settings, value, marks=[] if i % 2 == j else pytest.mark.slow)
+        for (i, (codec, settings)), (j, value) in product(enumerate(PLAIN + PICTURES), enumerate(values))
+    ]
+    return pytest.mark.parametrize(("codec", "settings", name), cases, ids=str)
 
 
 def with_copies() -> MeshSequence:
@@ -69,8 +70,7 @@ def assert_random_access(video: gvpipe.Player, path: Path) -> None:
     assert np.array_equal(gvpipe.open(path)[3:9], whole[3:9])
 
 
-@pytest.mark.parametrize("bound", [None, "0.2%"], ids=["", "max-error"])
-@variants()
+@with_each("bound", (None, "0.2%"))
 def test_still_vertices_stand_still(codec: str, settings: dict[str, object], bound: str | None, tmp_path: Path) -> None:
     sequence = partly_still()
     still = find_still(sequence)
@@ -85,8 +85,7 @@ def test_still_vertices_stand_still(codec: str, settings: dict[str, object], bou
     assert_random_access(video, tmp_path / "a.mp4")
 
 
-@pytest.mark.parametrize("bound", [None, "0.2%"], ids=["", "max-error"])
-@variants()
+@with_each("bound", (None, "0.2%"))
 def test_coincident_vertices_coincide(codec: str, settings: dict[str, object], bound: str | None, tmp_path: Path) -> None:
     sequence = with_copies()
     frames = encode(sequence, tmp_path, codec, settings, max_error=bound)[:]
@@ -94,8 +93,7 @@ def test_coincident_vertices_coincide(codec: str, settings: dict[str, object], b
     assert np.array_equal(frames[:, :half], frames[:, half:])
 
 
-@pytest.mark.parametrize("bound", [None, "0.2%"], ids=["", "max-error"])
-@variants()
+@with_each("bound", (None, "0.2%"))
 def test_repeated_frames_are_identical(codec: str, settings: dict[str, object], bound: str | None, tmp_path: Path) -> None:
     lengths = [3, 1, 1, 2, 1, 1, 1, 9, 1, 1, 4]
     sequence = held(waving(9, len(lengths)), lengths)
@@ -107,8 +105,7 @@ def test_repeated_frames_are_identical(codec: str, settings: dict[str, object], 
     assert_random_access(video, tmp_path / "a.mp4")
 
 
-@pytest.mark.parametrize("target", [{"target_rmse": 1e-3}, {"max_error": "0.1%"}], ids=["rmse", "max-error"])
-@pytest.mark.parametrize(("codec", "settings"), PLAIN + PICTURES)
+@with_each("target", ({"target_rmse": 1e-3}, {"max_error": "0.1%"}))
 def test_repeated_frames_cost_nearly_nothing(
     codec: str, settings: dict[str, object], target: dict[str, Any], tmp_path: Path
 ) -> None:
@@ -123,7 +120,7 @@ def test_still_vertices_save_bytes(codec: str, settings: dict[str, object]) -> N
     frames = np.asarray(sequence.positions[:]).copy()
     frames[1::2] += np.float32(1e-5)  # nothing stands still, and nothing else is new
     size = [
-        sum(map(len, codec_class(codec)(**settings).encode(MeshSequence(f, sequence.faces)).sections.values()))
+        sum(map(len, codec_class(codec)(**settings).encode(MeshSequence(f, sequence.faces)).bitstream.sections.values()))
         for f in (np.asarray(sequence.positions[:]), frames)
     ]
     assert size[0] < size[1]
@@ -172,12 +169,12 @@ def test_pictures_are_of_distinct_frames(codec: str, settings: dict[str, object]
 
 def test_mcgv_without_repeated_frames_is_as_without_holds() -> None:
     codec, sequence = codec_class("mcgv")(preset="fast"), partly_still()
-    assert encode_sequence(codec, sequence) == codec.encode(sequence)
+    assert encode_sequence(codec, sequence).bitstream == codec.encode(sequence).bitstream
 
 
 @pytest.mark.parametrize(("codec", "settings"), PLAIN)
 def test_files_without_stillness_keep_their_version(codec: str, settings: dict[str, object]) -> None:
-    bitstream = encode_sequence(codec_class(codec)(**settings), waving(7, 9))
+    bitstream = encode_sequence(codec_class(codec)(**settings), waving(7, 9)).bitstream
     assert bitstream.version == (2 if codec == "pdct" else 1)  # pdct's version 2 also codes points
     assert not {"still", "holds"} & set(bitstream.sections)
 
@@ -189,7 +186,7 @@ def test_nothing_moves_at_all(codec: str, settings: dict[str, object], tmp_path:
     video = encode(sequence, tmp_path, codec, settings)
     assert len(video) == 15
     assert (video[:] == video[0]).all()
-    bitstream = codec_class(codec)(**settings).encode(sequence)
+    bitstream = codec_class(codec)(**settings).encode(sequence).bitstream
     frames = open_reader(bitstream).read(2, 13)
     assert (frames == frames[0]).all()
     assert np.abs(frames - sequence.positions[:1]).max() < 0.01
@@ -197,12 +194,11 @@ def test_nothing_moves_at_all(codec: str, settings: dict[str, object], tmp_path:
 
 def test_still_vertices_have_one_position_on_all_levels_and_segments() -> None:
     sequence = partly_still()
-    memo = Memo()
-    reader = open_reader(codec_class("pca")(segment=7).encode(sequence, memo=memo))
+    encoded = codec_class("pca")(segment=7).encode(sequence)
+    reader = open_reader(encoded.bitstream)
     assert isinstance(reader, LevelReader)
-    assert memo.permutation is not None
     finest = reader.read(0, 20)
-    placed = {row.tobytes() for row in finest[0, find_still(sequence)[memo.permutation]]}
+    placed = {row.tobytes() for row in finest[0, find_still(sequence)[encoded.permutation]]}
     for lod in range(1, len(reader.levels)):
         frames = reader.read(0, 20, lod=lod)
         is_still = (frames == frames[:1]).all(axis=(0, 2))
@@ -213,13 +209,13 @@ def test_still_vertices_have_one_position_on_all_levels_and_segments() -> None:
 def test_levels_and_groups_of_held_frames() -> None:
     lengths = [1, 4, 1, 2, 3, 1]
     sequence = held(waving(9, 6), lengths)
-    reader = open_reader(encode_sequence(codec_class("pca")(), sequence))
+    reader = open_reader(encode_sequence(codec_class("pca")(), sequence).bitstream)
     assert isinstance(reader, LevelReader)
     coarse = reader.read(0, 12, lod=1)
     assert coarse.shape == (12, reader.levels[1], 3)
     assert (coarse[1] == coarse[4]).all()
     assert reader.read(5, 5).shape == (0, 81, 3)
-    clips = open_reader(encode_sequence(codec_class("pdct")(segment=2), sequence))
+    clips = open_reader(encode_sequence(codec_class("pdct")(segment=2), sequence).bitstream)
     assert [clips.group(frame) for frame in (0, 4, 5, 7, 8, 11)] == [(0, 5), (0, 5), (5, 8), (5, 8), (8, 12), (8, 12)]  # type: ignore[attr-defined]
 
 
@@ -269,7 +265,7 @@ def test_wrong_flags_are_refused(lengths: list[int]) -> None:
 def test_wrong_holds_are_refused(lengths: list[int]) -> None:
     from gvpipe.repeated_frames import add_holds
 
-    bitstream = codec_class("pca")().encode(waving(4, 10))
+    bitstream = codec_class("pca")().encode(waving(4, 10)).bitstream
     wrong = add_holds(bitstream, Holds(np.array(lengths)), 2)
     with pytest.raises(CorruptFile, match="holds"):
         read_holds(type(bitstream)(**{**vars(wrong), "n_frames": 10}))
@@ -279,7 +275,7 @@ def test_wrong_holds_are_refused(lengths: list[int]) -> None:
 def test_damaged_sections_raise_format_errors_only(codec: str) -> None:
     from gvpipe.errors import FormatError
 
-    bitstream = encode_sequence(codec_class(codec)(), held(partly_still(), [2, *[1] * 19]))
+    bitstream = encode_sequence(codec_class(codec)(), held(partly_still(), [2, *[1] * 19])).bitstream
     assert {"still", "holds"} <= set(bitstream.sections)
     rng = np.random.default_rng(4)
     for name in ("still", "holds"):

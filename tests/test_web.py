@@ -19,7 +19,7 @@ import pages
 import pytest
 from pages import FRAMES, LOAD, check_frames, run
 from PIL import Image
-from sequences import awkward, held, patched, waving
+from sequences import awkward, held, patched, rigid, waving
 
 import gvpipe
 from gvcodecs.mcgv.base.surface import read_surface
@@ -33,6 +33,7 @@ from gvpipe.repeated_frames import Holds, add_holds
 from gvpipe.sequence import MeshSequence
 
 pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())
+slow = pytest.mark.slow  # the default run has one test of exact positions and one of the player
 
 GOLDEN = Path(__file__).parent / "golden"
 DOCS = (Path(__file__).parents[1] / "docs" / "player.md").read_text("utf-8")
@@ -86,12 +87,14 @@ def _encode(site: tuple[Path, str], sequence: MeshSequence, name: str = "x.mp4",
     return site[0] / name
 
 
+@slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_frames_of_a_sample_equal_pythons(kind: str, module: Callable[..., Any], site: tuple[Path, str], samples: Path) -> None:
     gvpipe.encode(samples / "creature.npz", site[0] / "creature.mp4", preset="fast", **KINDS[kind])
     check_frames(module, site[0] / "creature.mp4")
 
 
+@slow
 @pytest.mark.skipif(not SAMBA.exists(), reason="no ../shared/data")
 @pytest.mark.parametrize("kind", ["affine", "blended", "tiles"])
 def test_frames_of_samba_equal_pythons(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
@@ -99,6 +102,7 @@ def test_frames_of_samba_equal_pythons(kind: str, module: Callable[..., Any], si
     check_frames(module, site[0] / "samba.mp4")
 
 
+@slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("sequence", awkward().values(), ids=lambda sequence: sequence.name)
 def test_frames_of_awkward_inputs_equal_pythons(
@@ -107,6 +111,7 @@ def test_frames_of_awkward_inputs_equal_pythons(
     check_frames(module, _encode(site, sequence, **KINDS[kind]))
 
 
+@slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("reorder", [False, True])
 def test_frames_of_seams_and_still_vertices_equal_pythons(
@@ -122,14 +127,38 @@ def test_frames_of_seams_and_still_vertices_equal_pythons(
     check_frames(module, path)
 
 
+@slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_frames_of_what_never_moves_equal_pythons(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     """One distinct frame; and, where the codec is asked directly, nothing but still points."""
     sequence, path = patched(still=1.0), site[0] / "x.mp4"
     check_frames(module, _encode(site, sequence, **KINDS[kind]))
-    write_file(make_codec("mcgv", {**FAST, **KINDS[kind]}).encode(sequence), path)
+    write_file(make_codec("mcgv", {**FAST, **KINDS[kind]}).encode(sequence).bitstream, path)
     assert "still" in read_file(path).sections
     check_frames(module, path)
+
+
+@pytest.mark.parametrize("lengths", [[1] * 60, [3, *[1] * 58, 5]], ids=["", "held"])
+@pytest.mark.parametrize("settings", [{}, {"segment": 25, "reorder": True}], ids=str)
+def test_frames_without_pictures_equal_pythons(
+    settings: dict[str, Any], lengths: list[int], module: Callable[..., Any], site: tuple[Path, str]
+) -> None:
+    gvpipe.encode(held(rigid(), lengths), site[0] / "x.mp4", **settings)
+    assert read_file(site[0] / "x.mp4").header["pictures"] is False
+    check_frames(module, site[0] / "x.mp4")
+
+
+def test_a_file_without_pictures_plays(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    gvpipe.encode(rigid(), site[0] / "x.mp4")
+    shown = module(
+        """const video = await GeometryVideo.load(args[0]);
+        const shown = [];
+        await new Promise((ended, failed) => video.play((_, k) => shown.push(k), { rate: 4, ended, failed }));
+        video.close();
+        return shown;""",
+        "x.mp4",
+    )
+    assert shown == sorted(shown) and shown[0] == 0 and shown[-1] == 59
 
 
 @pytest.mark.parametrize("fps", [0.5, 12.0, 29.97, 59.94, 240.0])
@@ -137,18 +166,21 @@ def test_frames_at_any_rate(fps: float, module: Callable[..., Any], site: tuple[
     check_frames(module, _encode(site, dataclasses.replace(waving(8, 30), fps=fps)))
 
 
+@slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_frames_of_several_segments_in_the_codecs_order(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     settings = {"segment": 11, "reorder": True, "quality": 95, **KINDS[kind]}
     check_frames(module, _encode(site, waving(10, 50), **settings))
 
 
+@slow
 @pytest.mark.parametrize("kind", ["affine-halves", "blended", "tiles"])
 def test_frames_on_the_finest_lattice(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     """Where integers are largest: sums that decide pixels and contexts must be exact still."""
     check_frames(module, _encode(site, waving(20, 12), base_bits=20, quality=100, **KINDS[kind]))
 
 
+@slow
 def test_frames_are_corrected(module: Callable[..., Any], site: tuple[Path, str], kinds: dict[str, Bitstream]) -> None:
     """Files with a bound on every vertex keep it in the browser: all frames, over several groups of corrections."""
     sequence, bitstream = patched(), kinds["corrected"]
@@ -161,6 +193,7 @@ def test_frames_are_corrected(module: Callable[..., Any], site: tuple[Path, str]
     assert after <= LARGEST_ERROR < before
 
 
+@slow
 @pytest.mark.parametrize("bound", [None, "0.02%"], ids=["", "max-error"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_repeated_frames_equal_pythons(
@@ -177,13 +210,14 @@ def test_frames_of_golden_files(module: Callable[..., Any], site: tuple[Path, st
     versions = set()
     for path in sorted(GOLDEN.glob("mcgv-*.mp4")):
         bitstream = read_file(path)
-        if bitstream.header["profile"] == "h264-8" and "transform" not in bitstream.header:
+        if bitstream.header.get("profile", "h264-8") == "h264-8" and "transform" not in bitstream.header:
             versions.add(bitstream.version)
             shutil.copy(path, site[0])
             check_frames(module, site[0] / path.name, gvpipe.read(path.with_suffix(".npz")))
-    assert versions >= {1, 2}
+    assert versions >= {1, 2, 3, 4}
 
 
+@slow
 def test_bounds_hold_what_never_moves(module: Callable[..., Any], site: tuple[Path, str]) -> None:
     path = _encode(site, patched(), prediction="blended")
     bounds = module(FRAMES, path.name, [0])["bounds"]
@@ -194,6 +228,7 @@ def test_bounds_hold_what_never_moves(module: Callable[..., Any], site: tuple[Pa
     assert (bounds["max"] >= positions[0, still].max(axis=0)).all()
 
 
+@slow
 @pytest.mark.parametrize("kind", ["affine", "blended"])
 def test_bounds_hold_the_motion(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     path = _encode(site, waving(), quality=95, **{"clusters": 12, **KINDS[kind]})
@@ -205,6 +240,7 @@ def test_bounds_hold_the_motion(kind: str, module: Callable[..., Any], site: tup
     assert (bounds["max"] >= high - 0.02).all() and (bounds["max"] <= high + slack).all()
 
 
+@slow
 def test_module_plays_every_frame_that_is_due(module: Callable[..., Any], site: tuple[Path, str]) -> None:
     path = _encode(site, waving(10, 24))
     frames, matches = module(
@@ -222,6 +258,7 @@ def test_module_plays_every_frame_that_is_due(module: Callable[..., Any], site: 
     assert matches == len(frames)
 
 
+@slow
 @pytest.mark.parametrize("decoder", ["", "delete window.VideoDecoder;"], ids=["webcodecs", "video"])
 def test_repeated_frames_play_in_order(decoder: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     """From a frame sought to the end, at the sequence's own pace; each with its own positions."""
@@ -249,6 +286,7 @@ def test_repeated_frames_play_in_order(decoder: str, module: Callable[..., Any],
     assert seconds > 0.8 * 30 / 24
 
 
+@slow
 def test_overlapping_requests_are_answered_in_turn(module: Callable[..., Any], site: tuple[Path, str]) -> None:
     path = _encode(site, waving(10, 24))
     same = module(
@@ -298,6 +336,7 @@ BROKEN: dict[str, tuple[str, Callable[[bytes], bytes]]] = {
 }
 
 
+@slow
 @pytest.mark.parametrize("case", BROKEN)
 def test_broken_files_are_told_apart(case: str, module: Callable[..., Any], site: tuple[Path, str], video_bytes: bytes) -> None:
     kind, damage = BROKEN[case]
@@ -311,6 +350,7 @@ def test_broken_files_are_told_apart(case: str, module: Callable[..., Any], site
     assert "\n" not in found[2]
 
 
+@slow
 def test_a_damaged_index_gives_one_clear_error(module: Callable[..., Any], site: tuple[Path, str], video_bytes: bytes) -> None:
     """No checksum covers the video's tables: whatever they hold, the file opens or there is one error of ours."""
     first, end = video_bytes.index(b"stbl"), video_bytes.index(b"mdat")
@@ -334,6 +374,7 @@ def test_a_damaged_index_gives_one_clear_error(module: Callable[..., Any], site:
     assert outcomes.count("corrupt") > 10
 
 
+@slow
 def test_a_file_that_is_not_there(module: Callable[..., Any]) -> None:
     for address in ("nothing.mp4", "http://127.0.0.1:9/x.mp4"):
         assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", address) == "load"
@@ -342,6 +383,7 @@ def test_a_file_that_is_not_there(module: Callable[..., Any]) -> None:
 KLT = {"prediction": "blended", "transform": "klt"}
 
 
+@slow
 @pytest.mark.parametrize("settings", [{"codec": "pca"}, {"profile": "precise"}, {"image": "jpeg"}, KLT], ids=str)
 def test_files_not_for_browsers_say_so(settings: dict[str, str], module: Callable[..., Any], site: tuple[Path, str]) -> None:
     gvpipe.encode(waving(6, 5), site[0] / "other.mp4", **settings)
@@ -350,6 +392,7 @@ def test_files_not_for_browsers_say_so(settings: dict[str, str], module: Callabl
     assert "export-html" in message
 
 
+@slow
 @pytest.mark.parametrize(("field", "value"), [("n_frames", 12), ("n_frames", 1 << 24), ("n_vertices", 71), ("n_triangles", 1)])
 def test_counts_that_do_not_fit_are_noticed(
     field: str, value: int, module: Callable[..., Any], site: tuple[Path, str], video: Path
@@ -380,6 +423,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Bitstream]:
     return found
 
 
+@slow
 @pytest.mark.parametrize(
     ("kind", "settings"),
     [
@@ -414,6 +458,7 @@ def test_settings_out_of_range_are_noticed(
     assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", "settings.mp4") == "corrupt"
 
 
+@slow
 @pytest.mark.parametrize(
     ("kind", "section"),
     [
@@ -466,6 +511,7 @@ def test_hostile_sections_give_one_clear_error(
     assert not differing, differing  # JavaScript refuses what Python refuses
 
 
+@slow
 @pytest.mark.parametrize("lengths", [[5, 0, 7], [3, 4], [14, -2], [1] * 13, [1 << 38, 5], [12], [6, 6], []], ids=str)
 def test_wrong_holds_are_refused(
     lengths: list[int], module: Callable[..., Any], site: tuple[Path, str], kinds: dict[str, Bitstream]
@@ -504,6 +550,7 @@ def silhouette(points: npt.NDArray[np.float64], faces: npt.NDArray[np.int32], si
     return mask
 
 
+@slow
 @pytest.mark.parametrize("up", ["y", "z"])
 def test_the_picture_shows_the_mesh(
     up: str, player: Callable[..., Any], browser: Any, site: tuple[Path, str], samples: Path
@@ -533,6 +580,7 @@ def test_the_picture_shows_the_mesh(
     assert inside.std(axis=0).max() > 10  # shaded, not one flat colour
 
 
+@slow
 def test_seek_pause_and_end(player: Callable[..., Any], site: tuple[Path, str]) -> None:
     path = _encode(site, waving(10, 36))
     result = player(
@@ -574,6 +622,7 @@ def test_seek_pause_and_end(player: Callable[..., Any], site: tuple[Path, str]) 
     assert result["again"] == [0, False]  # from the start
 
 
+@slow
 def test_loop_and_speed(player: Callable[..., Any], site: tuple[Path, str]) -> None:
     path = _encode(site, waving(10, 24))  # one second long
     frames = player(
@@ -593,6 +642,7 @@ def test_loop_and_speed(player: Callable[..., Any], site: tuple[Path, str]) -> N
     assert 2 <= turns <= 7  # 6 on an idle machine
 
 
+@slow
 def test_late_frames_are_dropped_not_queued(player: Callable[..., Any], site: tuple[Path, str]) -> None:
     """A page that needs 100 ms for each frame of 24 a second still plays a second in about a second."""
     path = _encode(site, waving(10, 48))
@@ -614,6 +664,7 @@ def test_late_frames_are_dropped_not_queued(player: Callable[..., Any], site: tu
     assert frames == sorted(set(frames)) and 4 <= len(frames) <= 24
 
 
+@slow
 def test_controls_by_mouse_and_keyboard(player: Callable[..., Any], browser: Any, site: tuple[Path, str]) -> None:
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
@@ -656,6 +707,7 @@ def test_controls_by_mouse_and_keyboard(player: Callable[..., Any], browser: Any
     assert not player(fullscreen)
 
 
+@slow
 def test_size_and_bit_rate_are_shown(player: Callable[..., Any], site: tuple[Path, str]) -> None:
     path = _encode(site, waving(10, 48))
     facts = player(f"{LOAD} return element.shadowRoot.querySelector('.facts').textContent", path.name).replace("\xa0", " ")
@@ -670,6 +722,7 @@ def test_size_and_bit_rate_are_shown(player: Callable[..., Any], site: tuple[Pat
         assert fact in facts
 
 
+@slow
 def test_a_corrupt_file_shows_an_error_in_the_page(
     player: Callable[..., Any], site: tuple[Path, str], video_bytes: bytes
 ) -> None:
@@ -710,6 +763,7 @@ def test_exported_page_opens_from_a_disk_and_plays(browser: Any, video: Path, tm
     assert title == "tube"
 
 
+@slow
 def test_the_element_as_the_docs_show_it(browser: Any, site: tuple[Path, str]) -> None:
     _encode(site, waving(10, 24), "walk.mp4")
     (page,) = re.findall(r"```html\n(.*?)```", DOCS, re.DOTALL)
@@ -721,6 +775,7 @@ def test_the_element_as_the_docs_show_it(browser: Any, site: tuple[Path, str]) -
     assert run(browser, played) == 24
 
 
+@slow
 def test_the_module_as_the_docs_show_it(module: Callable[..., Any], browser: Any, site: tuple[Path, str]) -> None:
     _encode(site, waving(10, 24), "walk.mp4")
     (script,) = re.findall(r"```js\n(.*?)```", DOCS, re.DOTALL)

@@ -46,8 +46,8 @@ class BaseMesh:
     visits: Array  # (V,) int64: vertex v is the codec's vertex visits[v]; the codec's order walks over the surface
 
 
-def encode_base(points: Array, faces: Array, reorder: bool) -> EncodedMesh:
-    """Code lattice points (V, 3) int in [0, 2^31) and triangles (T, 3) int.
+def encode_base(points: Array, faces: Array, reorder: bool) -> tuple[EncodedMesh, BaseMesh]:
+    """Code lattice points (V, 3) int in [0, 2^31) and triangles (T, 3) int; return the streams and the decoder's mesh.
 
     `reorder` lets the decoder see the codec's vertex order. Triangles may come back in another order, and rotated.
     """
@@ -64,14 +64,17 @@ def encode_base(points: Array, faces: Array, reorder: bool) -> EncodedMesh:
     points, faces = points.astype(np.int64), faces.astype(np.int64)
 
     try:
-        mesh, permutation = _encode_mesh(points, faces, _encode_draco(points, _proper(points, faces)))
+        mesh, permutation, codec_faces = _encode_mesh(points, faces, _encode_draco(points, _proper(points, faces)))
     except (ValueError, CorruptFile):
-        mesh, permutation = _encode_mesh(points, faces, b"")
+        mesh, permutation, codec_faces = _encode_mesh(points, faces, b"")
+    own = np.arange(n_vertices)
     if reorder:
-        return EncodedMesh(mesh, b"", permutation)
-    codec_points, codec_faces = _decode_mesh(mesh)
-    order = encode_order(np.argsort(permutation), codec_points, codec_faces)
-    return EncodedMesh(mesh, order, np.arange(n_vertices))
+        decoded = BaseMesh(points[permutation].astype(np.int32), codec_faces.astype(np.int32), own)
+        return EncodedMesh(mesh, b"", permutation), decoded
+    visits = np.argsort(permutation)
+    order = encode_order(visits, points[permutation], codec_faces)
+    decoded = BaseMesh(points.astype(np.int32), permutation[codec_faces].astype(np.int32), visits)
+    return EncodedMesh(mesh, order, own), decoded
 
 
 def decode_base(mesh: bytes, order: bytes) -> BaseMesh:
@@ -116,8 +119,11 @@ def _encode_draco(points: Array, faces: Array) -> bytes:
         raise ValueError("Draco cannot encode this mesh") from exc
 
 
-def _encode_mesh(points: Array, faces: Array, draco: bytes) -> tuple[bytes, Array]:
-    """The mesh stream and its codec order: whatever the Draco stream does not give back is added as loose rows."""
+def _encode_mesh(points: Array, faces: Array, draco: bytes) -> tuple[bytes, Array, Array]:
+    """The mesh stream, its codec order, and its triangles in that order.
+
+    Whatever the Draco stream does not give back is added as loose rows.
+    """
     keys, draco_faces = _decode_draco(draco)
     carried = _find_vertices(points, used_vertices(_proper(points, faces), len(points)), keys)
     is_loose = np.ones(len(points), bool)
@@ -135,7 +141,8 @@ def _encode_mesh(points: Array, faces: Array, draco: bytes) -> tuple[bytes, Arra
 
     loose_points = encode_table(points[is_loose])
     header = HEADER.pack(len(draco), int(is_loose.sum()), len(loose_faces), len(loose_points))
-    return header + draco + loose_points + encode_table(loose_faces), permutation
+    mesh = header + draco + loose_points + encode_table(loose_faces)
+    return mesh, permutation, np.concatenate([draco_faces, loose_faces])
 
 
 def _proper(points: Array, faces: Array) -> Array:

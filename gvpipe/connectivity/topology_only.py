@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,22 +48,25 @@ class BareMesh:
     n_points: int
 
 
-def encode_mesh(faces: Int32, points: Array, reorder: bool) -> EncodedMesh:
+def encode_mesh(faces: Int32, points: Array, reorder: bool) -> tuple[EncodedMesh, BareMesh]:
     """Code triangles ``(T, 3)`` over V vertices, of which those with equal ``points (V,)``, 0..P-1, are copies.
 
-    ``reorder`` lets the decoder see the codec's vertex order. Triangles may come back in another order, and rotated.
+    Returns the streams, and the mesh as decoding returns it. ``reorder`` lets the decoder see the codec's vertex order.
+    Triangles may come back in another order, and rotated.
     """
     faces, points = faces.astype(np.int64), points.astype(np.int64)
     n_points = int(points.max()) + 1
     point_faces = points[faces]
     try:
-        draco, came_from = _encode_draco(point_faces)
-        parts, place = _place_points(point_faces, n_points, draco, came_from)
+        carried = _encode_draco(point_faces)
+        parts, place, coded_faces = _place_points(point_faces, n_points, carried)
     except (ValueError, CorruptFile):
-        parts, place = _place_points(point_faces, n_points, b"", np.zeros(0, np.int64))
-    coded = encode_copies(faces, place[points], _point_faces(*parts), n_points, reorder)
+        parts, place, coded_faces = _place_points(point_faces, n_points, _NOTHING)
+    coded = encode_copies(faces, place[points], coded_faces, n_points, reorder)
     head = HEADER.pack(*(len(part) for part in parts[:2]), len(parts[2]), len(coded.counts), parts[3], n_points)
-    return EncodedMesh(head + b"".join([*parts[:3], coded.counts, coded.copies]), coded.order, coded.permutation)
+    streams = head + b"".join([*parts[:3], coded.counts, coded.copies])
+    decoded = BareMesh(coded.faces.astype(np.int32), coded.points, coded_faces.astype(np.int32), n_points)
+    return EncodedMesh(streams, coded.order, coded.permutation), decoded
 
 
 def decode_mesh(mesh: bytes, order: bytes, n_vertices: int) -> BareMesh:
@@ -86,18 +90,26 @@ def read_mesh(bitstream: Bitstream) -> BareMesh:
     return mesh
 
 
-def _encode_draco(faces: Array) -> tuple[bytes, Array]:
-    """The Draco stream of the triangles with three different points, and the point of each vertex that it decodes to.
+class _Carried(NamedTuple):
+    """What Draco carries: its stream, the triangles that it decodes to, and the point of each of their vertices."""
 
-    Raises ValueError where Draco fails.
-    """
+    draco: bytes
+    faces: Array
+    came_from: Array
+
+
+_NOTHING = _Carried(b"", np.zeros((0, 3), np.int64), np.zeros(0, np.int64))
+
+
+def _encode_draco(faces: Array) -> _Carried:
+    """Code the triangles with three different points; raises ValueError where Draco fails."""
     import DracoPy
 
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     faces = faces[np.argsort(-faces.max(axis=1, initial=0), kind="stable")]  # as in `connectivity`: vertex orders follow
     used = used_vertices(faces, int(faces.max(initial=-1)) + 1)
     if not len(used):
-        return b"", np.zeros(0, np.int64)
+        return _NOTHING
     number = np.arange(len(used))
     silent = np.zeros((len(used), 3), np.float32)
     silent[:, 0] = (1 + number % 1024) * 2.0**-30
@@ -108,16 +120,17 @@ def _encode_draco(faces: Array) -> tuple[bytes, Array]:
     try:
         draco = bytes(DracoPy.encode(silent, corners, quantization_bits=1, compression_level=COMPRESSION_LEVEL))
         told = DracoPy.decode(DracoPy.encode(telling, corners, compression_level=COMPRESSION_LEVEL))
-        same = np.array_equal(told.faces, DracoPy.decode(draco).faces)
+        decoded = DracoPy.decode(draco).faces
     except Exception as exc:  # DracoPy's own and bare ones; each means: not this way
         raise ValueError("Draco cannot encode this mesh") from exc
-    if not same:
+    if not np.array_equal(told.faces, decoded):
         raise ValueError("Draco's order depends on positions")
-    return draco, used[told.points[:, 0].astype(np.int64)]
+    return _Carried(draco, decoded.astype(np.int64), used[told.points[:, 0].astype(np.int64)])
 
 
-def _place_points(faces: Array, n_points: int, draco: bytes, came_from: Array) -> tuple[tuple[bytes, bytes, bytes, int], Array]:
-    """The streams of triangles over points, and the codec's number of each point ``(P,)``."""
+def _place_points(faces: Array, n_points: int, carried: _Carried) -> tuple[tuple[bytes, bytes, bytes, int], Array, Array]:
+    """The streams of triangles over points, the codec's number of each point ``(P,)``, and the triangles as decoded."""
+    draco, draco_faces, came_from = carried
     _, first, inverse = np.unique(came_from, return_index=True, return_inverse=True)
     again = np.flatnonzero(first[inverse] != np.arange(len(came_from)))  # Draco vertices whose point came before
     back = again - first[inverse][again]
@@ -126,19 +139,25 @@ def _place_points(faces: Array, n_points: int, draco: bytes, came_from: Array) -
     is_left = np.ones(n_points, bool)
     is_left[known] = False
     place = np.argsort(np.concatenate([known, np.flatnonzero(is_left)]))
-    rows = np.concatenate([smallest_first(place[faces]), smallest_first(_point_faces(draco, merges, b"", 0))])
+    merged = smallest_first(_merge(draco_faces, len(came_from), merges))
+    rows = np.concatenate([smallest_first(place[faces]), merged])
     ids, representatives = row_ids(rows)
     missing = np.bincount(ids[: len(faces)], minlength=len(representatives))
     missing -= np.bincount(ids[len(faces) :], minlength=len(representatives))
     if (missing < 0).any():
         raise ValueError("Draco returned triangles that the mesh does not have")
     loose = rows[np.repeat(representatives, missing)]
-    return (draco, merges, encode_table(loose), len(loose)), place
+    return (draco, merges, encode_table(loose), len(loose)), place, np.concatenate([merged, loose])
 
 
 def _point_faces(draco: bytes, merges: bytes, loose: bytes, n_loose: int) -> Array:
     """Triangles over points, smallest point first: Draco's with its split vertices merged, then the loose ones."""
     faces, n_vertices = _decode_draco(draco)
+    return np.concatenate([smallest_first(_merge(faces, n_vertices, merges)), decode_table(loose, n_loose)])
+
+
+def _merge(faces: Array, n_vertices: int, merges: bytes) -> Array:
+    """Draco's triangles over points: vertices that it split are one point again; raises `CorruptFile`."""
     stands_for = np.arange(n_vertices)
     if merges:
         cursor = Cursor(merges, "mesh")
@@ -155,7 +174,8 @@ def _point_faces(draco: bytes, merges: bytes, loose: bytes, n_loose: int) -> Arr
         if not is_new[stands_for[again]].all():
             raise CorruptFile("section 'mesh' is corrupt: a merge names a merged vertex")
         stands_for = (np.cumsum(is_new) - 1)[stands_for]
-    return np.concatenate([smallest_first(stands_for[faces]), decode_table(loose, n_loose)])
+    merged: Array = stands_for[faces]
+    return merged
 
 
 def _decode_draco(draco: bytes) -> tuple[Array, int]:

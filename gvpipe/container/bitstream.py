@@ -48,7 +48,9 @@ class Bitstream:
     Args:
         codec: id of the codec that wrote it and alone can read it.
         version: of that codec's sections.
-        n_frames, n_vertices, n_triangles: F, V, T of the sequence.
+        n_frames: F of the sequence.
+        n_vertices: V of the sequence.
+        n_triangles: T of the sequence.
         fps: frames per second.
         header: what else the codec's reader must know, as JSON values.
         sections: the codec's binary data by name.

@@ -36,9 +36,9 @@ B_FRAMES = 8  # between two others, at most
 AHEAD = 2  # groups of pictures decoded ahead of the reader
 MAX_SIDE = 16384  # pixels, of a picture that is read
 QP_RANGE = (1, 51)  # 0 would be lossless, which is another H.264 profile that browsers do not read
-# measured on chicken, cow and samba (docs/benchmarks.md): psycho-visual choices and the deblocking filter only cost here, since
-# blocks are separate charts; long pyramids of B-frames (`B_FRAMES`) suit residuals that change slowly; nothing moves in the
-# pictures, so neither partitions nor more references pay, and both cost decoding time
+# measured on chicken, cow and samba (docs/decisions/0094-mcgv-x264-settings.md): psycho-visual choices and the deblocking
+# filter only cost here, since blocks are separate charts; long pyramids of B-frames (`B_FRAMES`) suit residuals that change
+# slowly; nothing moves in the pictures, so neither partitions nor more references pay, and both cost decoding time
 X264 = {
     "no-psy": 1,
     "aq-mode": 0,

@@ -57,7 +57,8 @@ class Camera:
     Args:
         target: the point in the middle of the picture, model units.
         distance: from the eye to the target, model units, above 0.
-        azimuth, elevation: degrees.
+        azimuth: degrees.
+        elevation: degrees.
         up: the world's axis that is up in the picture, ``"x"``, ``"y"`` or ``"z"``.
         field_of_view: of the picture's height, degrees, between 1 and 120.
 

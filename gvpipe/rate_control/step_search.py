@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvpipe.codec import FrameReader
+from gvpipe.codec import Encoded, FrameReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.sequence import MeshSequence
 
@@ -30,10 +30,15 @@ NEAR = 2.0  # times, an error beside a measured one for which the step in propor
 class Aimed:
     """An encode, its step and its root mean square error, model units, and how its logarithm rises with the step's."""
 
-    bitstream: Bitstream
+    encoded: Encoded
     step: float
     error: float
     slope: float = SLOPE
+
+    @property
+    def bitstream(self) -> Bitstream:
+        """Of the encode."""
+        return self.encoded.bitstream
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,7 @@ def mend(
     tried: list[Aimed] = []
     for _ in range(rounds):
         trial = attempt(step)
-        trial = Aimed(trial.bitstream, step, max(trial.error, 1e-300))
+        trial = Aimed(trial.encoded, step, max(trial.error, 1e-300))
         if tried and trial.step != tried[-1].step:
             last = tried[-1]
             slope = math.log(trial.error / last.error) / math.log(trial.step / last.step)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from gvpipe.codec import Codec, FrameReader, Memo, Progress
+from gvpipe.arrays import Integers
+from gvpipe.codec import Codec, Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import file_size
 from gvpipe.corrections.bound import SECTION, Bound, encode_corrections
@@ -36,14 +37,19 @@ class Trial:
         bytes: of the whole file.
         bpvf: the same in bits per vertex and frame.
         errors: of the decoded frames.
-        bitstream: with its poster, ready to be written.
+        encoded: the bitstream with its poster, ready to be written.
     """
 
     codec: Codec
     bytes: int
     bpvf: float
     errors: Errors
-    bitstream: Bitstream
+    encoded: Encoded
+
+    @property
+    def bitstream(self) -> Bitstream:
+        """With its poster, ready to be written."""
+        return self.encoded.bitstream
 
     @property
     def corrections(self) -> int:
@@ -85,12 +91,13 @@ class Trials:
         """Encode at a quality, and measure."""
         memo, report = self._memo, self._progress or (lambda stage, done: None)
         codec = cast("Codec", dataclasses.replace(cast("DataclassInstance", self.codec), quality=quality))
-        bitstream = encode_sequence(codec, self._sequence, self._progress, memo)
+        encoded = encode_sequence(codec, self._sequence, self._progress, memo)
+        bitstream = encoded.bitstream
         if not bitstream.video:
             bitstream = dataclasses.replace(bitstream, video=memo("poster", lambda: poster_of(self._sequence)))
         report("measure", 0.0)
         reader = open_reader(bitstream)
-        reference = self._in_reader_order(reader)
+        reference = self._sequence.reordered(encoded.permutation, reader.faces)
         if self._bound is None:
             errors = measure_errors(reference, reader.read)
         else:
@@ -98,25 +105,23 @@ class Trials:
             bitstream, errors = _correct(bitstream, reference, reader, bound)
         size = file_size(bitstream)
         report("measure", 1.0)
-        return Trial(codec, size, 8 * size / (bitstream.n_vertices * bitstream.n_frames), errors, bitstream)
+        bpvf = 8 * size / (bitstream.n_vertices * bitstream.n_frames)
+        return Trial(codec, size, bpvf, errors, Encoded(bitstream, encoded.permutation))
 
-    def check(self, bitstream: Bitstream) -> None:
-        """Decode what a finished file holds, if there is a bound, and raise `InputError` if a vertex is out of it."""
+    def check(self, permutation: Integers, bitstream: Bitstream) -> None:
+        """Decode what a finished file holds, if there is a bound, and raise `InputError` if a vertex is out of it.
+
+        ``permutation (V,)`` is that of its encode.
+        """
         if self._bound is None:
             return
         reader = open_reader(bitstream)
-        largest = measure_errors(self._in_reader_order(reader), reader.read).max
+        largest = measure_errors(self._sequence.reordered(permutation, reader.faces), reader.read).max
         if not largest <= self._bound:
             raise InputError(
                 f"a vertex of the finished file is {largest:g} off, {self._bound:g} were allowed; nothing was written; "
                 "please report it, and allow more meanwhile"
             )
-
-    def _in_reader_order(self, reader: FrameReader) -> MeshSequence:
-        """The sequence with its vertices in the order of the reader's."""
-        sequence, permutation = self._sequence, self._memo.permutation
-        assert permutation is not None, "an encoder must tell its memo the permutation"
-        return sequence.reordered(permutation, reader.faces)
 
 
 def _correct(bitstream: Bitstream, reference: MeshSequence, reader: FrameReader, bound: Bound) -> tuple[Bitstream, Errors]:

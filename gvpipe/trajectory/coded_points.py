@@ -12,7 +12,7 @@ import numpy as np
 from gvpipe.arrays import Float64, Int64
 from gvpipe.codec import Memo, Progress
 from gvpipe.connectivity.base_mesh import EncodedMesh
-from gvpipe.connectivity.topology_only import BareMesh, decode_mesh, encode_mesh
+from gvpipe.connectivity.topology_only import BareMesh, encode_mesh
 from gvpipe.metrics.vertex_errors import Spread
 from gvpipe.quality_scale import error_of
 from gvpipe.sequence import MeshSequence
@@ -44,9 +44,7 @@ def code_points(sequence: MeshSequence, reorder: bool, memo: Memo, report: Progr
     report("read", 0)
     points, spread = memo("survey", lambda: survey(sequence, report))
     report("mesh", 0)
-    coded = memo("mesh", lambda: encode_mesh(sequence.faces, points, reorder))
-    memo.permutation = coded.permutation
-    mesh = decode_mesh(coded.mesh, coded.order, sequence.n_vertices)
+    coded, mesh = memo("mesh", lambda: encode_mesh(sequence.faces, points, reorder))
     _, first = np.unique(mesh.points, return_index=True)
     return CodedPoints(coded, mesh, coded.permutation[first], spread)
 

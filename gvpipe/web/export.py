@@ -45,8 +45,9 @@ class ExportReport:
         bytes: of the page.
         video_bytes: of the geometry video in it.
         converted: what the file was if browsers cannot read that, else "".
-        rmse_diag, max_diag: error that the conversion adds, fractions of the frame-0 bounding-box diagonal; 0 without one,
-            None if the diagonal is 0.
+        rmse_diag: root mean square error that the conversion adds, a fraction of the frame-0 bounding-box diagonal; 0 without
+            one, None if the diagonal is 0.
+        max_diag: the same of the largest error.
         kg: the same as Karni-Gotsman error, percent; None if the file's frames are a point each.
     """
 
@@ -76,7 +77,8 @@ def export_html(
         target: the ``.html`` to write; an older file is replaced once the new one is complete.
         up: the axis that stands upright in the first view, ``y`` or ``z``.
         quality: 0..100, of the conversion where there is one: the error that it may add (`gvpipe.quality_scale`); `QUALITY` if
-        None. progress: called with a stage's name and the part of it that is done.
+            None.
+        progress: called with a stage's name and the part of it that is done.
 
     Raises:
         InputError: there is no such file, or an argument cannot be used.

@@ -1,8 +1,8 @@
 """The average mesh as bytes: its coordinates coded as trajectories are, by the Laplacian of connectivity alone.
 
 Place and size do not matter to the operators, so that they are left out: the unit is the mean edge length. What precision the
-weights need is measured in docs/codecs/laplacian.md. They need local shape, which is what deltas keep; positions predicted
-along the vertex hierarchy took 3 bits per point more at equal worth.
+weights need is measured in docs/experiments/laplacian-average.md. They need local shape, which is what deltas keep; positions
+predicted along the vertex hierarchy took 3 bits per point more at equal worth.
 
 Source: Sorkine, Cohen-Or and Toledo, "High-pass quantization for mesh encoding", 2003.
 """

@@ -40,7 +40,7 @@ from gvcodecs.laplacian.header import (
 from gvcodecs.laplacian.operators import OPERATORS
 from gvcodecs.laplacian.reader import LaplacianReader
 from gvpipe.arrays import Int64
-from gvpipe.codec import FrameReader, Memo, Progress, Settings
+from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, cut
 from gvpipe.rate_control.step_search import NEAR, Aimed, Anchor, first_step, mend, step_between
@@ -55,7 +55,7 @@ POINT_COST, ROW_COST = 0.1, 5.0  # of a component: deltas cost little, so that c
 
 
 @dataclass(frozen=True)
-class Laplacian(Settings):
+class Laplacian(BaseCodec):
     """Settings of the geometric-Laplacian codec.
 
     Errors are small between neighbours and grow from anchor to anchor, on thin parts and small meshes the most. So the error
@@ -96,24 +96,17 @@ class Laplacian(Settings):
         self.check_range(FINEST, COARSEST, "average_step")
         self.check_range(1, MAX_SEGMENT, "segment")
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
-        """Code a sequence.
-
-        Raises:
-            InputError: a frame cannot be read, or lies too far from the origin for the quality asked for.
-        """
-        report = progress or (lambda stage, done: None)
-        memo = memo or Memo()
+    def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         start = self._start(sequence, memo, report)
         wanted = start.shared.aimed_error(self.quality)
         anchors = memo("anchors", list[Anchor])
         known = step_between(anchors, wanted)
         if known is not None or not start.still.n_moving or self.components:
-            return self._code(sequence, start, known or FIRST * wanted, report).bitstream
+            return self._code(sequence, start, known or FIRST * wanted, report).encoded
         aimed = mend(lambda asked: self._code(sequence, start, asked, report), first_step(anchors, wanted, FIRST), wanted)
         if aimed.error > wanted / NEAR:  # else the step hardly matters, and tells nothing of other errors
             anchors.append(Anchor(aimed.step, aimed.error))
-        return aimed.bitstream
+        return aimed.encoded
 
     def _start(self, sequence: MeshSequence, memo: Memo, report: Progress) -> _Start:
         """What does not depend on the step: mesh and average as coded, what coefficients are coded with; and still points."""
@@ -159,17 +152,10 @@ class Laplacian(Settings):
             errors = squared_errors(trajectories, reduced.decoded, decoded[~still.flags])
             squared += float(errors @ start.copies[~still.flags])
         report("segments", 1)
-        bitstream = Bitstream(
-            codec=self.id,
-            version=self.version if SECTION in sections else 1,
-            n_frames=sequence.n_frames,
-            n_vertices=sequence.n_vertices,
-            n_triangles=len(start.shared.mesh.faces),
-            fps=float(sequence.fps),
-            header={**header.to_json(), "steps": steps or [1.0] * header.segments},
-            sections=sections,
-        )
-        return Aimed(bitstream, asked, math.sqrt(squared / (sequence.n_frames * sequence.n_vertices)))
+        words = {**header.to_json(), "steps": steps or [1.0] * header.segments}
+        bitstream = self._bitstream(sequence, words, sections, version=None if SECTION in sections else 1)
+        encoded = Encoded(bitstream, start.shared.coded.permutation)
+        return Aimed(encoded, asked, math.sqrt(squared / (sequence.n_frames * sequence.n_vertices)))
 
     @classmethod
     def reader(cls, bitstream: Bitstream) -> FrameReader:

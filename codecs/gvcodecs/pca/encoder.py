@@ -20,7 +20,7 @@ import numpy as np
 
 from gvcodecs.pca.header import MAX_SEGMENTS, VERSION_STILL, Header
 from gvcodecs.pca.reader import PcaReader, ordered_rows
-from gvpipe.codec import FrameReader, Memo, Progress, Settings
+from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, cut
 from gvpipe.mesh.hierarchy import build_hierarchy
@@ -35,7 +35,7 @@ LEFT = 0.93  # part of the error asked of `reduce_trajectories` that is left: sm
 
 
 @dataclass(frozen=True)
-class Pca(Settings):
+class Pca(BaseCodec):
     """Settings of the trajectory PCA codec.
 
     The error that quality asks for (`gvpipe.quality_scale`) is met without a loop: how it follows from the step is known well.
@@ -63,14 +63,7 @@ class Pca(Settings):
         self.check_range(0, MAX_COMPONENTS, "components")
         self.check_range(1, MAX_SEGMENT, "segment")
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
-        """Code a sequence.
-
-        Raises:
-            InputError: a frame cannot be read, or lies too far from the origin for the quality asked for.
-        """
-        report = progress or (lambda stage, done: None)
-        memo = memo or Memo()
+    def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         shared = code_points(sequence, self.reorder, memo, report)
         mesh, wanted = shared.mesh, shared.aimed_error(self.quality)
         rows = memo("rows", lambda: ordered_rows(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor))
@@ -90,16 +83,8 @@ class Pca(Settings):
             sections[f"coefficients.{s}"] = self._encode_coefficients(reduced, still, rows)
         report("segments", 1)
         header = Header(self.predictor, float(self.beta), n_segments, tuple(steps) or (1.0,) * n_segments)
-        return Bitstream(
-            codec=self.id,
-            version=self.version if data else 1,
-            n_frames=sequence.n_frames,
-            n_vertices=sequence.n_vertices,
-            n_triangles=len(mesh.faces),
-            fps=float(sequence.fps),
-            header=header.to_json(),
-            sections=sections,
-        )
+        bitstream = self._bitstream(sequence, header.to_json(), sections, version=None if data else 1)
+        return Encoded(bitstream, shared.coded.permutation)
 
     def _encode_coefficients(self, reduced: Reduced, still: StillPoints, rows: Rows) -> bytes:
         given = still.given(reduced.decoded)

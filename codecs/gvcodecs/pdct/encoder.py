@@ -24,9 +24,9 @@ from gvcodecs.pdct.header import MAX_CLIPS, VERSION_POINTS, Header, surface_of_p
 from gvcodecs.pdct.reader import PdctReader
 from gvcodecs.pdct.still_points import SECTION, encode_still
 from gvpipe.arrays import Float32, Int64
-from gvpipe.codec import FrameReader, Memo, Progress, Settings
+from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.connectivity.base_mesh import EncodedMesh
-from gvpipe.connectivity.welded_mesh import PointMesh, decode_points, encode_points
+from gvpipe.connectivity.welded_mesh import PointMesh, encode_points
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, cut
 from gvpipe.mesh.lattice import Lattice
@@ -45,7 +45,7 @@ SMALLEST = 1e-9  # step, part of a clip's diagonal
 
 
 @dataclass(frozen=True)
-class Pdct(Settings):
+class Pdct(BaseCodec):
     """Settings of the predictive DCT codec.
 
     The error that quality asks for (`gvpipe.quality_scale`) is met by a loop: encode, measure, mend the step of the delta
@@ -85,10 +85,7 @@ class Pdct(Settings):
         """Most frames per clip."""
         return self.clip or self.segment
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Bitstream:
-        """Code a sequence; raises `InputError` where a frame cannot be read."""
-        report = progress or (lambda stage, done: None)
-        memo = memo or Memo()
+    def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         report("base", 0)
         wanted = error_of(self.quality) / 100 * memo("spread", lambda: measure_spread(sequence))
         start = self._start(sequence, wanted, memo)
@@ -99,14 +96,14 @@ class Pdct(Settings):
         own = sequence.reordered(start.coded.permutation, start.mesh.faces)
 
         def attempt(step: float) -> Aimed:
-            bitstream = self._code(sequence, start, step, memo, report)
+            encoded = self._code(sequence, start, step, memo, report)
             report("measure", 0)
-            return Aimed(bitstream, step, root_mean_square(own, self.reader(bitstream)))
+            return Aimed(encoded, step, root_mean_square(own, self.reader(encoded.bitstream)))
 
         aimed = mend(attempt, first_step(anchors, wanted, FIRST), wanted)
         if aimed.error > wanted / NEAR:  # else the step hardly matters, and tells nothing of other errors
             anchors.append(Anchor(aimed.step, aimed.error))
-        return aimed.bitstream
+        return aimed.encoded
 
     @classmethod
     def reader(cls, bitstream: Bitstream) -> FrameReader:
@@ -134,9 +131,8 @@ class Pdct(Settings):
         first = sequence.read(0, 1)[0]
         members = np.unique(points, return_index=True)[1]
         lattice = Lattice.over(first, self.base_bits)
-        coded = memo("base", lambda: encode_points(lattice.quantise(first[members]), sequence.faces, points, self.reorder))
-        memo.permutation = coded.permutation
-        mesh = decode_points(coded.mesh, coded.order)
+        at = lattice.quantise(first[members])
+        coded, mesh = memo("base", lambda: encode_points(at, sequence.faces, points, self.reorder))
         sources, surface = coded.permutation[mesh.members], surface_of_points(mesh, lattice)
         sections = {"mesh": coded.mesh, "order": coded.order}
         flags = still[sources]  # vertices of one trajectory move, or stand still, together
@@ -144,7 +140,7 @@ class Pdct(Settings):
             sections[SECTION] = encode_still(flags, first[sources], surface, STILL * wanted)
         return _Start(coded, mesh, lattice, sources, surface.without(np.flatnonzero(flags)), sections)
 
-    def _code(self, sequence: MeshSequence, start: _Start, step: float, memo: Memo, report: Progress) -> Bitstream:
+    def _code(self, sequence: MeshSequence, start: _Start, step: float, memo: Memo, report: Progress) -> Encoded:
         """Code with a step, model units."""
         bounds = cut(sequence.n_frames, self.clip_frames, MAX_CLIPS)
         n_clips, sections = len(bounds) - 1, dict(start.sections)
@@ -154,16 +150,8 @@ class Pdct(Settings):
             clusters = memo(f"clip.{c}", partial(self.find_clusters, frames, start.surface))
             sections[f"clip.{c}"] = self.encode_clip(frames, start.surface, clusters, step)
         report("clips", 1)
-        return Bitstream(
-            codec=self.id,
-            version=self.version,
-            n_frames=sequence.n_frames,
-            n_vertices=sequence.n_vertices,
-            n_triangles=len(start.mesh.faces),
-            fps=float(sequence.fps),
-            header=Header(n_clips, start.lattice).to_json(),
-            sections=sections,
-        )
+        bitstream = self._bitstream(sequence, Header(n_clips, start.lattice).to_json(), sections)
+        return Encoded(bitstream, start.coded.permutation)
 
 
 @dataclass(frozen=True)

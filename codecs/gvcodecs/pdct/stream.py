@@ -118,8 +118,8 @@ class _Base:
     def of(cls, frame: Float32, faces: Int32, settings: Pdct) -> _Base:
         """Code a mesh with positions ``frame (V, 3)`` and triangles ``faces (T, 3)``."""
         lattice = Lattice.over(frame, settings.base_bits)
-        coded = encode_base(lattice.quantise(frame), faces, settings.reorder)
-        return cls(lattice, coded, surface_of(decode_base(coded.mesh, coded.order), lattice), diagonal_of(frame))
+        coded, base = encode_base(lattice.quantise(frame), faces, settings.reorder)
+        return cls(lattice, coded, surface_of(base, lattice), diagonal_of(frame))
 
 
 class StreamReader:

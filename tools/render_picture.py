@@ -1,6 +1,6 @@
 """Makes docs/picture.png from the samples: source, decoded, and where the decoded one is off, for one frame.
 
-python docs/render_picture.py [OUT.png]
+python tools/render_picture.py [OUT.png]
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from PIL import Image
 import gvpipe
 from gvpipe.rasterizer.camera import framing
 
-SAMPLES = Path(__file__).parents[1] / "samples"
+ROOT = Path(__file__).parents[1]
 FRAME, SIZE, VIEW = 30, (400, 310), (62.0, 14.0)
 LEGEND = 110  # pixels, about: the picture with the colour bar is so much wider, to show the fox at the same size
 
 
 def main(target: str) -> None:
-    source = gvpipe.read(SAMPLES / "creature.npz")
+    source = gvpipe.read(ROOT / "samples" / "creature.npz")
     camera = framing(source, [FRAME], VIEW, aspect=SIZE[0] / SIZE[1])
     with tempfile.TemporaryDirectory() as folder:
         video = Path(folder) / "creature.mp4"
@@ -36,4 +36,4 @@ def main(target: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1] if len(sys.argv) > 1 else str(Path(__file__).with_name("picture.png")))
+    main(sys.argv[1] if len(sys.argv) > 1 else str(ROOT / "docs" / "picture.png"))

@@ -1,6 +1,6 @@
-"""The plots in docs/codecs/pdct.md: rate and error of ``pdct`` against cluster count and kept coefficients.
+"""The plots in docs/experiments/pdct-rates.md: rate and error of ``pdct`` against cluster count and kept coefficients.
 
-    python docs/plot_pdct.py chicken.npz [FRAMES]
+    python tools/plot_pdct.py chicken.npz [FRAMES]
 
 The paper's figures 4 and 5 (Amjoun and Strasser 2008). Needs matplotlib.
 """
@@ -27,11 +27,11 @@ QUALITY = 60.0
 
 
 def main() -> None:
-    """Draw both figures beside this file."""
+    """Draw both figures into docs/."""
     whole = gvpipe.read(sys.argv[1])
     n_frames = int(sys.argv[2]) if len(sys.argv) > 2 else whole.n_frames
     sequence = MeshSequence(whole.read(0, n_frames), whole.faces, whole.fps)
-    folder = Path(__file__).parent
+    folder = Path(__file__).parents[1] / "docs"
     rows = [measure(sequence, Pdct(quality=QUALITY, clusters=k)) for k in CLUSTERS]
     print("clusters", *zip(CLUSTERS, rows, strict=True), sep="\n")
     draw(folder / "pdct_clusters.png", "clusters", [("by cost", CLUSTERS, rows)])
@@ -45,7 +45,7 @@ def main() -> None:
 
 def measure(sequence: MeshSequence, settings: Pdct) -> tuple[float, float]:
     """Bits per vertex and frame of all sections, and da."""
-    bitstream = settings.encode(sequence)
+    bitstream = settings.encode(sequence).bitstream
     reader = Pdct.reader(bitstream)
     decoded = MeshSequence(reader.read(0, sequence.n_frames), reader.faces, sequence.fps)
     bits = 8 * sum(map(len, bitstream.sections.values()))

@@ -1,4 +1,4 @@
-"""Frames a second that the painter makes: python docs/measure_render.py FILE [SIZE]."""
+"""Frames a second that the painter makes: python tools/measure_render.py FILE [SIZE]."""
 
 from __future__ import annotations
 

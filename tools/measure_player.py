@@ -1,4 +1,4 @@
-"""How fast the web player is: ``python docs/measure_player.py FILE.mp4 [--size 512] [--seconds 5]``.
+"""How fast the web player is: ``python tools/measure_player.py FILE.mp4 [--size 512] [--seconds 5]``.
 
 Exports the file, opens the page in headless Chromium (no GPU: WebGL on the processor) and prints what docs/player.md tells:
 unique frames per second while playing, the longest time between two, milliseconds for a frame at random, and for loading.

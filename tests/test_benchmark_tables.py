@@ -1,0 +1,47 @@
+"""The tables of the benchmark pages are those that the committed results give."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gvpipe.benchmark.bd_rate import rate_at
+from gvpipe.benchmark.report import BenchReport
+
+ROOT = Path(__file__).parents[1]
+TOOL: dict[str, Any] = runpy.run_path(str(ROOT / "tools" / "benchmark_tables.py"))
+RESULTS = sorted((ROOT / "docs" / "benchmarks").glob("*.json"))
+
+
+@pytest.mark.parametrize("page", TOOL["PAGES"], ids=lambda page: page.name)
+def test_tables_are_made_from_results(page: Path) -> None:
+    text = page.read_text("utf-8")
+    assert TOOL["fill"](text) == text, "run python tools/benchmark_tables.py"
+
+
+def test_every_table_stands_on_a_page() -> None:
+    names = [found[1] for page in TOOL["PAGES"] for found in TOOL["MARKED"].findall(page.read_text("utf-8"))]
+    assert set(names) == set(TOOL["TABLES"])
+
+
+@pytest.mark.parametrize("path", RESULTS, ids=lambda path: path.stem)
+def test_results_are_reports_of_bench(path: Path) -> None:
+    report = BenchReport.read(path)
+    names = [(curve.sequence, curve.codec) for curve in report.curves]
+    assert len(set(names)) == len(names)
+    for curve in report.curves:
+        for point in curve.points:
+            if point["bytes"]:
+                assert point["bpvf"] == pytest.approx(8 * point["bytes"] / (curve.vertices * curve.frames), abs=1e-4)
+
+
+def test_stated_rates_follow_from_rounded_points() -> None:
+    results = TOOL["load"](TOOL["CURVES"])
+    found = TOOL["curves_of"](results)
+    for sequence, codecs in results["rates"].items():
+        for codec, rates in codecs.items():
+            for level, rate in rates.items():
+                assert rate_at(found[sequence][codec], "kg", float(level)) == pytest.approx(rate, rel=0.01)

@@ -1,0 +1,98 @@
+"""What the project says of itself holds: version, paths, links, names of modules, settings of the workflow."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+import gvpipe
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+NAMELESS = ("CHANGELOG.md", "tests/test_project.py")  # may name modules that are gone
+OLD_MODULES = {  # of the flat layout
+    "gvpipe": """
+        aiming auto bare_mesh bench binary bitstream block_kernels blocks breakdown coarse_walk console copies curves
+        decimation fans frame_rows hierarchy holds images index_rows magnitude_tables matching mesh_rows moves pipes plots
+        point_mesh poster prediction_kernels purposes quality quantize range_kernels rate row_coding row_kernels
+        row_prediction segments sted stillness still_points surface topology trajectories trajectory_basis trajectory_frames
+        trials vertex_errors vertex_order video welding rendering.camera rendering.colours rendering.renderer
+        rendering.raster_kernels rendering.shading_kernels rendering.pictures
+    """,
+    "gvcodecs.mcgv": """affine_motion blend_fitting blend_kernels blended_motion blending chart_coding chart_kernels
+        chart_placement format frame_images outliers packing padding parameterization placement points prediction quality
+        rebuilding segmentation separation surface trajectories trajectory_encoder trajectory_images transforms weight_choice
+        weight_coding weight_kernels""",
+    "gvcodecs.laplacian": "format kernels system",
+    "gvcodecs.pca": "format",
+    "gvcodecs.pdct": "format stillness",
+}
+
+
+def test_one_version() -> None:
+    """``gvpipe.__version__`` is the source; the citation repeats it."""
+    assert "version" in PROJECT["dynamic"]
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert re.findall(r"^version: (.+)$", citation, re.MULTILINE) == [gvpipe.__version__] == [version("gvpipe")]
+
+
+def test_python_versions_are_those_that_the_workflow_tests() -> None:
+    workflow = (ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8")
+    (tested,) = re.findall(r"python: \[(.*)\]", workflow)
+    classified = re.findall(r"Python :: (3\.\d+)", "\n".join(PROJECT["classifiers"]))
+    assert re.findall(r"3\.\d+", tested) == classified
+    assert PROJECT["requires-python"] == f">={classified[0]}"
+
+
+@pytest.mark.parametrize("page", ["CONTRIBUTING.md", "RELEASING.md", "SECURITY.md"])
+def test_paths_exist(page: str) -> None:
+    named = re.findall(r"`((?:gvpipe|codecs|tests|tools|docs|samples)/[\w./-]*)`", (ROOT / page).read_text(encoding="utf-8"))
+    assert named
+    placeholders = [path for path in named if "NAME" in path]
+    assert not [path for path in named if not (ROOT / path).exists() and path not in placeholders]
+
+
+def test_ten_ideas_are_each_in_a_file() -> None:
+    table = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split("| idea | file |")[1].split("\n\n")[0]
+    assert len(re.findall(r"\| `\S+\.py` \|$", table, re.MULTILINE)) == 10
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.relative_to(ROOT).as_posix() for page in PAGES])
+def test_links_lead_to_files(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
+        if "://" not in target:
+            assert (page.parent / target).exists(), target
+
+
+def test_the_reference_page_has_the_public_interface() -> None:
+    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+    shown = set(re.findall(r"^::: (.*)$", page, re.MULTILINE))
+    # `gvpipe.errors` shows all errors
+    assert {f"gvpipe.{name}" for name in gvpipe.__all__ if name != "GvpipeError"} | {"gvpipe.errors"} <= shown
+
+
+def test_no_old_module_names() -> None:
+    names = [f"{package}.{name}" for package, names in OLD_MODULES.items() for name in names.split()]
+    paths = [name.replace(".", "/") for name in names]
+    assert not [path for path in paths if (ROOT / f"{path}.py").exists() or (ROOT / f"codecs/{path}.py").exists()]
+    dotted = re.compile(rf"\b({'|'.join(map(re.escape, names))})(?![\w/])")
+    slashed = re.compile(rf"\b({'|'.join(paths)})\.py\b")
+    for path in _texts():
+        text = path.read_text(encoding="utf-8")
+        assert not [*dotted.findall(text), *slashed.findall(text)], path
+
+
+def _texts() -> Iterator[Path]:
+    """The project's own text files."""
+    folders = (".ci", ".github", "codecs", "docs", "gvpipe", "samples", "tests", "tools")
+    for path in [*ROOT.glob("*.*"), *(path for folder in folders for path in (ROOT / folder).rglob("*"))]:
+        name = path.relative_to(ROOT).as_posix()
+        generated = "node_modules" in name or "web/bundle" in name
+        if path.suffix in (".py", ".md", ".toml", ".yml", ".js", ".mjs") and not generated and name not in NAMELESS:
+            yield path

@@ -1,0 +1,167 @@
+"""Writes the tables of the benchmark pages from the results in ``docs/benchmarks``.
+
+    python tools/benchmark_tables.py                    # the tables between markers, in all pages
+    python tools/benchmark_tables.py points FILE.json   # every point of one file, to standard output
+
+A table stands between ``<!-- table: NAME -->`` and ``<!-- end -->``, NAME one of `TABLES`. Results have the shape that
+`gvpipe bench --json` writes (`gvpipe.benchmark.report.BenchReport`). A file may add to it: ``rates`` and
+``kg_differences``, ``sted_differences`` where its points are rounded, ``targets`` (encodes to a given error), ``vdmc`` (the
+rates of another codec). What is null was not recorded.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from gvpipe.benchmark.bd_rate import average_rate_difference, rate_at
+from gvpipe.benchmark.report import BenchReport
+from gvpipe.benchmark.tables import tables
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGES = (DOCS / "benchmarks.md", DOCS / "codecs" / "mcgv.md", DOCS / "experiments" / "benchmark-curves-version-2.md")
+CURVES, QUALITY = "curves-version-2", "quality-75"  # files of results
+MARKED = re.compile(r"(<!-- table: ([\w.-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+NAMES = {
+    "mcgv:prediction=affine": "`mcgv` affine",
+    "mcgv:image=jpeg": "`mcgv` JPEG",
+    "mcgv:prediction=blended": "`mcgv` blended",
+    "mcgv:prediction=blended:transform=klt": "`mcgv` klt",
+}  # others: their own
+DEFAULT, PUBLISHED, ANCHOR = "mcgv", "mcgv:prediction=affine", "pca"
+
+Points = list[dict[str, Any]]
+
+
+def load(name: str) -> dict[str, Any]:
+    """A file of results by its name, without folder and extension."""
+    values: dict[str, Any] = json.loads((DOCS / "benchmarks" / f"{name}.json").read_text("utf-8"))
+    return values
+
+
+def curves_of(results: dict[str, Any]) -> dict[str, dict[str, Points]]:
+    """Points by sequence and codec."""
+    found: dict[str, dict[str, Points]] = {}
+    for curve in results["curves"]:
+        found.setdefault(curve["sequence"], {})[curve["codec"]] = curve["points"]
+    return found
+
+
+def default_against_published() -> list[str]:
+    """Bytes and errors of both at one quality, their quotient, and the default's rate at a target error."""
+    results = load(QUALITY)
+    targets = {target["sequence"]: target for target in results["targets"]}
+    heads = ("default, bytes", "KG", "published, bytes", "KG", "part", "default at KG 0.1, bpvf (encodes)")
+    rows, logarithms = [], []
+    for sequence, codecs in curves_of(results).items():
+        (ours,), (theirs,), target = codecs[DEFAULT], codecs[PUBLISHED], targets[sequence]
+        part = ours["bytes"] / theirs["bytes"]
+        logarithms.append(math.log(part))
+        files = (f"{ours['bytes']}", f"{ours['kg']:.3f}", f"{theirs['bytes']}", f"{theirs['kg']:.3f}")
+        rows.append((sequence, *files, f"{100 * part:.0f} %", f"{target['bpvf']:.3f} ({target['encodes']})"))
+    mean = math.exp(sum(logarithms) / len(logarithms))
+    return table(("sequence", *heads), [*rows, ("geometric mean", *"----", f"{100 * mean:.0f} %", "-")])
+
+
+def errors_at_quality() -> list[str]:
+    """KG errors of all codecs at one quality."""
+    found = curves_of(load(QUALITY))
+    rows = [(name, *(f"{points[0]['kg']:.3f}" for points in codecs.values())) for name, codecs in found.items()]
+    return table(("sequence", *heads_of(found)), rows)
+
+
+def rates_at(level: str) -> list[str]:
+    """Rates of all codecs at a KG error."""
+    results = load(CURVES)
+    found = curves_of(results)
+    rows = []
+    for sequence, codecs in found.items():
+        stated = results.get("rates", {}).get(sequence, {})
+        cells = [rate_cell(points, stated.get(codec, {}).get(level), float(level)) for codec, points in codecs.items()]
+        rows.append((sequence, *cells, number(results.get("vdmc", {}).get(sequence, {}).get(level), ".2f")))
+    return table(("sequence", *heads_of(found), "V-DMC base mesh"), rows)
+
+
+def rate_cell(points: Points, stated: float | None, error: float) -> str:
+    """A rate; the coarsest file's where that is better already, with its error; "-" where none is as good."""
+    rate = stated or rate_at(points, "kg", error)
+    coarsest = max(points, key=lambda point: float(point["kg"]))
+    if rate is None and coarsest["kg"] < error:
+        return f"<= {coarsest['bpvf']:.3f} ({coarsest['kg']:.2f})"
+    return number(rate, ".3f")
+
+
+def differences(measure: str) -> list[str]:
+    """Average differences of rate to `ANCHOR` at equal error, and the mean of their logarithms."""
+    results = load(CURVES)
+    found, given = curves_of(results), results.get(f"{measure}_differences", {})
+    heads = [head for head in heads_of(found) if head != f"`{ANCHOR}`"]
+    rows = []
+    for sequence, codecs in found.items():
+        stated = given.get(sequence, {})
+        others = {codec: points for codec, points in codecs.items() if codec != ANCHOR}
+        rows.append(
+            [stated.get(codec) or average_rate_difference(codecs[ANCHOR], own, measure) for codec, own in others.items()]
+        )
+    means = [mean_difference([value for value in column if value is not None]) for column in zip(*rows, strict=True)]
+    lines = [
+        (name, *(number(value, "+.0f", " %") for value in row))
+        for name, row in zip([*found, "mean"], [*rows, means], strict=True)
+    ]
+    return table(("sequence", *heads), lines)
+
+
+def mean_difference(differences: list[float]) -> float | None:
+    """The mean of differences of rate, percent, by their logarithms."""
+    logarithms = [math.log1p(value / 100) for value in differences]
+    return 100 * math.expm1(sum(logarithms) / len(logarithms)) if logarithms else None
+
+
+TABLES: dict[str, Callable[[], list[str]]] = {
+    "default-against-published": default_against_published,
+    "errors-at-quality-75": errors_at_quality,
+    "rates-at-kg-1": lambda: rates_at("1"),
+    "rates-at-kg-0.3": lambda: rates_at("0.3"),
+    "rates-at-kg-0.1": lambda: rates_at("0.1"),
+    "differences-kg": lambda: differences("kg"),
+    "differences-sted": lambda: differences("sted"),
+}
+
+
+def heads_of(found: dict[str, dict[str, Points]]) -> list[str]:
+    """Column heads of the codecs."""
+    return [NAMES.get(codec, f"`{codec}`") for codec in next(iter(found.values()))]
+
+
+def number(value: float | None, form: str, unit: str = "") -> str:
+    """A number as text, "-" where there is none."""
+    return "-" if value is None else f"{value:{form}}{unit}"
+
+
+def table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
+    """Lines of a Markdown table."""
+    lines = [f"| {' | '.join(cells)} |" for cells in (heads, *rows)]
+    return [lines[0], "|---" * (lines[0].count(" | ") + 1) + "|", *lines[1:]]
+
+
+def fill(page: str) -> str:
+    """A page with its tables made anew."""
+    return MARKED.sub(lambda found: "\n".join((found[1].rstrip(), *TABLES[found[2]](), found[3])), page)
+
+
+def main(arguments: list[str]) -> None:
+    """Write the tables, or print the points of a file."""
+    if arguments[:1] == ["points"]:
+        print(tables(BenchReport.read(arguments[1]).curves))
+        return
+    for page in PAGES:
+        page.write_text(fill(page.read_text("utf-8")), "utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
