@@ -1,17 +1,23 @@
 /** What the reader of an `mcgv` bitstream must know beside its sections. Mirrors `gvcodecs.mcgv.header.Header`. */
 
+import {
+  BROWSER_PROFILE as PROFILE,
+  BROWSER_VERSION as VERSION,
+  HEADER_LARGE as LARGE,
+  HEADER_MAX_CLUSTERS as MAX_CLUSTERS,
+  HEADER_MAX_SEGMENTS as MAX_SEGMENTS,
+  HEADER_OF_PICTURES as OF_PICTURES,
+  HEADER_PLACEMENTS as PLACEMENTS,
+  HEADER_PREDICTIONS as PREDICTIONS,
+  HEADER_SMALL as SMALL,
+  VIDEO_MAX_SIDE as MAX_SIDE,
+} from "../constants.js";
 import { GeometryVideoError, corrupt } from "../format/errors.js";
 import { checkInteger, checkNumber } from "../format/payload.js";
 
+export { VERSION, PROFILE };
+
 export const CODEC = "mcgv";
-export const VERSION = 4;
-export const PROFILE = "h264-8"; // the one that a browser gives back sample by sample
-const OF_PICTURES = ["placement", "profile", "block", "width", "height", "residual_step"]; // keys of files that have some
-const PREDICTIONS = ["blended", "affine"];
-const PLACEMENTS = ["halves", "charts", "tiles"];
-const MAX_SIDE = 16384;
-const LARGE = 1e39;
-const SMALL = 1e-60;
 
 /** Throw unless the payload is of this codec, in a version that it can read. */
 export function checkCodec(header) {
@@ -83,8 +89,8 @@ function readMotion(header) {
     throw corrupt("header", `base is ${JSON.stringify(base)}`);
   }
   return {
-    clusters: checkInteger(settings, "clusters", 1, 1024),
-    segments: checkInteger(settings, "segments", 1, Math.min(1 << 16, header.frames)),
+    clusters: checkInteger(settings, "clusters", 1, MAX_CLUSTERS),
+    segments: checkInteger(settings, "segments", 1, Math.min(MAX_SEGMENTS, header.frames)),
     origin: base.slice(0, 3),
     baseStep: base[3],
     transformStep: checkNumber(settings, "transform_step", SMALL, LARGE),

@@ -3,14 +3,17 @@
  * section 9.
  */
 
+import {
+  DISPLACEMENTS_LARGE as LARGE,
+  DISPLACEMENTS_MAX_POSITIONS as MAX_POSITIONS,
+  DISPLACEMENTS_NEAR as NEAR,
+  DISPLACEMENTS_SMALL as SMALL,
+} from "../constants.js";
 import { Cursor } from "./cursor.js";
 import { decodeIntegers } from "./integers.js";
 import { Recent } from "./recent.js";
 
-const MAX_POSITIONS = 1 << 20; // of a group, unless one frame has more
-const [SMALL, LARGE] = [1e-60, 1e39]; // of the step
 const LARGEST = 2 ** 128; // float32 ends there
-const NEAR = 3; // magnitudes of the axes before that are told apart
 
 export class Moves {
   /**
