@@ -15,7 +15,7 @@ import numpy as np
 
 from gvpipe import notes
 from gvpipe.arguments import StrPath, check_path, show
-from gvpipe.codec import Codec, Progress
+from gvpipe.codec import Codec, Encoded, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import bytes_by_part, write_file
 from gvpipe.errors import InputError, OutputError, SettingError
@@ -397,7 +397,7 @@ class _Coded:
     """The bitstream to write, its codec, how to check its file, and what was tried for it and why."""
 
     codec: Codec
-    bitstream: Bitstream
+    encoded: Encoded
     check: Callable[[Bitstream], None] | None = None
     tried: Sequence[Trial] = ()
     reason: str = ""
@@ -407,19 +407,19 @@ def _code(sequence: MeshSequence, given: Codec | Sequence[Codec], target: Target
     """Encode, at the quality that meets the target, with the codec that does so in the smallest file."""
     if isinstance(given, Codec):
         if target is None:
-            return _Coded(given, encode_sequence(given, sequence, progress).bitstream)
+            return _Coded(given, encode_sequence(given, sequence, progress))
         choice = meet(target, given, sequence, progress)
     else:
         choice = choose_codec(given, sequence, target or default_target(given), progress)
     trial = choice.trial
     check = partial(choice.trials.check, trial.encoded.permutation)
-    return _Coded(trial.codec, trial.bitstream, check, choice.tried, choice.reason)
+    return _Coded(trial.codec, trial.encoded, check, choice.tried, choice.reason)
 
 
 def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progress) -> tuple[int, Bitstream]:
     """Write the file with its poster and origin; return its bytes and what it holds."""
     progress("write", 0.0)
-    bitstream = coded.bitstream
+    bitstream = coded.encoded.bitstream
     if not bitstream.video:
         bitstream = dataclasses.replace(bitstream, video=poster_of(sequence))
     x, y, z = sequence.origin.tolist()

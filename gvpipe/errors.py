@@ -19,6 +19,8 @@ or value, the limit and what to do about it.
 
 from __future__ import annotations
 
+REMEDY = "get the file again from its source"
+
 
 class GvpipeError(Exception):
     """Base of all errors raised on purpose; its text is one line, fit to be shown to a user."""
@@ -58,3 +60,17 @@ class TruncatedFile(FormatError):
 
 class CorruptFile(FormatError):
     """A checksum, a length or an index in the file does not hold."""
+
+
+def corrupt(what: str) -> CorruptFile:
+    """Return the error for a file of which ``what`` says what does not hold; the remedy is added.
+
+    >>> str(corrupt("its video is damaged"))
+    'its video is damaged; get the file again from its source'
+    """
+    return CorruptFile(f"{what}; {REMEDY}")
+
+
+def corrupt_section(name: str, what: str) -> CorruptFile:
+    """Return the error for a section of which ``what`` says what does not hold; name and remedy are added."""
+    return corrupt(f"section {name!r} is corrupt: {what}")

@@ -17,7 +17,7 @@ from gvpipe.codec import Codec, Encoded, FrameReader, Memo, Progress, check_name
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.corrections.bound import correct
 from gvpipe.errors import NewerVersion, SettingError
-from gvpipe.repeated_frames import HeldReader, add_holds, find_holds, read_holds
+from gvpipe.repeated_frames import RepeatedFramesReader, add_repeated_frames, find_repeated_frames, read_repeated_frames
 from gvpipe.sequence import MeshSequence
 
 GROUP = "gvpipe.codecs"
@@ -63,10 +63,10 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
             f"it was made by version {bitstream.version} of codec {bitstream.codec!r}, this gvpipe has version "
             f"{codec.version}; upgrade gvpipe"
         )
-    holds = read_holds(bitstream) if _is_held(codec) else None
+    holds = read_repeated_frames(bitstream) if _is_held(codec) else None
     distinct = bitstream if holds is None else dataclasses.replace(bitstream, n_frames=holds.n_distinct)
     reader = correct(distinct, codec.reader(distinct))
-    return reader if holds is None else HeldReader(reader, holds)
+    return reader if holds is None else RepeatedFramesReader(reader, holds)
 
 
 def browser_obstacle(bitstream: Bitstream) -> str:
@@ -90,11 +90,11 @@ def encode_sequence(
         InputError: what the codec raises.
     """
     memo = memo or Memo(is_shared=False)
-    holds = memo("holds", lambda: find_holds(sequence)) if _is_held(codec) else None
+    holds = memo("holds", lambda: find_repeated_frames(sequence)) if _is_held(codec) else None
     if holds is None:
         return codec.encode(sequence, progress, memo)
     encoded = codec.encode(holds.distinct(sequence), progress, memo)
-    return Encoded(add_holds(encoded.bitstream, holds, codec.version), encoded.permutation)
+    return Encoded(add_repeated_frames(encoded.bitstream, holds, codec.version), encoded.permutation)
 
 
 @functools.cache

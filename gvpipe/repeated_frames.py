@@ -32,7 +32,7 @@ SECTION = "holds"
 
 
 @dataclass(frozen=True)
-class Holds:
+class RepeatedFrames:
     """How long each distinct frame is shown.
 
     Args:
@@ -56,7 +56,7 @@ class Holds:
         return MeshSequence(_Distinct(sequence, self.starts[:-1]), sequence.faces, sequence.fps, name=sequence.name)
 
 
-def find_holds(sequence: MeshSequence) -> Holds | None:
+def find_repeated_frames(sequence: MeshSequence) -> RepeatedFrames | None:
     """Compare each frame with the one before, coordinate by coordinate, exactly; None if no frame is repeated."""
     is_new = np.ones(sequence.n_frames, bool)
     last: Float32 | None = None
@@ -67,18 +67,22 @@ def find_holds(sequence: MeshSequence) -> Holds | None:
         last = chunk[-1].copy()
     if is_new.all():
         return None
-    return Holds(np.diff(np.flatnonzero(is_new), append=sequence.n_frames))
+    return RepeatedFrames(np.diff(np.flatnonzero(is_new), append=sequence.n_frames))
 
 
-def add_holds(bitstream: Bitstream, holds: Holds, version: int) -> Bitstream:
+def add_repeated_frames(bitstream: Bitstream, holds: RepeatedFrames, version: int) -> Bitstream:
     """The bitstream of the whole sequence, from that of its distinct frames; ``version`` is the codec's that knows holds."""
     section = varint(holds.n_distinct) + encode_integers(holds.lengths - 1)
     n_frames = int(holds.lengths.sum())
     return dataclasses.replace(bitstream, version=version, n_frames=n_frames, sections={**bitstream.sections, SECTION: section})
 
 
-def read_holds(bitstream: Bitstream) -> Holds | None:
-    """Mirror of `add_holds`, None without the section; raises `CorruptFile` unless it holds the header's number of frames."""
+def read_repeated_frames(bitstream: Bitstream) -> RepeatedFrames | None:
+    """Mirror of `add_repeated_frames`, None without the section.
+
+    Raises:
+        CorruptFile: the run lengths do not add up to the header's number of frames.
+    """
     if SECTION not in bitstream.sections:
         return None
     cursor = Cursor(bitstream.section(SECTION), SECTION)
@@ -87,10 +91,10 @@ def read_holds(bitstream: Bitstream) -> Holds | None:
     outside = lengths.min(initial=1) < 1 or lengths.max(initial=1) > bitstream.n_frames
     if outside or int(lengths.sum()) != bitstream.n_frames:
         raise cursor.corrupt(f"its runs do not add up to {bitstream.n_frames} frames")
-    return Holds(lengths)
+    return RepeatedFrames(lengths)
 
 
-class HeldReader:
+class RepeatedFramesReader:
     """All frames, from a reader of the distinct ones; it offers what else that reader does.
 
     Args:
@@ -102,7 +106,7 @@ class HeldReader:
     level_faces: Callable[[int], Int32]
     group: Callable[[int], tuple[int, int]]
 
-    def __init__(self, distinct: FrameReader, holds: Holds) -> None:
+    def __init__(self, distinct: FrameReader, holds: RepeatedFrames) -> None:
         self.distinct, self.holds, self._starts = distinct, holds, holds.starts
         if isinstance(distinct, LevelReader):
             self.levels, self.level_faces = distinct.levels, distinct.level_faces

@@ -24,7 +24,7 @@ from gvpipe.corrections.bound import (
     encode_corrections,
     find_corrections,
 )
-from gvpipe.corrections.displacements import HEAD, MAX_POSITIONS, Moves, decode_group, encode_group, move
+from gvpipe.corrections.displacements import HEAD, MAX_POSITIONS, Displacements, decode_group, displace, encode_group
 from gvpipe.errors import CorruptFile, FormatError, InputError
 from gvpipe.metrics.vertex_errors import frame_diagonal, measure_errors
 from gvpipe.rate_control import trials
@@ -149,7 +149,7 @@ def test_one_correction_is_enough(largest: float, offset: float, off: float, see
     decoded = (wanted + rng.normal(0, off * largest, wanted.shape)).astype(np.float32)
     bound = Bound.of(largest, float(np.abs(wanted).max()))
     found = find_corrections(wanted, decoded, bound)
-    decoded[found.frames, found.vertices] = move(decoded[found.frames, found.vertices], found.steps, bound.step)
+    decoded[found.frames, found.vertices] = displace(decoded[found.frames, found.vertices], found.steps, bound.step)
     assert np.linalg.norm(decoded.astype(np.float64) - wanted, axis=2).max() <= bound.inner
     assert bound.inner >= largest / 2
 
@@ -158,7 +158,7 @@ def test_one_correction_is_enough(largest: float, offset: float, off: float, see
 def test_groups_round_trip(n_frames: int, n_vertices: int, share: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     vertices, frames = np.nonzero(rng.random((n_vertices, n_frames)) < share)
-    found = Moves(frames, vertices, rng.integers(-40, 40, (len(frames), 3)) ** 3)
+    found = Displacements(frames, vertices, rng.integers(-40, 40, (len(frames), 3)) ** 3)
     back = decode_group(encode_group(found, n_frames), n_frames, n_vertices, SECTION)
     for name in ("frames", "vertices", "steps"):
         assert np.array_equal(getattr(found, name), getattr(back, name))
@@ -217,11 +217,11 @@ def test_hostile_numbers_are_refused() -> None:
         correct(stream_of(HEAD.pack(1.0) + b"\xff\xff\x7f\x00", sequence), held)
     assert MAX_POSITIONS // 81 < 0x1FFFFF
     for frames, vertices in (([0, 1], [0, 81]), ([0], [500])):  # runs past the last vertex
-        beyond = Moves(np.array(frames), np.array(vertices), np.ones((len(frames), 3), np.int64))
+        beyond = Displacements(np.array(frames), np.array(vertices), np.ones((len(frames), 3), np.int64))
         data = encode_group(beyond, 10)
         with pytest.raises(CorruptFile, match="range|fit"):
             correct(stream_of(HEAD.pack(1.0) + b"\x0a" + varint(len(data)) + data, sequence), held).read(0, 10)
-    far = Moves(np.array([0]), np.array([0]), np.array([[1 << 37, 0, 0]]))
+    far = Displacements(np.array([0]), np.array([0]), np.array([[1 << 37, 0, 0]]))
     data = encode_group(far, 10)
     with pytest.raises(CorruptFile, match="float32"):
         correct(stream_of(HEAD.pack(1e38) + b"\x0a" + varint(len(data)) + data, sequence), held).read(0, 10)

@@ -13,7 +13,7 @@ import gvpipe.trajectory.prediction
 from gvcodecs.laplacian import Laplacian
 from gvcodecs.laplacian.anchors import SMALL, choose_anchors
 from gvcodecs.laplacian.average_coding import decode_average, encode_average
-from gvcodecs.laplacian.delta_rows import N_KNOWN, border_order, delta_order, delta_rows
+from gvcodecs.laplacian.delta_rows import N_KNOWN, border_order, delta_causal_order, delta_order
 from gvcodecs.laplacian.domain import build_domain, build_surface
 from gvcodecs.laplacian.extended_laplacian import MAX_NEIGHBOURS, ExtendedLaplacian, thin_hubs
 from gvcodecs.laplacian.header import Header
@@ -24,7 +24,7 @@ from gvpipe.errors import FormatError, SettingError
 from gvpipe.mesh.topology import components
 from gvpipe.metrics.comparison import compare
 from gvpipe.sequence import MeshSequence
-from gvpipe.trajectory.prediction import select_rows
+from gvpipe.trajectory.prediction import select_vectors
 
 HEADER = Header("mean-value", "kalman", 16, "hierarchy", 0.75, 1 / 16, 1.2, 1.5, 1, (1.0,))
 
@@ -130,14 +130,14 @@ def test_every_component_has_an_anchor_and_small_ones_nothing_else() -> None:
     walk = border_order(surface.faces, len(points))
     for choice in ("hierarchy", "walk"):
         for spacing in (1, 7, 1000):
-            anchors = choose_anchors(choice, spacing, surface.hierarchy, surface.rows, walk, component_of)
-            assert len(set(anchors.points)) == len(anchors.points) == len(anchors.rows.order)
+            anchors = choose_anchors(choice, spacing, surface.hierarchy, surface.causal, walk, component_of)
+            assert len(set(anchors.points)) == len(anchors.points) == len(anchors.causal.order)
             assert set(component_of[anchors.points]) == set(range(n_components))
             small = np.flatnonzero(sizes[component_of] <= SMALL)
             assert set(small) <= set(anchors.points)
             assert spacing > 1 or len(anchors.points) == len(points)
-            known = np.repeat(np.arange(len(anchors.points)), np.diff(anchors.rows.starts))
-            assert (anchors.rows.near < known).all()
+            known = np.repeat(np.arange(len(anchors.points)), np.diff(anchors.causal.starts))
+            assert (anchors.causal.neighbours < known).all()
         header = dataclasses.replace(HEADER, anchor_choice=choice)
         domain = build_domain(surface, points, header)
         assert set(domain.delta_points) <= set(np.flatnonzero(sizes[component_of] > SMALL))
@@ -145,11 +145,11 @@ def test_every_component_has_an_anchor_and_small_ones_nothing_else() -> None:
 
 def test_selected_rows_know_what_they_knew() -> None:
     _, surface = surface_of(grid(12))
-    rows = surface.rows  # type: ignore[attr-defined]
-    keep = np.arange(len(rows.order)) < 50
-    chosen = select_rows(rows, keep)
-    assert np.array_equal(rows.order[keep][chosen.near], rows.near[: rows.starts[50]])
-    assert np.array_equal(chosen.starts, rows.starts[:51])
+    causal = surface.causal  # type: ignore[attr-defined]
+    keep = np.arange(len(causal.order)) < 50
+    chosen = select_vectors(causal, keep)
+    assert np.array_equal(causal.order[keep][chosen.neighbours], causal.neighbours[: causal.starts[50]])
+    assert np.array_equal(chosen.starts, causal.starts[:51])
     assert chosen.blocks[-1] == 50
 
 
@@ -160,18 +160,18 @@ def test_known_neighbours_are_known_near_and_many(prediction: str) -> None:
     walk = border_order(surface.faces, len(points))
     order, blocks, limits = delta_order(prediction, surface.hierarchy, walk, np.ones(len(points), bool))
     assert sorted(walk) == sorted(order) == list(range(len(points)))
-    rows = delta_rows(prediction, order, blocks, limits, surface.neighbours, np.asarray(points))
-    known = np.diff(rows.starts)
+    causal = delta_causal_order(prediction, order, blocks, limits, surface.neighbours, np.asarray(points))
+    known = np.diff(causal.starts)
     row = np.repeat(np.arange(len(order)), known)
-    assert (rows.near < limits[row]).all()
+    assert (causal.neighbours < limits[row]).all()
     assert known.max() == N_KNOWN[prediction]
     assert (known[100:] >= 12).all()
     if prediction == "kalman":  # chains are no longer than there are blocks
         block = np.searchsorted(blocks, np.arange(len(order)), side="right")
-        assert (block[rows.near] < block[row]).all()
+        assert (block[causal.neighbours] < block[row]).all()
     steps = sparse.csgraph.shortest_path(surface.neighbours, unweighted=True)[order][:, order]
     for i in (140, 200, 479):
-        found = steps[i, rows.near[rows.starts[i] : rows.starts[i + 1]]]
+        found = steps[i, causal.neighbours[causal.starts[i] : causal.starts[i + 1]]]
         assert (np.diff(found) >= 0).all()
         assert found.max() <= np.sort(steps[i, : limits[i]])[len(found) - 1]
 
@@ -183,11 +183,11 @@ def test_rigid_weights_carry_any_linear_map_of_the_average() -> None:
     walk = border_order(surface.faces, len(points))
     order, blocks, limits = delta_order("rigid", surface.hierarchy, walk, np.ones(len(points), bool))
     differential = np.random.default_rng(0).standard_normal((len(points), 3))
-    rows = delta_rows("rigid", order, blocks, limits, surface.neighbours, differential)
+    causal = delta_causal_order("rigid", order, blocks, limits, surface.neighbours, differential)
     deltas = (differential @ np.random.default_rng(1).standard_normal((3, 7)))[order]
-    row = np.repeat(np.arange(len(order)), np.diff(rows.starts))
+    row = np.repeat(np.arange(len(order)), np.diff(causal.starts))
     predicted = np.zeros_like(deltas)
-    np.add.at(predicted, row, rows.weights[:, None] * deltas[rows.near])
+    np.add.at(predicted, row, causal.weights[:, None] * deltas[causal.neighbours])
     assert np.linalg.norm((predicted - deltas)[100:]) < 0.1 * np.linalg.norm(deltas[100:])
 
 
@@ -279,13 +279,13 @@ def test_perturbed_predictions_hardly_move_vertices(prediction: str, monkeypatch
     sequence = moving(20, shake=0.02)  # noise teaches weights that mean nothing
     bitstream = Laplacian(quality=80, delta_prediction=prediction).encode(sequence).bitstream
     clean = Laplacian.reader(bitstream).read(0, 20).astype(np.float64)
-    original = gvpipe.trajectory.prediction.predict_rows
+    original = gvpipe.trajectory.prediction.predict_vectors
 
-    def perturbed(rows: gvpipe.trajectory.prediction.Rows, *rest: object) -> None:
-        noise = 1 + 1e-12 * np.random.default_rng(5).choice([-1, 1], len(rows.weights))
-        original(dataclasses.replace(rows, weights=rows.weights * noise), *rest)  # type: ignore[arg-type]
+    def perturbed(causal: gvpipe.trajectory.prediction.CausalOrder, *rest: object) -> None:
+        noise = 1 + 1e-12 * np.random.default_rng(5).choice([-1, 1], len(causal.weights))
+        original(causal._replace(weights=causal.weights * noise), *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("gvpipe.trajectory.coefficient_coding.predict_rows", perturbed)
+    monkeypatch.setattr("gvpipe.trajectory.coefficient_coding.predict_vectors", perturbed)
     moved = Laplacian.reader(bitstream).read(0, 20).astype(np.float64)
     assert np.abs(clean - moved).max() < 1e-3 * bitstream.header["steps"][0]
 

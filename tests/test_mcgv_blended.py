@@ -24,7 +24,7 @@ from gvcodecs.mcgv.motion.skinning_fit import Motions, fit_blend
 from gvcodecs.mcgv.motion.weight_coding import Prices, decode_weights, encode_weights
 from gvcodecs.mcgv.motion.weight_kernels import MAX_LISTED, cluster_of, list_known, rank_of, share
 from gvcodecs.mcgv.motion.weight_selection import Transforms, choose
-from gvpipe.connectivity.welded_mesh import PointMesh
+from gvpipe.connectivity.welded_mesh import WeldedMesh
 from gvpipe.container.mp4 import read_file
 from gvpipe.errors import CorruptFile, FormatError, NewerVersion
 from gvpipe.mesh.lattice import Lattice
@@ -94,7 +94,7 @@ def test_points_are_numbered_along_the_codecs_order() -> None:
 
 def test_points_that_move_keep_the_sides_between_them() -> None:
     """Also those of triangles whose third corner stands still, which are no triangles any more."""
-    mesh = PointMesh(
+    mesh = WeldedMesh(
         faces=np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2]], np.int32),
         point=np.arange(5),
         lattice=np.arange(15, dtype=np.int32).reshape(5, 3),

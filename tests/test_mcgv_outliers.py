@@ -16,7 +16,7 @@ from sequences import waving
 from gvcodecs.mcgv import Mcgv
 from gvcodecs.mcgv.pictures.outliers import SECTION, OutlierWriter
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.corrections.displacements import MovesReader
+from gvpipe.corrections.displacements import DisplacementReader
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import PROFILES
 from gvpipe.registry import open_reader
@@ -56,13 +56,13 @@ def test_outliers_come_back_and_coarsen_nothing(settings: dict[str, Any]) -> Non
     codec = Mcgv(**{**FAST, **settings})
     stream = codec.encode(sequence).bitstream
     assert stream.header["outliers"] is True and stream.version == 4
-    groups = MovesReader(stream.section(SECTION), 30, 144, SECTION)
+    groups = DisplacementReader(stream.section(SECTION), 30, 144, SECTION)
     assert groups.group == 8
     error = np.abs(open_reader(stream).read(0, 30) - sequence.positions[:]).max(axis=2)
     step = groups.step
     assert error.max() < 4 * step
     assert error[off].max() < 3 * step  # of 2 model units
-    held = MovesReader(stream.section(SECTION), 30, 144, SECTION)
+    held = DisplacementReader(stream.section(SECTION), 30, 144, SECTION)
     moved = np.zeros((30, 144, 3), np.float32)
     held.apply(0, moved)
     assert 0 < np.count_nonzero(moved.any(axis=2)) < 0.1 * off.size
@@ -121,7 +121,7 @@ def test_what_pictures_and_section_hold_is_the_residual(
     outside = np.abs(np.rint(residual / level) - held) * level > levels * level / 2
     assert bool(section) >= bool(outside.any())
     if section:
-        MovesReader(section, n_frames, n_vertices, SECTION).apply(0, result)
+        DisplacementReader(section, n_frames, n_vertices, SECTION).apply(0, result)
     allowed = (level + np.where(np.abs(residual) >= 1, levels * level, 0)) / 2 + 1e-6 * np.abs(residual) + 1e-9
     assert (np.abs(result - residual) <= allowed).all()
 

@@ -221,13 +221,13 @@ def test_perturbed_predictions_hardly_move_vertices(predictor: str, monkeypatch:
     sequence = make(*TUBE, n_frames=20)
     bitstream = Pca(quality=80, predictor=predictor).encode(sequence).bitstream
     clean = Pca.reader(bitstream).read(0, 20).astype(np.float64)
-    original = gvpipe.trajectory.prediction.predict_rows
+    original = gvpipe.trajectory.prediction.predict_vectors
 
-    def perturbed(rows: gvpipe.trajectory.prediction.Rows, *rest: object) -> None:
-        noise = 1 + 1e-12 * np.random.default_rng(5).choice([-1, 1], len(rows.weights))
-        original(dataclasses.replace(rows, weights=rows.weights * noise), *rest)  # type: ignore[arg-type]
+    def perturbed(causal: gvpipe.trajectory.prediction.CausalOrder, *rest: object) -> None:
+        noise = 1 + 1e-12 * np.random.default_rng(5).choice([-1, 1], len(causal.weights))
+        original(causal._replace(weights=causal.weights * noise), *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("gvpipe.trajectory.coefficient_coding.predict_rows", perturbed)
+    monkeypatch.setattr("gvpipe.trajectory.coefficient_coding.predict_vectors", perturbed)
     moved = Pca.reader(bitstream).read(0, 20).astype(np.float64)
     assert np.abs(clean - moved).max() < 1e-3 * bitstream.header["steps"][0]
 

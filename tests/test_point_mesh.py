@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from sequences import awkward, grid, patched, same_triangles
 
 from gvpipe.connectivity.base_mesh import encode_base
-from gvpipe.connectivity.seams import decode_copies, encode_copies
-from gvpipe.connectivity.welded_mesh import PointMesh, decode_points, encode_points
+from gvpipe.connectivity.seams import decode_seams, encode_seams
+from gvpipe.connectivity.welded_mesh import WeldedMesh, decode_points, encode_points
 from gvpipe.container.cursor import varint
 from gvpipe.entropy.integers import encode_integers
 from gvpipe.errors import CorruptFile
@@ -62,7 +62,7 @@ both_codings = pytest.mark.parametrize("across", [False, True], ids=["difference
 each_mesh = pytest.mark.parametrize("mesh", MESHES.values(), ids=MESHES.keys())
 
 
-def check_mesh(decoded: PointMesh) -> None:
+def check_mesh(decoded: WeldedMesh) -> None:
     """Whatever the bytes: numbers in range, triangles over vertices that are those over points, no point without a vertex."""
     n_vertices, n_points = len(decoded.point), len(decoded.lattice)
     assert decoded.faces.shape == decoded.point_faces.shape == (len(decoded.faces), 3)
@@ -192,7 +192,7 @@ def test_garbage_does_no_harm(data: bytes, order: bytes, across: bool) -> None:
 @pytest.mark.parametrize("counts", [[-1, 1], [1 << 24, 1], [(1 << 23), (1 << 23)], [1 << 38, 1 << 38], [-(1 << 38), 0]])
 def test_numbers_of_copies_out_of_range(counts: list[int]) -> None:
     with pytest.raises(CorruptFile, match="number of copies"):
-        decode_copies(encode_integers(np.array(counts)), encode_integers(np.zeros(0, np.int64)), b"", np.zeros((0, 3), int), 2)
+        decode_seams(encode_integers(np.array(counts)), encode_integers(np.zeros(0, np.int64)), b"", np.zeros((0, 3), int), 2)
 
 
 @pytest.mark.parametrize("differences", [[0, -1], [0, 3], [0, 1, 2], [5, 2, -3], [0, 1 << 38]])
@@ -201,9 +201,9 @@ def test_corners_of_copies_that_do_not_exist(differences: list[int]) -> None:
     faces = np.tile([0, 1, 2], (len(differences), 1))
     coded = encode_integers(np.array(differences), np.full(len(differences), 3))
     with pytest.raises(CorruptFile, match="a copy that does not exist"):
-        decode_copies(encode_integers(np.array([2, 0, 0])), coded, b"", faces, 3)
+        decode_seams(encode_integers(np.array([2, 0, 0])), coded, b"", faces, 3)
     coded = encode_integers(np.array([7, 1, 1, -2]), np.full(4, 3))
-    found, points = decode_copies(encode_integers(np.array([2, 0, 0])), coded, b"", np.tile([0, 1, 2], (4, 1)), 3)
+    found, points = decode_seams(encode_integers(np.array([2, 0, 0])), coded, b"", np.tile([0, 1, 2], (4, 1)), 3)
     assert found.tolist() == [[0, 3, 4], [1, 3, 4], [2, 3, 4], [0, 3, 4]] and points.tolist() == [0, 0, 0, 1, 2]
 
 
@@ -211,9 +211,9 @@ def test_copies_are_numbered_by_first_use() -> None:
     """So that most differences are small; those that no corner uses come last."""
     faces = np.array([[3, 4, 5], [1, 4, 5], [3, 4, 5]])
     points = np.array([0, 0, 0, 0, 1, 2])
-    coded = encode_copies(faces, points, points[faces], 3, reorder=True)
+    coded = encode_seams(faces, points, points[faces], 3, reorder=True)
     assert coded.permutation.tolist() == [3, 1, 0, 2, 4, 5]
-    found, _ = decode_copies(coded.counts, coded.copies, coded.order, points[faces], 3)
+    found, _ = decode_seams(coded.counts, coded.copies, coded.order, points[faces], 3)
     assert found.tolist() == [[0, 4, 5], [1, 4, 5], [0, 4, 5]]
 
 
@@ -223,7 +223,7 @@ def test_soups_cost_hardly_more_than_their_points() -> None:
     points = np.sort(point_faces.ravel())
     order = np.argsort(point_faces.ravel(), kind="stable")
     faces = np.argsort(order).reshape(-1, 3)
-    coded = encode_copies(faces, points, point_faces, 401, reorder=True)
+    coded = encode_seams(faces, points, point_faces, 401, reorder=True)
     assert len(coded.copies) < 30
-    found, _ = decode_copies(coded.counts, coded.copies, coded.order, point_faces, 401)
+    found, _ = decode_seams(coded.counts, coded.copies, coded.order, point_faces, 401)
     assert np.array_equal(found, faces)

@@ -1,4 +1,4 @@
-"""Shared pieces under the pca codec: bare meshes, hierarchy, block coding, tables told by two numbers, rows in time."""
+"""Shared pieces under the pca codec: topology alone, hierarchy, block coding, parametric tables, vectors in time."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from gvpipe.entropy import parametric_tables, range_decoder
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.errors import CorruptFile
 from gvpipe.mesh.hierarchy import build_hierarchy
-from gvpipe.trajectory.coefficient_coding import decode_rows, encode_rows
-from gvpipe.trajectory.temporal_neighbours import frame_rows
+from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
+from gvpipe.trajectory.temporal_neighbours import temporal_order
 
 
 def random_mesh(seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -49,7 +49,7 @@ def test_hierarchy_orders_every_vertex_after_what_predicts_it(seed: int) -> None
     assert np.array_equal(np.sort(hierarchy.order), np.arange(n_vertices))
     rank = np.argsort(hierarchy.order)
     owner = np.repeat(np.arange(n_vertices), np.diff(hierarchy.starts))
-    assert (rank[hierarchy.near] < owner).all()
+    assert (rank[hierarchy.neighbours] < owner).all()
     assert hierarchy.blocks[0] == 0 and hierarchy.blocks[-1] == n_vertices and (np.diff(hierarchy.blocks) > 0).all()
 
 
@@ -130,11 +130,11 @@ def test_tables_told_by_two_numbers_fit_laplacian_residuals(mean: float) -> None
 
 @pytest.mark.parametrize("n_frames", [1, 2, 3, 4, 7, 16, 17, 100])
 def test_frame_rows_hold_every_row_after_what_predicts_it(n_frames: int) -> None:
-    rows = frame_rows(n_frames)
-    assert np.array_equal(np.sort(rows.order), np.arange(3 * n_frames))
-    rank, owner = np.argsort(rows.order), np.repeat(np.arange(3 * n_frames), np.diff(rows.starts))
-    assert (rank[rows.near] < owner).all() and (rows.near % 3 == rows.order[owner] % 3).all()
-    assert rows.blocks[-1] == 3 * n_frames
+    causal = temporal_order(n_frames)
+    assert np.array_equal(np.sort(causal.order), np.arange(3 * n_frames))
+    rank, owner = np.argsort(causal.order), np.repeat(np.arange(3 * n_frames), np.diff(causal.starts))
+    assert (rank[causal.neighbours] < owner).all() and (causal.neighbours % 3 == causal.order[owner] % 3).all()
+    assert causal.blocks[-1] == 3 * n_frames
 
 
 def test_rows_come_back_within_a_step_and_a_prefix_of_blocks_alone() -> None:
@@ -142,11 +142,11 @@ def test_rows_come_back_within_a_step_and_a_prefix_of_blocks_alone() -> None:
     time = np.arange(50)[:, None]
     target = np.repeat(np.sin(time / rng.uniform(3, 20, 12)) * 40 * 0.7 ** np.arange(12), 3, axis=0)
     target *= np.tile([1, -2, 0.5], 50)[:, None]
-    rows = frame_rows(50)
-    data, decoded = encode_rows(target, 0.01, rows)
+    causal = temporal_order(50)
+    data, decoded = encode_vectors(target, 0.01, causal)
     assert np.abs(target - decoded).max() < 0.0059  # ROUND_UP lets 0.58 of a step pass
-    assert np.allclose(decode_rows(data, 12, 0.01, rows, "x"), decoded, atol=1e-9)
-    part = decode_rows(data, 12, 0.01, rows, "x", n_blocks=1)
-    known = rows.order[: rows.blocks[1]]
+    assert np.allclose(decode_vectors(data, 12, 0.01, causal, "x"), decoded, atol=1e-9)
+    part = decode_vectors(data, 12, 0.01, causal, "x", n_blocks=1)
+    known = causal.order[: causal.blocks[1]]
     assert np.allclose(part[known], decoded[known], atol=1e-9)
     assert 8 * len(data) < 0.6 * target.size * np.log2(np.abs(target).mean() / 0.01)

@@ -16,7 +16,7 @@ import gvpipe
 from gvpipe.codec import GroupReader, LevelReader
 from gvpipe.errors import CorruptFile
 from gvpipe.registry import codec_class, encode_sequence, open_reader
-from gvpipe.repeated_frames import Holds, find_holds, read_holds
+from gvpipe.repeated_frames import RepeatedFrames, find_repeated_frames, read_repeated_frames
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.still_vertices import decode_flags, encode_flags, find_still
 
@@ -238,11 +238,11 @@ def test_holds_across_chunks_and_lazily(monkeypatch: pytest.MonkeyPatch) -> None
     lengths = [2, 1, 5, 1, 3]
     sequence = held(waving(4, 5), lengths)
     monkeypatch.setattr("gvpipe.sequence.CHUNK_BYTES", 12 * 16 * 2)
-    holds = find_holds(sequence)
+    holds = find_repeated_frames(sequence)
     assert holds is not None
     assert holds.lengths.tolist() == lengths
     assert np.array_equal(holds.distinct(sequence).read(1, 4), sequence.positions[:][[2, 3, 8]])
-    assert find_holds(waving(4, 5)) is None
+    assert find_repeated_frames(waving(4, 5)) is None
 
 
 def test_flags_come_back() -> None:
@@ -263,12 +263,12 @@ def test_wrong_flags_are_refused(lengths: list[int]) -> None:
 
 @pytest.mark.parametrize("lengths", [[5, 0, 5], [3, 4], [12, -2], [1] * 11, [1 << 38, 5]])
 def test_wrong_holds_are_refused(lengths: list[int]) -> None:
-    from gvpipe.repeated_frames import add_holds
+    from gvpipe.repeated_frames import add_repeated_frames
 
     bitstream = codec_class("pca")().encode(waving(4, 10)).bitstream
-    wrong = add_holds(bitstream, Holds(np.array(lengths)), 2)
+    wrong = add_repeated_frames(bitstream, RepeatedFrames(np.array(lengths)), 2)
     with pytest.raises(CorruptFile, match="holds"):
-        read_holds(type(bitstream)(**{**vars(wrong), "n_frames": 10}))
+        read_repeated_frames(type(bitstream)(**{**vars(wrong), "n_frames": 10}))
 
 
 @pytest.mark.parametrize("codec", ["pca", "laplacian", "pdct", "mcgv"])

@@ -29,7 +29,7 @@ from gvpipe.container.mp4 import read_file, write_file
 from gvpipe.corrections.bound import Bound, encode_corrections
 from gvpipe.errors import CorruptFile
 from gvpipe.registry import make_codec, open_reader
-from gvpipe.repeated_frames import Holds, add_holds
+from gvpipe.repeated_frames import RepeatedFrames, add_repeated_frames
 from gvpipe.sequence import MeshSequence
 
 pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())
@@ -518,7 +518,7 @@ def test_wrong_holds_are_refused(
 ) -> None:
     """Runs that do not add up to the header's frames, or that are not of as many pictures as the video has."""
     plain = kinds["blended"]
-    wrong = add_holds(plain, Holds(np.array(lengths, np.int64)), plain.version)
+    wrong = add_repeated_frames(plain, RepeatedFrames(np.array(lengths, np.int64)), plain.version)
     path = site[0] / "holds.mp4"
     write_file(dataclasses.replace(wrong, n_frames=plain.n_frames), path)
     assert _outcome(path) == "corrupt"

@@ -21,7 +21,8 @@ import numpy as np
 from gvpipe.arrays import Array, Int32
 from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.container.cursor import Cursor
+from gvpipe.errors import CorruptFile, InputError, corrupt_section
 from gvpipe.mesh.unique_rows import decode_table, encode_table, row_ids, smallest_first, used_vertices
 
 HEADER = struct.Struct("<4I")
@@ -175,20 +176,20 @@ def _decode_draco(draco: bytes) -> tuple[Array, Array]:
         points, attributes = decoded.points, decoded.attributes
         faces = decoded.faces.astype(np.int64)
     except Exception as exc:  # DracoPy's own, TypeError, bare ones; each means: corrupt
-        raise CorruptFile("section 'mesh' is corrupt: Draco cannot decode it") from exc
+        raise corrupt_section("mesh", "Draco cannot decode it") from exc
     if points is None or points.dtype != np.uint32 or points.shape[1:] != (3,) or len(attributes) > 2:
-        raise CorruptFile("section 'mesh' is corrupt: unexpected Draco attributes")
+        raise corrupt_section("mesh", "unexpected Draco attributes")
     occurrence = np.zeros((len(points), 1), np.int64)
     for attribute in attributes:
         if attribute["attribute_type"] == GENERIC:
             occurrence = np.asarray(attribute["data"])
     if occurrence.shape != (len(points), 1) or occurrence.dtype.kind not in "iu":
-        raise CorruptFile("section 'mesh' is corrupt: unexpected Draco attributes")
+        raise corrupt_section("mesh", "unexpected Draco attributes")
     keys = np.c_[points, occurrence].astype(np.int64)
     if faces.size and (faces.min() < 0 or faces.max() >= len(keys)):
-        raise CorruptFile("section 'mesh' is corrupt: a triangle names a vertex that does not exist")
+        raise corrupt_section("mesh", "a triangle names a vertex that does not exist")
     if keys.size and keys.max() >= 1 << 31:
-        raise CorruptFile("section 'mesh' is corrupt: lattice coordinate out of range")
+        raise corrupt_section("mesh", "lattice coordinate out of range")
 
     ids, representatives = row_ids(keys)  # merge what Draco split
     by_appearance = np.argsort(representatives)
@@ -198,40 +199,28 @@ def _decode_draco(draco: bytes) -> tuple[Array, Array]:
 def check_draco_header(draco: bytes) -> None:
     """Refuse counts that the stream cannot hold before Draco allocates for them."""
     if not draco.startswith(DRACO_PREFIX):
-        raise CorruptFile("section 'mesh' is corrupt: not the kind of Draco stream that is written here")
-    position = len(DRACO_PREFIX) + 1  # skip the traversal type
-    for _ in ("vertices", "faces"):
-        count = shift = 0
-        while True:
-            if position >= len(draco) or shift > 28:
-                raise CorruptFile("section 'mesh' is corrupt: truncated Draco header")
-            byte = draco[position]
-            position += 1
-            count |= (byte & 127) << shift
-            shift += 7
-            if byte < 128:
-                break
+        raise corrupt_section("mesh", "not the kind of Draco stream that is written here")
+    cursor = Cursor(draco, "mesh")
+    cursor.take(len(DRACO_PREFIX) + 1)  # the last byte is the traversal type
+    for elements in ("vertices", "faces"):
+        count = cursor.varint((1 << 35) - 1, f"Draco's number of {elements}")
         if count > MAX_PER_BYTE * len(draco):
-            raise CorruptFile(f"section 'mesh' is corrupt: {count} elements in {len(draco)} bytes")
+            raise cursor.corrupt(f"{count} elements in {len(draco)} bytes")
 
 
 def _decode_mesh(mesh: bytes) -> tuple[Array, Array]:
-    if len(mesh) < HEADER.size:
-        raise CorruptFile(f"section 'mesh' of {len(mesh)} bytes: truncated")
-    bytes_draco, n_loose_points, n_loose_faces, bytes_points = HEADER.unpack_from(mesh)
-    end_draco = HEADER.size + bytes_draco
-    end_points = end_draco + bytes_points
-    if end_points > len(mesh):
-        raise CorruptFile(f"section 'mesh' of {len(mesh)} bytes, its header promises {end_points} and more: truncated")
-    keys, draco_faces = _decode_draco(mesh[HEADER.size : end_draco])
-    points = np.concatenate([keys[:, :3], decode_table(mesh[end_draco:end_points], n_loose_points)])
-    faces = np.concatenate([draco_faces, decode_table(mesh[end_points:], n_loose_faces)])
+    cursor = Cursor(mesh, "mesh")
+    bytes_draco, n_loose_points, n_loose_faces, bytes_points = cursor.struct(HEADER)
+    draco, loose_points = cursor.take(bytes_draco), cursor.take(bytes_points)
+    keys, draco_faces = _decode_draco(draco)
+    points = np.concatenate([keys[:, :3], decode_table(loose_points, n_loose_points)])
+    faces = np.concatenate([draco_faces, decode_table(cursor.rest(), n_loose_faces)])
     if len(points) > MAX_VERTICES:
-        raise CorruptFile(f"section 'mesh' is corrupt: {len(points)} vertices, at most {MAX_VERTICES}")
+        raise corrupt_section("mesh", f"{len(points)} vertices, at most {MAX_VERTICES}")
     if points.size and points.min() < 0:
-        raise CorruptFile("section 'mesh' is corrupt: lattice coordinate out of range")
+        raise corrupt_section("mesh", "lattice coordinate out of range")
     if faces.size and (faces.min() < 0 or faces.max() >= len(points)):
-        raise CorruptFile("section 'mesh' is corrupt: a triangle names a vertex that does not exist")
+        raise corrupt_section("mesh", "a triangle names a vertex that does not exist")
     return points, faces
 
 

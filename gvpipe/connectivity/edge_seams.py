@@ -14,10 +14,10 @@ import numpy as np
 
 from gvpipe.arrays import Array
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import corrupt_section
 
 
-def encode_seams(copies: Array, point_faces: Array, counts: Array) -> bytes:
+def encode_across_edges(copies: Array, point_faces: Array, counts: Array) -> bytes:
     """Code the copy ``(3 T,)`` that each corner uses, numbered by first use.
 
     Args:
@@ -33,8 +33,8 @@ def encode_seams(copies: Array, point_faces: Array, counts: Array) -> bytes:
     return encode_integers(places[told], contexts[told])
 
 
-def decode_seams(data: bytes, point_faces: Array, counts: Array) -> Array:
-    """Mirror of `encode_seams`; raises `CorruptFile` where a corner uses a copy that does not exist."""
+def decode_across_edges(data: bytes, point_faces: Array, counts: Array) -> Array:
+    """Mirror of `encode_across_edges`; raises `CorruptFile` where a corner uses a copy that does not exist."""
     from gvpipe.connectivity.edge_seam_kernels import CONTEXTS, DECODE, walk
 
     corners, begins = _shared_corners(point_faces, counts)
@@ -44,7 +44,7 @@ def decode_seams(data: bytes, point_faces: Array, counts: Array) -> Array:
     told = begins < np.arange(len(corners))
     places[told] = decode_integers(data, int(told.sum()), contexts[told], "mesh")
     if walk(flat, corners, begins, counts, copies, places, contexts, DECODE) < len(corners):
-        raise CorruptFile("section 'mesh' is corrupt: a corner uses a copy that does not exist")
+        raise corrupt_section("mesh", "a corner uses a copy that does not exist")
     return copies
 
 

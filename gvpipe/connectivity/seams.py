@@ -15,16 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Array
-from gvpipe.connectivity.edge_seams import decode_seams, encode_seams
+from gvpipe.connectivity.edge_seams import decode_across_edges, encode_across_edges
 from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import corrupt_section
 
-MAX_COPIES = 7  # copies of a point that have contexts of their own
+MAX_SEAM_VERTICES = 7  # copies of a point that have contexts of their own
 
 
 @dataclass(frozen=True)
-class CodedCopies:
+class CodedSeams:
     """The streams, and what decoding them returns.
 
     Args:
@@ -43,9 +43,9 @@ class CodedCopies:
     points: Array
 
 
-def encode_copies(
+def encode_seams(
     faces: Array, points: Array, point_faces: Array, n_points: int, reorder: bool, across: bool = False
-) -> CodedCopies:
+) -> CodedSeams:
     """Code which vertices the corners of ``point_faces`` use.
 
     Args:
@@ -65,15 +65,15 @@ def encode_copies(
     permutation = np.lexsort((copies, points))
     rank = np.argsort(permutation)
     if reorder:
-        return CodedCopies(counts, told, b"", permutation, rank[corners], points[permutation])
+        return CodedSeams(counts, told, b"", permutation, rank[corners], points[permutation])
     order = encode_order(rank, _as_lattice(points[permutation]), rank[corners])
-    return CodedCopies(counts, told, order, np.arange(len(points)), corners, points)
+    return CodedSeams(counts, told, order, np.arange(len(points)), corners, points)
 
 
-def decode_copies(
+def decode_seams(
     counts: bytes, copies: bytes, order: bytes, point_faces: Array, n_points: int, across: bool = False
 ) -> tuple[Array, Array]:
-    """Mirror of `encode_copies`: triangles ``(T, 3)`` over vertices, and the point of each vertex ``(V,)``."""
+    """Mirror of `encode_seams`: triangles ``(T, 3)`` over vertices, and the point of each vertex ``(V,)``."""
     faces, points = _decode_corners(counts, copies, point_faces, n_points, across)
     if order:
         visits = decode_order(order, _as_lattice(points), faces)
@@ -94,10 +94,10 @@ def _encode_corners(
     copies = np.empty(len(points), np.int64)
     copies[by_use] = np.arange(len(points)) - starts[points[by_use]]
     if across:
-        return copies, encode_integers(counts - 1), encode_seams(copies[corners.ravel()], point_faces, counts)
+        return copies, encode_integers(counts - 1), encode_across_edges(copies[corners.ravel()], point_faces, counts)
     where, is_first = _shared_corners(point_faces, counts)
     differences = np.diff(copies[corners.ravel()[where]], prepend=0)
-    contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_COPIES)
+    contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_SEAM_VERTICES)
     return copies, encode_integers(counts - 1), encode_integers(_filled(differences, contexts, is_first), contexts)
 
 
@@ -118,8 +118,8 @@ def _decode_corners(counts_data: bytes, data: bytes, point_faces: Array, n_point
     """Mirror of `_encode_corners`: triangles over vertices, and the point of each vertex."""
     counts = 1 + decode_integers(counts_data, n_points, name="mesh")
     if n_points and (counts.min() < 1 or counts.max() > MAX_VERTICES or counts.sum() > MAX_VERTICES):
-        raise CorruptFile("section 'mesh' is corrupt: a number of copies is out of range")
-    copies = decode_seams(data, point_faces, counts) if across else _decode_differences(data, point_faces, counts)
+        raise corrupt_section("mesh", "a number of copies is out of range")
+    copies = decode_across_edges(data, point_faces, counts) if across else _decode_differences(data, point_faces, counts)
     flat = point_faces.ravel()
     starts = np.cumsum(counts) - counts
     faces: Array = (starts[flat] + copies).reshape(-1, 3)
@@ -128,13 +128,13 @@ def _decode_corners(counts_data: bytes, data: bytes, point_faces: Array, n_point
 
 def _decode_differences(data: bytes, point_faces: Array, counts: Array) -> Array:
     where, is_first = _shared_corners(point_faces, counts)
-    contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_COPIES)
+    contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_SEAM_VERTICES)
     total = np.cumsum(decode_integers(data, len(where), contexts, "mesh"))
     begin = np.maximum.accumulate(np.where(is_first, np.arange(len(where)), 0))
     copies = np.zeros(point_faces.size, np.int64)
     copies[where] = total - total[begin] if len(where) else 0
     if ((copies < 0) | (copies >= counts[point_faces.ravel()])).any():
-        raise CorruptFile("section 'mesh' is corrupt: a corner uses a copy that does not exist")
+        raise corrupt_section("mesh", "a corner uses a copy that does not exist")
     return copies
 
 

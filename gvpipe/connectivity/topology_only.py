@@ -23,19 +23,19 @@ import numpy as np
 
 from gvpipe.arrays import Array, Int32
 from gvpipe.connectivity.base_mesh import COMPRESSION_LEVEL, MAX_PER_BYTE, EncodedMesh, check_draco_header
-from gvpipe.connectivity.seams import decode_copies, encode_copies
+from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import CorruptFile, corrupt_section
 from gvpipe.mesh.unique_rows import decode_table, encode_table, row_ids, smallest_first, used_vertices
 
 HEADER = struct.Struct("<6I")
 
 
 @dataclass(frozen=True)
-class BareMesh:
+class Topology:
     """Args:
     faces: ``(T, 3) int32`` triangles over V vertices.
     points: ``(V,) int64`` the point of each vertex.
@@ -48,7 +48,7 @@ class BareMesh:
     n_points: int
 
 
-def encode_mesh(faces: Int32, points: Array, reorder: bool) -> tuple[EncodedMesh, BareMesh]:
+def encode_mesh(faces: Int32, points: Array, reorder: bool) -> tuple[EncodedMesh, Topology]:
     """Code triangles ``(T, 3)`` over V vertices, of which those with equal ``points (V,)``, 0..P-1, are copies.
 
     Returns the streams, and the mesh as decoding returns it. ``reorder`` lets the decoder see the codec's vertex order.
@@ -62,14 +62,14 @@ def encode_mesh(faces: Int32, points: Array, reorder: bool) -> tuple[EncodedMesh
         parts, place, coded_faces = _place_points(point_faces, n_points, carried)
     except (ValueError, CorruptFile):
         parts, place, coded_faces = _place_points(point_faces, n_points, _NOTHING)
-    coded = encode_copies(faces, place[points], coded_faces, n_points, reorder)
+    coded = encode_seams(faces, place[points], coded_faces, n_points, reorder)
     head = HEADER.pack(*(len(part) for part in parts[:2]), len(parts[2]), len(coded.counts), parts[3], n_points)
     streams = head + b"".join([*parts[:3], coded.counts, coded.copies])
-    decoded = BareMesh(coded.faces.astype(np.int32), coded.points, coded_faces.astype(np.int32), n_points)
+    decoded = Topology(coded.faces.astype(np.int32), coded.points, coded_faces.astype(np.int32), n_points)
     return EncodedMesh(streams, coded.order, coded.permutation), decoded
 
 
-def decode_mesh(mesh: bytes, order: bytes, n_vertices: int) -> BareMesh:
+def decode_mesh(mesh: bytes, order: bytes, n_vertices: int) -> Topology:
     """Mirror of `encode_mesh`, for a mesh of at most ``n_vertices``. Raises CorruptFile for anything malformed."""
     cursor = Cursor(mesh, "mesh")
     bytes_draco, bytes_merges, bytes_loose, bytes_counts, n_loose, n_points = cursor.struct(HEADER)
@@ -79,11 +79,11 @@ def decode_mesh(mesh: bytes, order: bytes, n_vertices: int) -> BareMesh:
     point_faces = _point_faces(draco, merges, loose, n_loose)
     if point_faces.size and (point_faces.min() < 0 or point_faces.max() >= n_points):
         raise cursor.corrupt("a triangle names a point that does not exist")
-    faces, points = decode_copies(cursor.take(bytes_counts), cursor.rest(), order, point_faces, n_points)
-    return BareMesh(faces.astype(np.int32), points, point_faces.astype(np.int32), n_points)
+    faces, points = decode_seams(cursor.take(bytes_counts), cursor.rest(), order, point_faces, n_points)
+    return Topology(faces.astype(np.int32), points, point_faces.astype(np.int32), n_points)
 
 
-def read_mesh(bitstream: Bitstream) -> BareMesh:
+def read_mesh(bitstream: Bitstream) -> Topology:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
     mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"), bitstream.n_vertices)
     bitstream.check_size(len(mesh.points), len(mesh.faces))
@@ -164,15 +164,15 @@ def _merge(faces: Array, n_vertices: int, merges: bytes) -> Array:
         n_merges = cursor.varint(n_vertices, "the number of merges")
         gaps, back = decode_integers(cursor.rest(), 2 * n_merges, name="mesh").reshape(2, -1)
         if not n_merges or ((gaps < 0) | (gaps >= n_vertices)).any():
-            raise CorruptFile("section 'mesh' is corrupt: a merge names a vertex that does not exist")
+            raise corrupt_section("mesh", "a merge names a vertex that does not exist")
         again = np.cumsum(gaps + 1) - 1
         if (back <= 0).any() or again[-1] >= n_vertices or (back > again).any():
-            raise CorruptFile("section 'mesh' is corrupt: a merge names a vertex that does not exist")
+            raise corrupt_section("mesh", "a merge names a vertex that does not exist")
         stands_for[again] = again - back
         is_new = np.ones(n_vertices, bool)
         is_new[again] = False
         if not is_new[stands_for[again]].all():
-            raise CorruptFile("section 'mesh' is corrupt: a merge names a merged vertex")
+            raise corrupt_section("mesh", "a merge names a merged vertex")
         stands_for = (np.cumsum(is_new) - 1)[stands_for]
     merged: Array = stands_for[faces]
     return merged
@@ -188,7 +188,7 @@ def _decode_draco(draco: bytes) -> tuple[Array, int]:
         decoded = DracoPy.decode(draco)
         faces, n_vertices = decoded.faces.astype(np.int64), len(decoded.points)
     except Exception as exc:  # DracoPy's own, TypeError, bare ones; each means: corrupt
-        raise CorruptFile("section 'mesh' is corrupt: Draco cannot decode it") from exc
+        raise corrupt_section("mesh", "Draco cannot decode it") from exc
     if faces.size and (faces.min() < 0 or faces.max() >= n_vertices):
-        raise CorruptFile("section 'mesh' is corrupt: a triangle names a vertex that does not exist")
+        raise corrupt_section("mesh", "a triangle names a vertex that does not exist")
     return faces, n_vertices

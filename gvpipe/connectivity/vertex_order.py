@@ -18,7 +18,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gvpipe.arrays import Array, Float64
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.errors import InputError, corrupt_section
 from gvpipe.mesh.unique_rows import sort_rows
 
 REACH = 256  # most vertices that one search looks at: 1024 saves 0.3 bit per vertex on samba, and takes twice the time
@@ -64,10 +64,10 @@ def decode_order(data: bytes, points: Array, faces: Array) -> Array:
 
     n_vertices = len(points)
     if len(data) < N_SYMBOLS or (len(data) - N_SYMBOLS) % 4 or n_vertices > MAX_VERTICES:
-        raise CorruptFile(f"vertex order of {len(data)} bytes for {n_vertices} vertices: not a vertex order")
+        raise corrupt_section("order", f"{len(data)} bytes for {n_vertices} vertices")
     table = np.frombuffer(data, np.uint8, N_SYMBOLS)
     if n_vertices and not table.any():
-        raise CorruptFile("vertex order with an empty symbol table")
+        raise corrupt_section("order", "its symbol table is empty")
     coder = constriction.stream.queue.RangeDecoder(np.frombuffer(data, "<u4", offset=N_SYMBOLS).astype(np.uint32))
     try:
         symbols = np.zeros(0, np.int32)
@@ -79,14 +79,14 @@ def decode_order(data: bytes, points: Array, faces: Array) -> Array:
         if has_low.any():
             low[has_low] = coder.decode(constriction.stream.model.Uniform(), sizes[has_low])
     except (AssertionError, ValueError) as exc:
-        raise CorruptFile("section 'order' is corrupt: the range coder ran out of step") from exc
+        raise corrupt_section("order", "the range coder ran out of step") from exc
     if not coder.maybe_exhausted():
-        raise CorruptFile("section 'order' is corrupt: bytes left over")
+        raise corrupt_section("order", "bytes left over")
     ranks, jumps = _joined(symbols, low)
     visits = np.zeros(n_vertices, np.int64)
     n_done = _compiled_walk()(*_neighbours(points, faces), REACH, ranks, jumps, visits, True)
     if n_done != n_vertices:
-        raise CorruptFile(f"section 'order' is corrupt: no vertex has the rank sent for vertex {n_done}")
+        raise corrupt_section("order", f"no vertex has the rank sent for vertex {n_done}")
     return visits
 
 

@@ -17,15 +17,15 @@ from scipy import sparse
 
 from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.connectivity.base_mesh import EncodedMesh, decode_base, encode_base
-from gvpipe.connectivity.seams import decode_copies, encode_copies
+from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.mesh.topology import adjacency
 from gvpipe.mesh.unique_rows import smallest_first
 
 
 @dataclass(frozen=True)
-class PointMesh:
+class WeldedMesh:
     """A mesh and its points, numbered as the coder walks over the surface.
 
     Args:
@@ -53,7 +53,7 @@ class PointMesh:
 
 def encode_points(
     lattice: Array, faces: Array, points: Array, reorder: bool, across: bool = False
-) -> tuple[EncodedMesh, PointMesh]:
+) -> tuple[EncodedMesh, WeldedMesh]:
     """Code a mesh of ``points (V,)``, 0..P-1, at ``lattice (P, 3)`` with triangles ``faces (T, 3)`` over V vertices.
 
     Returns the streams, and the mesh as decoding returns it. ``reorder`` lets the decoder see the codec's vertex order, and
@@ -64,23 +64,23 @@ def encode_points(
     streams, base = encode_base(lattice, points[faces], reorder=True)
     place = np.argsort(streams.permutation)
     point_faces = smallest_first(base.faces.astype(np.int64))
-    coded = encode_copies(faces, place[points], point_faces, len(lattice), reorder, across)
-    mesh = varint(len(streams.mesh)) + streams.mesh + varint(len(coded.counts)) + coded.counts + coded.copies
-    decoded = PointMesh(coded.faces.astype(np.int32), coded.points, base.points, point_faces.astype(np.int32))
+    coded = encode_seams(faces, place[points], point_faces, len(lattice), reorder, across)
+    mesh = pack_block(streams.mesh) + pack_block(coded.counts) + coded.copies
+    decoded = WeldedMesh(coded.faces.astype(np.int32), coded.points, base.points, point_faces.astype(np.int32))
     return EncodedMesh(mesh, coded.order, coded.permutation), decoded
 
 
-def decode_points(mesh: bytes, order: bytes, across: bool = False) -> PointMesh:
+def decode_points(mesh: bytes, order: bytes, across: bool = False) -> WeldedMesh:
     """Mirror of `encode_points`. Raises CorruptFile for anything malformed."""
     cursor = Cursor(mesh, "mesh")
-    base = decode_base(cursor.take(cursor.varint(cursor.left, "a length")), b"")
+    base = decode_base(cursor.block(), b"")
     point_faces = smallest_first(base.faces.astype(np.int64))
-    counts = cursor.take(cursor.varint(cursor.left, "a length"))
-    faces, point = decode_copies(counts, cursor.rest(), order, point_faces, len(base.points), across)
-    return PointMesh(faces.astype(np.int32), point, base.points, point_faces.astype(np.int32))
+    counts = cursor.block()
+    faces, point = decode_seams(counts, cursor.rest(), order, point_faces, len(base.points), across)
+    return WeldedMesh(faces.astype(np.int32), point, base.points, point_faces.astype(np.int32))
 
 
-def read_points(bitstream: Bitstream, across: bool = False) -> PointMesh:
+def read_points(bitstream: Bitstream, across: bool = False) -> WeldedMesh:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
     mesh = decode_points(bitstream.section("mesh"), bitstream.section("order"), across)
     bitstream.check_size(len(mesh.point), len(mesh.faces))

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gvpipe.container.cursor import Cursor
-from gvpipe.errors import CorruptFile, NewerVersion, TruncatedFile
+from gvpipe.errors import CorruptFile, NewerVersion, TruncatedFile, corrupt, corrupt_section
 
 MAGIC = b"gvpipe\r\n"
 VERSION = 1
@@ -73,7 +73,7 @@ class Bitstream:
     def section(self, name: str) -> bytes:
         """Return a section's bytes; raises `CorruptFile` if there is none of that name."""
         if name not in self.sections:
-            raise CorruptFile(f"section {name!r} is missing; get the file again from its source")
+            raise corrupt(f"section {name!r} is missing")
         return self.sections[name]
 
     def check_size(self, n_vertices: int, n_triangles: int) -> None:
@@ -102,14 +102,14 @@ class Bitstream:
         """Return a list of ``count`` numbers of the header; raises `CorruptFile` unless each lies in ``low..high``."""
         values = self.header.get(key)
         if not (isinstance(values, list) and len(values) == count and all(_is_number(value, low, high) for value in values)):
-            raise CorruptFile(f"header: {key!r} is not {count} numbers in {low}..{high}; get the file again from its source")
+            raise corrupt(f"header: {key!r} is not {count} numbers in {low}..{high}")
         return tuple(values)
 
     def integers(self, key: str, count: int, low: int, high: int) -> tuple[int, ...]:
         """Return a list of ``count`` integers of the header; raises `CorruptFile` unless each lies in ``low..high``."""
         values = tuple(value for value in self.numbers(key, count, low, high) if isinstance(value, int))
         if len(values) != count:
-            raise CorruptFile(f"header: {key!r} is not {count} integers; get the file again from its source")
+            raise corrupt(f"header: {key!r} is not {count} integers")
         return values
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
@@ -152,7 +152,7 @@ def unpack_payload(payload: bytes) -> tuple[Bitstream, dict[str, Any]]:
         CorruptFile: anything else is not as written.
     """
     if payload[: len(MAGIC)] != MAGIC:
-        raise CorruptFile("the payload does not start with gvpipe's magic; get the file again from its source")
+        raise corrupt("the payload does not start with gvpipe's magic")
     cursor = Cursor(payload, "table")
     cursor.take(len(MAGIC))
     try:
@@ -184,7 +184,7 @@ def _read_sections(cursor: Cursor, entries: list[tuple[str, int, int]]) -> dict[
     for name, length, checksum in entries:
         data = cursor.take(length)
         if zlib.crc32(data) != checksum:
-            raise CorruptFile(f"section {name!r} is corrupt: its checksum does not match; get the file again from its source")
+            raise corrupt_section(name, "its checksum does not match")
         if name in sections:
             raise cursor.corrupt(f"section {name!r} occurs twice")
         sections[name] = data
@@ -211,7 +211,7 @@ def _read_header(sections: dict[str, bytes]) -> tuple[Bitstream, dict[str, Any]]
             raise ValueError(f"fps {bitstream.fps}")
         return bitstream, dict(header["container"])
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError, zlib.error) as exc:
-        raise CorruptFile(f"the header is not as gvpipe writes it ({exc}); get the file again from its source") from exc
+        raise corrupt(f"the header is not as gvpipe writes it ({exc})") from exc
 
 
 def _is_number(value: object, low: float, high: float) -> bool:

@@ -1,7 +1,11 @@
 """Bounds-checked reading, and the matching writing, of small binary sections.
 
-A number is either a field of a declared little-endian struct or a *varint*: seven bits a byte, least significant
-group first, top bit set on all bytes but the last (LEB128), at most 64 bits.
+A number is one of two things:
+
+- a field of a declared little-endian struct;
+- a *varint*: seven bits a byte, least significant group first, top bit set on all bytes but the last (LEB128), at most 64 bits.
+
+A length-prefixed block is the varint of its length, then its bytes.
 """
 
 from __future__ import annotations
@@ -12,13 +16,17 @@ from typing import Any
 import numpy as np
 
 from gvpipe.arrays import Array
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import CorruptFile, corrupt_section
 
 MAX_VARINT_BYTES = 10
 
 
 def varint(value: int) -> bytes:
-    """Return ``value`` (0..2**64-1) as a varint."""
+    """Return ``value`` (0..2**64-1) as a varint; raises ValueError beyond.
+
+    >>> varint(300).hex()
+    'ac02'
+    """
     if not 0 <= value < 1 << 64:
         raise ValueError(f"varint of {value}: it must lie in 0..2**64-1")
     result = bytearray()
@@ -29,8 +37,25 @@ def varint(value: int) -> bytes:
     return bytes(result)
 
 
+def pack_block(data: bytes) -> bytes:
+    """Return ``data`` behind the varint of its length; `Cursor.block` reads it.
+
+    >>> pack_block(b"abc")
+    b'\\x03abc'
+    """
+    return varint(len(data)) + data
+
+
 class Cursor:
     """Reads one section from its start to its end; every read is checked against what is left.
+
+    >>> cursor = Cursor(varint(300) + pack_block(b"abc"), "example")
+    >>> cursor.varint(1000), cursor.block(), cursor.left
+    (300, b'abc', 0)
+
+    Args:
+        data: the section.
+        name: of the section, for messages.
 
     Raises:
         CorruptFile: a field reaches past the end, or is out of its range; the message names the section.
@@ -52,6 +77,10 @@ class Cursor:
             raise self.corrupt(f"needs {count} more bytes where {self.left} are left")
         self._position += count
         return self._data[self._position - count : self._position]
+
+    def block(self) -> bytes:
+        """Return the bytes of a length-prefixed block (`pack_block`)."""
+        return self.take(self.varint(self.left, "a length"))
 
     def rest(self) -> bytes:
         """Return all bytes not read yet."""
@@ -84,4 +113,4 @@ class Cursor:
 
     def corrupt(self, what: str) -> CorruptFile:
         """Return the error that says ``what`` is wrong in this section."""
-        return CorruptFile(f"section {self._name!r} is corrupt: {what}; get the file again from its source")
+        return corrupt_section(self._name, f"{what}")

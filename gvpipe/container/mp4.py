@@ -26,7 +26,7 @@ from uuid import UUID
 
 from gvpipe.atomic import atomic_path
 from gvpipe.container.bitstream import VERSION, Bitstream, pack_payload, unpack_payload
-from gvpipe.errors import CorruptFile, InputError, NewerVersion, NotGeometryVideo, StrippedFile, TruncatedFile
+from gvpipe.errors import REMEDY, CorruptFile, InputError, NewerVersion, NotGeometryVideo, StrippedFile, TruncatedFile, corrupt
 
 BOX_UUID = UUID("6a1f0c52-3d7b-4e0e-9c55-67e4f0a7d1b9")
 TAG = "comment"
@@ -34,7 +34,6 @@ TAG_PREFIX = "gvpipe "
 BOX = struct.Struct(">I4s")
 LARGE = struct.Struct(">Q")
 MAX_BOXES = 1 << 16
-AGAIN = "get the file again from its source"
 
 
 def write_file(bitstream: Bitstream, path: str | os.PathLike[str], check: Callable[[Bitstream], None] | None = None) -> int:
@@ -107,7 +106,7 @@ def _read(file: IO[bytes], size: int) -> Bitstream:
     tag = track.tag
     if payload_range is None:
         if tag:
-            raise StrippedFile(f"its geometry was stripped, as remuxing or re-encoding does; {AGAIN}")
+            raise StrippedFile(f"its geometry was stripped, as remuxing or re-encoding does; {REMEDY}")
         raise NotGeometryVideo("an MP4 file, but not one that gvpipe wrote; encode a sequence to make one")
     version = tag.partition(" ")[0]
     if version.isascii() and version.isdecimal() and len(version) < 10 and int(version) > VERSION:
@@ -116,9 +115,9 @@ def _read(file: IO[bytes], size: int) -> Bitstream:
     bitstream, container = unpack_payload(file.read(payload_range[1] - payload_range[0]))
     identity = _content_id(bitstream)
     if container.get("id") != identity or (tag and tag.split()[-1] != identity):
-        raise CorruptFile(f"its geometry belongs to another file; {AGAIN}")
+        raise corrupt("its geometry belongs to another file")
     if container.get("video_crc32") != track.checksum:
-        raise CorruptFile(f"its video is damaged, or was re-encoded; {AGAIN}")
+        raise corrupt("its video is damaged, or was re-encoded")
     return replace(bitstream, video=video)
 
 
@@ -133,8 +132,8 @@ def _find_payload(file: IO[bytes], size: int) -> tuple[int, tuple[int, int] | No
             raise NotGeometryVideo("not an MP4 file; a geometry video (.mp4) is needed")
         if len(head) < BOX.size:
             if found:
-                raise CorruptFile(f"{len(head)} stray bytes follow its last box; {AGAIN}")
-            raise TruncatedFile(f"it ends inside a box header at byte {position}; {AGAIN}")
+                raise corrupt(f"{len(head)} stray bytes follow its last box")
+            raise TruncatedFile(f"it ends inside a box header at byte {position}; {REMEDY}")
         length, kind = BOX.unpack(head)
         start = position + BOX.size
         if length == 1:
@@ -144,22 +143,22 @@ def _find_payload(file: IO[bytes], size: int) -> tuple[int, tuple[int, int] | No
         elif length == 0:
             length = size - position
         if position + length > size and kind.isalnum():
-            raise TruncatedFile(f"its {kind.decode('ascii')} box ends {position + length - size} bytes past its end; {AGAIN}")
+            raise TruncatedFile(f"its {kind.decode('ascii')} box ends {position + length - size} bytes past its end; {REMEDY}")
         if not kind.isalnum() or length < start - position or position + length > size or len(kinds) > MAX_BOXES:
-            raise CorruptFile(f"the box at byte {position} has an impossible size of {length}; {AGAIN}")
+            raise corrupt(f"the box at byte {position} has an impossible size of {length}")
         if kind == b"uuid":
             file.seek(start)
             if file.read(16) == BOX_UUID.bytes:
                 if found:
-                    raise CorruptFile(f"it holds two geometries; {AGAIN}")
+                    raise corrupt("it holds two geometries")
                 found = (position, (start + 16, position + length))
         kinds.append(kind)
         position += length
     if not kinds:
-        raise TruncatedFile(f"the file is empty; {AGAIN}")
+        raise TruncatedFile(f"the file is empty; {REMEDY}")
     for kind in (b"moov", b"mdat"):
         if kind not in kinds:
-            raise TruncatedFile(f"its {kind.decode('ascii')} box is missing; {AGAIN}")
+            raise TruncatedFile(f"its {kind.decode('ascii')} box is missing; {REMEDY}")
     return (found[0], found[1]) if found else (size, None)
 
 
@@ -228,5 +227,5 @@ def _inspect(video: IO[bytes]) -> _Track:
                 checksum = zlib.crc32(bytes(packet), checksum)
                 n_bytes += packet.size
     except (av.FFmpegError, UnicodeDecodeError, ValueError) as exc:
-        raise CorruptFile(f"its video cannot be read ({exc}); {AGAIN}") from exc
+        raise corrupt(f"its video cannot be read ({exc})") from exc
     return _Track(tag, checksum, n_bytes)

@@ -11,6 +11,7 @@ from gvpipe.errors import CorruptFile
 
 MAX_SEGMENT = 100_000  # frames
 SMALLEST_STEP, LARGEST_STEP = 2.0**-131, 2.0**129  # model units; no step of a float32 model lies beyond
+TINY, HUGE = 1e-60, 1e39  # open limits, model units, of numbers that were never limited more closely; old files may use them
 
 
 def count_segments(n_frames: int, most: int) -> int:

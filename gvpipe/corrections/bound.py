@@ -21,7 +21,15 @@ import numpy as np
 from gvpipe.arrays import Float32, Float64, Floats, Int32
 from gvpipe.codec import FrameReader, GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.corrections.displacements import MAX_STEPS, Moves, MovesReader, encode_group, encode_moves, most_frames, move
+from gvpipe.corrections.displacements import (
+    MAX_STEPS,
+    DisplacementReader,
+    Displacements,
+    displace,
+    encode_displacements,
+    encode_group,
+    most_frames,
+)
 from gvpipe.errors import InputError
 from gvpipe.metrics.vertex_errors import Errors, VertexErrors, frame_diagonal
 from gvpipe.sequence import MeshSequence
@@ -76,13 +84,13 @@ def encode_corrections(sequence: MeshSequence, reader: FrameReader, bound: Bound
         found = find_corrections(wanted, decoded, bound)
         groups.append(encode_group(found, stop - first))
         at = found.frames, found.vertices
-        decoded[at] = move(decoded[at], found.steps, bound.step)
+        decoded[at] = displace(decoded[at], found.steps, bound.step)
         errors.add(wanted, _distance(wanted, decoded))
     left = errors.result(frame_diagonal(sequence))
-    return encode_moves(bound.step, size, groups), left
+    return encode_displacements(bound.step, size, groups), left
 
 
-def find_corrections(wanted: Floats, decoded: Float32, bound: Bound) -> Moves:
+def find_corrections(wanted: Floats, decoded: Float32, bound: Bound) -> Displacements:
     """Corrections that bring ``decoded`` within the bound of ``wanted``, both ``(n, V, 3)``, model units."""
     off = _distance(wanted, decoded) > bound.inner
     vertices, frames = np.nonzero(off.T)
@@ -95,21 +103,21 @@ def find_corrections(wanted: Floats, decoded: Float32, bound: Bound) -> Moves:
     for axes in range(1, 8):  # every choice of axes to be rounded towards 0 instead
         candidate = nearest - towards * [axes & 1, axes >> 1 & 1, axes >> 2]
         count = np.abs(candidate).sum(axis=1)
-        better = (count < fewest) & (_distance(there, move(here, candidate, bound.step)) <= bound.inner)
+        better = (count < fewest) & (_distance(there, displace(here, candidate, bound.step)) <= bound.inner)
         steps[better], fewest[better] = candidate[better], count[better]
-    return Moves(frames, vertices, steps)
+    return Displacements(frames, vertices, steps)
 
 
 def correct(bitstream: Bitstream, reader: FrameReader) -> FrameReader:
     """Wrap the reader of a codec's frames, if there are corrections to them.
 
     Raises:
-        CorruptFile: here or later: the section is not what `encode_moves` writes.
+        CorruptFile: here or later: the section is not what `encode_displacements` writes.
     """
     if SECTION not in bitstream.sections:
         return reader
     section = bitstream.section(SECTION)
-    return _Corrected(reader, MovesReader(section, bitstream.n_frames, bitstream.n_vertices, SECTION))
+    return _Corrected(reader, DisplacementReader(section, bitstream.n_frames, bitstream.n_vertices, SECTION))
 
 
 class _Corrected:
@@ -119,7 +127,7 @@ class _Corrected:
     level_faces: Callable[[int], Int32]
     group: Callable[[int], tuple[int, int]]
 
-    def __init__(self, reader: FrameReader, moves: MovesReader) -> None:
+    def __init__(self, reader: FrameReader, moves: DisplacementReader) -> None:
         self._reader, self._moves = reader, moves
         if isinstance(reader, LevelReader):
             self.levels, self.level_faces = reader.levels, reader.level_faces

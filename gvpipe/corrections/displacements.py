@@ -20,19 +20,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.arrays import Float32, Int64
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block, varint
+from gvpipe.container.segments import HUGE, TINY
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import corrupt_section
 
 HEAD = struct.Struct("<d")
 MAX_POSITIONS = 1 << 20  # of a group, unless one frame has more
-SMALL, LARGE = 1e-60, 1e39  # no step of a float32 model lies beyond
 MAX_STEPS = 1 << 38  # magnitude of a move, steps
 NEAR = 3  # magnitudes of the axes before that are told apart, in the contexts of y and z
 
 
 @dataclass(frozen=True)
-class Moves:
+class Displacements:
     """Moves in a group of frames.
 
     Args:
@@ -45,14 +45,14 @@ class Moves:
     steps: Int64
 
 
-def encode_moves(step: float, group: int, groups: list[bytes]) -> bytes:
+def encode_displacements(step: float, group: int, groups: list[bytes]) -> bytes:
     """Return the section of a step, model units, for groups of so many frames (`encode_group`); empty if nothing moves."""
     if not any(groups):
         return b""
     return HEAD.pack(step) + varint(group) + b"".join(varint(len(coded)) for coded in groups) + b"".join(groups)
 
 
-def encode_group(found: Moves, n_frames: int) -> bytes:
+def encode_group(found: Displacements, n_frames: int) -> bytes:
     """Return a group of so many frames."""
     at = found.vertices * n_frames + found.frames  # ascending
     if not len(at):
@@ -69,31 +69,31 @@ def encode_group(found: Moves, n_frames: int) -> bytes:
         encode_integers(y, _context(x)),
         encode_integers(z, _context(x, y)),
     ]
-    return varint(len(starts)) + b"".join(varint(len(block)) + block for block in blocks)
+    return varint(len(starts)) + b"".join(pack_block(block) for block in blocks)
 
 
 @dataclass(frozen=True)
-class Shared:
+class PointVertices:
     """Vertices that are moved together: those of number n are ``vertices[starts[n]:starts[n + 1]]``."""
 
     vertices: Int64
     starts: Int64
 
     @classmethod
-    def of(cls, vertices: Int64, numbers: Int64, n_numbers: int) -> Shared:
+    def of(cls, vertices: Int64, numbers: Int64, n_numbers: int) -> PointVertices:
         """Group ``vertices (M,)`` by their ``numbers (M,)``, 0..n - 1."""
         order = np.argsort(numbers, kind="stable")
         return cls(vertices[order], np.concatenate([[0], np.cumsum(np.bincount(numbers, minlength=n_numbers))]))
 
-    def spread(self, moves: Moves) -> Moves:
+    def spread(self, moves: Displacements) -> Displacements:
         """Moves of numbers as moves of all their vertices."""
         counts = np.diff(self.starts)[moves.vertices]
         own = np.repeat(np.arange(len(counts)), counts)
         place = np.arange(len(own)) - np.repeat(np.cumsum(counts) - counts, counts)
-        return Moves(moves.frames[own], self.vertices[self.starts[moves.vertices[own]] + place], moves.steps[own])
+        return Displacements(moves.frames[own], self.vertices[self.starts[moves.vertices[own]] + place], moves.steps[own])
 
 
-class MovesReader:
+class DisplacementReader:
     """Moves by group; the last group is kept.
 
     Args:
@@ -103,14 +103,14 @@ class MovesReader:
         shared: which vertices share a number; None: a number is a vertex.
 
     Raises:
-        CorruptFile: here or later: the section is not what `encode_moves` writes.
+        CorruptFile: here or later: the section is not what `encode_displacements` writes.
     """
 
-    def __init__(self, data: bytes, n_frames: int, n_vertices: int, name: str, shared: Shared | None = None) -> None:
+    def __init__(self, data: bytes, n_frames: int, n_vertices: int, name: str, shared: PointVertices | None = None) -> None:
         self._shared = shared
         cursor = Cursor(data, name)
         (self.step,) = cursor.struct(HEAD)
-        if not SMALL < self.step < LARGE:  # NaN neither
+        if not TINY < self.step < HUGE:  # NaN neither
             raise cursor.corrupt(f"its step is {self.step}")
         self.group = cursor.varint(most_frames(n_vertices), "the frames of a group")
         if not self.group:
@@ -119,7 +119,7 @@ class MovesReader:
         self._groups = [cursor.take(length) for length in lengths]
         cursor.end()
         self._n_frames, self._n_vertices, self._name = n_frames, n_vertices, name
-        self._last: tuple[int, Moves] | None = None
+        self._last: tuple[int, Displacements] | None = None
 
     def apply(self, start: int, frames: Float32) -> None:
         """Move the vertices of ``frames (n, V, 3)``, model units, the first of which is ``start``; raises `CorruptFile`."""
@@ -129,11 +129,11 @@ class MovesReader:
             places = found.frames + (number * self.group - start)
             asked = (places >= 0) & (places < len(frames))
             at = places[asked], found.vertices[asked]
-            frames[at] = move(frames[at], found.steps[asked], self.step)
+            frames[at] = displace(frames[at], found.steps[asked], self.step)
             if not np.isfinite(frames[at]).all():
-                raise CorruptFile(f"section {self._name!r} is corrupt: a position is larger than float32 can hold")
+                raise corrupt_section(self._name, "a position is larger than float32 can hold")
 
-    def _read(self, number: int) -> Moves:
+    def _read(self, number: int) -> Displacements:
         last = self._last  # once: other threads may read too
         if last is None or last[0] != number:
             n_frames = min(self.group, self._n_frames - number * self.group)
@@ -142,16 +142,16 @@ class MovesReader:
         return last[1]
 
 
-def decode_group(data: bytes, n_frames: int, n_vertices: int, name: str) -> Moves:
+def decode_group(data: bytes, n_frames: int, n_vertices: int, name: str) -> Displacements:
     """Mirror of `encode_group`; raises `CorruptFile`."""
     if not data:
         none = np.zeros(0, np.int64)
-        return Moves(none, none, np.zeros((0, 3), np.int64))
+        return Displacements(none, none, np.zeros((0, 3), np.int64))
     cursor = Cursor(data, name)
     n_runs = cursor.varint(n_frames * n_vertices, "the number of runs")
 
     def take(count: int, contexts: Int64 | None = None) -> Int64:
-        return decode_integers(cursor.take(cursor.varint(cursor.left, "a length")), count, contexts, name)
+        return decode_integers(cursor.block(), count, contexts, name)
 
     gaps, lengths = take(n_runs), take(n_runs) + 1
     limit = n_frames * n_vertices
@@ -166,10 +166,10 @@ def decode_group(data: bytes, n_frames: int, n_vertices: int, name: str) -> Move
     z = take(len(at), _context(x, y))
     cursor.end()
     vertices, frames = np.divmod(at, n_frames)
-    return Moves(frames, vertices, np.stack([x, y, z], axis=1))
+    return Displacements(frames, vertices, np.stack([x, y, z], axis=1))
 
 
-def move(points: Float32, steps: NDArray[np.generic], step: float) -> Float32:
+def displace(points: Float32, steps: NDArray[np.generic], step: float) -> Float32:
     """Points ``(C, 3)``, moved by so many steps: worked out in float64, then rounded."""
     with np.errstate(over="ignore"):
         return (points.astype(np.float64) + np.asarray(steps, np.float64) * step).astype(np.float32)

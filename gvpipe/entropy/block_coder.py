@@ -16,18 +16,24 @@ All models are tables of integers.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvpipe.arrays import Int64, Integers
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy import parametric_tables
+from gvpipe.entropy.grouping import group_by_context
 from gvpipe.entropy.tokens import CHUNK, MAX_BITS, MAX_TOKENS, TABLE_TOTAL, model, tokenise
 
-PARAMETRIC = 1  # kind of a table told by two numbers
+PARAMETRIC = 1  # kind of a table that two numbers describe
 
 
 class BlockEncoder:
-    """Collects blocks; tables are known, and bytes made, when all are there."""
+    """Collects blocks; tables and bytes are made when all are there.
+
+    >>> coder = BlockEncoder(2)
+    >>> coder.add(np.array([0, 1, -1]), np.array([0, 0, 1]))
+    >>> BlockDecoder(coder.finish(), 2, "example").take(np.array([0, 0, 1])).tolist()
+    [0, 1, -1]
+    """
 
     def __init__(self, n_contexts: int) -> None:
         self._n_contexts = n_contexts
@@ -38,7 +44,7 @@ class BlockEncoder:
         """Append a block of ``values (n,)``, magnitude below 2**39, in ``contexts (n,)``, 0..C-1."""
         tokens, low, n_low = tokenise(values.astype(np.int64))
         groups = []
-        for context, where in _groups(contexts):
+        for context, where in group_by_context(contexts):
             groups.append((context, tokens[where]))
             self._counts[context] += np.bincount(tokens[where], minlength=MAX_TOKENS)
         has_low = n_low > 0
@@ -52,7 +58,7 @@ class BlockEncoder:
         for counts in self._counts:
             described, table = _describe(counts)
             head.append(described)
-            models.append(model(table) if len(table) > 1 else None)  # None: nothing to tell
+            models.append(model(table) if len(table) > 1 else None)  # None: nothing to code
         coder = constriction.stream.queue.RangeEncoder()
         for groups, low, n_low in self._blocks:
             for context, tokens in groups:
@@ -71,8 +77,13 @@ class BlockEncoder:
 class BlockDecoder:
     """Mirror of `BlockEncoder`, as compiled loops: most blocks are small.
 
+    Args:
+        data: the stream.
+        n_contexts: C.
+        name: of the section, for messages.
+
     Attributes:
-        state, words, edges, sizes: what kernels need (`gvpipe.entropy.block_kernels`).
+        stream: what kernels need (`gvpipe.entropy.block_kernels`).
 
     Raises:
         CorruptFile: the stream's tables are not what the encoder writes.
@@ -80,30 +91,31 @@ class BlockDecoder:
 
     def __init__(self, data: bytes, n_contexts: int, name: str) -> None:
         from gvpipe.entropy import range_decoder
+        from gvpipe.entropy.block_kernels import BlockStream
 
         self._cursor = Cursor(data, name)
         if self._cursor.varint(n_contexts, "the context count") != n_contexts:
             raise self._cursor.corrupt("its context count does not fit its content")
         tables = [self._table() for _ in range(n_contexts)]
-        self.sizes = np.array([len(table) for table in tables], np.int64)
-        self.edges = np.zeros((n_contexts, int(self.sizes.max(initial=0)) + 1), np.uint64)
-        for edges, table in zip(self.edges, tables, strict=True):
-            edges[: len(table) + 1] = range_decoder.edges_of(table)
+        sizes = np.array([len(table) for table in tables], np.int64)
+        edges = np.zeros((n_contexts, int(sizes.max(initial=0)) + 1), np.uint64)
+        for own, table in zip(edges, tables, strict=True):
+            own[: len(table) + 1] = range_decoder.edges_of(table)
         if self._cursor.left % 4:
             raise self._cursor.corrupt("its words are not whole")
-        self.words = self._cursor.array("<u4", self._cursor.left // 4).astype(np.uint32)
-        self.state = range_decoder.start(self.words)
+        words = self._cursor.array("<u4", self._cursor.left // 4).astype(np.uint32)
+        self.stream = BlockStream(range_decoder.start(words), words, edges, sizes)
 
     def take(self, contexts: Integers) -> Int64:
         """Return the next block's values, ``(n,)``, for its ``contexts (n,)``; raises `CorruptFile` if they do not decode."""
         from gvpipe.entropy.block_kernels import take_block
 
-        values = np.zeros(len(contexts), np.int64)
-        self.check(take_block(self.state, self.words, self.edges, self.sizes, contexts.astype(np.int64), values))
+        values, status = take_block(self.stream, contexts.astype(np.int64))
+        self.check(status)
         return values
 
     def check(self, status: int) -> None:
-        """Raise `CorruptFile` if a kernel's status tells of an error."""
+        """Raise `CorruptFile` if a kernel's status is an error."""
         from gvpipe.entropy.block_kernels import NO_TABLE
 
         if status == NO_TABLE:
@@ -128,7 +140,7 @@ class BlockDecoder:
         """Check that no word is left."""
         from gvpipe.entropy import range_decoder
 
-        if not range_decoder.may_be_exhausted(self.state, self.words):
+        if not range_decoder.may_be_exhausted(self.stream.state, self.stream.words):
             raise self._cursor.corrupt("range-coded data are left over")
 
 
@@ -148,11 +160,3 @@ def _describe(counts: Int64) -> tuple[bytes, Int64]:
     if bits_parametric + 8 * 3 < bits:
         return varint(PARAMETRIC) + bytes([zero, ratio]), parametric_tables.table(zero, ratio)
     return described, frequencies
-
-
-def _groups(contexts: Integers) -> list[tuple[int, NDArray[np.intp]]]:
-    """Contexts that occur, ascending, and the positions of each one's values, in order."""
-    order = np.argsort(contexts, kind="stable")
-    ordered = contexts[order]
-    bounds = np.flatnonzero(np.diff(ordered)) + 1
-    return [(int(contexts[part[0]]), part) for part in np.split(order, bounds)] if len(order) else []

@@ -5,7 +5,7 @@ Why: the coders that constriction offers are exact where their models are, so al
 sent with the data; no probability is ever computed from a formula.
 
 A value ``x`` is folded to ``u = 2x`` (x >= 0) or ``-2x - 1`` (x < 0). ``u < 16`` is its own token; above that, the token
-tells the bit length of ``u`` and its second highest bit, and the bits below follow raw::
+signals the bit length of ``u`` and its second highest bit, and the bits below follow raw::
 
     block   = [varint] context count C, C tables, [varint] word count W, [W x u32] range-coded tokens, raw bits
     table   = [varint] token count N (0: the context is empty), N x [varint] frequency (0..4096)
@@ -22,17 +22,25 @@ from numpy.typing import NDArray
 
 from gvpipe.arrays import Int64, Integers
 from gvpipe.container.cursor import Cursor, varint
+from gvpipe.entropy.grouping import group_by_context
 from gvpipe.entropy.tokens import DIRECT, MAX_TOKENS, TABLE_TOTAL, model, tokenise, untokenise
 
 MAX_CONTEXTS = 1 << 16
+_EMPTY = np.zeros(0, np.intp)
 
 
 def encode_integers(values: Integers, contexts: Integers | None = None) -> bytes:
-    """Range code ``values`` (any shape, read in C order).
+    """Range code ``values`` (any shape, read in C order); returns one block of bytes.
+
+    >>> decode_integers(encode_integers(np.array([3, -1, 0])), 3).tolist()
+    [3, -1, 0]
 
     Args:
         values: signed integers, magnitude below 2**39.
-        contexts: same shape, 0..65535; which table each value uses; None is one table for all. The decoder must know it.
+        contexts: same shape, 0..65535; which table each value uses; None is one table for all. The decoder must derive it.
+
+    Raises:
+        ValueError: a value is too large.
     """
     import constriction
 
@@ -87,15 +95,14 @@ def decode_integers(data: bytes, count: int, contexts: Integers | None = None, n
 
 
 def _groups(contexts: Integers | None, count: int) -> list[NDArray[np.intp]]:
-    """Positions of each context's values, in order."""
+    """Indices of each context's values, ascending, of contexts 0 up to the largest that occurs."""
     if contexts is None:
         return [np.arange(count)]
     flat = np.asarray(contexts).ravel()
     if flat.size != count:
         raise ValueError(f"{flat.size} contexts for {count} values")
-    order = np.argsort(flat, kind="stable")
-    ends = np.cumsum(np.bincount(flat))
-    return np.split(order, ends[:-1]) if count else []
+    groups = dict(group_by_context(flat))
+    return [groups.get(context, _EMPTY) for context in range(max(groups, default=-1) + 1)]
 
 
 def _pack_bits(tokens: Int64, extra: Int64, n_extra: Int64) -> bytes:

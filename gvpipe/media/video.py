@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.arrays import Float64, Integers, UInt8
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import CorruptFile, corrupt
 from gvpipe.media.jpeg import decode_jpeg, encode_jpeg
 
 if TYPE_CHECKING:
@@ -209,7 +209,7 @@ class VideoReader:
         self._packets, self._extradata = _demux(data, profile, width, height)
         starts = [i for i, packet in enumerate(self._packets) if packet.is_keyframe]
         if not starts or starts[0] != 0:
-            raise CorruptFile("the video does not start with a key frame; get the file again from its source")
+            raise corrupt("the video does not start with a key frame")
         self._groups = list(zip(starts, [*starts[1:], len(self._packets)], strict=True))
         self._cached: tuple[int, list[Plane]] = (-1, [])
         self._pool = ThreadPoolExecutor(AHEAD)
@@ -274,10 +274,10 @@ class VideoReader:
                 pictures += decoder.decode(av.Packet(bytes(packet)))
             pictures += decoder.decode(None)
         except av.FFmpegError as exc:
-            raise CorruptFile(f"the video does not decode ({exc}); get the file again from its source") from exc
+            raise corrupt(f"the video does not decode ({exc})") from exc
         wanted = (self.profile.pixel_format, *self.shape)
         if len(pictures) != len(packets) or any((p.format.name, p.height, p.width) != wanted for p in pictures):
-            raise CorruptFile("the video does not decode to the pictures that the header tells of; get the file again")
+            raise corrupt("the video does not decode to the pictures that the header tells of")
         return [self._luma(picture) for picture in pictures]
 
     def _luma(self, picture: Any) -> Plane:
@@ -323,10 +323,10 @@ def _demux(data: bytes, profile: Profile, width: int, height: int) -> tuple[list
             stream = container.streams.video[0]
             context = stream.codec_context
             if context is None:
-                raise CorruptFile("the video is of no known kind; get the file again from its source")
+                raise corrupt("the video is of no known kind")
             found = (context.name, context.width, context.height)
             if found != (profile.codec, width, height) or max(width, height) > MAX_SIDE:
                 raise CorruptFile(f"the video is {found}; {(profile.codec, width, height)} is needed")
             return [packet for packet in container.demux(stream) if packet.size], context.extradata
     except (av.FFmpegError, IndexError, ValueError) as exc:
-        raise CorruptFile(f"the video track cannot be read ({exc}); get the file again from its source") from exc
+        raise corrupt(f"the video track cannot be read ({exc})") from exc

@@ -1,46 +1,128 @@
-"""Kernels on the triangles around a vertex: linked lists of corners, rings, and how to close the hole that a vertex leaves.
+"""Kernels on the triangles around a vertex: linked lists of corners, one-rings, and the filling of the hole a vertex leaves.
 
-Corner ``3 t + k`` is vertex k of triangle t. Everything is an integer.
+Corner ``3 t + k`` is vertex k of triangle t. Everything is an integer, so that every machine decides alike.
 """
 
 from __future__ import annotations
 
-from gvpipe.arrays import Array
+from typing import NamedTuple
+
+import numpy as np
+
+from gvpipe.arrays import Int32
 from gvpipe.compiled import compiled
 
+HUB = 256  # triangles; an edge between two vertices that have more counts as there, unsearched
+
+
+class CornerLists(NamedTuple):
+    """Triangles that can be removed and added, with a doubly linked list of the corners at every vertex; int32.
+
+    Args:
+        triangles: ``(T, 3)`` vertices; the first one of a removed triangle is -1.
+        head: ``(V,)`` the first corner at each vertex, -1 if there is none.
+        after, before: ``(3T,)`` the next and the previous corner at the same vertex, -1 at the ends.
+        degree: ``(V,)`` triangles at each vertex.
+    """
+
+    triangles: Int32
+    head: Int32
+    after: Int32
+    before: Int32
+    degree: Int32
+
+
+class Hole(NamedTuple):
+    """Scratch memory for the one-ring of a vertex, of up to n vertices, and for the triangles that fill it; int32.
+
+    Args:
+        sides: ``(n, 2)`` far sides of the vertex' triangles, in no order.
+        ring: ``(n,)`` vertices of the ring in order; of a boundary vertex both ends are boundary vertices.
+        polygon: ``(n,)`` places in the ring that no ear has cut off yet.
+        excess: ``(n,)`` by how much each ring vertex' degree exceeds the regular one.
+        triangles: ``(n, 3)`` what fills the hole.
+    """
+
+    sides: Int32
+    ring: Int32
+    polygon: Int32
+    excess: Int32
+    triangles: Int32
+
 
 @compiled
-def link(corner: int, vertex: int, head: Array, after: Array, before: Array) -> None:
-    after[corner] = head[vertex]
-    before[corner] = -1
-    if head[vertex] >= 0:
-        before[head[vertex]] = corner
-    head[vertex] = corner
+def link_corners(triangles: Int32, n_vertices: int) -> CornerLists:
+    """Build the lists of ``triangles (T, 3)`` over V vertices; at each vertex corners ascend."""
+    n_corners = 3 * len(triangles)
+    lists = CornerLists(
+        triangles,
+        np.full(n_vertices, -1, np.int32),
+        np.full(n_corners, -1, np.int32),
+        np.full(n_corners, -1, np.int32),
+        np.zeros(n_vertices, np.int32),
+    )
+    for t in range(len(triangles) - 1, -1, -1):
+        for k in range(2, -1, -1):
+            link(lists, t, k)
+    return lists
 
 
 @compiled
-def unlink(corner: int, vertex: int, head: Array, after: Array, before: Array) -> None:
-    if before[corner] >= 0:
-        after[before[corner]] = after[corner]
+def link(lists: CornerLists, t: int, k: int) -> None:
+    """Put corner k of triangle t first in its vertex' list."""
+    corner, vertex = 3 * t + k, lists.triangles[t, k]
+    first = lists.head[vertex]
+    lists.after[corner] = first
+    lists.before[corner] = -1
+    if first >= 0:
+        lists.before[first] = corner
+    lists.head[vertex] = corner
+    lists.degree[vertex] += 1
+
+
+@compiled
+def unlink(lists: CornerLists, t: int, k: int) -> None:
+    """Take corner k of triangle t out of its vertex' list."""
+    corner, vertex = 3 * t + k, lists.triangles[t, k]
+    before, after = lists.before[corner], lists.after[corner]
+    if before >= 0:
+        lists.after[before] = after
     else:
-        head[vertex] = after[corner]
-    if after[corner] >= 0:
-        before[after[corner]] = before[corner]
+        lists.head[vertex] = after
+    if after >= 0:
+        lists.before[after] = before
+    lists.degree[vertex] -= 1
 
 
 @compiled
-def find_ring(v: int, tri: Array, head: Array, after: Array, ring: Array, sides: Array) -> tuple[int, bool]:
-    """Chain the far sides of v's triangles: ring size and whether it closes; size 0: v cannot be removed."""
+def empty_hole(size: int) -> Hole:
+    """Memory for rings of up to ``size`` vertices."""
+    return Hole(
+        np.empty((size, 2), np.int32),
+        np.empty(size, np.int32),
+        np.empty(size, np.int32),
+        np.empty(size, np.int32),
+        np.empty((size, 3), np.int32),
+    )
+
+
+@compiled
+def find_ring(v: int, lists: CornerLists, hole: Hole) -> tuple[int, bool]:
+    """Chain the far sides of v's triangles to its ring: how many vertices that has, and whether it closes.
+
+    Size 0: the triangles are not one fan, or too many, so that v cannot be removed.
+    """
+    ring, sides = hole.ring, hole.sides
     n = 0
-    c = head[v]
+    c = lists.head[v]
     while c >= 0:
-        if n == ring.shape[0]:
+        if n == len(ring):
             return 0, False
         t, k = c // 3, c % 3
-        sides[n, 0] = tri[t, (k + 1) % 3]
-        sides[n, 1] = tri[t, (k + 2) % 3]
+        sides[n, 0] = lists.triangles[t, (k + 1) % 3]
+        sides[n, 1] = lists.triangles[t, (k + 2) % 3]
         n += 1
-        c = after[c]
+        c = lists.after[c]
     if n == 0:
         return 0, False
     first = 0
@@ -73,86 +155,87 @@ def find_ring(v: int, tri: Array, head: Array, after: Array, ring: Array, sides:
             return 0, False
     if closed:
         return (size, True) if at == ring[0] else (0, False)
-    if size == ring.shape[0]:
+    if size == len(ring):
         return 0, False
     for j in range(size):
-        if ring[j] == at:  # a point twice in the ring
+        if ring[j] == at:  # a vertex twice in the ring
             return 0, False
     ring[size] = at
     return size + 1, False
 
 
 @compiled
-def has_edge(a: int, b: int, tri: Array, head: Array, after: Array, degree: Array) -> bool:
-    if min(degree[a], degree[b]) > 256:
+def has_edge(a: int, b: int, lists: CornerLists) -> bool:
+    """Whether a triangle uses the edge between a and b."""
+    if min(lists.degree[a], lists.degree[b]) > HUB:
         return True
-    if degree[b] < degree[a]:
+    if lists.degree[b] < lists.degree[a]:
         a, b = b, a
-    c = head[a]
+    c = lists.head[a]
     while c >= 0:
         t, k = c // 3, c % 3
-        if tri[t, (k + 1) % 3] == b or tri[t, (k + 2) % 3] == b:
+        if lists.triangles[t, (k + 1) % 3] == b or lists.triangles[t, (k + 2) % 3] == b:
             return True
-        c = after[c]
+        c = lists.after[c]
     return False
 
 
 @compiled
-def fill_hole(
-    n: int,
-    closed: bool,
-    ring: Array,
-    degree: Array,
-    regular: Array,
-    tri: Array,
-    head: Array,
-    after: Array,
-    polygon: Array,
-    gain: Array,
-    new: Array,
-) -> tuple[int, int]:
-    """Triangulate the hole by cutting ears, the one first that brings degrees closest to regular.
+def fill_hole(n: int, closed: bool, lists: CornerLists, regular: Int32, hole: Hole) -> tuple[int, int]:
+    """Triangulate the hole inside a ring of n vertices by cutting ears, the one first that brings degrees closest to regular.
 
-    Returns the number of new triangles in ``new``, -1 if there is no way, and the cost.
+    Args:
+        n, closed: of the ring in ``hole`` (`find_ring`).
+        regular: ``(V,)`` degree that each vertex is to have.
+
+    Returns the number of triangles in ``hole.triangles``, -1 if the hole cannot be filled without using an edge twice, and
+    the change of the sum of squared deviations from the regular degrees.
     """
-    if not closed and n >= 3 and has_edge(ring[0], ring[n - 1], tri, head, after, degree):
+    ring, polygon, excess = hole.ring, hole.polygon, hole.excess
+    if not closed and n >= 3 and has_edge(ring[0], ring[n - 1], lists):
         return -1, 0
     cost = 0
     for i in range(n):
         polygon[i] = i
         end = (not closed) and (i == 0 or i == n - 1)
-        gain[i] = degree[ring[i]] - (1 if end else 2) - regular[ring[i]]
-        was = degree[ring[i]] - regular[ring[i]]
-        cost -= was * was
+        excess_before = lists.degree[ring[i]] - regular[ring[i]]
+        excess[i] = excess_before - (1 if end else 2)  # of the ring's triangles the hole takes one or two
+        cost -= excess_before * excess_before
     size, count = n, 0
-    while size > 3:
-        best, best_cost = -1, 0
-        for i in range(size):
-            a, b, c = polygon[(i - 1) % size], polygon[i], polygon[(i + 1) % size]
-            rise = 2 * gain[a] + 2 * gain[c] - 2 * gain[b]
-            if best >= 0 and rise >= best_cost:
-                continue
-            if has_edge(ring[a], ring[c], tri, head, after, degree):
-                continue
-            best, best_cost = i, rise
+    while size >= 3:
+        best = _find_ear(size, lists, hole) if size > 3 else 1
         if best < 0:
             return -1, 0
-        a, b, c = polygon[(best - 1) % size], polygon[best], polygon[(best + 1) % size]
-        new[count, 0], new[count, 1], new[count, 2] = ring[a], ring[b], ring[c]
+        _cut_ear(best, size, count, hole)
         count += 1
-        gain[a] += 1
-        gain[b] += 1
-        gain[c] += 1
-        for i in range(best, size - 1):
-            polygon[i] = polygon[i + 1]
         size -= 1
-    if size == 3:
-        a, b, c = polygon[0], polygon[1], polygon[2]
-        new[count, 0], new[count, 1], new[count, 2] = ring[a], ring[b], ring[c]
-        count += 1
-        gain[a] += 1
-        gain[b] += 1
-        gain[c] += 1
     for i in range(n):
-        cost += gain[i] * gain[i]
+        cost += excess[i] * excess[i]
     return count, cost
+
+
+@compiled
+def _find_ear(size: int, lists: CornerLists, hole: Hole) -> int:
+    """The place in the polygon whose ear costs least, of those whose cut is no edge yet; -1 if there is none."""
+    best, best_cost = -1, 0
+    for i in range(size):
+        a, b, c = hole.polygon[(i - 1) % size], hole.polygon[i], hole.polygon[(i + 1) % size]
+        rise = 2 * hole.excess[a] + 2 * hole.excess[c] - 2 * hole.excess[b]
+        if best >= 0 and rise >= best_cost:
+            continue
+        if has_edge(hole.ring[a], hole.ring[c], lists):
+            continue
+        best, best_cost = i, rise
+    return best
+
+
+@compiled
+def _cut_ear(place: int, size: int, count: int, hole: Hole) -> None:
+    """Make triangle ``count`` of the polygon's vertex at ``place`` and its two neighbours, and take that vertex out."""
+    polygon = hole.polygon
+    for k in range(3):
+        corner = polygon[(place + k - 1) % size]
+        hole.triangles[count, k] = hole.ring[corner]
+        hole.excess[corner] += 1
+    for i in range(place, size - 1):
+        polygon[i] = polygon[i + 1]

@@ -1,156 +1,197 @@
 """Kernel of the vertex hierarchy: removal of vertices in waves.
 
-A wave takes vertices in the order of what their removal costs, the change of the sum of squared deviations from the regular
-degree (6 triangles, 3 at a boundary); what a removal touches is locked for the rest of the wave. A vertex stays if its
-triangles are not one fan (non-manifold places), if it has more than `MAX_RING` neighbours, or if its hole cannot be closed
-without using an edge twice.
+A wave takes vertices in the order of what their removal costs: the change of the sum of squared deviations from the regular
+degree (6 triangles, 3 at a boundary). What a removal touches is locked for the rest of the wave. A vertex stays in each of
+these cases:
+
+- its triangles are not one fan (non-manifold places);
+- it has more than `MAX_RING` neighbours;
+- its hole cannot be filled without using an edge twice.
 
 Everything is an integer; see `gvpipe.mesh.corner_lists` for the lists of corners.
 
-Source: Vasa and Skala 2010, section 3.2 (degrees near 6, known to both sides); see `gvpipe.mesh.hierarchy`.
+Source: Vasa and Skala 2010, section 3.2 (degrees near 6, derived by both sides); see `gvpipe.mesh.hierarchy`.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from gvpipe.arrays import Array
+from gvpipe.arrays import Bool, Int32, Int64
 from gvpipe.compiled import compiled
-from gvpipe.mesh.corner_lists import fill_hole, find_ring, link, unlink
+from gvpipe.mesh.corner_lists import CornerLists, Hole, empty_hole, fill_hole, find_ring, link, link_corners, unlink
 
 MAX_RING = 12  # most neighbours of a vertex that is removed
-MAX_NEAR = 20  # most vertices known about a vertex: its ring, then what lies across the ring, then what touches the ring
+MAX_NEIGHBOURS = 20  # most vertices kept about a vertex: its ring, then what lies across the ring, then what touches the ring
 MIN_COARSE = 16  # vertices; decimation stops here at the latest
 REGULAR, REGULAR_BOUNDARY = 6, 3  # triangles around a vertex
 NEVER = 1 << 40  # the cost of what cannot be removed
 
 
-@compiled
-def decimate(
-    faces: Array, n_vertices: int, max_waves: int, order: Array, waves: Array, starts: Array, near: Array, rings: Array
-) -> tuple[int, int, Array]:
-    """Remove vertices wave by wave until none can go, or `MIN_COARSE` are left.
+class Decimation(NamedTuple):
+    """Vertices that were removed, fine to coarse, and what is left; int32.
 
-    Fills ``order`` with the vertices as they leave, ``waves`` with the bounds of waves in it, ``near`` and ``starts`` with what
-    is around each as it leaves, ``rings`` with ring sizes (negative at a boundary).
-
-    Returns the numbers of vertices and waves removed and the triangles left.
+    Args:
+        order: ``(n,)`` vertices as they leave.
+        waves: ``(W + 1,)`` bounds of waves in ``order``.
+        starts: ``(n + 1,)`` bounds of each vertex' neighbours in ``neighbours``.
+        neighbours: of each vertex as it leaves: its ring in order, then vertices near it.
+        rings: ``(n,)`` ring sizes, negative at a boundary.
+        left: ``(m, 3)`` triangles of the coarsest mesh.
     """
-    n_faces = len(faces)
-    tri = faces.copy()
-    head = np.full(n_vertices, -1, np.int32)
-    after = np.full(3 * n_faces, -1, np.int32)
-    before = np.full(3 * n_faces, -1, np.int32)
-    degree = np.zeros(n_vertices, np.int32)
-    for c in range(3 * n_faces - 1, -1, -1):
-        v = tri[c // 3, c % 3]
-        link(c, v, head, after, before)
-        degree[v] += 1
-    regular = np.full(n_vertices, REGULAR, np.int32)
-    ring = np.empty(MAX_RING, np.int32)
-    sides = np.empty((MAX_RING, 2), np.int32)
-    polygon = np.empty(MAX_RING, np.int32)
-    gain = np.empty(MAX_RING, np.int32)
-    new = np.empty((MAX_RING, 3), np.int32)
-    free = np.empty(MAX_RING, np.int32)
-    for v in range(n_vertices):
-        size, closed = find_ring(v, tri, head, after, ring, sides)
-        if size > 0 and not closed:
-            regular[v] = REGULAR_BOUNDARY
-    costs = np.empty(n_vertices, np.int64)
-    locked = np.full(n_vertices, -1, np.int32)
-    gone = np.zeros(n_vertices, np.bool_)
-    n_out, n_waves, end = 0, 0, 0
-    while n_waves < max_waves and n_vertices - n_out > MIN_COARSE:
-        n_candidates = 0
-        for v in range(n_vertices):
-            costs[v] = NEVER
-            if gone[v] or head[v] < 0:
-                continue
-            size, closed = find_ring(v, tri, head, after, ring, sides)
-            if size < 2:
-                continue
-            count, cost = fill_hole(size, closed, ring, degree, regular, tri, head, after, polygon, gain, new)
-            if count >= 0:
-                own = degree[v] - regular[v]
-                costs[v] = cost - own * own
-                n_candidates += 1
+
+    order: Int32
+    waves: Int32
+    starts: Int32
+    neighbours: Int32
+    rings: Int32
+    left: Int32
+
+
+@compiled
+def decimate(faces: Int32, n_vertices: int, max_waves: int) -> Decimation:
+    """Remove vertices of ``faces (T, 3)``, wave by wave, until none can go, or `MIN_COARSE` of V are left."""
+    lists, hole = link_corners(faces.copy(), n_vertices), empty_hole(MAX_RING)
+    freed = np.empty(MAX_RING, np.int32)
+    regular = _regular_degrees(n_vertices, lists, hole)
+    order, rings = np.empty(n_vertices, np.int32), np.empty(n_vertices, np.int32)
+    waves, starts = np.zeros(max_waves + 1, np.int32), np.zeros(n_vertices + 1, np.int32)
+    neighbours = np.empty((n_vertices + 1) * MAX_NEIGHBOURS + 2 * MAX_RING, np.int32)
+    locked = np.full(n_vertices, -1, np.int32)  # the last wave that touched a vertex
+    is_gone = np.zeros(n_vertices, np.bool_)
+    n_gone, n_waves = 0, 0
+    while n_waves < max_waves and n_vertices - n_gone > MIN_COARSE:
+        costs, n_candidates = _removal_costs(is_gone, lists, regular, hole)
         by_cost = np.argsort(costs, kind="mergesort")
-        removed = 0
         for i in range(n_candidates):
             v = by_cost[i]
-            if n_vertices - n_out <= MIN_COARSE:
+            if n_vertices - n_gone <= MIN_COARSE:
                 break
             if locked[v] == n_waves:
                 continue
-            size, closed = find_ring(v, tri, head, after, ring, sides)
+            size, closed = find_ring(v, lists, hole)
             if size < 2:
                 continue
-            count, cost = fill_hole(size, closed, ring, degree, regular, tri, head, after, polygon, gain, new)
-            if count < 0:
+            n_new, _ = fill_hole(size, closed, lists, regular, hole)
+            if n_new < 0:
                 continue
-            n_free = 0
-            c = head[v]
-            while c >= 0:
-                free[n_free] = c // 3
-                n_free += 1
-                c = after[c]
-            for j in range(n_free):
-                t = free[j]
-                for k in range(3):
-                    unlink(3 * t + k, tri[t, k], head, after, before)
-                    degree[tri[t, k]] -= 1
-                tri[t, 0] = -1
             for j in range(size):
-                near[end + j] = ring[j]
-                locked[ring[j]] = n_waves
-            n_far = size
-            for j in range(min(size if closed else size - 1, MAX_NEAR - size)):  # across the ring's sides
-                a, b = ring[j], ring[(j + 1) % size]
-                from_b = degree[b] < degree[a]  # the shorter list: a hub's would make this quadratic
-                c = head[b] if from_b else head[a]
-                while c >= 0:
-                    t, k = c // 3, c % 3
-                    if tri[t, (k + 1) % 3] == a if from_b else tri[t, (k + 2) % 3] == b:
-                        far = tri[t, (k + 2) % 3] if from_b else tri[t, (k + 1) % 3]
-                        known = False
-                        for m in range(n_far):
-                            if near[end + m] == far:
-                                known = True
-                        if not known:
-                            near[end + n_far] = far
-                            n_far += 1
-                        break
-                    c = after[c]
-            for j in range(size):  # then whatever else touches the ring
-                c = head[ring[j]]
-                while c >= 0 and n_far < MAX_NEAR:
-                    t, k = c // 3, c % 3
-                    for e in range(1, 3):
-                        far = tri[t, (k + e) % 3]
-                        known = n_far == MAX_NEAR
-                        for m in range(n_far):
-                            if near[end + m] == far:
-                                known = True
-                        if not known:
-                            near[end + n_far] = far
-                            n_far += 1
-                    c = after[c]
-            for j in range(count):
-                t = free[j]
-                for k in range(3):
-                    tri[t, k] = new[j, k]
-                    link(3 * t + k, new[j, k], head, after, before)
-                    degree[new[j, k]] += 1
-            gone[v] = True
-            order[n_out] = v
-            rings[n_out] = size if closed else -size
-            end += n_far
-            n_out += 1
-            starts[n_out] = end
-            removed += 1
-        if removed == 0:
+                locked[hole.ring[j]] = n_waves
+            _remove_triangles(v, lists, freed)
+            start = starts[n_gone]
+            starts[n_gone + 1] = start + _list_neighbours(size, closed, lists, hole, neighbours[start : start + MAX_NEIGHBOURS])
+            _add_triangles(n_new, lists, hole, freed)
+            is_gone[v] = True
+            order[n_gone] = v
+            rings[n_gone] = size if closed else -size
+            n_gone += 1
+        if n_gone == waves[n_waves]:
             break
         n_waves += 1
-        waves[n_waves] = n_out
-    return n_out, n_waves, tri[tri[:, 0] >= 0]
+        waves[n_waves] = n_gone
+    return Decimation(
+        order[:n_gone],
+        waves[: n_waves + 1],
+        starts[: n_gone + 1],
+        neighbours[: starts[n_gone]],
+        rings[:n_gone],
+        lists.triangles[lists.triangles[:, 0] >= 0],
+    )
+
+
+@compiled
+def _regular_degrees(n_vertices: int, lists: CornerLists, hole: Hole) -> Int32:
+    """``(V,)`` the degree that each vertex is to have."""
+    regular = np.full(n_vertices, REGULAR, np.int32)
+    for v in range(n_vertices):
+        size, closed = find_ring(v, lists, hole)
+        if size > 0 and not closed:
+            regular[v] = REGULAR_BOUNDARY
+    return regular
+
+
+@compiled
+def _removal_costs(is_gone: Bool, lists: CornerLists, regular: Int32, hole: Hole) -> tuple[Int64, int]:
+    """``(V,)`` what each vertex' removal costs, and how many vertices can be removed."""
+    costs = np.full(len(is_gone), NEVER, np.int64)
+    n_candidates = 0
+    for v in range(len(is_gone)):
+        if is_gone[v] or lists.head[v] < 0:
+            continue
+        size, closed = find_ring(v, lists, hole)
+        if size < 2:
+            continue
+        n_new, cost = fill_hole(size, closed, lists, regular, hole)
+        if n_new >= 0:
+            own = lists.degree[v] - regular[v]
+            costs[v] = cost - own * own
+            n_candidates += 1
+    return costs, n_candidates
+
+
+@compiled
+def _remove_triangles(v: int, lists: CornerLists, freed: Int32) -> None:
+    """Take out the triangles around v; ``freed`` gets their numbers."""
+    n = 0
+    c = lists.head[v]
+    while c >= 0:
+        freed[n] = c // 3
+        n += 1
+        c = lists.after[c]
+    for i in range(n):
+        for k in range(3):
+            unlink(lists, freed[i], k)
+        lists.triangles[freed[i], 0] = -1
+
+
+@compiled
+def _add_triangles(n_new: int, lists: CornerLists, hole: Hole, freed: Int32) -> None:
+    """Put the triangles that fill the hole in the place of those that were freed."""
+    for i in range(n_new):
+        for k in range(3):
+            lists.triangles[freed[i], k] = hole.triangles[i, k]
+            link(lists, freed[i], k)
+
+
+@compiled
+def _list_neighbours(size: int, closed: bool, lists: CornerLists, hole: Hole, found: Int32) -> int:
+    """Fill ``found`` with the ring, what lies across its sides, then what touches it; return how many these are.
+
+    The vertex' own triangles are out of the lists already.
+    """
+    ring, triangles = hole.ring, lists.triangles
+    for i in range(size):
+        found[i] = ring[i]
+    n = size
+    for i in range(min(size if closed else size - 1, MAX_NEIGHBOURS - size)):
+        a, b = ring[i], ring[(i + 1) % size]
+        from_b = lists.degree[b] < lists.degree[a]  # the shorter list: a hub's would make this quadratic
+        c = lists.head[b] if from_b else lists.head[a]
+        while c >= 0:
+            t, k = c // 3, c % 3
+            if triangles[t, (k + 1) % 3] == a if from_b else triangles[t, (k + 2) % 3] == b:
+                n = _add_once(triangles[t, (k + 2) % 3] if from_b else triangles[t, (k + 1) % 3], found, n)
+                break
+            c = lists.after[c]
+    for i in range(size):
+        c = lists.head[ring[i]]
+        while c >= 0 and n < MAX_NEIGHBOURS:
+            t, k = c // 3, c % 3
+            n = _add_once(triangles[t, (k + 1) % 3], found, n)
+            n = _add_once(triangles[t, (k + 2) % 3], found, n)
+            c = lists.after[c]
+    return n
+
+
+@compiled
+def _add_once(vertex: int, found: Int32, n: int) -> int:
+    """Append a vertex to the n in ``found`` if there is room and it is not among them; return their number."""
+    if n == MAX_NEIGHBOURS:
+        return n
+    for i in range(n):
+        if found[i] == vertex:
+            return n
+    found[n] = vertex
+    return n + 1

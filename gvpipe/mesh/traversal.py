@@ -1,87 +1,121 @@
-"""Kernel of the vertex hierarchy: the order of the coarse mesh, and the vertices known about each when its turn comes.
+"""Traversal of a mesh from triangle to triangle, breadth first, component after component, as a kernel.
 
-The walk goes from triangle to triangle, breadth first, component after component. Everything is an integer.
+It gives the order of the coarsest mesh's vertices, and for each vertex the causal neighbours to extrapolate it from. Everything
+is an integer.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from gvpipe.arrays import Array
+from gvpipe.arrays import Bool, Int32
 from gvpipe.compiled import compiled
-from gvpipe.mesh.corner_lists import link
+from gvpipe.mesh.corner_lists import CornerLists, link_corners
+
+
+class Traversal(NamedTuple):
+    """Vertices in the order of a traversal; int32.
+
+    Args:
+        order: ``(n,)`` vertices.
+        starts: ``(n + 1,)`` bounds of each vertex' causal neighbours in ``neighbours``.
+        neighbours: earlier vertices: two sides of a parallelogram and the corner opposite, where there are three; else one or
+            two that share a triangle, or, for the first vertex of a component, the last one of the component before.
+    """
+
+    order: Int32
+    starts: Int32
+    neighbours: Int32
+
+
+class _Queue(NamedTuple):
+    """Triangles to be visited: ``triangles (T,)`` in order, and ``is_queued (T,)``, which ones were ever appended."""
+
+    triangles: Int32
+    is_queued: Bool
 
 
 @compiled
-def queue_fan(v: int, tail: int, head: Array, after: Array, queued: Array, queue: Array) -> int:
-    """Append the triangles around v that were never queued; returns the queue's new end."""
-    c = head[v]
+def traverse(triangles: Int32, seeds: Int32, n_vertices: int) -> Traversal:
+    """Order vertices so that each follows a triangle it can be extrapolated from, where there is one.
+
+    Args:
+        triangles: ``(T, 3)`` over V vertices, each of three different ones.
+        seeds: ``(n,)`` the vertices, all that triangles use among them; components start in their order.
+        n_vertices: V.
+    """
+    lists = link_corners(triangles, n_vertices)
+    order = np.empty(len(seeds), np.int32)
+    starts = np.zeros(len(seeds) + 1, np.int32)
+    neighbours = np.empty(3 * len(seeds), np.int32)
+    is_done = np.zeros(n_vertices, np.bool_)
+    queue = _Queue(np.empty(len(triangles), np.int32), np.zeros(len(triangles), np.bool_))
+    n, end = 0, 0
+    for seed in seeds:
+        if is_done[seed]:
+            continue
+        if n > 0:  # for want of better
+            neighbours[end] = order[n - 1]
+            end += 1
+        order[n] = seed
+        is_done[seed] = True
+        n += 1
+        starts[n] = end
+        top, tail = 0, _append_around(seed, 0, lists, queue)
+        while top < tail:
+            t = queue.triangles[top]
+            top += 1
+            for _ in range(3):  # at most two of its vertices are new; the one beside done ones first
+                for k in range(3):
+                    v, a, b = triangles[t, k], triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
+                    if is_done[v] or not (is_done[a] or is_done[b]):
+                        continue
+                    if is_done[a] and is_done[b]:
+                        neighbours[end], neighbours[end + 1] = a, b
+                        end += 2
+                        opposite = _opposite(a, b, lists, is_done)
+                        if opposite >= 0:
+                            neighbours[end] = opposite
+                            end += 1
+                    else:
+                        neighbours[end] = a if is_done[a] else b
+                        end += 1
+                    is_done[v] = True
+                    order[n] = v
+                    n += 1
+                    starts[n] = end
+                    tail = _append_around(v, tail, lists, queue)
+                    break
+    return Traversal(order, starts, neighbours[:end].copy())
+
+
+@compiled
+def _append_around(v: int, tail: int, lists: CornerLists, queue: _Queue) -> int:
+    """Append the triangles around v that were never queued; return the queue's new end."""
+    c = lists.head[v]
     while c >= 0:
-        if not queued[c // 3]:
-            queued[c // 3] = True
-            queue[tail] = c // 3
+        if not queue.is_queued[c // 3]:
+            queue.is_queued[c // 3] = True
+            queue.triangles[tail] = c // 3
             tail += 1
-        c = after[c]
+        c = lists.after[c]
     return tail
 
 
 @compiled
-def walk_coarse(tri: Array, coarse: Array, n_vertices: int) -> tuple[Array, Array, Array]:
-    """Order the coarse mesh's vertices so that each follows a triangle it can be extrapolated from, where there is one."""
-    n_tri = len(tri)
-    head = np.full(n_vertices, -1, np.int32)
-    after = np.full(3 * n_tri, -1, np.int32)
-    before = np.full(3 * n_tri, -1, np.int32)
-    for c in range(3 * n_tri - 1, -1, -1):
-        link(c, tri[c // 3, c % 3], head, after, before)
-    order = np.empty(len(coarse), np.int32)
-    starts = np.zeros(len(coarse) + 1, np.int32)
-    near = np.empty(3 * len(coarse), np.int32)
-    known = np.zeros(n_vertices, np.bool_)
-    queued = np.zeros(n_tri, np.bool_)
-    queue = np.empty(n_tri, np.int32)
-    n, end = 0, 0
-    for seed in coarse:
-        if known[seed]:
-            continue
-        if n > 0:  # a new component starts near the last vertex, for want of better
-            near[end] = order[n - 1]
-            end += 1
-        order[n] = seed
-        known[seed] = True
-        n += 1
-        starts[n] = end
-        top, tail = 0, queue_fan(seed, 0, head, after, queued, queue)
-        while top < tail:
-            t = queue[top]
-            top += 1
-            for _ in range(3):  # at most two of its vertices are new; the one beside known ones first
-                for k in range(3):
-                    v, a, b = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
-                    if known[v] or not (known[a] or known[b]):
-                        continue
-                    if known[a] and known[b]:
-                        near[end], near[end + 1] = a, b
-                        end += 2
-                        c = head[a]
-                        while c >= 0:
-                            far = -1
-                            if tri[c // 3, (c % 3 + 1) % 3] == b:
-                                far = tri[c // 3, (c % 3 + 2) % 3]
-                            elif tri[c // 3, (c % 3 + 2) % 3] == b:
-                                far = tri[c // 3, (c % 3 + 1) % 3]
-                            if far >= 0 and known[far]:
-                                near[end] = far
-                                end += 1
-                                break
-                            c = after[c]
-                    else:
-                        near[end] = a if known[a] else b
-                        end += 1
-                    known[v] = True
-                    order[n] = v
-                    n += 1
-                    starts[n] = end
-                    tail = queue_fan(v, tail, head, after, queued, queue)
-                    break
-    return order, starts, near[:end].copy()
+def _opposite(a: int, b: int, lists: CornerLists, is_done: Bool) -> int:
+    """The third vertex of the first triangle at the edge a b of which that is done; -1 without one."""
+    c = lists.head[a]
+    while c >= 0:
+        t, k = c // 3, c % 3
+        third = -1
+        if lists.triangles[t, (k + 1) % 3] == b:
+            third = lists.triangles[t, (k + 2) % 3]
+        elif lists.triangles[t, (k + 2) % 3] == b:
+            third = lists.triangles[t, (k + 1) % 3]
+        if third >= 0 and is_done[third]:
+            return third
+        c = lists.after[c]
+    return -1

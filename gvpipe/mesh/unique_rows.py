@@ -10,7 +10,7 @@ import zlib
 import numpy as np
 
 from gvpipe.arrays import Array
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import corrupt_section
 
 
 def used_vertices(faces: Array, n_vertices: int) -> Array:
@@ -28,9 +28,9 @@ def decode_table(data: bytes, n_rows: int) -> Array:
     try:
         planes = inflate.decompress(data, 12 * n_rows + 1) if n_rows else b""
     except zlib.error as exc:
-        raise CorruptFile("section 'mesh' is corrupt: loose rows do not inflate") from exc
+        raise corrupt_section("mesh", "loose rows do not inflate") from exc
     if len(planes) != 12 * n_rows or inflate.unused_data or (data and not inflate.eof):
-        raise CorruptFile(f"section 'mesh' is corrupt: {len(planes)} bytes of loose rows, expected {12 * n_rows}")
+        raise corrupt_section("mesh", f"{len(planes)} bytes of loose rows, expected {12 * n_rows}")
     differences = np.frombuffer(planes, np.uint8).reshape(12, n_rows).T.copy().view("<i4")  # (n, 12) -> (n, 3)
     return differences.astype(np.int64).cumsum(axis=0)
 

@@ -21,7 +21,7 @@ from gvpipe.errors import InputError
 from gvpipe.metrics.vertex_errors import Errors, measure_errors
 from gvpipe.registry import encode_sequence, open_reader
 from gvpipe.rendering.poster import poster_of
-from gvpipe.repeated_frames import HeldReader
+from gvpipe.repeated_frames import RepeatedFramesReader
 from gvpipe.sequence import MeshSequence
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ class Trials:
 
 def _correct(bitstream: Bitstream, reference: MeshSequence, reader: FrameReader, bound: Bound) -> tuple[Bitstream, Errors]:
     """Add what corrections the bound needs; return the bitstream, and the errors that are left."""
-    if not isinstance(reader, HeldReader):
+    if not isinstance(reader, RepeatedFramesReader):
         section, errors = encode_corrections(reference, reader, bound)
         return _with(bitstream, section), errors
     section, _ = encode_corrections(reader.holds.distinct(reference), reader.distinct, bound)  # repeated frames: once

@@ -1,19 +1,19 @@
-"""Principal trajectories of a sequence, how many are worth their bits, and their coding.
+"""Principal trajectories of a sequence, how many of them pay, and their coding.
 
 A sequence is a matrix of trajectories, ``(V, 3F)``. Its mean trajectory and the leading eigenvectors of its 3F x 3F
 autocorrelation span a space in which a vertex is a short feature vector.
 
 One step D serves everything. With eigenvalues l_k (energy over all vertices) the matrix is a product of coefficients of column
 energy l_k and of basis vectors of energy 1; the basis is scaled by sqrt(l_k) before it is quantised with D, so that an error
-of D in either factor costs the same (reverse water-filling). Both factors are then coded alike (`row_coding`): the
-coefficients along the surface, the basis along time (`frame_rows`). The mean is one more column, of scale sqrt(V).
+of D in either factor costs the same (reverse water-filling). Both factors are coded as feature vectors (`coefficient_coding`):
+the coefficients along the surface, the basis along time (`temporal_neighbours`). The mean is one more column, of scale sqrt(V).
 
 Components are kept while they pay: l_k > THRESHOLD (V + 3F) D^2. D is such that the error comes to what is wanted, also
 where a component leaves. After coding, coefficients are fitted anew to the decoded basis, so that what its errors span is not
 lost.
 
 Basis stream: [varint] components R; [varint] bytes of the scales, scales [integers]: differences of round(8 log2(sqrt(l_k) /
-D)), then the rows. Source: Vasa and Skala 2010, section 3.2; the paper's basis coder (COBRA) predicts along time from frames
+D)), then the vectors. Source: Vasa and Skala 2010, section 3.2; the paper's basis coder (COBRA) predicts along time from frames
 before alone.
 """
 
@@ -27,10 +27,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Float64, Int64
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_rows, encode_rows
-from gvpipe.trajectory.temporal_neighbours import frame_rows
+from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_vectors, encode_vectors
+from gvpipe.trajectory.temporal_neighbours import temporal_order
 
 THRESHOLD = 0.2
 NEGLIGIBLE = 0.01  # part of the error that all components left out may add
@@ -91,7 +91,7 @@ def reduce_trajectories(
     n_components: int = 0,
     basis_ratio: float = 1.0,
     point_cost: float = THRESHOLD,
-    row_cost: float = THRESHOLD,
+    entry_cost: float = THRESHOLD,
     noise: float = 1.0,
     most: int = MAX_COMPONENTS,
 ) -> Reduced:
@@ -102,15 +102,15 @@ def reduce_trajectories(
         error: squared error to leave, about, summed over all coordinates, model units squared.
         n_components: most components; 0: as many as pay.
         basis_ratio: step of the basis, in steps of the coefficients.
-        point_cost, row_cost: of a component (`count_components`).
+        point_cost, entry_cost: of a component (`count_components`).
         noise: squared error of decoded coefficients, in that of rounding them to the step.
         most: components, whatever pays.
     """
-    n_points, n_rows = trajectories.shape
+    n_points, n_coordinates = trajectories.shape
     principal = find_principal(trajectories, error)
-    left = (noise * n_points + basis_ratio**2 * n_rows) / 12
+    left = (noise * n_points + basis_ratio**2 * n_coordinates) / 12
     step, kept = choose_step(
-        principal, error, lambda step: min(most, count_components(principal, n_points, step, point_cost, row_cost)), left
+        principal, error, lambda step: min(most, count_components(principal, n_points, step, point_cost, entry_cost)), left
     )
     kept = min(n_components, most, len(principal.energies)) or kept
     data, basis = encode_basis(principal, kept, n_points, step * basis_ratio)
@@ -141,16 +141,16 @@ def find_principal(trajectories: Float64, error: float) -> Principal:
 
 
 def count_components(
-    principal: Principal, n_points: int, step: float, point_cost: float = THRESHOLD, row_cost: float = THRESHOLD
+    principal: Principal, n_points: int, step: float, point_cost: float = THRESHOLD, entry_cost: float = THRESHOLD
 ) -> int:
-    """How many components are worth coding at this step, for V points.
+    """How many components pay at this step, for V points.
 
-    A component is worth it while its energy exceeds, in squared steps, what its V coefficients and 3F basis entries cost:
-    ``V * point_cost + 3F * row_cost``.
+    A component pays while its energy exceeds, in squared steps, what its V coefficients and 3F basis entries cost:
+    ``V * point_cost + 3F * entry_cost``.
     """
-    n_rows = len(principal.mean)
-    worth = int((principal.energies > (point_cost * n_points + row_cost * n_rows) * step * step).sum())
-    return min(worth, MAX_COMPONENTS, MAX_VALUES // max(n_points, n_rows) - 1)
+    n_coordinates = len(principal.mean)
+    n_paying = int((principal.energies > (point_cost * n_points + entry_cost * n_coordinates) * step * step).sum())
+    return min(n_paying, MAX_COMPONENTS, MAX_VALUES // max(n_points, n_coordinates) - 1)
 
 
 def expected_error(principal: Principal, n_kept: int, step: float, left: float) -> float:
@@ -166,7 +166,7 @@ def expected_error(principal: Principal, n_kept: int, step: float, left: float) 
 def choose_step(principal: Principal, error: float, count: Callable[[float], int], left: float) -> tuple[float, int]:
     """Return the step, model units, that leaves about the squared ``error``, and how many components to keep.
 
-    ``count`` tells how many are worth it at a step. Where one leaves, the error jumps, and no step leaves what lies between:
+    ``count`` returns how many pay at a step. Where one leaves, the error jumps, and no step leaves what lies between:
     then the step is chosen for either number of components, and taken is the one that lies nearer to the jump.
     """
 
@@ -197,24 +197,24 @@ def encode_basis(principal: Principal, n_components: int, n_points: int, step: f
     levels = np.clip(levels, -MAX_SCALE, MAX_SCALE)
     scales = _scales(levels, n_points, step)
     columns = np.column_stack([principal.mean, principal.vectors[:, :n_components]]) * scales  # (3F, 1 + R)
-    data, decoded = encode_rows(columns, _basis_step(step, columns.shape), frame_rows(len(columns) // 3))
+    data, decoded = encode_vectors(columns, _basis_step(step, columns.shape), temporal_order(len(columns) // 3))
     head = encode_integers(np.diff(levels, prepend=0))
     decoded /= scales
-    return varint(n_components) + varint(len(head)) + head + data, Basis(decoded[:, 0], decoded[:, 1:])
+    return varint(n_components) + pack_block(head) + data, Basis(decoded[:, 0], decoded[:, 1:])
 
 
 def decode_basis(data: bytes, n_frames: int, n_points: int, step: float, name: str) -> Basis:
     """Mirror of `encode_basis`; raises `CorruptFile` if the bytes are not what it writes."""
     cursor = Cursor(data, name)
     n_components = cursor.varint(min(MAX_COMPONENTS, 3 * n_frames), "the number of components")
-    head = cursor.take(cursor.varint(cursor.left, "a length"))
+    head = cursor.block()
     levels = np.cumsum(decode_integers(head, n_components, name=name))
     if (np.abs(levels) > MAX_SCALE).any():
         raise cursor.corrupt("a scale is out of range")
     if 3 * n_frames * (n_components + 1) > MAX_VALUES:
         raise cursor.corrupt(f"{n_components} components over {n_frames} frames")
     coarse_step = _basis_step(step, (3 * n_frames, n_components + 1))
-    decoded = decode_rows(cursor.rest(), n_components + 1, coarse_step, frame_rows(n_frames), name)
+    decoded = decode_vectors(cursor.rest(), n_components + 1, coarse_step, temporal_order(n_frames), name)
     decoded /= _scales(levels, n_points, step)
     return Basis(decoded[:, 0], decoded[:, 1:])
 

@@ -12,14 +12,14 @@ import numpy as np
 from gvpipe.arrays import Float64, Int64
 from gvpipe.codec import Memo, Progress
 from gvpipe.connectivity.base_mesh import EncodedMesh
-from gvpipe.connectivity.topology_only import BareMesh, encode_mesh
+from gvpipe.connectivity.topology_only import Topology, encode_mesh
 from gvpipe.metrics.vertex_errors import Spread
 from gvpipe.quality_scale import error_of
 from gvpipe.sequence import MeshSequence
 
 
 @dataclass(frozen=True)
-class CodedPoints:
+class CodedConnectivity:
     """A sequence's mesh as it is coded, and the points whose trajectories are still to be.
 
     Args:
@@ -30,23 +30,23 @@ class CodedPoints:
     """
 
     coded: EncodedMesh
-    mesh: BareMesh
+    mesh: Topology
     members: Int64
     spread: float
 
-    def aimed_error(self, quality: float) -> float:
+    def target_error(self, quality: float) -> float:
         """Root mean square error of a vertex, model units, that a quality asks for (`gvpipe.quality_scale`)."""
         return self.spread * error_of(quality) / 100
 
 
-def code_points(sequence: MeshSequence, reorder: bool, memo: Memo, report: Progress) -> CodedPoints:
+def code_connectivity(sequence: MeshSequence, reorder: bool, memo: Memo, report: Progress) -> CodedConnectivity:
     """Find a sequence's points and code its mesh; ``reorder`` lets the decoder see the codec's vertex order."""
     report("read", 0)
     points, spread = memo("survey", lambda: survey(sequence, report))
     report("mesh", 0)
     coded, mesh = memo("mesh", lambda: encode_mesh(sequence.faces, points, reorder))
     _, first = np.unique(mesh.points, return_index=True)
-    return CodedPoints(coded, mesh, coded.permutation[first], spread)
+    return CodedConnectivity(coded, mesh, coded.permutation[first], spread)
 
 
 def survey(sequence: MeshSequence, report: Progress) -> tuple[Int64, float]:

@@ -1,15 +1,18 @@
-"""Rows of coefficients <-> bytes: closed-loop residuals (`row_prediction`), range coded in contexts of their expected
-magnitude.
+"""Feature vectors <-> bytes: residuals of closed-loop prediction, range coded in contexts of their expected magnitude.
 
-A residual's magnitude is forecast from integers alone, all decoded before: the mean magnitude of its component (sent), how
-large the row's earlier components came out against theirs (over a short and a long span), how large the same component was in
-the block before and in the rows near. The forecast is a product of powers of these, worked out as a sum of integer
-logarithms; in half octaves it is the context, which picks one of `N_CONTEXTS` frequency tables::
+A residual's magnitude is forecast from integers alone, all decoded before:
 
-    rows  = [varint] bytes of the levels, levels: R integers (`gvpipe.entropy.integers`), differences; then blocks
-    (`gvpipe.entropy.block_coder`): for
-            every block of rows, every component's residuals of those rows
-    level = of the component's mean magnitude m: the largest with 2 ** (level / 4) <= 64 m + 1
+- the mean magnitude of its component, which is sent;
+- how large the vector's earlier components came out against theirs, over a short and a long span;
+- how large the same component was in the block before;
+- how large it was in the causal neighbours.
+
+The forecast is a product of powers of these, worked out as a sum of integer logarithms. In half octaves it is the context,
+which picks one of `N_CONTEXTS` frequency tables::
+
+    vectors = [varint] bytes of the levels, levels: R integers (`gvpipe.entropy.integers`), differences; then blocks
+              (`gvpipe.entropy.block_coder`): for every block of vectors, every component's residuals
+    level   = of the component's mean magnitude m: the largest with 2 ** (level / 4) <= 64 m + 1
 """
 
 from __future__ import annotations
@@ -19,64 +22,77 @@ from itertools import pairwise
 import numpy as np
 
 from gvpipe.arrays import Float64
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import CorruptFile, InputError
-from gvpipe.trajectory.contexts import MAX_LEVEL, N_CONTEXTS, ONE, level_bounds, surroundings_of
-from gvpipe.trajectory.prediction import Rows, predict_rows
+from gvpipe.errors import InputError, corrupt_section
+from gvpipe.trajectory.contexts import MAX_LEVEL, N_CONTEXTS, ONE, context_inputs, level_bounds
+from gvpipe.trajectory.prediction import CausalOrder, predict_vectors
 
 LARGEST = 1 << 36  # magnitude of a residual, in steps; sums of its forecasts stay below 2**58
-MAX_VALUES = 1 << 27  # of a section: rows times components
+MAX_VALUES = 1 << 27  # of a section: vectors times components
 
 
-def encode_rows(
+def encode_vectors(
     target: Float64,
     step: float,
-    rows: Rows,
+    causal: CausalOrder,
     predictor: str = "kalman",
     beta: float = 1.8,
     given: Float64 | None = None,
 ) -> tuple[bytes, Float64]:
-    """Code ``target (n, R)`` with a quantisation step; return the bytes and what the decoder will have.
+    """Code ``target (n, R)``; return the bytes and what the decoder will have, ``(n, R)``.
 
-    ``given (n, R)`` holds the decoded rows that ``rows`` leaves out (`gvpipe.trajectory.prediction.rows_left`); contexts take
-    their residuals for 0.
+    Args:
+        target: n vectors of R components, in the order of transmission.
+        step: quantisation step, in the unit of the components.
+        causal: the order of the vectors.
+        predictor: one of `gvpipe.trajectory.prediction.PREDICTORS`.
+        beta: exponent of the radial function (rbf).
+        given: ``(n, R)`` decoded vectors that ``causal`` leaves out (`gvpipe.trajectory.prediction.leave_out`); contexts take
+            their residuals for 0.
 
     Raises:
         InputError: a value is too large for the step.
     """
     from gvpipe.trajectory.context_kernels import find_all_contexts
 
-    residuals = np.zeros((len(rows.order), target.shape[1]), np.int64)
+    residuals = np.zeros((len(causal.order), target.shape[1]), np.int64)
     decoded = np.zeros(target.shape) if given is None else given.copy()
-    predict_rows(rows, step, residuals, decoded, target, predictor, beta)
+    predict_vectors(causal, step, residuals, decoded, target, predictor, beta)
     largest = int(np.abs(residuals).max(initial=0))
     if largest >= LARGEST:
         raise InputError(f"a residual has {largest} quantisation steps, at most {LARGEST} fit; ask for a lower quality")
     means = np.abs(residuals).sum(axis=0) * ONE // max(1, len(residuals))
     levels = np.searchsorted(level_bounds(), means + 1, side="right") - 1
-    contexts = find_all_contexts(residuals, surroundings_of(rows, len(target), levels, len(rows.blocks) - 1))
+    contexts = find_all_contexts(residuals, context_inputs(causal, len(target), levels, len(causal.blocks) - 1))
     coder = BlockEncoder(N_CONTEXTS)
-    for first, end in pairwise(rows.blocks.tolist()):
+    for first, end in pairwise(causal.blocks.tolist()):
         for c in range(target.shape[1]):
             coder.add(residuals[first:end, c], contexts[first:end, c])
     head = encode_integers(np.diff(levels, prepend=0))
-    return varint(len(head)) + head + coder.finish(), decoded
+    return pack_block(head) + coder.finish(), decoded
 
 
-def decode_rows(
+def decode_vectors(
     data: bytes,
     n_components: int,
     step: float,
-    rows: Rows,
+    causal: CausalOrder,
     name: str,
     n_blocks: int | None = None,
     predictor: str = "kalman",
     beta: float = 1.8,
     given: Float64 | None = None,
 ) -> Float64:
-    """Mirror of `encode_rows`: ``(n, R)``; of the first ``n_blocks`` blocks only if that is not None, other rows stay 0.
+    """Mirror of `encode_vectors`: ``(n, R)``.
+
+    Args:
+        data: the bytes.
+        n_components: R.
+        step, causal, predictor, beta, given: as for `encode_vectors`.
+        name: of the section, for messages.
+        n_blocks: decode the first so many blocks alone, other vectors stay 0; None: all.
 
     Raises:
         CorruptFile: the bytes are not what the encoder writes.
@@ -84,21 +100,21 @@ def decode_rows(
     from gvpipe.trajectory.context_kernels import decode_residuals
 
     cursor = Cursor(data, name)
-    if len(rows.order) * n_components > MAX_VALUES:  # zeros may cost no bits: believe no counts beyond this
-        raise cursor.corrupt(f"{len(rows.order)} rows of {n_components} components")
-    head = cursor.take(cursor.varint(cursor.left, "a length"))
+    if len(causal.order) * n_components > MAX_VALUES:  # zeros may cost no bits: believe no counts beyond this
+        raise cursor.corrupt(f"{len(causal.order)} vectors of {n_components} components")
+    head = cursor.block()
     levels = np.cumsum(decode_integers(head, n_components, name=name))
     if ((levels < 0) | (levels > MAX_LEVEL)).any():
         raise cursor.corrupt("a magnitude level is out of range")
     coder = BlockDecoder(cursor.rest(), N_CONTEXTS, name)
-    wanted = len(rows.blocks) - 1 if n_blocks is None else n_blocks
-    residuals = np.zeros((int(rows.blocks[wanted]), n_components), np.int64)
-    decoded = np.zeros((len(rows.order), n_components)) if given is None else given.copy()
-    around = surroundings_of(rows, len(decoded), levels, wanted)
-    coder.check(decode_residuals(residuals, around, coder.state, coder.words, coder.edges, coder.sizes))
+    wanted = len(causal.blocks) - 1 if n_blocks is None else n_blocks
+    residuals = np.zeros((int(causal.blocks[wanted]), n_components), np.int64)
+    decoded = np.zeros((len(causal.order), n_components)) if given is None else given.copy()
+    inputs = context_inputs(causal, len(decoded), levels, wanted)
+    coder.check(decode_residuals(residuals, inputs, coder.stream))
     if n_blocks is None:
         coder.end()
     if np.abs(residuals).max(initial=0) >= LARGEST:
-        raise CorruptFile(f"section {name!r} is corrupt: a residual is out of range; get the file again from its source")
-    predict_rows(rows, step, residuals, decoded, None, predictor, beta)
+        raise corrupt_section(name, "a residual is out of range")
+    predict_vectors(causal, step, residuals, decoded, None, predictor, beta)
     return decoded

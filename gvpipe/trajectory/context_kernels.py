@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64, UInt32, UInt64
+from gvpipe.arrays import Int64
 from gvpipe.compiled import compiled
-from gvpipe.entropy.block_kernels import take_block
+from gvpipe.entropy.block_kernels import BlockStream, take_block
 from gvpipe.trajectory.contexts import (
     FLOOR_NEAR,
     FLOOR_SPAN,
@@ -22,15 +22,15 @@ from gvpipe.trajectory.contexts import (
     POWER_ONE,
     POWERS,
     SHORT,
-    Surroundings,
+    ContextInputs,
 )
 
 
 @compiled
-def _log(value: int, around: Surroundings) -> int:
+def _log(value: int, inputs: ContextInputs) -> int:
     """Logarithm to base two, in 1 / PER_OCTAVE, rounded down; of 0 as of 1/64."""
-    if 0 <= value < len(around.logs):
-        return int(around.logs[value])
+    if 0 <= value < len(inputs.logs):
+        return int(inputs.logs[value])
     x = 64 * max(value, 0) + 1
     octave = 0
     while x >> (octave + 1):
@@ -38,7 +38,7 @@ def _log(value: int, around: Surroundings) -> int:
     low, high = PER_OCTAVE * octave, PER_OCTAVE * octave + PER_OCTAVE - 1
     while low < high:
         middle = (low + high + 1) // 2
-        if around.roots[middle] <= x:
+        if inputs.roots[middle] <= x:
             low = middle
         else:
             high = middle - 1
@@ -46,39 +46,32 @@ def _log(value: int, around: Surroundings) -> int:
 
 
 @compiled
-def _find_contexts(
-    first: int,
-    end: int,
-    c: int,
-    residuals: Int64,
-    around: Surroundings,
-    before: Int64,
-    contexts: Int64,
-) -> None:
-    """Fill ``contexts (end - first,)`` of component c in the block of places ``first`` to ``end``.
+def _find_contexts(first: int, end: int, c: int, residuals: Int64, inputs: ContextInputs, before: Int64) -> Int64:
+    """``(end - first,)`` contexts of component c in the block of ranks ``first`` to ``end``.
 
     Args:
-        residuals: ``(m, R)`` by place, known for the blocks before and for this block's components before c.
+        residuals: ``(m, R)`` by rank, decoded for the blocks before and for this block's components before c.
         before: ``(R,)`` mean magnitudes of the block before, in 1 / ONE.
     """
-    usual = around.usual
+    contexts = np.empty(end - first, np.int64)
+    usual = inputs.usual
     short_from, long_from = max(0, c - len(SHORT)), max(0, c - len(LONG))
     usual_short = usual_long = 0
     for k in range(long_from, c):
         usual_long += usual[k] * LONG[c - 1 - k]
         if k >= short_from:
             usual_short += usual[k] * SHORT[c - 1 - k]
-    fixed = POWERS[0] * _log(usual[c], around) + POWERS[1] * _log(before[c], around)
-    fixed -= POWERS[3] * _log(usual_short + FLOOR_SPAN, around) + POWERS[4] * _log(usual_long + FLOOR_SPAN, around)
+    fixed = POWERS[0] * _log(usual[c], inputs) + POWERS[1] * _log(before[c], inputs)
+    fixed -= POWERS[3] * _log(usual_short + FLOOR_SPAN, inputs) + POWERS[4] * _log(usual_long + FLOOR_SPAN, inputs)
     for i in range(first, end):
         near = usual[c]
         if first > 0:
-            count = min(around.rings[i], around.starts[i + 1] - around.starts[i], N_NEAR)
+            count = min(inputs.ring_sizes[i], inputs.starts[i + 1] - inputs.starts[i], N_NEAR)
             total = 0
-            for j in range(around.starts[i], around.starts[i] + count):
-                place = around.place[around.near[j]]
-                if place < first:
-                    total += ONE * abs(residuals[place, c])
+            for j in range(inputs.starts[i], inputs.starts[i] + count):
+                rank = inputs.rank[inputs.neighbours[j]]
+                if rank < first:
+                    total += ONE * abs(residuals[rank, c])
             near = total // max(count, 1)
         short = long = 0
         for k in range(long_from, c):
@@ -86,10 +79,11 @@ def _find_contexts(
             long += magnitude * LONG[c - 1 - k]
             if k >= short_from:
                 short += magnitude * SHORT[c - 1 - k]
-        forecast = fixed + POWERS[2] * _log(near + FLOOR_NEAR, around)
-        forecast += POWERS[3] * _log(short + FLOOR_SPAN, around) + POWERS[4] * _log(long + FLOOR_SPAN, around)
+        forecast = fixed + POWERS[2] * _log(near + FLOOR_NEAR, inputs)
+        forecast += POWERS[3] * _log(short + FLOOR_SPAN, inputs) + POWERS[4] * _log(long + FLOOR_SPAN, inputs)
         octaves = forecast // POWER_ONE - 6 * PER_OCTAVE  # ONE is six octaves
         contexts[i - first] = min(max(octaves // (PER_OCTAVE // 2), LOWEST), HIGHEST) - LOWEST
+    return contexts
 
 
 @compiled
@@ -103,40 +97,29 @@ def _mean_magnitudes(residuals: Int64, first: int, end: int, means: Int64) -> No
 
 
 @compiled
-def find_all_contexts(residuals: Int64, around: Surroundings) -> Int64:
-    """``(m, R)`` contexts of residuals ``(m, R)`` by place that are all known."""
+def find_all_contexts(residuals: Int64, inputs: ContextInputs) -> Int64:
+    """``(m, R)`` contexts of ``residuals (m, R)`` by rank, all of which there are."""
     contexts = np.zeros(residuals.shape, np.int64)
-    own = np.zeros(len(residuals), np.int64)
-    before = around.usual.copy()
-    for b in range(len(around.blocks) - 1):
-        first, end = around.blocks[b], around.blocks[b + 1]
+    before = inputs.usual.copy()
+    for b in range(len(inputs.blocks) - 1):
+        first, end = inputs.blocks[b], inputs.blocks[b + 1]
         for c in range(residuals.shape[1]):
-            _find_contexts(first, end, c, residuals, around, before, own)
-            contexts[first:end, c] = own[: end - first]
+            contexts[first:end, c] = _find_contexts(first, end, c, residuals, inputs, before)
         _mean_magnitudes(residuals, first, end, before)
     return contexts
 
 
 @compiled
-def decode_residuals(
-    residuals: Int64,
-    around: Surroundings,
-    state: UInt64,
-    words: UInt32,
-    edges: UInt64,
-    sizes: Int64,
-) -> int:
-    """Fill ``residuals (m, R)``, by place, block by block and component by component; returns what `take_block` returns, and
-    takes what it takes."""
-    own, values = np.zeros(len(residuals), np.int64), np.zeros(len(residuals), np.int64)
-    before = around.usual.copy()
-    for b in range(len(around.blocks) - 1):
-        first, end = around.blocks[b], around.blocks[b + 1]
+def decode_residuals(residuals: Int64, inputs: ContextInputs, stream: BlockStream) -> int:
+    """Fill ``residuals (m, R)``, by rank, block by block and component by component; return what `take_block` does."""
+    before = inputs.usual.copy()
+    for b in range(len(inputs.blocks) - 1):
+        first, end = inputs.blocks[b], inputs.blocks[b + 1]
         for c in range(residuals.shape[1]):
-            _find_contexts(first, end, c, residuals, around, before, own)
-            status = take_block(state, words, edges, sizes, own[: end - first], values[: end - first])
+            contexts = _find_contexts(first, end, c, residuals, inputs, before)
+            values, status = take_block(stream, contexts)
             if status:
                 return status
-            residuals[first:end, c] = values[: end - first]
+            residuals[first:end, c] = values
         _mean_magnitudes(residuals, first, end, before)
     return 0

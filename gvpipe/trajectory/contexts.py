@@ -1,4 +1,4 @@
-"""The context model of coefficients' residuals: its constants, its inputs and its tables of logarithms."""
+"""The context model of feature vectors' residuals: its constants, its inputs and its tables of logarithms."""
 
 from __future__ import annotations
 
@@ -9,57 +9,65 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Int64
-from gvpipe.trajectory.prediction import Rows
+from gvpipe.trajectory.prediction import CausalOrder
 
-SHORT = (16, 10, 6, 4)  # weights of a row's earlier components, the latest first
+SHORT = (16, 10, 6, 4)  # weights of a vector's earlier components, the latest first
 LONG = (16, 14, 13, 12, 11, 10, 9, 8, 7, 6, 6, 5, 5, 4, 4, 3)
 ONE = 64  # fixed point of magnitudes
 PER_OCTAVE = 16  # of integer logarithms
 MAX_LEVEL = 160
 FLOOR_SPAN, FLOOR_NEAR = 128, 16  # added to sums of magnitudes: what nothing is taken for
-POWERS = (12, 4, 4, 8, 7)  # of the component's mean, the block before, the rows near, the short and the long span
+POWERS = (12, 4, 4, 8, 7)  # of the component's mean, the block before, the neighbours, the short and the long span
 POWER_ONE = 20
 LOWEST, HIGHEST = -10, 16  # contexts, half octaves above magnitude one
 N_CONTEXTS = HIGHEST - LOWEST + 1
-N_NEAR = 6  # rows near that count
+N_NEAR = 6  # causal neighbours that count
 
 
-class Surroundings(NamedTuple):
-    """What contexts depend on beside residuals, for kernels.
+class ContextInputs(NamedTuple):
+    """What contexts depend on beside residuals; kernels take it as it is. All are int64.
 
     Args:
         blocks: ``(B + 1,)`` bounds of the blocks that are coded.
-        place: ``(n,)`` of each row in the order.
-        starts, near, rings: of `Rows`.
-        usual: ``(R,)`` magnitudes of the components, in 1 / ONE.
+        rank: ``(n,)`` of each vector in the order.
+        starts, neighbours, ring_sizes: of `gvpipe.trajectory.prediction.CausalOrder`.
+        usual: ``(R,)`` mean magnitudes of the components, in 1 / ONE.
         roots: ``2 ** (i / 16)`` rounded down.
         logs: of the smallest numbers, in 1 / PER_OCTAVE: looked up, not searched for.
     """
 
     blocks: Int64
-    place: Int64
+    rank: Int64
     starts: Int64
-    near: Int64
-    rings: Int64
+    neighbours: Int64
+    ring_sizes: Int64
     usual: Int64
     roots: Int64
     logs: Int64
 
 
-def surroundings_of(rows: Rows, n_rows: int, levels: Int64, n_blocks: int) -> Surroundings:
-    place = np.full(n_rows, len(rows.order), np.int64)  # given rows: behind all blocks, so that they count for 0
-    place[rows.order] = np.arange(len(rows.order))
+def context_inputs(causal: CausalOrder, n_vectors: int, levels: Int64, n_blocks: int) -> ContextInputs:
+    """Return the inputs for the first ``n_blocks`` blocks.
+
+    Args:
+        causal: the order, of which given vectors may be left out.
+        n_vectors: n, given vectors counted.
+        levels: ``(R,)`` levels of the components' mean magnitudes (`level_bounds`).
+        n_blocks: 0..B.
+    """
+    rank = np.full(n_vectors, len(causal.order), np.int64)  # given vectors: behind all blocks, so that they count for 0
+    rank[causal.order] = np.arange(len(causal.order))
     arrays = (
-        rows.blocks[: n_blocks + 1],
-        place,
-        rows.starts,
-        rows.near,
-        rows.rings,
+        causal.blocks[: n_blocks + 1],
+        rank,
+        causal.starts,
+        causal.neighbours,
+        causal.ring_sizes,
         level_bounds()[levels],
         _roots(),
         _logs(),
     )
-    return Surroundings(*(np.ascontiguousarray(array, np.int64) for array in arrays))
+    return ContextInputs(*(np.ascontiguousarray(array, np.int64) for array in arrays))
 
 
 @functools.cache
@@ -78,5 +86,5 @@ def _logs() -> Int64:
 
 @functools.cache
 def level_bounds() -> Int64:
-    """2 ** (level / 4) rounded down, exactly."""
+    """``(MAX_LEVEL + 1,)``: 2 ** (level / 4) rounded down, exactly."""
     return np.array([math.isqrt(math.isqrt(1 << level)) for level in range(MAX_LEVEL + 1)], np.int64)

@@ -1,25 +1,208 @@
-"""Kernels of `gvpipe.trajectory.prediction`: one loop over rows and components, in encoder and decoder alike."""
+"""Kernels of `gvpipe.trajectory.prediction`: for each predictor one loop over vectors and components, to code and to decode.
+
+All take a `gvpipe.trajectory.prediction.VectorCoding` and fill ``decoded``, and ``residuals`` where there is a target.
+"""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from gvpipe.arrays import Array, Float64
+from gvpipe.arrays import Float64
 from gvpipe.compiled import compiled
-
-LSP, RBF, KALMAN = 1, 2, 3  # places in PREDICTORS
+from gvpipe.trajectory.prediction import VectorCoding
 
 ROUND_UP = 0.42  # added before a residual's magnitude is cut to whole steps: 0.5 would cost 1.5 % more at equal error
 DOUBT = 1e-4  # of kalman: part of a weight's variance that a component leaves at least, so that rounding cannot grow
 RIDGE, COARSE_RIDGE = 4.0, 64.0  # of lsp, in squared steps: draws weights that are left open to the prior ones
-NUGGET = 16  # of rbf, in units of step**beta: what quantisation adds to the radial function between two rows
+NUGGET = 16  # of rbf, in units of step**beta: what quantisation adds to the radial function between two vectors
 EVERY = 4  # rbf's weights are solved for each of the first components, then for every fourth: distances hardly change
 FIRST = 12
 
 
+class LeastSquares(NamedTuple):
+    """Memory for the least squares of one vector with up to n neighbours.
+
+    Args:
+        normal: ``(n, n)`` normal matrix, lower triangle; right: ``(n,)`` right-hand side.
+        factor: ``(n, n)`` the normal matrix as its solution destroys it.
+        weights, values: ``(n,)`` of the neighbours.
+    """
+
+    normal: Float64
+    right: Float64
+    factor: Float64
+    weights: Float64
+    values: Float64
+
+
+@compiled
+def predict_navg(coding: VectorCoding) -> None:
+    """Predict by the prior weights."""
+    causal, decoded = coding.causal, coding.decoded
+    for i in range(len(coding.residuals)):
+        first, n = causal.starts[i], _count_neighbours(coding, i)
+        for c in range(decoded.shape[1]):
+            guess = 0.0
+            for j in range(n):
+                guess += causal.weights[first + j] * decoded[causal.neighbours[first + j], c]
+            _code(coding, i, c, guess)
+
+
+@compiled
+def predict_kalman(coding: VectorCoding) -> None:
+    """Predict by weights that each decoded component updates."""
+    causal, decoded = coding.causal, coding.decoded
+    most = _most_neighbours(coding)
+    weights, values, direction = np.zeros(most), np.zeros(most), np.zeros(most)
+    covariance = np.zeros((most, most))
+    noise = coding.step * coding.step
+    for i in range(len(coding.residuals)):
+        first = causal.starts[i]
+        n = causal.starts[i + 1] - first
+        total = 0.0
+        for j in range(n):
+            weights[j] = causal.weights[first + j]
+            total += causal.variances[first + j]
+        for j in range(n):
+            for k in range(n):
+                covariance[j, k] = 0.0
+            covariance[j, j] = causal.variances[first + j]
+            if causal.affine:  # condition on the sum of the weights
+                for k in range(n):
+                    covariance[j, k] -= causal.variances[first + j] * causal.variances[first + k] / total
+        for c in range(decoded.shape[1]):
+            guess = 0.0
+            for j in range(n):
+                values[j] = decoded[causal.neighbours[first + j], c]
+                guess += weights[j] * values[j]
+            change = _code(coding, i, c, guess)
+            variance = noise  # of the component's prediction
+            for j in range(n):
+                total = 0.0
+                for k in range(n):
+                    total += covariance[j, k] * values[k]
+                direction[j] = total
+                variance += (1 + DOUBT) * total * values[j]
+            for j in range(n):
+                gain = direction[j] / variance
+                weights[j] += gain * change
+                for k in range(n):
+                    covariance[j, k] -= gain * direction[k]
+
+
+@compiled
+def predict_lsp(coding: VectorCoding) -> None:
+    """Predict by least squares over the components decoded so far."""
+    fit = _least_squares(_most_neighbours(coding))
+    for i in range(len(coding.residuals)):
+        _predict_vector_lsp(coding, i, fit)
+
+
+@compiled
+def predict_rbf(coding: VectorCoding, beta: float) -> None:
+    """Predict by interpolation with radial functions, where a vector has a ring of two at least; else as `predict_lsp`."""
+    causal, decoded = coding.causal, coding.decoded
+    most = _most_neighbours(coding)
+    fit = _least_squares(most)
+    weights, values = np.zeros(most), np.zeros(most)
+    squared, to_vector = np.zeros((most, most)), np.zeros(most)  # squared distances between neighbours, and to the vector
+    matrix = np.zeros((most, most))
+    nugget = NUGGET * coding.step**beta
+    for i in range(len(coding.residuals)):
+        first, n = causal.starts[i], causal.ring_sizes[i]
+        if n < 2:
+            _predict_vector_lsp(coding, i, fit)
+            continue
+        for j in range(n):
+            weights[j] = causal.weights[first + j]
+            to_vector[j] = 0.0
+            for k in range(n):
+                squared[j, k] = 0.0
+        for c in range(decoded.shape[1]):
+            if c > 0 and (c < FIRST or c % EVERY == 0):
+                radial_weights(squared, to_vector, n, (beta, nugget), matrix, weights)
+            guess = 0.0
+            for j in range(n):
+                values[j] = decoded[causal.neighbours[first + j], c]
+                guess += weights[j] * values[j]
+            value = guess + _code(coding, i, c, guess)
+            for j in range(n):
+                to_vector[j] += (value - values[j]) ** 2
+                for k in range(n):
+                    squared[j, k] += (values[j] - values[k]) ** 2
+
+
+@compiled
+def _predict_vector_lsp(coding: VectorCoding, i: int, fit: LeastSquares) -> None:
+    """Code vector i of the order by least squares."""
+    causal, decoded = coding.causal, coding.decoded
+    first, n = causal.starts[i], _count_neighbours(coding, i)
+    ridge = coding.step * coding.step * (RIDGE if causal.ring_sizes[i] != 0 else COARSE_RIDGE)
+    for j in range(n):
+        fit.weights[j] = causal.weights[first + j]
+        fit.right[j] = ridge * fit.weights[j]
+        for k in range(n):
+            fit.normal[j, k] = 0.0
+        fit.normal[j, j] = ridge
+    for c in range(decoded.shape[1]):
+        if c >= n and n > 0:
+            for j in range(n):
+                fit.weights[j] = fit.right[j]
+                for k in range(j + 1):
+                    fit.factor[j, k] = fit.normal[j, k]
+            solve(fit.factor, fit.weights, n)
+        guess = 0.0
+        for j in range(n):
+            fit.values[j] = decoded[causal.neighbours[first + j], c]
+            guess += fit.weights[j] * fit.values[j]
+        value = guess + _code(coding, i, c, guess)
+        for j in range(n):
+            fit.right[j] += fit.values[j] * value
+            for k in range(j + 1):
+                fit.normal[j, k] += fit.values[j] * fit.values[k]
+
+
+@compiled
+def _code(coding: VectorCoding, i: int, c: int, guess: float) -> float:
+    """Quantise component c of vector i of the order, if there is a target; decode it, and return by how much it is off."""
+    vector = coding.causal.order[i]
+    if len(coding.target):
+        steps = (coding.target[vector, c] - guess) / coding.step
+        whole = np.floor(abs(steps) + ROUND_UP)
+        coding.residuals[i, c] = whole if steps > 0 else -whole
+    change: float = coding.residuals[i, c] * coding.step
+    coding.decoded[vector, c] = guess + change
+    return change
+
+
+@compiled
+def _count_neighbours(coding: VectorCoding, i: int) -> int:
+    """How many neighbours of vector i of the order predictors other than kalman use: its ring, or, without one, all."""
+    ring_size: int = coding.causal.ring_sizes[i]
+    n_all: int = coding.causal.starts[i + 1] - coding.causal.starts[i]
+    return ring_size if ring_size != 0 else n_all
+
+
+@compiled
+def _most_neighbours(coding: VectorCoding) -> int:
+    """The most neighbours that a vector has, 1 at least."""
+    most = 1
+    for i in range(len(coding.residuals)):
+        most = max(most, coding.causal.starts[i + 1] - coding.causal.starts[i])
+    return most
+
+
+@compiled
+def _least_squares(most: int) -> LeastSquares:
+    """Memory for vectors with up to ``most`` neighbours."""
+    return LeastSquares(np.zeros((most, most)), np.zeros(most), np.zeros((most, most)), np.zeros(most), np.zeros(most))
+
+
 @compiled
 def solve(a: Float64, b: Float64, n: int) -> None:
-    """Solve the positive definite system of the first n unknowns in place (Cholesky)."""
+    """Solve the positive definite system ``a x = b`` of the first n unknowns in place, by Cholesky's factors; b becomes x."""
     for i in range(n):
         for j in range(i + 1):
             total = a[i, j]
@@ -42,123 +225,32 @@ def solve(a: Float64, b: Float64, n: int) -> None:
 
 
 @compiled
-def radial_weights(squared: Float64, own: Float64, n: int, beta: float, nugget: float, a: Float64, w: Float64) -> None:
-    """Weights of rbf interpolation: equation 11 with its side condition used to eliminate the first row.
+def radial_weights(
+    squared: Float64, to_vector: Float64, n: int, radial: tuple[float, float], matrix: Float64, weights: Float64
+) -> None:
+    """Fill the weights of rbf interpolation: equation 11 with its side condition used to eliminate the first neighbour.
 
     With lambda_1 = -(lambda_2 + ...) the system in the others is positive definite, for 0 < beta < 2, and so is its sum with
-    a nugget; the interpolated value is then a sum of the known ones whose weights add up to one.
+    a nugget; the interpolated value is then a sum of the neighbours' values whose weights add up to one.
+
+    Args:
+        squared: ``(n, n)`` squared distances between the n neighbours.
+        to_vector: ``(n,)`` their squared distances to the vector.
+        radial: beta and nugget.
+        matrix: ``(n, n)`` memory.
+        weights: ``(n,)``.
     """
+    beta, nugget = radial
     half = beta / 2
     total = 1.0
     for i in range(1, n):
         to_first = squared[i, 0] ** half
         for j in range(1, i + 1):
             between = squared[i, j] ** half if i != j else 0.0
-            a[i - 1, j - 1] = to_first + squared[j, 0] ** half - between + nugget
-        a[i - 1, i - 1] += nugget
-        w[i] = to_first + own[0] ** half - own[i] ** half + nugget
-    solve(a, w[1:], n - 1)
+            matrix[i - 1, j - 1] = to_first + squared[j, 0] ** half - between + nugget
+        matrix[i - 1, i - 1] += nugget
+        weights[i] = to_first + to_vector[0] ** half - to_vector[i] ** half + nugget
+    solve(matrix, weights[1:], n - 1)
     for i in range(1, n):
-        total -= w[i]
-    w[0] = total
-
-
-@compiled
-def predict(
-    order: Array,
-    starts: Array,
-    near: Array,
-    weights: Float64,
-    variances: Float64,
-    rings: Array,
-    affine: bool,
-    step: float,
-    predictor: int,
-    beta: float,
-    residuals: Array,
-    decoded: Float64,
-    target: Float64,
-) -> None:
-    """See `gvpipe.trajectory.prediction.predict_rows`.
-
-    ``cov`` is the weights' covariance (kalman), the normal matrix (lsp) or squared distances between the known rows (rbf).
-    """
-    n_components = decoded.shape[1]
-    widest = 1
-    for i in range(len(order)):
-        widest = max(widest, starts[i + 1] - starts[i])
-    w, y, p = np.zeros(widest), np.zeros(widest), np.zeros(widest)
-    right, own = np.zeros(widest), np.zeros(widest)
-    cov, a = np.zeros((widest, widest)), np.zeros((widest, widest))
-    nugget = NUGGET * step**beta
-    noise = step * step
-    for i in range(len(order)):
-        row = order[i]
-        first = starts[i]
-        n = starts[i + 1] - first
-        method = predictor
-        if method != KALMAN and rings[i] != 0:
-            n = rings[i]
-        if method == RBF and (rings[i] == 0 or n < 2):
-            method = LSP
-        ridge = noise * (RIDGE if rings[i] != 0 else COARSE_RIDGE)
-        total = 0.0
-        for j in range(n):
-            w[j] = weights[first + j]
-            total += variances[first + j]
-            own[j] = 0.0
-            right[j] = ridge * w[j]
-        for j in range(n):
-            for k in range(n):
-                cov[j, k] = 0.0
-            if method == KALMAN:
-                cov[j, j] = variances[first + j]
-                if affine:
-                    for k in range(n):
-                        cov[j, k] -= variances[first + j] * variances[first + k] / total
-            elif method == LSP:
-                cov[j, j] = ridge
-        for c in range(n_components):
-            for j in range(n):
-                y[j] = decoded[near[first + j], c]
-            if method == RBF and c > 0 and (c < FIRST or c % EVERY == 0):
-                radial_weights(cov, own, n, beta, nugget, a, w)
-            if method == LSP and c >= n and n > 0:
-                for j in range(n):
-                    w[j] = right[j]
-                    for k in range(j + 1):
-                        a[j, k] = cov[j, k]
-                solve(a, w, n)
-            guess = 0.0
-            for j in range(n):
-                guess += w[j] * y[j]
-            if len(target):
-                wish = (target[row, c] - guess) / step
-                whole = np.floor(abs(wish) + ROUND_UP)
-                residuals[i, c] = whole if wish > 0 else -whole
-            change = residuals[i, c] * step
-            value = guess + change
-            decoded[row, c] = value
-            if method == KALMAN:
-                gain = noise
-                for j in range(n):
-                    total = 0.0
-                    for k in range(n):
-                        total += cov[j, k] * y[k]
-                    p[j] = total
-                    gain += (1 + DOUBT) * total * y[j]
-                for j in range(n):
-                    scaled = p[j] / gain
-                    w[j] += scaled * change
-                    for k in range(n):
-                        cov[j, k] -= scaled * p[k]
-            elif method == LSP:
-                for j in range(n):
-                    right[j] += y[j] * value
-                    for k in range(j + 1):
-                        cov[j, k] += y[j] * y[k]
-            elif method == RBF:
-                for j in range(n):
-                    own[j] += (value - y[j]) ** 2
-                    for k in range(n):
-                        cov[j, k] += (y[j] - y[k]) ** 2
+        total -= weights[i]
+    weights[0] = total

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from gvpipe.arrays import Float32, Float64, Integers
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import corrupt
 from gvpipe.trajectory.basis import Basis
 
 MAX_FLOAT32 = float(np.finfo(np.float32).max)
@@ -47,6 +47,6 @@ def read_frames(start: int, stop: int, bounds: list[int], points: Integers, deco
             placed = segment.basis.vectors[rows] @ segment.coefficients + segment.basis.mean[rows, None]  # (3, P)
             np.take(placed, points, axis=1, out=buffer)
             if not np.abs(buffer).max(initial=0) <= MAX_FLOAT32:
-                raise CorruptFile(f"frame {frame} does not decode to finite positions; get the file again from its source")
+                raise corrupt(f"frame {frame} does not decode to finite positions")
             result[frame - start] = buffer.T
     return result

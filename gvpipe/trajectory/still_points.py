@@ -1,12 +1,12 @@
 """Still points of codecs that code trajectories of points: one position each, in place of a trajectory.
 
 What: the flags of the points that never move (`gvpipe.trajectory.still_vertices`), and their positions on a lattice. These are
-predicted by parallelograms along a walk over the triangles between still points (`gvpipe.trajectory.spatial_neighbours`), and
-rounded to float32 once, so that all frames, segments and levels of detail have the same bits. Why: no shimmer, and three
-numbers in place of a trajectory. Moving points are still predicted from still neighbours: a still point's coefficients are
-those that bring the decoded basis closest to its position::
+predicted by parallelograms along a traversal of the triangles between still points. They are rounded to float32 once, so that
+all frames, segments and levels of detail have the same bits. Why: no shimmer, and three numbers in place of a trajectory.
+Moving points are still predicted from still neighbours: a still point's coefficients are those that bring the decoded basis
+closest to its position::
 
-    section = [float64] step, [3 x float32] origin, [varint] bytes, flags, rows of 3 components: lattice points
+    section = [float64] step, [3 x float32] origin, [varint] bytes, flags, vectors of 3 components: lattice points
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ import numpy as np
 
 from gvpipe.arrays import Bool, Float32, Float64, Int32, Integers
 from gvpipe.codec import Memo
-from gvpipe.connectivity.topology_only import BareMesh
+from gvpipe.connectivity.topology_only import Topology
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.segments import LARGEST_STEP, SMALLEST_STEP
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import corrupt_section
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import Basis, fit_coefficients
-from gvpipe.trajectory.coded_points import CodedPoints
-from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_rows, encode_rows
-from gvpipe.trajectory.prediction import Rows
-from gvpipe.trajectory.spatial_neighbours import walk_rows
+from gvpipe.trajectory.coded_points import CodedConnectivity
+from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_vectors, encode_vectors
+from gvpipe.trajectory.prediction import CausalOrder
+from gvpipe.trajectory.spatial_neighbours import traversal_order
 from gvpipe.trajectory.still_vertices import decode_flags, encode_flags, find_still
 
 SECTION = "still"
@@ -67,7 +67,7 @@ class StillPoints:
             return None
         if basis.vectors.shape[1] > self.most_components:
             size = f"{basis.vectors.shape[1]} components of {len(self.flags)} points"
-            raise CorruptFile(f"section {SECTION!r} is corrupt: {size}; get the file again from its source")
+            raise corrupt_section(SECTION, f"{size}")
         result = np.zeros((len(self.flags), basis.vectors.shape[1]))
         trajectories = np.tile(self.positions[self.flags].astype(np.float64), len(basis.mean) // 3)
         result[self.flags] = fit_coefficients(trajectories, basis)
@@ -81,13 +81,13 @@ class StillPoints:
         result[~self.flags] = moving
         return result
 
-    def place(self, frames: Float32, points: Integers) -> None:
+    def overwrite(self, frames: Float32, points: Integers) -> None:
         """Give the still vertices of ``frames (n, V, 3)`` their positions; ``points (V,)`` are the vertices' points."""
         where = self.flags[points]
         frames[:, where] = self.positions[points[where]]
 
 
-def code_still(sequence: MeshSequence, shared: CodedPoints, error: float, memo: Memo) -> tuple[bytes, StillPoints]:
+def code_still(sequence: MeshSequence, shared: CodedConnectivity, error: float, memo: Memo) -> tuple[bytes, StillPoints]:
     """Find and code the still points of a sequence, leaving an ``error`` as in `encode_still`; no bytes if all points move."""
     flags = memo("still", lambda: find_still(sequence))[shared.members]
     if not flags.any():
@@ -96,7 +96,7 @@ def code_still(sequence: MeshSequence, shared: CodedPoints, error: float, memo: 
     return encode_still(flags, positions, error, shared.mesh.point_faces)
 
 
-def read_still(bitstream: Bitstream, mesh: BareMesh) -> StillPoints:
+def read_still(bitstream: Bitstream, mesh: Topology) -> StillPoints:
     """Decode the section of a bitstream, none if it has none; raises `CorruptFile`."""
     if SECTION not in bitstream.sections:
         return no_still(mesh.n_points)
@@ -123,9 +123,9 @@ def encode_still(flags: Bool, positions: Float64, error: float, point_faces: Int
     step = float(np.clip(2 * error, SMALLEST_STEP, LARGEST_STEP))  # rounding leaves step / sqrt(12) on each of three axes
     origin = positions.mean(axis=0).astype(np.float32)
     indices = np.rint((positions - origin) / step)
-    data, _ = encode_rows(indices, 1.0, _still_rows(flags, point_faces), "navg")
+    data, _ = encode_vectors(indices, 1.0, _still_order(flags, point_faces), "navg")
     coded = encode_flags(flags)
-    return HEAD.pack(step, *origin.tolist()) + varint(len(coded)) + coded + data, _place(flags, indices, step, origin)
+    return HEAD.pack(step, *origin.tolist()) + pack_block(coded) + data, _round(flags, indices, step, origin)
 
 
 def decode_still(data: bytes, point_faces: Int32, n_points: int) -> StillPoints:
@@ -134,24 +134,25 @@ def decode_still(data: bytes, point_faces: Int32, n_points: int) -> StillPoints:
     step, *origin = cursor.struct(HEAD)
     if not SMALLEST_STEP <= step <= LARGEST_STEP or not np.isfinite(origin).all():  # NaN neither
         raise cursor.corrupt(f"its step is {step}, its origin {origin}")
-    flags = decode_flags(cursor.take(cursor.varint(cursor.left, "a length")), n_points, SECTION)
+    flags = decode_flags(cursor.block(), n_points, SECTION)
     if not flags.any():
         raise cursor.corrupt("no point stands still")
-    indices = decode_rows(cursor.rest(), 3, 1.0, _still_rows(flags, point_faces), SECTION, predictor="navg")
-    still = _place(flags, indices, step, np.array(origin, np.float32))
+    indices = decode_vectors(cursor.rest(), 3, 1.0, _still_order(flags, point_faces), SECTION, predictor="navg")
+    still = _round(flags, indices, step, np.array(origin, np.float32))
     if not np.isfinite(still.positions).all():
         raise cursor.corrupt("a position is larger than float32 can hold")
     return still
 
 
-def _still_rows(flags: Bool, point_faces: Int32) -> Rows:
-    """Rows of the still points, numbered among themselves, along a walk over the triangles between them."""
+def _still_order(flags: Bool, point_faces: Int32) -> CausalOrder:
+    """Rows of the still points, numbered among themselves, along a traversal of the triangles between them."""
     number = np.cumsum(flags) - 1
     between = point_faces[flags[point_faces].all(axis=1)]
-    return walk_rows(number[between].astype(np.int32), int(flags.sum()))
+    return traversal_order(number[between].astype(np.int32), int(flags.sum()))
 
 
-def _place(flags: Bool, indices: Float64, step: float, origin: Float32) -> StillPoints:
+def _round(flags: Bool, indices: Float64, step: float, origin: Float32) -> StillPoints:
+    """Still points at lattice points ``indices (S, 3)``, rounded to float32."""
     positions = np.zeros((len(flags), 3), np.float32)
     with np.errstate(over="ignore"):
         positions[flags] = (origin + step * indices).astype(np.float32)

@@ -19,23 +19,23 @@ import numpy as np
 
 from gvpipe.arrays import Bool, Int32, Integers
 from gvpipe.mesh.hierarchy import Hierarchy
-from gvpipe.trajectory.prediction import Rows, rows_left, select_rows
+from gvpipe.trajectory.prediction import CausalOrder, leave_out, select_vectors
 
 ANCHOR_CHOICES = ("hierarchy", "walk")
 SMALL = 4  # points of components that are all anchors
-MIN_BLOCK = 48  # rows coded at once, at least
+MIN_BLOCK = 48  # vectors coded at once, at least
 
 
 @dataclass(frozen=True)
 class Anchors:
     """Args:
-    points: ``(A,)`` anchors, in the order of their rows.
-    rows: of the anchors, numbered 0..A-1; those that stand still are left out.
+    points: ``(A,)`` anchors, in the order of their vectors.
+    causal: order of the anchors, numbered 0..A-1; those that stand still are left out.
     is_free: ``(A,)`` the anchors that do not stand still.
     """
 
     points: Int32
-    rows: Rows
+    causal: CausalOrder
     is_free: Bool
 
 
@@ -43,7 +43,7 @@ def choose_anchors(
     choice: str,
     spacing: int,
     hierarchy: Hierarchy,
-    rows: Rows,
+    causal: CausalOrder,
     walk: Int32,
     component_of: Integers,
     is_still: Bool | None = None,
@@ -52,7 +52,7 @@ def choose_anchors(
 
     Args:
         choice: one of `ANCHOR_CHOICES`.
-        rows: of all points along the hierarchy.
+        causal: order of all points along the hierarchy.
         walk: all points in border-expansion order.
         component_of: ``(P,)`` the component of each point.
         is_still: ``(P,)`` the points whose coefficients are given; none if None.
@@ -64,23 +64,23 @@ def choose_anchors(
         n_coarse = int((hierarchy.rings == 0).sum())
         keep = np.arange(n_points) < max(n_coarse, -(-n_points // spacing))
         keep |= is_held[hierarchy.order]
-        points, anchor_rows = hierarchy.order[keep], select_rows(rows, keep)
-        return Anchors(points, rows_left(anchor_rows, is_still[points]), ~is_still[points])
+        points, chosen = hierarchy.order[keep], select_vectors(causal, keep)
+        return Anchors(points, leave_out(chosen, is_still[points]), ~is_still[points])
     keep = (np.arange(n_points) % spacing == 0) | is_held[walk]
     keep[np.unique(component_of[walk], return_index=True)[1]] = True
     points = walk[keep]
-    return Anchors(points, rows_left(_chain(len(points)), is_still[points]), ~is_still[points])
+    return Anchors(points, leave_out(_chain(len(points)), is_still[points]), ~is_still[points])
 
 
-def _chain(n: int) -> Rows:
-    """Rows of which each is predicted from the one before."""
-    return Rows(
+def _chain(n: int) -> CausalOrder:
+    """An order in which each vector is predicted from the one before."""
+    return CausalOrder(
         order=np.arange(n, dtype=np.int32),
         starts=np.maximum(np.arange(n + 1) - 1, 0).astype(np.int32),
-        near=np.arange(n - 1, dtype=np.int32),
+        neighbours=np.arange(n - 1, dtype=np.int32),
         weights=np.ones(n - 1),
         variances=np.full(n - 1, 0.1),
-        rings=(np.arange(n) > 0).astype(np.int32),
+        ring_sizes=(np.arange(n) > 0).astype(np.int32),
         blocks=np.unique(np.append(np.arange(0, n, MIN_BLOCK), n)).astype(np.int32),
         affine=True,
     )

@@ -18,8 +18,8 @@ from gvcodecs.laplacian.domain import Surface, build_domain
 from gvcodecs.laplacian.header import Header
 from gvcodecs.laplacian.mesh_scale import edge_lengths
 from gvpipe.arrays import Float64
-from gvpipe.container.cursor import Cursor, varint
-from gvpipe.errors import CorruptFile
+from gvpipe.container.cursor import Cursor, pack_block
+from gvpipe.errors import corrupt_section
 
 NAME = "average"
 SPACING = 256  # points per anchor
@@ -34,7 +34,7 @@ def encode_average(points: Float64, surface: Surface, header: Header) -> tuple[b
     own = _own_header(header)
     domain = build_domain(surface, None, own)
     anchors, deltas, _ = encode_coefficients((points - points.mean(axis=0)) / unit, header.average_step, domain, own)
-    data = varint(len(anchors)) + anchors + deltas
+    data = pack_block(anchors) + deltas
     return data, decode_average(data, surface, header)
 
 
@@ -42,11 +42,11 @@ def decode_average(data: bytes, surface: Surface, header: Header) -> Float64:
     """Mirror of `encode_average`; raises `CorruptFile` if the bytes are not what it writes."""
     own = _own_header(header)
     cursor = Cursor(data, NAME)
-    anchors = cursor.take(cursor.varint(cursor.left, "a length"))
+    anchors = cursor.block()
     domain = build_domain(surface, None, own)
     points = decode_coefficients(anchors, cursor.rest(), 3, header.average_step, domain, own, (NAME, NAME))
     if not np.abs(points).max(initial=0) < FARTHEST:
-        raise CorruptFile(f"section {NAME!r} is corrupt: a position is out of range; get the file again from its source")
+        raise corrupt_section(NAME, "a position is out of range")
     return points
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from gvcodecs.laplacian.domain import Domain
 from gvcodecs.laplacian.header import Header
 from gvpipe.arrays import Float64
-from gvpipe.trajectory.coefficient_coding import decode_rows, encode_rows
+from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
 
 
 def encode_coefficients(
@@ -19,9 +19,11 @@ def encode_coefficients(
     ``given (P, R)`` has the coefficients of the points that stand still, which are those in ``coefficients``.
     """
     wanted = domain.system.deltas(coefficients)[domain.delta_points]
-    deltas, rounded = encode_rows(wanted, step, domain.deltas, _predictor(header))
+    deltas, rounded = encode_vectors(wanted, step, domain.deltas, _predictor(header))
     anchored = domain.system.fit_anchors(domain.delta_points, rounded, coefficients)
-    anchors, sent = encode_rows(anchored, step * header.anchor_ratio, domain.anchors.rows, given=_of_anchors(given, domain))
+    anchors, sent = encode_vectors(
+        anchored, step * header.anchor_ratio, domain.anchors.causal, given=_of_anchors(given, domain)
+    )
     return anchors, deltas, domain.system.solve(domain.delta_points, rounded, sent)
 
 
@@ -37,8 +39,8 @@ def decode_coefficients(
 ) -> Float64:
     """Mirror of `encode_coefficients`: ``(P, R)``; raises `CorruptFile` naming the section that is not what it writes."""
     anchor_step, held = step * header.anchor_ratio, _of_anchors(given, domain)
-    anchored = decode_rows(anchors, n_components, anchor_step, domain.anchors.rows, names[0], given=held)
-    decoded = decode_rows(deltas, n_components, step, domain.deltas, names[1], predictor=_predictor(header))
+    anchored = decode_vectors(anchors, n_components, anchor_step, domain.anchors.causal, names[0], given=held)
+    decoded = decode_vectors(deltas, n_components, step, domain.deltas, names[1], predictor=_predictor(header))
     return domain.system.solve(domain.delta_points, decoded, anchored)
 
 

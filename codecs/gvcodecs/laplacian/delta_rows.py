@@ -21,23 +21,23 @@ from scipy import sparse
 
 from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.mesh.hierarchy import Hierarchy
-from gvpipe.trajectory.prediction import Rows
+from gvpipe.trajectory.prediction import CausalOrder
 
 DELTA_PREDICTIONS = ("kalman", "rigid", "none")
 N_KNOWN = {"kalman": 20, "rigid": 15, "none": 0}  # known points, at most; 15 is the paper's k
 REACH = 160  # points that the search for them visits at most
 RIDGE = 0.01  # in traces of A^T A
 VARIANCE = 0.2  # prior variance of a weight
-BLOCK = 512  # rows of the walk that are entropy coded at once
-N_RING = 6  # known rows whose magnitudes count for a row's contexts
+BLOCK = 512  # vectors of the traversal that are entropy coded at once
+N_RING = 6  # causal neighbours whose magnitudes count for a vector's contexts
 TINY = 1e-30
 
 
 def border_order(faces: Int32, n_points: int) -> Int32:
     """All points in the order of a walk over ``faces (T, 3)`` that goes from triangle to triangle, breadth first."""
-    from gvpipe.mesh.traversal import walk_coarse
+    from gvpipe.mesh.traversal import traverse
 
-    order: Int32 = walk_coarse(faces, np.arange(n_points, dtype=np.int32), n_points)[0]
+    order: Int32 = traverse(faces, np.arange(n_points, dtype=np.int32), n_points)[0]
     return order
 
 
@@ -52,15 +52,15 @@ def delta_order(prediction: str, hierarchy: Hierarchy, walk: Int32, has_deltas: 
     return order, blocks.astype(np.int32), np.arange(len(order), dtype=np.int32)
 
 
-def delta_rows(
+def delta_causal_order(
     prediction: str,
     order: Int32,
     blocks: Int32,
     limits: Int32,
     neighbours: sparse.csr_array,
     differential: Float64,
-) -> Rows:
-    """Return the rows of points in ``order (n,)``, numbered by their places in it.
+) -> CausalOrder:
+    """Return the causal order of points in ``order (n,)``, numbered by their ranks in it.
 
     Args:
         prediction: one of `DELTA_PREDICTIONS`.
@@ -77,20 +77,20 @@ def delta_rows(
     row = np.repeat(np.arange(len(order)), known)
     place = np.zeros(len(differential), np.int32)
     place[order] = np.arange(len(order))
-    return Rows(
+    return CausalOrder(
         order=np.arange(len(order), dtype=np.int32),
         starts=starts,
-        near=place[near],
+        neighbours=place[near],
         weights=_rigid_weights(differential[order], differential[near], row),
         variances=np.full(len(near), VARIANCE),
-        rings=known.astype(np.int32) if prediction == "rigid" else np.minimum(known, N_RING).astype(np.int32),
+        ring_sizes=known.astype(np.int32) if prediction == "rigid" else np.minimum(known, N_RING).astype(np.int32),
         blocks=blocks,
         affine=False,
     )
 
 
 def _rigid_weights(own: Float64, known: Float64, row: NDArray[np.intp]) -> Float64:
-    """Weights of the known rows, for differential coordinates ``own (n, 3)`` and ``known (m, 3)`` of rows ``row (m,)``."""
+    """Weights of causal neighbours: differential coordinates ``own (n, 3)``, ``known (m, 3)`` of neighbours of ``row (m,)``."""
     normal = np.zeros((len(own), 3, 3))
     for a in range(3):
         for b in range(3):

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from gvcodecs.laplacian.anchors import Anchors, choose_anchors
-from gvcodecs.laplacian.delta_rows import border_order, delta_order, delta_rows
+from gvcodecs.laplacian.delta_rows import border_order, delta_causal_order, delta_order
 from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian, thin_hubs
 from gvcodecs.laplacian.header import Header
 from gvcodecs.laplacian.mesh_scale import fineness
@@ -16,8 +16,8 @@ from gvcodecs.laplacian.operators import laplacian
 from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy
 from gvpipe.mesh.topology import adjacency, components, unique_edges
-from gvpipe.trajectory.prediction import Rows
-from gvpipe.trajectory.spatial_neighbours import mesh_rows
+from gvpipe.trajectory.prediction import CausalOrder
+from gvpipe.trajectory.spatial_neighbours import hierarchy_order
 
 
 @dataclass(frozen=True)
@@ -29,28 +29,28 @@ class Surface:
         edges: ``(E, 2)``.
         neighbours: ``(P, P)`` adjacency.
         hierarchy: of the points.
-        rows: of all points along the hierarchy.
+        causal: order of all points along the hierarchy.
     """
 
     faces: Int32
     edges: Int32
     neighbours: sparse.csr_array
     hierarchy: Hierarchy
-    rows: Rows
+    causal: CausalOrder
 
 
 @dataclass(frozen=True)
 class Domain:
     """Args:
     anchors: points coded themselves.
-    delta_points: ``(D,)`` points that have deltas, in the order of their rows.
-    deltas: their rows.
+    delta_points: ``(D,)`` points that have deltas, in the order of their vectors.
+    deltas: their order.
     system: the extended Laplacian.
     """
 
     anchors: Anchors
     delta_points: Int32
-    deltas: Rows
+    deltas: CausalOrder
     system: ExtendedLaplacian
 
 
@@ -58,7 +58,7 @@ def build_surface(point_faces: Int32, n_points: int) -> Surface:
     """Take in the mesh ``point_faces (T, 3)``."""
     faces = point_faces[(point_faces != np.roll(point_faces, 1, axis=1)).all(axis=1)]
     hierarchy = build_hierarchy(faces, n_points)
-    return Surface(faces, unique_edges(faces), adjacency(faces, n_points), hierarchy, mesh_rows(hierarchy))
+    return Surface(faces, unique_edges(faces), adjacency(faces, n_points), hierarchy, hierarchy_order(hierarchy))
 
 
 def build_domain(surface: Surface, average: Float64 | None, header: Header, is_still: Bool | None = None) -> Domain:
@@ -76,7 +76,7 @@ def build_domain(surface: Surface, average: Float64 | None, header: Header, is_s
     _, component_of = components(surface.neighbours)
     is_still = np.zeros(n_points, bool) if is_still is None else is_still
     anchors = choose_anchors(
-        header.anchor_choice, header.anchors, surface.hierarchy, surface.rows, walk, component_of, is_still
+        header.anchor_choice, header.anchors, surface.hierarchy, surface.causal, walk, component_of, is_still
     )
     is_anchor = np.zeros(n_points, bool)
     is_anchor[anchors.points] = True
@@ -86,5 +86,5 @@ def build_domain(surface: Surface, average: Float64 | None, header: Header, is_s
     operator = sparse.diags_array(scale * has_deltas) @ thin_hubs(laplacian(points, surface.faces, header.operator))
     operator = sparse.csr_array(operator)
     order, blocks, limits = delta_order(header.delta_prediction, surface.hierarchy, walk, has_deltas)
-    rows = delta_rows(header.delta_prediction, order, blocks, limits, surface.neighbours, operator @ points)
-    return Domain(anchors, order, rows, ExtendedLaplacian(operator, anchors.points, 1 / header.anchor_ratio, anchors.is_free))
+    causal = delta_causal_order(header.delta_prediction, order, blocks, limits, surface.neighbours, operator @ points)
+    return Domain(anchors, order, causal, ExtendedLaplacian(operator, anchors.points, 1 / header.anchor_ratio, anchors.is_free))

@@ -46,7 +46,7 @@ from gvpipe.container.segments import MAX_SEGMENT, cut
 from gvpipe.rate_control.step_search import NEAR, Aimed, Anchor, first_step, mend, step_between
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import MAX_COMPONENTS, reduce_trajectories, squared_errors
-from gvpipe.trajectory.coded_points import CodedPoints, code_points, read_trajectories
+from gvpipe.trajectory.coded_points import CodedConnectivity, code_connectivity, read_trajectories
 from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
 
 FIRST = 1.0  # of the error wanted, asked of `reduce_trajectories` in a first encode, before drift is known
@@ -98,7 +98,7 @@ class Laplacian(BaseCodec):
 
     def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         start = self._start(sequence, memo, report)
-        wanted = start.shared.aimed_error(self.quality)
+        wanted = start.shared.target_error(self.quality)
         anchors = memo("anchors", list[Anchor])
         known = step_between(anchors, wanted)
         if known is not None or not start.still.n_moving or self.components:
@@ -110,8 +110,8 @@ class Laplacian(BaseCodec):
 
     def _start(self, sequence: MeshSequence, memo: Memo, report: Progress) -> _Start:
         """What does not depend on the step: mesh and average as coded, what coefficients are coded with; and still points."""
-        shared = code_points(sequence, self.reorder, memo, report)
-        held, still = code_still(sequence, shared, shared.aimed_error(self.quality), memo)
+        shared = code_connectivity(sequence, self.reorder, memo, report)
+        held, still = code_still(sequence, shared, shared.target_error(self.quality), memo)
         header = Header(
             self.operator,
             self.delta_prediction,
@@ -167,7 +167,7 @@ class Laplacian(BaseCodec):
 class _Start:
     """What encodes with different steps share; ``sections`` are those that no step changes."""
 
-    shared: CodedPoints
+    shared: CodedConnectivity
     still: StillPoints
     header: Header
     domain: Domain
@@ -185,7 +185,9 @@ class _Start:
         return sequence.n_frames * float(np.square(off).sum(axis=1) @ self.copies[flags])
 
 
-def _prepare(sequence: MeshSequence, shared: CodedPoints, header: Header, still: StillPoints) -> tuple[bytes | None, Domain]:
+def _prepare(
+    sequence: MeshSequence, shared: CodedConnectivity, header: Header, still: StillPoints
+) -> tuple[bytes | None, Domain]:
     """The coded average mesh, where one is needed, and what coefficients are coded with: both know nothing of quality."""
     mesh = shared.mesh
     surface = build_surface(mesh.point_faces, mesh.n_points)

@@ -16,7 +16,7 @@ from gvpipe.arrays import Float32, Int32
 from gvpipe.connectivity.topology_only import read_mesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import corrupt_section
 from gvpipe.trajectory.basis import decode_basis
 from gvpipe.trajectory.reconstruction import Segment, read_frames
 from gvpipe.trajectory.still_points import read_still
@@ -37,7 +37,7 @@ class LaplacianReader:
         try:
             self._domain = self._build_domain(surface)
         except RuntimeError as exc:  # SuperLU: singular
-            raise CorruptFile("section 'average' is corrupt: its Laplacian cannot be inverted; get the file again") from exc
+            raise corrupt_section("average", "its Laplacian cannot be inverted") from exc
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
         self._kept: tuple[int, Segment] | None = None
 
@@ -60,7 +60,7 @@ class LaplacianReader:
         if not self._still.n_moving:
             return np.repeat(self._still.positions[None, self._mesh.points], stop - start, axis=0)
         frames = read_frames(start, stop, self._bounds, self._mesh.points, self._decode)
-        self._still.place(frames, self._mesh.points)
+        self._still.overwrite(frames, self._mesh.points)
         return frames
 
     def _build_domain(self, surface: Surface) -> Domain:

@@ -33,6 +33,7 @@ from typing import Any
 
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import HUGE, TINY
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import MAX_SIDE, PROFILES, Profile
 from gvpipe.mesh.lattice import Lattice
@@ -42,8 +43,6 @@ PLACEMENTS = ("halves", "charts", "tiles")
 OF_PICTURES = ("placement", "profile", "block", "width", "height", "residual_step")  # keys of files that have some
 MAX_CLUSTERS = 1024
 MAX_SEGMENTS = 1 << 16
-LARGE = 1e39  # no coordinate or step of a float32 model lies beyond
-SMALL = 1e-60  # no step of a float32 model is smaller
 
 
 @dataclass(frozen=True)
@@ -124,8 +123,8 @@ class Header:
             clusters=bitstream.integer("clusters", 1, MAX_CLUSTERS),
             segments=segments,
             base=_read_base(bitstream),
-            transform_step=1.0 if images else bitstream.number("transform_step", SMALL, LARGE),
-            residual_step=1.0 if images else bitstream.number("residual_step", SMALL, LARGE),
+            transform_step=1.0 if images else bitstream.number("transform_step", TINY, HUGE),
+            residual_step=1.0 if images else bitstream.number("residual_step", TINY, HUGE),
             outliers="outliers" in bitstream.header,
             images=images,
         )
@@ -149,7 +148,7 @@ class Header:
             clusters=bitstream.integer("clusters", 1, MAX_CLUSTERS),
             segments=_read_segments(bitstream),
             base=_read_base(bitstream),
-            transform_step=bitstream.number("transform_step", SMALL, LARGE),
+            transform_step=bitstream.number("transform_step", TINY, HUGE),
             pictures=False,
         )
 
@@ -162,6 +161,6 @@ def _read_base(bitstream: Bitstream) -> Lattice:
     base = bitstream.header.get("base")
     if not (isinstance(base, list) and len(base) == 4 and all(isinstance(v, int | float) for v in base)):
         raise CorruptFile(f"header: base is {base!r}; an origin and a step are needed")
-    if not (base[3] > 0 and all(abs(v) < LARGE for v in base)):  # NaN neither
+    if not (base[3] > 0 and all(abs(v) < HUGE for v in base)):  # NaN neither
         raise CorruptFile(f"header: base is {base!r}, out of range")
     return Lattice((base[0], base[1], base[2]), base[3])

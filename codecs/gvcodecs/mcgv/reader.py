@@ -26,7 +26,7 @@ from gvcodecs.mcgv.pictures.outliers import SECTION
 from gvpipe.arrays import Float32, Int32, Integers
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
-from gvpipe.corrections.displacements import MovesReader, Shared
+from gvpipe.corrections.displacements import DisplacementReader, PointVertices
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import VideoReader
 
@@ -100,10 +100,10 @@ class McgvReader:
         return result
 
     @cached_property
-    def _outliers(self) -> MovesReader:
+    def _outliers(self) -> DisplacementReader:
         bitstream, surface = self._bitstream, self._surface
-        shared = Shared.of(surface.vertices, surface.slot, surface.n_slots)
-        return MovesReader(bitstream.section(SECTION), bitstream.n_frames, surface.n_slots, SECTION, shared)
+        shared = PointVertices.of(surface.vertices, surface.slot, surface.n_slots)
+        return DisplacementReader(bitstream.section(SECTION), bitstream.n_frames, surface.n_slots, SECTION, shared)
 
 
 def _open_video(bitstream: Bitstream, header: Header, bounds: list[int]) -> VideoReader | NoPictures:

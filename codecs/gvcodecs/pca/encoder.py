@@ -19,16 +19,16 @@ from typing import ClassVar
 import numpy as np
 
 from gvcodecs.pca.header import MAX_SEGMENTS, VERSION_STILL, Header
-from gvcodecs.pca.reader import PcaReader, ordered_rows
+from gvcodecs.pca.reader import PcaReader, causal_order
 from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, cut
 from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import MAX_COMPONENTS, Reduced, reduce_trajectories
-from gvpipe.trajectory.coded_points import code_points, read_trajectories
-from gvpipe.trajectory.coefficient_coding import encode_rows
-from gvpipe.trajectory.prediction import PREDICTORS, Rows, rows_left
+from gvpipe.trajectory.coded_points import code_connectivity, read_trajectories
+from gvpipe.trajectory.coefficient_coding import encode_vectors
+from gvpipe.trajectory.prediction import PREDICTORS, CausalOrder, leave_out
 from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
 
 LEFT = 0.93  # part of the error asked of `reduce_trajectories` that is left: small coefficients err by less than steps do
@@ -64,11 +64,11 @@ class Pca(BaseCodec):
         self.check_range(1, MAX_SEGMENT, "segment")
 
     def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
-        shared = code_points(sequence, self.reorder, memo, report)
-        mesh, wanted = shared.mesh, shared.aimed_error(self.quality)
-        rows = memo("rows", lambda: ordered_rows(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor))
+        shared = code_connectivity(sequence, self.reorder, memo, report)
+        mesh, wanted = shared.mesh, shared.target_error(self.quality)
+        causal = memo("order", lambda: causal_order(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor))
         data, still = code_still(sequence, shared, wanted, memo)
-        rows, moving = rows_left(rows, still.flags), shared.members[~still.flags]
+        causal, moving = leave_out(causal, still.flags), shared.members[~still.flags]
         bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
         n_segments = len(bounds) - 1
         sections = {"mesh": shared.coded.mesh, "order": shared.coded.order, **({SECTION: data} if data else {})}
@@ -80,19 +80,19 @@ class Pca(BaseCodec):
             reduced = reduce_trajectories(trajectories, error, self.components, most=still.most_components)
             steps.append(reduced.step)
             sections[f"basis.{s}"] = reduced.basis
-            sections[f"coefficients.{s}"] = self._encode_coefficients(reduced, still, rows)
+            sections[f"coefficients.{s}"] = self._encode_coefficients(reduced, still, causal)
         report("segments", 1)
         header = Header(self.predictor, float(self.beta), n_segments, tuple(steps) or (1.0,) * n_segments)
         bitstream = self._bitstream(sequence, header.to_json(), sections, version=None if data else 1)
         return Encoded(bitstream, shared.coded.permutation)
 
-    def _encode_coefficients(self, reduced: Reduced, still: StillPoints, rows: Rows) -> bytes:
+    def _encode_coefficients(self, reduced: Reduced, still: StillPoints, causal: CausalOrder) -> bytes:
         given = still.given(reduced.decoded)
         wanted = still.join(reduced.coefficients, given)
         if self.predictor == "lsp":  # section 3.4: the small ones first
             wanted = np.ascontiguousarray(wanted[:, ::-1])
             given = None if given is None else np.ascontiguousarray(given[:, ::-1])
-        return encode_rows(wanted, reduced.step, rows, self.predictor, self.beta, given)[0]
+        return encode_vectors(wanted, reduced.step, causal, self.predictor, self.beta, given)[0]
 
     @classmethod
     def reader(cls, bitstream: Bitstream) -> FrameReader:

@@ -15,18 +15,18 @@ from gvpipe.container.segments import segment_starts
 from gvpipe.errors import InputError
 from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy, level_faces
 from gvpipe.trajectory.basis import decode_basis
-from gvpipe.trajectory.coefficient_coding import decode_rows
-from gvpipe.trajectory.prediction import Rows, rows_left
+from gvpipe.trajectory.coefficient_coding import decode_vectors
+from gvpipe.trajectory.prediction import CausalOrder, leave_out
 from gvpipe.trajectory.reconstruction import Segment, read_frames
-from gvpipe.trajectory.spatial_neighbours import OVERSHOOT, mesh_rows
+from gvpipe.trajectory.spatial_neighbours import OVERSHOOT, hierarchy_order
 from gvpipe.trajectory.still_points import read_still
 
 
 class PcaReader:
     """Frames of a ``pca`` bitstream.
 
-    Level 0 is the mesh as it was given. Level k > 0 has the points (not the copies of seams) that are known when the k finest
-    blocks of the hierarchy are left out.
+    Level 0 is the mesh as it was given. Level k > 0 has the points (one for all vertices of a seam) that are decoded when the
+    k finest blocks of the hierarchy are left out.
 
     Raises:
         CorruptFile: a section does not hold what it must.
@@ -37,7 +37,7 @@ class PcaReader:
         self._mesh, self._bitstream = read_mesh(bitstream), bitstream
         self._hierarchy = build_hierarchy(self._mesh.point_faces, self._mesh.n_points)
         self._still = read_still(bitstream, self._mesh)
-        self._rows = rows_left(ordered_rows(self._hierarchy, self._header.predictor), self._still.flags)
+        self._causal = leave_out(causal_order(self._hierarchy, self._header.predictor), self._still.flags)
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
         self._kept: tuple[tuple[int, int], Segment] | None = None  # segment and level; points that the level lacks are 0
 
@@ -79,7 +79,7 @@ class PcaReader:
         if not self._still.n_moving:
             return np.repeat(self._still.positions[None, vertices], stop - start, axis=0)
         frames = read_frames(start, stop, self._bounds, vertices, lambda s: self._decode(s, lod))
-        self._still.place(frames, vertices)
+        self._still.overwrite(frames, vertices)
         return frames
 
     def _decode(self, s: int, lod: int) -> Segment:
@@ -92,11 +92,11 @@ class PcaReader:
             given = self._still.given(basis)
             if given is not None and self._header.predictor == "lsp":
                 given = np.ascontiguousarray(given[:, ::-1])
-            coefficients = decode_rows(
+            coefficients = decode_vectors(
                 self._bitstream.section(name),
                 basis.vectors.shape[1],
                 step,
-                self._rows,
+                self._causal,
                 name,
                 self._count_blocks(lod) if lod else None,
                 self._header.predictor,
@@ -111,7 +111,7 @@ class PcaReader:
     def _count_blocks(self, lod: int) -> int:
         """How many blocks of coefficients a level needs: those of its points that move."""
         n_moving = int((~self._still.flags[self._alive(lod)]).sum())
-        return int(np.searchsorted(self._rows.blocks, n_moving))
+        return int(np.searchsorted(self._causal.blocks, n_moving))
 
     def _alive(self, lod: int) -> Int32:
         """Points of a level, ascending."""
@@ -122,6 +122,6 @@ class PcaReader:
             raise InputError(f"level {lod}: there are levels 0..{len(self.levels) - 1}")
 
 
-def ordered_rows(hierarchy: Hierarchy, predictor: str) -> Rows:
-    """The rows of a mesh's points, as encoder and decoder go through them."""
-    return mesh_rows(hierarchy, OVERSHOOT if predictor == "kalman" else 0.0)
+def causal_order(hierarchy: Hierarchy, predictor: str) -> CausalOrder:
+    """The order of a mesh's points in encoder and decoder."""
+    return hierarchy_order(hierarchy, OVERSHOOT if predictor == "kalman" else 0.0)

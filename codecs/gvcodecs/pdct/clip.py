@@ -35,15 +35,14 @@ from gvcodecs.pdct.local_frames import local_frames
 from gvcodecs.pdct.momentum import Momentum
 from gvcodecs.pdct.seed_coding import decode_seeds, encode_seeds
 from gvpipe.arrays import Float32, Float64, Int64
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block, varint
+from gvpipe.container.segments import HUGE, TINY
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.entropy.tokens import tokenise
 from gvpipe.mesh.lattice import Lattice
 
 HEAD = struct.Struct("<6d")
 MAX_CLUSTERS = 1024
-LARGE = 1e39  # no coordinate or step of a float32 model lies beyond
-SMALL = 1e-60  # no step of a float32 model is smaller
 LARGEST = float(np.finfo(np.float32).max)
 RIDGE = 1e-6  # of the affine fit
 LAMBDA = 0.14  # squared steps that a bit is worth; 0.1155 by theory at a high rate
@@ -76,7 +75,7 @@ def encode_clip(frames: Float32, surface: Surface, quantiser: Quantiser, cluster
         [
             HEAD.pack(*lattice.origin, lattice.step, quantiser.step, quantiser.fineness),
             varint(len(seeds)),
-            *(varint(len(block)) + block for block in blocks),
+            *(pack_block(block) for block in blocks),
             _encode_deltas(signals, dictionary, quantiser),
         ]
     )
@@ -90,7 +89,7 @@ def decode_clip(data: bytes, n_frames: int, surface: Surface, name: str) -> Floa
     """
     cursor = Cursor(data, name)
     *origin, seed_step, step, fineness = cursor.struct(HEAD)
-    wrong = not all(abs(v) < LARGE for v in origin) or not all(SMALL < v < LARGE for v in (seed_step, step))
+    wrong = not all(abs(v) < HUGE for v in origin) or not all(TINY < v < HUGE for v in (seed_step, step))
     if wrong or not 1 <= fineness <= 64:  # NaN neither
         raise cursor.corrupt("a step or the lattice's origin is out of range")
     lattice = Lattice((origin[0], origin[1], origin[2]), seed_step)
@@ -98,7 +97,7 @@ def decode_clip(data: bytes, n_frames: int, surface: Surface, name: str) -> Floa
     n_seeds = cursor.varint(min(MAX_CLUSTERS, n_vertices), "the number of clusters")
     if n_seeds < 1:
         raise cursor.corrupt("there is no cluster")
-    blocks = [cursor.take(cursor.varint(cursor.left, "a length")) for _ in range(3)]
+    blocks = [cursor.block() for _ in range(3)]
     seeds = np.cumsum(decode_integers(blocks[0], 3 * n_seeds, name=name)).reshape(-1, 3)
     if seeds.min() < 0 or seeds.max() >= n_vertices:
         raise cursor.corrupt("a seed vertex does not exist")

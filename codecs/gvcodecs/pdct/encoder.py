@@ -26,7 +26,7 @@ from gvcodecs.pdct.still_points import SECTION, encode_still
 from gvpipe.arrays import Float32, Int64
 from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.connectivity.base_mesh import EncodedMesh
-from gvpipe.connectivity.welded_mesh import PointMesh, encode_points
+from gvpipe.connectivity.welded_mesh import WeldedMesh, encode_points
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, cut
 from gvpipe.mesh.lattice import Lattice
@@ -168,7 +168,7 @@ class _Start:
     """
 
     coded: EncodedMesh
-    mesh: PointMesh
+    mesh: WeldedMesh
     lattice: Lattice
     sources: Int64
     surface: Surface

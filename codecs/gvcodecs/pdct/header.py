@@ -18,12 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from gvcodecs.pdct.clip import LARGE
 from gvcodecs.pdct.dictionary import Surface
 from gvpipe.connectivity.base_mesh import BaseMesh
-from gvpipe.connectivity.welded_mesh import PointMesh
+from gvpipe.connectivity.welded_mesh import WeldedMesh
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.segments import read_segments
+from gvpipe.container.segments import HUGE, read_segments
 from gvpipe.errors import CorruptFile
 from gvpipe.mesh.lattice import Lattice
 
@@ -56,7 +55,7 @@ class Header:
 def check_lattice(values: Any) -> Lattice:
     """Return the lattice that ``values``, an origin and a step, name; raises `CorruptFile` for anything else."""
     is_list = isinstance(values, list) and len(values) == 4
-    if not is_list or not all(isinstance(v, int | float) and abs(v) < LARGE for v in values) or not values[3] > 0:
+    if not is_list or not all(isinstance(v, int | float) and abs(v) < HUGE for v in values) or not values[3] > 0:
         raise CorruptFile(f"header: base is {values!r}; an origin and a step above 0 are needed")
     return Lattice((values[0], values[1], values[2]), values[3])
 
@@ -66,6 +65,6 @@ def surface_of(mesh: BaseMesh, lattice: Lattice) -> Surface:
     return Surface(lattice.place(mesh.points), mesh.faces, np.argsort(mesh.visits))
 
 
-def surface_of_points(mesh: PointMesh, lattice: Lattice) -> Surface:
+def surface_of_points(mesh: WeldedMesh, lattice: Lattice) -> Surface:
     """What all clips share, from the decoded base frame; points are numbered along the walk."""
     return Surface(lattice.place(mesh.lattice), mesh.point_faces, np.arange(len(mesh.lattice)))

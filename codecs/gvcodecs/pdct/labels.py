@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gvpipe.arrays import Int64
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 
 
@@ -19,8 +19,7 @@ def encode_labels(labels: Int64, n_clusters: int) -> bytes:
         return b""
     starts = np.flatnonzero(np.diff(labels, prepend=-1))
     lengths = encode_integers(np.diff(starts, append=len(labels)) - 1)
-    head = varint(len(starts)) + varint(len(lengths))
-    return head + lengths + encode_integers(np.diff(labels[starts], prepend=0))
+    return varint(len(starts)) + pack_block(lengths) + encode_integers(np.diff(labels[starts], prepend=0))
 
 
 def decode_labels(cursor: Cursor, n_vertices: int, n_clusters: int, name: str) -> Int64:
@@ -29,7 +28,7 @@ def decode_labels(cursor: Cursor, n_vertices: int, n_clusters: int, name: str) -
         cursor.end()
         return np.zeros(n_vertices, np.int64)
     n_runs = cursor.varint(n_vertices, "the number of runs")
-    lengths = decode_integers(cursor.take(cursor.varint(cursor.left, "a length")), n_runs, name=name) + 1
+    lengths = decode_integers(cursor.block(), n_runs, name=name) + 1
     clusters = np.cumsum(decode_integers(cursor.rest(), n_runs, name=name))
     if n_runs < 1 or lengths.min() < 1 or lengths.max() > n_vertices or lengths.sum() != n_vertices:
         raise cursor.corrupt("the runs of clusters do not cover the vertices")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gvcodecs.pdct.dictionary import Surface
 from gvpipe.arrays import Bool, Float32
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.segments import LARGEST_STEP, SMALLEST_STEP
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.trajectory.still_vertices import decode_flags, encode_flags
@@ -50,7 +50,7 @@ def encode_still(still: Bool, frame: Float32, surface: Surface, step: float) -> 
     step = float(np.clip(step, SMALLEST_STEP, LARGEST_STEP))
     off = np.rint((frame[points].astype(np.float64) - surface.base[points]) / step).astype(np.int64)
     flags = encode_flags(still[surface.walk])
-    return HEAD.pack(step) + varint(len(flags)) + flags + encode_integers(off.T)
+    return HEAD.pack(step) + pack_block(flags) + encode_integers(off.T)
 
 
 def decode_still(data: bytes, surface: Surface) -> StillPoints:
@@ -59,7 +59,7 @@ def decode_still(data: bytes, surface: Surface) -> StillPoints:
     (step,) = cursor.struct(HEAD)
     if not SMALLEST_STEP <= step <= LARGEST_STEP:  # NaN neither
         raise cursor.corrupt(f"its step is {step}")
-    flags = decode_flags(cursor.take(cursor.varint(cursor.left, "a length")), len(surface.walk), SECTION)
+    flags = decode_flags(cursor.block(), len(surface.walk), SECTION)
     points = surface.walk[flags]
     off = decode_integers(cursor.rest(), 3 * len(points), name=SECTION).reshape(3, -1).T
     with np.errstate(over="ignore"):

@@ -12,7 +12,7 @@ export const EDGE_SEAM_KERNELS_LATER = 2;
 export const EDGE_SEAM_KERNELS_NEW = 3;
 
 // gvpipe.connectivity.seams
-export const SEAMS_MAX_COPIES = 7;
+export const SEAMS_MAX_SEAM_VERTICES = 7;
 
 // gvpipe.connectivity.vertex_order
 export const VERTEX_ORDER_REACH = 256;
@@ -33,12 +33,13 @@ export const BITSTREAM_MAX_VERTICES = 268435456;
 // gvpipe.container.mp4
 export const MP4_BOX_UUID = [106, 31, 12, 82, 61, 123, 78, 14, 156, 85, 103, 228, 240, 167, 209, 185];
 export const MP4_MAX_BOXES = 65536;
-export const MP4_AGAIN = "get the file again from its source";
+
+// gvpipe.container.segments
+export const SEGMENTS_TINY = 1e-60;
+export const SEGMENTS_HUGE = 1e+39;
 
 // gvpipe.corrections.displacements
 export const DISPLACEMENTS_MAX_POSITIONS = 1048576;
-export const DISPLACEMENTS_SMALL = 1e-60;
-export const DISPLACEMENTS_LARGE = 1e+39;
 export const DISPLACEMENTS_NEAR = 3;
 
 // gvpipe.entropy.block_coder
@@ -62,6 +63,9 @@ export const TOKENS_DIRECT = 16;
 export const TOKENS_TABLE_TOTAL = 4096;
 export const TOKENS_MAX_TOKENS = 88;
 export const TOKENS_CHUNK = 16;
+
+// gvpipe.errors
+export const ERRORS_REMEDY = "get the file again from its source";
 
 // gvpipe.media.video
 export const VIDEO_MAX_SIDE = 16384;
@@ -98,7 +102,7 @@ export const CONTEXTS_N_NEAR = 6;
 export const PREDICTION_KERNELS_DOUBT = 0.0001;
 
 // gvpipe.trajectory.temporal_neighbours
-export const TEMPORAL_NEIGHBOURS_MAX_KNOWN = 6;
+export const TEMPORAL_NEIGHBOURS_MAX_NEIGHBOURS = 6;
 export const TEMPORAL_NEIGHBOURS_VARIANCE = 0.02;
 export const TEMPORAL_NEIGHBOURS_MIN_BLOCK = 48;
 export const TEMPORAL_NEIGHBOURS_CUBIC = new Map([[-3, -0.0625], [-1, 0.5625], [1, 0.5625], [3, -0.0625]]);
@@ -118,8 +122,6 @@ export const HEADER_PREDICTIONS = ["blended", "affine"];
 export const HEADER_PLACEMENTS = ["halves", "charts", "tiles"];
 export const HEADER_MAX_CLUSTERS = 1024;
 export const HEADER_MAX_SEGMENTS = 65536;
-export const HEADER_SMALL = 1e-60;
-export const HEADER_LARGE = 1e+39;
 
 // gvcodecs.mcgv.layout.chart_coding
 export const CHART_CODING_CONTEXTS = 5;

@@ -25,8 +25,8 @@ from gvpipe.trajectory.basis import (
     find_principal,
     fit_coefficients,
 )
-from gvpipe.trajectory.coefficient_coding import decode_rows, encode_rows
-from gvpipe.trajectory.prediction import Rows
+from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
+from gvpipe.trajectory.prediction import CausalOrder
 
 
 @dataclass(frozen=True)
@@ -67,24 +67,24 @@ def decode_trajectories(data: bytes, n_clusters: int, n_frames: int, step: float
 
 def encode_coefficients(coefficients: Float64, step: float) -> tuple[bytes, Float64]:
     """Code the transforms' ``coefficients (4K, R)``; return the bytes and what the decoder will have."""
-    return encode_rows(coefficients, step, _lone_rows(len(coefficients)))
+    return encode_vectors(coefficients, step, _unpredicted(len(coefficients)))
 
 
 def decode_coefficients(data: bytes, n_clusters: int, n_components: int, step: float, name: str) -> Float64:
     """Mirror of `encode_coefficients`; raises `CorruptFile` if the bytes are not what it writes."""
-    return decode_rows(data, n_components, step, _lone_rows(4 * n_clusters), name)
+    return decode_vectors(data, n_components, step, _unpredicted(4 * n_clusters), name)
 
 
-def _lone_rows(n_rows: int) -> Rows:
-    """Rows in their own order, each predicted as zero: what is left to tell is known from the row's earlier components."""
+def _unpredicted(n_vectors: int) -> CausalOrder:
+    """Vectors in their own order, each predicted as zero: contexts follow from the vector's earlier components."""
     nothing = np.zeros(0)
-    return Rows(
-        order=np.arange(n_rows, dtype=np.int32),
-        starts=np.zeros(n_rows + 1, np.int32),
-        near=nothing.astype(np.int32),
+    return CausalOrder(
+        order=np.arange(n_vectors, dtype=np.int32),
+        starts=np.zeros(n_vectors + 1, np.int32),
+        neighbours=nothing.astype(np.int32),
         weights=nothing,
         variances=nothing,
-        rings=np.zeros(n_rows, np.int32),
-        blocks=np.array([0, n_rows], np.int32),
+        ring_sizes=np.zeros(n_vectors, np.int32),
+        blocks=np.array([0, n_vectors], np.int32),
         affine=False,
     )

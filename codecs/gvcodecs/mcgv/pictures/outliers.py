@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from gvpipe.arrays import Float64, Int64
-from gvpipe.corrections.displacements import Moves, encode_group, encode_moves, most_frames
+from gvpipe.corrections.displacements import Displacements, encode_displacements, encode_group, most_frames
 from gvpipe.media.video import Profile
 
 SECTION = "outliers"
@@ -54,11 +54,11 @@ class OutlierWriter:
         """Return the section, empty if nothing exceeds the pictures."""
         if self._found:
             self._close()
-        return encode_moves(self._step, self._group, self._groups)
+        return encode_displacements(self._step, self._group, self._groups)
 
     def _close(self) -> None:
         frames, vertices, steps = (np.concatenate(parts) for parts in zip(*self._found, strict=True))
         order = np.lexsort((frames, vertices))
         n_frames = (self._n_frames - 1) % self._group + 1
-        self._groups.append(encode_group(Moves(frames[order], vertices[order], steps[order]), n_frames))
+        self._groups.append(encode_group(Displacements(frames[order], vertices[order], steps[order]), n_frames))
         self._found = []

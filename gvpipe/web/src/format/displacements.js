@@ -4,10 +4,10 @@
  */
 
 import {
-  DISPLACEMENTS_LARGE as LARGE,
+  SEGMENTS_HUGE as HUGE,
   DISPLACEMENTS_MAX_POSITIONS as MAX_POSITIONS,
   DISPLACEMENTS_NEAR as NEAR,
-  DISPLACEMENTS_SMALL as SMALL,
+  SEGMENTS_TINY as TINY,
 } from "../constants.js";
 import { Cursor } from "./cursor.js";
 import { decodeIntegers } from "./integers.js";
@@ -23,7 +23,7 @@ export class Moves {
   constructor(data, frames, vertices, name) {
     const cursor = new Cursor(data, name);
     this.step = cursor.f64();
-    if (!(this.step > SMALL && this.step < LARGE)) throw cursor.corrupt(`its step is ${this.step}`);
+    if (!(this.step > TINY && this.step < HUGE)) throw cursor.corrupt(`its step is ${this.step}`);
     /** Frames of a group. */
     this.group = cursor.varint(Math.max(1, Math.floor(MAX_POSITIONS / vertices)), "the frames of a group");
     if (!this.group) throw cursor.corrupt("its groups have no frames");

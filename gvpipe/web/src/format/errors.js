@@ -1,6 +1,6 @@
 /** The one kind of error that the player raises on purpose; its text is one line, fit to be shown to a user. */
 
-import { MP4_AGAIN as AGAIN } from "../constants.js";
+import { ERRORS_REMEDY as AGAIN } from "../constants.js";
 
 export { AGAIN };
 

@@ -3,7 +3,7 @@
  * 6.1.
  */
 
-import { SEAMS_MAX_COPIES as MAX_COPIES, VERTEX_ORDER_MAX_VERTICES as MAX_VERTICES } from "../constants.js";
+import { SEAMS_MAX_SEAM_VERTICES as MAX_SEAM_VERTICES, VERTEX_ORDER_MAX_VERTICES as MAX_VERTICES } from "../constants.js";
 import { corrupt } from "./errors.js";
 import { decodeIntegers } from "./integers.js";
 import { decodeSeams } from "./edge_seams.js";
@@ -46,7 +46,7 @@ function decodeCorners(countsData, data, pointFaces, nPoints, across) {
 }
 
 function decodeDifferences(data, pointFaces, counts, where) {
-  const contexts = Uint8Array.from(where, (corner) => Math.min(counts[pointFaces[corner]], MAX_COPIES));
+  const contexts = Uint8Array.from(where, (corner) => Math.min(counts[pointFaces[corner]], MAX_SEAM_VERTICES));
   const differences = decodeIntegers(data, where.length, contexts, "mesh");
   const copies = new Uint32Array(pointFaces.length);
   for (let i = 0, before = -1, copy = 0; i < where.length; i++) {

@@ -3,7 +3,7 @@
 import {
   TEMPORAL_NEIGHBOURS_CUBIC as CUBIC,
   TEMPORAL_NEIGHBOURS_LINEAR as LINEAR,
-  TEMPORAL_NEIGHBOURS_MAX_KNOWN as MAX_KNOWN,
+  TEMPORAL_NEIGHBOURS_MAX_NEIGHBOURS as MAX_NEIGHBOURS,
   TEMPORAL_NEIGHBOURS_MIN_BLOCK as MIN_BLOCK,
   TEMPORAL_NEIGHBOURS_OFFSETS as OFFSETS,
   TEMPORAL_NEIGHBOURS_VARIANCE as VARIANCE,
@@ -16,7 +16,7 @@ export function frameRows(frames) {
   const rows = { order: [], starts: [0], near: [], weights: [], variances: [], rings: [], blocks: [0] };
   const isKnown = new Uint8Array(frames);
   const add = (frame, step) => {
-    const near = OFFSETS.filter((o) => isKnown[frame + o * step]).slice(0, MAX_KNOWN);
+    const near = OFFSETS.filter((o) => isKnown[frame + o * step]).slice(0, MAX_NEIGHBOURS);
     const prior = [CUBIC, LINEAR, BEFORE].find((p) => [...p.keys()].every((o) => near.includes(o)));
     for (let axis = 0; axis < 3; axis++) {
       rows.order.push(3 * frame + axis);

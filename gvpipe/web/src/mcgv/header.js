@@ -3,13 +3,13 @@
 import {
   BROWSER_PROFILE as PROFILE,
   BROWSER_VERSION as VERSION,
-  HEADER_LARGE as LARGE,
+  SEGMENTS_HUGE as HUGE,
   HEADER_MAX_CLUSTERS as MAX_CLUSTERS,
   HEADER_MAX_SEGMENTS as MAX_SEGMENTS,
   HEADER_OF_PICTURES as OF_PICTURES,
   HEADER_PLACEMENTS as PLACEMENTS,
   HEADER_PREDICTIONS as PREDICTIONS,
-  HEADER_SMALL as SMALL,
+  SEGMENTS_TINY as TINY,
   VIDEO_MAX_SIDE as MAX_SIDE,
 } from "../constants.js";
 import { GeometryVideoError, corrupt } from "../format/errors.js";
@@ -66,7 +66,7 @@ export function readHeader(header) {
     width: checkInteger(settings, "width", 2, MAX_SIDE),
     height: checkInteger(settings, "height", 2, Math.floor(MAX_SIDE / 3)),
     ...readMotion(header),
-    residualStep: checkNumber(settings, "residual_step", SMALL, LARGE),
+    residualStep: checkNumber(settings, "residual_step", TINY, HUGE),
     outliers: "outliers" in settings,
     pictures: true,
   };
@@ -85,7 +85,7 @@ export function readHeader(header) {
 function readMotion(header) {
   const settings = header.settings;
   const base = settings.base;
-  if (!Array.isArray(base) || base.length !== 4 || !base.every((v) => Math.abs(v) < LARGE) || !(base[3] > 0)) {
+  if (!Array.isArray(base) || base.length !== 4 || !base.every((v) => Math.abs(v) < HUGE) || !(base[3] > 0)) {
     throw corrupt("header", `base is ${JSON.stringify(base)}`);
   }
   return {
@@ -93,7 +93,7 @@ function readMotion(header) {
     segments: checkInteger(settings, "segments", 1, Math.min(MAX_SEGMENTS, header.frames)),
     origin: base.slice(0, 3),
     baseStep: base[3],
-    transformStep: checkNumber(settings, "transform_step", SMALL, LARGE),
+    transformStep: checkNumber(settings, "transform_step", TINY, HUGE),
   };
 }
 

@@ -1,0 +1,19 @@
+"""Values grouped by their contexts, each of which has its own frequency table."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gvpipe.arrays import Integers
+
+
+def group_by_context(contexts: Integers) -> list[tuple[int, NDArray[np.intp]]]:
+    """Contexts ``(n,)`` that occur, ascending, and the indices of each one's values, ascending.
+
+    >>> [(context, values.tolist()) for context, values in group_by_context(np.array([5, 0, 5]))]
+    [(0, [1]), (5, [0, 2])]
+    """
+    order = np.argsort(contexts, kind="stable")
+    bounds = np.flatnonzero(np.diff(contexts[order])) + 1
+    return [(int(contexts[group[0]]), group) for group in np.split(order, bounds)] if len(order) else []

@@ -1,0 +1,23 @@
+"""Examples in docstrings print what they say."""
+
+from __future__ import annotations
+
+import doctest
+from importlib import import_module
+
+import pytest
+
+MODULES = [
+    "gvpipe.container.cursor",
+    "gvpipe.entropy.block_coder",
+    "gvpipe.entropy.grouping",
+    "gvpipe.entropy.integers",
+    "gvpipe.errors",
+    "gvpipe.trajectory.temporal_neighbours",
+]
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_print_what_they_say(name: str) -> None:
+    result = doctest.testmod(import_module(name), optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert result.attempted and not result.failed
