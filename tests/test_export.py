@@ -6,6 +6,7 @@ import base64
 import dataclasses
 import json
 import re
+import runpy
 import shutil
 import subprocess
 import webbrowser
@@ -169,10 +170,19 @@ def test_what_cannot_be_exported(run: Run, video: Path, tmp_path: Path) -> None:
 
 def test_player_reads_what_encode_writes() -> None:
     """When this fails, a new version of the codec is waiting for src/mcgv/ to read it."""
-    header = (WEB / "src" / "mcgv" / "header.js").read_text()
-    found = re.findall(r'^export const \w+ = "?([\w-]+)"?;', header, re.MULTILINE)
-    assert found == ["mcgv", str(browser.VERSION), browser.PROFILE]
     assert codec_class("mcgv").version <= browser.VERSION
+
+
+def test_the_player_s_constants_are_python_s() -> None:
+    script = runpy.run_path(str(Path(__file__).parents[1] / "tools" / "web_constants.py"))
+    assert (WEB / "src" / "constants.js").read_text("utf-8") == script["make"](), "run tools/web_constants.py"
+
+
+def test_the_player_s_constants_are_used() -> None:
+    names = re.findall(r"^export const (\w+)", (WEB / "src" / "constants.js").read_text("utf-8"), re.MULTILINE)
+    sources = [path.read_text("utf-8") for path in (WEB / "src").rglob("*.js") if path.name != "constants.js"]
+    assert len(set(names)) == len(names) > 80
+    assert [name for name in names if not any(re.search(rf"\b{name}\b", text) for text in sources)] == []
 
 
 def test_licences_are_beside_the_bundles() -> None:

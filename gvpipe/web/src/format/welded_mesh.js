@@ -4,7 +4,7 @@
  */
 
 import { decodeBase } from "./base_mesh.js";
-import { decodeCopies } from "./copies.js";
+import { decodeCopies } from "./seams.js";
 import { Cursor } from "./cursor.js";
 
 /**

@@ -1,16 +1,15 @@
 /** Frequency tables of integers by two numbers. Mirrors `gvpipe.entropy.parametric_tables`; `docs/format.md`, section 6. */
 
-const DIRECT = 16;
-const N_TOKENS = 40;
-const RATIO_BITS = 12;
-const MEANS = [
-  2, 4, 6, 8, 11, 16, 23, 32, 38, 45, 54, 64, 76, 91, 108, 128,
-  152, 181, 215, 256, 304, 362, 431, 512, 724, 1024, 1448, 2048, 2896, 4096,
-];
-const RATIOS = MEANS.map((mean) => Math.floor((4096 * mean) / (mean + 32)));
+import {
+  PARAMETRIC_TABLES_N_TOKENS as N_TOKENS,
+  PARAMETRIC_TABLES_RATIOS as RATIOS,
+  PARAMETRIC_TABLES_RATIO_BITS as RATIO_BITS,
+  PARAMETRIC_TABLES_TOTAL as TOTAL,
+  PARAMETRIC_TABLES_ZEROS as ZEROS,
+  TOKENS_DIRECT as DIRECT,
+} from "../constants.js";
+
 export const N_RATIOS = RATIOS.length;
-const TOTAL = 1 << 20;
-const ZEROS = 256;
 
 const shapes = []; // of the ratios used so far
 

@@ -1,10 +1,10 @@
 /** The published prediction: one affine transform per cluster and frame. Mirrors `gvcodecs.mcgv.motion.affine`. */
 
-import { Segments } from "./motion.js";
-import { AffinePredictor } from "./prediction.js";
-import { decodeTransforms } from "./transforms.js";
+import { Segments } from "./contract.js";
+import { AffinePredictor } from "./affine_fit.js";
+import { decodeTransforms } from "./affine_coding.js";
 
-/** @implements {import("./motion.js").Motion} */
+/** @implements {import("./contract.js").Motion} */
 export class AffineMotion {
   /**
    * @param {import("../format/payload.js").Payload} payload

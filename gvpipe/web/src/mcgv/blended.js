@@ -1,13 +1,13 @@
 /** Blended prediction: weights once, transforms as trajectories. Mirrors `gvcodecs.mcgv.motion.blended`. */
 
-import { Blend } from "./blending.js";
-import { Segments } from "./motion.js";
-import { Trajectories } from "./trajectories.js";
+import { Blend } from "./skinning.js";
+import { Segments } from "./contract.js";
+import { Trajectories } from "./skinning_coding.js";
 import { decodeWeights } from "./weight_coding.js";
 
 const LOOKS = 2 ** 24; // products that a look at the whole motion may take: some hundredths of a second
 
-/** @implements {import("./motion.js").Motion} */
+/** @implements {import("./contract.js").Motion} */
 export class BlendedMotion {
   /**
    * @param {import("../format/payload.js").Payload} payload

@@ -1,14 +1,15 @@
 /** Principal trajectories of a segment. Mirrors `gvpipe.trajectory.basis.decode_basis`; `docs/format.md`, section 6. */
 
+import {
+  BASIS_LEAST_OUTSIDE as LEAST_OUTSIDE,
+  BASIS_MAX_COMPONENTS as MAX_COMPONENTS,
+  BASIS_MAX_SCALE as MAX_SCALE,
+  BASIS_PER_OCTAVE as PER_OCTAVE,
+} from "../constants.js";
 import { Cursor } from "./cursor.js";
-import { frameRows } from "./frame_rows.js";
+import { frameRows } from "./temporal_neighbours.js";
 import { decodeIntegers } from "./integers.js";
-import { MAX_VALUES, decodeRows } from "./row_coding.js";
-
-const MAX_COMPONENTS = 1 << 14;
-const MAX_SCALE = 8 * 64;
-const PER_OCTAVE = 8;
-const LEAST_OUTSIDE = 0.2;
+import { MAX_VALUES, decodeRows } from "./coefficient_coding.js";
 
 /**
  * @typedef {object} Basis

@@ -1,12 +1,10 @@
 /** Range-coded integers that come block by block. Mirrors `gvpipe.entropy.block_coder.BlockDecoder`; `docs/format.md`, section 6. */
 
+import { BLOCK_CODER_PARAMETRIC as PARAMETRIC, TOKENS_CHUNK as CHUNK } from "../constants.js";
 import { Cursor } from "./cursor.js";
 import { DIRECT, MAX_TOKENS, TABLE_TOTAL, normalised, unfold } from "./integers.js";
-import { N_RATIOS, magnitudeTable } from "./magnitude_tables.js";
+import { N_RATIOS, magnitudeTable } from "./parametric_tables.js";
 import { RangeDecoder, categoricalEdges } from "./range_decoder.js";
-
-const CHUNK = 16; // low bits coded at a time
-const PARAMETRIC = 1; // kind of a table told by two numbers
 
 export class BlockDecoder {
   /** @param {Uint8Array} data @param {number} nContexts at most 256 @param {string} name of the section, for messages */

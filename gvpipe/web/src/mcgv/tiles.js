@@ -3,7 +3,7 @@
  * level by level; `docs/format.md`, section 5.5.
  */
 
-import { checkLattice, fill, momentShift, widestPair } from "./placement.js";
+import { checkLattice, fill, momentShift, widestPair } from "./kd_tree.js";
 
 /**
  * @param {Int32Array} points (V, 3) base frame on its lattice, flat

@@ -3,13 +3,15 @@
  * cell, not level by level; `docs/format.md`, section 5.1. All sums stay below 2^53.
  */
 
+import {
+  KD_TREE_COMMON as COMMON,
+  KD_TREE_FRAME as FRAME,
+  KD_TREE_MAX_COORDINATE as MAX_COORDINATE,
+  KD_TREE_MOMENT_BITS as MOMENT_BITS,
+  KD_TREE_SPREAD as SPREAD,
+} from "../constants.js";
 import { corrupt } from "../format/errors.js";
 
-const COMMON = 90; // a multiple of every direction's squared length
-const FRAME = 4; // pixels: side of the squares that share one pair of directions
-const MOMENT_BITS = 10; // of deviations in second moments
-const SPREAD = 2; // groups are moved apart by this many times their distance from the middle
-const MAX_COORDINATE = 2 ** 20;
 const FEW = 24; // vertices that are sorted by insertion
 
 const DIRECTIONS = directions();

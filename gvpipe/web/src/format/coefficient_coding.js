@@ -5,25 +5,30 @@
  * Contexts are integers, and must be Python's: all sums here stay below 2^53.
  */
 
-import { BlockDecoder } from "./blocks.js";
+import {
+  COEFFICIENT_CODING_LARGEST as LARGEST,
+  COEFFICIENT_CODING_MAX_VALUES as MAX_VALUES,
+  CONTEXTS_FLOOR_NEAR as FLOOR_NEAR,
+  CONTEXTS_FLOOR_SPAN as FLOOR_SPAN,
+  CONTEXTS_HIGHEST as HIGHEST,
+  CONTEXTS_LONG as LONG,
+  CONTEXTS_LOWEST as LOWEST,
+  CONTEXTS_MAX_LEVEL as MAX_LEVEL,
+  CONTEXTS_N_CONTEXTS as N_CONTEXTS,
+  CONTEXTS_N_NEAR as N_NEAR,
+  CONTEXTS_ONE as ONE,
+  CONTEXTS_PER_OCTAVE as PER_OCTAVE,
+  CONTEXTS_POWERS as POWERS,
+  CONTEXTS_POWER_ONE as POWER_ONE,
+  CONTEXTS_SHORT as SHORT,
+} from "../constants.js";
+import { BlockDecoder } from "./block_coder.js";
 import { Cursor } from "./cursor.js";
 import { powersOfTwo } from "./exact_powers.js";
 import { decodeIntegers } from "./integers.js";
-import { predictRows } from "./row_prediction.js";
+import { predictRows } from "./prediction.js";
 
-const SHORT = [16, 10, 6, 4]; // weights of a row's earlier components, the latest first
-const LONG = [16, 14, 13, 12, 11, 10, 9, 8, 7, 6, 6, 5, 5, 4, 4, 3];
-const ONE = 64; // fixed point of magnitudes
-const PER_OCTAVE = 16; // of integer logarithms
-const MAX_LEVEL = 160;
-const [FLOOR_SPAN, FLOOR_NEAR] = [128, 16]; // added to sums of magnitudes
-const POWERS = [12, 4, 4, 8, 7]; // of the component's mean, the block before, the rows near, the short and the long span
-const POWER_ONE = 20;
-const [LOWEST, HIGHEST] = [-10, 16]; // contexts, half octaves above magnitude one
-const N_CONTEXTS = HIGHEST - LOWEST + 1;
-const N_NEAR = 6; // rows near that count
-const LARGEST = 2 ** 36; // magnitude of a residual, in steps
-export const MAX_VALUES = 2 ** 27; // of a section: rows times components
+export { MAX_VALUES };
 
 const ROUNDED = powersOfTwo();
 const LEVEL_BOUNDS = Float64Array.from({ length: MAX_LEVEL + 1 }, (_, level) => Number(ROUNDED[4 * level]));
@@ -35,7 +40,7 @@ const SMALL_LOGS = Int16Array.from({ length: 1 << 14 }, (_, value) => searchLog(
  * @param {Uint8Array} data
  * @param {number} components R
  * @param {number} step quantisation step
- * @param {import("./row_prediction.js").Rows} rows
+ * @param {import("./prediction.js").Rows} rows
  * @param {string} name of the section, for messages
  * @returns {Float64Array} (n, R) by row, flat
  */

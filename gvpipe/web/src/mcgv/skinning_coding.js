@@ -1,8 +1,8 @@
 /** A blend's transforms over a segment. Mirrors `gvcodecs.mcgv.motion.skinning_coding`; `docs/format.md`, section 5. */
 
 import { Cursor } from "../format/cursor.js";
-import { decodeRows } from "../format/row_coding.js";
-import { decodeBasis } from "../format/trajectory_basis.js";
+import { decodeRows } from "../format/coefficient_coding.js";
+import { decodeBasis } from "../format/basis.js";
 
 export class Trajectories {
   /**

@@ -1,19 +1,22 @@
 /** Rows of a trajectory basis, one per frame and axis, in an order that interpolates. Mirrors `gvpipe.trajectory.temporal_neighbours`. */
 
-const MAX_KNOWN = 6; // frames that predict a frame
-const VARIANCE = 0.02; // prior variance of a weight
-const MIN_BLOCK = 48; // rows coded at once, at least
-const CUBIC = new Map([[-3, -1 / 16], [-1, 9 / 16], [1, 9 / 16], [3, -1 / 16]]); // offsets in steps, and weights
-const LINEAR = new Map([[-1, 0.5], [1, 0.5]]);
-const BEFORE = new Map([[-1, 1]]);
-const OFFSETS = [-1, 1, -3, 3, -2, -5, 5, -4]; // frames that may be known, the most telling first
+import {
+  TEMPORAL_NEIGHBOURS_CUBIC as CUBIC,
+  TEMPORAL_NEIGHBOURS_LINEAR as LINEAR,
+  TEMPORAL_NEIGHBOURS_MAX_NEIGHBOURS as MAX_NEIGHBOURS,
+  TEMPORAL_NEIGHBOURS_MIN_BLOCK as MIN_BLOCK,
+  TEMPORAL_NEIGHBOURS_OFFSETS as OFFSETS,
+  TEMPORAL_NEIGHBOURS_VARIANCE as VARIANCE,
+} from "../constants.js";
 
-/** @param {number} frames @returns {import("./row_prediction.js").Rows} 3 F rows; row 3 f + a is axis a of frame f */
+const BEFORE = new Map([[-1, 1]]);
+
+/** @param {number} frames @returns {import("./prediction.js").Rows} 3 F rows; row 3 f + a is axis a of frame f */
 export function frameRows(frames) {
   const rows = { order: [], starts: [0], near: [], weights: [], variances: [], rings: [], blocks: [0] };
   const isKnown = new Uint8Array(frames);
   const add = (frame, step) => {
-    const near = OFFSETS.filter((o) => isKnown[frame + o * step]).slice(0, MAX_KNOWN);
+    const near = OFFSETS.filter((o) => isKnown[frame + o * step]).slice(0, MAX_NEIGHBOURS);
     const prior = [CUBIC, LINEAR, BEFORE].find((p) => [...p.keys()].every((o) => near.includes(o)));
     for (let axis = 0; axis < 3; axis++) {
       rows.order.push(3 * frame + axis);

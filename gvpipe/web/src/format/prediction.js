@@ -4,7 +4,7 @@
  * order of operations.
  */
 
-const DOUBT = 1e-4; // part of a weight's variance that a component leaves at least
+import { PREDICTION_KERNELS_DOUBT as DOUBT } from "../constants.js";
 
 /**
  * @typedef {object} Rows in which order n rows are coded, and from what each is predicted

@@ -5,10 +5,8 @@
  * `C_k = L_k^T T_k`, where L_k is the Cholesky factor of the energy that the cluster's rows cause.
  */
 
+import { SKINNING_FLAT as FLAT, SKINNING_LEAST_ENERGY as LEAST_ENERGY } from "../constants.js";
 import { INFLUENCES, TOTAL } from "./weight_kernels.js";
-
-const FLAT = 1e-6; // of a cluster's energy: what directions in which it has no extent count for
-const LEAST_ENERGY = 1e-9; // of a cluster that no point follows
 
 export class Blend {
   /**

@@ -3,14 +3,17 @@
  * section 9.
  */
 
+import {
+  SEGMENTS_HUGE as HUGE,
+  DISPLACEMENTS_MAX_POSITIONS as MAX_POSITIONS,
+  DISPLACEMENTS_NEAR as NEAR,
+  SEGMENTS_TINY as TINY,
+} from "../constants.js";
 import { Cursor } from "./cursor.js";
 import { decodeIntegers } from "./integers.js";
 import { Recent } from "./recent.js";
 
-const MAX_POSITIONS = 1 << 20; // of a group, unless one frame has more
-const [SMALL, LARGE] = [1e-60, 1e39]; // of the step
 const LARGEST = 2 ** 128; // float32 ends there
-const NEAR = 3; // magnitudes of the axes before that are told apart
 
 export class Moves {
   /**
@@ -20,7 +23,7 @@ export class Moves {
   constructor(data, frames, vertices, name) {
     const cursor = new Cursor(data, name);
     this.step = cursor.f64();
-    if (!(this.step > SMALL && this.step < LARGE)) throw cursor.corrupt(`its step is ${this.step}`);
+    if (!(this.step > TINY && this.step < HUGE)) throw cursor.corrupt(`its step is ${this.step}`);
     /** Frames of a group. */
     this.group = cursor.varint(Math.max(1, Math.floor(MAX_POSITIONS / vertices)), "the frames of a group");
     if (!this.group) throw cursor.corrupt("its groups have no frames");

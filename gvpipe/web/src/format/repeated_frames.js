@@ -3,11 +3,10 @@
  * `gvpipe.repeated_frames`; `docs/format.md`, section 10.
  */
 
+import { REPEATED_FRAMES_SECTION as SECTION } from "../constants.js";
 import { Cursor } from "./cursor.js";
 import { decodeIntegers } from "./integers.js";
 import { Payload } from "./payload.js";
-
-const SECTION = "holds";
 
 export class Holds {
   /**

@@ -1,13 +1,12 @@
 /**
  * Where each slot sits in the picture, and which cluster moves it. Mirrors `decode_pixels`, `decode_clusters` and
- * `decode_slot_clusters` of `gvcodecs.mcgv.header`; `docs/format.md`, section 5.
+ * `decode_slot_clusters` of `gvcodecs.mcgv.layout.coding`; `docs/format.md`, section 5.
  */
 
+import { CODING_CONTEXTS as CONTEXTS } from "../constants.js";
 import { Cursor } from "../format/cursor.js";
 import { corrupt } from "../format/errors.js";
 import { decodeIntegers } from "../format/integers.js";
-
-const CONTEXTS = 4; // of a pixel's y: 0, 1, 2, 3 or more columns from the slot before
 
 /**
  * @param {Uint8Array} data section `pixels`
