@@ -28,9 +28,13 @@ class Memo:
 
     An encoder wraps the stages that do not look at quality: ``mesh = memo("mesh", lambda: ...)`` works it out once. What is
     kept should be small beside the sequence; frames are read again instead.
+
+    Args:
+        is_shared: whether other encodes follow, as in a search for a quality.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, is_shared: bool = True) -> None:
+        self.is_shared = is_shared
         self._results: dict[str, Any] = {}
 
     def __call__(self, stage: str, work: Callable[[], Result]) -> Result:
@@ -165,7 +169,7 @@ class BaseCodec(Settings):
         Raises:
             InputError: a frame cannot be read, or what else the codec refuses.
         """
-        return self._encode(sequence, progress or _silent, memo or Memo())
+        return self._encode(sequence, progress or _silent, memo or Memo(is_shared=False))
 
     def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         raise NotImplementedError

@@ -77,7 +77,7 @@ def encode_sequence(
     Raises:
         InputError: what the codec raises.
     """
-    memo = memo or Memo()
+    memo = memo or Memo(is_shared=False)
     holds = memo("holds", lambda: find_holds(sequence)) if _is_held(codec) else None
     if holds is None:
         return codec.encode(sequence, progress, memo)

@@ -16,7 +16,8 @@ import gvpipe
 from gvpipe.cli.commands import main
 from gvpipe.sequence import MeshSequence
 
-settings.register_profile("same", derandomize=True)  # the same examples in every run; --hypothesis-profile=default draws others
+# the same examples in every run, however busy the machine; --hypothesis-profile=default draws others
+settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
 if worker := os.environ.get("PYTEST_XDIST_WORKER"):
     # numba replaces a function's index and its machine code one after the other, so processes that share them may mix them up

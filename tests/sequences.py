@@ -27,6 +27,17 @@ def waving(n: int = 14, n_frames: int = 40, name: str = "waving") -> MeshSequenc
     return MeshSequence(turned[:, order].astype(np.float32), np.argsort(order)[faces].astype(np.int32), 24.0, name=name)
 
 
+def rigid(n: int = 12, n_frames: int = 60) -> MeshSequence:
+    """Two sheets that turn about different axes, each as a whole."""
+    points, faces = grid(n)
+    angle = np.linspace(0, 2, n_frames)[:, None]
+    x, y = points[:, 0], points[:, 1]
+    first = np.stack([x * np.cos(angle), y + 0 * angle, x * np.sin(angle)], axis=2)
+    second = np.stack([x + 2 + 0 * angle, y * np.cos(angle), y * np.sin(angle)], axis=2)
+    positions = np.concatenate([first, second], axis=1).astype(np.float32)
+    return MeshSequence(positions, np.concatenate([faces, faces + n * n]).astype(np.int32), 24.0, name="rigid")
+
+
 def partly_still() -> MeshSequence:
     """A sheet half of which waves; two vertices elsewhere and one at the sheet's middle stand still too. 20 frames."""
     points, faces = grid(12)

@@ -107,7 +107,10 @@ def test_same_input_same_bytes(codec: str, settings: dict[str, object], tmp_path
     assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
 
 
-@each_codec
+@pytest.mark.parametrize(
+    ("codec", "settings"),
+    [pytest.param(*v.values, id=v.id, marks=[] if i % 2 == 0 else pytest.mark.slow) for i, v in enumerate(VARIANTS)],
+)
 def test_quality_is_monotone(codec: str, settings: dict[str, object], tmp_path: Path) -> None:
     sequence = waving(16, 24)
     sizes, errors = [], []

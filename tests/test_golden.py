@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sequences import held, partly_still, patched, waving
+from sequences import held, partly_still, patched, rigid, waving
 
 import gvpipe
 from gvpipe.registry import codec_class
@@ -18,21 +18,22 @@ from gvpipe.registry import codec_class
 GOLDEN = Path(__file__).parent / "golden"
 CURRENT: dict[str, tuple[str, dict[str, object]]] = {
     "laplacian-2-still": ("laplacian", {"segment": 7}),
-    "mcgv-3-h264": ("mcgv", {"prediction": "blended", "gop": 5, "segment": 7}),
-    "mcgv-3-affine": ("mcgv", {"clusters": 5, "prediction": "affine", "placement": "halves"}),
-    "mcgv-3-outliers": ("mcgv", {"prediction": "affine", "clusters": 1, "quality": 95, "gop": 5}),
-    "mcgv-3-charts": ("mcgv", {"prediction": "blended", "clusters": 5, "profile": "precise", "placement": "charts"}),
-    "mcgv-3-jpeg": (
+    "mcgv-4-h264": ("mcgv", {"prediction": "blended", "gop": 5, "segment": 7, "placement": "tiles"}),
+    "mcgv-4-affine": ("mcgv", {"clusters": 5, "prediction": "affine", "placement": "halves"}),
+    "mcgv-4-outliers": ("mcgv", {"prediction": "affine", "clusters": 1, "quality": 95, "gop": 5}),
+    "mcgv-4-charts": ("mcgv", {"prediction": "blended", "clusters": 5, "profile": "precise", "placement": "charts"}),
+    "mcgv-4-jpeg": (
         "mcgv",
         {"prediction": "blended", "clusters": 5, "image": "jpeg", "reorder": True, "placement": "halves"},
     ),
-    "mcgv-3-klt": ("mcgv", {"prediction": "blended", "transform": "klt", "segment": 7}),
-    "mcgv-3-klt-10": (
+    "mcgv-4-klt": ("mcgv", {"prediction": "blended", "transform": "klt", "segment": 7}),
+    "mcgv-4-klt-10": (
         "mcgv",
         {"prediction": "blended", "transform": "klt", "profile": "precise", "placement": "charts", "reorder": True},
     ),
-    "mcgv-3-seams": ("mcgv", {"gop": 5, "placement": "halves"}),
-    "mcgv-3-still": ("mcgv", {"gop": 5, "segment": 7}),
+    "mcgv-4-seams": ("mcgv", {"gop": 5, "placement": "halves"}),
+    "mcgv-4-still": ("mcgv", {"gop": 5, "segment": 7, "placement": "tiles"}),
+    "mcgv-4-rigid": ("mcgv", {"segment": 20}),
     "pca-2-still": ("pca", {"segment": 7}),
     "pdct-2-seams": ("pdct", {"clusters": 3, "segment": 7, "kept": 0.3}),
     "pdct-2-still": ("pdct", {"clusters": 3, "segment": 7}),
@@ -50,6 +51,8 @@ def test_golden_file_decodes_to_the_same_positions(name: str, request: pytest.Fi
             sequence = held(partly_still(), [2, *[1] * 18, 3])
         elif name.endswith("-seams"):
             sequence = patched()
+        elif name.endswith("-rigid"):
+            sequence = held(rigid(), [4, *[1] * 59])
         gvpipe.encode(sequence, video, codec, **settings)
         gvpipe.write(gvpipe.decode(video), expected)
     decoded, wanted = gvpipe.decode(video), gvpipe.read(expected)

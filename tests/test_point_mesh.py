@@ -58,6 +58,7 @@ MESHES: dict[str, Mesh] = {
         np.array([0, 1, 2, 0, 1, 2]),
     ),
 }
+both_codings = pytest.mark.parametrize("across", [False, True], ids=["differences", "across edges"])
 each_mesh = pytest.mark.parametrize("mesh", MESHES.values(), ids=MESHES.keys())
 
 
@@ -73,10 +74,10 @@ def check_mesh(decoded: PointMesh) -> None:
     assert decoded.neighbours.shape == (n_points, n_points)
 
 
-def check_round_trip(mesh: Mesh, reorder: bool) -> None:
+def check_round_trip(mesh: Mesh, reorder: bool, across: bool) -> None:
     lattice, faces, points = mesh
-    coded = encode_points(lattice, faces, points, reorder)[0]
-    decoded = decode_points(coded.mesh, coded.order)
+    coded = encode_points(lattice, faces, points, reorder, across)[0]
+    decoded = decode_points(coded.mesh, coded.order, across)
     check_mesh(decoded)
     source = coded.permutation  # the given vertex of each decoded one
     assert np.array_equal(np.sort(source), np.arange(len(points)))
@@ -92,18 +93,19 @@ def check_round_trip(mesh: Mesh, reorder: bool) -> None:
 
 @each_mesh
 @both_orders
-def test_meshes_come_back(mesh: Mesh, reorder: bool) -> None:
-    check_round_trip(mesh, reorder)
+@both_codings
+def test_meshes_come_back(mesh: Mesh, reorder: bool, across: bool) -> None:
+    check_round_trip(mesh, reorder, across)
 
 
 @settings(max_examples=80, deadline=None)
-@given(st.integers(1, 12), st.integers(0, 25), st.integers(0, 30), st.integers(0, 2**32 - 1), st.booleans())
-def test_any_triangles_come_back(n_points: int, others: int, n_faces: int, seed: int, reorder: bool) -> None:
+@given(st.integers(1, 12), st.integers(0, 25), st.integers(0, 30), st.integers(0, 2**32 - 1), st.booleans(), st.booleans())
+def test_any_triangles_come_back(n_points: int, others: int, n_faces: int, seed: int, reorder: bool, across: bool) -> None:
     """Few points, so that triangles repeat, collapse and meet at every edge."""
     draw = np.random.default_rng(seed)
     points = draw.permutation(np.r_[np.arange(n_points), draw.integers(0, n_points, others)])
     faces = draw.integers(0, len(points), (n_faces, 3))
-    check_round_trip((draw.integers(0, 3, (n_points, 3)).astype(np.int32), faces, points), reorder)
+    check_round_trip((draw.integers(0, 3, (n_points, 3)).astype(np.int32), faces, points), reorder, across)
 
 
 def test_a_soup_costs_little_more_than_the_surface_that_it_draws() -> None:
@@ -115,13 +117,28 @@ def test_a_soup_costs_little_more_than_the_surface_that_it_draws() -> None:
     assert len(soup.mesh) < len(whole.mesh) + faces.size / 8
 
 
+def test_seams_across_edges_cost_less() -> None:
+    """Patches of three by three squares, each with vertices of its own."""
+    places, faces = grid(31)
+    lattice = np.rint(4000 * places).astype(np.int32)
+    patch = np.floor(10 * places[faces].mean(axis=1)[:, :2]) @ [1, 10]
+    corners, number = np.unique(np.c_[faces.ravel(), np.repeat(patch, 3)], axis=0, return_inverse=True)
+    points = corners[:, 0].astype(np.int64)
+    whole = len(encode_points(lattice, faces, np.arange(len(places)), reorder=True)[0].mesh)
+    before, after = (
+        len(encode_points(lattice, number.reshape(-1, 3), points, reorder=True, across=across)[0].mesh)
+        for across in (False, True)
+    )
+    assert after - whole < 0.6 * (before - whole)
+
+
 # hostile bytes
 
 
-def decode_or_refuse(mesh: bytes, order: bytes) -> bool:
+def decode_or_refuse(mesh: bytes, order: bytes, across: bool) -> bool:
     """A mesh that makes sense, or one line of CorruptFile; whether it was refused."""
     try:
-        decoded = decode_points(mesh, order)
+        decoded = decode_points(mesh, order, across)
     except CorruptFile as exc:
         assert "\n" not in str(exc)
         return True
@@ -133,22 +150,24 @@ HOSTILE = ["one triangle", "triangle soup", "non-manifold", "unreferenced vertic
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-def test_every_truncated_prefix_is_refused(name: str) -> None:
-    coded = encode_points(*MESHES[name], reorder=False)[0]
+@both_codings
+def test_every_truncated_prefix_is_refused(name: str, across: bool) -> None:
+    coded = encode_points(*MESHES[name], reorder=False, across=across)[0]
     for cut in range(0, len(coded.mesh), 1 + len(coded.mesh) // 300):
         with pytest.raises(CorruptFile):
-            decode_points(coded.mesh[:cut], b"")
+            decode_points(coded.mesh[:cut], b"", across)
     with pytest.raises(CorruptFile):
-        decode_points(coded.mesh + b"\0", b"")
+        decode_points(coded.mesh + b"\0", b"", across)
     for cut in range(1, len(coded.order), 1 + len(coded.order) // 60):
-        decode_or_refuse(coded.mesh, coded.order[:cut])
+        decode_or_refuse(coded.mesh, coded.order[:cut], across)
     with pytest.raises(CorruptFile, match="order"):
-        decode_points(coded.mesh, coded.order + b"\0")
+        decode_points(coded.mesh, coded.order + b"\0", across)
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-def test_changed_bytes_do_no_harm(name: str) -> None:
-    coded = encode_points(*MESHES[name], reorder=False)[0]
+@both_codings
+def test_changed_bytes_do_no_harm(name: str, across: bool) -> None:
+    coded = encode_points(*MESHES[name], reorder=False, across=across)[0]
     draw = np.random.default_rng(0)
     refused = 0
     for _ in range(200):
@@ -156,17 +175,18 @@ def test_changed_bytes_do_no_harm(name: str) -> None:
             data = bytearray(coded.mesh if is_mesh else coded.order)
             for at in draw.integers(0, len(data), draw.integers(1, 4)):
                 data[at] = draw.integers(256)
-            refused += decode_or_refuse(bytes(data) if is_mesh else coded.mesh, coded.order if is_mesh else bytes(data))
+            mesh, order = (bytes(data), coded.order) if is_mesh else (coded.mesh, bytes(data))
+            refused += decode_or_refuse(mesh, order, across)
     assert refused > 50
 
 
-@given(st.binary(max_size=120), st.binary(max_size=60))
-def test_garbage_does_no_harm(data: bytes, order: bytes) -> None:
-    decode_or_refuse(data, order)
+@given(st.binary(max_size=120), st.binary(max_size=60), st.booleans())
+def test_garbage_does_no_harm(data: bytes, order: bytes, across: bool) -> None:
+    decode_or_refuse(data, order, across)
     base = encode_base(np.eye(3, dtype=np.int32), np.array([[0, 1, 2]]), reorder=True)[0].mesh
-    decode_or_refuse(varint(len(base)) + base + data, order)
+    decode_or_refuse(varint(len(base)) + base + data, order, across)
     counts = encode_integers(np.array([0, 2, 1]))
-    decode_or_refuse(varint(len(base)) + base + varint(len(counts)) + counts + data, order)
+    decode_or_refuse(varint(len(base)) + base + varint(len(counts)) + counts + data, order, across)
 
 
 @pytest.mark.parametrize("counts", [[-1, 1], [1 << 24, 1], [(1 << 23), (1 << 23)], [1 << 38, 1 << 38], [-(1 << 38), 0]])

@@ -32,20 +32,21 @@ PLAIN: list[tuple[str, dict[str, object]]] = [
     ("pdct", {"clusters": 3, "segment": 7}),
 ]
 PICTURES: list[tuple[str, dict[str, object]]] = [
-    ("mcgv", {}),
-    ("mcgv", {"image": "jpeg"}),
-    ("mcgv", {"profile": "precise"}),
+    ("mcgv", {"placement": "tiles"}),
+    ("mcgv", {"placement": "charts", "image": "jpeg"}),
+    ("mcgv", {"placement": "tiles", "profile": "precise"}),
     ("mcgv", {"prediction": "affine"}),
     ("mcgv", {"prediction": "blended", "transform": "klt"}),
 ]
 
 
-def variants() -> pytest.MarkDecorator:
-    """All codecs, in several profiles, with and without a bound."""
-    cases = []
-    for codec, settings in PLAIN + PICTURES:
-        cases.append(pytest.param(codec, settings, id=" ".join([codec, *map(str, settings.values())])))
-    return pytest.mark.parametrize(("codec", "settings"), cases)
+def with_each(name: str, values: tuple[Any, Any]) -> pytest.MarkDecorator:
+    """All codecs, in several profiles, each with one of two values; with the other one in the slow run."""
+    cases = [
+        pytest.param(codec, settings, value, marks=[] if i % 2 == j else pytest.mark.slow)
+        for (i, (codec, settings)), (j, value) in product(enumerate(PLAIN + PICTURES), enumerate(values))
+    ]
+    return pytest.mark.parametrize(("codec", "settings", name), cases, ids=str)
 
 
 def with_copies() -> MeshSequence:
@@ -69,8 +70,7 @@ def assert_random_access(video: gvpipe.Player, path: Path) -> None:
     assert np.array_equal(gvpipe.open(path)[3:9], whole[3:9])
 
 
-@pytest.mark.parametrize("bound", [None, "0.2%"], ids=["", "max-error"])
-@variants()
+@with_each("bound", (None, "0.2%"))
 def test_still_vertices_stand_still(codec: str, settings: dict[str, object], bound: str | None, tmp_path: Path) -> None:
     sequence = partly_still()
     still = find_still(sequence)
@@ -85,8 +85,7 @@ def test_still_vertices_stand_still(codec: str, settings: dict[str, object], bou
     assert_random_access(video, tmp_path / "a.mp4")
 
 
-@pytest.mark.parametrize("bound", [None, "0.2%"], ids=["", "max-error"])
-@variants()
+@with_each("bound", (None, "0.2%"))
 def test_coincident_vertices_coincide(codec: str, settings: dict[str, object], bound: str | None, tmp_path: Path) -> None:
     sequence = with_copies()
     frames = encode(sequence, tmp_path, codec, settings, max_error=bound)[:]
@@ -94,8 +93,7 @@ def test_coincident_vertices_coincide(codec: str, settings: dict[str, object], b
     assert np.array_equal(frames[:, :half], frames[:, half:])
 
 
-@pytest.mark.parametrize("bound", [None, "0.2%"], ids=["", "max-error"])
-@variants()
+@with_each("bound", (None, "0.2%"))
 def test_repeated_frames_are_identical(codec: str, settings: dict[str, object], bound: str | None, tmp_path: Path) -> None:
     lengths = [3, 1, 1, 2, 1, 1, 1, 9, 1, 1, 4]
     sequence = held(waving(9, len(lengths)), lengths)
@@ -107,8 +105,7 @@ def test_repeated_frames_are_identical(codec: str, settings: dict[str, object], 
     assert_random_access(video, tmp_path / "a.mp4")
 
 
-@pytest.mark.parametrize("target", [{"target_rmse": 1e-3}, {"max_error": "0.1%"}], ids=["rmse", "max-error"])
-@pytest.mark.parametrize(("codec", "settings"), PLAIN + PICTURES)
+@with_each("target", ({"target_rmse": 1e-3}, {"max_error": "0.1%"}))
 def test_repeated_frames_cost_nearly_nothing(
     codec: str, settings: dict[str, object], target: dict[str, Any], tmp_path: Path
 ) -> None:

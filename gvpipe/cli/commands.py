@@ -7,6 +7,8 @@ Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage.
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import sys
 import traceback
@@ -26,10 +28,13 @@ if TYPE_CHECKING:
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 VIDEO_SUFFIXES = (".mp4", ".m4v")
+COLLECTED = 100_000  # objects made between garbage collections: a command makes cycles by imports, hardly by its work
 
 
 def main() -> None:
     """Run the command line and exit."""
+    gc.set_threshold(COLLECTED)
+    atexit.register(gc.freeze)  # what the process takes along when it ends need not be looked through
     try:
         status = cli(standalone_mode=False, prog_name="gvpipe")
     except GvpipeError as exc:

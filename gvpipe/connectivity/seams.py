@@ -4,7 +4,8 @@ A *point* stands for the vertices that share its trajectory, its *copies*. The m
 `point_mesh`); here every corner of it names the copy it uses, and the user's order of vertices follows.
 
 Streams: copies of each point less one [integers]; then, for corners of points with more than one, in order of point and corner,
-the copy's difference from that point's corner before [integers]. Order stream: `vertex_order`, points in place of positions.
+the copy's difference from that point's corner before [integers], or what `seams` makes of it. Order stream: `vertex_order`,
+points in place of positions.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Array
+from gvpipe.connectivity.edge_seams import decode_seams, encode_seams
 from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile
@@ -41,7 +43,9 @@ class CodedCopies:
     points: Array
 
 
-def encode_copies(faces: Array, points: Array, point_faces: Array, n_points: int, reorder: bool) -> CodedCopies:
+def encode_copies(
+    faces: Array, points: Array, point_faces: Array, n_points: int, reorder: bool, across: bool = False
+) -> CodedCopies:
     """Code which vertices the corners of ``point_faces`` use.
 
     Args:
@@ -50,31 +54,36 @@ def encode_copies(faces: Array, points: Array, point_faces: Array, n_points: int
         point_faces: ``(T, 3)`` the same triangles over points, smallest point first, as the decoder will have them.
         n_points: P.
         reorder: let the decoder see the codec's vertex order.
+        across: code copies across edges (`seams`).
     """
     # triangles alike over points are matched in order of appearance: which is which does not matter
     turned, turns = _turned(points[faces])
     matched = np.empty(len(faces), np.int64)
     matched[np.lexsort(point_faces.T[::-1])] = np.lexsort(turned.T[::-1])
     corners = np.take_along_axis(faces, turns, axis=1)[matched]  # vertices of the codec's triangles
-    copies, counts, differences = _encode_corners(corners, point_faces, points, n_points)
+    copies, counts, told = _encode_corners(corners, point_faces, points, n_points, across)
     permutation = np.lexsort((copies, points))
     rank = np.argsort(permutation)
     if reorder:
-        return CodedCopies(counts, differences, b"", permutation, rank[corners], points[permutation])
+        return CodedCopies(counts, told, b"", permutation, rank[corners], points[permutation])
     order = encode_order(rank, _as_lattice(points[permutation]), rank[corners])
-    return CodedCopies(counts, differences, order, np.arange(len(points)), corners, points)
+    return CodedCopies(counts, told, order, np.arange(len(points)), corners, points)
 
 
-def decode_copies(counts: bytes, copies: bytes, order: bytes, point_faces: Array, n_points: int) -> tuple[Array, Array]:
+def decode_copies(
+    counts: bytes, copies: bytes, order: bytes, point_faces: Array, n_points: int, across: bool = False
+) -> tuple[Array, Array]:
     """Mirror of `encode_copies`: triangles ``(T, 3)`` over vertices, and the point of each vertex ``(V,)``."""
-    faces, points = _decode_corners(counts, copies, point_faces, n_points)
+    faces, points = _decode_corners(counts, copies, point_faces, n_points, across)
     if order:
         visits = decode_order(order, _as_lattice(points), faces)
         points, faces = points[visits], np.argsort(visits)[faces]
     return faces, points
 
 
-def _encode_corners(corners: Array, point_faces: Array, points: Array, n_points: int) -> tuple[Array, bytes, bytes]:
+def _encode_corners(
+    corners: Array, point_faces: Array, points: Array, n_points: int, across: bool
+) -> tuple[Array, bytes, bytes]:
     """The number of each vertex among its point's copies ``(V,)``, by first use, and the streams that tell it."""
     counts = np.bincount(points, minlength=n_points)
     used, first = np.unique(corners.ravel(), return_index=True)
@@ -84,6 +93,8 @@ def _encode_corners(corners: Array, point_faces: Array, points: Array, n_points:
     starts = np.cumsum(counts) - counts
     copies = np.empty(len(points), np.int64)
     copies[by_use] = np.arange(len(points)) - starts[points[by_use]]
+    if across:
+        return copies, encode_integers(counts - 1), encode_seams(copies[corners.ravel()], point_faces, counts)
     where, is_first = _shared_corners(point_faces, counts)
     differences = np.diff(copies[corners.ravel()[where]], prepend=0)
     contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_COPIES)
@@ -103,23 +114,28 @@ def _filled(differences: Array, contexts: Array, is_first: Array) -> Array:
     return result
 
 
-def _decode_corners(counts_data: bytes, data: bytes, point_faces: Array, n_points: int) -> tuple[Array, Array]:
+def _decode_corners(counts_data: bytes, data: bytes, point_faces: Array, n_points: int, across: bool) -> tuple[Array, Array]:
     """Mirror of `_encode_corners`: triangles over vertices, and the point of each vertex."""
     counts = 1 + decode_integers(counts_data, n_points, name="mesh")
     if n_points and (counts.min() < 1 or counts.max() > MAX_VERTICES or counts.sum() > MAX_VERTICES):
         raise CorruptFile("section 'mesh' is corrupt: a number of copies is out of range")
+    copies = decode_seams(data, point_faces, counts) if across else _decode_differences(data, point_faces, counts)
+    flat = point_faces.ravel()
+    starts = np.cumsum(counts) - counts
+    faces: Array = (starts[flat] + copies).reshape(-1, 3)
+    return faces, np.repeat(np.arange(n_points), counts)
+
+
+def _decode_differences(data: bytes, point_faces: Array, counts: Array) -> Array:
     where, is_first = _shared_corners(point_faces, counts)
     contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_COPIES)
     total = np.cumsum(decode_integers(data, len(where), contexts, "mesh"))
     begin = np.maximum.accumulate(np.where(is_first, np.arange(len(where)), 0))
     copies = np.zeros(point_faces.size, np.int64)
     copies[where] = total - total[begin] if len(where) else 0
-    flat = point_faces.ravel()
-    if ((copies < 0) | (copies >= counts[flat])).any():
+    if ((copies < 0) | (copies >= counts[point_faces.ravel()])).any():
         raise CorruptFile("section 'mesh' is corrupt: a corner uses a copy that does not exist")
-    starts = np.cumsum(counts) - counts
-    faces: Array = (starts[flat] + copies).reshape(-1, 3)
-    return faces, np.repeat(np.arange(n_points), counts)
+    return copies
 
 
 def _shared_corners(point_faces: Array, counts: Array) -> tuple[Array, Array]:

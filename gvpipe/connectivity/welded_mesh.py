@@ -51,34 +51,37 @@ class PointMesh:
         return adjacency(self.point_faces, len(self.lattice))
 
 
-def encode_points(lattice: Array, faces: Array, points: Array, reorder: bool) -> tuple[EncodedMesh, PointMesh]:
+def encode_points(
+    lattice: Array, faces: Array, points: Array, reorder: bool, across: bool = False
+) -> tuple[EncodedMesh, PointMesh]:
     """Code a mesh of ``points (V,)``, 0..P-1, at ``lattice (P, 3)`` with triangles ``faces (T, 3)`` over V vertices.
 
-    Returns the streams, and the mesh as decoding returns it. ``reorder`` lets the decoder see the codec's vertex order.
-    Triangles may come back in another order, and rotated.
+    Returns the streams, and the mesh as decoding returns it. ``reorder`` lets the decoder see the codec's vertex order, and
+    ``across`` codes seams across edges (`gvpipe.connectivity.edge_seams`). Triangles may come back in another order, and
+    rotated.
     """
     faces, points = faces.astype(np.int64), points.astype(np.int64)
     streams, base = encode_base(lattice, points[faces], reorder=True)
     place = np.argsort(streams.permutation)
     point_faces = smallest_first(base.faces.astype(np.int64))
-    coded = encode_copies(faces, place[points], point_faces, len(lattice), reorder)
+    coded = encode_copies(faces, place[points], point_faces, len(lattice), reorder, across)
     mesh = varint(len(streams.mesh)) + streams.mesh + varint(len(coded.counts)) + coded.counts + coded.copies
     decoded = PointMesh(coded.faces.astype(np.int32), coded.points, base.points, point_faces.astype(np.int32))
     return EncodedMesh(mesh, coded.order, coded.permutation), decoded
 
 
-def decode_points(mesh: bytes, order: bytes) -> PointMesh:
+def decode_points(mesh: bytes, order: bytes, across: bool = False) -> PointMesh:
     """Mirror of `encode_points`. Raises CorruptFile for anything malformed."""
     cursor = Cursor(mesh, "mesh")
     base = decode_base(cursor.take(cursor.varint(cursor.left, "a length")), b"")
     point_faces = smallest_first(base.faces.astype(np.int64))
     counts = cursor.take(cursor.varint(cursor.left, "a length"))
-    faces, point = decode_copies(counts, cursor.rest(), order, point_faces, len(base.points))
+    faces, point = decode_copies(counts, cursor.rest(), order, point_faces, len(base.points), across)
     return PointMesh(faces.astype(np.int32), point, base.points, point_faces.astype(np.int32))
 
 
-def read_points(bitstream: Bitstream) -> PointMesh:
+def read_points(bitstream: Bitstream, across: bool = False) -> PointMesh:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
-    mesh = decode_points(bitstream.section("mesh"), bitstream.section("order"))
+    mesh = decode_points(bitstream.section("mesh"), bitstream.section("order"), across)
     bitstream.check_size(len(mesh.point), len(mesh.faces))
     return mesh

@@ -181,25 +181,26 @@ def _remux(video: bytes, tag: str) -> bytes:
     """Copy the video's one track, unchanged, into a file that carries the tag and whose index comes first.
 
     In memory, where the video is already: a file that PyAV writes itself stays open, and its disk space taken, if the
-    last write to it fails.
+    last write to it fails. What no player needs is left out: bit rates, the handler's name, the edit list where each picture
+    is shown in the order of coding.
     """
     import av
 
-    options = {"movflags": "+faststart+use_metadata_tags", "fflags": "+bitexact"}
+    options = {"movflags": "+faststart+use_metadata_tags", "fflags": "+bitexact", "write_btrt": "0", "empty_hdlr_name": "1"}
     result = io.BytesIO()
 
     def reopen(name: str, flags: int, more: dict[str, str]) -> IO[bytes]:
         return io.BytesIO(result.getvalue())  # FFmpeg reads the file again to move the index to the front
 
-    with (
-        av.open(io.BytesIO(video), "r", format="mp4") as source,
-        av.open(result, "w", format="mp4", options=options, io_open=reopen) as target,
-    ):
-        target.metadata[TAG] = TAG_PREFIX + tag
+    with av.open(io.BytesIO(video), "r", format="mp4") as source:
         track = source.streams.video[0]
-        copy = target.add_stream_from_template(track)
-        for packet in source.demux(track):
-            if packet.size:
+        packets = [packet for packet in source.demux(track) if packet.size]
+        if all(packet.pts == packet.dts for packet in packets):
+            options["use_editlist"] = "0"
+        with av.open(result, "w", format="mp4", options=options, io_open=reopen) as target:
+            target.metadata[TAG] = TAG_PREFIX + tag
+            copy = target.add_stream_from_template(track)
+            for packet in packets:
                 packet.stream = copy
                 target.mux(packet)
     return result.getvalue()

@@ -31,9 +31,12 @@ class Lattice:
 
     @classmethod
     def spaced(cls, points: Floats, step: float) -> Lattice:
-        """Return the lattice of a step, model units, from the least coordinates of ``points (V, 3)`` on."""
-        x, y, z = points.min(axis=0).astype(np.float64).tolist()
-        return cls((x, y, z), step if step > 0 else 1.0)
+        """Return the lattice of about a step, model units, from about the least coordinates of ``points (V, 3)`` on.
+
+        Origin and step are short decimal numbers, which take fewer bytes in a header.
+        """
+        x, y, z = (float(str(low)) for low in points.min(axis=0).astype(np.float32))
+        return cls((x, y, z), float(f"{step:.6g}") if step > 0 else 1.0)
 
     def quantise(self, points: Floats) -> Int32:
         """Return the nearest lattice indices, ``(V, 3) int32``."""

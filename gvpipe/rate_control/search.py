@@ -235,7 +235,7 @@ def _look_around(attempt: Attempt, goal: _Goal, tried: list[Trial], first: int) 
     The trials go to ``tried``.
 
     Errors that scatter are as if drawn anew at every quality, so that the best guess is any untried one next to the root. Where
-    a codec gives the same bytes as before, its qualities are coarser, and steps grow.
+    a codec gives the same file as before, its qualities are coarser, and steps grow: bytes alone are often the same by chance.
     """
     known = [(trial.codec.quality, goal.value(trial)) for trial in tried[first:]]
     slope = _slope(min(known), max(known), goal.slope(known[-1][0]))
@@ -250,7 +250,7 @@ def _look_around(attempt: Attempt, goal: _Goal, tried: list[Trial], first: int) 
         if quality is None:
             break
         trial = attempt(quality)
-        if any(trial.bytes == other.bytes for other in tried):
+        if any((trial.bytes, trial.errors) == (other.bytes, other.errors) for other in tried):
             spacing *= 2
         tried.append(trial)
         known.append((quality, goal.value(trial)))

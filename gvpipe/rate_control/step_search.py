@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from gvpipe.codec import Encoded, FrameReader
+from gvpipe.container.bitstream import Bitstream
 from gvpipe.sequence import MeshSequence
 
 ROUNDS = 3  # encodes at most
@@ -33,6 +34,11 @@ class Aimed:
     step: float
     error: float
     slope: float = SLOPE
+
+    @property
+    def bitstream(self) -> Bitstream:
+        """Of the encode."""
+        return self.encoded.bitstream
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from gvpipe.quality_scale import error_of, quality_of
 from gvpipe.rate_control.trials import Trial, Trials
 from gvpipe.registry import make_codec
 
-READS = ("mcgv", 3, "h264-8")  # codec, its highest version, profile: what src/mcgv/header.js reads
+READS = ("mcgv", 4, "h264-8")  # codec, its highest version, profile: what src/mcgv/header.js reads
 SUFFIXES = (".html", ".htm")
 AXES = ("y", "z")
 QUALITY = 90.0  # of a conversion: KG 0.044, which makes the error of a file of quality 75 (KG 0.14) 5 % larger
@@ -126,8 +126,8 @@ def _convert(player: Player, quality: float, progress: Progress | None) -> Trial
 def _is_readable(bitstream: Bitstream) -> bool:
     codec, version, profile = READS
     header = bitstream.header
-    frames = "transform" not in header  # not trajectory images
-    return bitstream.codec == codec and bitstream.version <= version and header.get("profile") == profile and frames
+    frames = header.get("profile") == profile and "transform" not in header  # not trajectory images
+    return bitstream.codec == codec and bitstream.version <= version and (frames or header.get("pictures") is False)
 
 
 def _kind(bitstream: Bitstream) -> str:

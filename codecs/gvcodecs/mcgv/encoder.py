@@ -14,6 +14,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -36,6 +37,7 @@ from gvcodecs.mcgv.motion.affine import code_affine
 from gvcodecs.mcgv.motion.blended import code_blended
 from gvcodecs.mcgv.motion.contract import CodedMotion
 from gvcodecs.mcgv.motion.segmentation import segment
+from gvcodecs.mcgv.motion.skinning import Weights
 from gvcodecs.mcgv.motion.skinning_fit import Fitted, Motions, fit_blend
 from gvcodecs.mcgv.pictures.frames import code_frames, measure_residuals
 from gvcodecs.mcgv.pictures.outliers import SECTION, OutlierWriter
@@ -69,6 +71,7 @@ BASE_STEP = 1.3  # of a base frame, times step / sqrt(frames): measured, docs/de
 FINER = 2**0.25  # times, a lattice that does not
 DISTINCT = 0.85  # part of the places in a base frame that its lattice must tell apart; the others give way
 GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
+NARROW = 0.935, 0.955  # part of the error wanted, where a target is sought without pictures
 BAND = {"blended": (0.9, 0.99), "affine": (1.0, 1.1)}  # of the error wanted: the published mode is no finer than asked
 LARGE, FINE = 1_000_000, 0.81  # vertices of all frames, from which on another encode is not made for an error so fine
 FAR = 0.75, 1.4  # of the error wanted: what a blend is kept for
@@ -78,6 +81,16 @@ MOST_TILED = (
     1 << 15
 )  # points: beyond, xatlas takes longer than all else, and labels of charts are a tenth of a smooth mesh's file
 PART = 250  # points of a part by motion that charts refine: xatlas takes more than ten times as long per point for all at once
+SPARED = 0.02  # part of the bytes that pictures must take for an encode without them to be tried
+FINER_THAN = 0.95  # part of the error wanted that a blend alone is to leave at the second attempt
+COARSEST = 1.0, 1.3  # times the error wanted, lattice steps of base frames without pictures
+LARGE_BASE = 0.25  # part of the bytes that a base frame must take for the second of them to be tried
+REBASED = 1.2  # times the lattice step of a base frame, another one is tried
+MORE_ROUNDS = 5  # encodes without pictures at most: they take little time
+POSTER = 1200  # bytes that stand in place of pictures, about
+FINE_PART, FINE_COST = 1 / 4, 1.1  # of the error wanted, and times the bytes: files without pictures that get there take it
+MOST_MOVED = 0.2  # part of the bytes that transforms may take for that to be tried: they grow by half and more
+FINE_BAND = 0.8, 1.0  # part of that error which is close enough
 MERGED = 1 / 16  # steps that vertices of one point may be apart: far below the errors that follow
 AUTO = "auto"
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
@@ -92,7 +105,7 @@ class Mcgv(BaseCodec):
     """
 
     id: ClassVar[str] = "mcgv"
-    version: ClassVar[int] = 3
+    version: ClassVar[int] = 4
     summary: ClassVar[str] = "multi-chart geometry video: residual images of a blended affine prediction, as H.264 or JPEG"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
 
@@ -105,7 +118,7 @@ class Mcgv(BaseCodec):
     transform_bits: int = 17  # bits over the sequence's extent, 8..24 (affine)
     base_bits: int = 0  # bits along the base frame's longest side, 4..20; 0: as many as pay (blended), 12 (affine)
     placement: str = AUTO  # charts: as published; halves: pixels follow from the base frame; tiles (blended): from charts;
-    # auto: tiles if blended h264 (halves beyond 32768 points), else charts
+    # auto: tiles if blended h264 (halves beyond 32768 points), else charts; blended, no pictures at all where that is smaller
     density: float = 1.5  # pixels per vertex inside charts, 1..16 (placement charts)
     size: str = AUTO  # of a plane, pixels: auto, or WIDTHxHEIGHT in whole blocks, such as 256x256
     gop: int = 32  # frames per group of pictures, 1..1000 (h264)
@@ -146,9 +159,16 @@ class Mcgv(BaseCodec):
             away = math.log(wanted) - math.log(anchor.error)
             if not anchor.fitted or abs(away) < REUSED:
                 step = anchor.start.step * math.exp(min(max(away / anchor.slope, -FARTHEST), FARTHEST))
+                if not anchor.start.pictures:  # cheap, and the error of base and blend makes it follow the step less
+                    attempt = functools.partial(
+                        self._attempt, sequence, anchor.start, fitted=anchor.fitted, memo=memo, report=report
+                    )
+                    return mend(attempt, step, wanted, NARROW, anchor.slope, rounds=MORE_ROUNDS).encoded
                 return self._code(sequence, anchor.start, step, anchor.fitted, memo, report)
         aimed, anchor = self._aim(sequence, wanted, memo, report)
         anchors.append(anchor)
+        if not memo.is_shared and not anchor.start.pictures:  # who searches a quality asks for no more than its error
+            return self._refine(sequence, aimed, anchor, wanted, memo, report)
         return aimed.encoded
 
     def _aim(self, sequence: MeshSequence, wanted: float, memo: Memo, report: Progress) -> tuple[Aimed, _Anchor]:
@@ -159,11 +179,9 @@ class Mcgv(BaseCodec):
             fitted, step = self._fit(start, wanted, memo, report)
 
         @functools.cache
-        def attempt(step: float) -> Aimed:
-            encoded = self._code(sequence, start, step, fitted, memo, report)
-            report("measure", 0)
-            own = sequence.reordered(start.coded.permutation, start.faces)
-            return Aimed(encoded, step, root_mean_square(own, self.reader(encoded.bitstream)))
+        def attempt(step: float, pictures: bool = True) -> Aimed:
+            start_ = dataclasses.replace(start, pictures=pictures)
+            return self._attempt(sequence, start_, step, fitted=fitted, memo=memo, report=report)
 
         first = attempt(step)
         if fitted and not FAR[0] <= first.error / wanted <= FAR[1]:  # another step wants another blend, and another base
@@ -176,31 +194,110 @@ class Mcgv(BaseCodec):
         low, high = BAND[self.prediction]
         if sequence.n_frames * sequence.n_vertices > LARGE:
             low = min(low, FINE)
+        if self._are_pictures_dear(attempt, step, wanted):
+            aimed = mend(lambda step: attempt(step, False), step, wanted, (low, high), SLOPE, rounds=MORE_ROUNDS)
+            if aimed.error <= wanted and _worth(aimed) < _worth(attempt(step)):
+                start = dataclasses.replace(start, step=aimed.step, pictures=False)
+                return self._rebased(sequence, aimed, _Anchor(start, fitted, aimed.error, aimed.slope), wanted, memo, report)
         aimed = mend(attempt, step, wanted, (low, high), SLOPE)
         return aimed, _Anchor(dataclasses.replace(start, step=aimed.step), fitted, aimed.error, aimed.slope)
+
+    def _are_pictures_dear(self, attempt: Callable[..., Aimed], step: float, wanted: float) -> bool:
+        """Whether a blend alone is worth more than with pictures, and leaves no error that a finer step cannot take away."""
+        if (self.prediction, self.transform, self.placement) != ("blended", "none", AUTO):
+            return False
+        whole = attempt(step)
+        if _count_picture_bytes(whole.bitstream) < SPARED * _count_bytes(whole.bitstream):
+            return False
+        without = attempt(step, False)
+        if _worth(without) > _worth(whole):
+            return False
+        if without.error > wanted:
+            without = attempt(step * (FINER_THAN * wanted / without.error) ** (1 / SLOPE), False)
+        return without.error <= wanted
+
+    def _rebased(
+        self, sequence: MeshSequence, aimed: Aimed, anchor: _Anchor, wanted: float, memo: Memo, report: Progress
+    ) -> tuple[Aimed, _Anchor]:
+        """The same blend and error without pictures, on the base frame that makes the file smallest: coarser ones are tried."""
+        n_bytes = _count_bytes(aimed.bitstream)
+        for coarsest in COARSEST if len(aimed.bitstream.sections["mesh"]) > LARGE_BASE * n_bytes else COARSEST[:1]:
+            lattice_step = min(_base_step(aimed.step, sequence.n_frames), coarsest * wanted)
+            if lattice_step < REBASED * anchor.start.lattice.step:
+                continue
+            start, fitted = self._restart(sequence, anchor, aimed.step, coarsest * wanted, memo, report)
+            attempt = functools.partial(self._attempt, sequence, start, fitted=fitted, memo=memo, report=report)
+            other = mend(attempt, aimed.step, wanted, BAND[self.prediction], SLOPE, rounds=MORE_ROUNDS)
+            if other.error <= wanted and _count_bytes(other.bitstream) < _count_bytes(aimed.bitstream):
+                aimed = other
+                anchor = _Anchor(dataclasses.replace(start, step=other.step), fitted, other.error, other.slope)
+        return aimed, anchor
+
+    def _refine(
+        self, sequence: MeshSequence, aimed: Aimed, anchor: _Anchor, wanted: float, memo: Memo, report: Progress
+    ) -> Encoded:
+        """A file without pictures, or the same blend with `FINE_PART` of the error wanted where that costs next to nothing.
+
+        Parts that move rigidly are exact but for the rounding of base and transforms.
+        """
+        n_bytes = _count_bytes(aimed.bitstream)
+        moved = sum(len(data) for name, data in aimed.bitstream.sections.items() if name.startswith("transforms"))
+        if moved > MOST_MOVED * n_bytes:
+            return aimed.encoded
+        wanted, most = FINE_PART * wanted, FINE_COST * n_bytes
+        step = aimed.step * FINE_PART ** (1 / SLOPE)
+        start, fitted = self._restart(sequence, anchor, step, wanted, memo, report)
+        attempt = functools.cache(functools.partial(self._attempt, sequence, start, fitted=fitted, memo=memo, report=report))
+        if _count_bytes(attempt(step).bitstream) > most:
+            return aimed.encoded
+        finer = mend(attempt, step, wanted, FINE_BAND, SLOPE, rounds=MORE_ROUNDS)
+        is_cheap = finer.error <= wanted and _count_bytes(finer.bitstream) <= most
+        return finer.encoded if is_cheap else aimed.encoded
+
+    def _restart(
+        self, sequence: MeshSequence, anchor: _Anchor, step: float, wanted: float, memo: Memo, report: Progress
+    ) -> tuple[_Start, Fitted]:
+        """An anchor's points and blend, without pictures, on the base frame of another step and error, model units."""
+        given, fitted = anchor.start, anchor.fitted
+        assert fitted
+        start = dataclasses.replace(self._start(sequence, step, wanted, memo, report, given.shared), pictures=False)
+        number = np.empty(len(given.shared), np.int64)
+        number[given.shared[given.sources]] = np.arange(len(given.sources))
+        place = number[start.shared[start.sources]]
+        return start, Fitted(Weights(fitted.weights.clusters[place], fitted.weights.weights[place]), fitted.n_clusters)
+
+    def _attempt(
+        self, sequence: MeshSequence, start: _Start, step: float, *, fitted: Fitted | None, memo: Memo, report: Progress
+    ) -> Aimed:
+        """Code with a step, model units, and measure."""
+        encoded = self._code(sequence, start, step, fitted, memo, report)
+        report("measure", 0)
+        own = sequence.reordered(start.coded.permutation, start.faces)
+        return Aimed(encoded, step, root_mean_square(own, self.reader(encoded.bitstream)))
 
     def _code(
         self, sequence: MeshSequence, start: _Start, step: float, fitted: Fitted | None, memo: Memo, report: Progress
     ) -> Encoded:
         """Code with a step, model units, and a blend, or as published."""
-        start = dataclasses.replace(start, step=step)
+        start = dataclasses.replace(start, step=float(f"{step:.6g}"))
         coded = self._blended(start, fitted, memo, report) if fitted else self._affine(start, memo, report)
         return Encoded(self._finish(sequence, start, coded), start.coded.permutation)
 
     def _finish(self, sequence: MeshSequence, start: _Start, coded: _Coded) -> Bitstream:
         header = Header(
-            prediction=self.prediction,
-            placement=start.placement,
-            profile=self._video_profile,
-            block=BLOCKS[self.image],
-            width=coded.layout.width,
-            height=coded.layout.height,
-            segments=len(start.bounds) - 1,
-            base=start.lattice,
-            **coded.own,
+            prediction=self.prediction, segments=len(start.bounds) - 1, base=start.lattice, pictures=start.pictures, **coded.own
         )
         placed = {STILL: start.still} if start.still else {}
-        if start.placement == "charts":
+        if coded.layout:
+            header = dataclasses.replace(
+                header,
+                placement=start.placement,
+                profile=self._video_profile,
+                block=BLOCKS[self.image],
+                width=coded.layout.width,
+                height=coded.layout.height,
+            )
+        if coded.layout and start.placement == "charts":
             placed["pixels"] = encode_pixels(coded.layout)
         sections = {"mesh": start.coded.mesh, "order": start.coded.order, **placed, **coded.sections}
         return self._bitstream(sequence, header.to_json(), sections, coded.video)
@@ -211,17 +308,22 @@ class Mcgv(BaseCodec):
         header = Header.of(bitstream)
         return TrajectoryReader(bitstream, header, header.images) if header.images else McgvReader(bitstream)
 
-    def _start(self, given: MeshSequence, step: float, wanted: float, memo: Memo, report: Progress) -> _Start:
-        """Code the base frame for a step and an error, model units, and see the sequence as the decoder will."""
+    def _start(
+        self, given: MeshSequence, step: float, wanted: float, memo: Memo, report: Progress, points: Int64 | None = None
+    ) -> _Start:
+        """Code the base frame for a step and an error, model units, and see the sequence as the decoder will.
+
+        ``points (V,)`` is the point of each vertex, if that is known.
+        """
         report("base", 0)
         first = given.read(0, 1)[0]
         still = memo("still", lambda: find_still(given))
-        points = _find_points(given, still, MERGED * step)
+        points = _find_points(given, still, MERGED * step) if points is None else points
         members = np.unique(points, return_index=True)[1]
-        lattice = self._lattice(first[members], min(BASE_STEP * step / math.sqrt(given.n_frames), wanted))
+        lattice = self._lattice(first[members], min(_base_step(step, given.n_frames), wanted))
         name = f"base {lattice.step} {len(members)}"
         at = self._base_points(lattice, first[members])
-        coded, mesh = memo(name, lambda: encode_points(at, given.faces, points, self.reorder))
+        coded, mesh = memo(name, lambda: encode_points(at, given.faces, points, self.reorder, across=True))
         sources = coded.permutation[mesh.members]  # the given vertex of each point
         moves = np.flatnonzero(~still[sources])
         if not len(moves):  # one point at least has samples
@@ -236,6 +338,8 @@ class Mcgv(BaseCodec):
         bounds = cut(sequence.n_frames, self.segment, MOST_SEGMENTS)
         return _Start(
             sequence=sequence,
+            shared=points,
+            sources=sources[moves],
             coded=coded,
             faces=mesh.faces,
             still=encode_flags(flags) if flags.any() else b"",
@@ -257,6 +361,9 @@ class Mcgv(BaseCodec):
 
     def _blended(self, start: _Start, fitted: Fitted, memo: Memo, report: Progress) -> _Coded:
         """Pictures are frames, or coefficients of trajectories, predicted by a blend."""
+        if not start.pictures:
+            motion = code_blended(start.sequence, start.base, start.points, fitted, start.bounds, start.step, report)
+            return _Coded(None, {"clusters": motion.n_clusters, "transform_step": motion.step}, motion.sections, b"")
         layout = self._blended_layout(start, memo, report)
         tiles = {}
         if start.placement == "tiles":
@@ -397,6 +504,7 @@ class _Start:
 
     Args:
         sequence: of the points that move, in the decoder's order.
+        shared: ``(V,)`` the given number of each vertex' point; sources: ``(P,)`` a vertex of each point that moves.
         coded: the mesh's sections; faces: ``(T, 3)`` as the decoder will have them.
         still: the section of that name, empty if all points move.
         lattice: of the base frame.
@@ -406,9 +514,12 @@ class _Start:
         bounds: first frame of every segment, and F.
         step: of quantisation, model units.
         part: of the vertices that moves.
+        pictures: whether frames have them; without, they are their prediction.
     """
 
     sequence: MeshSequence
+    shared: Int64
+    sources: Int64
     coded: EncodedMesh
     faces: Int32
     still: bytes
@@ -420,6 +531,7 @@ class _Start:
     bounds: list[int]
     step: float
     part: float
+    pictures: bool = True
 
     @property
     def name(self) -> str:
@@ -439,18 +551,35 @@ class _Anchor:
 
 @dataclass(frozen=True)
 class _Coded:
-    """What a route ends with: the vertices' pixels, its own fields of the header, its sections, and the video."""
+    """What a route ends with: the vertices' pixels, its own fields of the header, its sections, and the video.
 
-    layout: Layout
+    Without pictures there are no pixels, and the video is empty.
+    """
+
+    layout: Layout | None
     own: dict[str, Any]
     sections: dict[str, bytes]
     video: bytes
 
 
+def _base_step(step: float, n_frames: int) -> float:
+    """Of a base frame's lattice, model units: its errors stay for all frames."""
+    return BASE_STEP * step / math.sqrt(n_frames)
+
+
 def _worth(aimed: Aimed) -> float:
     """Bytes, at about equal error: with one blend, they go with the error to the power of about -0.2."""
-    bitstream = aimed.encoded.bitstream
-    return (sum(map(len, bitstream.sections.values())) + len(bitstream.video)) * math.pow(aimed.error, 0.2)
+    return _count_bytes(aimed.bitstream) * math.pow(aimed.error, 0.2)
+
+
+def _count_bytes(bitstream: Bitstream) -> int:
+    return sum(map(len, bitstream.sections.values())) + (len(bitstream.video) or POSTER)
+
+
+def _count_picture_bytes(bitstream: Bitstream) -> int:
+    """Bytes that a file without pictures does without."""
+    placed = sum(len(bitstream.sections.get(name, b"")) for name in (CHARTS, "pixels", SECTION))
+    return placed + len(bitstream.video) - POSTER
 
 
 def _find_points(sequence: MeshSequence, still: Bool, tolerance: float) -> Int64:

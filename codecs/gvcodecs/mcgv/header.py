@@ -15,6 +15,9 @@
 ``trajectories.N`` klt, in place of ``transforms.N``: principal trajectories of segment N (`trajectory_images`)
 =================  ==========================================================================================
 
+Files without pictures (version 4) have ``mesh``, ``order``, ``still``, ``weights`` and ``transforms.N`` alone; the header's key
+``pictures`` is then false, and nothing in it tells of pictures.
+
 Slots are the points that move (`surface`). In versions 1 and 2 every vertex is a slot, ``mesh`` and ``order`` are those of
 `gvpipe.connectivity.base_mesh`, and there is no section ``still``. Version 1 knows affine prediction and charts alone.
 
@@ -36,6 +39,7 @@ from gvpipe.mesh.lattice import Lattice
 
 PREDICTIONS = ("blended", "affine")
 PLACEMENTS = ("halves", "charts", "tiles")
+OF_PICTURES = ("placement", "profile", "block", "width", "height", "residual_step")  # keys of files that have some
 MAX_CLUSTERS = 1024
 MAX_SEGMENTS = 1 << 16
 LARGE = 1e39  # no coordinate or step of a float32 model lies beyond
@@ -58,21 +62,23 @@ class Header:
         transform_step, residual_step: quantisation steps where pictures are frames.
         outliers: whether residuals exceed the pictures' levels.
         images: where pictures are coefficients of trajectories.
+        pictures: False where frames are their prediction; then nothing here that tells of pictures means anything.
     """
 
     prediction: str
-    placement: str
-    profile: Profile
-    block: int
-    width: int
-    height: int
     clusters: int
     segments: int
     base: Lattice
+    placement: str = "halves"
+    profile: Profile = PROFILES["h264-8"]
+    block: int = 16
+    width: int = 16
+    height: int = 16
     transform_step: float = 1.0
     residual_step: float = 1.0
     outliers: bool = False
     images: TrajectoryHeader | None = None
+    pictures: bool = True
 
     def to_json(self) -> dict[str, Any]:
         """Return the header as JSON values."""
@@ -85,11 +91,18 @@ class Header:
             values |= self.images.to_json()
         values["profile"] = self.profile.name
         values["base"] = [*self.base.origin, self.base.step]
+        if self.pictures:
+            del values["pictures"]
+        else:
+            for key in OF_PICTURES:
+                del values[key]
         return values
 
     @classmethod
     def of(cls, bitstream: Bitstream) -> Header:
         """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
+        if "pictures" in bitstream.header:
+            return cls._without_pictures(bitstream)
         words = {"prediction": "affine", "placement": "charts"} if bitstream.version == 1 else bitstream.header
         prediction, placement = str(words.get("prediction")), str(words.get("placement"))
         if prediction not in PREDICTIONS or placement not in PLACEMENTS:
@@ -97,14 +110,9 @@ class Header:
         if placement == "tiles" and prediction != "blended":
             raise CorruptFile(f"header: no placement {placement!r} with prediction {prediction!r}; get the file again")
         profile = PROFILES.get(str(bitstream.header.get("profile")))
-        base = bitstream.header.get("base")
         if profile is None:
             raise CorruptFile(f"header: no profile {bitstream.header.get('profile')!r}; there are {', '.join(PROFILES)}")
-        if not (isinstance(base, list) and len(base) == 4 and all(isinstance(v, int | float) for v in base)):
-            raise CorruptFile(f"header: base is {base!r}; an origin and a step are needed")
-        if not (base[3] > 0 and all(abs(v) < LARGE for v in base)):  # NaN neither
-            raise CorruptFile(f"header: base is {base!r}, out of range")
-        segments = bitstream.integer("segments", 1, min(MAX_SEGMENTS, bitstream.n_frames))
+        segments = _read_segments(bitstream)
         images = TrajectoryHeader.of(bitstream, segments)
         header = cls(
             prediction=prediction,
@@ -115,7 +123,7 @@ class Header:
             height=bitstream.integer("height", 2, MAX_SIDE // 3),
             clusters=bitstream.integer("clusters", 1, MAX_CLUSTERS),
             segments=segments,
-            base=Lattice((base[0], base[1], base[2]), base[3]),
+            base=_read_base(bitstream),
             transform_step=1.0 if images else bitstream.number("transform_step", SMALL, LARGE),
             residual_step=1.0 if images else bitstream.number("residual_step", SMALL, LARGE),
             outliers="outliers" in bitstream.header,
@@ -130,3 +138,30 @@ class Header:
         if placement != "charts" and header.block not in (8, 16):
             raise CorruptFile(f"header: blocks of {header.block}; vertices are placed in blocks of 8 or 16")
         return header
+
+    @classmethod
+    def _without_pictures(cls, bitstream: Bitstream) -> Header:
+        alien = [key for key in (*OF_PICTURES, "outliers", "transform") if key in bitstream.header]
+        if bitstream.header["pictures"] is not False or bitstream.version < 4 or alien:
+            raise CorruptFile(f"header: pictures {bitstream.header['pictures']!r} beside {alien}; get the file again")
+        return cls(
+            prediction=bitstream.choice("prediction", ("blended",)),
+            clusters=bitstream.integer("clusters", 1, MAX_CLUSTERS),
+            segments=_read_segments(bitstream),
+            base=_read_base(bitstream),
+            transform_step=bitstream.number("transform_step", SMALL, LARGE),
+            pictures=False,
+        )
+
+
+def _read_segments(bitstream: Bitstream) -> int:
+    return bitstream.integer("segments", 1, min(MAX_SEGMENTS, bitstream.n_frames))
+
+
+def _read_base(bitstream: Bitstream) -> Lattice:
+    base = bitstream.header.get("base")
+    if not (isinstance(base, list) and len(base) == 4 and all(isinstance(v, int | float) for v in base)):
+        raise CorruptFile(f"header: base is {base!r}; an origin and a step are needed")
+    if not (base[3] > 0 and all(abs(v) < LARGE for v in base)):  # NaN neither
+        raise CorruptFile(f"header: base is {base!r}, out of range")
+    return Lattice((base[0], base[1], base[2]), base[3])

@@ -1,6 +1,6 @@
 """From an ``mcgv`` bitstream back to frames, any of them, in any order.
 
-A frame costs its group of pictures (H.264) or its one picture (JPEG), and the transforms of its segment.
+A frame costs its group of pictures (H.264) or its one picture (JPEG), if there are any, and the transforms of its segment.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from gvcodecs.mcgv.layout.tiles import place_charts
 from gvcodecs.mcgv.motion.affine import AffineMotion
 from gvcodecs.mcgv.motion.blended import BlendedMotion, decode_transforms
 from gvcodecs.mcgv.motion.contract import Motion
+from gvcodecs.mcgv.pictures.no_pictures import NoPictures
 from gvcodecs.mcgv.pictures.outliers import SECTION
 from gvpipe.arrays import Float32, Int32, Integers
 from gvpipe.container.bitstream import Bitstream
@@ -40,7 +41,7 @@ class McgvReader:
     def __init__(self, bitstream: Bitstream) -> None:
         self._header, self._bitstream = Header.of(bitstream), bitstream
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
-        self._video = VideoReader(bitstream.video, self._header.profile, self._header.width, 3 * self._header.height)
+        self._video = _open_video(bitstream, self._header, self._bounds)
         if self._video.n_frames != bitstream.n_frames:
             raise CorruptFile(f"the video has {self._video.n_frames} pictures in place of {bitstream.n_frames}")
         if self._header.outliers != (SECTION in bitstream.sections):
@@ -105,12 +106,20 @@ class McgvReader:
         return MovesReader(bitstream.section(SECTION), bitstream.n_frames, surface.n_slots, SECTION, shared)
 
 
+def _open_video(bitstream: Bitstream, header: Header, bounds: list[int]) -> VideoReader | NoPictures:
+    if not header.pictures:
+        return NoPictures(bounds, header.profile.middle)
+    return VideoReader(bitstream.video, header.profile, header.width, 3 * header.height)
+
+
 def read_layout(bitstream: Bitstream, header: Header, surface: Surface, groups: Integers | None = None) -> Layout:
     """The slots' pixels in a file; by halves, ``groups (S,)`` belong together, connected pieces if not given.
 
     Raises:
         CorruptFile: they are not what an encoder writes.
     """
+    if not header.pictures:
+        return Layout(1, 1, np.zeros(surface.n_slots, np.int64))
     if header.width * header.height < surface.n_slots:
         raise CorruptFile(f"header: planes of {header.width}x{header.height} do not hold {surface.n_slots} samples")
     if header.placement == "halves":

@@ -27,7 +27,8 @@ export class DecodedPictures {
     if (found !== holds.distinct) {
       throw new GeometryVideoError("corrupt", `its video has ${found} pictures in place of ${holds.distinct}; ${AGAIN}`);
     }
-    const pictures = new DecodedPictures(track, fps, holds, size, samples);
+    const groupBytes = (samples.length * holds.distinct) / track.groups.length;
+    const pictures = new DecodedPictures(track.groups, groupBytes, fps, holds, new GroupDecoder(track, size, samples));
     try {
       await pictures.seek(0);
     } catch (error) {
@@ -37,18 +38,32 @@ export class DecodedPictures {
     return pictures;
   }
 
-  constructor(track, fps, holds, size, samples) {
+  /**
+   * The same clock for a file without pictures, whose frames all have the levels of no residual.
+   *
+   * @param {number} fps @param {import("./format/holds.js").Holds} holds @param {Uint8Array} levels
+   * @returns {Promise<DecodedPictures>}
+   */
+  static async without(fps, holds, levels) {
+    const group = Array.from({ length: holds.distinct }, (_, picture) => ({ picture }));
+    const decode = async (samples, add) => samples.forEach(({ picture }) => add(picture, levels));
+    const pictures = new DecodedPictures([group], 0, fps, holds, { decode, close() {} });
+    await pictures.seek(0);
+    return pictures;
+  }
+
+  constructor(groups, groupBytes, fps, holds, decoder) {
     this.fps = fps;
     this.holds = holds;
     this.frames = holds.frames;
     /** The frame shown. */
     this.shown = -1;
-    this.decoder = new GroupDecoder(track, size, samples);
-    this.groupBytes = (samples.length * holds.distinct) / track.groups.length;
-    this.samples = track.groups;
+    this.decoder = decoder;
+    this.groupBytes = groupBytes;
+    this.samples = groups;
     /** Of each picture its group. */
     this.groupOf = new Uint32Array(holds.distinct);
-    track.groups.forEach((group, g) => group.forEach(({ picture }) => (this.groupOf[picture] = g)));
+    groups.forEach((group, g) => group.forEach(({ picture }) => (this.groupOf[picture] = g)));
     this.kept = new Map(); // group -> Group, the one asked for last at the end
     this.turn = Promise.resolve(); // one group after the other
   }

@@ -6,6 +6,7 @@
  *     video.play((positions, frame) => draw(positions));   // as the video plays
  */
 
+import { DecodedPictures } from "./decoded_pictures.js";
 import { readContainer } from "./format/boxes.js";
 import { GeometryVideoError } from "./format/errors.js";
 import { readHolds } from "./format/holds.js";
@@ -34,7 +35,10 @@ export class GeometryVideo {
       checkCodec(payload.header);
       const holds = readHolds(payload);
       const reader = await McgvReader.open(holds.distinctPayload(payload));
-      pictures = await openPictures(file, payload.header.fps, holds, reader.pictureSize, reader.samples);
+      const { fps } = payload.header;
+      pictures = reader.samples
+        ? await openPictures(file, fps, holds, reader.pictureSize, reader.samples)
+        : await DecodedPictures.without(fps, holds, reader.zeroLevels);
       return new GeometryVideo(payload.header, file.length, holds, reader, pictures);
     } catch (error) {
       pictures?.close();

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.base.surface import Surface
 from gvcodecs.mcgv.base.welded_points import Points
 from gvcodecs.mcgv.header import Header
@@ -36,7 +37,7 @@ def code_blended(
         bounds: first frame of every segment, and F.
     """
     fit = BlendFit(Blend(base, fitted.weights, fitted.n_clusters))
-    coded = {"weights": encode_weights(fitted.weights, points.neighbours)}
+    coded = {"weights": encode_weights(fitted.weights, causal_neighbours(points.neighbours))}
     segments: list[Trajectories] = []
     for s, (start, stop) in enumerate(pairwise(bounds)):
         rows = [fit.fit(_columns(block - base)) for _, block in sequence.chunks(start, stop)]

@@ -16,14 +16,17 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
+from threading import Lock
 
 import numpy as np
 from scipy import sparse
 
-from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
+from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighbours
 from gvcodecs.mcgv.motion.segmentation import SEED, local_motions
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights, homogeneous, solve_normal
 from gvcodecs.mcgv.motion.weight_coding import Prices, encode_weights
@@ -88,14 +91,14 @@ class Motions:
         self._columns, self._energies = _principal(moved)
         self.clustering = Clustering(local_motions(base, k_ring(neighbours, RING), self._columns[:, :DIMENSIONS]))
 
-    def error(self, problem: _Problem, fitted: Fitted, step: float) -> float:
+    def error(self, problem: _Problem, trial: _Trial, step: float) -> float:
         """Expected root mean square error of points, model units: what a blend leaves, or pictures where that is less.
 
         Beside that, what rounding the transforms leaves.
         """
         n_points, n_columns = problem.motions.shape
-        left = problem.errors(fitted) + self._energies[n_columns:].sum() / n_points
-        rounded = ROUNDED * min(4 * fitted.n_clusters, n_points) * n_columns * step**2
+        left = trial.errors + self._energies[n_columns:].sum() / n_points
+        rounded = ROUNDED * min(4 * trial.fitted.n_clusters, n_points) * n_columns * step**2
         most = (PICTURED * step) ** 2 * self.n_frames / self._scale
         total = float(np.minimum(left + rounded / n_points, most).sum())
         return math.sqrt(total * self._scale / (n_points * self.n_frames))
@@ -124,15 +127,32 @@ def fit_blend(motions: Motions, step: float, n_clusters: int, wanted: float = 0.
     starts = [motions.clustering.start(n_clusters or 1)]
     for _ in range(ROUNDS):
         problem = motions.problem(step)
-        if not n_clusters:
-            starts = _find_number(problem, motions.clustering, starts)
-        starts = _alternate_all(problem, starts, FIRST_PASSES)
-        best = min(starts, key=problem.cost)
+        found = [] if n_clusters else _find_number(problem, motions.clustering, starts)
+        tried = _try_all(problem, found or starts, FIRST_PASSES)
+        best = min(tried, key=lambda trial: trial.cost)
+        starts = [trial.fitted for trial in tried]
         left = motions.error(problem, best, step)
         if not wanted or not left > 0 or abs(math.log(AIM * wanted / left)) < CLOSE:
             break
         step *= min(max((AIM * wanted / left) ** (1 / SLOPE), 1 / MOST_MOVED), MOST_MOVED)
     return _alternate(problem, best, LAST_PASSES), step
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A blend and what it comes to.
+
+    Args:
+        fitted: the blend.
+        transforms: ``(K, 4, m)`` of least squared error.
+        errors: squared error ``(P,)`` that it leaves of each point.
+        cost: squared error of all, and what weights and clusters cost.
+    """
+
+    fitted: Fitted
+    transforms: Float64
+    errors: Float64
+    cost: float
 
 
 @dataclass(frozen=True)
@@ -157,6 +177,11 @@ class _Problem:
         """``(P, 4)`` base positions and 1."""
         return homogeneous(self.base)
 
+    @cached_property
+    def known(self) -> CausalNeighbours:
+        """Each point's neighbours of lower number."""
+        return causal_neighbours(self.neighbours)
+
     def solve(self, fitted: Fitted) -> Float64:
         """Transforms ``(K, 4, m)`` of least squared error, in homogeneous coordinates."""
         from gvcodecs.mcgv.motion.skinning_fit_kernels import add_normal
@@ -167,37 +192,34 @@ class _Problem:
         add_normal(fitted.weights.clusters, parts, self.homogeneous, self.motions, normal, right)
         return solve_normal(normal, right)
 
-    def errors(self, fitted: Fitted) -> Float64:
-        """Squared error ``(P,)`` that a blend leaves of each point."""
+    def measure(self, fitted: Fitted) -> _Trial:
+        """What a blend comes to."""
         from gvcodecs.mcgv.motion.skinning_fit_kernels import add_errors
 
-        errors = np.empty(len(self.base))
+        transforms, errors = self.solve(fitted), np.empty(len(self.base))
         parts = fitted.weights.weights / TOTAL
-        add_errors(fitted.weights.clusters, parts, self.homogeneous, self.motions, self.solve(fitted), errors)
-        return errors
-
-    def cost(self, fitted: Fitted) -> float:
-        """Squared error that a blend leaves, and what its weights and clusters cost."""
-        bits = 8 * len(encode_weights(fitted.weights, self.neighbours))
-        return float(self.errors(fitted).sum()) + self.price * bits + self.cluster_price * fitted.n_clusters
+        add_errors(fitted.weights.clusters, parts, self.homogeneous, self.motions, transforms, errors)
+        bits = 8 * len(encode_weights(fitted.weights, self.known))
+        cost = float(errors.sum()) + self.price * bits + self.cluster_price * fitted.n_clusters
+        return _Trial(fitted, transforms, errors, cost)
 
 
-def _find_number(problem: _Problem, clustering: Clustering, starts: list[Fitted]) -> list[Fitted]:
+def _find_number(problem: _Problem, clustering: Clustering, starts: list[Fitted]) -> list[_Trial]:
     """The blends, of as many clusters as pay, that cost least after a few turns: grown, and from k-means.
 
     ``starts`` are blends found for another step, or of one cluster: numbers from half of theirs up are tried.
     """
     draw, patches = np.random.default_rng(SEED), k_ring(problem.neighbours, PATCH)
-    last = min(starts, key=problem.cost)
+    last = min(map(problem.measure, starts), key=lambda trial: trial.cost)
     best, least = [last, last], [np.inf, np.inf]
     most = min(MOST, len(problem.base) / LEAST_POINTS)
     count, worse = float(max(FEWEST, starts[0].n_clusters // 2)), 0
     while count <= most and problem.cluster_price * count < min(least) and worse < PATIENCE:
-        tried = [_grow(problem, last, round(count), patches, draw)]
+        begun = [_grow(last, round(count), patches, draw)]
         if count * len(problem.base) <= MOST_DISTANCES:
-            tried.append(clustering.start(round(count)))
-        tried = _alternate_all(problem, tried, TRIAL_PASSES)
-        costs = [problem.cost(fitted) for fitted in tried]
+            begun.append(clustering.start(round(count)))
+        tried = _try_all(problem, begun, TRIAL_PASSES)
+        costs = [trial.cost for trial in tried]
         worse = 0 if min(costs) < min(least) else worse + 1
         for kind, cost in enumerate(costs):
             if cost < least[kind]:
@@ -205,20 +227,20 @@ def _find_number(problem: _Problem, clustering: Clustering, starts: list[Fitted]
         last = tried[int(np.argmin(costs))]
         excess = min(costs) / (problem.cluster_price * count)
         count *= next(growth for limit, growth in GROWTH if excess > limit)
-    return [fitted for fitted, cost in zip(best, least, strict=True) if cost <= PROMISING * min(least)]
+    return [trial for trial, cost in zip(best, least, strict=True) if cost <= PROMISING * min(least)]
 
 
-def _alternate_all(problem: _Problem, starts: list[Fitted], passes: int) -> list[Fitted]:
-    """`_alternate` from every start, side by side: nearly all of it is compiled, and holds no lock."""
+def _try_all(problem: _Problem, starts: Sequence[Fitted | _Trial], passes: int) -> list[_Trial]:
+    """`_alternate` from every start, side by side, and measure: nearly all of it is compiled, and holds no lock."""
     with ThreadPoolExecutor(len(starts)) as pool:
-        return list(pool.map(lambda start: _alternate(problem, start, passes), starts))
+        return list(pool.map(lambda start: problem.measure(_alternate(problem, start, passes)), starts))
 
 
-def _grow(problem: _Problem, fitted: Fitted, n_clusters: int, patches: sparse.csr_array, draw: np.random.Generator) -> Fitted:
+def _grow(trial: _Trial, n_clusters: int, patches: sparse.csr_array, draw: np.random.Generator) -> Fitted:
     """Give ``patches (P, P)`` of the surface clusters of their own, drawn by the error in them, until there are so many."""
-    clusters, parts = fitted.weights.clusters.copy(), fitted.weights.weights.copy()
-    errors = np.asarray(patches @ problem.errors(fitted))
-    for cluster in range(fitted.n_clusters, n_clusters):
+    clusters, parts = trial.fitted.weights.clusters.copy(), trial.fitted.weights.weights.copy()
+    errors = np.asarray(patches @ trial.errors)
+    for cluster in range(trial.fitted.n_clusters, n_clusters):
         total = np.cumsum(errors)
         if not total[-1] > 0:
             break
@@ -230,22 +252,22 @@ def _grow(problem: _Problem, fitted: Fitted, n_clusters: int, patches: sparse.cs
     return _renumber(clusters, parts)
 
 
-def _alternate(problem: _Problem, fitted: Fitted, passes: int) -> Fitted:
-    """Fit transforms, then weights, several times over."""
+def _alternate(problem: _Problem, start: Fitted | _Trial, passes: int) -> Fitted:
+    """Fit transforms, which a trial has already, then weights, several times over."""
     from gvcodecs.mcgv.motion.weight_selection import Transforms, choose
 
-    known = causal_neighbours(problem.neighbours)
-    ring = problem.neighbours
-    prices = Prices.guess()
+    known, ring = problem.known, problem.neighbours
+    ring_starts, ring_points = ring.indptr.astype(np.int64), ring.indices.astype(np.int64)
+    fitted, prices = start.fitted if isinstance(start, _Trial) else start, Prices.guess()
     errors = np.zeros(len(problem.base))
-    for _ in range(passes):
-        transforms = problem.solve(fitted)
+    for i in range(passes):
+        transforms = start.transforms if isinstance(start, _Trial) and i == 0 else problem.solve(fitted)
         clusters, parts = fitted.weights.clusters.copy(), fitted.weights.weights.copy()
         choose(
             known.starts,
             known.near,
-            ring.indptr.astype(np.int64),
-            ring.indices.astype(np.int64),
+            ring_starts,
+            ring_points,
             problem.homogeneous,
             problem.motions,
             Transforms.of(transforms),
@@ -258,7 +280,7 @@ def _alternate(problem: _Problem, fitted: Fitted, passes: int) -> Fitted:
             errors,
         )
         fitted = _renumber(clusters, parts)
-        prices = Prices.learnt(problem.neighbours, fitted.weights)
+        prices = Prices.learnt(known, fitted.weights)
     return fitted
 
 
@@ -268,37 +290,41 @@ class Clustering:
     def __init__(self, features: Float64) -> None:
         self._features = features
         self._sample = features[:: max(1, len(features) // SAMPLES)]
-        self._seeds = _seeds(self._sample, MOST)
+        self._seeds: list[int] = []
+        self._drawn, self._lock = _draw_seeds(self._sample), Lock()
 
     def start(self, n_clusters: int) -> Fitted:
         """Each point follows its own cluster alone, of at most ``n_clusters``."""
         from scipy.cluster.vq import kmeans2, vq
 
+        with self._lock:  # charts start from clusters beside the blend
+            self._seeds += islice(self._drawn, max(0, n_clusters - len(self._seeds)))
+            seeds = self._sample[self._seeds[:n_clusters]]
         clusters = np.zeros((len(self._features), INFLUENCES), np.int32)
         parts = np.zeros((len(self._features), INFLUENCES), np.int32)
         parts[:, 0] = TOTAL
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a cluster may run empty: it is dropped
-            centres, _ = kmeans2(self._sample, self._seeds[:n_clusters], iter=K_MEANS_ROUNDS, minit="matrix")
+            centres, _ = kmeans2(self._sample, seeds, iter=K_MEANS_ROUNDS, minit="matrix")
         clusters[:, 0] = vq(self._features, centres)[0]
         return _renumber(clusters, parts)
 
 
-def _seeds(sample: Float64, n: int) -> Float64:
-    """At most ``n`` rows of ``sample``, each drawn with the square of its distance from those before (k-means++)."""
+def _draw_seeds(sample: Float64) -> Iterator[int]:
+    """Yield rows of ``sample``, each drawn with the square of its distance from those before (k-means++)."""
     draw = np.random.default_rng(SEED)
     squares = np.square(sample).sum(axis=1)
     seeds = [int(squares.argmax())]
     distance = np.full(len(sample), np.inf)
-    while len(seeds) < n:
+    while True:
+        yield seeds[-1]
         last = seeds[-1]
         distance = np.minimum(distance, np.maximum(squares + squares[last] - 2 * (sample @ sample[last]), 0))
         distance[seeds] = 0
         total = np.cumsum(distance)
         if not total[-1] > TINY * squares.sum():
-            break
+            return
         seeds.append(int(np.searchsorted(total, draw.random() * total[-1], side="right")))
-    return sample[seeds]
 
 
 def _renumber(clusters: Int32, parts: Int32) -> Fitted:

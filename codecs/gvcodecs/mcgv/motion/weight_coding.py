@@ -25,9 +25,8 @@ from gvpipe.entropy.integers import decode_integers, encode_integers
 COUNT_CONTEXTS = 4
 
 
-def encode_weights(weights: Weights, neighbours: sparse.csr_array) -> bytes:
+def encode_weights(weights: Weights, causal: CausalNeighbours) -> bytes:
     """Return the section ``weights``."""
-    causal = causal_neighbours(neighbours)
     counts, gaps, changes = _described(weights, causal)
     slots = np.broadcast_to(np.arange(INFLUENCES), gaps.shape)
     own, changed = slots < counts[:, None], slots < counts[:, None] - 1
@@ -81,9 +80,9 @@ class Prices:
         return cls(np.array([0.5, 3, 3, 3, 3]), np.tile(gap, (INFLUENCES, 1)), np.tile(change, (INFLUENCES, 1)))
 
     @classmethod
-    def learnt(cls, neighbours: sparse.csr_array, weights: Weights) -> Prices:
+    def learnt(cls, causal: CausalNeighbours, weights: Weights) -> Prices:
         """Prices by how often numbers occur."""
-        counts, gaps, changes = _described(weights, causal_neighbours(neighbours))
+        counts, gaps, changes = _described(weights, causal)
         guess = cls.guess()
         slots = np.arange(INFLUENCES)
         own, changed = slots < counts[:, None], slots < counts[:, None] - 1

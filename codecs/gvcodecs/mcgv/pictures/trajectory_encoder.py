@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.base.welded_points import Points
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding import Padding
@@ -66,7 +67,7 @@ def code_trajectories(
         profile, preset: of the video.
     """
     fit = BlendFit(Blend(base, fitted.weights, fitted.n_clusters))
-    sections = {"weights": encode_weights(fitted.weights, points.neighbours)}
+    sections = {"weights": encode_weights(fitted.weights, causal_neighbours(points.neighbours))}
     fineness = FINENESS[profile.name]
     largest = profile.amplitude / fineness
     padding = Padding(layout, block)

@@ -15,14 +15,15 @@ import { Cursor } from "./cursor.js";
  * @property {Uint32Array} pointFaces (T, 3) the triangles over points, flat
  *
  * @param {Uint8Array} mesh @param {Uint8Array} order sections
+ * @param {boolean} across whether seams are coded across edges (`seams.js`)
  * @returns {Promise<PointMesh>}
  */
-export async function decodePoints(mesh, order) {
+export async function decodePoints(mesh, order, across) {
   const cursor = new Cursor(mesh, "mesh");
   const base = await decodeBase(cursor.take(cursor.varint(cursor.left, "a length")), new Uint8Array(0));
   const pointFaces = smallestFirst(base.faces);
   const counts = cursor.take(cursor.varint(cursor.left, "a length"));
-  const { faces, point } = decodeCopies(counts, cursor.rest(), order, pointFaces, base.visits.length);
+  const { faces, point } = decodeCopies(counts, cursor.rest(), order, pointFaces, base.visits.length, across);
   return { faces, point, lattice: base.points, pointFaces };
 }
 

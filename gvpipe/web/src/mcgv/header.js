@@ -4,8 +4,9 @@ import { GeometryVideoError, corrupt } from "../format/errors.js";
 import { checkInteger, checkNumber } from "../format/payload.js";
 
 export const CODEC = "mcgv";
-export const VERSION = 3;
+export const VERSION = 4;
 export const PROFILE = "h264-8"; // the one that a browser gives back sample by sample
+const OF_PICTURES = ["placement", "profile", "block", "width", "height", "residual_step"]; // keys of files that have some
 const PREDICTIONS = ["blended", "affine"];
 const PLACEMENTS = ["halves", "charts", "tiles"];
 const MAX_SIDE = 16384;
@@ -35,6 +36,7 @@ export function checkCodec(header) {
  * @property {number[]} origin @property {number} baseStep lattice of the base frame
  * @property {number} transformStep @property {number} residualStep model units
  * @property {boolean} outliers whether residuals exceed the pictures' levels
+ * @property {boolean} pictures false where frames are their prediction; what tells of pictures is then absent
  *
  * @param {object} header of the payload, of this codec
  * @returns {Header}
@@ -44,12 +46,9 @@ export function readHeader(header) {
   if (settings.transform !== undefined) {
     throw new GeometryVideoError("unsupported", "it holds trajectory images; gvpipe export-html converts it");
   }
+  if ("pictures" in settings) return withoutPictures(header);
   if (settings.profile !== PROFILE) {
     throw new GeometryVideoError("unsupported", `its profile is '${settings.profile}'; gvpipe export-html converts it`);
-  }
-  const base = settings.base;
-  if (!Array.isArray(base) || base.length !== 4 || !base.every((v) => Math.abs(v) < LARGE) || !(base[3] > 0)) {
-    throw corrupt("header", `base is ${JSON.stringify(base)}`);
   }
   const [prediction, placement] = header.version === 1 ? ["affine", "charts"] : [settings.prediction, settings.placement];
   if (!PREDICTIONS.includes(prediction)) throw corrupt("header", `prediction is ${JSON.stringify(prediction)}`);
@@ -60,13 +59,10 @@ export function readHeader(header) {
     block: checkInteger(settings, "block", 2, 64),
     width: checkInteger(settings, "width", 2, MAX_SIDE),
     height: checkInteger(settings, "height", 2, Math.floor(MAX_SIDE / 3)),
-    clusters: checkInteger(settings, "clusters", 1, 1024),
-    segments: checkInteger(settings, "segments", 1, Math.min(1 << 16, header.frames)),
-    origin: base.slice(0, 3),
-    baseStep: base[3],
-    transformStep: checkNumber(settings, "transform_step", SMALL, LARGE),
+    ...readMotion(header),
     residualStep: checkNumber(settings, "residual_step", SMALL, LARGE),
     outliers: "outliers" in settings,
+    pictures: true,
   };
   if (result.outliers && (settings.outliers !== true || header.version === 1)) {
     throw corrupt("header", `outliers is ${JSON.stringify(settings.outliers)}`);
@@ -77,4 +73,29 @@ export function readHeader(header) {
   if (placement === "tiles" && prediction !== "blended") throw corrupt("header", `placement is tiles, prediction ${prediction}`);
   if (placement !== "charts" && ![8, 16].includes(result.block)) throw corrupt("header", `blocks of ${result.block} pixels`);
   return result;
+}
+
+/** What files with and without pictures tell alike. */
+function readMotion(header) {
+  const settings = header.settings;
+  const base = settings.base;
+  if (!Array.isArray(base) || base.length !== 4 || !base.every((v) => Math.abs(v) < LARGE) || !(base[3] > 0)) {
+    throw corrupt("header", `base is ${JSON.stringify(base)}`);
+  }
+  return {
+    clusters: checkInteger(settings, "clusters", 1, 1024),
+    segments: checkInteger(settings, "segments", 1, Math.min(1 << 16, header.frames)),
+    origin: base.slice(0, 3),
+    baseStep: base[3],
+    transformStep: checkNumber(settings, "transform_step", SMALL, LARGE),
+  };
+}
+
+function withoutPictures(header) {
+  const settings = header.settings;
+  const alien = [...OF_PICTURES, "outliers"].filter((key) => key in settings);
+  if (settings.pictures !== false || header.version < 4 || alien.length || settings.prediction !== "blended") {
+    throw corrupt("header", `pictures is ${JSON.stringify(settings.pictures)} beside ${JSON.stringify(alien)}`);
+  }
+  return { prediction: "blended", ...readMotion(header), residualStep: 1, outliers: false, pictures: false };
 }

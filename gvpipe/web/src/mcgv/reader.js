@@ -38,9 +38,9 @@ export class McgvReader {
     /** What a bound on every vertex needs. */
     this.corrections = movesOf("corrections", surface.slot.length);
     const plane = header.width * header.height;
-    /** (S, 3) which sample of a picture carries each coordinate. */
-    this.samples = new Uint32Array(3 * surface.nSlots);
-    pixels.forEach((pixel, slot) => this.samples.set([pixel, pixel + plane, pixel + 2 * plane], 3 * slot));
+    /** (S, 3) which sample of a picture carries each coordinate; null without pictures. */
+    this.samples = pixels && new Uint32Array(3 * surface.nSlots);
+    pixels?.forEach((pixel, slot) => this.samples.set([pixel, pixel + plane, pixel + 2 * plane], 3 * slot));
     this.predicted = new Float64Array(3 * surface.nSlots);
     this.placed = new Float32Array(3 * surface.nSlots);
   }
@@ -51,6 +51,11 @@ export class McgvReader {
 
   get basePoints() {
     return this.surface.basePoints;
+  }
+
+  /** `Uint8Array` (S, 3): the levels of a frame without a residual. */
+  get zeroLevels() {
+    return new Uint8Array(3 * this.surface.nSlots).fill(ZERO);
   }
 
   /** Width and height of a picture: the x, y and z planes, one below the other. */
@@ -92,6 +97,7 @@ export class McgvReader {
 /** The slots' pixels, and how they move: clusters or pixels, whichever follows from the other, come second. */
 function decodeMotion(payload, header, surface) {
   const { lattice, visits, nSlots } = surface;
+  if (!header.pictures) return { pixels: null, motion: new BlendedMotion(payload, header, surface) };
   const { width, height } = header;
   if (width * height < nSlots) throw corrupt("header", `planes of ${width}x${height} do not hold ${nSlots} samples`);
   const charts = header.placement === "charts" ? decodePixels(payload.section("pixels"), visits, header) : null;

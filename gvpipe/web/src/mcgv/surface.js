@@ -81,7 +81,11 @@ async function readVertices(payload) {
 }
 
 async function readPoints(payload) {
-  const { faces, point, lattice, pointFaces } = await decodePoints(payload.section("mesh"), payload.section("order"));
+  const { faces, point, lattice, pointFaces } = await decodePoints(
+    payload.section("mesh"),
+    payload.section("order"),
+    payload.header.version > 3,
+  );
   checkCounts(payload.header, point.length, faces);
   const n = lattice.length / 3;
   const still = payload.sections.has(STILL) ? decodeFlags(payload.section(STILL), n, STILL) : new Uint8Array(n);
