@@ -77,6 +77,11 @@ def test_the_reference_page_has_the_public_interface() -> None:
     assert {f"gvpipe.{name}" for name in gvpipe.__all__ if name != "GvpipeError"} | {"gvpipe.errors"} <= shown
 
 
+def test_every_decision_is_in_the_index() -> None:
+    index = re.findall(r"\(decisions/([\w-]+\.md)\)", (ROOT / "docs/architecture.md").read_text(encoding="utf-8"))
+    assert sorted(index) == sorted(path.name for path in ROOT.glob("docs/decisions/*.md"))
+
+
 def test_no_old_module_names() -> None:
     names = [f"{package}.{name}" for package, names in OLD_MODULES.items() for name in names.split()]
     paths = [name.replace(".", "/") for name in names]
