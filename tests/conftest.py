@@ -20,7 +20,7 @@ from gvpipe.sequence import MeshSequence
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
 if worker := os.environ.get("PYTEST_XDIST_WORKER"):
-    # numba replaces a function's index and its machine code one after the other, so processes that share them may mix them up
+    # workers that fill one cache together replace each other's entries, and compile more often
     os.environ["NUMBA_CACHE_DIR"] = str(Path(__file__).parents[1] / ".pytest_cache" / f"numba-{worker}")
 FAST = {"preset": "ultrafast", "clusters": 3, "gop": 4}  # settings that cost little, for tests of anything but coding
 
