@@ -10,6 +10,7 @@ from typing import Any
 import av
 import numpy as np
 import pytest
+from folders import DATA
 from sequences import awkward, held, partly_still, waving
 
 import gvpipe
@@ -21,7 +22,7 @@ from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.still_vertices import decode_flags, encode_flags, find_still
 
 AWKWARD = awkward()
-MORPH_WAVE = Path(__file__).parents[2] / "shared" / "data" / "morph_wave.npz"
+MORPH_WAVE = DATA / "morph_wave.npz"
 PLAIN: list[tuple[str, dict[str, object]]] = [
     ("pca", {}),
     ("pca", {"predictor": "lsp", "segment": 7}),

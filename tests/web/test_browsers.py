@@ -13,6 +13,7 @@ import browsers
 import numpy as np
 import pages
 import pytest
+from folders import ROOT
 from PIL import Image
 from sequences import held, waving
 
@@ -236,7 +237,7 @@ def test_a_browser_without_h264_says_so(browser: str, site: tuple[Path, str], tm
 
 def test_the_snippet_from_a_disk_says_that_it_needs_a_server(driver: Any, site: tuple[Path, str]) -> None:
     """Browsers load no modules for a page that is itself a file: what the element holds then stays on the page."""
-    snippet = Path(__file__).parents[1].joinpath("README.md").read_text("utf-8")
+    snippet = ROOT.joinpath("README.md").read_text("utf-8")
     (page,) = [block.split("```")[0] for block in snippet.split("```html\n")[1:]]
     (site[0] / "snippet.html").write_text(page.replace("walk.mp4", "affine.mp4"))
     text = """await new Promise((resolve) => setTimeout(resolve, 1500));

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from folders import DATA
 from numpy.typing import NDArray
 from placing import tiled
 from sequences import awkward, grid, waving
-from test_mcgv_steps import awkward_surfaces, check_layout
+from surfaces import awkward_surfaces, check_layout
 
 import gvpipe
 from gvcodecs.mcgv import Mcgv
@@ -23,8 +24,6 @@ from gvpipe.mesh.lattice import Lattice
 from gvpipe.mesh.topology import adjacency
 from gvpipe.rate_control.step_search import root_mean_square
 from gvpipe.registry import open_reader
-
-DATA = Path(__file__).parents[2] / "shared" / "data"
 
 
 @pytest.mark.parametrize("name", awkward_surfaces())

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import runpy
 import tracemalloc
-from pathlib import Path
 
 import numpy as np
 import pytest
+from folders import SAMPLES
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sequences import awkward, grid, waving
@@ -267,7 +267,7 @@ def test_awkward_sequences_stream(name: str) -> None:
 
 
 def test_the_sample_runs(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    script = Path(__file__).parents[1] / "samples" / "stream.py"
+    script = SAMPLES / "stream.py"
     monkeypatch.setattr("sys.argv", ["stream.py", str(script.with_name("cloth.npz")), "40"])
     runpy.run_path(str(script), run_name="__main__")
     assert "110 frames" in capsys.readouterr().out

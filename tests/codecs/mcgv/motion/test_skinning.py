@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
+from folders import GOLDEN
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -32,8 +32,6 @@ from gvpipe.mesh.topology import adjacency
 from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.welding import find_points
-
-GOLDEN = Path(__file__).parent / "golden"
 
 Float64 = NDArray[np.float64]
 

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from folders import DATA
 
 import gvpipe
 from gvpipe.errors import InputError
 from gvpipe.sequence import MeshSequence
 
-SHARED = Path(__file__).parents[2] / "shared" / "data"
 CHANNEL = {"sampler": 0, "target": {"node": 0, "path": "translation"}}
 
 
@@ -98,8 +98,8 @@ def test_damaged_files_are_one_clear_line(tmp_path: Path, data: bytes) -> None:
         gvpipe.read(tmp_path / "bad.glb")
 
 
-@pytest.mark.skipif(not SHARED.exists(), reason="no shared data")
+@pytest.mark.skipif(not DATA.exists(), reason="no shared data")
 @pytest.mark.parametrize("name", ["raw/Fox.glb", "raw/MorphStressTest.gltf", "assets/gltf/BoxAnimated_Binary/BoxAnimated.glb"])
 def test_real_animations(name: str) -> None:
     with pytest.raises(InputError, match="animation"):
-        gvpipe.read(SHARED / name)
+        gvpipe.read(DATA / name)

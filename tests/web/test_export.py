@@ -1,4 +1,4 @@
-"""The web player's files and pages, as far as no browser is needed; `test_web` has the rest."""
+"""The web player's files and pages, as far as no browser is needed; `test_geometry_video` has the rest."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Finished
+from folders import SAMPLES
 from sequences import waving
 
 import gvpipe
@@ -86,7 +87,7 @@ def test_conversion_is_measured(settings: dict[str, Any], kind: str, tmp_path: P
 
 def test_conversion_adds_little(tmp_path: Path) -> None:
     """To a file at default quality; vertices that coincide do so in the page too."""
-    sequence = gvpipe.read(Path(__file__).parents[1] / "samples" / "creature.npz").part(0, 30)
+    sequence = gvpipe.read(SAMPLES / "creature.npz").part(0, 30)
     corners = sequence.faces.ravel()  # a soup: each triangle has vertices of its own
     soup = gvpipe.MeshSequence(sequence.read(0, 30)[:, corners], np.arange(len(corners), dtype=np.int32).reshape(-1, 3), 30.0)
     gvpipe.encode(soup, tmp_path / "other.mp4", "pca")

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import pages
 import pytest
+from folders import DATA, DOCS, GOLDEN
 from pages import FRAMES, LOAD, check_frames, run
 from PIL import Image
 from sequences import awkward, held, patched, rigid, waving
@@ -35,9 +36,8 @@ from gvpipe.sequence import MeshSequence
 pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())
 slow = pytest.mark.slow  # the default run has one test of exact positions and one of the player
 
-GOLDEN = Path(__file__).parent / "golden"
-DOCS = (Path(__file__).parents[1] / "docs" / "player.md").read_text("utf-8")
-SAMBA = Path(__file__).parents[2] / "shared" / "data" / "samba.npz"
+PLAYER_PAGE = (DOCS / "player.md").read_text("utf-8")
+SAMBA = DATA / "samba.npz"
 FAST = {"preset": "ultrafast", "clusters": 3, "gop": 4}
 KINDS: dict[str, dict[str, Any]] = {  # how vertices move, and where their pixels are: all that a file may be
     "affine": {"prediction": "affine", "placement": "charts"},
@@ -766,7 +766,7 @@ def test_exported_page_opens_from_a_disk_and_plays(browser: Any, video: Path, tm
 @slow
 def test_the_element_as_the_docs_show_it(browser: Any, site: tuple[Path, str]) -> None:
     _encode(site, waving(10, 24), "walk.mp4")
-    (page,) = re.findall(r"```html\n(.*?)```", DOCS, re.DOTALL)
+    (page,) = re.findall(r"```html\n(.*?)```", PLAYER_PAGE, re.DOTALL)
     (site[0] / "docs.html").write_text(page)
     browser.get(f"{site[1]}/docs.html")
     played = """const element = document.querySelector("geometry-video");
@@ -778,7 +778,7 @@ def test_the_element_as_the_docs_show_it(browser: Any, site: tuple[Path, str]) -
 @slow
 def test_the_module_as_the_docs_show_it(module: Callable[..., Any], browser: Any, site: tuple[Path, str]) -> None:
     _encode(site, waving(10, 24), "walk.mp4")
-    (script,) = re.findall(r"```js\n(.*?)```", DOCS, re.DOTALL)
+    (script,) = re.findall(r"```js\n(.*?)```", PLAYER_PAGE, re.DOTALL)
     drawn = "window.draw = (positions, indices) => { window.drawn = [positions.length, indices.length] };"
     (site[0] / "docs.html").write_text(f"<!doctype html><script>{drawn}</script><script type=module>{script}</script>")
     browser.get(f"{site[1]}/docs.html")

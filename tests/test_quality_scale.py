@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
+from folders import DATA
 from sequences import held, patched, waving
 
 import gvpipe
@@ -15,7 +14,6 @@ from gvpipe.rate_control.step_search import BAND, Aimed, Anchor, mend, root_mean
 from gvpipe.registry import codec_class, codec_ids, encode_sequence, open_reader
 from gvpipe.sequence import MeshSequence
 
-DATA = Path(__file__).parents[2] / "shared" / "data"
 QUALITIES = (50, 75, 90)
 SMALL = "dembones_bone", "fox_run", "kaykit_spin", "morph_wave", "walking_cat"  # docs/rate-control.md has the others
 NAMES = [name for name in SMALL if (DATA / f"{name}.npz").exists()]

@@ -1,13 +1,13 @@
-"""The metrics against closed forms and invariances; see also test_sted and test_surface."""
+"""The metrics against closed forms and invariances; see also test_sted and test_triangle_search."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from folders import DATA
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from gvpipe.metrics import comparison
 from gvpipe.metrics.comparison import Comparison, compare
 from gvpipe.sequence import MeshSequence
 
-SAMPLES = Path(__file__).parents[2] / "shared" / "data"
 SEEDS = st.integers(0, 2**32 - 1)
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], np.int32)
 VALUES = ("rmse", "rmse_diag", "max", "max_diag", "kg", "da", "sted", "sted_spatial", "sted_temporal", "hausdorff")
@@ -223,9 +222,9 @@ def test_chunks_bound_memory_and_change_nothing(chunk: int, block: int, monkeypa
 # Real data
 
 
-@pytest.mark.skipif(not SAMPLES.is_dir(), reason="needs ../shared/data")
+@pytest.mark.skipif(not DATA.is_dir(), reason="needs ../shared/data")
 def test_half_a_lattice_step_bounds_the_errors_of_rounding() -> None:
-    with np.load(SAMPLES / "cow.npz") as file:
+    with np.load(DATA / "cow.npz") as file:
         cow = MeshSequence(file["vertices"][:40], file["faces"], name="cow")
     positions = cow.read(0, 40).astype(float)
     step = np.ptp(positions, axis=(0, 1)).max() / (2**10 - 1)

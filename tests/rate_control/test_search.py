@@ -10,6 +10,7 @@ from itertools import product
 from pathlib import Path
 
 import pytest
+from folders import SAMPLES
 from hypothesis import given
 from hypothesis import strategies as st
 from sequences import awkward, waving
@@ -187,7 +188,7 @@ def test_files_meet_their_targets(codec: str, measure: str, reorder: bool, tmp_p
     path = tmp_path / "t.mp4"
     sequence = waving(24 if codec == "laplacian" else 16, 24)
     if codec == "mcgv":
-        sequence = gvpipe.read(Path(__file__).parents[1] / "samples" / "creature.npz").part(0, 24)
+        sequence = gvpipe.read(SAMPLES / "creature.npz").part(0, 24)
 
     def measured() -> float:
         values = gvpipe.compare(sequence, gvpipe.decode(path))
