@@ -47,3 +47,9 @@ def check_layout(layout: Layout, chart: NDArray[Any], block: int) -> None:
     owner: dict[tuple[int, int], int] = {}
     for by, bx, c in zip((y // block).tolist(), (x // block).tolist(), chart.tolist(), strict=True):
         assert owner.setdefault((by, bx), c) == c
+
+
+def affine_maps(n: int, seed: int = 1) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """``(n, 3, 3)`` matrices (as x A) and ``(n, 3)`` translations."""
+    random = np.random.default_rng(seed)
+    return np.eye(3) + random.normal(0, 0.4, (n, 3, 3)), random.normal(0, 3, (n, 3))

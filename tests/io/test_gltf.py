@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 from folders import DATA
+from mesh_files import same_bits
 
 import gvpipe
+from gvpipe import io
 from gvpipe.errors import InputError
 from gvpipe.sequence import MeshSequence
 
@@ -103,3 +105,59 @@ def test_damaged_files_are_one_clear_line(tmp_path: Path, data: bytes) -> None:
 def test_real_animations(name: str) -> None:
     with pytest.raises(InputError, match="animation"):
         gvpipe.read(DATA / name)
+
+
+def glb(positions: Any, nodes: list[dict[str, Any]], primitives: int = 1) -> bytes:
+    """A hand-made GLB: one mesh of some equal primitives, used by the nodes given."""
+    import json
+
+    blob = np.asarray(positions, "<f4").tobytes() + np.array([0, 1, 2, 0], "<u2").tobytes()
+    n_bytes = 12 * len(positions)
+    tree = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"byteLength": len(blob)}],
+        "bufferViews": [{"buffer": 0, "byteLength": n_bytes}, {"buffer": 0, "byteOffset": n_bytes, "byteLength": 6}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": len(positions), "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"},
+        ],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}] * primitives}],
+        "nodes": nodes,
+        "scenes": [{"nodes": list(range(len(nodes)))}],
+        "scene": 0,
+    }
+    header = json.dumps(tree).encode()
+    header += b" " * (-len(header) % 4)
+    chunks = struct.pack("<II", len(header), 0x4E4F534A) + header + struct.pack("<II", len(blob), 0x004E4942) + blob
+    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+
+
+def test_glb_scenes_are_joined_with_their_transforms(tmp_path: Path) -> None:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]], np.float32)
+    nodes = [{"mesh": 0, "name": "a"}, {"mesh": 0, "name": "b", "translation": [1, 2, 3], "scale": [-1, 1, 1]}]
+    for i in range(3):
+        (tmp_path / f"{i}.glb").write_bytes(glb(corners + i, nodes, primitives=2))
+    read = io.read(tmp_path)
+    assert read.positions.shape == (3, 16, 3)
+    moved = corners * [-1, 1, 1] + [1, 2, 3]
+    blocks = read.read(0, 1)[0].reshape(4, 4, 3)
+    assert sorted(block[0].tolist() for block in blocks) == sorted([corners[0].tolist(), moved[0].tolist()] * 2)
+    for block, faces in zip(blocks, read.faces - 4 * np.arange(4)[:, None], strict=True):
+        mirrored = same_bits(block, moved.astype(np.float32))
+        assert mirrored or same_bits(block, corners)
+        assert faces.tolist() == ([2, 1, 0] if mirrored else [0, 1, 2])
+    later = read.read(2, 3)[0].reshape(4, 4, 3)
+    for before, after in zip(blocks, later, strict=True):
+        assert (abs(after - before) == 2).all()
+
+
+@pytest.mark.parametrize("included", [True, False])
+def test_glb_normals_are_those_of_the_file(tmp_path: Path, included: bool) -> None:
+    import trimesh
+
+    mesh = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], vertex_normals=[[0, 0.6, 0.8]] * 3, process=False)
+    (tmp_path / "a.glb").write_bytes(mesh.export(file_type="glb", include_normals=included))
+    read = io.read(tmp_path / "a.glb")
+    assert set(read.attributes) == ({"normal"} if included else set())
+    for values in read.attributes.values():
+        np.testing.assert_allclose(values, [[0, 0.6, 0.8]] * 3, atol=1e-6)

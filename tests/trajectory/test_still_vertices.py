@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from sequences import waving
 
+import gvpipe
 import gvpipe.sequence
 from gvpipe.container.cursor import varint
 from gvpipe.entropy.integers import encode_integers
@@ -114,3 +116,34 @@ def test_still_vertices_have_one_position(frames_of_a_chunk: int, monkeypatch: p
 def test_of_one_frame_nothing_is_still() -> None:
     assert not find_still(MeshSequence(np.ones((1, 4, 3), np.float32), NO_FACES)).any()
     assert find_still(MeshSequence(np.ones((2, 4, 3), np.float32), NO_FACES)).all()
+
+
+def test_find_still_stops_where_everything_has_moved() -> None:
+    class Lazy:
+        shape = (50, 200_000, 3)
+        read = 0
+
+        def __getitem__(self, key: slice, /) -> np.ndarray:
+            Lazy.read = max(Lazy.read, key.stop)
+            times = np.arange(key.start, key.stop, dtype=np.float32)[:, None, None]
+            return np.broadcast_to(times, (len(times), *self.shape[1:]))
+
+    assert not find_still(MeshSequence(Lazy(), np.zeros((0, 3), np.int32))).any()
+    assert Lazy.read < 50
+    assert not find_still(waving(3, 1)).any()
+
+
+def test_flags_of_any_kind_come_back() -> None:
+    rng = np.random.default_rng(2)
+    for flags in (np.ones(5, bool), np.zeros(5, bool), rng.random(300) < 0.5, np.repeat([True, False, True], 400)):
+        assert np.array_equal(decode_flags(encode_flags(flags), len(flags), "still"), flags)
+    assert len(encode_flags(np.repeat([True, False, True], 40_000))) < 60
+
+
+@pytest.mark.parametrize("lengths", [[3, -1, 3], [2, 0, 3], [4, 2], [1] * 9, [1 << 38, 5]])
+def test_wrong_flags_are_refused(lengths: list[int]) -> None:
+    from gvpipe.container.cursor import varint
+    from gvpipe.entropy.integers import encode_integers
+
+    with pytest.raises(CorruptFile, match="still"):
+        decode_flags(varint(len(lengths)) + encode_integers(np.array(lengths)), 5, "still")
