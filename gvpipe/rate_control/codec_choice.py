@@ -17,7 +17,8 @@ from gvpipe.codec import Codec, Progress
 from gvpipe.errors import InputError
 from gvpipe.quality_scale import error_of
 from gvpipe.rate_control.purposes import describe
-from gvpipe.rate_control.search import Choice, Target, meet
+from gvpipe.rate_control.search import Choice, meet
+from gvpipe.rate_control.targets import Target
 from gvpipe.rate_control.trials import Trial
 from gvpipe.sequence import MeshSequence
 
