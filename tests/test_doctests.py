@@ -19,6 +19,7 @@ MODULES = [
     "gvpipe.quality_scale",
     "gvpipe.repeated_frames",
     "gvpipe.trajectory.still_vertices",
+    "gvpipe.rate_control.step_search",
     "gvpipe.trajectory.temporal_neighbours",
 ]
 
