@@ -10,7 +10,7 @@ import gvpipe
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of, quality_of
-from gvpipe.rate_control.step_search import BAND, Aimed, Anchor, mend, root_mean_square, step_between
+from gvpipe.rate_control.step_search import BAND, Anchor, StepTrial, find_step, root_mean_square, step_between
 from gvpipe.registry import codec_class, codec_ids, encode_sequence, open_reader
 from gvpipe.sequence import MeshSequence
 
@@ -54,24 +54,24 @@ def test_the_scale() -> None:
         assert quality_of(error_of(quality)) == pytest.approx(quality)
 
 
-def pretend(step: float, exponent: float) -> Aimed:
-    return Aimed(Bitstream("none", 1, 1, 1, 0, 30.0), step, 0.3 * step**exponent)
+def pretend(step: float, exponent: float) -> StepTrial:
+    return StepTrial(Bitstream("none", 1, 1, 1, 0, 30.0), step, 0.3 * step**exponent)
 
 
 @pytest.mark.parametrize("exponent", [0.6, 1.0, 1.3])
-def test_steps_are_mended_until_the_error_is_close(exponent: float) -> None:
-    aimed = mend(lambda step: pretend(step, exponent), 1.0, 1.0)
+def test_steps_are_corrected_until_the_error_is_close(exponent: float) -> None:
+    aimed = find_step(lambda step: pretend(step, exponent), 1.0, 1.0)
     assert BAND[0] <= aimed.error <= BAND[1]
 
 
 def test_errors_that_do_not_follow_the_step_end_the_loop() -> None:
     tried: list[float] = []
 
-    def attempt(step: float) -> Aimed:
+    def attempt(step: float) -> StepTrial:
         tried.append(step)
-        return Aimed(Bitstream("none", 1, 1, 1, 0, 30.0), step, 0.0)
+        return StepTrial(Bitstream("none", 1, 1, 1, 0, 30.0), step, 0.0)
 
-    assert mend(attempt, 1.0, 1e30).step in tried
+    assert find_step(attempt, 1.0, 1e30).step in tried
     assert len(tried) == 3
 
 

@@ -17,7 +17,7 @@ from gvpipe.quality_scale import error_of
 from gvpipe.rate_control import codec_choice
 from gvpipe.rate_control.codec_choice import choose_codec
 from gvpipe.rate_control.purposes import PURPOSES, candidates, describe
-from gvpipe.rate_control.search import Target
+from gvpipe.rate_control.targets import Target
 from gvpipe.registry import codec_class
 from gvpipe.sequence import MeshSequence
 

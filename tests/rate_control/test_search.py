@@ -20,8 +20,10 @@ from gvpipe.codec import Memo
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import InputError, SettingError
 from gvpipe.metrics.vertex_errors import Errors
-from gvpipe.rate_control.search import MOST_ENCODES, MOST_SCATTERED, TOLERANCE, Target, find_quality, find_smallest, parse_bound
+from gvpipe.rate_control.quality_search import MOST_ENCODES, MOST_SCATTERED, TOLERANCE, find_quality
+from gvpipe.rate_control.smallest_search import find_smallest
 from gvpipe.rate_control.step_search import root_mean_square
+from gvpipe.rate_control.targets import Target, parse_bound
 from gvpipe.rate_control.trials import Trial
 from gvpipe.registry import codec_class, codec_ids, open_reader
 from gvpipe.sequence import MeshSequence
