@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,11 @@ settings.load_profile("same")
 if worker := os.environ.get("PYTEST_XDIST_WORKER"):
     # numba replaces a function's index and its machine code one after the other, so processes that share them may mix them up
     os.environ["NUMBA_CACHE_DIR"] = str(ROOT / ".pytest_cache" / f"numba-{worker}")
-FAST = {"preset": "ultrafast", "clusters": 3, "gop": 4}  # settings that cost little, for tests of anything but coding
+FAST: dict[str, Any] = {
+    "preset": "ultrafast",
+    "clusters": 3,
+    "gop": 4,
+}  # cost little, for tests of anything but coding
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

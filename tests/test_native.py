@@ -20,6 +20,8 @@ from gvpipe.errors import GvpipeError, InputError, SettingError
 from gvpipe.registry import codec_class
 from gvpipe.sequence import MeshSequence
 
+untyped: Any = gvpipe  # where calls break the annotations on purpose
+
 Run = Callable[..., Any]
 
 
@@ -90,9 +92,9 @@ def test_slices(frames: Any) -> None:
     for index in (11, -12):
         with pytest.raises(IndexError, match=f"frame {index}"):
             frames[index]
-    for key in (1.5, "a", None):
+    for wrong in (1.5, "a", None):
         with pytest.raises(TypeError):
-            frames[key]
+            frames[wrong]
 
 
 def test_sequences_are_values_that_move(sequence: MeshSequence) -> None:
@@ -101,12 +103,12 @@ def test_sequences_are_values_that_move(sequence: MeshSequence) -> None:
 
 
 def test_numbers_of_numpy_are_numbers(sequence: MeshSequence, tmp_path: Path) -> None:
-    made = MeshSequence(sequence.positions, sequence.faces, np.float32(24))  # type: ignore[arg-type]
+    made = untyped.MeshSequence(sequence.positions, sequence.faces, np.float32(24))
     assert gvpipe.encode(made, tmp_path / "o.mp4", preset="ultrafast", clusters=3).fps == 24.0 and type(made.fps) is float
 
 
 def test_a_list_is_an_array() -> None:
-    assert MeshSequence([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], [[0, 1, 2]]).shape == (1, 3, 3)  # type: ignore[arg-type]
+    assert untyped.MeshSequence([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], [[0, 1, 2]]).shape == (1, 3, 3)
 
 
 # wrong types
@@ -114,29 +116,29 @@ def test_a_list_is_an_array() -> None:
 TRIANGLE = np.zeros((1, 3, 3), np.float32)
 FACES = np.array([[0, 1, 2]])
 WRONG_TYPES: dict[str, tuple[Callable[[Path], object], str]] = {
-    "encode": (lambda p: gvpipe.encode(5, p / "o.mp4"), "source is 5 (int); a MeshSequence or a path"),  # type: ignore[arg-type]
-    "encode path": (lambda p: gvpipe.encode(p / "a.npz", None), "path is None (NoneType); a path"),  # type: ignore[arg-type]
-    "encode bytes": (lambda p: gvpipe.encode(b"a.npz", p / "o.mp4"), "b'a.npz' (bytes)"),  # type: ignore[arg-type]
-    "encode codec": (lambda p: gvpipe.encode(p / "a.npz", p / "o.mp4", 7), "codec is 7 (int); an id such as"),  # type: ignore[arg-type]
+    "encode": (lambda p: untyped.encode(5, p / "o.mp4"), "source is 5 (int); a MeshSequence or a path"),
+    "encode path": (lambda p: untyped.encode(p / "a.npz", None), "path is None (NoneType); a path"),
+    "encode bytes": (lambda p: untyped.encode(b"a.npz", p / "o.mp4"), "b'a.npz' (bytes)"),
+    "encode codec": (lambda p: untyped.encode(p / "a.npz", p / "o.mp4", 7), "codec is 7 (int); an id such as"),
     "encode codec class": (
-        lambda p: gvpipe.encode(p / "a.npz", p / "o.mp4", codec_class("mcgv")), "a settings object",  # type: ignore[arg-type]
+        lambda p: untyped.encode(p / "a.npz", p / "o.mp4", codec_class("mcgv")), "a settings object",
     ),
-    "read": (lambda p: gvpipe.read(3), "3 (int); a list of frame files or a path"),  # type: ignore[arg-type]
-    "read list": (lambda p: gvpipe.read([1, 2]), "gvpipe.read's list is 1 (int); a path"),  # type: ignore[list-item]
-    "open": (lambda p: gvpipe.open(3), "3 (int); a path (str or os.PathLike)"),  # type: ignore[arg-type]
-    "player": (lambda p: gvpipe.Player(3), "3 (int); a path"),  # type: ignore[arg-type]
-    "info": (lambda p: gvpipe.info(3.5), "3.5 (float); a path"),  # type: ignore[arg-type]
-    "decode": (lambda p: gvpipe.decode(None), "None (NoneType); a path"),  # type: ignore[arg-type]
-    "write": (lambda p: gvpipe.write("a.npz", p / "b.npz"), "'a.npz' (str); a MeshSequence"),  # type: ignore[arg-type]
-    "write path": (lambda p: gvpipe.write(MeshSequence(TRIANGLE, FACES), 3), "path is 3 (int)"),  # type: ignore[arg-type]
-    "compare": (lambda p: gvpipe.compare("a", "b"), "reference is 'a' (str); a MeshSequence"),  # type: ignore[arg-type]
-    "positions": (lambda p: MeshSequence("x", FACES), "positions are 'x' (str); an array"),  # type: ignore[arg-type]
-    "no positions": (lambda p: MeshSequence(None, FACES), "positions are None"),  # type: ignore[arg-type]
-    "fps": (lambda p: MeshSequence(TRIANGLE, FACES, "30"), "fps is '30' (str); a number"),  # type: ignore[arg-type]
-    "attributes": (lambda p: MeshSequence(TRIANGLE, FACES, 30.0, [1]), "attributes are [1] (list)"),  # type: ignore[arg-type]
-    "faces": (lambda p: MeshSequence(TRIANGLE, "x"), "faces are 'x' (str); an array of shape (triangles, 3)"),  # type: ignore[arg-type]
+    "read": (lambda p: untyped.read(3), "3 (int); a list of frame files or a path"),
+    "read list": (lambda p: untyped.read([1, 2]), "gvpipe.read's list is 1 (int); a path"),
+    "open": (lambda p: untyped.open(3), "3 (int); a path (str or os.PathLike)"),
+    "player": (lambda p: untyped.Player(3), "3 (int); a path"),
+    "info": (lambda p: untyped.info(3.5), "3.5 (float); a path"),
+    "decode": (lambda p: untyped.decode(None), "None (NoneType); a path"),
+    "write": (lambda p: untyped.write("a.npz", p / "b.npz"), "'a.npz' (str); a MeshSequence"),
+    "write path": (lambda p: untyped.write(MeshSequence(TRIANGLE, FACES), 3), "path is 3 (int)"),
+    "compare": (lambda p: untyped.compare("a", "b"), "reference is 'a' (str); a MeshSequence"),
+    "positions": (lambda p: untyped.MeshSequence("x", FACES), "positions are 'x' (str); an array"),
+    "no positions": (lambda p: untyped.MeshSequence(None, FACES), "positions are None"),
+    "fps": (lambda p: untyped.MeshSequence(TRIANGLE, FACES, "30"), "fps is '30' (str); a number"),
+    "attributes": (lambda p: untyped.MeshSequence(TRIANGLE, FACES, 30.0, [1]), "attributes are [1] (list)"),
+    "faces": (lambda p: untyped.MeshSequence(TRIANGLE, "x"), "faces are 'x' (str); an array of shape (triangles, 3)"),
     "encode fps": (
-        lambda p: gvpipe.encode(MeshSequence(TRIANGLE, FACES), p / "o.mp4", fps="9"), "fps is '9' (str)",  # type: ignore[arg-type]
+        lambda p: untyped.encode(MeshSequence(TRIANGLE, FACES), p / "o.mp4", fps="9"), "fps is '9' (str)",
     ),
 }  # fmt: skip
 

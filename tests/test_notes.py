@@ -15,6 +15,7 @@ from folders import DOCS
 from sequences import grid
 
 import gvpipe
+from gvpipe.arrays import Array
 from gvpipe.cli.commands import cli
 from gvpipe.errors import InputError, OutputError
 from gvpipe.io.discovery import find_frames, order_list
@@ -99,13 +100,13 @@ def test_binary_quads(tmp_path: Path) -> None:
 
 def test_a_frame_rate_that_was_assumed(run: Run, walk: Path, sequence: MeshSequence, tmp_path: Path) -> None:
     out = tmp_path / "o.mp4"
-    np.savez(tmp_path / "no_fps.npz", vertices=sequence.positions, faces=sequence.faces)
+    np.savez(tmp_path / "no_fps.npz", vertices=sequence.positions[:], faces=sequence.faces)
     gvpipe.write(sequence, tmp_path / "fps.npz")
     for source in (walk, tmp_path / "no_fps.npz"):
         assert notes_of(run, "encode", source, out, *OPTIONS) == [ASSUMED_FPS]
         assert notes_of(run, "encode", source, out, *OPTIONS, "--fps", 30) == []
     assert notes_of(run, "encode", tmp_path / "fps.npz", out, *OPTIONS) == []
-    assert gvpipe.encode(gvpipe.read(walk), out, fps=24.0, **FAST).notes == []  # type: ignore[arg-type]
+    assert gvpipe.encode(gvpipe.read(walk), out, fps=24.0, **FAST).notes == []
 
 
 def test_a_bound_larger_than_the_object(run: Run, tmp_path: Path, sequence: MeshSequence) -> None:
@@ -117,13 +118,13 @@ def test_a_bound_larger_than_the_object(run: Run, tmp_path: Path, sequence: Mesh
 
 
 def test_attributes_that_the_file_does_not_carry(run: Run, sequence: MeshSequence, tmp_path: Path) -> None:
-    attributes = {"uv": np.zeros((72, 2), np.float32), "color": np.zeros((72, 4), np.uint8)}
+    attributes: dict[str, Array] = {"uv": np.zeros((72, 2), np.float32), "color": np.zeros((72, 4), np.uint8)}
     gvpipe.write(MeshSequence(sequence.positions, sequence.faces, 25.0, attributes), tmp_path / "a.npz")
     assert notes_of(run, "encode", tmp_path / "a.npz", tmp_path / "o.mp4", *OPTIONS) == ["the file does not carry color, uv"]
 
 
 def test_the_library_prints_nothing(walk: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    report = gvpipe.encode(walk / "f1.obj", tmp_path / "o.mp4", max_error=1e3, **FAST)  # type: ignore[arg-type]
+    report = gvpipe.encode(walk / "f1.obj", tmp_path / "o.mp4", max_error=1e3, **FAST)
     assert len(report.notes) == 2 and report.to_json()["notes"] == report.notes
     assert capfd.readouterr() == ("", "")
 

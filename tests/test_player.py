@@ -13,6 +13,7 @@ from sequences import waving
 
 import gvpipe
 from gvpipe import frame_cache
+from gvpipe.arrays import Float32
 from gvpipe.errors import CorruptFile
 from gvpipe.frame_cache import FrameCache
 from gvpipe.registry import codec_ids
@@ -30,7 +31,7 @@ class Reader:
         self.threads: set[int] = set()
         self.lock = threading.Lock()
 
-    def read(self, start: int, stop: int) -> frame_cache.Float32:
+    def read(self, start: int, stop: int) -> Float32:
         with self.lock:
             self.reads.append((start, stop))
             self.threads.add(threading.get_ident())
@@ -102,7 +103,7 @@ def test_an_error_reaches_the_frame_it_belongs_to_and_is_not_kept() -> None:
     reader = Reader()
     broken = {3}
 
-    def read(start: int, stop: int) -> frame_cache.Float32:
+    def read(start: int, stop: int) -> Float32:
         if start // GROUP in broken:
             raise CorruptFile("group 3")
         return reader.read(start, stop)
@@ -142,7 +143,7 @@ def test_many_threads_share_a_cache(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_video_plays_alike_forwards_backwards_and_from_threads(codec: str, tmp_path: Path) -> None:
     path = tmp_path / "a.mp4"
     gvpipe.encode(waving(8, 40), path, codec=codec)
-    whole = gvpipe.decode(path).positions
+    whole = gvpipe.decode(path).positions[:]
     with gvpipe.open(path) as video:
         assert len(video) == 40
         np.testing.assert_array_equal(np.stack(list(video)), whole)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from folders import DATA
 from sequences import held, patched, waving
 
 import gvpipe
+from gvpipe.codec import Encoded
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of, quality_of
@@ -54,8 +56,11 @@ def test_the_scale() -> None:
         assert quality_of(error_of(quality)) == pytest.approx(quality)
 
 
+EMPTY = Encoded(Bitstream("none", 1, 1, 1, 0, 30.0), np.arange(1))
+
+
 def pretend(step: float, exponent: float) -> Aimed:
-    return Aimed(Bitstream("none", 1, 1, 1, 0, 30.0), step, 0.3 * step**exponent)
+    return Aimed(EMPTY, step, 0.3 * step**exponent)
 
 
 @pytest.mark.parametrize("exponent", [0.6, 1.0, 1.3])
@@ -69,7 +74,7 @@ def test_errors_that_do_not_follow_the_step_end_the_loop() -> None:
 
     def attempt(step: float) -> Aimed:
         tried.append(step)
-        return Aimed(Bitstream("none", 1, 1, 1, 0, 30.0), step, 0.0)
+        return Aimed(EMPTY, step, 0.0)
 
     assert mend(attempt, 1.0, 1e30).step in tried
     assert len(tried) == 3

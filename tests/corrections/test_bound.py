@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from sequences import awkward, waving
 
 import gvpipe
+from gvpipe.arrays import Float32, Int32
 from gvpipe.codec import LevelReader
 from gvpipe.container import mp4
 from gvpipe.container.bitstream import Bitstream
@@ -29,7 +30,7 @@ from gvpipe.errors import CorruptFile, FormatError, InputError
 from gvpipe.metrics.vertex_errors import frame_diagonal, measure_errors
 from gvpipe.rate_control import trials
 from gvpipe.registry import codec_class, codec_ids, open_reader
-from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 AWKWARD = awkward()
 each_codec = pytest.mark.parametrize("codec", codec_ids())
@@ -174,7 +175,7 @@ def test_a_file_out_of_bound_never_takes_its_name(tmp_path: Path, monkeypatch: p
     """If correcting went wrong, the check of the finished file finds out."""
     path = tmp_path / "a.mp4"
     path.write_bytes(b"before")
-    honest = trials.encode_corrections
+    honest = encode_corrections
     monkeypatch.setattr(trials, "encode_corrections", lambda *a: (b"", honest(*a)[1]))
     with pytest.raises(InputError, match="nothing was written"):
         gvpipe.encode(waving(12, 8), path, "pca", max_error="0.01%")

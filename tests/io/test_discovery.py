@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gvpipe.errors import InputError
-from gvpipe.io.discovery import find_frames, natural_key
+from gvpipe.io.discovery import find_frames
+from gvpipe.io.numbering import natural_key
 from gvpipe.io.pattern import Pattern, match_pattern
 
 

@@ -25,17 +25,17 @@ def decaying(n: int, decades: float) -> Principal:
     decades=st.floats(0, 12),
     part=st.floats(0.001, 0.9),
     point_cost=st.floats(0.05, 0.5),
-    row_cost=st.floats(0.05, 10),
+    entry_cost=st.floats(0.05, 10),
     noise=st.floats(1, 4),
 )
 def test_any_error_is_met_where_components_leave_too(
-    n: int, decades: float, part: float, point_cost: float, row_cost: float, noise: float
+    n: int, decades: float, part: float, point_cost: float, entry_cost: float, noise: float
 ) -> None:
     principal = decaying(n, decades)
     low, high = np.log(2 * principal.rest), np.log(principal.energies.sum())
     error = float(np.exp(low + part * (high - low)))
     left = (noise * N_POINTS + N_ROWS) / 12
-    count = functools.partial(count_components, principal, N_POINTS, point_cost=point_cost, row_cost=row_cost)
+    count = functools.partial(count_components, principal, N_POINTS, point_cost=point_cost, entry_cost=entry_cost)
     step, n_kept = choose_step(principal, error, count, left)
     assert 0.998 * error < expected_error(principal, n_kept, step, left) <= error
     # as many as are worth it at that step, or at one a little off where that number's error jumps

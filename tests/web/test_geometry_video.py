@@ -38,7 +38,7 @@ slow = pytest.mark.slow  # the default run has one test of exact positions and o
 
 PLAYER_PAGE = (DOCS / "player.md").read_text("utf-8")
 SAMBA = DATA / "samba.npz"
-FAST = {"preset": "ultrafast", "clusters": 3, "gop": 4}
+FAST: dict[str, Any] = {"preset": "ultrafast", "clusters": 3, "gop": 4}
 KINDS: dict[str, dict[str, Any]] = {  # how vertices move, and where their pixels are: all that a file may be
     "affine": {"prediction": "affine", "placement": "charts"},
     "affine-halves": {"prediction": "affine", "placement": "halves"},
@@ -189,7 +189,7 @@ def test_frames_are_corrected(module: Callable[..., Any], site: tuple[Path, str]
     frames = module(FRAMES, "corrected.mp4", [*range(12)])["frames"]
     found = np.stack([np.frombuffer(base64.b64decode(text), "<f4").reshape(-1, 3) for text in frames])
     plain = open_reader(kinds["patched"]).read(0, 12)
-    before, after = (np.linalg.norm(sequence.positions - p, axis=2).max() for p in (plain, found))
+    before, after = (np.linalg.norm(sequence.positions[:] - p, axis=2).max() for p in (plain, found))
     assert after <= LARGEST_ERROR < before
 
 
@@ -385,7 +385,7 @@ KLT = {"prediction": "blended", "transform": "klt"}
 
 @slow
 @pytest.mark.parametrize("settings", [{"codec": "pca"}, {"profile": "precise"}, {"image": "jpeg"}, KLT], ids=str)
-def test_files_not_for_browsers_say_so(settings: dict[str, str], module: Callable[..., Any], site: tuple[Path, str]) -> None:
+def test_files_not_for_browsers_say_so(settings: dict[str, Any], module: Callable[..., Any], site: tuple[Path, str]) -> None:
     gvpipe.encode(waving(6, 5), site[0] / "other.mp4", **settings)
     kind, message = module("return GeometryVideo.load(args[0]).catch((error) => [error.kind, error.message])", "other.mp4")
     assert kind == "unsupported"
@@ -397,7 +397,8 @@ def test_files_not_for_browsers_say_so(settings: dict[str, str], module: Callabl
 def test_counts_that_do_not_fit_are_noticed(
     field: str, value: int, module: Callable[..., Any], site: tuple[Path, str], video: Path
 ) -> None:
-    write_file(dataclasses.replace(read_file(video), **{field: value}), site[0] / "counts.mp4")
+    changed: dict[str, Any] = {field: value}
+    write_file(dataclasses.replace(read_file(video), **changed), site[0] / "counts.mp4")
     assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", "counts.mp4") == "corrupt"
 
 
@@ -412,7 +413,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Bitstream]:
     sequence = patched()
     gvpipe.encode(sequence, path, **{**FAST, "prediction": "blended"})
     found["patched"] = plain = read_file(path)
-    bound = Bound.of(LARGEST_ERROR, float(np.abs(sequence.positions).max()))
+    bound = Bound.of(LARGEST_ERROR, float(np.abs(sequence.positions[:]).max()))
     section, _ = encode_corrections(sequence, open_reader(plain), bound)
     found["corrected"] = dataclasses.replace(plain, sections={**plain.sections, "corrections": section})
     gvpipe.encode(held(waving(9, len(LENGTHS)), LENGTHS), path, **FAST)

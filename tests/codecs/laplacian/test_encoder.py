@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from gvcodecs.laplacian import Laplacian
 from gvcodecs.laplacian.anchors import SMALL, choose_anchors
 from gvcodecs.laplacian.average_coding import decode_average, encode_average
 from gvcodecs.laplacian.delta_rows import N_KNOWN, border_order, delta_causal_order, delta_order
-from gvcodecs.laplacian.domain import build_domain, build_surface
+from gvcodecs.laplacian.domain import Surface, build_domain, build_surface
 from gvcodecs.laplacian.extended_laplacian import MAX_NEIGHBOURS, ExtendedLaplacian, thin_hubs
 from gvcodecs.laplacian.header import Header
 from gvcodecs.laplacian.mesh_scale import edge_lengths, fineness
@@ -57,11 +58,17 @@ def decoded(bitstream: Bitstream, like: MeshSequence) -> MeshSequence:
     return MeshSequence(reader.read(0, bitstream.n_frames), reader.faces, like.fps)
 
 
+def kg(sequence: MeshSequence, bitstream: Bitstream) -> float:
+    error = compare(sequence, decoded(bitstream, sequence)).kg
+    assert error is not None
+    return error
+
+
 def n_bytes(bitstream: Bitstream, *names: str) -> int:
     return sum(len(data) for name, data in bitstream.sections.items() if name.split(".")[0] in names)
 
 
-def surface_of(shape: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, object]:
+def surface_of(shape: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, Surface]:
     points, faces = shape
     return points, build_surface(faces.astype(np.int32), len(points))
 
@@ -72,14 +79,16 @@ def test_perceived_error_falls_and_bytes_rise_with_quality() -> None:
     for quality in (20, 40, 60, 80, 100):
         bitstream = Laplacian(quality=quality).encode(sequence).bitstream
         sizes.append(sum(map(len, bitstream.sections.values())))
-        errors.append(compare(sequence, decoded(bitstream, sequence)).sted)
+        sted = compare(sequence, decoded(bitstream, sequence)).sted
+        assert sted is not None
+        errors.append(sted)
     assert sizes == sorted(sizes)
-    assert errors == sorted(errors, reverse=True)  # type: ignore[type-var]
+    assert errors == sorted(errors, reverse=True)
 
 
 def test_the_geometric_operator_needs_fewer_bits_than_connectivity_alone_and_prediction_fewer_still() -> None:
     sequence = moving()
-    settings = {"quality": 60, "edge_power": 0.0}
+    settings: dict[str, Any] = {"quality": 60, "edge_power": 0.0}
     variants = [("tutte", "none"), ("mean-value", "none"), ("mean-value", "rigid"), ("mean-value", "kalman")]
     sizes = [
         n_bytes(Laplacian(operator=o, delta_prediction=p, **settings).encode(sequence).bitstream, "deltas") for o, p in variants
@@ -93,10 +102,10 @@ def test_more_and_finer_anchors_bound_the_drift() -> None:
     """At one step, which a given number of components leaves as it is."""
     sequence = moving()
     coarse, dense, fine = (
-        compare(sequence, decoded(Laplacian(quality=50, components=12, **settings).encode(sequence).bitstream, sequence))
+        kg(sequence, Laplacian(quality=50, components=12, **settings).encode(sequence).bitstream)
         for settings in ({"anchors": 400}, {"anchors": 16}, {"anchors": 4, "anchor_ratio": 0.5})
     )
-    assert fine.kg < dense.kg < coarse.kg  # type: ignore[operator]
+    assert fine < dense < coarse
 
 
 def test_reorder_gives_the_same_frames_in_another_order() -> None:
@@ -112,7 +121,7 @@ def test_still_sequences_cost_little_more_than_their_average() -> None:
     points, faces = tube(12, 40)
     still = MeshSequence(np.repeat(points[None].astype(np.float32), 30, axis=0), faces)
     bitstream = Laplacian().encode(still).bitstream
-    assert compare(still, decoded(bitstream, still)).kg < 0.5  # type: ignore[operator]
+    assert kg(still, bitstream) < 0.5
     assert sum(map(len, bitstream.sections.values())) < 6000
 
 
@@ -145,7 +154,7 @@ def test_every_component_has_an_anchor_and_small_ones_nothing_else() -> None:
 
 def test_selected_rows_know_what_they_knew() -> None:
     _, surface = surface_of(grid(12))
-    causal = surface.causal  # type: ignore[attr-defined]
+    causal = surface.causal
     keep = np.arange(len(causal.order)) < 50
     chosen = select_vectors(causal, keep)
     assert np.array_equal(causal.order[keep][chosen.neighbours], causal.neighbours[: causal.starts[50]])
@@ -194,7 +203,7 @@ def test_rigid_weights_carry_any_linear_map_of_the_average() -> None:
 @pytest.mark.parametrize("operator", ["mean-value", "cotangent", "tutte"])
 def test_exact_deltas_and_anchors_give_the_coefficients_back(operator: str) -> None:
     points, surface = surface_of(tube(12, 40))
-    domain = build_domain(surface, points, dataclasses.replace(HEADER, operator=operator))  # type: ignore[arg-type]
+    domain = build_domain(surface, points, dataclasses.replace(HEADER, operator=operator))
     coefficients = np.random.default_rng(0).standard_normal((len(points), 5))
     deltas = domain.system.deltas(coefficients)[domain.delta_points]
     solved = domain.system.solve(domain.delta_points, deltas, coefficients[domain.anchors.points])
@@ -214,14 +223,15 @@ def test_a_solution_is_the_least_squares_one() -> None:
 def test_anchors_make_good_what_rounding_of_deltas_did() -> None:
     """Two steps come near the least squares over all values of anchors; exact deltas leave them as they are."""
     points, surface = surface_of(tube(12, 40))
-    domain = build_domain(surface, points, HEADER)  # type: ignore[arg-type]
+    domain = build_domain(surface, points, HEADER)
     wanted = np.random.default_rng(0).standard_normal((len(points), 5)) + 20 * points[:, :1]
     exact = domain.system.deltas(wanted)[domain.delta_points]
     true = wanted[domain.anchors.points]
     assert np.abs(domain.system.fit_anchors(domain.delta_points, exact, wanted) - true).max() < 1e-8
 
     def error(anchored: np.ndarray) -> np.ndarray:
-        return ((domain.system.solve(domain.delta_points, np.rint(exact), anchored) - wanted) ** 2).sum(axis=0)
+        squares: np.ndarray = ((domain.system.solve(domain.delta_points, np.rint(exact), anchored) - wanted) ** 2).sum(axis=0)
+        return squares
 
     fitted = domain.system.fit_anchors(domain.delta_points, np.rint(exact), wanted)
     zero = domain.system.solve(domain.delta_points, np.rint(exact), 0 * true)
@@ -246,19 +256,19 @@ def test_hubs_keep_few_neighbours_and_their_sum() -> None:
     kept = thin.indices[thin.indptr[0] : thin.indptr[1]]
     assert np.diff(kept).max() <= n // MAX_NEIGHBOURS + 2
     sequence = MeshSequence(np.stack([points, 1.1 * points + [0, 0, 0.1]]).astype(np.float32), faces)
-    assert compare(sequence, decoded(Laplacian().encode(sequence).bitstream, sequence)).kg < 1  # type: ignore[operator]
+    assert kg(sequence, Laplacian().encode(sequence).bitstream) < 1
 
 
 def test_the_average_comes_back_to_its_precision() -> None:
     points, surface = surface_of(tube(12, 40))
-    unit = edge_lengths(points, surface.edges).mean()  # type: ignore[attr-defined]
+    unit = edge_lengths(points, surface.edges).mean()
     sizes = []
     for step in (1 / 4, 1 / 64):
         header = dataclasses.replace(HEADER, average_step=step)
-        data, theirs = encode_average(5 + points, surface, header)  # type: ignore[arg-type]
-        assert np.array_equal(decode_average(data, surface, header), theirs)  # type: ignore[arg-type]
+        data, theirs = encode_average(5 + points, surface, header)
+        assert np.array_equal(decode_average(data, surface, header), theirs)
         wanted = (points - points.mean(axis=0)) / unit
-        lengths, expected = (edge_lengths(p, surface.edges) for p in (theirs, wanted))  # type: ignore[attr-defined]
+        lengths, expected = (edge_lengths(p, surface.edges) for p in (theirs, wanted))
         assert np.abs(lengths - expected).mean() < step
         sizes.append(len(data))
     assert sizes[0] < 0.7 * sizes[1]
@@ -266,7 +276,7 @@ def test_the_average_comes_back_to_its_precision() -> None:
 
 def test_dense_regions_are_quantised_finer() -> None:
     points, surface = surface_of(tube(12, 40))
-    edges = surface.edges  # type: ignore[attr-defined]
+    edges = surface.edges
     scale = fineness(points / edge_lengths(points, edges).mean(), edges, 0.75)
     around = np.bincount(edges.ravel(), np.repeat(edge_lengths(points, edges), 2)) / np.bincount(edges.ravel())
     assert np.all(np.diff(scale[np.argsort(around)]) <= 1e-12)
@@ -281,9 +291,9 @@ def test_perturbed_predictions_hardly_move_vertices(prediction: str, monkeypatch
     clean = Laplacian.reader(bitstream).read(0, 20).astype(np.float64)
     original = gvpipe.trajectory.prediction.predict_vectors
 
-    def perturbed(causal: gvpipe.trajectory.prediction.CausalOrder, *rest: object) -> None:
+    def perturbed(causal: gvpipe.trajectory.prediction.CausalOrder, *rest: Any) -> None:
         noise = 1 + 1e-12 * np.random.default_rng(5).choice([-1, 1], len(causal.weights))
-        original(causal._replace(weights=causal.weights * noise), *rest)  # type: ignore[arg-type]
+        original(causal._replace(weights=causal.weights * noise), *rest)
 
     monkeypatch.setattr("gvpipe.trajectory.coefficient_coding.predict_vectors", perturbed)
     moved = Laplacian.reader(bitstream).read(0, 20).astype(np.float64)
@@ -332,7 +342,7 @@ def test_settings_are_checked() -> None:
         {"average_step": 0.0},
     ):
         with pytest.raises(SettingError, match=next(iter(wrong))):
-            Laplacian(**wrong)  # type: ignore[arg-type]
+            Laplacian(**wrong)
 
 
 def test_damage_is_noticed_or_harmless() -> None:
