@@ -24,11 +24,8 @@ settings.load_profile("same")
 if worker := os.environ.get("PYTEST_XDIST_WORKER"):
     # numba replaces a function's index and its machine code one after the other, so processes that share them may mix them up
     os.environ["NUMBA_CACHE_DIR"] = str(ROOT / ".pytest_cache" / f"numba-{worker}")
-FAST: dict[str, Any] = {
-    "preset": "ultrafast",
-    "clusters": 3,
-    "gop": 4,
-}  # cost little, for tests of anything but coding
+# settings that cost little, for tests of anything but coding
+FAST: dict[str, Any] = {"preset": "ultrafast", "clusters": 3, "gop": 4}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -97,3 +94,14 @@ def run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> C
         return Finished(int(stopped.value.code or 0), out, err)
 
     return call
+
+
+@pytest.fixture(params=["sequence", "lazy", "player", "of player"])
+def frames(request: pytest.FixtureRequest, sequence: MeshSequence, video: Path, tmp_path: Path) -> Any:
+    """The small animation as each thing that slices by frame."""
+    if request.param == "lazy":
+        gvpipe.write(sequence, tmp_path / "f" / "%02d.obj")
+        return gvpipe.read(tmp_path / "f", 25.0)
+    if request.param == "sequence":
+        return sequence
+    return gvpipe.open(video) if request.param == "player" else gvpipe.open(video).sequence()

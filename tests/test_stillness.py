@@ -23,8 +23,6 @@ from gvpipe.trajectory.still_vertices import find_still
 
 AWKWARD = awkward()
 MORPH_WAVE = DATA / "morph_wave.npz"
-
-
 PLAIN: list[tuple[str, dict[str, Any]]] = [
     ("pca", {}),
     ("pca", {"predictor": "lsp", "segment": 7}),
@@ -34,8 +32,6 @@ PLAIN: list[tuple[str, dict[str, Any]]] = [
     ("pdct", {}),
     ("pdct", {"clusters": 3, "segment": 7}),
 ]
-
-
 PICTURES: list[tuple[str, dict[str, Any]]] = [
     ("mcgv", {"placement": "tiles"}),
     ("mcgv", {"placement": "charts", "image": "jpeg"}),

@@ -25,7 +25,7 @@ from gvpipe.corrections.bound import (
     encode_corrections,
     find_corrections,
 )
-from gvpipe.corrections.displacements import HEAD, MAX_POSITIONS, Displacements, decode_group, displace, encode_group
+from gvpipe.corrections.displacements import HEAD, MAX_POSITIONS, Displacements, displace, encode_group
 from gvpipe.errors import CorruptFile, FormatError, InputError
 from gvpipe.metrics.vertex_errors import frame_diagonal, measure_errors
 from gvpipe.rate_control import trials
@@ -153,16 +153,6 @@ def test_one_correction_is_enough(largest: float, offset: float, off: float, see
     decoded[found.frames, found.vertices] = displace(decoded[found.frames, found.vertices], found.steps, bound.step)
     assert np.linalg.norm(decoded.astype(np.float64) - wanted, axis=2).max() <= bound.inner
     assert bound.inner >= largest / 2
-
-
-@given(st.integers(1, 12), st.integers(1, 30), st.floats(0, 1), st.integers(0, 99))
-def test_groups_round_trip(n_frames: int, n_vertices: int, share: float, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    vertices, frames = np.nonzero(rng.random((n_vertices, n_frames)) < share)
-    found = Displacements(frames, vertices, rng.integers(-40, 40, (len(frames), 3)) ** 3)
-    back = decode_group(encode_group(found, n_frames), n_frames, n_vertices, SECTION)
-    for name in ("frames", "vertices", "steps"):
-        assert np.array_equal(getattr(found, name), getattr(back, name))
 
 
 def test_a_bound_too_small_to_code_is_refused(tmp_path: Path) -> None:

@@ -1,19 +1,13 @@
-"""Python's side: sequences show and slice themselves, wrong types and names say what is needed."""
+"""Wrong types and misspelt names say what is needed."""
 
 from __future__ import annotations
 
-import base64
-import copy
-import io
-import pickle
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
 
 import gvpipe
 from gvpipe.errors import GvpipeError, InputError, SettingError
@@ -21,98 +15,7 @@ from gvpipe.registry import codec_class
 from gvpipe.sequence import MeshSequence
 
 untyped: Any = gvpipe  # where calls break the annotations on purpose
-
 Run = Callable[..., Any]
-
-
-@pytest.fixture(params=["sequence", "lazy", "player", "of player"])
-def frames(request: pytest.FixtureRequest, sequence: MeshSequence, video: Path, tmp_path: Path) -> Any:
-    """Things that slice by frame."""
-    if request.param == "lazy":
-        gvpipe.write(sequence, tmp_path / "f" / "%02d.obj")
-        return gvpipe.read(tmp_path / "f", 25.0)
-    if request.param == "sequence":
-        return sequence
-    return gvpipe.open(video) if request.param == "player" else gvpipe.open(video).sequence()
-
-
-# showing
-
-
-def test_repr(sequence: MeshSequence, video: Path) -> None:
-    shape = "11 frames of 72 vertices, 128 triangles, 25 fps"
-    assert repr(sequence) == f"<MeshSequence sequence: {shape}>"
-    assert repr(gvpipe.open(video)) == f"<Player {video}: codec mcgv, {shape}>"
-    far = MeshSequence(np.array([[[5e6, 0, 0], [5e6 + 0.3, 0, 1], [5e6 + 0.1, 1, 0]]]), np.array([[0, 1, 2]]), 30.0, name="far")
-    assert repr(far) == "<MeshSequence far: 1 frames of 3 vertices, 1 triangles, 30 fps, origin (5000000, 0, 0)>"
-
-
-def test_html(sequence: MeshSequence, video: Path, frames: Any) -> None:
-    """A picture that shows something, and the numbers."""
-    text = frames._repr_html_()
-    (data,) = re.findall(r'src="data:image/png;base64,([^"]+)"', text)
-    picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(data))))
-    assert picture.shape == (240, 240, 3)
-    drawn = (picture != picture[0, 0]).any(axis=2).mean()
-    assert 0.05 < drawn < 0.9
-    for words in ("<td", "72", "128", "11 at 25 per second, 0.44 s"):
-        assert words in text
-    size = f"{video.stat().st_size} bytes"
-    assert (size in text and "mcgv version 4" in text) == isinstance(frames, gvpipe.Player)
-
-
-def test_html_of_what_cannot_be_painted(video: Path) -> None:
-    points = MeshSequence(np.zeros((2, 3, 3)), np.zeros((0, 3), np.int32), name="<b>points & co</b>")
-    text = points._repr_html_()
-    assert "<img" not in text and "&lt;b&gt;points &amp; co&lt;/b&gt;" in text and "<td" in text
-    player = gvpipe.open(video)
-    video.unlink()
-    assert "<img" in player._repr_html_() and "bytes" not in player._repr_html_()
-
-
-def test_showing_loads_no_renderer(sequence: MeshSequence) -> None:
-    import subprocess
-    import sys
-
-    program = "import sys, gvpipe.sequence, gvpipe.player; print([m for m in sys.modules if 'rendering' in m or m == 'PIL'])"
-    assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout == "[]\n"
-
-
-# slicing
-
-
-def test_slices(frames: Any) -> None:
-    whole = frames[:]
-    assert whole.shape == frames.shape == (11, 72, 3) and whole.dtype == np.float32
-    assert np.array_equal(frames[3], whole[3]) and np.array_equal(frames[-1], whole[10])
-    assert np.array_equal(frames[np.int64(4)], whole[4])
-    for key in (slice(2, 5), slice(None, None, 3), slice(8, 2, -2), slice(-3, None), slice(5, 5), slice(7, 3), slice(5, 2, 2)):
-        assert np.array_equal(frames[key], whole[key]) and frames[key].shape == whole[key].shape
-    assert np.array_equal(np.stack(list(frames)), whole)
-    for index in (11, -12):
-        with pytest.raises(IndexError, match=f"frame {index}"):
-            frames[index]
-    for wrong in (1.5, "a", None):
-        with pytest.raises(TypeError):
-            frames[wrong]
-
-
-def test_sequences_are_values_that_move(sequence: MeshSequence) -> None:
-    for same in (copy.copy(sequence), copy.deepcopy(sequence), pickle.loads(pickle.dumps(sequence))):
-        assert np.array_equal(same[:], sequence[:]) and same != sequence and len({same, sequence}) == 2
-
-
-def test_numbers_of_numpy_are_numbers(sequence: MeshSequence, tmp_path: Path) -> None:
-    made = untyped.MeshSequence(sequence.positions, sequence.faces, np.float32(24))
-    assert gvpipe.encode(made, tmp_path / "o.mp4", preset="ultrafast", clusters=3).fps == 24.0 and type(made.fps) is float
-
-
-def test_a_list_is_an_array() -> None:
-    assert untyped.MeshSequence([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], [[0, 1, 2]]).shape == (1, 3, 3)
-
-
-# wrong types
-
 TRIANGLE = np.zeros((1, 3, 3), np.float32)
 FACES = np.array([[0, 1, 2]])
 WRONG_TYPES: dict[str, tuple[Callable[[Path], object], str]] = {
@@ -157,8 +60,6 @@ def test_wrong_arrays_stay_input_errors() -> None:
     with pytest.raises(InputError, match="shape"):
         MeshSequence(np.zeros(3), FACES)
 
-
-# misspelt names
 
 MISSPELT = {
     "setting": ({"qualty": 80}, "no setting 'qualty'", "did you mean 'quality'?"),
