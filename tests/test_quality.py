@@ -62,8 +62,8 @@ def pretend(step: float, exponent: float) -> StepTrial:
 
 @pytest.mark.parametrize("exponent", [0.6, 1.0, 1.3])
 def test_steps_are_corrected_until_the_error_is_close(exponent: float) -> None:
-    aimed = find_step(lambda step: pretend(step, exponent), 1.0, 1.0)
-    assert BAND[0] <= aimed.error <= BAND[1]
+    trial = find_step(lambda step: pretend(step, exponent), 1.0, 1.0)
+    assert BAND[0] <= trial.error <= BAND[1]
 
 
 def test_errors_that_do_not_follow_the_step_end_the_loop() -> None:
