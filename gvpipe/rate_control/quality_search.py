@@ -52,7 +52,7 @@ def find_quality(attempt: Attempt, target: Target, start: float, tolerance: floa
     allowed comes close enough, the closest on the allowed side is.
 
     Raises:
-        InputError: no quality meets the target; the message tells the best.
+        InputError: no quality meets the target; the message names the best.
     """
     goal = _Goal(target, tolerance)
     search = _Search(goal, start)

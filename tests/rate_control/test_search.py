@@ -91,7 +91,7 @@ def test_errors_that_scatter_are_met_mostly(scatter: float, least: float, growth
 
     Sizes that are alike do not make files the same: those of small meshes hardly change with quality.
 
-    The search begins where codecs aim at the target, and miss by some percent.
+    The search begins at the quality of the target error, which codecs miss by some percent.
     """
     n_met = n_encodes = 0
     for seed in range(200):
