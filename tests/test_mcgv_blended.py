@@ -21,9 +21,10 @@ from gvcodecs.mcgv.motion.reconstruction_kernels import rebuild_blended
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Blend, BlendFit, Weights, homogeneous
 from gvcodecs.mcgv.motion.skinning_coding import decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.motion.skinning_fit import Motions, fit_blend
-from gvcodecs.mcgv.motion.weight_coding import Prices, decode_weights, encode_weights
-from gvcodecs.mcgv.motion.weight_kernels import MAX_LISTED, cluster_of, list_known, rank_of, share
-from gvcodecs.mcgv.motion.weight_selection import Transforms, choose
+from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights, guess_prices
+from gvcodecs.mcgv.motion.weight_fit_kernels import Transforms
+from gvcodecs.mcgv.motion.weight_kernels import MAX_LISTED, cluster_of, list_clusters, new_list, rank_of, suggest
+from gvcodecs.mcgv.motion.weight_selection import PointMotions, choose
 from gvpipe.connectivity.welded_mesh import WeldedMesh
 from gvpipe.container.mp4 import read_file
 from gvpipe.errors import CorruptFile, FormatError, NewerVersion
@@ -49,19 +50,19 @@ def sheet(n: int = 12) -> tuple[Float64, sparse.csr_array]:
 def random_weights(neighbours: sparse.csr_array, n_clusters: int, seed: int, own: float = 0.4) -> Weights:
     """Weights that some points have of their own and the others from their lists, as a file may hold them."""
     draw = np.random.default_rng(seed)
-    known = causal_neighbours(neighbours)
-    n_points = len(known.starts) - 1
+    causal = causal_neighbours(neighbours)
+    n_points = len(causal.starts) - 1
     clusters, parts = np.zeros((n_points, INFLUENCES), np.int32), np.zeros((n_points, INFLUENCES), np.int32)
-    listed, sums, shares = np.zeros(MAX_LISTED, np.int64), np.zeros(MAX_LISTED, np.int64), np.zeros(INFLUENCES, np.int64)
+    listed = new_list()
     for point in range(n_points):
-        n_listed = list_known(point, known.starts, known.near, clusters, parts, listed, sums)
+        n_listed = list_clusters(point, causal, Weights(clusters, parts), listed)
         if n_listed and draw.random() >= own:
-            n = share(sums, n_listed, shares)
-            clusters[point, :n], parts[point, :n] = listed[:n], shares[:n]
+            n = suggest(listed, n_listed)
+            clusters[point, :n], parts[point, :n] = listed.clusters[:n], listed.shares[:n]
             continue
         n = int(draw.integers(1, min(INFLUENCES, n_clusters) + 1))
         chosen = draw.permutation(n_clusters)[:n]
-        ranks = [rank_of(int(c), listed, n_listed) for c in chosen]
+        ranks = [rank_of(int(c), listed.clusters, n_listed) for c in chosen]
         clusters[point, :n] = chosen[np.argsort(ranks)]
         ends = np.sort(draw.permutation(TOTAL - 1)[: n - 1]) + 1
         parts[point, :n] = np.diff(np.r_[0, ends, TOTAL])
@@ -177,19 +178,15 @@ def test_choice_finds_the_weights_of_a_blend() -> None:
     base, neighbours, weights, motions = blended()
     blend = Blend(base, weights, 3)
     transforms = blend.transforms(BlendFit(blend).fit(motions))
-    known, ring = causal_neighbours(neighbours), neighbours
-    guess = Prices.guess()
-    # every point knows all clusters, and starts from weights that are wrong
-    clusters, parts = weights.clusters.copy(), weights.weights[::-1].copy()
-    errors = np.zeros(len(base))
-    near = (ring.indptr.astype(np.int64), ring.indices.astype(np.int64))
-    prices = (guess.count, guess.gap, guess.change)
+    # every point sees all clusters, and starts from weights that are wrong
+    found = Weights(weights.clusters, weights.weights[::-1].copy())
+    ring = (neighbours.indptr.astype(np.int64), neighbours.indices.astype(np.int64))
     points = homogeneous(base)
+    flat = transforms.reshape(-1, transforms.shape[2])
+    prepared = Transforms(np.ascontiguousarray(transforms.swapaxes(1, 2)), flat @ flat.T)
     for price, most in ((0.0, 1.0), (1e-4, 2.0)):
-        choose(
-            known.starts, known.near, *near, points, motions, Transforms.of(transforms), price, *prices, clusters, parts, errors
-        )
-        found = Weights(clusters, parts)
+        problem = PointMotions(causal_neighbours(neighbours), *ring, points, motions, price)
+        found, errors = choose(problem, prepared, guess_prices(), found)
         check_weights(found, 3)
         exact = motions - _applied(points, found, transforms)
         assert np.allclose(np.square(exact).sum(axis=1), errors, atol=1e-9)

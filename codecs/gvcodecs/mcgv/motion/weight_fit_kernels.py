@@ -1,0 +1,246 @@
+"""Compiled least squares of one point's skinning weights: positive weights, of sum one, over few of some candidate clusters.
+
+Candidates' errors are kept as one Gram matrix. With ``r_a``, what cluster a alone misses of the point's motion, weights w that
+sum to one leave the squared error ``sum over a, b  w_a w_b G_ab`` where ``G_ab = r_a . r_b``. Clusters are taken one after the
+other, each time the one that helps most (orthogonal least squares: Chen, Cowan and Grant, "Orthogonal least squares learning
+algorithm for radial basis function networks", 1991, DOI 10.1109/72.80341).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL
+from gvpipe.arrays import Float64, Int64
+from gvpipe.compiled import compiled
+
+MAX_CANDIDATES = 10  # clusters that a fit considers
+LEAST_GAIN = 1e-3  # of the error: a further cluster must gain this much to be tried
+RIDGE = 1e-7  # of a system's trace: clusters may move alike
+
+
+class Transforms(NamedTuple):
+    """Transforms as a fit reads them.
+
+    Args:
+        columns: ``(K, m, 4)`` the transforms of homogeneous coordinates, number after number of a motion.
+        products: ``(4K, 4K)`` of the transforms' rows with one another.
+    """
+
+    columns: Float64
+    products: Float64
+
+
+class WeightFit(NamedTuple):
+    """Memory for the fit of one point's weights; c is `MAX_CANDIDATES`.
+
+    Args:
+        candidates: ``(c,) int64`` clusters.
+        along: ``(c,)`` products of the candidates' predictions with the motion.
+        gram: ``(c, c)`` products of what the candidates alone miss of the motion.
+        differences: ``(c, c)`` products of candidates less the first taken, those taken eliminated; gains: ``(c,)`` likewise.
+        taken: ``(4,) int64`` indices of the candidates taken.
+        solution: ``(4,)`` their weights, of sum one; parts: ``(4,) int64`` the same in 1 / TOTAL.
+        system: ``(4, 5)`` equations.
+    """
+
+    candidates: Int64
+    along: Float64
+    gram: Float64
+    differences: Float64
+    gains: Float64
+    taken: Int64
+    solution: Float64
+    parts: Int64
+    system: Float64
+
+
+def new_fit() -> WeightFit:
+    """Memory for a fit."""
+    return WeightFit(
+        candidates=np.zeros(MAX_CANDIDATES, np.int64),
+        along=np.zeros(MAX_CANDIDATES),
+        gram=np.zeros((MAX_CANDIDATES, MAX_CANDIDATES)),
+        differences=np.zeros((MAX_CANDIDATES, MAX_CANDIDATES)),
+        gains=np.zeros(MAX_CANDIDATES),
+        taken=np.zeros(INFLUENCES, np.int64),
+        solution=np.zeros(INFLUENCES),
+        parts=np.zeros(INFLUENCES, np.int64),
+        system=np.zeros((INFLUENCES, INFLUENCES + 1)),
+    )
+
+
+@compiled
+def fill_gram(start: int, stop: int, place: Float64, motion: Float64, transforms: Transforms, fit: WeightFit) -> None:
+    """Fill ``fit.gram`` for the candidates ``start`` to ``stop``.
+
+    Transforms are multiplied with one another once for all points. So a point's frames count but once per candidate.
+
+    Args:
+        start, stop: indices of candidates; those before are there.
+        place: ``(4,)`` homogeneous coordinates of the point.
+        motion: ``(m,)`` its displacements.
+        transforms: of all clusters.
+        fit: its candidates are set.
+    """
+    square = 0.0
+    for i in range(len(motion)):
+        square += motion[i] * motion[i]
+    for a in range(start, stop):
+        columns = transforms.columns[fit.candidates[a]]
+        x, y, z, one = 0.0, 0.0, 0.0, 0.0
+        for i in range(len(motion)):
+            x += columns[i, 0] * motion[i]
+            y += columns[i, 1] * motion[i]
+            z += columns[i, 2] * motion[i]
+            one += columns[i, 3] * motion[i]
+        fit.along[a] = place[0] * x + place[1] * y + place[2] * z + place[3] * one
+        for b in range(a + 1):
+            total = 0.0
+            for r in range(4):
+                row = transforms.products[4 * fit.candidates[a] + r]
+                first = 4 * fit.candidates[b]
+                total += place[r] * (
+                    place[0] * row[first] + place[1] * row[first + 1] + place[2] * row[first + 2] + place[3] * row[first + 3]
+                )
+            fit.gram[a, b] = fit.gram[b, a] = total - fit.along[a] - fit.along[b] + square
+
+
+@compiled
+def extend(fit: WeightFit, n: int, size: int, previous: float) -> float:
+    """Take the candidate of least error with positive weights as number ``size``; return the error, or infinity if none helps.
+
+    Errors follow from a Cholesky elimination of the differences from the first cluster. So one small system is solved for each
+    candidate taken, not for each tried.
+
+    Args:
+        fit: with ``n`` candidates, of which ``size - 1`` are taken; its solution is set.
+        n: candidates.
+        size: 1..4.
+        previous: error of the clusters taken so far.
+    """
+    if size == 1:
+        return _take_first(fit, n)
+    least = RIDGE * fit.gram[fit.taken[0], fit.taken[0]] + 1e-300
+    refused = 1 << fit.taken[0]  # bits of candidates that are taken, or whose weights would not be positive
+    for j in range(1, size - 1):
+        refused |= 1 << fit.taken[j]
+    while True:
+        best = _find_best(fit.differences, fit.gains, n, least, refused, LEAST_GAIN * previous)
+        if best < 0:
+            return np.inf
+        fit.taken[size - 1] = best
+        error = _solve(fit.gram, fit.taken, size, fit.system, fit.solution)
+        if error < np.inf:
+            break
+        refused |= 1 << best
+    _eliminate(fit.differences, fit.gains, n, best)
+    return error
+
+
+@compiled
+def _take_first(fit: WeightFit, n: int) -> float:
+    """Take the candidate that leaves the least error alone; return that error."""
+    gram, best = fit.gram, 0
+    for a in range(1, n):
+        if gram[a, a] < gram[best, best]:
+            best = a
+    fit.taken[0], fit.solution[0] = best, 1.0
+    for a in range(n):
+        fit.gains[a] = gram[best, best] - gram[a, best]
+        for b in range(n):
+            fit.differences[a, b] = gram[a, b] - gram[a, best] - gram[best, b] + gram[best, best]
+    return float(gram[best, best])
+
+
+@compiled
+def _find_best(differences: Float64, gains: Float64, n: int, least: float, refused: int, most: float) -> int:
+    """The candidate that gains most, and more than ``most``; -1 if none does.
+
+    Candidates whose bits ``refused`` has are left out, and those that differ from the ones taken by no more than ``least``.
+    """
+    best = -1
+    for a in range(n):
+        if not refused >> a & 1 and differences[a, a] > least and gains[a] > 0.0 and gains[a] ** 2 > most * differences[a, a]:
+            best, most = a, gains[a] ** 2 / differences[a, a]
+    return best
+
+
+@compiled
+def _eliminate(differences: Float64, gains: Float64, n: int, taken: int) -> None:
+    """Take a candidate's part out of the differences and gains of the others."""
+    pivot = differences[taken, taken]
+    for a in range(n):
+        if a != taken:
+            part = differences[a, taken] / pivot
+            gains[a] -= part * gains[taken]
+            for b in range(n):
+                if b != taken:
+                    differences[a, b] -= part * differences[taken, b]
+
+
+@compiled
+def _solve(gram: Float64, taken: Int64, n: int, system: Float64, solution: Float64) -> float:
+    """Fill ``solution`` for the ``n`` clusters taken; return the error, or infinity if a weight would not be positive."""
+    trace = 0.0
+    for i in range(n):
+        trace += gram[taken[i], taken[i]]
+    for i in range(n):
+        for j in range(n):
+            system[i, j] = gram[taken[i], taken[j]]
+        system[i, i] += RIDGE * trace + 1e-300
+        system[i, n] = 1.0
+    for i in range(n):  # symmetric and positive: no pivoting
+        for r in range(i + 1, n):
+            factor = system[r, i] / system[i, i]
+            for c in range(i, n + 1):
+                system[r, c] -= factor * system[i, c]
+    total = 0.0
+    for i in range(n - 1, -1, -1):
+        value = system[i, n]
+        for c in range(i + 1, n):
+            value -= system[i, c] * solution[c]
+        solution[i] = value / system[i, i]
+        total += solution[i]
+    if not total > 0:
+        return np.inf
+    for i in range(n):
+        solution[i] /= total
+        if not solution[i] > 0:
+            return np.inf
+    error = 0.0
+    for i in range(n):
+        for j in range(n):
+            error += gram[taken[i], taken[j]] * solution[i] * solution[j]
+    return max(error, 0.0)
+
+
+@compiled
+def round_weights(solution: Float64, n: int, parts: Int64) -> bool:
+    """Round ``n`` weights of sum one to ``parts`` of TOTAL, largest remainders up; false if one would vanish."""
+    left = TOTAL
+    for j in range(n):
+        parts[j] = int(solution[j] * TOTAL)
+        left -= parts[j]
+    for _ in range(left):
+        largest = 0
+        for j in range(1, n):
+            if solution[j] * TOTAL - parts[j] > solution[largest] * TOTAL - parts[largest]:
+                largest = j
+        parts[largest] += 1
+    least = parts[0]
+    for j in range(1, n):
+        least = min(least, parts[j])
+    return bool(least >= 1)
+
+
+@compiled
+def squared_error(gram: Float64, taken: Int64, parts: Int64, n: int) -> float:
+    """Squared error of the weights ``parts (n,)``, in 1 / TOTAL, of the candidates ``taken (n,)``."""
+    total = 0.0
+    for i in range(n):
+        for j in range(n):
+            total += gram[taken[i], taken[j]] * parts[i] * parts[j]
+    return total / (TOTAL * TOTAL)
