@@ -17,7 +17,7 @@ from gvcodecs.mcgv import Mcgv
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.base.distinct_positions import keep_apart
 from gvcodecs.mcgv.base.welded_points import Points, weld_vertices
-from gvcodecs.mcgv.motion.reconstruction_kernels import rebuild_blended
+from gvcodecs.mcgv.motion.reconstruction_kernels import Sites, SkinnedPoints, rebuild_blended
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Blend, BlendFit, Weights, homogeneous
 from gvcodecs.mcgv.motion.skinning_coding import decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.motion.skinning_fit import Motions, fit_blend
@@ -267,9 +267,9 @@ def test_rebuilding_is_base_blend_and_residual() -> None:
     vertices = draw.permutation(n)
     points = homogeneous(base)
     result = np.zeros((n, 3), np.float32)
-    order = (base[vertices], points[vertices], weights.clusters[vertices], weights.weights[vertices] / TOTAL)
-    residuals = 0.01 * (np.arange(256.0) - 128)
-    rebuild_blended(samples, vertices, pixels, *order, transforms, residuals, result)
+    skinned = SkinnedPoints(base[vertices], points[vertices], weights.clusters[vertices], weights.weights[vertices] / TOTAL)
+    sites = Sites(vertices, pixels, 0.01 * (np.arange(256.0) - 128))
+    rebuild_blended(samples, sites, skinned, transforms, result)
     wanted = base + _applied(points, weights, transforms)
     wanted[vertices] += 0.01 * (samples[:, pixels].T.astype(float) - 128)
     assert np.allclose(result, wanted, atol=1e-5)
