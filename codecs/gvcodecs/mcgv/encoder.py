@@ -335,7 +335,7 @@ class Mcgv(BaseCodec):
         if not len(moves):  # one point at least has samples
             moves = np.zeros(1, np.int64)
         own = Points.moving(mesh, moves)
-        base = lattice.place(mesh.lattice[moves])
+        base = lattice.points_at(mesh.lattice[moves])
         sequence = given.reordered(sources[moves], own.faces)
         if still.all():
             sequence = MeshSequence(np.broadcast_to(base.astype(np.float32), sequence.positions.shape), own.faces, given.fps)
