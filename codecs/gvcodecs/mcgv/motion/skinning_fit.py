@@ -33,6 +33,7 @@ from gvcodecs.mcgv.motion.weight_coding import encode_weights, guess_prices, lea
 from gvpipe.arrays import Float64
 from gvpipe.mesh.topology import k_ring
 from gvpipe.sequence import MeshSequence
+from gvpipe.trajectory.gram import descending_eigenvectors, is_tall, smaller_gram
 
 RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`
 FRAMES = 192  # frames, evenly spaced, that fitting looks at
@@ -323,11 +324,7 @@ def _displacements(sequence: MeshSequence, base: Float64) -> Float64:
 
 def _principal(columns: Float64) -> tuple[Float64, Float64]:
     """Principal coordinates ``(P, n)`` of rows, and the columns' energies, descending; none is subtracted first."""
-    from scipy.linalg import eigh
-
-    tall = columns.shape[0] >= columns.shape[1]
-    gram = columns.T @ columns if tall else columns @ columns.T
-    energies, vectors = eigh(gram, driver="evr", overwrite_a=True)
-    energies, vectors = np.maximum(energies[::-1], 0.0), vectors[:, ::-1]
-    placed = columns @ vectors if tall else vectors * np.sqrt(energies)
-    return np.ascontiguousarray(placed), energies
+    energies, vectors = descending_eigenvectors(smaller_gram(columns))
+    energies = np.maximum(energies, 0.0)
+    coordinates = columns @ vectors if is_tall(columns) else vectors * np.sqrt(energies)
+    return np.ascontiguousarray(coordinates), energies
