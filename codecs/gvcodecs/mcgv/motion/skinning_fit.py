@@ -252,10 +252,10 @@ def _grow(trial: _Trial, n_clusters: int, patches: sparse.csr_array, draw: np.ra
 def _alternate(problem: _Problem, start: Fitted | _Trial, passes: int) -> Fitted:
     """Fit transforms, which a trial has already, then weights, several times over."""
     from gvcodecs.mcgv.motion.weight_fit_kernels import Transforms
-    from gvcodecs.mcgv.motion.weight_selection import PointMotions, choose
+    from gvcodecs.mcgv.motion.weight_selection import PointMotions, Ring, choose
 
-    ring_starts, ring = problem.neighbours.indptr.astype(np.int64), problem.neighbours.indices.astype(np.int64)
-    points = PointMotions(problem.causal, ring_starts, ring, problem.homogeneous, problem.motions, problem.price)
+    ring = Ring(problem.neighbours.indptr.astype(np.int64), problem.neighbours.indices.astype(np.int64))
+    points = PointMotions(problem.causal, ring, problem.homogeneous, problem.motions, problem.price)
     fitted, prices = start.fitted if isinstance(start, _Trial) else start, guess_prices()
     for i in range(passes):
         transforms = start.transforms if isinstance(start, _Trial) and i == 0 else problem.solve(fitted)

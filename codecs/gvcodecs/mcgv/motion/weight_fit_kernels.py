@@ -33,48 +33,55 @@ class Transforms(NamedTuple):
     products: Float64
 
 
+class Candidates(NamedTuple):
+    """Memory for one point's candidates; c is `MAX_CANDIDATES`.
+
+    Args:
+        clusters: ``(c,) int64``.
+        along: ``(c,)`` products of their predictions with the motion.
+        gram: ``(c, c)`` products of what they alone miss of the motion.
+    """
+
+    clusters: Int64
+    along: Float64
+    gram: Float64
+
+
 class WeightFit(NamedTuple):
     """Memory for the fit of one point's weights; c is `MAX_CANDIDATES`.
 
     Args:
-        candidates: ``(c,) int64`` clusters.
-        along: ``(c,)`` products of the candidates' predictions with the motion.
-        gram: ``(c, c)`` products of what the candidates alone miss of the motion.
+        taken: ``(4,) int64`` indices of the candidates taken; solution: ``(4,)`` their weights, of sum one.
         differences: ``(c, c)`` products of candidates less the first taken, those taken eliminated; gains: ``(c,)`` likewise.
-        taken: ``(4,) int64`` indices of the candidates taken.
-        solution: ``(4,)`` their weights, of sum one; parts: ``(4,) int64`` the same in 1 / TOTAL.
         system: ``(4, 5)`` equations.
     """
 
-    candidates: Int64
-    along: Float64
-    gram: Float64
-    differences: Float64
-    gains: Float64
     taken: Int64
     solution: Float64
-    parts: Int64
+    differences: Float64
+    gains: Float64
     system: Float64
+
+
+def new_candidates() -> Candidates:
+    """Memory for candidates."""
+    return Candidates(np.zeros(MAX_CANDIDATES, np.int64), np.zeros(MAX_CANDIDATES), np.zeros((MAX_CANDIDATES, MAX_CANDIDATES)))
 
 
 def new_fit() -> WeightFit:
     """Memory for a fit."""
     return WeightFit(
-        candidates=np.zeros(MAX_CANDIDATES, np.int64),
-        along=np.zeros(MAX_CANDIDATES),
-        gram=np.zeros((MAX_CANDIDATES, MAX_CANDIDATES)),
-        differences=np.zeros((MAX_CANDIDATES, MAX_CANDIDATES)),
-        gains=np.zeros(MAX_CANDIDATES),
         taken=np.zeros(INFLUENCES, np.int64),
         solution=np.zeros(INFLUENCES),
-        parts=np.zeros(INFLUENCES, np.int64),
+        differences=np.zeros((MAX_CANDIDATES, MAX_CANDIDATES)),
+        gains=np.zeros(MAX_CANDIDATES),
         system=np.zeros((INFLUENCES, INFLUENCES + 1)),
     )
 
 
 @compiled
-def fill_gram(start: int, stop: int, place: Float64, motion: Float64, transforms: Transforms, fit: WeightFit) -> None:
-    """Fill ``fit.gram`` for the candidates ``start`` to ``stop``.
+def fill_gram(start: int, stop: int, place: Float64, motion: Float64, transforms: Transforms, candidates: Candidates) -> None:
+    """Fill the Gram matrix for the candidates ``start`` to ``stop``.
 
     Transforms are multiplied with one another once for all points. So a point's frames count but once per candidate.
 
@@ -83,76 +90,80 @@ def fill_gram(start: int, stop: int, place: Float64, motion: Float64, transforms
         place: ``(4,)`` homogeneous coordinates of the point.
         motion: ``(m,)`` its displacements.
         transforms: of all clusters.
-        fit: its candidates are set.
+        candidates: their clusters are set.
     """
+    clusters, along, gram = candidates  # once: each look into a named tuple counts references
+    all_columns, products = transforms
     square = 0.0
     for i in range(len(motion)):
         square += motion[i] * motion[i]
     for a in range(start, stop):
-        columns = transforms.columns[fit.candidates[a]]
+        columns = all_columns[clusters[a]]
         x, y, z, one = 0.0, 0.0, 0.0, 0.0
         for i in range(len(motion)):
             x += columns[i, 0] * motion[i]
             y += columns[i, 1] * motion[i]
             z += columns[i, 2] * motion[i]
             one += columns[i, 3] * motion[i]
-        fit.along[a] = place[0] * x + place[1] * y + place[2] * z + place[3] * one
+        along[a] = place[0] * x + place[1] * y + place[2] * z + place[3] * one
         for b in range(a + 1):
             total = 0.0
             for r in range(4):
-                row = transforms.products[4 * fit.candidates[a] + r]
-                first = 4 * fit.candidates[b]
+                row = products[4 * clusters[a] + r]
+                first = 4 * clusters[b]
                 total += place[r] * (
                     place[0] * row[first] + place[1] * row[first + 1] + place[2] * row[first + 2] + place[3] * row[first + 3]
                 )
-            fit.gram[a, b] = fit.gram[b, a] = total - fit.along[a] - fit.along[b] + square
+            gram[a, b] = gram[b, a] = total - along[a] - along[b] + square
 
 
 @compiled
-def extend(fit: WeightFit, n: int, size: int, previous: float) -> float:
+def extend(gram: Float64, n: int, size: int, previous: float, fit: WeightFit) -> float:
     """Take the candidate of least error with positive weights as number ``size``; return the error, or infinity if none helps.
 
     Errors follow from a Cholesky elimination of the differences from the first cluster. So one small system is solved for each
     candidate taken, not for each tried.
 
     Args:
-        fit: with ``n`` candidates, of which ``size - 1`` are taken; its solution is set.
+        gram: of ``n`` candidates.
         n: candidates.
         size: 1..4.
         previous: error of the clusters taken so far.
+        fit: of ``size - 1`` candidates; its solution is set.
     """
+    taken, solution, differences, gains, system = fit
     if size == 1:
-        return _take_first(fit, n)
-    least = RIDGE * fit.gram[fit.taken[0], fit.taken[0]] + 1e-300
-    refused = 1 << fit.taken[0]  # bits of candidates that are taken, or whose weights would not be positive
+        taken[0], solution[0] = _take_first(gram, n, differences, gains), 1.0
+        return float(gram[taken[0], taken[0]])
+    least = RIDGE * gram[taken[0], taken[0]] + 1e-300
+    refused = 1 << taken[0]  # bits of candidates that are taken, or whose weights would not be positive
     for j in range(1, size - 1):
-        refused |= 1 << fit.taken[j]
+        refused |= 1 << taken[j]
     while True:
-        best = _find_best(fit.differences, fit.gains, n, least, refused, LEAST_GAIN * previous)
+        best = _find_best(differences, gains, n, least, refused, LEAST_GAIN * previous)
         if best < 0:
             return np.inf
-        fit.taken[size - 1] = best
-        error = _solve(fit.gram, fit.taken, size, fit.system, fit.solution)
+        taken[size - 1] = best
+        error = _solve(gram, taken, size, system, solution)
         if error < np.inf:
             break
         refused |= 1 << best
-    _eliminate(fit.differences, fit.gains, n, best)
+    _eliminate(differences, gains, n, best)
     return error
 
 
 @compiled
-def _take_first(fit: WeightFit, n: int) -> float:
-    """Take the candidate that leaves the least error alone; return that error."""
-    gram, best = fit.gram, 0
+def _take_first(gram: Float64, n: int, differences: Float64, gains: Float64) -> int:
+    """The candidate that leaves the least error alone; differences and gains are from it."""
+    best = 0
     for a in range(1, n):
         if gram[a, a] < gram[best, best]:
             best = a
-    fit.taken[0], fit.solution[0] = best, 1.0
     for a in range(n):
-        fit.gains[a] = gram[best, best] - gram[a, best]
+        gains[a] = gram[best, best] - gram[a, best]
         for b in range(n):
-            fit.differences[a, b] = gram[a, b] - gram[a, best] - gram[best, b] + gram[best, best]
-    return float(gram[best, best])
+            differences[a, b] = gram[a, b] - gram[a, best] - gram[best, b] + gram[best, best]
+    return best
 
 
 @compiled

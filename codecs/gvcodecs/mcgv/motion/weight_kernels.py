@@ -56,16 +56,17 @@ def new_list() -> Listed:
 @compiled
 def list_clusters(point: int, causal: CausalNeighbours, weights: Weights, listed: Listed) -> int:
     """Fill ``listed`` with a point's list, its suggestion left out; return its length."""
-    clusters, sums = listed.clusters, listed.sums
+    clusters, sums, _ = listed
+    followed, parts = weights
     n = 0
     first = max(causal.starts[point], causal.starts[point + 1] - MAX_NEIGHBOURS)
     for entry in range(first, causal.starts[point + 1]):
         neighbour = causal.near[entry]
         for j in range(INFLUENCES):
-            weight = weights.weights[neighbour, j]
+            weight = parts[neighbour, j]
             if weight == 0:
                 break
-            cluster = weights.clusters[neighbour, j]
+            cluster = followed[neighbour, j]
             i = 0
             while i < n and clusters[i] != cluster:
                 i += 1
@@ -86,31 +87,32 @@ def list_clusters(point: int, causal: CausalNeighbours, weights: Weights, listed
 @compiled
 def suggest(listed: Listed, n_listed: int) -> int:
     """Divide TOTAL among the first four clusters of a list, as its ``shares``; return how many get something."""
+    sums, shares = listed.sums, listed.shares  # once: each look into a named tuple counts references
     n = min(n_listed, INFLUENCES)
     total = 0
     for j in range(n):
-        total += listed.sums[j]
+        total += sums[j]
     left, used = TOTAL, 0
     for j in range(n):
-        listed.shares[j] = TOTAL * listed.sums[j] // total
-        left -= listed.shares[j]
-        used += listed.shares[j] > 0
+        shares[j] = TOTAL * sums[j] // total
+        left -= shares[j]
+        used += shares[j] > 0
     if n > 0:
-        listed.shares[0] += left
+        shares[0] += left
     return used
 
 
 @compiled
-def expect(listed: Listed, n_listed: int, ranks: Int64, n: int, expected: Int64) -> None:
+def expect(sums: Int64, n_listed: int, ranks: Int64, n: int, expected: Int64) -> None:
     """Fill ``expected (4,)``, in 1 / TOTAL, for ``n`` clusters at ``ranks (4,)``.
 
-    Expected weights go with the clusters' sums, at least one part each; they are equal if no cluster is listed.
+    Expected weights go with the listed clusters' ``sums``, at least one part each; they are equal if no cluster is listed.
     """
     total = 0
     for j in range(n):
-        total += listed.sums[ranks[j]] if ranks[j] < n_listed else 0
+        total += sums[ranks[j]] if ranks[j] < n_listed else 0
     for j in range(n):
-        part = listed.sums[ranks[j]] if ranks[j] < n_listed else 0
+        part = sums[ranks[j]] if ranks[j] < n_listed else 0
         expected[j] = max(1, TOTAL * part // total) if total > 0 else TOTAL // n
 
 
@@ -163,7 +165,7 @@ def _describe(causal: CausalNeighbours, weights: Weights, listed: Listed, number
         for j in range(n):
             ranks[j] = rank_of(weights.clusters[point, j], listed.clusters, n_listed)
             numbers.gaps[point, j] = ranks[j] - (ranks[j - 1] + 1 if j else 0)
-        expect(listed, n_listed, ranks, n, expected)
+        expect(listed.sums, n_listed, ranks, n, expected)
         for j in range(n - 1):
             numbers.changes[point, j] = weights.weights[point, j] - expected[j]
 
@@ -211,7 +213,7 @@ def _restore(causal: CausalNeighbours, n_clusters: int, numbers: WeightNumbers, 
                 return point
             ranks[j] = rank
             clusters[point, j] = cluster_of(rank, listed.clusters, n_listed)
-        expect(listed, n_listed, ranks, n, expected)
+        expect(listed.sums, n_listed, ranks, n, expected)
         left = TOTAL
         for j in range(n - 1):
             parts[point, j] = expected[j] + numbers.changes[next_change]

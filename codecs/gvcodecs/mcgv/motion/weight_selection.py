@@ -22,10 +22,12 @@ from gvcodecs.mcgv.motion.weight_coding import Prices
 from gvcodecs.mcgv.motion.weight_fit_kernels import (
     LEAST_GAIN,
     MAX_CANDIDATES,
+    Candidates,
     Transforms,
     WeightFit,
     extend,
     fill_gram,
+    new_candidates,
     new_fit,
     round_weights,
     squared_error,
@@ -34,52 +36,82 @@ from gvcodecs.mcgv.motion.weight_kernels import Listed, expect, list_clusters, n
 from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.compiled import compiled
 
+FIRST = np.arange(INFLUENCES)  # the list's first clusters are the first candidates
+
+
+class Ring(NamedTuple):
+    """Each point's neighbours: ``starts (P + 1,)`` bounds in ``points``; both are int64."""
+
+    starts: Int64
+    points: Int64
+
 
 class PointMotions(NamedTuple):
     """What weights are chosen for.
 
     Args:
         causal: earlier neighbours of each point.
-        ring_starts, ring: all neighbours: ``(P + 1,)`` bounds in ``ring``. A point considers the clusters that they follow.
+        ring: all neighbours; a point considers the clusters that they follow.
         homogeneous: ``(P, 4)`` base positions and 1.
         motions: ``(P, m)`` displacements over the frames looked at.
         price: of a bit, in squared error over these frames; 0: error alone decides, and no point takes its suggestion.
     """
 
     causal: CausalNeighbours
-    ring_starts: Int64
-    ring: Int64
+    ring: Ring
     homogeneous: Float64
     motions: Float64
     price: float
 
 
-class Choice(NamedTuple):
-    """Memory for the choice of one point's weights.
+class Best(NamedTuple):
+    """Memory for the best weights of one point so far: ``clusters`` and ``weights``, ``(4,) int32`` each."""
+
+    clusters: Int32
+    weights: Int32
+
+
+class Ranked(NamedTuple):
+    """Memory for the clusters taken, in the order of their ranks; all are ``(4,) int64``.
 
     Args:
-        listed: its list.
-        fit: of candidates.
-        clusters, weights: ``(4,) int32`` the best so far.
-        ranks, order: ``(4,) int64`` ranks of the clusters taken, ascending, and which of them each is.
-        expected: ``(4,) int64`` their expected weights, in 1 / TOTAL.
-        scores: ``(K,) int64`` how much the neighbours around follow each cluster, 0 but while they are counted.
-        seen: ``(K,) int64`` the clusters that they follow.
-        least: ``(6,)`` cost, in squared error, of the bits of so many own clusters or more, at least.
-        suggested: ``(4,) int64`` 0..3: the list's first clusters are the first candidates.
+        ranks: ascending.
+        order: which of the clusters taken each is.
+        parts: weights of the clusters taken, in 1 / TOTAL, in the order in which they were taken.
+        expected: weights that the list expects, in 1 / TOTAL, by rank.
+    """
+
+    ranks: Int64
+    order: Int64
+    parts: Int64
+    expected: Int64
+
+
+class Around(NamedTuple):
+    """Memory for the clusters that neighbours follow; both are ``(K,) int64``.
+
+    Args:
+        scores: how much they follow each cluster; 0 but while they are counted.
+        seen: the clusters that they follow.
+    """
+
+    scores: Int64
+    seen: Int64
+
+
+class Memory(NamedTuple):
+    """What a choice works in: memory for one point, and ``least (6,)``.
+
+    ``least[n]`` is what the bits of n own clusters or more cost at least, in squared error.
     """
 
     listed: Listed
+    candidates: Candidates
     fit: WeightFit
-    clusters: Int32
-    weights: Int32
-    ranks: Int64
-    order: Int64
-    expected: Int64
-    scores: Int64
-    seen: Int64
+    ranked: Ranked
+    around: Around
+    best: Best
     least: Float64
-    suggested: Int64
 
 
 def choose(points: PointMotions, transforms: Transforms, prices: Prices, start: Weights) -> tuple[Weights, Float64]:
@@ -95,81 +127,97 @@ def choose(points: PointMotions, transforms: Transforms, prices: Prices, start: 
         The weights, and the squared errors ``(P,)`` that they leave.
     """
     weights, errors = Weights(start.clusters.copy(), start.weights.copy()), np.zeros(len(points.homogeneous))
-    _choose(points, transforms, prices, _new_choice(len(transforms.columns), prices, points.price), weights, errors)
+    _choose(points, transforms, prices, _new_memory(len(transforms.columns), prices, points.price), weights, errors)
     return weights, errors
 
 
-def _new_choice(n_clusters: int, prices: Prices, price: float) -> Choice:
-    """Memory for choices among ``n_clusters``."""
+def _new_memory(n_clusters: int, prices: Prices, price: float) -> Memory:
     least = np.full(INFLUENCES + 2, np.inf)
     least[1:-1] = np.minimum.accumulate(price * prices.counts[:0:-1])[::-1]
-    return Choice(
-        listed=new_list(),
-        fit=new_fit(),
-        clusters=np.zeros(INFLUENCES, np.int32),
-        weights=np.zeros(INFLUENCES, np.int32),
-        ranks=np.zeros(INFLUENCES, np.int64),
-        order=np.zeros(INFLUENCES, np.int64),
-        expected=np.zeros(INFLUENCES, np.int64),
-        scores=np.zeros(n_clusters, np.int64),
-        seen=np.zeros(n_clusters, np.int64),
-        least=least,
-        suggested=np.arange(INFLUENCES),
+    return Memory(
+        new_list(),
+        new_candidates(),
+        new_fit(),
+        Ranked(*(np.zeros(INFLUENCES, np.int64) for _ in range(4))),
+        Around(np.zeros(n_clusters, np.int64), np.zeros(n_clusters, np.int64)),
+        Best(np.zeros(INFLUENCES, np.int32), np.zeros(INFLUENCES, np.int32)),
+        least,
     )
 
 
 @compiled
 def _choose(
-    points: PointMotions, transforms: Transforms, prices: Prices, choice: Choice, weights: Weights, errors: Float64
+    points: PointMotions, transforms: Transforms, prices: Prices, memory: Memory, weights: Weights, errors: Float64
 ) -> None:
     """Change ``weights`` and fill ``errors``, point after point."""
-    for point in range(len(points.homogeneous)):
-        n_listed = list_clusters(point, points.causal, weights, choice.listed)
+    listed, candidates, fit, ranked, around, best, least = memory  # once: each look into a named tuple counts references
+    causal, ring, places, motions, price = points
+    taken, solution, parts, gram, choices = fit.taken, fit.solution, ranked.parts, candidates.gram, candidates.clusters
+    all_clusters, all_weights = weights
+    best_clusters, best_weights = best
+    for point in range(len(errors)):
+        n_listed = list_clusters(point, causal, weights, listed)
         n = min(n_listed, INFLUENCES)
         for j in range(n):
-            choice.fit.candidates[j] = choice.listed.clusters[j]
-        place, motion = points.homogeneous[point], points.motions[point]
-        fill_gram(n - n, n, place, motion, transforms, choice.fit)  # a literal 0 would be compiled apart
+            choices[j] = listed.clusters[j]
+        place, motion = places[point], motions[point]
+        fill_gram(n - n, n, place, motion, transforms, candidates)  # a literal 0 would be compiled apart
         cost = np.inf
-        if points.price > 0 and n_listed > 0:
-            errors[point] = _take_suggestion(choice, n_listed)
-            cost = errors[point] + points.price * prices.counts[0]
-        if cost > choice.least[1]:
-            n_before, n = n, _add_candidates(point, points, weights, choice, n)
-            fill_gram(n_before, n, place, motion, transforms, choice.fit)
-        error = _take_own(choice, n, n_listed, prices, points.price, cost)
-        if error < np.inf:
-            errors[point] = error
-        for j in range(INFLUENCES):  # assigning rows would take a second more to compile
-            weights.clusters[point, j], weights.weights[point, j] = choice.clusters[j], choice.weights[j]
-
-
-@compiled
-def _take_suggestion(choice: Choice, n_listed: int) -> float:
-    """Take what the list suggests, whose clusters are the first candidates; return the squared error."""
-    listed, used = choice.listed, suggest(choice.listed, n_listed)
-    for j in range(INFLUENCES):
-        choice.clusters[j] = listed.clusters[j] if j < used else 0
-        choice.weights[j] = listed.shares[j] if j < used else 0
-    return squared_error(choice.fit.gram, choice.suggested, listed.shares, used)
-
-
-@compiled
-def _add_candidates(point: int, points: PointMotions, weights: Weights, choice: Choice, n: int) -> int:
-    """Add the clusters that a point and its neighbours follow, by how much, to ``n`` candidates; return how many there are."""
-    candidates, scores, seen = choice.fit.candidates, choice.scores, choice.seen
-    start, stop = points.ring_starts[point], points.ring_starts[point + 1]
-    n_seen = 0
-    for entry in range(start, stop + 1):
-        other = points.ring[entry] if entry < stop else point
-        for j in range(INFLUENCES):
-            weight, cluster = weights.weights[other, j], weights.clusters[other, j]
-            if weight == 0:
+        if price > 0 and n_listed > 0:
+            errors[point] = _take_suggestion(listed, n_listed, gram, best)
+            cost = errors[point] + price * prices.counts[0]
+        if cost > least[1]:
+            n_before, n = n, _add_candidates(point, ring, weights, around, choices, n)
+            fill_gram(n_before, n, place, motion, transforms, candidates)
+        previous = np.inf
+        for size in range(1, INFLUENCES + 1):  # own clusters, one after the other, as long as more of them can pay
+            if cost <= least[size]:
                 break
+            left = extend(gram, n, size, previous, fit)
+            if not left <= (1 - LEAST_GAIN) * previous:
+                break
+            previous = left
+            if not round_weights(solution, size, parts):
+                continue
+            error = squared_error(gram, taken, parts, size)
+            _rank(choices, taken, size, listed, n_listed, ranked)
+            own_cost = error + price * _count_bits(size, ranked, prices)
+            if own_cost < cost:
+                cost, errors[point] = own_cost, error
+                _take_own(choices, taken, size, ranked, best)
+        for j in range(INFLUENCES):  # assigning rows would take a second more to compile
+            all_clusters[point, j], all_weights[point, j] = best_clusters[j], best_weights[j]
+
+
+@compiled
+def _take_suggestion(listed: Listed, n_listed: int, gram: Float64, best: Best) -> float:
+    """Take what the list suggests, whose clusters are the first candidates; return the squared error."""
+    used = suggest(listed, n_listed)
+    clusters, _, shares = listed
+    best_clusters, best_weights = best
+    for j in range(INFLUENCES):
+        best_clusters[j] = clusters[j] if j < used else 0
+        best_weights[j] = shares[j] if j < used else 0
+    return squared_error(gram, FIRST, shares, used)
+
+
+@compiled
+def _add_candidates(point: int, ring: Ring, weights: Weights, around: Around, candidates: Int64, n: int) -> int:
+    """Add the clusters that a point and its neighbours follow, by how much, to ``n`` candidates; return how many there are."""
+    scores, seen = around
+    followed, parts = weights
+    starts, neighbours = ring
+    start, stop, n_seen = starts[point], starts[point + 1], 0
+    for entry in range(start, stop + 1):
+        other = neighbours[entry] if entry < stop else point
+        for j in range(INFLUENCES):
+            if parts[other, j] == 0:
+                break
+            cluster = followed[other, j]
             if scores[cluster] == 0:
                 seen[n_seen] = cluster
                 n_seen += 1
-            scores[cluster] += weight
+            scores[cluster] += parts[other, j]
     for j in range(n):
         scores[candidates[j]] = 0
     while n < MAX_CANDIDATES:
@@ -188,46 +236,37 @@ def _add_candidates(point: int, points: PointMotions, weights: Weights, choice: 
 
 
 @compiled
-def _take_own(choice: Choice, n: int, n_listed: int, prices: Prices, price: float, cost: float) -> float:
-    """Take weights of a point's own if they cost less than ``cost``; return their squared error, or infinity.
-
-    Clusters are taken one after the other, as long as the error falls and more of them can pay for their bits.
-    """
-    fit, previous, best = choice.fit, np.inf, np.inf
-    for size in range(1, INFLUENCES + 1):
-        if cost <= choice.least[size]:
-            break
-        left = extend(fit, n, size, previous)
-        if not left <= (1 - LEAST_GAIN) * previous:
-            break
-        previous = left
-        if not round_weights(fit.solution, size, fit.parts):
-            continue
-        error = squared_error(fit.gram, fit.taken, fit.parts, size)
-        own_cost = error + price * _count_bits(choice, size, n_listed, prices)
-        if own_cost < cost:
-            cost, best = own_cost, error
-            for j in range(INFLUENCES):
-                which = choice.order[j]
-                choice.clusters[j] = fit.candidates[fit.taken[which]] if j < size else 0
-                choice.weights[j] = fit.parts[which] if j < size else 0
-    return best
+def _take_own(candidates: Int64, taken: Int64, size: int, ranked: Ranked, best: Best) -> None:
+    """Take the ``size`` clusters taken of ``candidates``, and their rounded weights."""
+    order, parts = ranked.order, ranked.parts
+    clusters, weights = best
+    for j in range(INFLUENCES):
+        clusters[j] = candidates[taken[order[j]]] if j < size else 0
+        weights[j] = parts[order[j]] if j < size else 0
 
 
 @compiled
-def _count_bits(choice: Choice, size: int, n_listed: int, prices: Prices) -> float:
-    """Bits of the ``size`` clusters taken and of their rounded weights; fills ``choice.order``, ascending by rank."""
-    fit, ranks, order = choice.fit, choice.ranks, choice.order
-    bits = prices.counts[size]
+def _rank(candidates: Int64, taken: Int64, size: int, listed: Listed, n_listed: int, ranked: Ranked) -> None:
+    """Fill ranks, order and expected weights of the ``size`` clusters taken."""
+    ranks, order, _, expected = ranked
+    clusters = listed.clusters
     for j in range(size):
-        ranks[j] = rank_of(fit.candidates[fit.taken[j]], choice.listed.clusters, n_listed)
+        ranks[j] = rank_of(candidates[taken[j]], clusters, n_listed)
     _sort(ranks, order, size)
-    expect(choice.listed, n_listed, ranks, size, choice.expected)
+    expect(listed.sums, n_listed, ranks, size, expected)
+
+
+@compiled
+def _count_bits(size: int, ranked: Ranked, prices: Prices) -> float:
+    """Bits of ``size`` own clusters and their weights."""
+    ranks, order, parts, expected = ranked
+    counts, gaps, changes = prices
+    bits = counts[size]
     for j in range(size):
         gap = ranks[j] - (ranks[j - 1] + 1 if j else 0)
-        bits += prices.gaps[j, min(gap, prices.gaps.shape[1] - 1)]
+        bits += gaps[j, min(gap, gaps.shape[1] - 1)]
         if j < size - 1:
-            bits += prices.changes[j, abs(fit.parts[order[j]] - choice.expected[j])]
+            bits += changes[j, abs(parts[order[j]] - expected[j])]
     return float(bits)
 
 
