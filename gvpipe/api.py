@@ -25,7 +25,8 @@ from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
 from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
-from gvpipe.rate_control.search import Target, meet, parse_bound
+from gvpipe.rate_control.search import meet
+from gvpipe.rate_control.targets import Target, parse_bound
 from gvpipe.rate_control.trials import Trial
 from gvpipe.registry import encode_sequence, make_codec
 from gvpipe.rendering.poster import poster_of

@@ -1,7 +1,7 @@
 """Matrix products on one thread.
 
-Why: codecs make many small products, and the threads of a BLAS wait for one another longer than they work: samba took 51 s
-instead of 23 s where other programs kept the cores busy.
+Why: codecs make many small products, and the threads of a BLAS then wait for one another longer than they compute. Where other
+programs kept the cores busy, samba took 51 s instead of 23 s.
 """
 
 from __future__ import annotations

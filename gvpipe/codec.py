@@ -24,13 +24,16 @@ Result = TypeVar("Result")
 
 
 class Memo:
-    """What encodes of one sequence share if their settings differ in quality alone.
+    """Results that do not depend on quality, kept by name between encodes of one sequence with otherwise equal settings.
 
-    An encoder wraps the stages that do not look at quality: ``mesh = memo("mesh", lambda: ...)`` works it out once. What is
-    kept should be small beside the sequence; frames are read again instead.
+    An encoder wraps each such stage. Results should be small beside the sequence; frames are read again instead.
 
     Args:
         is_shared: whether other encodes follow, as in a search for a quality.
+
+    >>> memo = Memo()
+    >>> memo("mesh", lambda: "made"), memo("mesh", lambda: "made again")
+    ('made', 'made')
     """
 
     def __init__(self, is_shared: bool = True) -> None:
@@ -38,7 +41,7 @@ class Memo:
         self._results: dict[str, Any] = {}
 
     def __call__(self, stage: str, work: Callable[[], Result]) -> Result:
-        """Return the stage's result, from before if there is one."""
+        """Return the stage's result: that of its first call, or of ``work`` if this is the first."""
         if stage not in self._results:
             self._results[stage] = work()
         result: Result = self._results[stage]
@@ -60,28 +63,28 @@ class Encoded:
 
 @runtime_checkable
 class LevelReader(Protocol):
-    """What a frame reader offers beside if its codec has levels of detail: coarser meshes of the same motion."""
+    """A frame reader whose codec has levels of detail: coarser meshes of the same motion."""
 
     @property
     def levels(self) -> list[int]:
-        """Vertex counts of the levels, level 0 (the mesh itself) first."""
+        """Number of vertices of each level, level 0 (the mesh itself) first."""
         ...
 
     def level_faces(self, lod: int) -> Int32:
-        """``(n, 3) int32`` triangles of a level, in the order of the vertices that `read` returns for it."""
+        """Return the triangles of a level: ``(n, 3) int32``, indices of the vertices that `read` returns for it."""
         ...
 
     def read(self, start: int, stop: int, lod: int = 0) -> Float32:
-        """Return frames of a level: ``(stop - start, its vertices, 3) float32``; decodes only what the level needs."""
+        """Return frames of a level: ``(stop - start, levels[lod], 3) float32``, model units; decodes only what it needs."""
         ...
 
 
 @runtime_checkable
 class GroupReader(Protocol):
-    """What a frame reader offers beside if its codec decodes several frames at the price of one."""
+    """A frame reader whose codec decodes a group of frames at the price of one."""
 
     def group(self, frame: int) -> tuple[int, int]:
-        """``(start, stop)`` of the frames that are best read together with a frame, itself among them."""
+        """Return ``(start, stop)`` of the group that a frame is in."""
         ...
 
 
@@ -95,11 +98,15 @@ class FrameReader(Protocol):
 
     @property
     def faces(self) -> Int32:
-        """``(T, 3) int32`` triangles, in the order of the vertices that `read` returns."""
+        """Triangles ``(T, 3) int32``, indices of the vertices that `read` returns."""
         ...
 
     def read(self, start: int, stop: int) -> Float32:
-        """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units; decodes no more than it must."""
+        """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units; decodes no more than it must.
+
+        Raises:
+            CorruptFile: a section is not what the codec writes.
+        """
         ...
 
 
@@ -107,8 +114,8 @@ class FrameReader(Protocol):
 class Codec(Protocol):
     """A codec's settings, and what it does with them.
 
-    A class attribute ``holds = True`` keeps repeated frames away from it (`gvpipe.repeated_frames`); its ``version`` then knows
-    of them.
+    A class attribute ``holds = True``, after the section of that name, says that the codec never sees repeated frames: run
+    lengths around it code them (`gvpipe.repeated_frames`). Its ``version`` then knows of them.
     """
 
     id: ClassVar[str]
@@ -118,21 +125,30 @@ class Codec(Protocol):
 
     @property
     def quality(self) -> float:
-        """0..100, higher is better; bytes and error follow it monotonically."""
+        """0..100: names the target error (`gvpipe.quality_scale`); bytes rise with it, the error falls."""
         ...
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Encoded:
-        """Code a sequence; ``memo`` is shared with encodes of the same sequence at another quality."""
+        """Code a sequence.
+
+        Args:
+            sequence: to code.
+            progress: called with each stage and the part of it that is done.
+            memo: shared with encodes of the same sequence at other qualities.
+
+        Raises:
+            InputError: a frame cannot be read, or what else the codec refuses.
+        """
         ...
 
     @classmethod
     def reader(cls, bitstream: Bitstream) -> FrameReader:
-        """Open a bitstream that this codec wrote, by what it holds alone."""
+        """Open a bitstream that this codec wrote, by its contents alone; raises `CorruptFile`."""
         ...
 
 
 class Settings:
-    """Base of codecs' dataclasses: turns texts into settings, and checks ranges."""
+    """Base of codecs' dataclasses: makes settings from texts, and checks ranges."""
 
     @classmethod
     def from_texts(cls, texts: Mapping[str, str]) -> Self:
@@ -162,14 +178,10 @@ class Settings:
 
 
 class BaseCodec(Settings):
-    """Base of codecs' dataclasses: what every encode begins and ends with."""
+    """Base of codecs' dataclasses: the first and the last step of every encode."""
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Encoded:
-        """Code a sequence.
-
-        Raises:
-            InputError: a frame cannot be read, or what else the codec refuses.
-        """
+        """Code a sequence; see `Codec.encode`."""
         return self._encode(sequence, progress or _silent, memo or Memo(is_shared=False))
 
     def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:

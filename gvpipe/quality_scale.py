@@ -23,7 +23,7 @@ def error_of(quality: float) -> float:
     >>> error_of(75), round(error_of(50), 6)
     (0.14, 0.7)
     """
-    return ERROR * math.exp((MIDDLE - quality) * (BELOW if quality < MIDDLE else ABOVE))
+    return ERROR * math.exp((MIDDLE - quality) * fall_at(quality))
 
 
 def quality_of(error: float) -> float:
@@ -33,4 +33,14 @@ def quality_of(error: float) -> float:
     (75.0, 0.0)
     """
     fall = math.log(ERROR / error)
-    return min(max(MIDDLE + fall / (BELOW if fall < 0 else ABOVE), 0.0), 100.0)
+    return on_scale(MIDDLE + fall / (BELOW if fall < 0 else ABOVE))
+
+
+def fall_at(quality: float) -> float:
+    """Return by how much the logarithm of the target error falls there, per unit of quality."""
+    return BELOW if quality < MIDDLE else ABOVE
+
+
+def on_scale(quality: float) -> float:
+    """Return the nearest quality in 0..100."""
+    return min(max(quality, 0.0), 100.0)

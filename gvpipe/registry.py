@@ -38,7 +38,16 @@ def codec_class(codec: str) -> type[Any]:
 
 
 def make_codec(codec: str, settings: Mapping[str, Any], also: Iterable[str] = ()) -> Codec:
-    """Return a codec's settings object; raises `SettingError` for an unknown one, naming the nearest of these and ``also``."""
+    """Return a codec's settings object.
+
+    Args:
+        codec: its id.
+        settings: values by name; others keep their defaults.
+        also: names that are no settings of it, but may have been meant; messages suggest them too.
+
+    Raises:
+        SettingError: there is no such codec or setting, or a value is out of range.
+    """
     chosen = codec_class(codec)
     names = [field.name for field in dataclasses.fields(chosen)]
     for key in settings:
@@ -48,8 +57,9 @@ def make_codec(codec: str, settings: Mapping[str, Any], also: Iterable[str] = ()
 
 
 def open_reader(bitstream: Bitstream) -> FrameReader:
-    """Open a bitstream with the codec that wrote it: its frames corrected (`gvpipe.corrections.bound`), then held
-    (`gvpipe.repeated_frames`).
+    """Open a bitstream with the codec that wrote it.
+
+    Corrections (`gvpipe.corrections.bound`) come first, then repeated frames (`gvpipe.repeated_frames`).
 
     Raises:
         NewerVersion: no installed codec has that id, or only an older version of it.

@@ -49,6 +49,16 @@ class MeshSequence:
     Raises:
         InputError: a wrong shape, no frame, no vertex, an index out of range, an fps that is not a positive number, a
             position in memory that is not finite (frames that load later are checked when they load).
+        TypeError: positions, faces, fps or attributes are of no such type.
+
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    >>> sequence = MeshSequence(np.array([corners, np.add(corners, [0, 0, 0.5])]), np.array([[0, 1, 2]]), fps=25)
+    >>> sequence
+    <MeshSequence sequence: 2 frames of 3 vertices, 1 triangles, 25 fps>
+    >>> sequence[1][:, 2].tolist()  # z of the second frame's vertices
+    [0.5, 0.5, 0.5]
+    >>> sequence.part(1, 2).shape
+    (1, 3, 3)
     """
 
     positions: Frames
@@ -151,7 +161,7 @@ class MeshSequence:
         return card(self.name, numbers_of(self), self)
 
     def read(self, start: int, stop: int) -> Float32:
-        """Frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units, relative to the origin.
+        """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units, relative to the origin.
 
         Raises:
             InputError: a position is NaN or infinite; the message names frame and vertex.
@@ -162,13 +172,13 @@ class MeshSequence:
         return block
 
     def read_exact(self, start: int, stop: int) -> Float64:
-        """The same in float64, with all digits that were given; raises `InputError`."""
+        """Return the same in float64, ``(stop - start, V, 3)``, with all digits that were given; raises `InputError`."""
         if self._exact is None:
             return self.read(start, stop).astype(np.float64)
         return self.read_absolute(start, stop) - self.origin
 
     def read_absolute(self, start: int, stop: int) -> Float64:
-        """Frames with the origin added: ``(stop - start, V, 3) float64``, model units; raises `InputError`."""
+        """Return frames with the origin added: ``(stop - start, V, 3) float64``, model units; raises `InputError`."""
         if self._exact is None:
             return self.read(start, stop) + self.origin
         block = np.asarray(self._exact[start:stop], dtype=np.float64)
@@ -178,11 +188,16 @@ class MeshSequence:
 
     @property
     def rounding(self) -> float:
-        """By how much float32 moved a coordinate at most, model units; for frames that load later, so far as they did."""
+        """The largest rounding of a coordinate to float32, model units; of frames that load later, those that have loaded."""
         return max(self._rounding, float(getattr(self.positions, "rounding", 0.0)))
 
     def reordered(self, permutation: Integers, faces: Int32) -> MeshSequence:
-        """Return the sequence whose vertex i is this one's vertex ``permutation[i]``; frames still load when read."""
+        """Return the sequence whose vertex i is this one's vertex ``permutation[i]``; frames still load when read.
+
+        Args:
+            permutation: ``(V,)`` vertex indices.
+            faces: ``(T, 3) int32`` triangles, in the new order.
+        """
         exact = None if self._exact is None else Permuted(self.read_absolute, len(self), permutation)
         return self._derived(Permuted(self.read, len(self), permutation), exact, faces=faces, attributes={})
 
@@ -222,7 +237,7 @@ class MeshSequence:
         return ((first, min(first + step, stop)) for first in range(start, stop, step))
 
     def sample(self, most: int, vertices: Integers | slice = slice(None)) -> Float64:
-        """Vertices of at most so many frames, evenly spaced from the first to the last: ``(n, vertices, 3)``, model units."""
+        """Return vertices of at most ``most`` frames, evenly spaced from first to last: ``(n, vertices, 3)``, model units."""
         picked = np.unique(np.linspace(0, self.n_frames - 1, most).astype(int))
         return np.concatenate([self.read(i, i + 1)[:, vertices] for i in picked]).astype(np.float64)
 

@@ -1,4 +1,4 @@
-"""The one data type of the sample generators: an animated triangle mesh."""
+"""The result of every sample generator: an animated triangle mesh."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A rubber ball that bounces, turning as it flies, squashed where it lands. The clip loops."""
+"""A rubber ball that bounces: it turns in flight, and the ground squashes it. The clip loops."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STRETCH = 1.14  # length over diameter at take-off and landing
 
 
 def make_bounce() -> Animation:
-    """One bounce: 24 frames, 362 vertices, on the ground y = 0."""
+    """Return one bounce on the ground y = 0: 24 frames, 362 vertices."""
     ball, faces = icosphere(N_CUTS)
     loop = np.arange(N_FRAMES) / N_FRAMES  # frame 0 is the middle of the contact
     since_landing = (loop + CONTACT / 2) % 1.0
@@ -32,7 +32,7 @@ def make_bounce() -> Animation:
     airtime = (1.0 - CONTACT) * N_FRAMES / FPS  # s
     bottom = 0.5 * GRAVITY * airtime**2 * flight * (1.0 - flight)
     width = 1.0 / np.sqrt(height)  # the volume stays
-    # The spin is over the flight alone: on the ground the rubber grips.
+    # The ball turns in flight alone: on the ground the rubber grips.
     spin = 2 * np.pi * flight  # rad, about x
     y = ball[:, 1] * np.cos(spin)[:, None] - ball[:, 2] * np.sin(spin)[:, None]  # (F, V)
     z = ball[:, 1] * np.sin(spin)[:, None] + ball[:, 2] * np.cos(spin)[:, None]
@@ -44,7 +44,7 @@ def make_bounce() -> Animation:
 
 
 def icosphere(n_cuts: int) -> tuple[Floats, npt.NDArray[np.int32]]:
-    """Unit sphere: vertices (10 n^2 + 2, 3) and faces (20 n^2, 3), counter-clockwise from outside."""
+    """Return the unit sphere: vertices (10 n^2 + 2, 3) and faces (20 n^2, 3), counter-clockwise from outside."""
     golden = (1 + 5**0.5) / 2
     corners = np.array([(0, s, t * golden) for s in (1, -1) for t in (1, -1)])
     corners = np.concatenate([np.roll(corners, k, axis=1) for k in range(3)])  # (12, 3)

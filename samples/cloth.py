@@ -1,14 +1,13 @@
 """A square cloth that falls on a ball, drapes and swings to rest.
 
-Simulated with extended position-based dynamics, one solver pass in each of many small substeps
-(M. Macklin et al., Small Steps in Physics Simulation, SCA 2019). Distance constraints along the edges resist
-stretch and shear; they are coloured so that no two of one colour share a vertex, and one colour is one
-vectorised Gauss-Seidel update. Bending is the quadratic energy of M. Bergou et al. (A Quadratic Bending Model
-for Inextensible Surfaces, SGP 2006), as an explicit force: at these substeps it is far from its stability
-limit.
-
-Departure from both papers: cloth against cloth is handled by short-range repulsion between vertices that are
-far apart in the material, which needs no triangle tests at this resolution.
+- Solver: extended position-based dynamics, one pass in each of many small substeps (M. Macklin et al., Small Steps in Physics
+  Simulation, SCA 2019).
+- Stretch and shear: distance constraints along the edges. No two of one colour share a vertex, so one colour is one
+  vectorised Gauss-Seidel update.
+- Bending: the quadratic energy of M. Bergou et al. (A Quadratic Bending Model for Inextensible Surfaces, SGP 2006), as an
+  explicit force. At these substeps it is far from its stability limit.
+- Cloth against cloth departs from both papers: vertices far apart in the material repel each other at short range. That
+  needs no triangle tests at this resolution.
 
 Frame: y up, metres, seconds.
 """
@@ -47,7 +46,7 @@ CLOTH_GAP = 0.03  # m between layers; above edge / sqrt(3), so that no vertex sl
 
 
 def make_cloth() -> Animation:
-    """Simulate the clip: 110 frames, 2025 vertices, open boundary."""
+    """Return the simulated clip: 110 frames, 2025 vertices, open boundary."""
     material, faces = triangulate_cloth()
     dt = 1.0 / (FPS * N_SUBSTEPS)
     colours = colour_constraints(edges_of(faces))
@@ -77,10 +76,10 @@ def make_cloth() -> Animation:
 
 
 def triangulate_cloth() -> tuple[Floats, npt.NDArray[np.int32]]:
-    """Cut the cloth: a jittered grid, Delaunay triangulated.
+    """Triangulate a jittered grid (Delaunay): irregular triangles fold alike in all directions, regular ones do not.
 
-    Irregular triangles fold alike in all directions; a regular grid would fold along its diagonals.
-    Returns material coordinates (V, 3) in m with y = 0, and faces (T, 3), counter-clockwise from above.
+    Returns:
+        Material coordinates (V, 3), m, with y = 0, and faces (T, 3), counter-clockwise from above.
     """
     rng = np.random.default_rng(SEED)
     steps = np.linspace(-0.5, 0.5, N_SIDE) * SIDE
@@ -97,17 +96,16 @@ def triangulate_cloth() -> tuple[Floats, npt.NDArray[np.int32]]:
 
 
 def edges_of(faces: npt.NDArray[np.int32]) -> Ints:
-    """Undirected edges (E, 2)."""
+    """Return the undirected edges (E, 2)."""
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     return np.unique(np.sort(sides, axis=1), axis=0).astype(np.int64)
 
 
 def bending_matrix(material: Floats, faces: npt.NDArray[np.int32]) -> sp.csr_matrix:
-    """The (V, V) matrix in 1/m^4 from positions to minus the accelerations by bending, for unit stiffness.
+    """Return the (V, V) matrix, 1/m^4, from positions to minus the accelerations by bending, for unit stiffness.
 
-    It is L^T M^-1 L / m with the cotangent Laplacian L and the vertex areas M of the flat cloth; m is the
-    mean area, since the solver gives all vertices one mass. The rows of L at the boundary are left out: a
-    free edge carries no bending moment.
+    It is L^T M^-1 L / m. L is the cotangent Laplacian, M the vertex areas of the flat cloth, m the mean area: the solver gives
+    all vertices one mass. L has no rows at the boundary, since a free edge carries no bending moment.
     """
     n_vertices = len(material)
     entries, rows, columns = [], [], []
@@ -121,17 +119,17 @@ def bending_matrix(material: Floats, faces: npt.NDArray[np.int32]) -> sp.csr_mat
         rows += [i, j, i, j]
         columns += [j, i, i, j]
         area += np.bincount(o, weights=double_area / 6.0, minlength=n_vertices)
-    places = (np.concatenate(rows), np.concatenate(columns))
-    laplacian = sp.csr_matrix((np.concatenate(entries), places), shape=(n_vertices, n_vertices))
+    indices = (np.concatenate(rows), np.concatenate(columns))
+    laplacian = sp.csr_matrix((np.concatenate(entries), indices), shape=(n_vertices, n_vertices))
     inside = (np.abs(material[:, [0, 2]]) < 0.5 * SIDE - 1e-9).all(axis=1)
     return sp.csr_matrix(laplacian.T @ sp.diags(inside / area) @ laplacian / area.mean())
 
 
 def colour_constraints(pairs: Ints) -> list[tuple[Ints, Ints]]:
-    """Split vertex pairs (E, 2) into sets within which no vertex occurs twice.
+    """Split vertex pairs (E, 2) into colours; within one, no vertex occurs twice.
 
-    Each colour is a maximal matching found in parallel: a pair joins when its random rank is the lowest at
-    both of its ends, and the pairs that it blocks wait for the next colour.
+    Each colour is a maximal matching found in parallel. A pair joins if its random rank is the lowest at both of its ends; the
+    pairs that it blocks wait for the next colour.
     """
     rng = np.random.default_rng(SEED)
     n_vertices = int(pairs.max()) + 1
@@ -153,7 +151,7 @@ def colour_constraints(pairs: Ints) -> list[tuple[Ints, Ints]]:
 
 
 def start_pose(material: Floats) -> tuple[Floats, Floats]:
-    """Position (V, 3) in m and velocity (V, 3) in m/s: above the ball, tilted, off centre, turning slowly."""
+    """Return position (V, 3), m, and velocity (V, 3), m/s: above the ball, tilted, off centre, turning slowly."""
     tilt, turn, spin = 0.16, 0.35, 1.6  # rad, rad, rad/s
     x, z = material[:, 0], material[:, 2]
     x, z = x * np.cos(turn) + z * np.sin(turn), z * np.cos(turn) - x * np.sin(turn)
@@ -164,7 +162,7 @@ def start_pose(material: Floats) -> tuple[Floats, Floats]:
 
 
 def vertex_normals(position: Floats, faces: npt.NDArray[np.int32]) -> Floats:
-    """Unit normals (V, 3), weighted by area."""
+    """Return unit normals (V, 3), weighted by area."""
     a, b, c = position[faces[:, 0]], position[faces[:, 1]], position[faces[:, 2]]
     corner_normals = np.repeat(np.cross(b - a, c - a), 3, axis=0)
     normals = _sum_at(faces.ravel(), corner_normals, len(position))
@@ -182,7 +180,7 @@ def solve_distances(position: Floats, i: Ints, j: Ints, rest: Floats, dt: float)
 
 
 def layers_near(position: Floats, material: Floats) -> Ints:
-    """Pairs (N, 2) that are close in space but not in the cloth; the margin covers a few substeps' motion."""
+    """Return pairs (N, 2) close in space but not in the cloth, with a margin for the motion of a few substeps."""
     reach = 1.6 * CLOTH_GAP
     pairs = cKDTree(position).query_pairs(reach, output_type="ndarray").astype(np.int64)
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
@@ -207,7 +205,7 @@ def push_layers_apart(position: Floats, pairs: Ints) -> None:
 
 
 def collide_with_ball(position: Floats, previous: Floats) -> None:
-    """Lift vertices out of the ball and hold them back by friction, in place."""
+    """Move vertices out of the ball and slow them by friction, in place."""
     radial = position - BALL_CENTRE
     distance = np.sqrt(_dot(radial))
     hit = np.flatnonzero(distance < BALL_RADIUS + CONTACT_GAP)

@@ -1,8 +1,7 @@
-"""A walking fox: one closed surface around a skeleton, skinned smoothly.
+"""A walking fox: one closed surface around a skeleton, by linear blend skinning.
 
-Linear blend skinning. The weights are diffused over the surface from "this vertex belongs to the nearest
-flesh", after I. Baran and J. Popovic (Automatic Rigging and Animation of 3D Characters, SIGGRAPH 2007,
-section 4): along the surface, so that one leg never pulls at the other.
+Each vertex first follows the nearest bone alone. The skinning weights then diffuse along the surface, so that one leg never
+pulls at the other (I. Baran and J. Popovic, Automatic Rigging and Animation of 3D Characters, SIGGRAPH 2007, section 4).
 
 Frame: metres, y up, the fox walks along +z on the ground y = 0.
 """
@@ -24,7 +23,7 @@ from scipy.sparse.linalg import splu
 Floats = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int32]
 
-# (place, cell size) along each axis in m, linear between: small at ears, muzzle and legs, large at the trunk.
+# (coordinate, cell size there) along each axis in m, linear between: small at ears, muzzle and legs, large at the trunk.
 GRID_X = [(-0.29, 0.029), (0.29, 0.029)]
 GRID_Y = [(-0.07, 0.029), (0.38, 0.031), (0.50, 0.044), (0.70, 0.044), (0.80, 0.030), (1.20, 0.025)]
 GRID_Z = [(-1.14, 0.040), (-0.50, 0.038), (-0.40, 0.029), (-0.20, 0.034), (-0.05, 0.055), (0.10, 0.044)]
@@ -34,7 +33,7 @@ SPREAD = 2.5  # edges squared; how far the skin blends between bones
 
 
 def make_creature() -> Animation:
-    """Build, skin and walk the fox."""
+    """Return the fox walking: 102 frames."""
     parts = fox_parts()
     rest, faces = build_surface(parts)
     bones = list(dict.fromkeys(part.bone for part in parts))
@@ -44,7 +43,7 @@ def make_creature() -> Animation:
 
 
 def build_surface(parts: list[RoundCone]) -> tuple[Floats, Faces]:
-    """Rest vertices (V, 3) in m and faces (T, 3) of the flesh's surface."""
+    """Return rest vertices (V, 3), m, and faces (T, 3) of the body's surface."""
     axes = [graded_axis(knots) for knots in (GRID_X, GRID_Y, GRID_Z)]
     points, faces = surface_nets(partial(distance_to_body, parts=parts), axes)
     require_closed(faces)
@@ -53,18 +52,18 @@ def build_surface(parts: list[RoundCone]) -> tuple[Floats, Faces]:
 
 
 def graded_axis(knots: list[tuple[float, float]]) -> Floats:
-    """Grid lines in m from the first knot to past the last; a knot is (place, cell size there)."""
-    places, sizes = np.array(knots).T
-    lines = [float(places[0])]
-    while lines[-1] < places[-1]:
-        lines.append(lines[-1] + float(np.interp(lines[-1], places, sizes)))
+    """Return grid lines, m, from the first knot to past the last; a knot is (coordinate, cell size there)."""
+    coordinates, sizes = np.array(knots).T
+    lines = [float(coordinates[0])]
+    while lines[-1] < coordinates[-1]:
+        lines.append(lines[-1] + float(np.interp(lines[-1], coordinates, sizes)))
     return np.array(lines)
 
 
 def require_closed(faces: Faces) -> None:
-    """Refuse a surface with an edge that does not have one face on each side.
+    """Raise ValueError unless every edge has one face on each side.
 
-    Surface nets make one where the surface grazes a grid plane; a small change of the grid then helps.
+    Surface nets leave such an edge where the surface touches a grid plane; a small change of the grid then helps.
     """
     half_edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     _, n_uses = np.unique(half_edges, axis=0, return_counts=True)
@@ -75,7 +74,7 @@ def require_closed(faces: Faces) -> None:
 
 
 def diffuse_weights(owned: Floats, faces: Faces) -> Floats:
-    """Skinning weights (V, B), rows summing to 1, from one-hot ownership (V, B)."""
+    """Return skinning weights (V, B), rows summing to 1, from the one-hot nearest bone (V, B)."""
     n_vertices = len(owned)
     mean = neighbour_mean(faces, n_vertices)
     # Two implicit steps: one alone leaves a crease along the border between two owners.
@@ -86,7 +85,7 @@ def diffuse_weights(owned: Floats, faces: Faces) -> Floats:
 
 
 def skin(rest: Floats, weights: Floats, bones: list[str], poses: Poses) -> Floats:
-    """Vertices (F, V, 3) in m of the posed skin."""
+    """Return the posed vertices (F, V, 3), m."""
     posed = np.zeros((len(poses[bones[0]][1]), *rest.shape))
     for bone, weight in zip(bones, weights.T, strict=True):
         rest_joint, turn, joint = poses[bone]

@@ -1,4 +1,4 @@
-"""The rest pose of a fox: bones and flesh.
+"""The rest pose of a fox: its bones, and the round cones around them.
 
 Frame: metres, y up, the fox faces +z, its left is +x, the ground is y = 0.
 """
@@ -12,21 +12,21 @@ from implicit import Point, RoundCone
 
 @dataclass(frozen=True)
 class Leg:
-    """Joints of one leg at rest, all in one plane of constant x."""
+    """The joints of one leg at rest, all in one plane of constant x."""
 
     name: str
-    parent: str  # the bone that it hangs from
+    parent: str  # bone
     root: Point  # m, hip or shoulder
     knee: Point  # m, knee or elbow
     ankle: Point  # m, hock or wrist
-    ball: Point  # m, where the paw begins; it stays planted while the leg carries
+    ball: Point  # m, where the paw begins; it stays in place while the leg carries weight
     toe: Point  # m
     knee_side: int  # +1 if the knee bends forward, -1 if backward
     phase: float  # part of a cycle by which this leg is ahead
 
     @property
     def bones(self) -> tuple[str, str, str, str]:
-        """Bone names from hip to toe."""
+        """The names of its bones, from hip to toe."""
         return (f"{self.name}_upper", f"{self.name}_lower", f"{self.name}_cannon", f"{self.name}_paw")
 
 
@@ -65,7 +65,7 @@ SPINE: list[tuple[str, str, Point]] = [
 
 
 def fox_parts() -> list[RoundCone]:
-    """The flesh: round cones, each carried by a bone."""
+    """Return the round cones that make up the body, each with its bone."""
     parts = [
         RoundCone("pelvis", (0.0, 0.575, -0.32), (0.0, 0.590, -0.04), 0.118, 0.112, 0.02),
         RoundCone("chest", (0.0, 0.590, -0.04), (0.0, 0.560, 0.23), 0.112, 0.142, 0.02),

@@ -1,7 +1,7 @@
-"""How the fox walks: for each bone, its rotation and the place of its joint in each frame.
+"""The walk of the fox: the rotation of each bone and the position of its joint, in each frame.
 
-The trunk, neck, head, ears and tail follow sine waves of the step. The paws follow footprints on the ground,
-and the legs reach them by two-bone inverse kinematics, so that a paw that carries weight stays where it is.
+Trunk, neck, head, ears and tail follow sine waves of the step. Paws follow footprints on the ground, so that a paw that carries
+weight stays in place. Legs reach their paws by two-bone inverse kinematics.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ LIFT = 0.055  # m, height of a paw's swing
 
 
 def pose_fox() -> Poses:
-    """For each bone: joint at rest (3,) m, rotation from rest (F, 3, 3), joint (F, 3) m."""
+    """Return for each bone: joint at rest (3,), m; rotation from rest (F, 3, 3); joint (F, 3), m."""
     cycle = np.arange(N_CYCLES * FRAMES_PER_CYCLE) / FRAMES_PER_CYCLE  # time in cycles, (F,)
     poses = pose_spine(cycle)
     for leg in LEGS:
@@ -31,12 +31,12 @@ def pose_fox() -> Poses:
 
 
 def body_advance(cycle: Floats) -> Floats:
-    """How far the trunk has walked along z, in m; 0 in the middle of the clip."""
+    """Return the distance (F,), m, that the trunk has walked along z; 0 in the middle of the clip."""
     return STRIDE * (cycle - N_CYCLES / 2)
 
 
 def pose_spine(cycle: Floats) -> Poses:
-    """Trunk, neck, head, ears and tail, by forward kinematics."""
+    """Return the poses of trunk, neck, head, ears and tail, by forward kinematics."""
     step = 2 * np.pi * cycle  # one turn per stride
     whole = 2 * np.pi * cycle / N_CYCLES  # one turn per clip
     still = np.zeros_like(cycle)
@@ -66,7 +66,7 @@ def pose_spine(cycle: Floats) -> Poses:
 
 
 def pose_leg(leg: Leg, cycle: Floats, parent: tuple[Floats, Floats, Floats]) -> Poses:
-    """The four bones of one leg, hung from its parent's pose."""
+    """Return the poses of the four bones of one leg, from the pose of its parent."""
     rest = [np.array(point) for point in (leg.root, leg.knee, leg.ankle, leg.ball, leg.toe)]
     parent_rest, parent_turn, parent_joint = parent
     root = parent_joint + parent_turn @ (rest[0] - parent_rest)
@@ -88,7 +88,7 @@ def pose_leg(leg: Leg, cycle: Floats, parent: tuple[Floats, Floats, Floats]) -> 
 
 
 def follow_footprints(leg: Leg, cycle: Floats) -> tuple[Floats, Floats]:
-    """Path (F, 3) in m of the ball of a paw, and how far its swing has gone (F,): 0 on the ground, to 1."""
+    """Return the path (F, 3), m, of the ball of a paw, and the part of its swing that is done (F,), 0 on the ground."""
     phase = cycle + leg.phase
     n_steps, within = np.floor(phase), phase % 1.0
     # A footprint lies where the paw is at rest under the trunk in the middle of its stance.
@@ -101,7 +101,7 @@ def follow_footprints(leg: Leg, cycle: Floats) -> tuple[Floats, Floats]:
 
 
 def bend_knee(root: Floats, ankle: Floats, upper: float, lower: float, side: int) -> Floats:
-    """The knee (F, 3) between hip and ankle, for bone lengths in m; it bends forward if side is +1."""
+    """Return the knee (F, 3), m, between hip and ankle, for bone lengths, m; it bends forward if side is +1."""
     reach = ankle - root
     distance = np.linalg.norm(reach, axis=1)
     along = reach / distance[:, None]
@@ -114,12 +114,12 @@ def bend_knee(root: Floats, ankle: Floats, upper: float, lower: float, side: int
 
 
 def rotation(yaw: Floats, pitch: Floats, roll: Floats) -> Floats:
-    """Rotations (F, 3, 3) by angles (F,) in rad: roll about z, then pitch about x, then yaw about y."""
+    """Return rotations (F, 3, 3) by angles (F,), rad: roll about z, then pitch about x, then yaw about y."""
     return _axis_turn(yaw, 1) @ _axis_turn(pitch, 0) @ _axis_turn(roll, 2)
 
 
 def turn_between(rest: Floats, posed: Floats) -> Floats:
-    """Rotations (F, 3, 3) from a bone's rest direction (3,) to directions (F, 3), without twist."""
+    """Return rotations (F, 3, 3) from a bone's rest direction (3,) to directions (F, 3), without twist."""
     return _frames(posed) @ _frames(rest[None]).transpose(0, 2, 1)
 
 
@@ -130,7 +130,7 @@ def _frames(direction: Floats) -> Floats:
 
 
 def _across(along: Floats) -> Floats:
-    """The unit vectors (F, 3) square to `along` that are closest to +x."""
+    """Return the unit vectors (F, 3) at right angles to `along` that are closest to +x."""
     across = np.array([1.0, 0.0, 0.0]) - along[:, :1] * along
     unit: Floats = across / np.linalg.norm(across, axis=1, keepdims=True)
     return unit

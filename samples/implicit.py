@@ -1,4 +1,4 @@
-"""Bodies as smooth unions of round cones: signed distance, gradient, and the part that each point belongs to.
+"""Bodies as smooth unions of round cones: signed distance, gradient, and the nearest part of each point.
 
 Signed distance is negative inside. Round cone and quadratic smooth minimum after I. Quilez, Distance
 Functions and Smooth Minimum (iquilezles.org).
@@ -17,18 +17,18 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class RoundCone:
-    """The convex hull of two balls."""
+    """The convex hull of two balls, which one bone moves."""
 
-    bone: str  # the bone that carries this part
+    bone: str  # moves this part
     start: Point  # m
     end: Point  # m
     start_radius: float  # m
     end_radius: float  # m
-    blend: float  # m; how far the joint with the parts before it reaches
+    blend: float  # m; reach of the smooth joint with the parts before it
 
 
 def distance_to_cone(points: Floats, cone: RoundCone) -> Floats:
-    """Exact signed distance (N,) in m of points (N, 3) to one cone."""
+    """Return the exact signed distance (N,), m, of points (N, 3) to one cone."""
     axis = np.subtract(cone.end, cone.start)
     length2 = float(axis @ axis)
     taper = cone.start_radius - cone.end_radius
@@ -49,7 +49,7 @@ def distance_to_cone(points: Floats, cone: RoundCone) -> Floats:
 
 
 def distance_to_body(points: Floats, parts: list[RoundCone]) -> Floats:
-    """Signed distance (N,) in m to the smooth union; near the joints only a close bound."""
+    """Return the signed distance (N,), m, to the smooth union; near the joints it is only a close bound."""
     union = distance_to_cone(points, parts[0])
     for part in parts[1:]:
         other = distance_to_cone(points, part)
@@ -59,7 +59,7 @@ def distance_to_body(points: Floats, parts: list[RoundCone]) -> Floats:
 
 
 def gradient_of_body(points: Floats, parts: list[RoundCone], step: float = 1e-4) -> Floats:
-    """Gradient (N, 3) by central differences over `step` m."""
+    """Return the gradient (N, 3) by central differences over `step`, m."""
     offsets = step * np.eye(3)
     ahead = [distance_to_body(points + offset, parts) for offset in offsets]
     behind = [distance_to_body(points - offset, parts) for offset in offsets]
@@ -67,7 +67,7 @@ def gradient_of_body(points: Floats, parts: list[RoundCone], step: float = 1e-4)
 
 
 def project_to_body(points: Floats, parts: list[RoundCone]) -> Floats:
-    """One Newton step of points (N, 3) towards the surface, along the gradient."""
+    """Return points (N, 3) one Newton step nearer to the surface, along the gradient."""
     gradient = gradient_of_body(points, parts)
     slope2 = np.maximum((gradient**2).sum(axis=1), 0.05)
     projected: Floats = points - (distance_to_body(points, parts) / slope2)[:, None] * gradient
@@ -75,7 +75,7 @@ def project_to_body(points: Floats, parts: list[RoundCone]) -> Floats:
 
 
 def nearest_part(points: Floats, parts: list[RoundCone]) -> npt.NDArray[np.int64]:
-    """Index (N,) of the part whose surface is nearest."""
+    """Return the index (N,) of the part whose surface is nearest."""
     distances = np.stack([distance_to_cone(points, part) for part in parts])
     nearest: npt.NDArray[np.int64] = distances.argmin(axis=0)
     return nearest

@@ -1,4 +1,4 @@
-"""Make gvpipe's sample animations from nothing; the bytes are the same on each run.
+"""Make gvpipe's sample animations; runs with the same libraries write the same bytes.
 
 `cloth.npz` and `creature.npz` hold `vertices` (F, V, 3) float32 in metres, y up, `faces` (T, 3) int32,
 counter-clockwise from outside, and `fps`. `ball_frames/` holds one OBJ file for each frame.
@@ -41,15 +41,15 @@ def main() -> None:
 def write_npz(path: Path, animation: Animation) -> None:
     """Write the arrays, vertices rounded to GRID.
 
-    They are stored in Fortran order, which numpy reads back as the same (F, V, 3) array: each coordinate's
-    whole path then lies together, which deflate packs a quarter smaller than frame after frame.
+    Fortran order stores the path of each coordinate together. Deflate then needs a quarter less than frame after frame,
+    and numpy reads back the same (F, V, 3) array.
     """
     vertices = np.asfortranarray(round_to_grid(animation.vertices))
     np.savez_compressed(path, vertices=vertices, faces=animation.faces, fps=np.float64(animation.fps))
 
 
 def write_obj_frames(folder: Path, animation: Animation) -> None:
-    """Write ball_0001.obj and so on, in units of 0.1 mm."""
+    """Write ball_0001.obj and so on, in metres, rounded to 0.1 mm."""
     folder.mkdir(parents=True, exist_ok=True)
     faces = "".join(f"f {a} {b} {c}\n" for a, b, c in (animation.faces + 1).tolist())
     for number, frame in enumerate(animation.vertices, start=1):
@@ -59,7 +59,7 @@ def write_obj_frames(folder: Path, animation: Animation) -> None:
 
 
 def round_to_grid(vertices: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
-    """Vertices (F, V, 3) as float32 multiples of GRID, without -0."""
+    """Return vertices (F, V, 3), m, as float32 multiples of GRID, without -0."""
     rounded: npt.NDArray[np.float32] = (np.round(vertices / GRID) * GRID + 0.0).astype(np.float32)
     return rounded
 

@@ -19,10 +19,11 @@ Field = Callable[[Floats], Floats]
 
 
 def surface_nets(distance: Field, axes: list[Floats]) -> tuple[Floats, Faces]:
-    """Vertices (V, 3) in m and faces (T, 3), counter-clockwise from outside, of the zero level in a box.
+    """Return vertices (V, 3), m, and faces (T, 3), counter-clockwise from outside, of a field's zero level.
 
-    `distance` maps points (N, 3) to signed distances (N,), negative inside. `axes` are the grid's x, y and z
-    in m, rising, as dense as the detail there needs; the surface must stay two cells inside.
+    Args:
+        distance: maps points (N, 3), m, to signed distances (N,), m, negative inside.
+        axes: the grid's x, y and z, m, ascending, denser where the surface has detail; it must keep two cells from the border.
     """
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)  # (X, Y, Z, 3)
     field = distance(grid.reshape(-1, 3)).reshape([len(lines) for lines in axes])
@@ -51,7 +52,7 @@ def surface_nets(distance: Field, axes: list[Floats]) -> tuple[Floats, Faces]:
 
 
 def split_quads(points: Floats, quads: npt.NDArray[np.int64]) -> Faces:
-    """Cut quads (Q, 4) along their shorter diagonals into triangles (2Q, 3)."""
+    """Return triangles (2Q, 3): quads (Q, 4) cut along their shorter diagonals."""
     a, b, c, d = quads.T
     first = ((points[a] - points[c]) ** 2).sum(axis=1) <= ((points[b] - points[d]) ** 2).sum(axis=1)
     ac = np.stack([a, b, c, a, c, d], axis=1)
@@ -60,7 +61,7 @@ def split_quads(points: Floats, quads: npt.NDArray[np.int64]) -> Faces:
 
 
 def neighbour_mean(faces: Faces, n_vertices: int) -> sp.csr_matrix:
-    """The (V, V) matrix that averages each vertex's neighbours."""
+    """Return the (V, V) matrix that averages the neighbours of each vertex."""
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     ones = np.ones(len(ends))
     # On a closed surface each edge occurs both ways, so the links are symmetric.
@@ -69,9 +70,9 @@ def neighbour_mean(faces: Faces, n_vertices: int) -> sp.csr_matrix:
 
 
 def relax(points: Floats, faces: Faces, gradient: Field, project: Field, n_rounds: int) -> Floats:
-    """Even out the vertices (V, 3): slide towards the mean of the neighbours, within the surface.
+    """Spread vertices (V, 3), m, evenly: each moves towards the mean of its neighbours, within the surface.
 
-    The part of the step along the gradient is left out; it would draw the mesh off ears and toes.
+    Steps leave out their part along the gradient, which would draw the mesh off ears and toes.
     """
     mean = neighbour_mean(faces, len(points))
     points = project(points)
@@ -85,7 +86,7 @@ def relax(points: Floats, faces: Faces, gradient: Field, project: Field, n_round
 
 
 def _halves(values: Floats, axis: int) -> tuple[Floats, Floats]:
-    """The values at the near and the far end of each grid edge along an axis."""
+    """Return the values at the near and at the far end of each grid edge along an axis."""
     n = values.shape[axis]
     return np.take(values, np.arange(n - 1), axis), np.take(values, np.arange(1, n), axis)
 
@@ -93,7 +94,7 @@ def _halves(values: Floats, axis: int) -> tuple[Floats, Floats]:
 def _quads_around(
     crossed: npt.NDArray[np.bool_], starts_inside: npt.NDArray[np.bool_], axis: int, n_cells: tuple[int, ...]
 ) -> npt.NDArray[np.int64]:
-    """The cells (Q, 4) around each crossed edge, counter-clockwise from outside."""
+    """Return the four cells around each crossed edge (Q, 4), counter-clockwise from outside."""
     u, v = (axis + 1) % 3, (axis + 2) % 3
     at = np.argwhere(crossed)  # (Q, 3)
     corners = []

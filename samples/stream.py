@@ -1,8 +1,8 @@
-"""Stream an animation: frames go in one by one, bytes come out clip by clip, and frames again as the bytes arrive.
+"""Stream an animation: the sender codes frames clip by clip, the receiver decodes them as the bytes arrive.
 
     python samples/stream.py [SEQUENCE.npz] [FRAMES_PER_CLIP]
 
-Sender and receiver each hold one clip, however long the animation is.
+Sender and receiver each hold one clip, for animations of any length.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ PACKET = 1400  # bytes that a network hands over at a time
 
 
 def main() -> None:
-    """Send a sequence to a receiver in this process, and tell what arrived when."""
+    """Send a sequence to a receiver in this process, and print which frames arrive when."""
     source = sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parent / "cloth.npz"
     clip = int(sys.argv[2]) if len(sys.argv) > 2 else 24
     sequence = gvpipe.read(source)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from sequences import grid
 
@@ -28,6 +30,6 @@ def two_plates() -> MeshSequence:
     return MeshSequence(np.concatenate([one, two], axis=1).astype(np.float32), np.concatenate([faces, faces + 64]))
 
 
-def coded_stream(sequence: MeshSequence, **chosen: object) -> bytes:
-    encoder = StreamEncoder(sequence.faces, Pdct(**chosen), sequence.fps)  # type: ignore[arg-type]
+def coded_stream(sequence: MeshSequence, **chosen: Any) -> bytes:
+    encoder = StreamEncoder(sequence.faces, Pdct(**chosen), sequence.fps)
     return b"".join(encoder.add(frame) for frame in sequence.read(0, sequence.n_frames)) + encoder.finish()

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,8 @@ settings.load_profile("same")
 if worker := os.environ.get("PYTEST_XDIST_WORKER"):
     # workers that fill one cache together replace each other's entries, and compile more often
     os.environ["NUMBA_CACHE_DIR"] = str(ROOT / ".pytest_cache" / f"numba-{worker}")
-FAST = {"preset": "ultrafast", "clusters": 3, "gop": 4}  # settings that cost little, for tests of anything but coding
+# settings that cost little, for tests of anything but coding
+FAST: dict[str, Any] = {"preset": "ultrafast", "clusters": 3, "gop": 4}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -92,3 +94,14 @@ def run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> C
         return Finished(int(stopped.value.code or 0), out, err)
 
     return call
+
+
+@pytest.fixture(params=["sequence", "lazy", "player", "of player"])
+def frames(request: pytest.FixtureRequest, sequence: MeshSequence, video: Path, tmp_path: Path) -> Any:
+    """The small animation as each thing that slices by frame."""
+    if request.param == "lazy":
+        gvpipe.write(sequence, tmp_path / "f" / "%02d.obj")
+        return gvpipe.read(tmp_path / "f", 25.0)
+    if request.param == "sequence":
+        return sequence
+    return gvpipe.open(video) if request.param == "player" else gvpipe.open(video).sequence()

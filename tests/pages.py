@@ -85,3 +85,15 @@ def check_frames(module: Callable[..., Any], path: Path, reference: MeshSequence
             if reference:
                 wanted = reference.read(k, k + 1)[0]
                 assert np.abs(found - wanted).max() <= np.spacing(np.abs(wanted).max()), f"frame {k}"
+
+
+FAST: dict[str, Any] = {"preset": "ultrafast", "clusters": 3, "gop": 4}
+
+
+def encode_file(site: tuple[Path, str], sequence: MeshSequence, name: str = "x.mp4", **settings: Any) -> Path:
+    gvpipe.encode(sequence, site[0] / name, **{**FAST, **settings})
+    return site[0] / name
+
+
+def flipped(data: bytes, position: int) -> bytes:
+    return data[:position] + bytes([data[position] ^ 0x55]) + data[position + 1 :]

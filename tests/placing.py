@@ -91,9 +91,9 @@ def halved(
             cell(own[:n], x, y, w, first, across, down)
             cell(own[n:], x, y + first, w, h - first, across, down)
 
-    for own, x, y, w, h in cells or []:
-        one, two = widest(scores(own))
-        cell(own, x, y, w, h, *((one, two) if w >= h else (two, one)))
+    for part, x, y, w, h in cells or []:
+        one, two = widest(scores(part))
+        cell(part, x, y, w, h, *((one, two) if w >= h else (two, one)))
     if not cells:
         cell(list(range(len(points))), 0, 0, width, height, (0, 0, 0), (0, 0, 0))
     return pixels

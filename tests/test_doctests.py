@@ -8,6 +8,7 @@ from importlib import import_module
 import pytest
 
 MODULES = [
+    "gvpipe.codec",
     "gvpipe.container.cursor",
     "gvpipe.entropy.block_coder",
     "gvpipe.entropy.grouping",
@@ -17,8 +18,11 @@ MODULES = [
     "gvpipe.errors",
     "gvpipe.mesh.lattice",
     "gvpipe.mesh.unique_rows",
+    "gvpipe.metrics.comparison",
     "gvpipe.quality_scale",
+    "gvpipe.rate_control.step_search",
     "gvpipe.repeated_frames",
+    "gvpipe.sequence",
     "gvpipe.trajectory.still_vertices",
     "gvpipe.trajectory.temporal_neighbours",
 ]

@@ -6,6 +6,8 @@ released is never written again.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from folders import GOLDEN
@@ -14,7 +16,7 @@ from sequences import held, partly_still, patched, rigid, waving
 import gvpipe
 from gvpipe.registry import codec_class
 
-CURRENT: dict[str, tuple[str, dict[str, object]]] = {
+CURRENT: dict[str, tuple[str, dict[str, Any]]] = {
     "laplacian-2-still": ("laplacian", {"segment": 7}),
     "mcgv-4-h264": ("mcgv", {"prediction": "blended", "gop": 5, "segment": 7, "placement": "tiles"}),
     "mcgv-4-affine": ("mcgv", {"clusters": 5, "prediction": "affine", "placement": "halves"}),

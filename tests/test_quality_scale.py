@@ -7,10 +7,9 @@ from folders import DATA
 from sequences import held, patched, waving
 
 import gvpipe
-from gvpipe.container.bitstream import Bitstream
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of, quality_of
-from gvpipe.rate_control.step_search import BAND, Aimed, Anchor, mend, root_mean_square, step_between
+from gvpipe.rate_control.step_search import root_mean_square
 from gvpipe.registry import codec_class, codec_ids, encode_sequence, open_reader
 from gvpipe.sequence import MeshSequence
 
@@ -52,33 +51,3 @@ def test_the_scale() -> None:
     for quality, error in {25: 3.5, 50: 0.7, 75: 0.14, 90: 0.0436, 100: 0.02}.items():
         assert error_of(quality) == pytest.approx(error, rel=2e-3)
         assert quality_of(error_of(quality)) == pytest.approx(quality)
-
-
-def pretend(step: float, exponent: float) -> Aimed:
-    return Aimed(Bitstream("none", 1, 1, 1, 0, 30.0), step, 0.3 * step**exponent)
-
-
-@pytest.mark.parametrize("exponent", [0.6, 1.0, 1.3])
-def test_steps_are_mended_until_the_error_is_close(exponent: float) -> None:
-    aimed = mend(lambda step: pretend(step, exponent), 1.0, 1.0)
-    assert BAND[0] <= aimed.error <= BAND[1]
-
-
-def test_errors_that_do_not_follow_the_step_end_the_loop() -> None:
-    tried: list[float] = []
-
-    def attempt(step: float) -> Aimed:
-        tried.append(step)
-        return Aimed(Bitstream("none", 1, 1, 1, 0, 30.0), step, 0.0)
-
-    assert mend(attempt, 1.0, 1e30).step in tried
-    assert len(tried) == 3
-
-
-def test_steps_between_anchors() -> None:
-    anchors = [Anchor(2.0, 1.0), Anchor(0.1, 0.1)]
-    assert step_between(anchors, 10**-0.5) == pytest.approx(0.2**0.5)
-    assert step_between(anchors, 1.5) == pytest.approx(3.0)
-    assert step_between(anchors, 0.06) == pytest.approx(0.06)
-    assert step_between(anchors, 3.0) is None
-    assert step_between([], 1.0) is None

@@ -1,10 +1,13 @@
 """The codec, with its settings, that meets a target with the smallest file.
 
-Every candidate first meets the target roughly on the sequence's first frames. The estimate for the whole: what all frames share
-as it is, what belongs to frames (sections named ``NAME.N``, the video) times as many, and more or less as the error is off.
-Those that promise about the smallest file then encode all frames, and the smallest file is kept; for a target in bits, the one
-with the smallest error. Estimates of one codec with several settings are wrong alike where the first frames tell little, so two
-codecs encode a longer sequence.
+1. Every candidate meets the target roughly on the sequence's first frames.
+2. Its size for all frames is estimated: shared + per_frame * (error / target)^ELASTICITY * F / SAMPLE. Sections named
+   ``NAME.N`` and the video are per frame, the others shared. For a target in bits, its error at that size is estimated.
+3. The candidates with the smallest estimates encode all frames.
+4. The smallest file is kept; for a target in bits, the one with the smallest error.
+
+Estimates of one codec with several settings err alike where the first frames differ from the others. So two codecs encode a
+longer sequence.
 """
 
 from __future__ import annotations
@@ -17,7 +20,8 @@ from gvpipe.codec import Codec, Progress
 from gvpipe.errors import InputError
 from gvpipe.quality_scale import error_of
 from gvpipe.rate_control.purposes import describe
-from gvpipe.rate_control.search import Choice, Target, meet
+from gvpipe.rate_control.search import Choice, meet
+from gvpipe.rate_control.targets import Target
 from gvpipe.rate_control.trials import Trial
 from gvpipe.sequence import MeshSequence
 
@@ -25,22 +29,31 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 SAMPLE = 100  # frames of an estimate
-ELASTICITY = 0.45  # bytes that belong to frames go with the error to about minus this power
-CLOSE = 1.08  # times the best estimate: another that may turn out smaller
+ELASTICITY = 0.45  # bytes per frame are about proportional to the error to minus this power
+CLOSE = 1.08  # times the best estimate: another candidate that may be the smallest
 FEW = 2  # candidates that need no estimate
 MOST = 3  # candidates that encode all frames, where there are estimates
 
 
 def default_target(codecs: Sequence[Codec]) -> Target:
-    """Without another target: the KG error that the candidates' quality asks for."""
+    """Return the target where none is given: the KG error of the candidates' highest quality."""
     return Target("kg", error_of(max(codec.quality for codec in codecs)))
 
 
 def choose_codec(codecs: Sequence[Codec], sequence: MeshSequence, target: Target, progress: Progress | None = None) -> Choice:
-    """Encode with the candidates that promise most, and choose; ``tried`` holds the encodes of the whole sequence.
+    """Encode with the most promising candidates, and choose one of the encodes.
+
+    Args:
+        codecs: the candidates.
+        sequence: to encode.
+        target: for each of them.
+        progress: called with the stages of every encode.
+
+    Returns:
+        The choice; its ``tried`` has the encodes of the whole sequence, of all finalists.
 
     Raises:
-        InputError: no codec meets the target; the message tells why.
+        InputError: no codec meets the target; the message says why.
     """
     ranking, estimates, n_finalists = list(codecs), "", len(codecs)
     if len(codecs) > FEW:
@@ -68,7 +81,7 @@ def choose_codec(codecs: Sequence[Codec], sequence: MeshSequence, target: Target
 
 
 def _finalists(costs: list[tuple[float, Codec]], is_part: bool) -> list[Codec]:
-    """Candidates that are to encode all frames; estimates come sorted, of all frames or of a part of them."""
+    """The candidates that encode all frames; ``costs`` are sorted, and estimated from some frames if ``is_part``."""
     close = [codec for cost, codec in costs if cost <= CLOSE * costs[0][0]][:MOST]
     rival = next((codec for _, codec in costs if codec.id != close[0].id), None)
     if is_part and rival and rival not in close:
@@ -77,7 +90,7 @@ def _finalists(costs: list[tuple[float, Codec]], is_part: bool) -> list[Codec]:
 
 
 def _estimate(codec: Codec, sequence: MeshSequence, target: Target, progress: Progress | None) -> tuple[float, Codec]:
-    """What the codec would come to, infinity if it does not meet the target, and its settings with the quality that did."""
+    """The estimated cost (infinity: it does not meet the target), and the settings at the quality that met it."""
     n_sample = min(SAMPLE, sequence.n_frames)
     try:
         trial = meet(target, codec, sequence.part(0, n_sample), progress, is_rough=True).trial
@@ -93,7 +106,7 @@ def _estimate(codec: Codec, sequence: MeshSequence, target: Target, progress: Pr
 
 
 def _cost(trial: Trial, target: Target) -> float:
-    """What is to be small: bytes, or the error that they buy."""
+    """What to minimise: bytes; for a target in bits the KG error."""
     return (trial.errors.kg or 0.0) if target.measure == "bpvf" else float(trial.bytes)
 
 

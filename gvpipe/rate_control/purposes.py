@@ -1,4 +1,4 @@
-"""What a file is for, and which codecs with which settings serve that.
+"""Purposes of a file, and the codecs with the settings that serve each.
 
 A codec may compete with several settings (`VARIANTS`). Of a codec that this module does not name, the defaults compete for
 archives.
@@ -39,12 +39,12 @@ LACKS = {WEB: "browsers do not play", STREAM: "readers cannot start at once with
 def candidates(
     codec: str | None, purpose: str | None, make: Callable[[str, Own], Codec], given: frozenset[str] = frozenset()
 ) -> Codec | list[Codec]:
-    """The settings object of the codec that is asked for, or of all to choose from.
+    """Return the settings object of the codec that is asked for, or of all candidates.
 
     Args:
         codec: its id; ``auto`` for all that serve the purpose; None: ``auto`` where a purpose is given, else ``mcgv``.
         purpose: one of `PURPOSES`, or None, which with ``auto`` is ``archive``.
-        make: builds a codec's settings object from its id and settings beside those of the user, which are stronger.
+        make: builds a codec's settings object from its id and settings; settings of the user override these.
         given: names of the user's settings.
 
     Raises:
@@ -64,7 +64,7 @@ def candidates(
 
 
 def check_purpose(purpose: str | None) -> None:
-    """Raise `SettingError` unless there is such a purpose."""
+    """Raise `SettingError` unless ``purpose`` is None or one of `PURPOSES`."""
     if purpose is not None and purpose not in PURPOSES:
         raise SettingError(f"purpose is {purpose!r}; one of {', '.join(PURPOSES)} is needed{did_you_mean(purpose, PURPOSES)}")
 
@@ -96,7 +96,7 @@ def _without(own: Own, given: frozenset[str]) -> Own:
 
 
 def describe(codec: Codec) -> str:
-    """A codec's id, with the settings by which it is told apart from others of that id."""
+    """Return a codec's id, with the settings that distinguish it from its other variants: ``mcgv transform=klt``."""
     settings = dataclasses.asdict(cast("DataclassInstance", codec))
     names = sorted({name for own in VARIANTS.get(codec.id, ()) for name in own})
     plain = {field.name: field.default for field in dataclasses.fields(cast("DataclassInstance", codec))}

@@ -1,8 +1,8 @@
-"""From the error that a quality asks for to an encoder's step: code, measure, mend.
+"""From a quality's target error to an encoder's step: code, measure, correct the step.
 
-How error follows from step is a sequence's own. Its logarithm is nearly a straight line over the step's, so two or
-three encodes do. Encodes of the same sequence at other qualities interpolate between the steps that were measured (`Anchor`),
-without a loop.
+How error follows from step differs from sequence to sequence. The logarithm of the error is nearly a straight line over that of
+the step, so two or three encodes do. Encodes of the same sequence at other qualities interpolate between the steps that were
+measured (`Anchor`), without a loop.
 """
 
 from __future__ import annotations
@@ -20,15 +20,23 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.sequence import MeshSequence
 
 ROUNDS = 3  # encodes at most
-MOST_MOVED = math.log(4)  # of a step's logarithm, at once
+MOST_CHANGE = math.log(4)  # of a step's logarithm, at once
 SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: assumed at first, and believed
-BAND = 0.9, 1.06  # part of the error wanted that is close enough, for codecs whose errors scatter by a few percent
+BAND = 0.9, 1.06  # part of the target error that is close enough, for codecs whose errors scatter by a few percent
 NEAR = 2.0  # times, an error beside a measured one for which the step in proportion is believed
+LEAST_ERROR = 1e-300  # instead of 0, which has no logarithm
 
 
 @dataclass(frozen=True)
-class Aimed:
-    """An encode, its step and its root mean square error, model units, and how its logarithm rises with the step's."""
+class StepTrial:
+    """An encode with a step, measured.
+
+    Args:
+        encoded: the encode.
+        step: its quantisation step, model units.
+        error: root mean square error, model units.
+        slope: how the error's logarithm rises with the step's, about.
+    """
 
     encoded: Encoded
     step: float
@@ -43,75 +51,87 @@ class Aimed:
 
 @dataclass(frozen=True)
 class Anchor:
-    """A step and the root mean square error that it left, model units."""
+    """A step and the root mean square error that it left, both model units, which later encodes of the sequence start from."""
 
     step: float
     error: float
 
 
-def mend(
-    attempt: Callable[[float], Aimed],
+def find_step(
+    attempt: Callable[[float], StepTrial],
     step: float,
-    wanted: float,
+    target_error: float,
     band: tuple[float, float] = BAND,
     slope: float = 1.0,
     rounds: int = ROUNDS,
-) -> Aimed:
+) -> StepTrial:
     """Encode with one step after the other until the error is close enough; return the encode that came closest.
 
     Args:
-        attempt: makes and measures a bitstream with a step, model units.
+        attempt: codes and measures with a step, model units.
         step: the first.
-        wanted: root mean square error, model units.
+        target_error: root mean square, model units.
         band: least and most part of it that is close enough.
         slope: of the error's logarithm over the step's, assumed until two are measured.
         rounds: most encodes.
     """
-    aimed_at = wanted * math.sqrt(band[0] * band[1])
-    tried: list[Aimed] = []
+    middle = target_error * math.sqrt(band[0] * band[1])
+    tried: list[StepTrial] = []
     for _ in range(rounds):
         trial = attempt(step)
-        trial = Aimed(trial.encoded, step, max(trial.error, 1e-300))
+        trial = StepTrial(trial.encoded, step, max(trial.error, LEAST_ERROR))
         if tried and trial.step != tried[-1].step:
-            last = tried[-1]
-            slope = math.log(trial.error / last.error) / math.log(trial.step / last.step)
-            slope = min(max(slope, SLOPES[0]), SLOPES[1])
+            slope = _slope(tried[-1], trial)
         tried.append(trial)
-        if band[0] <= trial.error / wanted <= band[1]:
+        if band[0] <= trial.error / target_error <= band[1]:
             break
-        move = (math.log(aimed_at) - math.log(trial.error)) / slope
-        step *= math.exp(min(max(move, -MOST_MOVED), MOST_MOVED))
-    best = min(tried, key=lambda trial: abs(math.log(trial.error) - math.log(aimed_at)))
+        step *= _change(trial.error, middle, slope)
+    best = min(tried, key=lambda trial: abs(math.log(trial.error) - math.log(middle)))
     return dataclasses.replace(best, slope=slope)
 
 
-def step_between(anchors: Sequence[Anchor], wanted: float) -> float | None:
-    """The step for an error, model units, that lies between or near those measured; None if it lies far from all.
+def step_between(anchors: Sequence[Anchor], target_error: float) -> float | None:
+    """Return the step for a target error, model units, that lies between or near those measured; None far from all.
 
     Between two anchors the logarithm of the step is interpolated; beside one, steps are in proportion to errors.
+
+    >>> step_between([Anchor(step=0.1, error=0.1), Anchor(step=4.0, error=1.0)], 1.5)
+    6.0
     """
     ordered = sorted(anchors, key=lambda anchor: anchor.error)
     for low, high in pairwise(ordered):
-        if low.error <= wanted < high.error:
-            part = math.log(wanted / low.error) / math.log(high.error / low.error)
+        if low.error <= target_error < high.error:
+            part = math.log(target_error / low.error) / math.log(high.error / low.error)
             return low.step * math.exp(part * math.log(high.step / low.step))
-    near = _nearest(anchors, wanted)
-    return near.step * wanted / near.error if near and 1 / NEAR <= wanted / near.error <= NEAR else None
+    near = _nearest(anchors, target_error)
+    return near.step * target_error / near.error if near and 1 / NEAR <= target_error / near.error <= NEAR else None
 
 
-def first_step(anchors: Sequence[Anchor], wanted: float, ratio: float) -> float:
-    """Where a loop starts: in proportion to the nearest anchor; without one, ``ratio`` times the error wanted."""
-    near = _nearest(anchors, wanted)
-    return wanted * (near.step / near.error if near else ratio)
-
-
-def _nearest(anchors: Sequence[Anchor], wanted: float) -> Anchor | None:
-    return min(anchors, key=lambda anchor: abs(math.log(anchor.error / wanted)), default=None)
+def first_step(anchors: Sequence[Anchor], target_error: float, ratio: float) -> float:
+    """Return the step where a loop starts: in proportion to the nearest anchor; without one, ``ratio`` target errors."""
+    near = _nearest(anchors, target_error)
+    return target_error * (near.step / near.error if near else ratio)
 
 
 def root_mean_square(sequence: MeshSequence, reader: FrameReader) -> float:
-    """Of the distances, model units, between a sequence's vertices and a reader's, in one order."""
+    """Return the root mean square distance, model units, of a sequence's vertices from a reader's, in one order."""
     total = 0.0
     for first, block in sequence.chunks():
         total += float(np.square(block.astype(np.float64) - reader.read(first, first + len(block))).sum())
     return math.sqrt(total / (sequence.n_frames * sequence.n_vertices))
+
+
+def _slope(before: StepTrial, after: StepTrial) -> float:
+    """Of the error's logarithm over the step's, so far as it is believed."""
+    slope = math.log(after.error / before.error) / math.log(after.step / before.step)
+    return min(max(slope, SLOPES[0]), SLOPES[1])
+
+
+def _change(error: float, target_error: float, slope: float) -> float:
+    """What to multiply a step by, so that it leaves the target error."""
+    change = (math.log(target_error) - math.log(error)) / slope
+    return math.exp(min(max(change, -MOST_CHANGE), MOST_CHANGE))
+
+
+def _nearest(anchors: Sequence[Anchor], target_error: float) -> Anchor | None:
+    return min(anchors, key=lambda anchor: abs(math.log(anchor.error / target_error)), default=None)

@@ -1,7 +1,7 @@
 """Encodes of one sequence at several qualities, each measured: the size of its whole file and the errors of its frames.
 
-The bitstream is decoded as any reader would, in memory. What does not depend on quality is worked out once
-(`gvpipe.codec.Memo`). Given a bound, every trial is corrected to keep it (`gvpipe.corrections.bound`).
+The bitstream is decoded in memory, as by any reader. A memo (`gvpipe.codec.Memo`) keeps what does not depend on quality. With
+a bound, every trial gets the corrections that keep it (`gvpipe.corrections.bound`).
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Trial:
-    """One encode.
+    """One encode of a search, measured.
 
     Args:
-        codec: with the quality tried.
-        bytes: of the whole file.
-        bpvf: the same in bits per vertex and frame.
+        codec: settings, the quality that was tried among them.
+        bytes: size of the whole file.
+        bpvf: the same, bits per vertex and frame.
         errors: of the decoded frames.
         encoded: the bitstream with its poster, ready to be written.
     """
@@ -53,11 +53,11 @@ class Trial:
 
     @property
     def corrections(self) -> int:
-        """Bytes of the corrections."""
+        """Bytes of the section of corrections, 0 without one."""
         return len(self.bitstream.sections.get(SECTION, b""))
 
     def to_json(self) -> dict[str, Any]:
-        """What was tried and what came of it, as JSON values."""
+        """Return settings and results as JSON values (``tried`` of `gvpipe.Report`)."""
         return {
             "codec": self.codec.id,
             "quality": self.codec.quality,
@@ -74,10 +74,10 @@ class Trials:
     """Tries a codec's settings at one quality after the other.
 
     Args:
-        codec: its settings; their quality counts for nothing.
+        codec: its settings; their quality is ignored.
         sequence: to encode.
         bound: largest distance of a vertex from where it was, model units; None: whatever the quality gives.
-        progress: told of the stages of every encode.
+        progress: called with the stages of every encode.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class Trials:
         self._memo = Memo()
 
     def __call__(self, quality: float) -> Trial:
-        """Encode at a quality, and measure."""
+        """Encode at a quality, 0..100, and measure; raises `InputError` as `Codec.encode` does."""
         memo, report = self._memo, self._progress or (lambda stage, done: None)
         codec = cast("Codec", dataclasses.replace(cast("DataclassInstance", self.codec), quality=quality))
         encoded = encode_sequence(codec, self._sequence, self._progress, memo)
@@ -109,9 +109,14 @@ class Trials:
         return Trial(codec, size, bpvf, errors, Encoded(bitstream, encoded.permutation))
 
     def check(self, permutation: Integers, bitstream: Bitstream) -> None:
-        """Decode what a finished file holds, if there is a bound, and raise `InputError` if a vertex is out of it.
+        """Decode a finished file's bitstream, if there is a bound, and measure every vertex.
 
-        ``permutation (V,)`` is that of its encode.
+        Args:
+            permutation: ``(V,)`` that of its encode (`gvpipe.codec.Encoded`).
+            bitstream: as read from the file.
+
+        Raises:
+            InputError: a vertex is farther off than the bound.
         """
         if self._bound is None:
             return
@@ -125,7 +130,7 @@ class Trials:
 
 
 def _correct(bitstream: Bitstream, reference: MeshSequence, reader: FrameReader, bound: Bound) -> tuple[Bitstream, Errors]:
-    """Add what corrections the bound needs; return the bitstream, and the errors that are left."""
+    """Add the corrections that the bound needs; return the bitstream, and the errors that are left."""
     if not isinstance(reader, RepeatedFramesReader):
         section, errors = encode_corrections(reference, reader, bound)
         return _with(bitstream, section), errors

@@ -1,11 +1,16 @@
 """Mesh streams: every awkward mesh comes back exactly, and no bytes do harm."""
 
+from __future__ import annotations
+
+from typing import NoReturn
+
 import DracoPy
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gvpipe.arrays import Array, Int32
 from gvpipe.connectivity import base_mesh
 from gvpipe.connectivity.base_mesh import decode_base, encode_base
 from gvpipe.errors import CorruptFile, InputError
@@ -13,35 +18,35 @@ from gvpipe.errors import CorruptFile, InputError
 TETRAHEDRON = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
 
 
-def random_points(n_vertices, top=4095, seed=0):
+def random_points(n_vertices: int, top: int = 4095, seed: int = 0) -> Int32:
     return np.random.default_rng(seed).integers(0, top + 1, (n_vertices, 3)).astype(np.int32)
 
 
-def grid(n):
+def grid(n: int) -> tuple[Int32, Int32]:
     i = np.arange((n - 1) * n).reshape(n - 1, n)[:, :-1].ravel()
     faces = np.concatenate([np.c_[i, i + 1, i + n], np.c_[i + 1, i + n + 1, i + n]])
     x, y = np.divmod(np.arange(n * n), n)
     return np.c_[40 * x, 40 * y, (x * y) % 7].astype(np.int32), faces.astype(np.int32)
 
 
-def shuffled(mesh, seed=1):
+def shuffled(mesh: tuple[Int32, Int32], seed: int = 1) -> tuple[Int32, Int32]:
     points, faces = mesh
     order = np.random.default_rng(seed).permutation(len(points))
     return points[order], np.argsort(order)[faces].astype(np.int32)
 
 
-def soup(n):
+def soup(n: int) -> tuple[Int32, Array]:
     random = np.random.default_rng(3)
     corners = np.concatenate([random.permutation(60)[:3] for _ in range(n)])
     return random_points(60)[corners], np.arange(3 * n).reshape(-1, 3)
 
 
-def faces_of(*rows):
+def faces_of(*rows: tuple[int, int, int]) -> Int32:
     return np.array(rows, np.int32).reshape(-1, 3)
 
 
 GRID_POINTS, GRID_FACES = grid(9)
-MESHES = {
+MESHES: dict[str, tuple[Array, Array]] = {
     "tetrahedron": (random_points(4), faces_of(*TETRAHEDRON)),
     "single triangle": (random_points(3), faces_of((0, 1, 2))),
     "two components": (random_points(8), np.r_[faces_of(*TETRAHEDRON), faces_of(*TETRAHEDRON) + 4]),
@@ -79,13 +84,13 @@ MESHES = {
 each_mesh = pytest.mark.parametrize(("points", "faces"), MESHES.values(), ids=MESHES.keys())
 
 
-def sorted_faces(faces):
+def sorted_faces(faces: Array) -> list[list[int]]:
     """Rows in one order, each rotated to its smallest rotation: equal if and only if set, count and winding are."""
     rotations = [faces.tolist(), faces[:, [1, 2, 0]].tolist(), faces[:, [2, 0, 1]].tolist()]
     return sorted(min(rows) for rows in zip(*rotations, strict=True))
 
 
-def check_round_trip(points, faces):
+def check_round_trip(points: Array, faces: Array) -> None:
     for reorder in (False, True):
         encoded = encode_base(points, faces, reorder)[0]
         decoded = decode_base(encoded.mesh, encoded.order)
@@ -98,38 +103,37 @@ def check_round_trip(points, faces):
             assert encoded.order == b""
         else:
             assert np.array_equal(encoded.permutation, np.arange(len(points)))
-    return encoded
 
 
 @each_mesh
-def test_round_trip(points, faces):
+def test_round_trip(points: Array, faces: Array) -> None:
     check_round_trip(points, faces)
 
 
 @each_mesh
-def test_deterministic(points, faces):
+def test_deterministic(points: Array, faces: Array) -> None:
     first, second = encode_base(points, faces, False)[0], encode_base(points, faces, False)[0]
     assert (first.mesh, first.order) == (second.mesh, second.order)
 
 
 @given(st.integers(1, 12), st.integers(0, 30), st.integers(0, 5), st.integers(0, 2**32 - 1))
 @settings(max_examples=300, deadline=None)
-def test_round_trip_of_random_meshes(n_vertices, n_faces, top, seed):
+def test_round_trip_of_random_meshes(n_vertices: int, n_faces: int, top: int, seed: int) -> None:
     random = np.random.default_rng(seed)
     check_round_trip(random.integers(0, top + 1, (n_vertices, 3)), random.integers(0, n_vertices, (n_faces, 3)))
 
 
-def fail(*_args, **_kwargs):
+def fail(*_args: object, **_kwargs: object) -> NoReturn:
     raise DracoPy.EncodingFailedException("no")
 
 
 @each_mesh
-def test_round_trip_without_draco(points, faces, monkeypatch):
+def test_round_trip_without_draco(points: Array, faces: Array, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(DracoPy, "encode", fail)
     check_round_trip(points, faces)
 
 
-def test_draco_result_that_differs_is_not_trusted(monkeypatch):
+def test_draco_result_that_differs_is_not_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
     honest = DracoPy.encode
     monkeypatch.setattr(DracoPy, "encode", lambda points, faces, **options: honest(points, faces[:, ::-1], **options))
     check_round_trip(*grid(9))
@@ -138,13 +142,13 @@ def test_draco_result_that_differs_is_not_trusted(monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["tetrahedron", "open grid", "triangle soup", "shuffled grid"])
-def test_draco_carries_whole_ordinary_meshes(name):
+def test_draco_carries_whole_ordinary_meshes(name: str) -> None:
     points, faces = MESHES[name]
     _, n_loose_points, n_loose_faces, _ = base_mesh.HEADER.unpack_from(encode_base(points, faces, True)[0].mesh)
     assert (n_loose_points, n_loose_faces) == (0, 0)
 
 
-def test_walks_cost_little_and_random_orders_no_more_than_plain_indices():
+def test_walks_cost_little_and_random_orders_no_more_than_plain_indices() -> None:
     points, faces = grid(60)
     assert 8 * len(encode_base(points, faces, False)[0].order) < 1.5 * len(points)
     points, faces = shuffled(grid(60))
@@ -161,7 +165,7 @@ def test_walks_cost_little_and_random_orders_no_more_than_plain_indices():
         (random_points(4), np.zeros((1, 4), int)),
     ],
 )
-def test_encode_refuses(points, faces):
+def test_encode_refuses(points: Array, faces: Array) -> None:
     with pytest.raises(InputError, match=r"lattice coordinates|faces index|three columns"):
         encode_base(points, faces, False)[0]
 
@@ -169,8 +173,9 @@ def test_encode_refuses(points, faces):
 @pytest.mark.parametrize(
     "name", ["tetrahedron", "open grid", "triangle soup", "unreferenced between", "duplicated faces", "one vertex"]
 )
-def test_every_truncated_prefix_is_refused(name):
-    encoded = encode_base(*MESHES[name], False)[0]
+def test_every_truncated_prefix_is_refused(name: str) -> None:
+    points, faces = MESHES[name]
+    encoded = encode_base(points, faces, False)[0]
     for n_bytes in range(len(encoded.mesh)):
         with pytest.raises(CorruptFile, match="corrupt|truncated"):
             decode_base(encoded.mesh[:n_bytes], b"")
@@ -182,7 +187,7 @@ def test_every_truncated_prefix_is_refused(name):
         decode_base(encoded.mesh, encoded.order + b"\0")
 
 
-def decode_or_refuse(mesh, order):
+def decode_or_refuse(mesh: bytes, order: bytes) -> None:
     """Anything is right for changed bytes (the container's checksums tell), but a valid mesh or a CorruptFile."""
     try:
         decoded = decode_base(mesh, order)
@@ -195,8 +200,9 @@ def decode_or_refuse(mesh, order):
 
 
 @pytest.mark.parametrize("name", ["tetrahedron", "open grid", "triangle soup", "duplicated faces", "unreferenced between"])
-def test_changed_bytes_do_no_harm(name):
-    encoded = encode_base(*MESHES[name], False)[0]
+def test_changed_bytes_do_no_harm(name: str) -> None:
+    points, faces = MESHES[name]
+    encoded = encode_base(points, faces, False)[0]
     random = np.random.default_rng(0)
     for _ in range(400):
         for mesh, order in ((True, False), (False, True)):
@@ -207,18 +213,18 @@ def test_changed_bytes_do_no_harm(name):
 
 
 @given(st.binary(max_size=200), st.binary(max_size=200))
-def test_garbage_does_no_harm(mesh, order):
+def test_garbage_does_no_harm(mesh: bytes, order: bytes) -> None:
     decode_or_refuse(mesh, order)
     decode_or_refuse(base_mesh.HEADER.pack(len(mesh) + 11, 0, 0, 0) + base_mesh.DRACO_PREFIX + mesh, order)
 
 
 @pytest.mark.parametrize("counts", [(2**32 - 1, 0, 0, 0), (0, 2**32 - 1, 0, 8), (0, 0, 2**32 - 1, 0), (0, 0, 0, 2**32 - 1)])
-def test_counts_are_refused_before_allocation(counts):
+def test_counts_are_refused_before_allocation(counts: tuple[int, int, int, int]) -> None:
     with pytest.raises(CorruptFile, match="corrupt|truncated"):
         decode_base(base_mesh.HEADER.pack(*counts) + bytes(8), b"")
 
 
-def test_draco_counts_are_refused_before_allocation():
+def test_draco_counts_are_refused_before_allocation() -> None:
     many = b"\xff\xff\xff\xff\x07"
     draco = base_mesh.DRACO_PREFIX + b"\0" + many + many + bytes(40)
     with pytest.raises(CorruptFile, match="elements in"):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -28,8 +30,15 @@ def test_varints(values: list[int]) -> None:
 
 
 def test_cursor_checks_every_read() -> None:
-    for read in (lambda c: c.take(4), lambda c: c.array("<u2", 2), lambda c: c.array("<f8", 1 << 62), lambda c: c.varint(0x81),
-                 lambda c: c.end(), lambda c: c.struct(ENTRY)):  # fmt: skip
+    reads: list[Callable[[Cursor], object]] = [
+        lambda c: c.take(4),
+        lambda c: c.array("<u2", 2),
+        lambda c: c.array("<f8", 1 << 62),
+        lambda c: c.varint(0x81),
+        lambda c: c.end(),
+        lambda c: c.struct(ENTRY),
+    ]
+    for read in reads:
         cursor = Cursor(b"\x82\x01\x03", "x")
         with pytest.raises(CorruptFile, match="section 'x' is corrupt"):
             read(cursor)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from sequences import awkward, waving
 
 import gvpipe
+from gvpipe.arrays import Float32, Int32
 from gvpipe.codec import LevelReader
 from gvpipe.container import mp4
 from gvpipe.container.bitstream import Bitstream
@@ -24,12 +25,12 @@ from gvpipe.corrections.bound import (
     encode_corrections,
     find_corrections,
 )
-from gvpipe.corrections.displacements import HEAD, MAX_POSITIONS, Displacements, decode_group, displace, encode_group
+from gvpipe.corrections.displacements import HEAD, MAX_POSITIONS, Displacements, displace, encode_group
 from gvpipe.errors import CorruptFile, FormatError, InputError
 from gvpipe.metrics.vertex_errors import frame_diagonal, measure_errors
 from gvpipe.rate_control import trials
 from gvpipe.registry import codec_class, codec_ids, open_reader
-from gvpipe.sequence import Float32, Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 AWKWARD = awkward()
 each_codec = pytest.mark.parametrize("codec", codec_ids())
@@ -154,16 +155,6 @@ def test_one_correction_is_enough(largest: float, offset: float, off: float, see
     assert bound.inner >= largest / 2
 
 
-@given(st.integers(1, 12), st.integers(1, 30), st.floats(0, 1), st.integers(0, 99))
-def test_groups_round_trip(n_frames: int, n_vertices: int, share: float, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    vertices, frames = np.nonzero(rng.random((n_vertices, n_frames)) < share)
-    found = Displacements(frames, vertices, rng.integers(-40, 40, (len(frames), 3)) ** 3)
-    back = decode_group(encode_group(found, n_frames), n_frames, n_vertices, SECTION)
-    for name in ("frames", "vertices", "steps"):
-        assert np.array_equal(getattr(found, name), getattr(back, name))
-
-
 def test_a_bound_too_small_to_code_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="allow more"):
         gvpipe.encode(waving(8, 6), tmp_path / "a.mp4", "pdct", quality=5, max_error=1e-30)
@@ -174,7 +165,7 @@ def test_a_file_out_of_bound_never_takes_its_name(tmp_path: Path, monkeypatch: p
     """If correcting went wrong, the check of the finished file finds out."""
     path = tmp_path / "a.mp4"
     path.write_bytes(b"before")
-    honest = trials.encode_corrections
+    honest = encode_corrections
     monkeypatch.setattr(trials, "encode_corrections", lambda *a: (b"", honest(*a)[1]))
     with pytest.raises(InputError, match="nothing was written"):
         gvpipe.encode(waving(12, 8), path, "pca", max_error="0.01%")

@@ -23,10 +23,10 @@ def test_compiled_range_decoder_reads_what_the_library_writes(seed: int) -> None
                 np.array([written[-1][2]], np.int32), constriction.stream.model.Uniform(), np.array([1 << width], np.int32)
             )
         else:
-            table = rng.integers(0, 4097, int(rng.integers(2, 88))) * (rng.random() < 0.9)
-            table[rng.integers(0, len(table))] += 1
-            written.append((table, 0, int(rng.integers(0, len(table)))))
-            model = constriction.stream.model.Categorical(table.astype(float) / float(table.sum()), perfect=False)
+            counts = rng.integers(0, 4097, int(rng.integers(2, 88))) * (rng.random() < 0.9)
+            counts[rng.integers(0, len(counts))] += 1
+            written.append((counts, 0, int(rng.integers(0, len(counts)))))
+            model = constriction.stream.model.Categorical(counts.astype(float) / float(counts.sum()), perfect=False)
             coder.encode(written[-1][2], model)
     words = coder.get_compressed().astype(np.uint32)
     state = range_decoder.start(words)

@@ -6,12 +6,9 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from gvpipe.errors import InputError
-from gvpipe.io.discovery import find_frames, natural_key
-from gvpipe.io.pattern import Pattern, match_pattern
+from gvpipe.io.discovery import find_frames, order_list
 
 
 def make(folder: Path, *names: str) -> Path:
@@ -127,25 +124,57 @@ def test_the_suggested_choice_works(tmp_path: Path, chosen: list[str], others: l
     assert names(str(error.value).split("such as ")[1].strip("'")) == chosen
 
 
-@given(st.lists(st.integers(0, 10**6), unique=True), st.text("ab_-", max_size=3))
-def test_natural_order_is_numeric_order(numbers: list[int], prefix: str) -> None:
-    assert sorted((f"{prefix}{n}.obj" for n in numbers), key=natural_key) == [f"{prefix}{n}.obj" for n in sorted(numbers)]
+@pytest.mark.parametrize(
+    ("given", "expected", "is_kept"),
+    [
+        (["f1", "f10", "f2", "f3", "f4", "f5", "f6", "f7", "f8", "f9"], [f"f{i}" for i in range(1, 11)], False),
+        (["f3", "f2", "f1"], ["f1", "f2", "f3"], False),
+        (["b", "a"], ["b", "a"], True),
+        (["rest", "f2", "f1"], ["rest", "f2", "f1"], True),
+        (["f1", "f2", "f3", "f2", "f1"], ["f1", "f2", "f3", "f2", "f1"], True),
+        (["t2_f1", "t2_f2", "t1_f1", "t1_f2"], ["t2_f1", "t2_f2", "t1_f1", "t1_f2"], True),
+        (["f1", "f01"], ["f1", "f01"], True),
+        (["f7"], ["f7"], False),
+    ],
+)
+def test_order_of_a_list(given: list[str], expected: list[str], is_kept: bool, tmp_path: Path) -> None:
+    for name in given:
+        (tmp_path / f"{name}.obj").touch()
+    files, kept = order_list([tmp_path / f"{name}.obj" for name in given])
+    assert ([file.stem for file in files], kept) == (expected, is_kept)
 
 
-@given(st.lists(st.text("aB1023_. ", max_size=6), max_size=8, unique=True))
-def test_natural_order_is_total(texts: list[str]) -> None:
-    backwards = texts[::-1]
-    assert sorted(texts, key=natural_key) == sorted(backwards, key=natural_key)
+@pytest.mark.parametrize(
+    "expected",
+    [
+        ["f_-2.obj", "f_-1.obj", "f_0.obj", "f_1.obj"],
+        ["f_-0010.obj", "f_-0009.obj", "f_-0008.obj"],
+        ["w.-1.obj", "w.0.obj", "w.1.obj"],
+        ["-2.obj", "-1.obj", "0.obj"],
+        ["frame-2.obj", "frame-1.obj", "frame0.obj", "frame1.obj", "frame2.obj"],
+        ["frame-1.obj", "frame-2.obj", "frame-3.obj"],
+        ["2024-05-01.obj", "2024-05-02.obj"],
+        ["s-1_f-1.obj", "s-1_f-2.obj"],
+    ],
+)
+def test_negative_numbers(expected: list[str], tmp_path: Path) -> None:
+    for name in expected:
+        (tmp_path / name).touch()
+    assert [file.name for file in find_frames(str(tmp_path))] == expected
+    assert [file.name for file in order_list([tmp_path / name for name in reversed(expected)])[0]] == expected
 
 
-@given(st.integers(0, 10**7), st.integers(0, 8))
-def test_pattern_inverts(number: int, width: int) -> None:
-    pattern = Pattern("a", ".obj", width)
-    assert pattern.number(pattern.name(number)) == number
-    assert pattern.name(number) == f"a%0{width}d.obj" % number if width else True
+def test_negative_numbers_of_a_pattern(tmp_path: Path) -> None:
+    for name in ("f-002.obj", "f-001.obj", "f0000.obj", "f0001.obj", "g-0001.obj", "g0000.obj", "f-3.obj"):
+        (tmp_path / name).touch()
+    assert [file.name for file in find_frames(str(tmp_path / "f%04d.obj"))] == [
+        "f-002.obj", "f-001.obj", "f0000.obj", "f0001.obj",
+    ]  # fmt: skip
+    assert [file.name for file in find_frames(str(tmp_path / "g####.obj"))] == ["g-0001.obj", "g0000.obj"]
 
 
-def test_match_pattern() -> None:
-    assert match_pattern("out/f%04d_x.obj") == Pattern("f", "_x.obj", 4)
-    assert match_pattern("out/f%d.obj") == Pattern("f", ".obj", 0)
-    assert match_pattern("out/f.obj") is None
+def test_gaps_among_negative_numbers(tmp_path: Path) -> None:
+    for name in ("f_-0003.obj", "f_-0001.obj", "f_0000.obj"):
+        (tmp_path / name).touch()
+    with pytest.raises(InputError, match="frame -0002 missing between f_-0003.obj and f_-0001.obj"):
+        find_frames(str(tmp_path))

@@ -156,8 +156,10 @@ def test_glb_normals_are_those_of_the_file(tmp_path: Path, included: bool) -> No
     import trimesh
 
     mesh = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], vertex_normals=[[0, 0.6, 0.8]] * 3, process=False)
-    (tmp_path / "a.glb").write_bytes(mesh.export(file_type="glb", include_normals=included))
+    exported = mesh.export(file_type="glb", include_normals=included)
+    assert isinstance(exported, bytes)
+    (tmp_path / "a.glb").write_bytes(exported)
     read = io.read(tmp_path / "a.glb")
     assert set(read.attributes) == ({"normal"} if included else set())
     for values in read.attributes.values():
-        np.testing.assert_allclose(values, [[0, 0.6, 0.8]] * 3, atol=1e-6)
+        np.testing.assert_allclose(values.astype(float), np.array([[0, 0.6, 0.8]] * 3), atol=1e-6)

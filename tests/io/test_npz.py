@@ -56,8 +56,6 @@ def test_npz_float64_and_no_fps(tmp_path: Path) -> None:
 
 
 OK = {"vertices": np.zeros((2, 3, 3), np.float32), "faces": FACES}
-
-
 BAD_ARCHIVES = {
     "no vertices": ({"faces": FACES}, "no array 'vertices' (it holds faces)"),
     "no faces": ({"vertices": OK["vertices"]}, "no array 'faces'"),

@@ -120,7 +120,7 @@ def test_counts_and_random_access(profile: Profile, gop: int) -> None:
         whole = read(reader)
         assert reader.n_frames == len(whole) == n
         spacing = 1 if profile.codec == "mjpeg" else gop
-        with av.open(io.BytesIO(data)) as container:
+        with av.open(io.BytesIO(data), "r") as container:
             keys = [i for i, packet in enumerate(p for p in container.demux(video=0) if p.size) if packet.is_keyframe]
         assert keys == list(range(0, n, spacing))
         random = np.random.default_rng(n)
@@ -137,8 +137,8 @@ def test_frames_need_their_group_alone(profile: Profile) -> None:
     n, gop = 23, 5
     data = code(profile, moving(profile, n), 24, gop)
     whole = read(open_video(data, profile))
-    with av.open(io.BytesIO(data)) as container:
-        places = [(packet.pos, packet.size) for packet in container.demux(video=0) if packet.size]
+    with av.open(io.BytesIO(data), "r") as container:
+        places = [(packet.pos, packet.size) for packet in container.demux(video=0) if packet.pos is not None and packet.size]
     spacing = 1 if profile.codec == "mjpeg" else gop
     for kept in range(0, n, spacing):
         wiped = bytearray(data)
@@ -157,8 +157,9 @@ def test_an_ordinary_video(profile: Profile, preset: str) -> None:
     """What ffprobe tells: H.264 High (10), 4:2:0, limited range, BT.709; chroma is neutral, luma as we read it."""
     data = code(profile, moving(profile, 9), 20, 4, 24000 / 1001, preset)
     ours = read(open_video(data, profile))
-    with av.open(io.BytesIO(data)) as container:
-        (stream,) = container.streams
+    with av.open(io.BytesIO(data), "r") as container:
+        assert len(container.streams) == 1
+        stream = container.streams.video[0]
         context = stream.codec_context
         assert (context.name, context.pix_fmt, context.width, context.height) == ("h264", profile.pixel_format, WIDTH, HEIGHT)
         assert context.profile == ("High" if profile.depth == 8 else "High 10")
@@ -181,9 +182,10 @@ def test_frame_rates(profile: Profile, fps: float) -> None:
     planes = moving(profile, 5, 32, 32)
     data = code(profile, planes, 20, 2, fps)
     assert len(read(open_video(data, profile, 32, 32))) == 5
-    with av.open(io.BytesIO(data)) as container:
+    with av.open(io.BytesIO(data), "r") as container:
         stream = container.streams.video[0]
-        assert stream.frames == 5 and float(stream.duration * stream.time_base) == pytest.approx(5 / fps, rel=0.01)
+        assert stream.frames == 5 and stream.duration is not None and stream.time_base is not None
+        assert float(stream.duration * stream.time_base) == pytest.approx(5 / fps, rel=0.01)
 
 
 def test_wrong_planes_are_refused() -> None:

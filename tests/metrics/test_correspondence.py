@@ -36,7 +36,8 @@ def test_exact_copy_is_at_distance_zero(name: str) -> None:
 def test_noise_far_above_the_spacing_of_a_few_vertices_is_sorted_out_by_triangles() -> None:
     sequence = waving()
     other, order = shuffled(sequence, noise=0.02)  # the sheet's vertices are 0.08 apart
-    assert np.array_equal(match_vertices(sequence, other), order)
+    match = match_vertices(sequence, other)
+    assert match is not None and np.array_equal(match, order)
     assert compare(sequence, other).rmse == pytest.approx(0.02 * np.sqrt(3), rel=0.05)
 
 

@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from gvpipe.arrays import Int32
 from gvpipe.metrics import triangle_search
 from gvpipe.metrics.comparison import compare
-from gvpipe.sequence import Int32, MeshSequence
+from gvpipe.sequence import MeshSequence
 
 Float64 = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ def _sheet(columns: int, rows: int) -> tuple[Float64, Int32]:
 
 
 def _foot(triangles: Float64, points: Float64) -> Float64:
-    foot: Float64 = trimesh.triangles.closest_point(triangles, points)  # type: ignore[no-untyped-call]
+    foot: Float64 = trimesh.triangles.closest_point(triangles, points)  # type: ignore[no-untyped-call]  # trimesh's own
     return foot
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,8 @@ from gvpipe.rendering.films import parse_size
 
 
 def eye_of(camera: Camera) -> np.ndarray:
-    return np.asarray(camera.target) + camera.distance * camera.rotation[2]
+    eye: np.ndarray = np.asarray(camera.target) + camera.distance * camera.rotation[2]
+    return eye
 
 
 def ray_directions(camera: Camera, width: int, height: int) -> np.ndarray:
@@ -149,10 +151,18 @@ def test_a_triangle_behind_the_eye_is_left_out() -> None:
 
 def test_renderer_and_camera_refuse_what_cannot_be() -> None:
     square = sheet(0.0, 0.0)
-    for wrong in ({"size": (0, 64)}, {"shading": "wet"}, {"samples": 0}, {"samples": 9}):
+    renderers: list[dict[str, Any]] = [{"size": (0, 64)}, {"shading": "wet"}, {"samples": 0}, {"samples": 9}]
+    for wrong in renderers:
         with pytest.raises(InputError):
             Renderer(SQUARE, square, **wrong)
-    for wrong in ({"distance": 0.0}, {"field_of_view": 170.0}, {"up": "w"}, {"azimuth": np.nan}, {"target": (0.0, 1.0)}):
+    cameras: list[dict[str, Any]] = [
+        {"distance": 0.0},
+        {"field_of_view": 170.0},
+        {"up": "w"},
+        {"azimuth": np.nan},
+        {"target": (0.0, 1.0)},
+    ]
+    for wrong in cameras:
         with pytest.raises(InputError):
             Camera(**wrong)
     with pytest.raises(InputError, match="positions of shape"):

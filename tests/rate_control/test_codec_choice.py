@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from conftest import Finished
@@ -17,27 +18,27 @@ from gvpipe.quality_scale import error_of
 from gvpipe.rate_control import codec_choice
 from gvpipe.rate_control.codec_choice import choose_codec
 from gvpipe.rate_control.purposes import PURPOSES, candidates, describe
-from gvpipe.rate_control.search import Target
+from gvpipe.rate_control.targets import Target
 from gvpipe.registry import codec_class
 from gvpipe.sequence import MeshSequence
 
 Run = Callable[..., Finished]
 
 
-def candidates_for(purpose: str | None = None, **settings: object) -> list[Codec]:
+def candidates_for(purpose: str | None = None, **settings: Any) -> list[Codec]:
     """What ``auto`` chooses from."""
     found = candidates("auto", purpose, lambda name, own: codec_class(name)(**own, **settings))
     assert isinstance(found, list)
     return found
 
 
-def best_alone(sequence: MeshSequence, folder: Path, **target: float | str) -> dict[str, gvpipe.Info]:
+def best_alone(sequence: MeshSequence, folder: Path, **target: Any) -> dict[str, gvpipe.Info]:
     """What each candidate makes of the target; those that cannot meet it left out."""
     found = {}
     for codec in candidates_for():
         name = describe(codec)
         try:
-            gvpipe.encode(sequence, folder / f"{name}.mp4", codec, **target)  # type: ignore[arg-type]
+            gvpipe.encode(sequence, folder / f"{name}.mp4", codec, **target)
         except InputError:
             continue
         found[name] = gvpipe.info(folder / f"{name}.mp4")
@@ -47,13 +48,13 @@ def best_alone(sequence: MeshSequence, folder: Path, **target: float | str) -> d
 @pytest.mark.parametrize(
     "target", [{"target_kg": 0.5}, pytest.param({"target_rmse": 2e-3}, marks=pytest.mark.slow), {"max_error": "1%"}], ids=str
 )
-def test_the_smallest_is_chosen(target: dict[str, float | str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_smallest_is_chosen(target: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By estimates from the whole sequence, and from a part of it."""
     sequence = waving(16, 30)
     alone = best_alone(sequence, tmp_path, **target)
     for sample in (100, 12):
         monkeypatch.setattr(codec_choice, "SAMPLE", sample)
-        report = gvpipe.encode(sequence, tmp_path / "auto.mp4", "auto", **target)  # type: ignore[arg-type]
+        report = gvpipe.encode(sequence, tmp_path / "auto.mp4", "auto", **target)
         smallest = min(info.bytes for info in alone.values())
         assert report.bytes <= 1.02 * smallest
         assert report.codec == gvpipe.info(tmp_path / "auto.mp4").codec
@@ -77,8 +78,8 @@ def test_for_bits_the_smallest_error_is_chosen(tmp_path: Path) -> None:
 def test_without_a_target_it_is_the_error_of_the_quality(quality: float | None, tmp_path: Path) -> None:
     """So that the default codec and ``auto`` compare at a glance."""
     sequence = waving(14, 20)
-    settings = {} if quality is None else {"quality": quality}
-    gvpipe.encode(sequence, tmp_path / "a.mp4", "auto", **settings)  # type: ignore[arg-type]
+    settings: dict[str, Any] = {} if quality is None else {"quality": quality}
+    gvpipe.encode(sequence, tmp_path / "a.mp4", "auto", **settings)
     kg = gvpipe.compare(sequence, gvpipe.decode(tmp_path / "a.mp4")).kg
     allowed = error_of(quality or 75)
     assert kg is not None and 0.97 * allowed <= kg <= allowed

@@ -29,9 +29,9 @@ Run = Callable[..., Any]
 def test_a_camera_that_follows_keeps_the_mesh_where_it_is(turntable: bool) -> None:
     """A mesh that only moves along gives the same picture in every frame, larger than in a picture of the whole way."""
     still = waving(10, 6)
-    way = np.linspace(0, 40, 6, dtype=np.float32)[:, None, None] * np.float32([1, 0.5, -1])
+    way = np.linspace(0, 40, 6, dtype=np.float32)[:, None, None] * np.array([1, 0.5, -1], np.float32)
     walking = replace(still, positions=np.repeat(still.positions[:1], 6, axis=0) + way)
-    renderer = gvpipe.Renderer(walking.faces, walking.positions[0], (96, 96))
+    renderer = gvpipe.Renderer(walking.faces, walking.positions[:][0], (96, 96))
     camera = framing(walking, turntable=turntable, follow=True)
     assert camera.distance < framing(walking, turntable=turntable).distance / 2
     film = Film(walking, [0, 3, 5], camera, renderer, follow=True)

@@ -17,9 +17,11 @@ from gvpipe.sequence import MeshSequence
 def test_poster_is_a_grey_picture_of_the_mesh_that_lasts(sequence: MeshSequence) -> None:
     first = sequence.read(0, 1)[0]
     data = make_poster(first, sequence.faces, 25.0, 11)
-    with av.open(io.BytesIO(data)) as film:
+    with av.open(io.BytesIO(data), "r") as film:
         (picture,) = film.decode(video=0)
-        assert film.streams.video[0].duration * film.streams.video[0].time_base == pytest.approx(11 / 25)
+        track = film.streams.video[0]
+        assert track.duration is not None and track.time_base is not None
+        assert track.duration * track.time_base == pytest.approx(11 / 25)
     luma = picture.to_ndarray()[:160].astype(int)  # the Y plane of yuv420p
     assert np.abs(luma - paint(first, sequence.faces)).mean() < 4
     camera = framing(sequence, [0])

@@ -41,7 +41,8 @@ def brute_force(frames: NDArray[np.float32]) -> NDArray[np.int64]:
     """Whole trajectories compared, points numbered by their first vertices; minus zero is zero."""
     rows = (frames + np.float32(0)).swapaxes(0, 1).reshape(frames.shape[1], -1)
     _, first, number = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    return np.argsort(np.argsort(first))[number.ravel()]
+    points: NDArray[np.int64] = np.argsort(np.argsort(first))[number.ravel()]
+    return points
 
 
 def tree(n_frames: int, n_vertices: int, seed: int, places: int) -> NDArray[np.float32]:

@@ -185,7 +185,7 @@ def test_exported_page_plays_from_a_disk(driver: Any, site: tuple[Path, str], tm
 def test_camera_follows_and_stills_are_pictures(player: Callable[..., Any], driver: Any, site: tuple[Path, str]) -> None:
     """With `follow`, the mesh' middle stays where it is in the picture; a still is a PNG file of the picture."""
     moving = waving(12, 40)
-    moving.positions[:] += np.linspace(0, 30, 40, dtype=np.float32)[:, None, None] * np.float32([1, 0, 0])
+    moving.positions[:] += np.linspace(0, 30, 40, dtype=np.float32)[:, None, None] * np.array([1, 0, 0], np.float32)
     gvpipe.encode(moving, site[0] / "moving.mp4", **FILES["affine"])
     result = player(
         f"""{pages.LOAD}
@@ -205,7 +205,7 @@ def test_camera_follows_and_stills_are_pictures(player: Callable[..., Any], driv
         "moving.mp4",
     )
     places = {
-        camera: [_middle(matrix, moving.positions[k]) for matrix, k in zip(result[camera], (0, 39), strict=True)]
+        camera: [_middle(matrix, moving.positions[:][k]) for matrix, k in zip(result[camera], (0, 39), strict=True)]
         for camera in ("fixed", "followed")
     }
     assert np.abs(np.subtract(*places["fixed"])).max() > 0.5

@@ -146,7 +146,12 @@ def test_play_prints_the_page_where_there_is_no_browser(run: Run, video: Path, m
 def test_play_opens_the_page_in_the_browser(run: Run, video: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
     monkeypatch.setenv("BROWSER", "any")
-    monkeypatch.setattr(webbrowser, "open", lambda address: opened.append(address) or True)
+
+    def noted(address: str) -> bool:
+        opened.append(address)
+        return True
+
+    monkeypatch.setattr(webbrowser, "open", noted)
     done = run("play", video)
     assert done.out == f"{video} plays in your browser\n"
     (address,) = opened

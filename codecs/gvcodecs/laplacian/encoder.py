@@ -43,7 +43,7 @@ from gvpipe.arrays import Int64
 from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, cut
-from gvpipe.rate_control.step_search import NEAR, Aimed, Anchor, first_step, mend, step_between
+from gvpipe.rate_control.step_search import NEAR, Anchor, StepTrial, find_step, first_step, step_between
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import MAX_COMPONENTS, reduce_trajectories, squared_errors
 from gvpipe.trajectory.coded_points import CodedConnectivity, code_connectivity, read_trajectories
@@ -59,8 +59,8 @@ class Laplacian(BaseCodec):
     """Settings of the geometric-Laplacian codec.
 
     Errors are small between neighbours and grow from anchor to anchor, on thin parts and small meshes the most. So the error
-    that quality asks for (`gvpipe.quality_scale`) is met by a loop: encode, measure, mend the step. A given number of
-    ``components`` sets the error itself, and the step is not mended.
+    that quality asks for (`gvpipe.quality_scale`) is met by a loop: encode, measure, correct the step. A given number of
+    ``components`` sets the error itself, and the step is not corrected.
 
     Raises:
         SettingError: a value out of its range.
@@ -103,7 +103,7 @@ class Laplacian(BaseCodec):
         known = step_between(anchors, wanted)
         if known is not None or not start.still.n_moving or self.components:
             return self._code(sequence, start, known or FIRST * wanted, report).encoded
-        aimed = mend(lambda asked: self._code(sequence, start, asked, report), first_step(anchors, wanted, FIRST), wanted)
+        aimed = find_step(lambda asked: self._code(sequence, start, asked, report), first_step(anchors, wanted, FIRST), wanted)
         if aimed.error > wanted / NEAR:  # else the step hardly matters, and tells nothing of other errors
             anchors.append(Anchor(aimed.step, aimed.error))
         return aimed.encoded
@@ -130,7 +130,7 @@ class Laplacian(BaseCodec):
         sections = {"mesh": shared.coded.mesh, "order": shared.coded.order, **({SECTION: held} if held else {})}
         return _Start(shared, still, header, domain, {**sections, **({} if average is None else {NAME: average})})
 
-    def _code(self, sequence: MeshSequence, start: _Start, asked: float, report: Progress) -> Aimed:
+    def _code(self, sequence: MeshSequence, start: _Start, asked: float, report: Progress) -> StepTrial:
         """Code with the step that would leave the error ``asked`` if nothing drifted, and tell the error that is left."""
         still, header = start.still, start.header
         moving = start.shared.members[~still.flags]
@@ -155,7 +155,7 @@ class Laplacian(BaseCodec):
         words = {**header.to_json(), "steps": steps or [1.0] * header.segments}
         bitstream = self._bitstream(sequence, words, sections, version=None if SECTION in sections else 1)
         encoded = Encoded(bitstream, start.shared.coded.permutation)
-        return Aimed(encoded, asked, math.sqrt(squared / (sequence.n_frames * sequence.n_vertices)))
+        return StepTrial(encoded, asked, math.sqrt(squared / (sequence.n_frames * sequence.n_vertices)))
 
     @classmethod
     def reader(cls, bitstream: Bitstream) -> FrameReader:

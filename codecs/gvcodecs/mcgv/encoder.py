@@ -59,7 +59,7 @@ from gvpipe.media.video import PROFILES, Profile
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of
-from gvpipe.rate_control.step_search import SLOPE, Aimed, mend, root_mean_square
+from gvpipe.rate_control.step_search import SLOPE, StepTrial, find_step, root_mean_square
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.still_vertices import encode_flags, find_still
 from gvpipe.trajectory.welding import find_points
@@ -164,7 +164,7 @@ class Mcgv(BaseCodec):
                     attempt = functools.partial(
                         self._attempt, sequence, anchor.start, fitted=anchor.fitted, memo=memo, report=report
                     )
-                    return mend(attempt, step, wanted, NARROW, anchor.slope, rounds=MORE_ROUNDS).encoded
+                    return find_step(attempt, step, wanted, NARROW, anchor.slope, rounds=MORE_ROUNDS).encoded
                 return self._code(sequence, anchor.start, step, anchor.fitted, memo, report)
         aimed, anchor = self._aim(sequence, wanted, memo, report)
         anchors.append(anchor)
@@ -172,7 +172,7 @@ class Mcgv(BaseCodec):
             return self._refine(sequence, aimed, anchor, wanted, memo, report)
         return aimed.encoded
 
-    def _aim(self, sequence: MeshSequence, wanted: float, memo: Memo, report: Progress) -> tuple[Aimed, _Anchor]:
+    def _aim(self, sequence: MeshSequence, wanted: float, memo: Memo, report: Progress) -> tuple[StepTrial, _Anchor]:
         """Code with the step that leaves about the root mean square error wanted, model units."""
         start, fitted = self._start(sequence, GUESS[self.prediction] * wanted, wanted, memo, report), None
         step = start.step
@@ -180,7 +180,7 @@ class Mcgv(BaseCodec):
             fitted, step = self._fit(start, wanted, memo, report)
 
         @functools.cache
-        def attempt(step: float, pictures: bool = True) -> Aimed:
+        def attempt(step: float, pictures: bool = True) -> StepTrial:
             start_ = dataclasses.replace(start, pictures=pictures)
             return self._attempt(sequence, start_, step, fitted=fitted, memo=memo, report=report)
 
@@ -196,14 +196,14 @@ class Mcgv(BaseCodec):
         if sequence.n_frames * sequence.n_vertices > LARGE:
             low = min(low, FINE)
         if self._are_pictures_dear(attempt, step, wanted):
-            aimed = mend(lambda step: attempt(step, False), step, wanted, (low, high), SLOPE, rounds=MORE_ROUNDS)
+            aimed = find_step(lambda step: attempt(step, False), step, wanted, (low, high), SLOPE, rounds=MORE_ROUNDS)
             if aimed.error <= wanted and _worth(aimed) < _worth(attempt(step)):
                 start = dataclasses.replace(start, step=aimed.step, pictures=False)
                 return self._rebased(sequence, aimed, _Anchor(start, fitted, aimed.error, aimed.slope), wanted, memo, report)
-        aimed = mend(attempt, step, wanted, (low, high), SLOPE)
+        aimed = find_step(attempt, step, wanted, (low, high), SLOPE)
         return aimed, _Anchor(dataclasses.replace(start, step=aimed.step), fitted, aimed.error, aimed.slope)
 
-    def _are_pictures_dear(self, attempt: Callable[..., Aimed], step: float, wanted: float) -> bool:
+    def _are_pictures_dear(self, attempt: Callable[..., StepTrial], step: float, wanted: float) -> bool:
         """Whether a blend alone is worth more than with pictures, and leaves no error that a finer step cannot take away."""
         if (self.prediction, self.transform, self.placement) != ("blended", "none", AUTO):
             return False
@@ -218,8 +218,8 @@ class Mcgv(BaseCodec):
         return without.error <= wanted
 
     def _rebased(
-        self, sequence: MeshSequence, aimed: Aimed, anchor: _Anchor, wanted: float, memo: Memo, report: Progress
-    ) -> tuple[Aimed, _Anchor]:
+        self, sequence: MeshSequence, aimed: StepTrial, anchor: _Anchor, wanted: float, memo: Memo, report: Progress
+    ) -> tuple[StepTrial, _Anchor]:
         """The same blend and error without pictures, on the base frame that makes the file smallest: coarser ones are tried."""
         n_bytes = _count_bytes(aimed.bitstream)
         for coarsest in COARSEST if len(aimed.bitstream.sections["mesh"]) > LARGE_BASE * n_bytes else COARSEST[:1]:
@@ -228,14 +228,14 @@ class Mcgv(BaseCodec):
                 continue
             start, fitted = self._restart(sequence, anchor, aimed.step, coarsest * wanted, memo, report)
             attempt = functools.partial(self._attempt, sequence, start, fitted=fitted, memo=memo, report=report)
-            other = mend(attempt, aimed.step, wanted, BAND[self.prediction], SLOPE, rounds=MORE_ROUNDS)
+            other = find_step(attempt, aimed.step, wanted, BAND[self.prediction], SLOPE, rounds=MORE_ROUNDS)
             if other.error <= wanted and _count_bytes(other.bitstream) < _count_bytes(aimed.bitstream):
                 aimed = other
                 anchor = _Anchor(dataclasses.replace(start, step=other.step), fitted, other.error, other.slope)
         return aimed, anchor
 
     def _refine(
-        self, sequence: MeshSequence, aimed: Aimed, anchor: _Anchor, wanted: float, memo: Memo, report: Progress
+        self, sequence: MeshSequence, aimed: StepTrial, anchor: _Anchor, wanted: float, memo: Memo, report: Progress
     ) -> Encoded:
         """A file without pictures, or the same blend with `FINE_PART` of the error wanted where that costs next to nothing.
 
@@ -251,7 +251,7 @@ class Mcgv(BaseCodec):
         attempt = functools.cache(functools.partial(self._attempt, sequence, start, fitted=fitted, memo=memo, report=report))
         if _count_bytes(attempt(step).bitstream) > most:
             return aimed.encoded
-        finer = mend(attempt, step, wanted, FINE_BAND, SLOPE, rounds=MORE_ROUNDS)
+        finer = find_step(attempt, step, wanted, FINE_BAND, SLOPE, rounds=MORE_ROUNDS)
         is_cheap = finer.error <= wanted and _count_bytes(finer.bitstream) <= most
         return finer.encoded if is_cheap else aimed.encoded
 
@@ -269,12 +269,12 @@ class Mcgv(BaseCodec):
 
     def _attempt(
         self, sequence: MeshSequence, start: _Start, step: float, *, fitted: Fitted | None, memo: Memo, report: Progress
-    ) -> Aimed:
+    ) -> StepTrial:
         """Code with a step, model units, and measure."""
         encoded = self._code(sequence, start, step, fitted, memo, report)
         report("measure", 0)
         own = sequence.reordered(start.coded.permutation, start.faces)
-        return Aimed(encoded, step, root_mean_square(own, self.reader(encoded.bitstream)))
+        return StepTrial(encoded, step, root_mean_square(own, self.reader(encoded.bitstream)))
 
     def _code(
         self, sequence: MeshSequence, start: _Start, step: float, fitted: Fitted | None, memo: Memo, report: Progress
@@ -547,7 +547,7 @@ class _Start:
 
 @dataclass(frozen=True)
 class _Anchor:
-    """An encode that was measured: its start and blend, its error, model units, and `Aimed.slope`."""
+    """An encode that was measured: its start and blend, its error, model units, and `StepTrial.slope`."""
 
     start: _Start
     fitted: Fitted | None
@@ -573,7 +573,7 @@ def _base_step(step: float, n_frames: int) -> float:
     return BASE_STEP * step / math.sqrt(n_frames)
 
 
-def _worth(aimed: Aimed) -> float:
+def _worth(aimed: StepTrial) -> float:
     """Bytes, at about equal error: with one blend, they go with the error to the power of about -0.2."""
     return _count_bytes(aimed.bitstream) * math.pow(aimed.error, 0.2)
 

@@ -32,7 +32,7 @@ from gvpipe.container.segments import MAX_SEGMENT, cut
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of
-from gvpipe.rate_control.step_search import NEAR, Aimed, Anchor, first_step, mend, root_mean_square, step_between
+from gvpipe.rate_control.step_search import NEAR, Anchor, StepTrial, find_step, first_step, root_mean_square, step_between
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.still_vertices import find_still
 from gvpipe.trajectory.welding import find_points
@@ -48,8 +48,8 @@ SMALLEST = 1e-9  # step, part of a clip's diagonal
 class Pdct(BaseCodec):
     """Settings of the predictive DCT codec.
 
-    The error that quality asks for (`gvpipe.quality_scale`) is met by a loop: encode, measure, mend the step of the delta
-    coefficients. With ``kept``, which sets the error itself, the step is not mended.
+    The error that quality asks for (`gvpipe.quality_scale`) is met by a loop: encode, measure, correct the step of the delta
+    coefficients. With ``kept``, which sets the error itself, the step is not corrected.
 
     Raises:
         SettingError: a value out of its range.
@@ -95,12 +95,12 @@ class Pdct(BaseCodec):
             return self._code(sequence, start, known or FIRST * wanted, memo, report)
         own = sequence.reordered(start.coded.permutation, start.mesh.faces)
 
-        def attempt(step: float) -> Aimed:
+        def attempt(step: float) -> StepTrial:
             encoded = self._code(sequence, start, step, memo, report)
             report("measure", 0)
-            return Aimed(encoded, step, root_mean_square(own, self.reader(encoded.bitstream)))
+            return StepTrial(encoded, step, root_mean_square(own, self.reader(encoded.bitstream)))
 
-        aimed = mend(attempt, first_step(anchors, wanted, FIRST), wanted)
+        aimed = find_step(attempt, first_step(anchors, wanted, FIRST), wanted)
         if aimed.error > wanted / NEAR:  # else the step hardly matters, and tells nothing of other errors
             anchors.append(Anchor(aimed.step, aimed.error))
         return aimed.encoded

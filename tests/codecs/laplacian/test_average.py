@@ -44,13 +44,15 @@ def walking_bar(n_frames: int = 90) -> MeshSequence:
 
 def lengths(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     edges = unique_edges(faces)
-    return np.linalg.norm(points[..., edges[:, 1], :] - points[..., edges[:, 0], :], axis=-1)
+    found: np.ndarray = np.linalg.norm(points[..., edges[:, 1], :] - points[..., edges[:, 0], :], axis=-1)
+    return found
 
 
 def length_errors(points: np.ndarray, sequence: MeshSequence) -> np.ndarray:
     """Relative errors of edge lengths against their mean over the frames."""
     wanted = lengths(sequence.read(0, sequence.n_frames).astype(np.float64), sequence.faces).mean(axis=0)
-    return np.abs(lengths(points, sequence.faces) / wanted - 1)
+    errors: np.ndarray = np.abs(lengths(points, sequence.faces) / wanted - 1)
+    return errors
 
 
 def rigidly_moved(sequence: MeshSequence, seed: int = 0) -> MeshSequence:
@@ -64,7 +66,8 @@ def rigidly_moved(sequence: MeshSequence, seed: int = 0) -> MeshSequence:
 def fitted(points: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Points moved and turned onto a target as one body."""
     one = Groups(np.zeros(len(points), np.int64))
-    return one.turned(points[None], target)[0] + target.mean(axis=0) - points.mean(axis=0)
+    moved: np.ndarray = one.turned(points[None], target)[0] + target.mean(axis=0) - points.mean(axis=0)
+    return moved
 
 
 def test_a_walk_in_a_circle_keeps_its_lengths_where_the_mean_shrinks() -> None:

@@ -26,7 +26,7 @@ def flat_sheet(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def bumpy_sphere() -> trimesh.Trimesh:
-    sphere = trimesh.creation.icosphere(subdivisions=2)
+    sphere: trimesh.Trimesh = trimesh.creation.icosphere(subdivisions=2)
     sphere.vertices += 0.03 * np.random.default_rng(1).normal(size=sphere.vertices.shape)
     return sphere
 

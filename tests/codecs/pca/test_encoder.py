@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import FormatError, InputError, SettingError
 from gvpipe.quality_scale import error_of
 from gvpipe.sequence import MeshSequence
+from gvpipe.trajectory.causal_order import CausalOrder
 
 
 def grid(side: int) -> tuple[np.ndarray, np.ndarray]:
@@ -31,7 +33,11 @@ def tube(around: int, along: int) -> tuple[np.ndarray, np.ndarray]:
     angle, turn = 2 * np.pi * u / around, 2 * np.pi * v / along
     radius = 2 + 0.7 * np.cos(angle)
     points = np.c_[(radius * np.cos(turn)).ravel(), (radius * np.sin(turn)).ravel(), 0.7 * np.sin(angle).ravel()]
-    at = lambda i, j: ((i % around) * along + j % along).ravel()  # noqa: E731 - two lines of index arithmetic
+
+    def at(i: np.ndarray, j: np.ndarray) -> np.ndarray:
+        vertices: np.ndarray = (i % around) * along + j % along
+        return vertices.ravel()
+
     a, b, c, d = at(u, v), at(u + 1, v), at(u, v + 1), at(u + 1, v + 1)
     return points, np.concatenate([np.c_[a, b, c], np.c_[b, d, c]])
 
@@ -212,7 +218,7 @@ def test_components_setting_limits_the_basis() -> None:
 def test_settings_are_checked() -> None:
     for wrong in ({"quality": 101}, {"predictor": "oracle"}, {"beta": 2.0}, {"components": -1}, {"segment": 0}):
         with pytest.raises(SettingError):
-            Pca(**wrong)  # type: ignore[arg-type]
+            Pca(**wrong)
 
 
 @pytest.mark.parametrize("predictor", ["lsp", "rbf", "kalman"])
@@ -223,9 +229,9 @@ def test_perturbed_predictions_hardly_move_vertices(predictor: str, monkeypatch:
     clean = Pca.reader(bitstream).read(0, 20).astype(np.float64)
     original = gvpipe.trajectory.prediction.predict_vectors
 
-    def perturbed(causal: gvpipe.trajectory.causal_order.CausalOrder, *rest: object) -> None:
+    def perturbed(causal: CausalOrder, *rest: Any) -> None:
         noise = 1 + 1e-12 * np.random.default_rng(5).choice([-1, 1], len(causal.weights))
-        original(causal._replace(weights=causal.weights * noise), *rest)  # type: ignore[arg-type]
+        original(causal._replace(weights=causal.weights * noise), *rest)
 
     monkeypatch.setattr("gvpipe.trajectory.coefficient_coding.predict_vectors", perturbed)
     moved = Pca.reader(bitstream).read(0, 20).astype(np.float64)

@@ -34,6 +34,11 @@ def test_a_frame_costs_one_clip(monkeypatch: pytest.MonkeyPatch) -> None:
     bitstream = Pdct(clip=8).encode(waving(6, 20)).bitstream
     wanted: list[str] = []
     plain = Bitstream.section
-    monkeypatch.setattr(Bitstream, "section", lambda self, name: (wanted.append(name), plain(self, name))[1])
+
+    def noted(self: Bitstream, name: str) -> bytes:
+        wanted.append(name)
+        return plain(self, name)
+
+    monkeypatch.setattr(Bitstream, "section", noted)
     assert Pdct.reader(bitstream).read(9, 12).shape == (3, 36, 3)
     assert [name for name in wanted if name.startswith("clip.")] == ["clip.1"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -118,11 +119,11 @@ def test_hostile_charts_are_noticed() -> None:
 @pytest.mark.parametrize(
     "settings", [{}, {"image": "jpeg"}, {"transform": "klt"}, {"size": "64x32"}, {"reorder": True}], ids=str
 )
-def test_files_of_tiles_decode(settings: dict[str, object], tmp_path: Path) -> None:
+def test_files_of_tiles_decode(settings: dict[str, Any], tmp_path: Path) -> None:
     """As exact as files of halves; charts are sent, pixels are not."""
     sequence, errors = waving(14, 20), []
     for placement in ("tiles", "halves"):
-        bitstream = Mcgv(prediction="blended", placement=placement, **settings).encode(sequence).bitstream  # type: ignore[arg-type]
+        bitstream = Mcgv(prediction="blended", placement=placement, **settings).encode(sequence).bitstream
         assert ("charts" in bitstream.sections) == (placement == "tiles") and "pixels" not in bitstream.sections
         decoded = open_reader(bitstream).read(0, 20)
         source = np.asarray(sequence.positions[:])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sequences import waving
@@ -13,9 +14,9 @@ from gvpipe.media.video import VideoReader
 
 @pytest.mark.parametrize(("settings", "wanted"), [({"gop": 8}, [2, 0, 4]), ({"image": "jpeg"}, [17, 18, 20, 3, 39])])
 def test_frames_decode_no_more_than_their_group(
-    settings: dict[str, object], wanted: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    settings: dict[str, Any], wanted: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    gvpipe.encode(waving(8, 40), tmp_path / "a.mp4", **settings)  # type: ignore[arg-type]
+    gvpipe.encode(waving(8, 40), tmp_path / "a.mp4", **settings)
     decoded: list[int] = []
     plain = VideoReader._decode
 

@@ -31,7 +31,7 @@ def jumping(n_frames: int = 30) -> tuple[MeshSequence, np.ndarray]:
     positions = np.array(sequence.positions[:])
     off = np.zeros(positions.shape[:2], bool)
     off[6:11, 40] = off[15, 17:20] = off[7:9, 100] = True  # over ends of groups too
-    positions[off] += np.float32([1.5, -0.8, 2.0])
+    positions[off] += np.array([1.5, -0.8, 2.0], np.float32)
     return dataclasses.replace(sequence, positions=positions), off
 
 

@@ -1,0 +1,42 @@
+"""The step that meets an error: mended, and interpolated between anchors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gvpipe.codec import Encoded
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.rate_control.step_search import BAND, Anchor, StepTrial, find_step, step_between
+
+EMPTY = Encoded(Bitstream("none", 1, 1, 1, 0, 30.0), np.arange(1))
+
+
+def pretend(step: float, exponent: float) -> StepTrial:
+    return StepTrial(EMPTY, step, 0.3 * step**exponent)
+
+
+@pytest.mark.parametrize("exponent", [0.6, 1.0, 1.3])
+def test_steps_are_mended_until_the_error_is_close(exponent: float) -> None:
+    aimed = find_step(lambda step: pretend(step, exponent), 1.0, 1.0)
+    assert BAND[0] <= aimed.error <= BAND[1]
+
+
+def test_errors_that_do_not_follow_the_step_end_the_loop() -> None:
+    tried: list[float] = []
+
+    def attempt(step: float) -> StepTrial:
+        tried.append(step)
+        return StepTrial(EMPTY, step, 0.0)
+
+    assert find_step(attempt, 1.0, 1e30).step in tried
+    assert len(tried) == 3
+
+
+def test_steps_between_anchors() -> None:
+    anchors = [Anchor(2.0, 1.0), Anchor(0.1, 0.1)]
+    assert step_between(anchors, 10**-0.5) == pytest.approx(0.2**0.5)
+    assert step_between(anchors, 1.5) == pytest.approx(3.0)
+    assert step_between(anchors, 0.06) == pytest.approx(0.06)
+    assert step_between(anchors, 3.0) is None
+    assert step_between([], 1.0) is None
