@@ -2,7 +2,7 @@
 
 Place and size do not matter to the operators, so that they are left out: the unit is the mean edge length. What precision the
 weights need is measured in docs/experiments/laplacian-average.md. They need local shape, which is what deltas keep; positions
-predicted along the vertex hierarchy took 3 bits per point more at equal worth.
+predicted along the vertex hierarchy took 3 bits per point more at equal errors.
 
 Source: Sorkine, Cohen-Or and Toledo, "High-pass quantization for mesh encoding", 2003.
 """

@@ -18,8 +18,8 @@ def encode_coefficients(
 
     ``given (P, R)`` has the coefficients of the points that stand still, which are those in ``coefficients``.
     """
-    wanted = domain.system.deltas(coefficients)[domain.delta_points]
-    deltas, rounded = encode_vectors(wanted, step, domain.deltas, _predictor(coding))
+    target = domain.system.deltas(coefficients)[domain.delta_points]
+    deltas, rounded = encode_vectors(target, step, domain.deltas, _predictor(coding))
     anchored = domain.system.fit_anchors(domain.delta_points, rounded, coefficients)
     anchors, sent = encode_vectors(
         anchored, step * coding.anchor_ratio, domain.anchors.causal, given=_of_anchors(given, domain)

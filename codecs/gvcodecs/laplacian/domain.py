@@ -72,11 +72,11 @@ def build_domain(surface: Surface, average: Float64 | None, coding: CoefficientC
     """
     n_points = len(surface.hierarchy.order)
     points = np.zeros((n_points, 3)) if average is None else average
-    walk = border_order(surface.faces, n_points)
+    traversal = border_order(surface.faces, n_points)
     _, component_of = components(surface.neighbours)
     is_still = np.zeros(n_points, bool) if is_still is None else is_still
     anchors = choose_anchors(
-        coding.anchor_choice, coding.anchors, surface.hierarchy, surface.causal, walk, component_of, is_still
+        coding.anchor_choice, coding.anchors, surface.hierarchy, surface.causal, traversal, component_of, is_still
     )
     is_anchor = np.zeros(n_points, bool)
     is_anchor[anchors.points] = True
@@ -85,6 +85,6 @@ def build_domain(surface: Surface, average: Float64 | None, coding: CoefficientC
     scale = np.ones(n_points) if average is None else fineness(average, surface.edges, coding.edge_power)
     operator = sparse.diags_array(scale * has_deltas) @ thin_hubs(laplacian(points, surface.faces, coding.operator))
     operator = sparse.csr_array(operator)
-    order, blocks, limits = delta_order(coding.delta_prediction, surface.hierarchy, walk, has_deltas)
+    order, blocks, limits = delta_order(coding.delta_prediction, surface.hierarchy, traversal, has_deltas)
     causal = delta_causal_order(coding.delta_prediction, order, blocks, limits, surface.neighbours, operator @ points)
     return Domain(anchors, order, causal, ExtendedLaplacian(operator, anchors.points, 1 / coding.anchor_ratio, anchors.is_free))
