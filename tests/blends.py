@@ -9,7 +9,7 @@ from sequences import grid
 
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights, homogeneous
-from gvcodecs.mcgv.motion.weight_kernels import MAX_LISTED, list_known, rank_of, share
+from gvcodecs.mcgv.motion.weight_kernels import list_clusters, new_list, rank_of, suggest
 from gvpipe.mesh.topology import adjacency
 
 Float64 = NDArray[np.float64]
@@ -26,19 +26,19 @@ def sheet(n: int = 12) -> tuple[Float64, sparse.csr_array]:
 def random_weights(neighbours: sparse.csr_array, n_clusters: int, seed: int, own: float = 0.4) -> Weights:
     """Weights that some points have of their own and the others from their lists, as a file may hold them."""
     draw = np.random.default_rng(seed)
-    known = causal_neighbours(neighbours)
-    n_points = len(known.starts) - 1
+    causal = causal_neighbours(neighbours)
+    n_points = len(causal.starts) - 1
     clusters, parts = np.zeros((n_points, INFLUENCES), np.int32), np.zeros((n_points, INFLUENCES), np.int32)
-    listed, sums, shares = np.zeros(MAX_LISTED, np.int64), np.zeros(MAX_LISTED, np.int64), np.zeros(INFLUENCES, np.int64)
+    listed = new_list()
     for point in range(n_points):
-        n_listed = list_known(point, known.starts, known.near, clusters, parts, listed, sums)
+        n_listed = list_clusters(point, causal, Weights(clusters, parts), listed)
         if n_listed and draw.random() >= own:
-            n = share(sums, n_listed, shares)
-            clusters[point, :n], parts[point, :n] = listed[:n], shares[:n]
+            n = suggest(listed, n_listed)
+            clusters[point, :n], parts[point, :n] = listed.clusters[:n], listed.shares[:n]
             continue
         n = int(draw.integers(1, min(INFLUENCES, n_clusters) + 1))
         chosen = draw.permutation(n_clusters)[:n]
-        ranks = [rank_of(int(c), listed, n_listed) for c in chosen]
+        ranks = [rank_of(int(c), listed.clusters, n_listed) for c in chosen]
         clusters[point, :n] = chosen[np.argsort(ranks)]
         ends = np.sort(draw.permutation(TOTAL - 1)[: n - 1]) + 1
         parts[point, :n] = np.diff(np.r_[0, ends, TOTAL])

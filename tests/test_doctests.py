@@ -14,6 +14,7 @@ MODULES = [
     "gvpipe.entropy.grouping",
     "gvpipe.entropy.integers",
     "gvpipe.entropy.parametric_tables",
+    "gvpipe.entropy.series",
     "gvpipe.errors",
     "gvpipe.mesh.lattice",
     "gvpipe.mesh.unique_rows",

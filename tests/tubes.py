@@ -6,12 +6,12 @@ import numpy as np
 
 from gvcodecs.laplacian import Laplacian
 from gvcodecs.laplacian.domain import Surface, build_surface
-from gvcodecs.laplacian.header import Header
+from gvcodecs.laplacian.header import CoefficientCoding
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.metrics.comparison import compare
 from gvpipe.sequence import MeshSequence
 
-HEADER = Header("mean-value", "kalman", 16, "hierarchy", 0.75, 1 / 16, 1.2, 1.5, 1, (1.0,))
+CODING = CoefficientCoding("mean-value", "kalman", 16, "hierarchy", 0.75, 1 / 16, 1.2, 1.5)
 
 
 def tube(around: int, along: int) -> tuple[np.ndarray, np.ndarray]:

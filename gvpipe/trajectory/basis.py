@@ -30,6 +30,7 @@ from gvpipe.arrays import Float64, Int64
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_vectors, encode_vectors
+from gvpipe.trajectory.gram import descending_eigenvectors, is_tall, smaller_gram
 from gvpipe.trajectory.temporal_neighbours import temporal_order
 
 THRESHOLD = 0.2
@@ -123,18 +124,15 @@ def find_principal(trajectories: Float64, error: float) -> Principal:
     From the smaller of the two Gram matrices, and only the eigenvectors wanted: on 2010 hardware the paper's full decomposition
     took minutes, this takes a fraction of a second for 400 frames.
     """
-    from scipy.linalg import eigh
-
     mean = trajectories.mean(axis=0)
     centred = trajectories - mean
-    tall = centred.shape[0] >= centred.shape[1]
-    gram = centred.T @ centred if tall else centred @ centred.T
+    tall = is_tall(centred)
+    gram = smaller_gram(centred)
     total = float(np.trace(gram))
     least = max(NEGLIGIBLE * error / len(gram), ROUNDING * total)
     if not total > least:
         return Principal(mean, np.zeros(0), np.zeros((centred.shape[1], 0)), total)
-    energies, vectors = eigh(gram, driver="evr", subset_by_value=[least, np.inf], overwrite_a=True)
-    energies, vectors = energies[::-1], vectors[:, ::-1]
+    energies, vectors = descending_eigenvectors(gram, least)
     if not tall:
         vectors = (centred.T @ vectors) / np.sqrt(energies)
     return Principal(mean, energies, np.ascontiguousarray(vectors), max(0.0, total - float(energies.sum())))

@@ -3,10 +3,10 @@
 What: the first points of the vertex hierarchy, which lie evenly over the surface, at least one on every component. They
 come in the hierarchy's order, so that each is interpolated from those before it as `pca` does it. A component of up to `SMALL`
 points is all anchors, and needs no deltas. Points that stand still are anchors too, whose coefficients are given.
-Why: deltas tell little of where a point far from any anchor lies. With few anchors the surface drifts, with many their
-own bits grow; anchors are quantised as finely as the wanted drift is small.
+Why: deltas hardly fix the position of a point far from any anchor. With few anchors the surface drifts, with many their
+own bits grow; anchors are quantised as finely as drift is to be small.
 
-``walk`` takes evenly spaced points of the border-expansion walk instead, each predicted from the one before.
+``walk`` takes evenly spaced points of the border-expansion traversal instead, each predicted from the one before.
 
 Source: Sorkine, Cohen-Or and Toledo, "High-pass quantization for mesh encoding", 2003, for anchors.
 """
@@ -44,7 +44,7 @@ def choose_anchors(
     spacing: int,
     hierarchy: Hierarchy,
     causal: CausalOrder,
-    walk: Int32,
+    traversal: Int32,
     component_of: Integers,
     is_still: Bool | None = None,
 ) -> Anchors:
@@ -53,7 +53,7 @@ def choose_anchors(
     Args:
         choice: one of `ANCHOR_CHOICES`.
         causal: order of all points along the hierarchy.
-        walk: all points in border-expansion order.
+        traversal: all points in border-expansion order.
         component_of: ``(P,)`` the component of each point.
         is_still: ``(P,)`` the points whose coefficients are given; none if None.
     """
@@ -66,9 +66,9 @@ def choose_anchors(
         keep |= is_held[hierarchy.order]
         points, chosen = hierarchy.order[keep], select_vectors(causal, keep)
         return Anchors(points, leave_out(chosen, is_still[points]), ~is_still[points])
-    keep = (np.arange(n_points) % spacing == 0) | is_held[walk]
-    keep[np.unique(component_of[walk], return_index=True)[1]] = True
-    points = walk[keep]
+    keep = (np.arange(n_points) % spacing == 0) | is_held[traversal]
+    keep[np.unique(component_of[traversal], return_index=True)[1]] = True
+    points = traversal[keep]
     return Anchors(points, leave_out(_chain(len(points)), is_still[points]), ~is_still[points])
 
 

@@ -2,7 +2,7 @@
 
 Place and size do not matter to the operators, so that they are left out: the unit is the mean edge length. What precision the
 weights need is measured in docs/experiments/laplacian-average.md. They need local shape, which is what deltas keep; positions
-predicted along the vertex hierarchy took 3 bits per point more at equal worth.
+predicted along the vertex hierarchy took 3 bits per point more at equal errors.
 
 Source: Sorkine, Cohen-Or and Toledo, "High-pass quantization for mesh encoding", 2003.
 """
@@ -15,7 +15,7 @@ import numpy as np
 
 from gvcodecs.laplacian.coefficients import decode_coefficients, encode_coefficients
 from gvcodecs.laplacian.domain import Surface, build_domain
-from gvcodecs.laplacian.header import Header
+from gvcodecs.laplacian.header import CoefficientCoding
 from gvcodecs.laplacian.mesh_scale import edge_lengths
 from gvpipe.arrays import Float64
 from gvpipe.container.cursor import Cursor, pack_block
@@ -26,30 +26,30 @@ SPACING = 256  # points per anchor
 FARTHEST = 1e9  # mean edge lengths: what a decoded coordinate may have
 
 
-def encode_average(points: Float64, surface: Surface, header: Header) -> tuple[bytes, Float64]:
+def encode_average(points: Float64, surface: Surface, coding: CoefficientCoding) -> tuple[bytes, Float64]:
     """Code ``points (P, 3)``, model units; return the bytes and the decoded points in mean edge lengths."""
     lengths = edge_lengths(points, surface.edges)
     unit = float(lengths.mean()) if len(lengths) else 0.0
     unit = unit or float(np.abs(points).max(initial=0)) or 1.0
-    own = _own_header(header)
+    own = _own_coding(coding)
     domain = build_domain(surface, None, own)
-    anchors, deltas, _ = encode_coefficients((points - points.mean(axis=0)) / unit, header.average_step, domain, own)
+    anchors, deltas, _ = encode_coefficients((points - points.mean(axis=0)) / unit, coding.average_step, domain, own)
     data = pack_block(anchors) + deltas
-    return data, decode_average(data, surface, header)
+    return data, decode_average(data, surface, coding)
 
 
-def decode_average(data: bytes, surface: Surface, header: Header) -> Float64:
+def decode_average(data: bytes, surface: Surface, coding: CoefficientCoding) -> Float64:
     """Mirror of `encode_average`; raises `CorruptFile` if the bytes are not what it writes."""
-    own = _own_header(header)
+    own = _own_coding(coding)
     cursor = Cursor(data, NAME)
     anchors = cursor.block()
     domain = build_domain(surface, None, own)
-    points = decode_coefficients(anchors, cursor.rest(), 3, header.average_step, domain, own, (NAME, NAME))
+    points = decode_coefficients(anchors, cursor.rest(), 3, coding.average_step, domain, own, (NAME, NAME))
     if not np.abs(points).max(initial=0) < FARTHEST:
         raise corrupt_section(NAME, "a position is out of range")
     return points
 
 
-def _own_header(header: Header) -> Header:
+def _own_coding(coding: CoefficientCoding) -> CoefficientCoding:
     """How the average itself is coded."""
-    return dataclasses.replace(header, operator="tutte", delta_prediction="kalman", anchors=SPACING, anchor_ratio=1.0)
+    return dataclasses.replace(coding, operator="tutte", delta_prediction="kalman", anchors=SPACING, anchor_ratio=1.0)

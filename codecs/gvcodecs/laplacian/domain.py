@@ -10,7 +10,7 @@ from scipy import sparse
 from gvcodecs.laplacian.anchors import Anchors, choose_anchors
 from gvcodecs.laplacian.delta_rows import border_order, delta_causal_order, delta_order
 from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian, thin_hubs
-from gvcodecs.laplacian.header import Header
+from gvcodecs.laplacian.header import CoefficientCoding
 from gvcodecs.laplacian.mesh_scale import fineness
 from gvcodecs.laplacian.operators import laplacian
 from gvpipe.arrays import Bool, Float64, Int32
@@ -61,30 +61,30 @@ def build_surface(point_faces: Int32, n_points: int) -> Surface:
     return Surface(faces, unique_edges(faces), adjacency(faces, n_points), hierarchy, hierarchy_order(hierarchy))
 
 
-def build_domain(surface: Surface, average: Float64 | None, header: Header, is_still: Bool | None = None) -> Domain:
+def build_domain(surface: Surface, average: Float64 | None, coding: CoefficientCoding, is_still: Bool | None = None) -> Domain:
     """Set up the coding of coefficients.
 
     Args:
         surface: the mesh.
         average: ``(P, 3)`` decoded, in mean edge lengths, if there is one.
-        header: of the bitstream.
+        coding: of coefficients.
         is_still: ``(P,)`` the points whose coefficients are given; none if None.
     """
     n_points = len(surface.hierarchy.order)
     points = np.zeros((n_points, 3)) if average is None else average
-    walk = border_order(surface.faces, n_points)
+    traversal = border_order(surface.faces, n_points)
     _, component_of = components(surface.neighbours)
     is_still = np.zeros(n_points, bool) if is_still is None else is_still
     anchors = choose_anchors(
-        header.anchor_choice, header.anchors, surface.hierarchy, surface.causal, walk, component_of, is_still
+        coding.anchor_choice, coding.anchors, surface.hierarchy, surface.causal, traversal, component_of, is_still
     )
     is_anchor = np.zeros(n_points, bool)
     is_anchor[anchors.points] = True
     has_deltas = (np.bincount(component_of[~is_anchor], minlength=int(component_of.max()) + 1) > 0)[component_of]
     has_deltas &= ~is_still
-    scale = np.ones(n_points) if average is None else fineness(average, surface.edges, header.edge_power)
-    operator = sparse.diags_array(scale * has_deltas) @ thin_hubs(laplacian(points, surface.faces, header.operator))
+    scale = np.ones(n_points) if average is None else fineness(average, surface.edges, coding.edge_power)
+    operator = sparse.diags_array(scale * has_deltas) @ thin_hubs(laplacian(points, surface.faces, coding.operator))
     operator = sparse.csr_array(operator)
-    order, blocks, limits = delta_order(header.delta_prediction, surface.hierarchy, walk, has_deltas)
-    causal = delta_causal_order(header.delta_prediction, order, blocks, limits, surface.neighbours, operator @ points)
-    return Domain(anchors, order, causal, ExtendedLaplacian(operator, anchors.points, 1 / header.anchor_ratio, anchors.is_free))
+    order, blocks, limits = delta_order(coding.delta_prediction, surface.hierarchy, traversal, has_deltas)
+    causal = delta_causal_order(coding.delta_prediction, order, blocks, limits, surface.neighbours, operator @ points)
+    return Domain(anchors, order, causal, ExtendedLaplacian(operator, anchors.points, 1 / coding.anchor_ratio, anchors.is_free))

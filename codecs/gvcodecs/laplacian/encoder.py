@@ -35,6 +35,7 @@ from gvcodecs.laplacian.header import (
     MOST_POWER,
     MOST_RATIO,
     VERSION_STILL,
+    CoefficientCoding,
     Header,
 )
 from gvcodecs.laplacian.operators import OPERATORS
@@ -112,7 +113,7 @@ class Laplacian(BaseCodec):
         """What does not depend on the step: mesh and average as coded, what coefficients are coded with; and still points."""
         shared = code_connectivity(sequence, self.reorder, memo, report)
         held, still = code_still(sequence, shared, shared.target_error(self.quality), memo)
-        header = Header(
+        coding = CoefficientCoding(
             self.operator,
             self.delta_prediction,
             self.anchors,
@@ -121,23 +122,22 @@ class Laplacian(BaseCodec):
             float(self.average_step),
             float(self.anchor_ratio),
             float(self.basis_ratio),
-            len(cut(sequence.n_frames, self.segment, MAX_SEGMENTS)) - 1,
-            (),
         )
-        if header.needs_average:
+        if coding.needs_average:
             report("average", 0)
-        average, domain = memo("domain", lambda: _prepare(sequence, shared, header, still))
+        average, domain = memo("domain", lambda: _prepare(sequence, shared, coding, still))
         sections = {"mesh": shared.coded.mesh, "order": shared.coded.order, **({SECTION: held} if held else {})}
-        return _Start(shared, still, header, domain, {**sections, **({} if average is None else {NAME: average})})
+        return _Start(shared, still, coding, domain, {**sections, **({} if average is None else {NAME: average})})
 
     def _code(self, sequence: MeshSequence, start: _Start, asked: float, report: Progress) -> StepTrial:
         """Code with the step that would leave the error ``asked`` if nothing drifted, and tell the error that is left."""
-        still, header = start.still, start.header
+        still = start.still
         moving = start.shared.members[~still.flags]
         sections, steps, squared = dict(start.sections), [], start.still_error(sequence)
         bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
+        n_segments = len(bounds) - 1
         for s, (first, stop) in enumerate(pairwise(bounds) if still.n_moving else []):
-            report("segments", s / header.segments)
+            report("segments", s / n_segments)
             trajectories = read_trajectories(sequence, first, stop, moving)
             error = asked**2 * still.n_moving * (stop - first)
             most = still.most_components
@@ -146,14 +146,14 @@ class Laplacian(BaseCodec):
             )
             given = still.given(reduced.decoded)
             coefficients = still.join(reduced.coefficients, given)
-            anchors, deltas, decoded = encode_coefficients(coefficients, reduced.step, start.domain, header, given)
+            anchors, deltas, decoded = encode_coefficients(coefficients, reduced.step, start.domain, start.coding, given)
             sections |= {f"basis.{s}": reduced.basis, f"anchors.{s}": anchors, f"deltas.{s}": deltas}
             steps.append(reduced.step)
             errors = squared_errors(trajectories, reduced.decoded, decoded[~still.flags])
             squared += float(errors @ start.copies[~still.flags])
         report("segments", 1)
-        words = {**header.to_json(), "steps": steps or [1.0] * header.segments}
-        bitstream = self._bitstream(sequence, words, sections, version=None if SECTION in sections else 1)
+        header = Header(start.coding, n_segments, tuple(steps) or (1.0,) * n_segments)
+        bitstream = self._bitstream(sequence, header.to_json(), sections, version=None if SECTION in sections else 1)
         encoded = Encoded(bitstream, start.shared.coded.permutation)
         return StepTrial(encoded, asked, math.sqrt(squared / (sequence.n_frames * sequence.n_vertices)))
 
@@ -169,7 +169,7 @@ class _Start:
 
     shared: CodedConnectivity
     still: StillPoints
-    header: Header
+    coding: CoefficientCoding
     domain: Domain
     sections: dict[str, bytes]
 
@@ -186,13 +186,13 @@ class _Start:
 
 
 def _prepare(
-    sequence: MeshSequence, shared: CodedConnectivity, header: Header, still: StillPoints
+    sequence: MeshSequence, shared: CodedConnectivity, coding: CoefficientCoding, still: StillPoints
 ) -> tuple[bytes | None, Domain]:
     """The coded average mesh, where one is needed, and what coefficients are coded with: both know nothing of quality."""
     mesh = shared.mesh
     surface = build_surface(mesh.point_faces, mesh.n_points)
-    if not header.needs_average:
-        return None, build_domain(surface, None, header, still.flags)
+    if not coding.needs_average:
+        return None, build_domain(surface, None, coding, still.flags)
     average = average_mesh(sequence, shared.members[surface.faces].astype(np.int32))[shared.members]
-    data, decoded = encode_average(average, surface, header)
-    return data, build_domain(surface, decoded, header, still.flags)
+    data, decoded = encode_average(average, surface, coding)
+    return data, build_domain(surface, decoded, coding, still.flags)

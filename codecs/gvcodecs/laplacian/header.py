@@ -1,4 +1,4 @@
-"""The sections of a ``laplacian`` bitstream, and the header that tells how to read them.
+"""The sections of a ``laplacian`` bitstream, and the header that says how to read them.
 
 ====================  ======================================================================================
 ``mesh``, ``order``   triangles, seams and vertex order (`gvpipe.connectivity.topology_only`)
@@ -33,8 +33,8 @@ MOST_POWER = 2.0
 
 
 @dataclass(frozen=True)
-class Header:
-    """What a reader must know beside the sections.
+class CoefficientCoding:
+    """How coefficients of all segments are coded, and the average mesh before them.
 
     Args:
         operator: whose deltas are coded.
@@ -44,8 +44,6 @@ class Header:
         edge_power: steps of deltas go with this power of the edge lengths around a point.
         average_step: quantisation step of the average mesh, mean edge lengths.
         anchor_ratio, basis_ratio: steps of anchors and of the basis, in steps of deltas.
-        segments: how many; segment s starts at frame ``s * F // segments``.
-        steps: quantisation step of each segment's deltas, model units.
     """
 
     operator: str
@@ -56,22 +54,15 @@ class Header:
     average_step: float
     anchor_ratio: float
     basis_ratio: float
-    segments: int
-    steps: tuple[float, ...]
 
     @property
     def needs_average(self) -> bool:
         """Whether there is an average mesh: the combinatorial operator needs none but for section 7's prediction."""
         return self.operator != "tutte" or self.delta_prediction == "rigid"
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the header as JSON values."""
-        return {**asdict(self), "steps": list(self.steps)}
-
     @classmethod
-    def of(cls, bitstream: Bitstream) -> Header:
-        """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
-        segments = read_segments(bitstream, MAX_SEGMENTS)
+    def of(cls, bitstream: Bitstream) -> CoefficientCoding:
+        """From the header of a bitstream; raises `CorruptFile` for values out of range."""
         return cls(
             bitstream.choice("operator", OPERATORS),
             bitstream.choice("delta_prediction", DELTA_PREDICTIONS),
@@ -81,6 +72,29 @@ class Header:
             float(bitstream.number("average_step", FINEST, COARSEST)),
             float(bitstream.number("anchor_ratio", LEAST_RATIO, MOST_RATIO)),
             float(bitstream.number("basis_ratio", LEAST_RATIO, MOST_RATIO)),
-            segments,
-            read_steps(bitstream, segments),
         )
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a reader must have beside the sections.
+
+    Args:
+        coding: of coefficients.
+        segments: how many; segment s starts at frame ``s * F // segments``.
+        steps: quantisation step of each segment's deltas, model units.
+    """
+
+    coding: CoefficientCoding
+    segments: int
+    steps: tuple[float, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the header as JSON values."""
+        return {**asdict(self.coding), "segments": self.segments, "steps": list(self.steps)}
+
+    @classmethod
+    def of(cls, bitstream: Bitstream) -> Header:
+        """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
+        segments = read_segments(bitstream, MAX_SEGMENTS)
+        return cls(CoefficientCoding.of(bitstream), segments, read_steps(bitstream, segments))

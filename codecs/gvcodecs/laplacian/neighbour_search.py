@@ -1,4 +1,4 @@
-"""Kernel of `gvcodecs.laplacian.delta_rows`: for every vertex of an order, the known ones that a breadth-first search meets."""
+"""Kernel of `gvcodecs.laplacian.delta_rows`: causal neighbours of every vertex, by breadth-first search."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from gvpipe.compiled import compiled
 
 
 @compiled
-def known_around(order: Array, limits: Array, starts: Array, neighbours: Array, most: int, reach: int) -> tuple[Array, Array]:
-    """Bounds ``(n + 1,)`` and vertices: for each vertex of the order up to ``most`` that are known, nearest first.
+def causal_around(order: Array, limits: Array, starts: Array, neighbours: Array, most: int, reach: int) -> tuple[Array, Array]:
+    """Bounds ``(n + 1,)`` and vertices: for each vertex of the order up to ``most`` causal neighbours, nearest first.
 
     Args:
-        order: ``(n,)`` vertices; those of the graph that are not in it are never known.
-        limits: ``(n,)`` vertices at places before the limit are known.
+        order: ``(n,)`` vertices; those of the graph that are not in it are no causal neighbours.
+        limits: ``(n,)`` vertices of rank below the limit are causal neighbours.
         starts, neighbours: the graph, ``neighbours[starts[v]:starts[v + 1]]`` ascending.
         reach: vertices that a search visits at most.
     """
     n_vertices = len(starts) - 1
-    place = np.full(n_vertices, len(order), np.int32)
+    rank = np.full(n_vertices, len(order), np.int32)
     for i in range(len(order)):
-        place[order[i]] = i
+        rank[order[i]] = i
     seen_by = np.full(n_vertices, -1, np.int32)
     queue = np.empty(reach, np.int32)
     bounds = np.zeros(len(order) + 1, np.int32)
@@ -41,7 +41,7 @@ def known_around(order: Array, limits: Array, starts: Array, neighbours: Array, 
                 seen_by[v] = i
                 queue[tail] = v
                 tail += 1
-                if place[v] < limits[i]:
+                if rank[v] < limits[i]:
                     near[end] = v
                     end += 1
                     found += 1

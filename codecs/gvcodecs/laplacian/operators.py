@@ -26,6 +26,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from gvcodecs.laplacian.vectors import dot, norm
 from gvpipe.arrays import Float64, Int32
 
 OPERATORS = ("mean-value", "cotangent", "tutte")
@@ -67,17 +68,17 @@ def laplacian(points: Float64, faces: Int32, operator: str = "mean-value") -> sp
 def _mean_value(to_b: Float64, to_c: Float64, scale: float, corners: tuple[Int32, ...], n_vertices: int) -> sparse.csr_array:
     """Each corner a adds tan(angle / 2) / length to the weights at a of b and of c."""
     a, b, c = corners
-    length_b, length_c = (np.maximum(_norm(side), SHORTEST * scale) for side in (to_b, to_c))
-    product, dot, cross = length_b * length_c, _dot(to_b, to_c), _norm(np.cross(to_b, to_c))
-    tangent = cross / np.maximum(product + dot, STRAIGHTEST * product)  # of half the angle; continuous where sides collapse
+    length_b, length_c = (np.maximum(norm(side), SHORTEST * scale) for side in (to_b, to_c))
+    product, cosine, sine = length_b * length_c, dot(to_b, to_c), norm(np.cross(to_b, to_c))  # all times both lengths
+    tangent = sine / np.maximum(product + cosine, STRAIGHTEST * product)  # of half the angle; continuous where sides collapse
     return _sum_pairs([(a, b, tangent / length_b), (a, c, tangent / length_c)], n_vertices)
 
 
 def _cotangent(to_b: Float64, to_c: Float64, scale: float, corners: tuple[Int32, ...], n_vertices: int) -> sparse.csr_array:
     """Each corner a adds half its cotangent to the weight of the opposite edge bc, both ways."""
     _, b, c = corners
-    product = np.maximum(_norm(to_b) * _norm(to_c), (SHORTEST * scale) ** 2)
-    cotangent = _dot(to_b, to_c) / np.maximum(_norm(np.cross(to_b, to_c)), FLATTEST * product)
+    product = np.maximum(norm(to_b) * norm(to_c), (SHORTEST * scale) ** 2)
+    cotangent = dot(to_b, to_c) / np.maximum(norm(np.cross(to_b, to_c)), FLATTEST * product)
     return _sum_pairs([(b, c, cotangent / 2), (c, b, cotangent / 2)], n_vertices)
 
 
@@ -96,11 +97,3 @@ def _sum_pairs(parts: list[tuple[Int32, Int32, Float64]], n_vertices: int) -> sp
     rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
     pair = rows != columns
     return sparse.csr_array((values[pair], (rows[pair], columns[pair])), shape=(n_vertices, n_vertices))
-
-
-def _dot(a: Float64, b: Float64) -> Float64:
-    return np.asarray(np.einsum("ni,ni->n", a, b))
-
-
-def _norm(a: Float64) -> Float64:
-    return np.asarray(np.sqrt(_dot(a, a)))

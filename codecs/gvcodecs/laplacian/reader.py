@@ -65,18 +65,19 @@ class LaplacianReader:
 
     def _build_domain(self, surface: Surface) -> Domain:
         average = None
-        if self._header.needs_average:
-            average = decode_average(self._bitstream.section(NAME), surface, self._header)
-        return build_domain(surface, average, self._header, self._still.flags)
+        if self._header.coding.needs_average:
+            average = decode_average(self._bitstream.section(NAME), surface, self._header.coding)
+        return build_domain(surface, average, self._header.coding, self._still.flags)
 
     def _decode(self, s: int) -> Segment:
         if self._kept is None or self._kept[0] != s:
             step, section = self._header.steps[s], self._bitstream.section
             name, n_frames = f"basis.{s}", self._bounds[s + 1] - self._bounds[s]
-            basis = decode_basis(section(name), n_frames, self._still.n_moving, step * self._header.basis_ratio, name)
+            basis = decode_basis(section(name), n_frames, self._still.n_moving, step * self._header.coding.basis_ratio, name)
             names = (f"anchors.{s}", f"deltas.{s}")
             anchors, deltas = (section(name) for name in names)
             n_components, given = basis.vectors.shape[1], self._still.given(basis)
-            coefficients = decode_coefficients(anchors, deltas, n_components, step, self._domain, self._header, names, given)
+            domain, coding = self._domain, self._header.coding
+            coefficients = decode_coefficients(anchors, deltas, n_components, step, domain, coding, names, given)
             self._kept = s, Segment(basis, np.ascontiguousarray(coefficients.T))
         return self._kept[1]

@@ -17,6 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from gvcodecs.laplacian.edge_shape import EdgeShape
+from gvcodecs.laplacian.vectors import dot
 from gvpipe.arrays import Float64, Integers
 
 BENDING = 0.1  # squared relative length error that a squared radian weighs as much as
@@ -87,7 +88,7 @@ def _length_errors(shape: EdgeShape, unit: float, points: Float64) -> tuple[Floa
     """Relative errors ``(E,)`` of lengths, and their derivatives ``(E, 2, 3)`` by the edges' ends."""
     i, j = shape.edges.T
     side = points[j] - points[i]
-    length = np.sqrt(_dot(side, side))
+    length = np.sqrt(dot(side, side))
     wanted = shape.lengths / unit
     weight = 1 / np.maximum(wanted, SHORTEST)
     toward = side * (weight / np.maximum(length, SHORTEST))[:, None]
@@ -99,19 +100,15 @@ def _angle_errors(shape: EdgeShape, points: Float64) -> tuple[Float64, Float64]:
     i, j, k, l = shape.hinges.T  # noqa: E741 - vertices i j k l
     edge, one, other = points[j] - points[i], points[k] - points[i], points[l] - points[i]
     normal_one, normal_other = np.cross(edge, one), np.cross(other, edge)  # twice the area long
-    squared = np.maximum(_dot(edge, edge), SHORTEST**2)
+    squared = np.maximum(dot(edge, edge), SHORTEST**2)
     length = np.sqrt(squared)
-    angle = np.arctan2(_dot(normal_one, other) * length, _dot(normal_one, normal_other))
+    angle = np.arctan2(dot(normal_one, other) * length, dot(normal_one, normal_other))
     weight = np.sqrt(BENDING) * shape.trust
     error = np.remainder(angle - shape.angles + np.pi, 2 * np.pi) - np.pi
     least = (FLATTEST * squared) ** 2
-    by_k = normal_one * (weight * length / np.maximum(_dot(normal_one, normal_one), least))[:, None]
-    by_l = normal_other * (weight * length / np.maximum(_dot(normal_other, normal_other), least))[:, None]
-    share_k, share_l = (_dot(one, edge) / squared)[:, None], (_dot(other, edge) / squared)[:, None]  # of j; of i the rest
+    by_k = normal_one * (weight * length / np.maximum(dot(normal_one, normal_one), least))[:, None]
+    by_l = normal_other * (weight * length / np.maximum(dot(normal_other, normal_other), least))[:, None]
+    share_k, share_l = (dot(one, edge) / squared)[:, None], (dot(other, edge) / squared)[:, None]  # of j; of i the rest
     by_i = -(1 - share_k) * by_k - (1 - share_l) * by_l
     by_j = -share_k * by_k - share_l * by_l
     return weight * error, np.stack([by_i, by_j, by_k, by_l], axis=1)
-
-
-def _dot(a: Float64, b: Float64) -> Float64:
-    return np.asarray(np.einsum("ni,ni->n", a, b))

@@ -11,8 +11,8 @@ grow from frame to frame, and no decision hangs on one. Departures from the pape
 - every clip, the first too, starts from the base frame, whose difference to the clip's first frame is coded like any other;
 - a delta is predicted as the part ``w`` (sixteenths) of the delta before. Each group of coefficients (cluster, octave) learns
   its w by least squares from decoded deltas: near 0 in noise, near 1 in smooth motion (`Momentum`);
-- before the DCT, four functions per cluster (1 and the three base coordinates) take the affine part of the motion, which a walk
-  over the vertices turns into high frequencies (`Dictionary`).
+- before the DCT, four functions per cluster (1 and the three base coordinates) take the affine part of the motion. A
+  traversal of the vertices would turn it into high frequencies (`Dictionary`).
 
 A clip's bytes::
 
@@ -29,7 +29,7 @@ import numpy as np
 
 from gvcodecs.pdct.clustering import Clusters
 from gvcodecs.pdct.delta_coding import DeltaDecoder, DeltaEncoder
-from gvcodecs.pdct.dictionary import UNIT, Dictionary, Surface, place
+from gvcodecs.pdct.dictionary import UNIT, BaseFrame, Dictionary, model_units
 from gvcodecs.pdct.labels import decode_labels, encode_labels
 from gvcodecs.pdct.local_frames import local_frames
 from gvcodecs.pdct.momentum import Momentum
@@ -49,7 +49,7 @@ LAMBDA = 0.14  # squared steps that a bit is worth; 0.1155 by theory at a high r
 
 
 @dataclass(frozen=True)
-class Quantiser:
+class DeltaQuantiser:
     """The step of the delta coefficients, model units; that of low frequencies is ``step / fineness``; ``kept`` 0: by cost."""
 
     step: float
@@ -57,18 +57,18 @@ class Quantiser:
     kept: float
 
 
-def encode_clip(frames: Float32, surface: Surface, quantiser: Quantiser, clusters: Clusters, seed_bits: int) -> bytes:
+def encode_clip(frames: Float32, surface: BaseFrame, quantiser: DeltaQuantiser, clusters: Clusters, seed_bits: int) -> bytes:
     """Code ``frames (n, V, 3)``, model units, in the order of vertices that ``surface`` has."""
     lattice = Lattice.over(frames.reshape(-1, 3), seed_bits)
     seeds, labels = clusters.seeds, clusters.labels
     dictionary = Dictionary(surface, seeds, labels, lattice, quantiser.fineness)
     seed_points = np.rint((frames[:, seeds].astype(np.float64) - lattice.origin) / lattice.step).astype(np.int64)
     origins, axes = local_frames(seed_points)
-    local = dictionary.to_local(frames[:, dictionary.members].astype(np.float64), place(lattice, origins), axes)
+    local = dictionary.to_local(frames[:, dictionary.members].astype(np.float64), model_units(lattice, origins), axes)
     signals = dictionary.transform(local - dictionary.rest) / quantiser.step
     blocks = [
         encode_integers(np.diff(seeds.ravel(), prepend=0)),
-        encode_labels(labels[surface.walk], len(seeds)),
+        encode_labels(labels[surface.traversal], len(seeds)),
         encode_seeds(seed_points, dictionary.base_seeds),
     ]
     return b"".join(
@@ -81,8 +81,8 @@ def encode_clip(frames: Float32, surface: Surface, quantiser: Quantiser, cluster
     )
 
 
-def decode_clip(data: bytes, n_frames: int, surface: Surface, name: str) -> Float32:
-    """Mirror of `encode_clip`: ``(n_frames, V, 3) float32``, model units; vertices that are not on the walk are left at 0.
+def decode_clip(data: bytes, n_frames: int, surface: BaseFrame, name: str) -> Float32:
+    """Mirror of `encode_clip`: ``(n_frames, V, 3) float32``, model units; vertices that are not in the traversal are left at 0.
 
     Raises:
         CorruptFile: the clip does not decode to that many frames.
@@ -102,7 +102,7 @@ def decode_clip(data: bytes, n_frames: int, surface: Surface, name: str) -> Floa
     if seeds.min() < 0 or seeds.max() >= n_vertices:
         raise cursor.corrupt("a seed vertex does not exist")
     labels = np.zeros(n_vertices, np.int64)
-    labels[surface.walk] = decode_labels(Cursor(blocks[1], name), len(surface.walk), n_seeds, name)
+    labels[surface.traversal] = decode_labels(Cursor(blocks[1], name), len(surface.traversal), n_seeds, name)
     if np.abs((surface.base - origin) / seed_step).max() > 1 << 40:
         raise cursor.corrupt("the base lies out of the seed lattice's range")
     dictionary = Dictionary(surface, seeds, labels, lattice, fineness)
@@ -110,14 +110,14 @@ def decode_clip(data: bytes, n_frames: int, surface: Surface, name: str) -> Floa
     sums = _decode_deltas(cursor, n_frames, dictionary)
     origins, axes = local_frames(seed_points)
     result = np.zeros((n_frames, n_vertices, 3))
-    result[:, dictionary.members] = dictionary.to_world(dictionary.rebuild(sums, step), place(lattice, origins), axes)
+    result[:, dictionary.members] = dictionary.to_world(dictionary.rebuild(sums, step), model_units(lattice, origins), axes)
     result[:, seeds.ravel()] = lattice.points_at(seed_points).reshape(n_frames, -1, 3)
     if not np.abs(result).max() <= LARGEST:
         raise cursor.corrupt("a position is larger than float32 can hold")
     return result.astype(np.float32)
 
 
-def _encode_deltas(signals: Float64, dictionary: Dictionary, quantiser: Quantiser) -> bytes:
+def _encode_deltas(signals: Float64, dictionary: Dictionary, quantiser: DeltaQuantiser) -> bytes:
     """Code ``signals (n, 3, N)``, coefficients in steps, by the loop that the decoder runs."""
     coder, momentum = DeltaEncoder(dictionary.layout), Momentum(dictionary)
     n_affine, scale = dictionary.n_affine, dictionary.scale

@@ -17,9 +17,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from gvcodecs.pdct.clip import MAX_CLUSTERS, Quantiser, encode_clip
+from gvcodecs.pdct.clip import MAX_CLUSTERS, DeltaQuantiser, encode_clip
 from gvcodecs.pdct.clustering import Clusters, find_clusters
-from gvcodecs.pdct.dictionary import Surface
+from gvcodecs.pdct.dictionary import BaseFrame
 from gvcodecs.pdct.header import MAX_CLIPS, VERSION_POINTS, Header, surface_of_points
 from gvcodecs.pdct.reader import PdctReader
 from gvcodecs.pdct.still_points import SECTION, encode_still
@@ -91,7 +91,7 @@ class Pdct(BaseCodec):
         start = self._start(sequence, wanted, memo)
         anchors = memo("anchors", list[Anchor])
         known = step_between(anchors, wanted)
-        if known is not None or not len(start.surface.walk) or self.kept:
+        if known is not None or not len(start.surface.traversal) or self.kept:
             return self._code(sequence, start, known or FIRST * wanted, memo, report)
         own = sequence.reordered(start.coded.permutation, start.mesh.faces)
 
@@ -114,15 +114,15 @@ class Pdct(BaseCodec):
         """The step, model units, where only a frame's ``diagonal`` is known, as in streams."""
         return OPEN * error_of(self.quality) / 100 * diagonal
 
-    def find_clusters(self, frames: Float32, surface: Surface) -> Clusters:
+    def find_clusters(self, frames: Float32, surface: BaseFrame) -> Clusters:
         """The clusters of a clip, ``frames (n, P, 3)``, in the order of points that ``surface`` has."""
         n_clusters = self.clusters or min(max(len(surface.base) // PER_CLUSTER, AUTO[0]), AUTO[1])
         return find_clusters(frames, surface.faces, n_clusters)
 
-    def encode_clip(self, frames: Float32, surface: Surface, clusters: Clusters, step: float) -> bytes:
+    def encode_clip(self, frames: Float32, surface: BaseFrame, clusters: Clusters, step: float) -> bytes:
         """Code a clip, ``frames (n, P, 3)``, in the order of points that ``surface`` has, with a step, model units."""
         step = max(step, SMALLEST * diagonal_of(frames)) or SMALLEST
-        return encode_clip(frames, surface, Quantiser(step, float(self.fineness), self.kept), clusters, self.seed_bits)
+        return encode_clip(frames, surface, DeltaQuantiser(step, float(self.fineness), self.kept), clusters, self.seed_bits)
 
     def _start(self, sequence: MeshSequence, wanted: float, memo: Memo) -> _Start:
         """Code points and connectivity, and still points to an error wanted, model units."""
@@ -144,7 +144,7 @@ class Pdct(BaseCodec):
         """Code with a step, model units."""
         bounds = cut(sequence.n_frames, self.clip_frames, MAX_CLIPS)
         n_clips, sections = len(bounds) - 1, dict(start.sections)
-        for c in range(n_clips if len(start.surface.walk) else 0):
+        for c in range(n_clips if len(start.surface.traversal) else 0):
             report("clips", c / n_clips)
             frames = np.ascontiguousarray(sequence.read(bounds[c], bounds[c + 1])[:, start.sources])
             clusters = memo(f"clip.{c}", partial(self.find_clusters, frames, start.surface))
@@ -171,7 +171,7 @@ class _Start:
     mesh: WeldedMesh
     lattice: Lattice
     sources: Int64
-    surface: Surface
+    surface: BaseFrame
     sections: dict[str, bytes]
 
 

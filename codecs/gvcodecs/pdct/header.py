@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from gvcodecs.pdct.dictionary import Surface
+from gvcodecs.pdct.dictionary import BaseFrame
 from gvpipe.connectivity.base_mesh import BaseMesh
 from gvpipe.connectivity.welded_mesh import WeldedMesh
 from gvpipe.container.bitstream import Bitstream
@@ -60,11 +60,11 @@ def check_lattice(values: Any) -> Lattice:
     return Lattice((values[0], values[1], values[2]), values[3])
 
 
-def surface_of(mesh: BaseMesh, lattice: Lattice) -> Surface:
-    """What all clips share where every vertex is a point; signals follow the codec's order, a walk over the surface."""
-    return Surface(lattice.points_at(mesh.points), mesh.faces, np.argsort(mesh.visits))
+def surface_of(mesh: BaseMesh, lattice: Lattice) -> BaseFrame:
+    """What all clips share where every vertex is a point; signals follow the codec's order, a traversal of the surface."""
+    return BaseFrame(lattice.points_at(mesh.points), mesh.faces, np.argsort(mesh.visits))
 
 
-def surface_of_points(mesh: WeldedMesh, lattice: Lattice) -> Surface:
-    """What all clips share, from the decoded base frame; points are numbered along the walk."""
-    return Surface(lattice.points_at(mesh.lattice), mesh.point_faces, np.arange(len(mesh.lattice)))
+def surface_of_points(mesh: WeldedMesh, lattice: Lattice) -> BaseFrame:
+    """What all clips share, from the decoded base frame; points are numbered along the traversal."""
+    return BaseFrame(lattice.points_at(mesh.lattice), mesh.point_faces, np.arange(len(mesh.lattice)))

@@ -1,4 +1,4 @@
-"""Which cluster each vertex belongs to, as runs along the walk over the surface.
+"""Which cluster each vertex belongs to, as runs along the traversal over the surface.
 
 section = [varint] runs R, [varint] length of the next block, [integers] R lengths less 1, [integers] R clusters, each the
           difference from the run before
@@ -14,7 +14,7 @@ from gvpipe.entropy.integers import decode_integers, encode_integers
 
 
 def encode_labels(labels: Int64, n_clusters: int) -> bytes:
-    """Return the section of ``labels (V,)``, vertices in the order of the walk."""
+    """Return the section of ``labels (V,)``, vertices in the order of the traversal."""
     if n_clusters == 1:
         return b""
     starts = np.flatnonzero(np.diff(labels, prepend=-1))

@@ -62,7 +62,7 @@ class PdctReader:
         result = np.empty((stop - start, len(self._surface.base), 3), np.float32)
         for c, (begin, end) in enumerate(zip(self._bounds[:-1], self._bounds[1:], strict=True)):
             first, last = max(start, begin), min(stop, end)
-            if first < last and len(self._surface.walk):
+            if first < last and len(self._surface.traversal):
                 result[first - start : last - start] = self._decode(c)[first - begin : last - begin]
         if self._still is not None:
             result[:, self._still.points] = self._still.positions

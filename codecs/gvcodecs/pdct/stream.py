@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvcodecs.pdct.clip import decode_clip
-from gvcodecs.pdct.dictionary import Surface
+from gvcodecs.pdct.dictionary import BaseFrame
 from gvcodecs.pdct.encoder import Pdct, diagonal_of
 from gvcodecs.pdct.header import check_lattice, surface_of
 from gvpipe.arrays import Float32, Floats, Int32, Integers
@@ -111,7 +111,7 @@ class _Base:
 
     lattice: Lattice
     coded: EncodedMesh
-    surface: Surface
+    surface: BaseFrame
     diagonal: float
 
     @classmethod
@@ -131,7 +131,7 @@ class StreamReader:
     def __init__(self) -> None:
         self._buffer = bytearray()
         self._mesh: BaseMesh | None = None
-        self._surface: Surface | None = None
+        self._surface: BaseFrame | None = None
         self._clips = 0
         self.fps = 0.0  # frames per second, once the head is there
         self.is_finished = False

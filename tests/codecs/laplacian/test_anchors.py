@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 from sequences import grid
-from tubes import HEADER
+from tubes import CODING
 
 from gvcodecs.laplacian.anchors import SMALL, choose_anchors
 from gvcodecs.laplacian.delta_rows import border_order
@@ -36,6 +36,6 @@ def test_every_component_has_an_anchor_and_small_ones_nothing_else() -> None:
             assert spacing > 1 or len(anchors.points) == len(points)
             known = np.repeat(np.arange(len(anchors.points)), np.diff(anchors.causal.starts))
             assert (anchors.causal.neighbours < known).all()
-        header = dataclasses.replace(HEADER, anchor_choice=choice)
-        domain = build_domain(surface, points, header)
+        coding = dataclasses.replace(CODING, anchor_choice=choice)
+        domain = build_domain(surface, points, coding)
         assert set(domain.delta_points) <= set(np.flatnonzero(sizes[component_of] > SMALL))

@@ -7,7 +7,7 @@ import pytest
 from scipy import sparse
 from tubes import tube
 
-from gvcodecs.laplacian.delta_rows import N_KNOWN, border_order, delta_causal_order, delta_order
+from gvcodecs.laplacian.delta_rows import N_CAUSAL, border_order, delta_causal_order, delta_order
 from gvcodecs.laplacian.domain import build_surface
 
 
@@ -22,7 +22,7 @@ def test_known_neighbours_are_known_near_and_many(prediction: str) -> None:
     known = np.diff(causal.starts)
     row = np.repeat(np.arange(len(order)), known)
     assert (causal.neighbours < limits[row]).all()
-    assert known.max() == N_KNOWN[prediction]
+    assert known.max() == N_CAUSAL[prediction]
     assert (known[100:] >= 12).all()
     if prediction == "kalman":  # chains are no longer than there are blocks
         block = np.searchsorted(blocks, np.arange(len(order)), side="right")

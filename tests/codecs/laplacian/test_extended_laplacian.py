@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 from scipy import sparse
-from tubes import HEADER, kg, surface_of, tube
+from tubes import CODING, kg, surface_of, tube
 
 from gvcodecs.laplacian import Laplacian
 from gvcodecs.laplacian.domain import build_domain
@@ -19,7 +19,7 @@ from gvpipe.sequence import MeshSequence
 @pytest.mark.parametrize("operator", ["mean-value", "cotangent", "tutte"])
 def test_exact_deltas_and_anchors_give_the_coefficients_back(operator: str) -> None:
     points, surface = surface_of(tube(12, 40))
-    domain = build_domain(surface, points, dataclasses.replace(HEADER, operator=operator))
+    domain = build_domain(surface, points, dataclasses.replace(CODING, operator=operator))
     coefficients = np.random.default_rng(0).standard_normal((len(points), 5))
     deltas = domain.system.deltas(coefficients)[domain.delta_points]
     solved = domain.system.solve(domain.delta_points, deltas, coefficients[domain.anchors.points])
@@ -39,7 +39,7 @@ def test_a_solution_is_the_least_squares_one() -> None:
 def test_anchors_make_good_what_rounding_of_deltas_did() -> None:
     """Two steps come near the least squares over all values of anchors; exact deltas leave them as they are."""
     points, surface = surface_of(tube(12, 40))
-    domain = build_domain(surface, points, HEADER)
+    domain = build_domain(surface, points, CODING)
     wanted = np.random.default_rng(0).standard_normal((len(points), 5)) + 20 * points[:, :1]
     exact = domain.system.deltas(wanted)[domain.delta_points]
     true = wanted[domain.anchors.points]

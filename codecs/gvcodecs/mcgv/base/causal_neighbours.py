@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -10,9 +10,8 @@ from scipy import sparse
 from gvpipe.arrays import Int64
 
 
-@dataclass(frozen=True)
-class CausalNeighbours:
-    """Each point's neighbours of lower number: ``starts (P + 1,)`` bounds in ``near``, ascending."""
+class CausalNeighbours(NamedTuple):
+    """Each point's neighbours of lower number: ``starts (P + 1,)`` bounds in ``near``, ascending; kernels take it as it is."""
 
     starts: Int64
     near: Int64

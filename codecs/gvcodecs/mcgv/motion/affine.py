@@ -1,4 +1,4 @@
-"""The published prediction in a file: one affine transform per cluster and frame (`prediction`, `transforms`).
+"""The published prediction in a file: one affine transform per cluster and frame (`affine_fit`, `affine_coding`).
 
 Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.2. Every vertex follows the cluster of its block.
 """
@@ -24,7 +24,16 @@ from gvpipe.sequence import MeshSequence
 def code_affine(
     sequence: MeshSequence, base: Float64, clusters: Int32, bounds: list[int], step: float, report: Progress
 ) -> CodedMotion:
-    """Fit and code the transforms of every segment, for clusters ``(S,)`` and a quantisation step, model units."""
+    """Fit and code the transforms of every segment.
+
+    Args:
+        sequence: of the S sample points.
+        base: ``(S, 3)`` their decoded base positions, model units.
+        clusters: ``(S,)`` theirs, 0..K-1.
+        bounds: first frame of every segment, and F.
+        step: of quantisation, model units.
+        report: takes progress.
+    """
     predictor = AffinePredictor(base, clusters, int(clusters.max()) + 1)
     segments = []
     for s, (start, stop) in enumerate(pairwise(bounds)):
@@ -47,8 +56,8 @@ class AffineMotion:
     Args:
         bitstream, header: of the file.
         surface: of the base frame.
-        clusters: ``(S,)`` cluster of each slot.
-        layout: the slots' pixels.
+        clusters: ``(S,)`` cluster of each sample point.
+        layout: the sample points' pixels.
         bounds: first frame of every segment, and F.
     """
 
@@ -72,20 +81,13 @@ class AffineMotion:
 
     def rebuild(self, frame: int, samples: Array, positions: Float32) -> None:
         """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
-        from gvcodecs.mcgv.motion.reconstruction_kernels import rebuild
+        from gvcodecs.mcgv.motion.reconstruction_kernels import AffinePoints, Sites, rebuild
 
         s = locate(self._bounds, frame)
         if self._segment[0] != s:
             name, n_frames = f"transforms.{s}", self._bounds[s + 1] - self._bounds[s]
             lattice = decode_transforms(self._bitstream.section(name), n_frames, self._header.clusters, name)
             self._segment = (s, dequantise(lattice, self._rest, self._header.transform_step))
-        rebuild(
-            samples.reshape(3, -1),
-            self._samples.vertices,
-            self._samples.pixels(samples.shape[1]),
-            self._coordinates,
-            self._clusters,
-            self._segment[1][frame - self._bounds[s]],
-            self._residuals,
-            positions,
-        )
+        sites = Sites(self._samples.vertices, self._samples.pixels(samples.shape[1]), self._residuals)
+        points = AffinePoints(self._coordinates, self._clusters)
+        rebuild(samples.reshape(3, -1), sites, points, self._segment[1][frame - self._bounds[s]], positions)

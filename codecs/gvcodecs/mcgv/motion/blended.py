@@ -1,4 +1,4 @@
-"""Blended prediction in a file: weights once, transforms as trajectories segment by segment (`blending`)."""
+"""Linear blend skinning in a file: weights once, transforms as trajectories segment by segment (`skinning`)."""
 
 from __future__ import annotations
 
@@ -27,21 +27,23 @@ CHUNK = 16  # frames whose transforms are made at a time
 def code_blended(
     sequence: MeshSequence, base: Float64, points: Points, fitted: Fitted, bounds: list[int], step: float, report: Progress
 ) -> CodedMotion:
-    """Code a blend's weights and the transforms of every segment with a quantisation step, model units.
+    """Code skinning weights, and the transforms of every segment.
 
     Args:
-        sequence: the points' animation.
+        sequence: of the welded points that move.
         base: ``(P, 3)`` their decoded base positions, model units.
-        points: what joins them.
-        fitted: their blend.
+        points: their triangles and adjacency.
+        fitted: their skinning weights.
         bounds: first frame of every segment, and F.
+        step: of quantisation, model units.
+        report: takes progress.
     """
     fit = BlendFit(Blend(base, fitted.weights, fitted.n_clusters))
     coded = {"weights": encode_weights(fitted.weights, causal_neighbours(points.neighbours))}
     segments: list[Trajectories] = []
     for s, (start, stop) in enumerate(pairwise(bounds)):
-        rows = [fit.fit(_columns(block - base)) for _, block in sequence.chunks(start, stop)]
-        coded[f"transforms.{s}"], decoded = encode_trajectories(np.hstack(rows), step)
+        transforms = [fit.fit(_columns(block - base)) for _, block in sequence.chunks(start, stop)]
+        coded[f"transforms.{s}"], decoded = encode_trajectories(np.hstack(transforms), step)
         segments.append(decoded)
         report("transforms", (s + 1) / (len(bounds) - 1))
 
@@ -59,7 +61,7 @@ class BlendedMotion:
     Args:
         bitstream, header: of the file.
         surface: of the base frame.
-        layout: the slots' pixels.
+        layout: the sample points' pixels.
         bounds: first frame of every segment, and F.
         first: transforms of the first segment, if they are decoded already.
     """
@@ -77,9 +79,8 @@ class BlendedMotion:
         weights = decode_weights(bitstream.section("weights"), surface.points.neighbours, header.clusters)
         self._blend = Blend(surface.base[surface.members], weights, header.clusters)
         self._samples = Samples(surface, layout)
-        self._base = surface.base[self._samples.slots]
         point = surface.point[self._samples.slots]
-        self._homogeneous = self._blend.homogeneous[point]
+        self._base, self._homogeneous = surface.base[self._samples.slots], self._blend.homogeneous[point]
         self._clusters, self._parts = weights.clusters[point], weights.weights[point] / TOTAL
         self._residuals = header.residual_step * header.profile.offsets
         self._segment: tuple[int, Trajectories | None] = (0, first)
@@ -87,24 +88,15 @@ class BlendedMotion:
 
     def rebuild(self, frame: int, samples: Array, positions: Float32) -> None:
         """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
-        from gvcodecs.mcgv.motion.reconstruction_kernels import rebuild_blended
+        from gvcodecs.mcgv.motion.reconstruction_kernels import Sites, SkinnedPoints, rebuild_blended
 
         s = locate(self._bounds, frame)
-        chunk, place = divmod(frame - self._bounds[s], CHUNK)
+        chunk, offset = divmod(frame - self._bounds[s], CHUNK)
         if self._chunk[:2] != (s, chunk):
             self._chunk = (s, chunk, self._transforms(s, chunk))
-        rebuild_blended(
-            samples.reshape(3, -1),
-            self._samples.vertices,
-            self._samples.pixels(samples.shape[1]),
-            self._base,
-            self._homogeneous,
-            self._clusters,
-            self._parts,
-            self._chunk[2][place],
-            self._residuals,
-            positions,
-        )
+        sites = Sites(self._samples.vertices, self._samples.pixels(samples.shape[1]), self._residuals)
+        points = SkinnedPoints(self._base, self._homogeneous, self._clusters, self._parts)
+        rebuild_blended(samples.reshape(3, -1), sites, points, self._chunk[2][offset], positions)
 
     def _transforms(self, s: int, chunk: int) -> Float64:
         """``(n, K, 4, 3)`` of a chunk of a segment's frames: always whole, so that sums do not depend on what else is read."""

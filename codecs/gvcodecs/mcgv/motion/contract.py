@@ -1,4 +1,4 @@
-"""What encoder and reader know of a prediction, whichever it is: `affine_motion` or `blended_motion`."""
+"""What encoder and reader see of a prediction, whichever it is: `affine` or `blended`."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class CodedMotion:
         n_clusters: K.
         step: quantisation step of the transforms, model units.
         sections: of the bitstream.
-        predict: ``(n, S, 3)`` positions, model units, of the frames from a first up to another one of the same segment, as the
-            decoder predicts them.
+        predict: returns ``(n, S, 3)`` positions, model units, of the frames from a first up to another one of the same
+            segment, as the decoder predicts them.
     """
 
     n_clusters: int
@@ -45,11 +45,11 @@ class Samples:
 
     Args:
         surface: whose vertices.
-        layout: the slots' pixels.
+        layout: the sample points' pixels.
 
     Attributes:
-        vertices, slots: ``(M,)`` the vertices that move, and theirs, in the order of their pixels: going through a picture from
-            one end to the other takes half the time.
+        vertices, slots: ``(M,)`` the vertices that move, and their sample points, in the order of their pixels: going through
+            a picture from one end to the other takes half the time.
     """
 
     def __init__(self, surface: Surface, layout: Layout) -> None:

@@ -16,7 +16,7 @@ displacements that they cause, and one quantisation step suits all of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -30,13 +30,12 @@ LEAST_ENERGY = 1e-9  # of a cluster that no point follows
 RIDGE = 1e-6
 
 
-@dataclass(frozen=True)
-class Weights:
-    """Which clusters the points follow.
+class Weights(NamedTuple):
+    """The points' skinning weights; kernels take them as they are.
 
     Args:
-        clusters: ``(P, 4) int32``, 0..K-1; 0 where unused.
-        weights: ``(P, 4) int32`` in 1 / TOTAL, used ones first, each row's sum is TOTAL.
+        clusters: ``(P, 4) int32`` the clusters that each point follows, 0..K-1; 0 where unused.
+        weights: ``(P, 4) int32`` in 1 / TOTAL, used ones first; a point's weights sum to TOTAL.
     """
 
     clusters: Int32

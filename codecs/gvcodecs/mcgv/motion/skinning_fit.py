@@ -29,10 +29,11 @@ from scipy import sparse
 from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighbours
 from gvcodecs.mcgv.motion.segmentation import SEED, local_motions
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights, homogeneous, solve_normal
-from gvcodecs.mcgv.motion.weight_coding import Prices, encode_weights
-from gvpipe.arrays import Float64, Int32
+from gvcodecs.mcgv.motion.weight_coding import encode_weights, guess_prices, learn_prices
+from gvpipe.arrays import Float64
 from gvpipe.mesh.topology import k_ring
 from gvpipe.sequence import MeshSequence
+from gvpipe.trajectory.gram import descending_eigenvectors, is_tall, smaller_gram
 
 RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`
 FRAMES = 192  # frames, evenly spaced, that fitting looks at
@@ -178,28 +179,24 @@ class _Problem:
         return homogeneous(self.base)
 
     @cached_property
-    def known(self) -> CausalNeighbours:
+    def causal(self) -> CausalNeighbours:
         """Each point's neighbours of lower number."""
         return causal_neighbours(self.neighbours)
 
     def solve(self, fitted: Fitted) -> Float64:
         """Transforms ``(K, 4, m)`` of least squared error, in homogeneous coordinates."""
-        from gvcodecs.mcgv.motion.skinning_fit_kernels import add_normal
+        from gvcodecs.mcgv.motion.skinning_fit_kernels import normal_equations
 
-        size = 4 * fitted.n_clusters
-        normal, right = np.zeros((size, size)), np.zeros((size, self.motions.shape[1]))
-        parts = fitted.weights.weights / TOTAL
-        add_normal(fitted.weights.clusters, parts, self.homogeneous, self.motions, normal, right)
-        return solve_normal(normal, right)
+        clusters, parts = fitted.weights.clusters, fitted.weights.weights / TOTAL
+        return solve_normal(*normal_equations(clusters, parts, self.homogeneous, self.motions, fitted.n_clusters))
 
     def measure(self, fitted: Fitted) -> _Trial:
-        """What a blend comes to."""
-        from gvcodecs.mcgv.motion.skinning_fit_kernels import add_errors
+        """Solve for the transforms, and sum up errors and costs."""
+        from gvcodecs.mcgv.motion.skinning_fit_kernels import squared_errors
 
-        transforms, errors = self.solve(fitted), np.empty(len(self.base))
-        parts = fitted.weights.weights / TOTAL
-        add_errors(fitted.weights.clusters, parts, self.homogeneous, self.motions, transforms, errors)
-        bits = 8 * len(encode_weights(fitted.weights, self.known))
+        transforms, parts = self.solve(fitted), fitted.weights.weights / TOTAL
+        errors = squared_errors(fitted.weights.clusters, parts, self.homogeneous, self.motions, transforms)
+        bits = 8 * len(encode_weights(fitted.weights, self.causal))
         cost = float(errors.sum()) + self.price * bits + self.cluster_price * fitted.n_clusters
         return _Trial(fitted, transforms, errors, cost)
 
@@ -249,38 +246,23 @@ def _grow(trial: _Trial, n_clusters: int, patches: sparse.csr_array, draw: np.ra
         clusters[patch], parts[patch] = 0, 0
         clusters[patch, 0], parts[patch, 0] = cluster, TOTAL
         errors[patch] = 0
-    return _renumber(clusters, parts)
+    return _renumber(Weights(clusters, parts))
 
 
 def _alternate(problem: _Problem, start: Fitted | _Trial, passes: int) -> Fitted:
     """Fit transforms, which a trial has already, then weights, several times over."""
-    from gvcodecs.mcgv.motion.weight_selection import Transforms, choose
+    from gvcodecs.mcgv.motion.weight_fit_kernels import Transforms
+    from gvcodecs.mcgv.motion.weight_selection import PointMotions, Ring, choose
 
-    known, ring = problem.known, problem.neighbours
-    ring_starts, ring_points = ring.indptr.astype(np.int64), ring.indices.astype(np.int64)
-    fitted, prices = start.fitted if isinstance(start, _Trial) else start, Prices.guess()
-    errors = np.zeros(len(problem.base))
+    ring = Ring(problem.neighbours.indptr.astype(np.int64), problem.neighbours.indices.astype(np.int64))
+    points = PointMotions(problem.causal, ring, problem.homogeneous, problem.motions, problem.price)
+    fitted, prices = start.fitted if isinstance(start, _Trial) else start, guess_prices()
     for i in range(passes):
         transforms = start.transforms if isinstance(start, _Trial) and i == 0 else problem.solve(fitted)
-        clusters, parts = fitted.weights.clusters.copy(), fitted.weights.weights.copy()
-        choose(
-            known.starts,
-            known.near,
-            ring_starts,
-            ring_points,
-            problem.homogeneous,
-            problem.motions,
-            Transforms.of(transforms),
-            problem.price,
-            prices.count,
-            prices.gap,
-            prices.change,
-            clusters,
-            parts,
-            errors,
-        )
-        fitted = _renumber(clusters, parts)
-        prices = Prices.learnt(known, fitted.weights)
+        flat = transforms.reshape(-1, transforms.shape[2])  # (K, 4, m) -> (4K, m)
+        prepared = Transforms(np.ascontiguousarray(transforms.swapaxes(1, 2)), flat @ flat.T)
+        fitted = _renumber(choose(points, prepared, prices, fitted.weights)[0])
+        prices = learn_prices(problem.causal, fitted.weights)
     return fitted
 
 
@@ -307,7 +289,7 @@ class Clustering:
             warnings.simplefilter("ignore", UserWarning)  # a cluster may run empty: it is dropped
             centres, _ = kmeans2(self._sample, seeds, iter=K_MEANS_ROUNDS, minit="matrix")
         clusters[:, 0] = vq(self._features, centres)[0]
-        return _renumber(clusters, parts)
+        return _renumber(Weights(clusters, parts))
 
 
 def _draw_seeds(sample: Float64) -> Iterator[int]:
@@ -327,8 +309,9 @@ def _draw_seeds(sample: Float64) -> Iterator[int]:
         seeds.append(int(np.searchsorted(total, draw.random() * total[-1], side="right")))
 
 
-def _renumber(clusters: Int32, parts: Int32) -> Fitted:
+def _renumber(weights: Weights) -> Fitted:
     """Number the clusters that points follow from 0."""
+    clusters, parts = weights
     used, number = np.unique(np.where(parts > 0, clusters, clusters[:, :1]), return_inverse=True)
     return Fitted(Weights(np.where(parts > 0, number.reshape(clusters.shape), 0).astype(np.int32), parts), len(used))
 
@@ -341,11 +324,7 @@ def _displacements(sequence: MeshSequence, base: Float64) -> Float64:
 
 def _principal(columns: Float64) -> tuple[Float64, Float64]:
     """Principal coordinates ``(P, n)`` of rows, and the columns' energies, descending; none is subtracted first."""
-    from scipy.linalg import eigh
-
-    tall = columns.shape[0] >= columns.shape[1]
-    gram = columns.T @ columns if tall else columns @ columns.T
-    energies, vectors = eigh(gram, driver="evr", overwrite_a=True)
-    energies, vectors = np.maximum(energies[::-1], 0.0), vectors[:, ::-1]
-    placed = columns @ vectors if tall else vectors * np.sqrt(energies)
-    return np.ascontiguousarray(placed), energies
+    energies, vectors = descending_eigenvectors(smaller_gram(columns))
+    energies = np.maximum(energies, 0.0)
+    coordinates = columns @ vectors if is_tall(columns) else vectors * np.sqrt(energies)
+    return np.ascontiguousarray(coordinates), energies

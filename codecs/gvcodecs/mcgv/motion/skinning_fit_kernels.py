@@ -1,4 +1,4 @@
-"""Compiled sums over points for fitting a blend: normal equations and errors."""
+"""Compiled sums over points for fitting skinning transforms: normal equations and errors."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from gvpipe.compiled import compiled
 
 
 @compiled
-def add_normal(
-    clusters: Int32, weights: Float64, homogeneous: Float64, motions: Float64, normal: Float64, right: Float64
-) -> None:
-    """Add up the normal equations of all clusters' transforms.
+def normal_equations(
+    clusters: Int32, weights: Float64, homogeneous: Float64, motions: Float64, n_clusters: int
+) -> tuple[Float64, Float64]:
+    """Return the normal equations of all clusters' transforms: ``(4K, 4K)``, symmetric, and the right side ``(4K, m)``.
 
     Args:
         clusters, weights: ``(P, 4)`` of the points, used ones first, unused weights 0.
         homogeneous: ``(P, 4)`` base positions and 1.
-        motions: ``(P, m)`` what the transforms are to give.
-        normal: ``(4K, 4K)``, symmetric.
-        right: ``(4K, m)``.
+        motions: ``(P, m)`` displacements that the transforms are to give.
+        n_clusters: K.
     """
     n_motion = motions.shape[1]
+    normal, right = np.zeros((4 * n_clusters, 4 * n_clusters)), np.zeros((4 * n_clusters, n_motion))
     for point in range(len(clusters)):
         for i in range(clusters.shape[1]):
             if weights[point, i] == 0.0:
@@ -40,15 +40,14 @@ def add_normal(
                 for r in range(4):
                     for c in range(4):
                         normal[first + r, second + c] += both * homogeneous[point, r] * homogeneous[point, c]
+    return normal, right
 
 
 @compiled
-def add_errors(
-    clusters: Int32, weights: Float64, homogeneous: Float64, motions: Float64, transforms: Float64, errors: Float64
-) -> None:
-    """Fill ``errors (P,)`` with the squared errors that ``transforms (K, 4, m)`` leave; the others are as in `add_normal`."""
+def squared_errors(clusters: Int32, weights: Float64, homogeneous: Float64, motions: Float64, transforms: Float64) -> Float64:
+    """Return ``(P,)`` squared errors that ``transforms (K, 4, m)`` leave; the others are as in `normal_equations`."""
     n_motion = motions.shape[1]
-    left = np.zeros(n_motion)
+    errors, left = np.empty(len(clusters)), np.zeros(n_motion)
     for point in range(len(clusters)):
         for c in range(n_motion):
             left[c] = motions[point, c]
@@ -64,3 +63,4 @@ def add_errors(
         for c in range(n_motion):
             total += left[c] * left[c]
         errors[point] = total
+    return errors

@@ -1,7 +1,13 @@
-"""The compiled choice of points' weights, closed loop: least squared error and bits, point after point.
+"""The compiled choice of skinning weights, closed loop: least squared error and bits, point after point.
 
-Weights of least squared error that add up to one solve a small linear system; those of one, two, three and four clusters, each
-found by adding the one that helps most, compete with what the point's list suggests (`weight_kernels`).
+For each point:
+
+1. Its list suggests weights (`weight_kernels`), which cost next to no bits.
+2. Candidates are the list's first clusters, then those that the neighbours around follow most.
+3. Least squares (`weight_fit_kernels`) gives the weights of one, two, three and four candidates.
+4. Of all these, the weights of least ``squared error + price * bits`` are kept.
+
+Points that follow see the choice, as a decoder will.
 """
 
 from __future__ import annotations
@@ -10,319 +16,266 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL
-from gvcodecs.mcgv.motion.weight_kernels import MAX_LISTED, expect, list_known, rank_of, share
+from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours
+from gvcodecs.mcgv.motion.skinning import INFLUENCES, Weights
+from gvcodecs.mcgv.motion.weight_coding import Prices
+from gvcodecs.mcgv.motion.weight_fit_kernels import (
+    LEAST_GAIN,
+    MAX_CANDIDATES,
+    Candidates,
+    Transforms,
+    WeightFit,
+    extend,
+    fill_gram,
+    new_candidates,
+    new_fit,
+    round_weights,
+    squared_error,
+)
+from gvcodecs.mcgv.motion.weight_kernels import Listed, expect, list_clusters, new_list, rank_of, suggest
 from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.compiled import compiled
 
-MAX_CANDIDATES = 10  # clusters that a fit considers
-LEAST_GAIN = 1e-3  # of the error: a further cluster must gain this much to be tried
-RIDGE = 1e-7  # of a system's trace: clusters may move alike
+FIRST = np.arange(INFLUENCES)  # the list's first clusters are the first candidates
 
 
-class Transforms(NamedTuple):
-    """Transforms as the choice reads them: ``rows (K, m, 4)``, and their products with one another ``(4K, 4K)``."""
+class Ring(NamedTuple):
+    """Each point's neighbours: ``starts (P + 1,)`` bounds in ``points``; both are int64."""
 
-    rows: Float64
-    products: Float64
-
-    @classmethod
-    def of(cls, transforms: Float64) -> Transforms:
-        """Of ``transforms (K, 4, m)``."""
-        flat = transforms.reshape(-1, transforms.shape[2])
-        return cls(np.ascontiguousarray(transforms.swapaxes(1, 2)), flat @ flat.T)
+    starts: Int64
+    points: Int64
 
 
-class Space(NamedTuple):
-    """Room to work in: differences of candidates from the first one taken and their gains, and a system of equations."""
+class PointMotions(NamedTuple):
+    """What weights are chosen for.
 
-    differences: Float64
-    gains: Float64
-    system: Float64
+    Args:
+        causal: earlier neighbours of each point.
+        ring: all neighbours; a point considers the clusters that they follow.
+        homogeneous: ``(P, 4)`` base positions and 1.
+        motions: ``(P, m)`` displacements over the frames looked at.
+        price: of a bit, in squared error over these frames; 0: error alone decides, and no point takes its suggestion.
+    """
+
+    causal: CausalNeighbours
+    ring: Ring
+    homogeneous: Float64
+    motions: Float64
+    price: float
+
+
+class Best(NamedTuple):
+    """Memory for the best weights of one point so far: ``clusters`` and ``weights``, ``(4,) int32`` each."""
+
+    clusters: Int32
+    weights: Int32
+
+
+class Ranked(NamedTuple):
+    """Memory for the clusters taken, in the order of their ranks; all are ``(4,) int64``.
+
+    Args:
+        ranks: ascending.
+        order: which of the clusters taken each is.
+        parts: weights of the clusters taken, in 1 / TOTAL, in the order in which they were taken.
+        expected: weights that the list expects, in 1 / TOTAL, by rank.
+    """
+
+    ranks: Int64
+    order: Int64
+    parts: Int64
+    expected: Int64
+
+
+class Around(NamedTuple):
+    """Memory for the clusters that neighbours follow; both are ``(K,) int64``.
+
+    Args:
+        scores: how much they follow each cluster; 0 but while they are counted.
+        seen: the clusters that they follow.
+    """
+
+    scores: Int64
+    seen: Int64
+
+
+class Memory(NamedTuple):
+    """What a choice works in: memory for one point, and ``least (6,)``.
+
+    ``least[n]`` is what the bits of n own clusters or more cost at least, in squared error.
+    """
+
+    listed: Listed
+    candidates: Candidates
+    fit: WeightFit
+    ranked: Ranked
+    around: Around
+    best: Best
+    least: Float64
+
+
+def choose(points: PointMotions, transforms: Transforms, prices: Prices, start: Weights) -> tuple[Weights, Float64]:
+    """Give each point in turn the weights of least ``squared error + price * bits``.
+
+    Args:
+        points: their motions.
+        transforms: of all clusters.
+        prices: bits of the section's numbers.
+        start: weights before; a point considers the clusters that it and its neighbours follow.
+
+    Returns:
+        The weights, and the squared errors ``(P,)`` that they leave.
+    """
+    weights, errors = Weights(start.clusters.copy(), start.weights.copy()), np.zeros(len(points.homogeneous))
+    _choose(points, transforms, prices, _new_memory(len(transforms.columns), prices, points.price), weights, errors)
+    return weights, errors
+
+
+def _new_memory(n_clusters: int, prices: Prices, price: float) -> Memory:
+    least = np.full(INFLUENCES + 2, np.inf)
+    least[1:-1] = np.minimum.accumulate(price * prices.counts[:0:-1])[::-1]
+    return Memory(
+        new_list(),
+        new_candidates(),
+        new_fit(),
+        Ranked(*(np.zeros(INFLUENCES, np.int64) for _ in range(4))),
+        Around(np.zeros(n_clusters, np.int64), np.zeros(n_clusters, np.int64)),
+        Best(np.zeros(INFLUENCES, np.int32), np.zeros(INFLUENCES, np.int32)),
+        least,
+    )
 
 
 @compiled
-def choose(
-    starts: Int64,
-    near: Int64,
-    ring_starts: Int64,
-    ring: Int64,
-    homogeneous: Float64,
-    motions: Float64,
-    transforms: Transforms,
-    price: float,
-    bits_count: Float64,
-    bits_gap: Float64,
-    bits_change: Float64,
-    clusters: Int32,
-    weights: Int32,
-    errors: Float64,
+def _choose(
+    points: PointMotions, transforms: Transforms, prices: Prices, memory: Memory, weights: Weights, errors: Float64
 ) -> None:
-    """Give each point in turn the weights of least ``squared error + price * bits``; change ``clusters``
-    and ``weights (P, 4)``.
-
-    Args:
-        starts, near: earlier neighbours of each point.
-        ring_starts, ring: all neighbours: a point considers the clusters that they and it follow.
-        homogeneous: ``(P, 4)`` base positions and 1.
-        motions: ``(P, m)`` displacements over the frames looked at.
-        transforms: of the displacements.
-        price: of a bit, in squared error over the frames looked at; 0: error alone decides, and nothing follows its list.
-        bits_count: ``(5,)``, by how many clusters a point follows of its own; 0: those of its list.
-        bits_gap: ``(4, n)``, by slot and gap; bits_change: ``(4, 64)``, by slot and magnitude.
-        errors: ``(P,)`` filled with the squared errors.
-    """
-    n_clusters = len(transforms.rows)
-    listed, sums, shares = np.zeros(MAX_LISTED, np.int64), np.zeros(MAX_LISTED, np.int64), np.zeros(INFLUENCES, np.int64)
-    ranks, order, expected = np.zeros(INFLUENCES, np.int64), np.zeros(INFLUENCES, np.int64), np.zeros(INFLUENCES, np.int64)
-    candidates, scores = np.zeros(MAX_CANDIDATES, np.int64), np.zeros(n_clusters, np.int64)
-    seen = np.zeros(n_clusters, np.int64)
-    along = np.zeros(MAX_CANDIDATES)
-    gram = np.zeros((MAX_CANDIDATES, MAX_CANDIDATES))
-    first = np.arange(INFLUENCES)
-    support, parts = np.zeros(INFLUENCES, np.int64), np.zeros(INFLUENCES, np.int64)
-    solution = np.zeros(INFLUENCES)
-    space = Space(np.zeros((MAX_CANDIDATES, MAX_CANDIDATES)), np.zeros(MAX_CANDIDATES), np.zeros((INFLUENCES, INFLUENCES + 1)))
-    best_clusters, best_weights = np.zeros(INFLUENCES, np.int32), np.zeros(INFLUENCES, np.int32)
-    least = np.full(INFLUENCES + 2, np.inf)  # what so many clusters of its own, or more, cost at least
-    for size in range(INFLUENCES, 0, -1):
-        least[size] = min(least[size + 1], price * bits_count[size])
-    for point in range(len(homogeneous)):
-        n_listed = list_known(point, starts, near, clusters, weights, listed, sums)
-        n_listed_used = share(sums, n_listed, shares)
+    """Change ``weights`` and fill ``errors``, point after point."""
+    listed, candidates, fit, ranked, around, best, least = memory  # once: each look into a named tuple counts references
+    causal, ring, places, motions, price = points
+    taken, solution, parts, gram, choices = fit.taken, fit.solution, ranked.parts, candidates.gram, candidates.clusters
+    all_clusters, all_weights = weights
+    best_clusters, best_weights = best
+    for point in range(len(errors)):
+        n_listed = list_clusters(point, causal, weights, listed)
         n = min(n_listed, INFLUENCES)
         for j in range(n):
-            candidates[j] = listed[j]
-        _add_candidates(0, n, candidates, homogeneous[point], motions[point], transforms, along, gram)
-        # what the list suggests
-        best = np.inf
+            choices[j] = listed.clusters[j]
+        place, motion = places[point], motions[point]
+        fill_gram(n - n, n, place, motion, transforms, candidates)  # a literal 0 would be compiled apart
+        cost = np.inf
         if price > 0 and n_listed > 0:
-            error = _error(gram, first, shares, n_listed_used)
-            best = error + price * bits_count[0]
-            errors[point] = error
-            for j in range(INFLUENCES):
-                best_clusters[j] = listed[j] if j < n_listed_used else 0
-                best_weights[j] = shares[j] if j < n_listed_used else 0
-        if best > least[1]:
-            # the clusters around, by how much the ring follows them
-            n_before, n_seen = n, 0
-            for entry in range(ring_starts[point], ring_starts[point + 1] + 1):
-                other = ring[entry] if entry < ring_starts[point + 1] else point
-                for j in range(INFLUENCES):
-                    if weights[other, j] == 0:
-                        break
-                    if scores[clusters[other, j]] == 0:
-                        seen[n_seen] = clusters[other, j]
-                        n_seen += 1
-                    scores[clusters[other, j]] += weights[other, j]
-            for j in range(n):
-                scores[candidates[j]] = 0
-            while n < MAX_CANDIDATES:
-                heaviest = -1
-                for i in range(n_seen):
-                    if scores[seen[i]] > 0 and (heaviest < 0 or scores[seen[i]] > scores[heaviest]):
-                        heaviest = seen[i]
-                if heaviest < 0:
-                    break
-                candidates[n] = heaviest
-                scores[heaviest] = 0
-                n += 1
-            for i in range(n_seen):
-                scores[seen[i]] = 0
-            _add_candidates(n_before, n, candidates, homogeneous[point], motions[point], transforms, along, gram)
-        # weights of its own: one cluster more at a time, the one that helps most
+            errors[point] = _take_suggestion(listed, n_listed, gram, best)
+            cost = errors[point] + price * prices.counts[0]
+        if cost > least[1]:
+            n_before, n = n, _add_candidates(point, ring, weights, around, choices, n)
+            fill_gram(n_before, n, place, motion, transforms, candidates)
         previous = np.inf
-        for size in range(1, INFLUENCES + 1):
-            if best <= least[size]:
+        for size in range(1, INFLUENCES + 1):  # own clusters, one after the other, as long as more of them can pay
+            if cost <= least[size]:
                 break
-            left = _extend(gram, n, support, size, previous, space, solution)
+            left = extend(gram, n, size, previous, fit)
             if not left <= (1 - LEAST_GAIN) * previous:
                 break
             previous = left
-            if not _round(solution, size, parts):
+            if not round_weights(solution, size, parts):
                 continue
-            error = _error(gram, support, parts, size)
-            bits = bits_count[size]
-            for j in range(size):
-                ranks[j] = rank_of(candidates[support[j]], listed, n_listed)
-            _sort(ranks, order, size)
-            expect(sums, n_listed, ranks, size, expected)
-            for j in range(size):
-                gap = ranks[j] - (ranks[j - 1] + 1 if j else 0)
-                bits += bits_gap[j, min(gap, bits_gap.shape[1] - 1)]
-                if j < size - 1:
-                    bits += bits_change[j, abs(parts[order[j]] - expected[j])]
-            if error + price * bits < best:
-                best = error + price * bits
-                errors[point] = error
-                best_clusters[:], best_weights[:] = 0, 0
-                for j in range(size):
-                    best_clusters[j] = candidates[support[order[j]]]
-                    best_weights[j] = parts[order[j]]
-        clusters[point], weights[point] = best_clusters, best_weights
+            error = squared_error(gram, taken, parts, size)
+            _rank(choices, taken, size, listed, n_listed, ranked)
+            own_cost = error + price * _count_bits(size, ranked, prices)
+            if own_cost < cost:
+                cost, errors[point] = own_cost, error
+                _take_own(choices, taken, size, ranked, best)
+        for j in range(INFLUENCES):  # assigning rows would take a second more to compile
+            all_clusters[point, j], all_weights[point, j] = best_clusters[j], best_weights[j]
 
 
 @compiled
-def _add_candidates(
-    start: int,
-    stop: int,
-    candidates: Int64,
-    place: Float64,
-    motion: Float64,
-    transforms: Transforms,
-    along: Float64,
-    gram: Float64,
-) -> None:
-    """Fill ``gram`` for the candidates ``start`` to ``stop``: products of what each alone misses of a point's motion.
-
-    Transforms are multiplied with one another once for all points (``transforms.products``), so that a point's frames count but
-    once per candidate: ``along`` holds the products of their places with the motion.
-    """
-    square = 0.0
-    for i in range(len(motion)):
-        square += motion[i] * motion[i]
-    for a in range(start, stop):
-        rows = transforms.rows[candidates[a]]
-        x, y, z, one = 0.0, 0.0, 0.0, 0.0
-        for i in range(len(motion)):
-            x += rows[i, 0] * motion[i]
-            y += rows[i, 1] * motion[i]
-            z += rows[i, 2] * motion[i]
-            one += rows[i, 3] * motion[i]
-        along[a] = place[0] * x + place[1] * y + place[2] * z + place[3] * one
-        for b in range(a + 1):
-            total = 0.0
-            for r in range(4):
-                row = transforms.products[4 * candidates[a] + r]
-                first = 4 * candidates[b]
-                total += place[r] * (
-                    place[0] * row[first] + place[1] * row[first + 1] + place[2] * row[first + 2] + place[3] * row[first + 3]
-                )
-            gram[a, b] = gram[b, a] = total - along[a] - along[b] + square
+def _take_suggestion(listed: Listed, n_listed: int, gram: Float64, best: Best) -> float:
+    """Take what the list suggests, whose clusters are the first candidates; return the squared error."""
+    used = suggest(listed, n_listed)
+    clusters, _, shares = listed
+    best_clusters, best_weights = best
+    for j in range(INFLUENCES):
+        best_clusters[j] = clusters[j] if j < used else 0
+        best_weights[j] = shares[j] if j < used else 0
+    return squared_error(gram, FIRST, shares, used)
 
 
 @compiled
-def _extend(gram: Float64, n: int, support: Int64, size: int, previous: float, space: Space, solution: Float64) -> float:
-    """Add to ``support`` the candidate of least error with positive weights, which go to ``solution``; return the error.
-
-    Errors follow from a Cholesky elimination of the differences from the first cluster, so that one small system is solved for
-    each candidate taken, not for each tried.
-    """
-    differences, gains = space.differences, space.gains
-    if size == 1:
-        taken = 0
-        for a in range(1, n):
-            if gram[a, a] < gram[taken, taken]:
-                taken = a
-        support[0], solution[0] = taken, 1.0
-        for a in range(n):
-            gains[a] = gram[taken, taken] - gram[a, taken]
-            for b in range(n):
-                differences[a, b] = gram[a, b] - gram[a, taken] - gram[taken, b] + gram[taken, taken]
-        return float(gram[taken, taken])
-    least = RIDGE * gram[support[0], support[0]] + 1e-300
-    refused = 0  # bits of candidates whose weights would not be positive
-    for j in range(size - 1):
-        refused |= 1 << support[j]
-    while True:
-        taken, most = -1, LEAST_GAIN * previous
-        for a in range(n):
-            if (
-                not refused >> a & 1
-                and differences[a, a] > least
-                and gains[a] > 0.0
-                and gains[a] ** 2 > most * differences[a, a]
-            ):
-                taken, most = a, gains[a] ** 2 / differences[a, a]
-        if taken < 0:
-            return np.inf
-        support[size - 1] = taken
-        error = _solve(gram, support, size, space.system, solution)
-        if error < np.inf:
+def _add_candidates(point: int, ring: Ring, weights: Weights, around: Around, candidates: Int64, n: int) -> int:
+    """Add the clusters that a point and its neighbours follow, by how much, to ``n`` candidates; return how many there are."""
+    scores, seen = around
+    followed, parts = weights
+    starts, neighbours = ring
+    start, stop, n_seen = starts[point], starts[point + 1], 0
+    for entry in range(start, stop + 1):
+        other = neighbours[entry] if entry < stop else point
+        for j in range(INFLUENCES):
+            if parts[other, j] == 0:
+                break
+            cluster = followed[other, j]
+            if scores[cluster] == 0:
+                seen[n_seen] = cluster
+                n_seen += 1
+            scores[cluster] += parts[other, j]
+    for j in range(n):
+        scores[candidates[j]] = 0
+    while n < MAX_CANDIDATES:
+        heaviest = -1
+        for i in range(n_seen):
+            if scores[seen[i]] > 0 and (heaviest < 0 or scores[seen[i]] > scores[heaviest]):
+                heaviest = seen[i]
+        if heaviest < 0:
             break
-        refused |= 1 << taken
-    pivot = differences[taken, taken]
-    for a in range(n):
-        if a != taken:
-            part = differences[a, taken] / pivot
-            gains[a] -= part * gains[taken]
-            for b in range(n):
-                if b != taken:
-                    differences[a, b] -= part * differences[taken, b]
-    return error
+        candidates[n] = heaviest
+        scores[heaviest] = 0
+        n += 1
+    for i in range(n_seen):
+        scores[seen[i]] = 0
+    return n
 
 
 @compiled
-def _error(gram: Float64, support: Int64, parts: Int64, n: int) -> float:
-    """Squared error of weights ``parts`` of TOTAL."""
-    total = 0.0
-    for i in range(n):
-        for j in range(n):
-            total += gram[support[i], support[j]] * parts[i] * parts[j]
-    return total / (TOTAL * TOTAL)
+def _take_own(candidates: Int64, taken: Int64, size: int, ranked: Ranked, best: Best) -> None:
+    """Take the ``size`` clusters taken of ``candidates``, and their rounded weights."""
+    order, parts = ranked.order, ranked.parts
+    clusters, weights = best
+    for j in range(INFLUENCES):
+        clusters[j] = candidates[taken[order[j]]] if j < size else 0
+        weights[j] = parts[order[j]] if j < size else 0
 
 
 @compiled
-def _solve(gram: Float64, support: Int64, n: int, system: Float64, solution: Float64) -> float:
-    """Weights of sum one and least error over ``n`` clusters; the error, or infinity where a weight would not be positive."""
-    trace = 0.0
-    for i in range(n):
-        trace += gram[support[i], support[i]]
-    for i in range(n):
-        for j in range(n):
-            system[i, j] = gram[support[i], support[j]]
-        system[i, i] += RIDGE * trace + 1e-300
-        system[i, n] = 1.0
-    for i in range(n):  # symmetric and positive: no pivoting
-        for r in range(i + 1, n):
-            factor = system[r, i] / system[i, i]
-            for c in range(i, n + 1):
-                system[r, c] -= factor * system[i, c]
-    total = 0.0
-    for i in range(n - 1, -1, -1):
-        value = system[i, n]
-        for c in range(i + 1, n):
-            value -= system[i, c] * solution[c]
-        solution[i] = value / system[i, i]
-        total += solution[i]
-    if not total > 0:
-        return np.inf
-    for i in range(n):
-        solution[i] /= total
-        if not solution[i] > 0:
-            return np.inf
-    error = 0.0
-    for i in range(n):
-        for j in range(n):
-            error += gram[support[i], support[j]] * solution[i] * solution[j]
-    return max(error, 0.0)
+def _rank(candidates: Int64, taken: Int64, size: int, listed: Listed, n_listed: int, ranked: Ranked) -> None:
+    """Fill ranks, order and expected weights of the ``size`` clusters taken."""
+    ranks, order, _, expected = ranked
+    clusters = listed.clusters
+    for j in range(size):
+        ranks[j] = rank_of(candidates[taken[j]], clusters, n_listed)
+    _sort(ranks, order, size)
+    expect(listed.sums, n_listed, ranks, size, expected)
+
+
+@compiled
+def _count_bits(size: int, ranked: Ranked, prices: Prices) -> float:
+    """Bits of ``size`` own clusters and their weights."""
+    ranks, order, parts, expected = ranked
+    counts, gaps, changes = prices
+    bits = counts[size]
+    for j in range(size):
+        gap = ranks[j] - (ranks[j - 1] + 1 if j else 0)
+        bits += gaps[j, min(gap, gaps.shape[1] - 1)]
+        if j < size - 1:
+            bits += changes[j, abs(parts[order[j]] - expected[j])]
+    return float(bits)
 
 
 @compiled
 def _sort(ranks: Int64, order: Int64, n: int) -> None:
-    """Sort ``n`` ranks, and tell in ``order`` where each was."""
+    """Sort ``n`` ranks; ``order (n,)`` becomes the index that each had."""
     for i in range(n):
-        rank, place = ranks[i], i
-        while place > 0 and ranks[place - 1] > rank:
-            ranks[place], order[place] = ranks[place - 1], order[place - 1]
-            place -= 1
-        ranks[place], order[place] = rank, i
-
-
-@compiled
-def _round(solution: Float64, n: int, parts: Int64) -> bool:
-    """Round weights of sum one to parts of TOTAL, largest remainders up; false where one would vanish."""
-    left = TOTAL
-    for j in range(n):
-        parts[j] = int(solution[j] * TOTAL)
-        left -= parts[j]
-    for _ in range(left):
-        largest = 0
-        for j in range(1, n):
-            if solution[j] * TOTAL - parts[j] > solution[largest] * TOTAL - parts[largest]:
-                largest = j
-        parts[largest] += 1
-    least = parts[0]
-    for j in range(1, n):
-        least = min(least, parts[j])
-    return bool(least >= 1)
+        rank, j = ranks[i], i
+        while j > 0 and ranks[j - 1] > rank:
+            ranks[j], order[j] = ranks[j - 1], order[j - 1]
+            j -= 1
+        ranks[j], order[j] = rank, i

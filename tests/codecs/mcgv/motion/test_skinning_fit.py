@@ -9,8 +9,9 @@ from sequences import waving
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit, Weights, homogeneous
 from gvcodecs.mcgv.motion.skinning_fit import Motions, fit_blend
-from gvcodecs.mcgv.motion.weight_coding import Prices, encode_weights
-from gvcodecs.mcgv.motion.weight_selection import Transforms, choose
+from gvcodecs.mcgv.motion.weight_coding import encode_weights, guess_prices
+from gvcodecs.mcgv.motion.weight_fit_kernels import Transforms
+from gvcodecs.mcgv.motion.weight_selection import PointMotions, Ring, choose
 from gvpipe.mesh.topology import adjacency
 
 
@@ -18,19 +19,15 @@ def test_choice_finds_the_weights_of_a_blend() -> None:
     base, neighbours, weights, motions = blended()
     blend = Blend(base, weights, 3)
     transforms = blend.transforms(BlendFit(blend).fit(motions))
-    known, ring = causal_neighbours(neighbours), neighbours
-    guess = Prices.guess()
-    # every point knows all clusters, and starts from weights that are wrong
-    clusters, parts = weights.clusters.copy(), weights.weights[::-1].copy()
-    errors = np.zeros(len(base))
-    near = (ring.indptr.astype(np.int64), ring.indices.astype(np.int64))
-    prices = (guess.count, guess.gap, guess.change)
+    # every point sees all clusters, and starts from weights that are wrong
+    found = Weights(weights.clusters, weights.weights[::-1].copy())
+    ring = Ring(neighbours.indptr.astype(np.int64), neighbours.indices.astype(np.int64))
     points = homogeneous(base)
+    flat = transforms.reshape(-1, transforms.shape[2])
+    prepared = Transforms(np.ascontiguousarray(transforms.swapaxes(1, 2)), flat @ flat.T)
     for price, most in ((0.0, 1.0), (1e-4, 2.0)):
-        choose(
-            known.starts, known.near, *near, points, motions, Transforms.of(transforms), price, *prices, clusters, parts, errors
-        )
-        found = Weights(clusters, parts)
+        problem = PointMotions(causal_neighbours(neighbours), ring, points, motions, price)
+        found, errors = choose(problem, prepared, guess_prices(), found)
         check_weights(found, 3)
         exact = motions - apply_weights(points, found, transforms)
         assert np.allclose(np.square(exact).sum(axis=1), errors, atol=1e-9)

@@ -1,0 +1,17 @@
+"""Products of many vectors at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gvpipe.arrays import Float64
+
+
+def dot(a: Float64, b: Float64) -> Float64:
+    """Scalar products ``(n,)`` of ``a (n, 3)`` with ``b (n, 3)``."""
+    return np.asarray(np.einsum("ni,ni->n", a, b))
+
+
+def norm(a: Float64) -> Float64:
+    """Lengths ``(n,)`` of ``a (n, 3)``."""
+    return np.asarray(np.sqrt(dot(a, a)))
