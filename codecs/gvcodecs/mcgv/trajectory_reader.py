@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from gvcodecs.mcgv.base.surface import Surface, read_surface
+from gvcodecs.mcgv.base.surface import DecodedBase, read_surface
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.motion.contract import locate
@@ -83,7 +83,7 @@ class TrajectoryReader:
         return self._surface.faces
 
     @cached_property
-    def _surface(self) -> Surface:
+    def _surface(self) -> DecodedBase:
         return read_surface(self._bitstream, self._header)
 
     @cached_property

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvcodecs.mcgv.base.surface import Surface
+from gvcodecs.mcgv.base.surface import DecodedBase
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.motion.affine_coding import decode_transforms, dequantise, encode_transforms, quantise
@@ -56,7 +56,7 @@ class AffineMotion:
         self,
         bitstream: Bitstream,
         header: Header,
-        surface: Surface,
+        surface: DecodedBase,
         clusters: Int32,
         layout: Layout,
         bounds: list[int],

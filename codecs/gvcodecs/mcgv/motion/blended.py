@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
-from gvcodecs.mcgv.base.surface import Surface
+from gvcodecs.mcgv.base.surface import DecodedBase
 from gvcodecs.mcgv.base.welded_points import Points
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.layout import Layout
@@ -68,7 +68,7 @@ class BlendedMotion:
         self,
         bitstream: Bitstream,
         header: Header,
-        surface: Surface,
+        surface: DecodedBase,
         layout: Layout,
         bounds: list[int],
         first: Trajectories | None = None,
