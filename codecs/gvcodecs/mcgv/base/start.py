@@ -38,6 +38,7 @@ class Start:
         bounds: first frame of every segment, and F.
         step: of quantisation, model units.
         moving_part: of the vertices, those that move, 0..1.
+        still_error: squared error of the vertices that never move, summed over them, squared model units a frame.
         pictures: whether frames have them; without, they are their prediction.
     """
 
@@ -55,12 +56,21 @@ class Start:
     bounds: list[int]
     step: float
     moving_part: float
+    still_error: float
     pictures: bool = True
 
     @property
     def key(self) -> str:
         """Of the base frame, for memos."""
         return f"{self.lattice.step} {len(self.base)}"
+
+    def moving(self) -> tuple[Int64, Int64]:
+        """The given vertices ``(M,)`` that move, and the point ``(M,)`` of each."""
+        number = np.full(int(self.point.max()) + 1, -1)
+        number[self.point[self.sources]] = np.arange(len(self.sources))
+        own = number[self.point]
+        vertices = np.flatnonzero(own >= 0)
+        return vertices, own[vertices]
 
 
 def begin(job: Job, step: float, wanted: float, point: Int64 | None = None) -> Start:
@@ -91,6 +101,8 @@ def begin(job: Job, step: float, wanted: float, point: Int64 | None = None) -> S
     sequence = given.reordered(sources[moving], points.faces)
     if still.all():
         sequence = MeshSequence(np.broadcast_to(base.astype(np.float32), sequence.positions.shape), points.faces, given.fps)
+    rests = is_still[mesh.point]
+    off = first[coded.permutation[rests]] - lattice.place(mesh.lattice[mesh.point[rests]])
     return Start(
         sequence=sequence,
         point=point,
@@ -105,7 +117,8 @@ def begin(job: Job, step: float, wanted: float, point: Int64 | None = None) -> S
         points=points,
         bounds=cut(sequence.n_frames, settings.segment, MAX_SEGMENTS),
         step=step,
-        moving_part=float((~is_still[mesh.point]).mean()),
+        moving_part=float((~rests).mean()),
+        still_error=float(np.square(off).sum()),
     )
 
 

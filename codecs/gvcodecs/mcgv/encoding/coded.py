@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ from gvcodecs.mcgv.motion.contract import CodedMotion
 from gvcodecs.mcgv.pictures.frames import CodedFrames
 from gvcodecs.mcgv.pictures.outliers import SECTION
 from gvcodecs.mcgv.settings import Settings
+from gvpipe.arrays import Float64
 
 
 @dataclass(frozen=True)
@@ -26,12 +27,14 @@ class Coded:
         fields: the route's own, of the header.
         sections: the route's own.
         video: empty without pictures.
+        predict: without pictures, the points' positions, as in `CodedMotion`.
     """
 
     layout: Layout | None
     fields: Mapping[str, Any]
     sections: Mapping[str, bytes]
     video: bytes
+    predict: Callable[[int, int], Float64] | None = None
 
     @classmethod
     def of_frames(cls, layout: Layout, motion: CodedMotion, frames: CodedFrames, placed: Mapping[str, bytes]) -> Coded:

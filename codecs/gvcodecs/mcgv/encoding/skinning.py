@@ -18,8 +18,9 @@ def fit_skinning(job: Job, start: Start, wanted: float) -> tuple[Fitted, float]:
     """
     job.report("segment", 0)
     motions = motions_of(job, start)
+    needs_charts = start.placement == "tiles" and not job.settings.may_omit_pictures  # else pictures may never be tried
     with ThreadPoolExecutor(1) as pool:  # charts beside the blend, whose loops hold no lock
-        charts = pool.submit(charts_of, job, start) if start.placement == "tiles" else None
+        charts = pool.submit(charts_of, job, start) if needs_charts else None
         found = fit_blend(motions, start.step, job.settings.clusters, wanted / math.sqrt(start.moving_part))
         if charts:
             charts.result()

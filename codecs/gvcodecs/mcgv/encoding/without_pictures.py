@@ -39,11 +39,11 @@ def omit_pictures(trials: Trials, step: float, wanted: float, band: tuple[float,
         wanted: the target error.
         band: least and most part of it that is close enough.
     """
-    alone = trials.without_pictures()
-    if not _are_pictures_dear(trials, alone, step, wanted):
+    alone, idle = trials.alone, trials.are_pictures_idle(step)
+    if not idle and not _are_pictures_dear(trials, step, wanted):
         return None
     aimed = mend(alone, step, wanted, band, SLOPE, MAX_ROUNDS)
-    if aimed.error > wanted or cost(aimed) >= cost(trials(step)):
+    if aimed.error > wanted or (not idle and cost(aimed) >= cost(trials(step))):
         return None
     return _choose_base(alone, aimed, wanted, band)
 
@@ -65,16 +65,16 @@ def refine(trials: Trials, aimed: Aimed, wanted: float) -> Aimed:
     return fine if fine.error <= wanted and count_bytes(fine.bitstream) <= most else aimed
 
 
-def _are_pictures_dear(trials: Trials, alone: Trials, step: float, wanted: float) -> bool:
+def _are_pictures_dear(trials: Trials, step: float, wanted: float) -> bool:
     """Whether a blend alone costs less than with pictures, and leaves no error that a finer step cannot take away."""
     whole = trials(step)
     if count_picture_bytes(whole.bitstream) < SPARED * count_bytes(whole.bitstream):
         return False
-    aimed = alone(step)
+    aimed = trials.alone(step)
     if cost(aimed) > cost(whole):
         return False
     if aimed.error > wanted:
-        aimed = alone(step * (FINER_THAN * wanted / aimed.error) ** (1 / SLOPE))
+        aimed = trials.alone(step * (FINER_THAN * wanted / aimed.error) ** (1 / SLOPE))
     return aimed.error <= wanted
 
 
