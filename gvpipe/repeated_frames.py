@@ -1,8 +1,8 @@
 """Frames that repeat the frame before them: coded once, whatever the codec.
 
-What: clips hold a pose at their start or end, are sampled twice as often as they were animated, or never move. Only *distinct*
-frames, those that differ from the frame before, go through the codec and its corrections; the section ``holds`` says how
-many frames each of them is shown for::
+What: clips rest in a pose at their start or end, are sampled twice as often as they were animated, or never move. Only
+*distinct* frames, those that differ from the frame before, go through the codec and its corrections. The section ``holds``
+has their run lengths: for how many frames each of them is shown::
 
     section = [varint] distinct frames D, [integers] D run lengths less 1
 
@@ -33,10 +33,13 @@ SECTION = "holds"
 
 @dataclass(frozen=True)
 class RepeatedFrames:
-    """How long each distinct frame is shown.
+    """Run lengths: for how many frames each distinct frame is shown.
 
     Args:
-        lengths: ``(D,)`` frames, each 1 at least.
+        lengths: ``(D,)``, each 1 at least.
+
+    >>> RepeatedFrames(np.array([2, 1, 3])).starts.tolist()
+    [0, 2, 3, 6]
     """
 
     lengths: Int64
@@ -57,7 +60,7 @@ class RepeatedFrames:
 
 
 def find_repeated_frames(sequence: MeshSequence) -> RepeatedFrames | None:
-    """Compare each frame with the one before, coordinate by coordinate, exactly; None if no frame is repeated."""
+    """Compare each frame with the one before, coordinate by coordinate, exactly; None if no frame repeats another."""
     is_new = np.ones(sequence.n_frames, bool)
     last: Float32 | None = None
     for first, chunk in sequence.chunks():
@@ -70,10 +73,16 @@ def find_repeated_frames(sequence: MeshSequence) -> RepeatedFrames | None:
     return RepeatedFrames(np.diff(np.flatnonzero(is_new), append=sequence.n_frames))
 
 
-def add_repeated_frames(bitstream: Bitstream, holds: RepeatedFrames, version: int) -> Bitstream:
-    """The bitstream of the whole sequence, from that of its distinct frames; ``version`` is the codec's that knows holds."""
-    section = varint(holds.n_distinct) + encode_integers(holds.lengths - 1)
-    n_frames = int(holds.lengths.sum())
+def add_repeated_frames(bitstream: Bitstream, repeated: RepeatedFrames, version: int) -> Bitstream:
+    """Return the bitstream of the whole sequence, from that of its distinct frames.
+
+    Args:
+        bitstream: of the distinct frames.
+        repeated: their run lengths.
+        version: of the codec that knows repeated frames.
+    """
+    section = varint(repeated.n_distinct) + encode_integers(repeated.lengths - 1)
+    n_frames = int(repeated.lengths.sum())
     return dataclasses.replace(bitstream, version=version, n_frames=n_frames, sections={**bitstream.sections, SECTION: section})
 
 
@@ -99,15 +108,15 @@ class RepeatedFramesReader:
 
     Args:
         distinct: the reader of the D distinct frames.
-        holds: how long each is shown.
+        repeated: for how long each is shown.
     """
 
     levels: list[int]
     level_faces: Callable[[int], Int32]
     group: Callable[[int], tuple[int, int]]
 
-    def __init__(self, distinct: FrameReader, holds: RepeatedFrames) -> None:
-        self.distinct, self.holds, self._starts = distinct, holds, holds.starts
+    def __init__(self, distinct: FrameReader, repeated: RepeatedFrames) -> None:
+        self.distinct, self.repeated, self._starts = distinct, repeated, repeated.starts
         if isinstance(distinct, LevelReader):
             self.levels, self.level_faces = distinct.levels, distinct.level_faces
         if isinstance(distinct, GroupReader):
@@ -152,6 +161,6 @@ class _Distinct:
 
     def __getitem__(self, key: slice, /) -> Float32:
         frames = self._frames[slice(*key.indices(self.shape[0]))]
-        stretches = np.split(frames, np.flatnonzero(np.diff(frames) != 1) + 1)  # no held frame is read
+        stretches = np.split(frames, np.flatnonzero(np.diff(frames) != 1) + 1)  # no repeated frame is read
         blocks = [self._sequence.read(int(each[0]), int(each[-1]) + 1) for each in stretches if len(each)]
         return np.concatenate(blocks) if blocks else np.zeros((0, *self.shape[1:]), np.float32)

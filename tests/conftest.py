@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from folders import ROOT, SAMPLES
 from hypothesis import settings
 
 import gvpipe
@@ -20,8 +21,8 @@ from gvpipe.sequence import MeshSequence
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
 if worker := os.environ.get("PYTEST_XDIST_WORKER"):
-    # numba replaces a function's index and its machine code one after the other, so processes that share them may mix them up
-    os.environ["NUMBA_CACHE_DIR"] = str(Path(__file__).parents[1] / ".pytest_cache" / f"numba-{worker}")
+    # workers that fill one cache together replace each other's entries, and compile more often
+    os.environ["NUMBA_CACHE_DIR"] = str(ROOT / ".pytest_cache" / f"numba-{worker}")
 FAST = {"preset": "ultrafast", "clusters": 3, "gop": 4}  # settings that cost little, for tests of anything but coding
 
 
@@ -41,7 +42,7 @@ class Finished:
 @pytest.fixture(scope="session")
 def samples() -> Path:
     """The project's samples folder."""
-    return Path(__file__).parents[1] / "samples"
+    return SAMPLES
 
 
 @pytest.fixture(scope="session")

@@ -120,3 +120,12 @@ def same_triangles(a: npt.NDArray[np.integer], b: npt.NDArray[np.integer]) -> bo
 def _canonical(faces: npt.NDArray[np.integer]) -> list[list[int]]:
     turns = [faces[:, [i, (i + 1) % 3, (i + 2) % 3]].tolist() for i in range(3)]
     return sorted(min(rows) for rows in zip(*turns, strict=True))
+
+
+def random_mesh(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles over vertices, of which some are copies of one point; the worse the higher the seed."""
+    rng = np.random.default_rng(seed)
+    n_vertices = int(rng.integers(1, 60))
+    faces = rng.integers(0, n_vertices, (int(rng.integers(0, 90)), 3)).astype(np.int32)
+    points = np.unique(rng.integers(0, max(1, n_vertices - seed % 5 * 7), n_vertices), return_inverse=True)[1]
+    return faces, points

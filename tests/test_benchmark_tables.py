@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from folders import ROOT
 
 from gvpipe.benchmark.bd_rate import rate_at
 from gvpipe.benchmark.report import BenchReport
 
-ROOT = Path(__file__).parents[1]
 TOOL: dict[str, Any] = runpy.run_path(str(ROOT / "tools" / "benchmark_tables.py"))
 RESULTS = sorted((ROOT / "docs" / "benchmarks").glob("*.json"))
 

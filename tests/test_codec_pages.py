@@ -5,17 +5,17 @@ from __future__ import annotations
 import dataclasses
 import re
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import pytest
+from folders import DOCS
 
 from gvcodecs.laplacian import Laplacian
 from gvcodecs.mcgv import Mcgv
 from gvcodecs.pca import Pca
 from gvcodecs.pdct import Pdct
 
-PAGES = Path(__file__).parents[1] / "docs" / "codecs"
+PAGES = DOCS / "codecs"
 
 
 def as_written(value: Any) -> str:

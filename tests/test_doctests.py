@@ -12,7 +12,13 @@ MODULES = [
     "gvpipe.entropy.block_coder",
     "gvpipe.entropy.grouping",
     "gvpipe.entropy.integers",
+    "gvpipe.entropy.parametric_tables",
     "gvpipe.errors",
+    "gvpipe.mesh.lattice",
+    "gvpipe.mesh.unique_rows",
+    "gvpipe.quality_scale",
+    "gvpipe.repeated_frames",
+    "gvpipe.trajectory.still_vertices",
     "gvpipe.trajectory.temporal_neighbours",
 ]
 

@@ -6,16 +6,14 @@ released is never written again.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from folders import GOLDEN
 from sequences import held, partly_still, patched, rigid, waving
 
 import gvpipe
 from gvpipe.registry import codec_class
 
-GOLDEN = Path(__file__).parent / "golden"
 CURRENT: dict[str, tuple[str, dict[str, object]]] = {
     "laplacian-2-still": ("laplacian", {"segment": 7}),
     "mcgv-4-h264": ("mcgv", {"prediction": "blended", "gop": 5, "segment": 7, "placement": "tiles"}),

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from conftest import FAST
+from folders import DOCS
 from sequences import grid
 
 import gvpipe
@@ -334,7 +335,7 @@ def test_unexpected_errors(run: Run, video: Path, monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_shell_completion(shell: str, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """The lines that docs/cli.md shows give a script, which asks for words that are commands and options."""
-    assert f"_GVPIPE_COMPLETE={shell}_source gvpipe" in (Path(__file__).parents[1] / "docs" / "cli.md").read_text()
+    assert f"_GVPIPE_COMPLETE={shell}_source gvpipe" in (DOCS / "cli.md").read_text()
     monkeypatch.setenv("_GVPIPE_COMPLETE", f"{shell}_source")
     assert f"_GVPIPE_COMPLETE={shell}_complete" in run().out
     monkeypatch.setenv("_GVPIPE_COMPLETE", f"{shell}_complete")

@@ -9,10 +9,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from folders import ROOT
 
 import gvpipe
 
-ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 NAMELESS = ("CHANGELOG.md", "tests/test_project.py")  # may name modules that are gone
@@ -75,6 +75,11 @@ def test_the_reference_page_has_the_public_interface() -> None:
     shown = set(re.findall(r"^::: (.*)$", page, re.MULTILINE))
     # `gvpipe.errors` shows all errors
     assert {f"gvpipe.{name}" for name in gvpipe.__all__ if name != "GvpipeError"} | {"gvpipe.errors"} <= shown
+
+
+def test_every_decision_is_in_the_index() -> None:
+    index = re.findall(r"\(decisions/([\w-]+\.md)\)", (ROOT / "docs/architecture.md").read_text(encoding="utf-8"))
+    assert sorted(index) == sorted(path.name for path in ROOT.glob("docs/decisions/*.md"))
 
 
 def test_no_old_module_names() -> None:

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from folders import SAMPLES
 
 import gvpipe
 from gvpipe.mesh.topology import adjacency, components, unique_edges
-
-SAMPLES = Path(__file__).parents[1] / "samples"
 
 
 def test_ball_frames_are_what_the_script_makes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

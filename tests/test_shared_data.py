@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from folders import DATA
 from sequences import same_triangles
 
 import gvpipe
 
-DATA = Path(__file__).parents[2] / "shared" / "data"
 NAMES = sorted(path.stem for path in DATA.glob("*.npz"))
 
 

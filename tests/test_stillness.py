@@ -10,6 +10,7 @@ from typing import Any
 import av
 import numpy as np
 import pytest
+from folders import DATA
 from sequences import awkward, held, partly_still, waving
 
 import gvpipe
@@ -18,10 +19,12 @@ from gvpipe.errors import CorruptFile
 from gvpipe.registry import codec_class, encode_sequence, open_reader
 from gvpipe.repeated_frames import RepeatedFrames, find_repeated_frames, read_repeated_frames
 from gvpipe.sequence import MeshSequence
-from gvpipe.trajectory.still_vertices import decode_flags, encode_flags, find_still
+from gvpipe.trajectory.still_vertices import find_still
 
 AWKWARD = awkward()
-MORPH_WAVE = Path(__file__).parents[2] / "shared" / "data" / "morph_wave.npz"
+MORPH_WAVE = DATA / "morph_wave.npz"
+
+
 PLAIN: list[tuple[str, dict[str, object]]] = [
     ("pca", {}),
     ("pca", {"predictor": "lsp", "segment": 7}),
@@ -31,6 +34,8 @@ PLAIN: list[tuple[str, dict[str, object]]] = [
     ("pdct", {}),
     ("pdct", {"clusters": 3, "segment": 7}),
 ]
+
+
 PICTURES: list[tuple[str, dict[str, object]]] = [
     ("mcgv", {"placement": "tiles"}),
     ("mcgv", {"placement": "charts", "image": "jpeg"}),
@@ -219,21 +224,6 @@ def test_levels_and_groups_of_held_frames() -> None:
     assert [clips.group(frame) for frame in (0, 4, 5, 7, 8, 11)] == [(0, 5), (0, 5), (5, 8), (5, 8), (8, 12), (8, 12)]  # type: ignore[attr-defined]
 
 
-def test_find_still_stops_where_everything_has_moved() -> None:
-    class Lazy:
-        shape = (50, 200_000, 3)
-        read = 0
-
-        def __getitem__(self, key: slice, /) -> np.ndarray:
-            Lazy.read = max(Lazy.read, key.stop)
-            times = np.arange(key.start, key.stop, dtype=np.float32)[:, None, None]
-            return np.broadcast_to(times, (len(times), *self.shape[1:]))
-
-    assert not find_still(MeshSequence(Lazy(), np.zeros((0, 3), np.int32))).any()
-    assert Lazy.read < 50
-    assert not find_still(waving(3, 1)).any()
-
-
 def test_holds_across_chunks_and_lazily(monkeypatch: pytest.MonkeyPatch) -> None:
     lengths = [2, 1, 5, 1, 3]
     sequence = held(waving(4, 5), lengths)
@@ -243,22 +233,6 @@ def test_holds_across_chunks_and_lazily(monkeypatch: pytest.MonkeyPatch) -> None
     assert holds.lengths.tolist() == lengths
     assert np.array_equal(holds.distinct(sequence).read(1, 4), sequence.positions[:][[2, 3, 8]])
     assert find_repeated_frames(waving(4, 5)) is None
-
-
-def test_flags_come_back() -> None:
-    rng = np.random.default_rng(2)
-    for flags in (np.ones(5, bool), np.zeros(5, bool), rng.random(300) < 0.5, np.repeat([True, False, True], 400)):
-        assert np.array_equal(decode_flags(encode_flags(flags), len(flags), "still"), flags)
-    assert len(encode_flags(np.repeat([True, False, True], 40_000))) < 60
-
-
-@pytest.mark.parametrize("lengths", [[3, -1, 3], [2, 0, 3], [4, 2], [1] * 9, [1 << 38, 5]])
-def test_wrong_flags_are_refused(lengths: list[int]) -> None:
-    from gvpipe.container.cursor import varint
-    from gvpipe.entropy.integers import encode_integers
-
-    with pytest.raises(CorruptFile, match="still"):
-        decode_flags(varint(len(lengths)) + encode_integers(np.array(lengths)), 5, "still")
 
 
 @pytest.mark.parametrize("lengths", [[5, 0, 5], [3, 4], [12, -2], [1] * 11, [1 << 38, 5]])

@@ -44,7 +44,7 @@ class EncodedMesh:
 class BaseMesh:
     points: Int32  # (V, 3), lattice units
     faces: Int32  # (T, 3)
-    visits: Array  # (V,) int64: vertex v is the codec's vertex visits[v]; the codec's order walks over the surface
+    visits: Array  # (V,) int64: vertex v is the codec's vertex visits[v]; the codec's order is a traversal of the surface
 
 
 def encode_base(points: Array, faces: Array, reorder: bool) -> tuple[EncodedMesh, BaseMesh]:

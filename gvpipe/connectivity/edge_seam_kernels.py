@@ -1,22 +1,40 @@
-"""The loops of `seams`: which copies a corner may use, likely ones first."""
+"""Kernels of `gvpipe.connectivity.edge_seams`: which of its point's vertices a corner may use, likely ones first."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from gvpipe.arrays import Array
+from gvpipe.arrays import Array, Int64
 from gvpipe.compiled import compiled
 
 LOOK = 32  # corners before, of the same point, that are looked at
-SAME, SINGLE, LATER, NEW = range(4)  # why a copy is likely, best first
-CONTEXTS, ENCODE, DECODE = range(3)  # what `walk` fills
+SAME, SINGLE, LATER, NEW = range(4)  # why a vertex is likely, best first
+CONTEXTS, ENCODE, DECODE = range(3)  # what `visit_corners` fills
+
+
+class SeamCorners(NamedTuple):
+    """Corners on seams, by point, then by corner; int64.
+
+    Args:
+        points: ``(3T,)`` the point of every corner of the mesh.
+        corners: ``(n,)`` corners of points with more than one vertex.
+        begins: ``(n,)`` for each of them the index of its point's first one.
+        counts: ``(P,)`` vertices of each point.
+    """
+
+    points: Int64
+    corners: Int64
+    begins: Int64
+    counts: Int64
 
 
 @compiled
-def note(listed: Array, reasons: Array, n: int, copy: int, reason: int) -> int:
-    """List a copy, once, with its best reason: best reason first, then highest number. Returns how many are listed."""
+def note(listed: Array, reasons: Array, n: int, number: int, reason: int) -> int:
+    """List a vertex' number, once, with its best reason: best reason first, then highest number; return how many are listed."""
     for k in range(n):
-        if listed[k] == copy:
+        if listed[k] == number:
             if reasons[k] <= reason:
                 return n
             for m in range(k, n - 1):
@@ -24,47 +42,53 @@ def note(listed: Array, reasons: Array, n: int, copy: int, reason: int) -> int:
             n -= 1
             break
     k = n
-    while k > 0 and (reasons[k - 1] > reason or (reasons[k - 1] == reason and listed[k - 1] < copy)):
+    while k > 0 and (reasons[k - 1] > reason or (reasons[k - 1] == reason and listed[k - 1] < number)):
         listed[k], reasons[k] = listed[k - 1], reasons[k - 1]
         k -= 1
-    listed[k], reasons[k] = copy, reason
+    listed[k], reasons[k] = number, reason
     return n + 1
 
 
 @compiled
-def place_of(listed: Array, reasons: Array, n: int, used: int, copy: int) -> int:
-    """The place of a copy: listed ones first, then the other used ones from the highest number down."""
+def rank_of(listed: Array, n: int, used: int, number: int) -> int:
+    """The rank of a number: listed ones first, then the other used ones from the highest down."""
     above = 0
     for k in range(n):
-        if listed[k] == copy:
+        if listed[k] == number:
             return k
-        above += copy < listed[k] < used
-    return n + used - 1 - copy - above
+        above += number < listed[k] < used
+    return n + used - 1 - number - above
 
 
 @compiled
-def copy_at(listed: Array, reasons: Array, n: int, used: int, place: int) -> int:
-    """Mirror of `place_of`; -1 if there is no such place."""
-    if 0 <= place < n:
-        return int(listed[place])
-    if place < 0:
+def number_at(listed: Array, n: int, used: int, rank: int) -> int:
+    """Mirror of `rank_of`; -1 if there is no such rank."""
+    if 0 <= rank < n:
+        return int(listed[rank])
+    if rank < 0:
         return -1
-    first = used - 1 - (place - n)
-    copy = first
+    first = used - 1 - (rank - n)
+    number = first
     while True:
         above = 0
         for k in range(n):
-            above += copy <= listed[k] < used
-        if first - above == copy or copy < 0:
-            return max(copy, -1)
-        copy = first - above
+            above += number <= listed[k] < used
+        if first - above == number or number < 0:
+            return max(number, -1)
+        number = first - above
 
 
 @compiled
-def walk(
-    flat: Array, corners: Array, begins: Array, counts: Array, copies: Array, places: Array, contexts: Array, mode: int
-) -> int:
-    """Fill contexts, places or copies. Returns the corners done: fewer than all if a place is wrong."""
+def visit_corners(seams: SeamCorners, numbers: Int64, ranks: Int64, contexts: Int64, mode: int) -> int:
+    """Fill contexts, ranks (``ENCODE``) or numbers (``DECODE``); return the corners done: fewer than n if a rank is wrong.
+
+    Args:
+        seams: the corners.
+        numbers: ``(3T,)`` of the vertex that each corner of the mesh uses, among its point's.
+        ranks, contexts: ``(n,)`` of the corners on seams.
+        mode: ``CONTEXTS``, ``ENCODE`` or ``DECODE``.
+    """
+    points, corners, begins, counts = seams.points, seams.corners, seams.begins, seams.counts
     listed, reasons = np.empty(4 * LOOK + 1, np.int64), np.empty(4 * LOOK + 1, np.int64)
     used = 0
     for i in range(len(corners)):
@@ -72,16 +96,16 @@ def walk(
         if i == begin:
             used = 1
             continue
-        p, n = flat[x], 0
-        known = single = later = 0
+        p, n = points[x], 0
+        done = single = later = 0
         for j in range(max(begin, i - LOOK), i):
             y = corners[j]
             for side in range(1, 3):
                 own = x - x % 3 + (x % 3 + side) % 3
-                q = flat[own]
+                q = points[own]
                 for other_side in range(1, 3):
                     other = y - y % 3 + (y % 3 + other_side) % 3
-                    if flat[other] != q:
+                    if points[other] != q:
                         continue
                     reason = SAME
                     if counts[q] == 1:
@@ -91,21 +115,21 @@ def walk(
                         later += 1
                         reason = LATER
                     else:
-                        known += 1
-                        if copies[own] != copies[other]:
+                        done += 1
+                        if numbers[own] != numbers[other]:
                             continue
                     if mode != CONTEXTS:
-                        n = note(listed, reasons, n, copies[y], reason)
-        contexts[i] = 9 * min(known, 2) + 3 * min(single, 2) + min(later, 2)
+                        n = note(listed, reasons, n, numbers[y], reason)
+        contexts[i] = 9 * min(done, 2) + 3 * min(single, 2) + min(later, 2)
         if mode == CONTEXTS:
             continue
         if used < counts[p]:
             n = note(listed, reasons, n, used, NEW)
         if mode == ENCODE:
-            places[i] = place_of(listed, reasons, n, used, copies[x])
+            ranks[i] = rank_of(listed, n, used, numbers[x])
         else:
-            copies[x] = copy_at(listed, reasons, n, used, places[i])
-            if copies[x] < 0:
+            numbers[x] = number_at(listed, n, used, ranks[i])
+            if numbers[x] < 0:
                 return i
-        used += copies[x] == used
+        used += numbers[x] == used
     return len(corners)

@@ -1,57 +1,69 @@
-"""Which copy of its point each corner uses, told along edges: nearly nothing where two triangles meet without a seam.
+"""Which of its point's vertices each corner uses, along edges: nearly nothing where two triangles meet without a seam.
 
-Triangles that share an edge mostly use the same copies at both of its ends. So the copies that a corner may use are listed,
-likely ones first, and its place in the list is coded. Corners come by point and number, and see earlier ones of their point.
-The context of a place depends on triangles and numbers of copies alone, which decoders have before the places.
+Triangles that share an edge mostly use the same vertices at both of its ends. So the vertices that a corner may use are listed
+by number, likely ones first, and the rank in the list is coded. Corners come by point and corner, and see earlier ones of
+their point. The context of a rank depends on triangles and counts alone, which decoders have before the ranks.
 
-Bytes against those of differences between a point's corners (`copies`): 92 and 1616 (13 boxes, 13,182 vertices), 896 and 2336
+Bytes against those of differences between a point's corners (`seams`): 92 and 1616 (13 boxes, 13,182 vertices), 896 and 2336
 (kaykit_spin), 73 and 239 (morph_wave).
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from gvpipe.arrays import Array
+from gvpipe.arrays import Array, Bool
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import corrupt_section
 
+if TYPE_CHECKING:
+    from gvpipe.connectivity.edge_seam_kernels import SeamCorners
 
-def encode_across_edges(copies: Array, point_faces: Array, counts: Array) -> bytes:
-    """Code the copy ``(3 T,)`` that each corner uses, numbered by first use.
+
+def encode_across_edges(numbers: Array, point_faces: Array, counts: Array) -> bytes:
+    """Return the stream of the ``numbers (3T,)`` of the vertices that corners use, numbered at each point by first use.
 
     Args:
+        numbers: by corner.
         point_faces: ``(T, 3)`` triangles over points.
-        counts: ``(P,)`` copies of each point.
+        counts: ``(P,)`` vertices of each point.
     """
-    from gvpipe.connectivity.edge_seam_kernels import ENCODE, walk
+    from gvpipe.connectivity.edge_seam_kernels import ENCODE, visit_corners
 
-    corners, begins = _shared_corners(point_faces, counts)
-    places, contexts = np.zeros(len(corners), np.int64), np.zeros(len(corners), np.int64)
-    walk(point_faces.ravel(), corners, begins, counts, copies, places, contexts, ENCODE)
-    told = begins < np.arange(len(corners))
-    return encode_integers(places[told], contexts[told])
+    seams = _seam_corners(point_faces, counts)
+    ranks, contexts = np.zeros(len(seams.corners), np.int64), np.zeros(len(seams.corners), np.int64)
+    visit_corners(seams, numbers, ranks, contexts, ENCODE)
+    coded = _is_coded(seams)
+    return encode_integers(ranks[coded], contexts[coded])
 
 
 def decode_across_edges(data: bytes, point_faces: Array, counts: Array) -> Array:
-    """Mirror of `encode_across_edges`; raises `CorruptFile` where a corner uses a copy that does not exist."""
-    from gvpipe.connectivity.edge_seam_kernels import CONTEXTS, DECODE, walk
+    """Mirror of `encode_across_edges`: ``(3T,)``; raises `CorruptFile` where a corner uses a vertex that does not exist."""
+    from gvpipe.connectivity.edge_seam_kernels import CONTEXTS, DECODE, visit_corners
 
-    corners, begins = _shared_corners(point_faces, counts)
-    flat, copies = point_faces.ravel(), np.zeros(point_faces.size, np.int64)
-    places, contexts = np.zeros(len(corners), np.int64), np.zeros(len(corners), np.int64)
-    walk(flat, corners, begins, counts, copies, places, contexts, CONTEXTS)
-    told = begins < np.arange(len(corners))
-    places[told] = decode_integers(data, int(told.sum()), contexts[told], "mesh")
-    if walk(flat, corners, begins, counts, copies, places, contexts, DECODE) < len(corners):
+    seams, numbers = _seam_corners(point_faces, counts), np.zeros(point_faces.size, np.int64)
+    ranks, contexts = np.zeros(len(seams.corners), np.int64), np.zeros(len(seams.corners), np.int64)
+    visit_corners(seams, numbers, ranks, contexts, CONTEXTS)
+    coded = _is_coded(seams)
+    ranks[coded] = decode_integers(data, int(coded.sum()), contexts[coded], "mesh")
+    if visit_corners(seams, numbers, ranks, contexts, DECODE) < len(seams.corners):
         raise corrupt_section("mesh", "a corner uses a copy that does not exist")
-    return copies
+    return numbers
 
 
-def _shared_corners(point_faces: Array, counts: Array) -> tuple[Array, Array]:
-    """Corners of points with more than one copy, by point, then by number; and for each the place of its point's first."""
-    flat = point_faces.ravel()
-    where = np.flatnonzero(counts[flat] > 1)
-    where = where[np.argsort(flat[where], kind="stable")]
-    is_first = np.diff(flat[where], prepend=-1) > 0
-    return where, np.maximum.accumulate(np.where(is_first, np.arange(len(where)), 0))
+def _is_coded(seams: SeamCorners) -> Bool:
+    """``(n,)`` all corners but the first of each point, which uses its first vertex."""
+    return np.asarray(seams.begins < np.arange(len(seams.corners)))
+
+
+def _seam_corners(point_faces: Array, counts: Array) -> SeamCorners:
+    from gvpipe.connectivity.edge_seam_kernels import SeamCorners
+
+    points = point_faces.ravel()
+    corners = np.flatnonzero(counts[points] > 1)
+    corners = corners[np.argsort(points[corners], kind="stable")]
+    is_first = np.diff(points[corners], prepend=-1) > 0
+    begins = np.maximum.accumulate(np.where(is_first, np.arange(len(corners)), 0))
+    return SeamCorners(*(np.ascontiguousarray(array, np.int64) for array in (points, corners, begins, counts)))

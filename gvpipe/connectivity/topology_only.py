@@ -1,16 +1,20 @@
 """Triangles, seams and vertex order of a mesh <-> bytes, without any position.
 
-Codecs that code all positions themselves need connectivity alone. Draco's Edgebreaker gives it for 2.3 bits per vertex once
-positions say nothing: they go in as distinct tiny floats that all quantise to one value at one bit, so that Draco keeps
-vertices apart and spends next to nothing on them. A second, private run with telling positions shows in which order they come
-out.
+Codecs that code all positions themselves need connectivity alone. Draco's Edgebreaker codes it at 2.3 bits per vertex once
+positions carry no information. They go in as distinct tiny floats that all quantise to one value at one bit, so that Draco
+keeps vertices apart and spends next to nothing on them. A second run, whose stream is not kept, has the vertices' numbers for
+positions; it shows in which order vertices come out.
 
-Vertices at one place in every frame (*copies* of one *point*: seams, triangle soups) are welded first, so that Draco, and
-everything after it, sees one surface; each corner then says which copy it uses.
+Vertices that share a trajectory (seams, triangle soups) are welded to *points* first, so that Draco, and everything after it,
+sees one surface; each corner then names the vertex it uses (`seams`).
 
-Mesh stream: [6 x 32 bits] bytes of Draco, merges, loose triangles, copies; loose triangles; points. Then these in that order:
-Draco; *merges* [integers]: how many Draco vertices come between one that is a second copy of an earlier one (Draco splits at
-non-manifold places), and how far back that one is; loose triangles, deflated as in `connectivity`; the streams of `copies`.
+Mesh stream: [6 x 32 bits] bytes of Draco, merges, loose triangles, counts; loose triangles; points. Then these in that order:
+
+- Draco's stream;
+- *merges* [integers]: Draco splits points at non-manifold places. Of each vertex whose point came out before: how many Draco
+  vertices lie between it and the last such one, and how far back its point's first vertex is;
+- loose triangles, deflated as in `base_mesh`;
+- the streams ``counts`` and ``corners`` of `seams`.
 """
 
 from __future__ import annotations
@@ -36,10 +40,13 @@ HEADER = struct.Struct("<6I")
 
 @dataclass(frozen=True)
 class Topology:
-    """Args:
-    faces: ``(T, 3) int32`` triangles over V vertices.
-    points: ``(V,) int64`` the point of each vertex.
-    point_faces: ``(T, 3) int32`` the same triangles over P points, which are numbered as Draco walks over the surface.
+    """Triangles over vertices and over welded points, without positions.
+
+    Args:
+        faces: ``(T, 3) int32`` triangles over V vertices.
+        points: ``(V,) int64`` the point of each vertex.
+        point_faces: ``(T, 3) int32`` the same triangles over P points, numbered in the order of Draco's traversal.
+        n_points: P.
     """
 
     faces: Int32
@@ -49,7 +56,7 @@ class Topology:
 
 
 def encode_mesh(faces: Int32, points: Array, reorder: bool) -> tuple[EncodedMesh, Topology]:
-    """Code triangles ``(T, 3)`` over V vertices, of which those with equal ``points (V,)``, 0..P-1, are copies.
+    """Code triangles ``(T, 3)`` over V vertices, of which those with equal ``points (V,)``, 0..P-1, are one point.
 
     Returns the streams, and the mesh as decoding returns it. ``reorder`` lets the decoder see the codec's vertex order.
     Triangles may come back in another order, and rotated.
@@ -64,7 +71,7 @@ def encode_mesh(faces: Int32, points: Array, reorder: bool) -> tuple[EncodedMesh
         parts, place, coded_faces = _place_points(point_faces, n_points, _NOTHING)
     coded = encode_seams(faces, place[points], coded_faces, n_points, reorder)
     head = HEADER.pack(*(len(part) for part in parts[:2]), len(parts[2]), len(coded.counts), parts[3], n_points)
-    streams = head + b"".join([*parts[:3], coded.counts, coded.copies])
+    streams = head + b"".join([*parts[:3], coded.counts, coded.corners])
     decoded = Topology(coded.faces.astype(np.int32), coded.points, coded_faces.astype(np.int32), n_points)
     return EncodedMesh(streams, coded.order, coded.permutation), decoded
 
@@ -106,7 +113,7 @@ def _encode_draco(faces: Array) -> _Carried:
     import DracoPy
 
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
-    faces = faces[np.argsort(-faces.max(axis=1, initial=0), kind="stable")]  # as in `connectivity`: vertex orders follow
+    faces = faces[np.argsort(-faces.max(axis=1, initial=0), kind="stable")]  # as in `base_mesh`: vertex orders follow
     used = used_vertices(faces, int(faces.max(initial=-1)) + 1)
     if not len(used):
         return _NOTHING
@@ -115,17 +122,17 @@ def _encode_draco(faces: Array) -> _Carried:
     silent[:, 0] = (1 + number % 1024) * 2.0**-30
     silent[:, 1] = (1 + number // 1024) * 2.0**-40
     silent[0] = 1
-    telling = np.c_[number, 0 * number, 0 * number].astype(np.uint32)
+    numbered = np.c_[number, 0 * number, 0 * number].astype(np.uint32)
     corners = np.searchsorted(used, faces).astype(np.uint32)
     try:
         draco = bytes(DracoPy.encode(silent, corners, quantization_bits=1, compression_level=COMPRESSION_LEVEL))
-        told = DracoPy.decode(DracoPy.encode(telling, corners, compression_level=COMPRESSION_LEVEL))
+        in_order = DracoPy.decode(DracoPy.encode(numbered, corners, compression_level=COMPRESSION_LEVEL))
         decoded = DracoPy.decode(draco).faces
     except Exception as exc:  # DracoPy's own and bare ones; each means: not this way
         raise ValueError("Draco cannot encode this mesh") from exc
-    if not np.array_equal(told.faces, decoded):
+    if not np.array_equal(in_order.faces, decoded):
         raise ValueError("Draco's order depends on positions")
-    return _Carried(draco, decoded.astype(np.int64), used[told.points[:, 0].astype(np.int64)])
+    return _Carried(draco, decoded.astype(np.int64), used[in_order.points[:, 0].astype(np.int64)])
 
 
 def _place_points(faces: Array, n_points: int, carried: _Carried) -> tuple[tuple[bytes, bytes, bytes, int], Array, Array]:
@@ -135,10 +142,10 @@ def _place_points(faces: Array, n_points: int, carried: _Carried) -> tuple[tuple
     again = np.flatnonzero(first[inverse] != np.arange(len(came_from)))  # Draco vertices whose point came before
     back = again - first[inverse][again]
     merges = varint(len(again)) + encode_integers(np.stack([np.diff(again, prepend=-1) - 1, back])) if len(again) else b""
-    known = came_from[np.sort(first)]
+    carried_points = came_from[np.sort(first)]
     is_left = np.ones(n_points, bool)
-    is_left[known] = False
-    place = np.argsort(np.concatenate([known, np.flatnonzero(is_left)]))
+    is_left[carried_points] = False
+    place = np.argsort(np.concatenate([carried_points, np.flatnonzero(is_left)]))
     merged = smallest_first(_merge(draco_faces, len(came_from), merges))
     rows = np.concatenate([smallest_first(place[faces]), merged])
     ids, representatives = row_ids(rows)

@@ -1,10 +1,10 @@
 """The vertex order of a mesh <-> bytes, given its triangles in the codec's order.
 
 Connectivity coders renumber vertices, so giving users their own order back means sending a permutation. Real orders
-are walks over the surface (strips, rings, files written face by face): the vertices are visited here in the user's
+are traversals of the surface (strips, rings, files written face by face): the vertices are visited here in the user's
 order, and each is coded by its rank in a breadth-first search that starts from the vertex before it and counts only
 vertices not visited yet. Vertices that share a lattice position count as neighbours, so that seams and triangle soups
-are walked too. What the search does not reach is coded as a plain choice among the vertices left.
+are traversed too. What the search does not reach is coded as a plain choice among the vertices left.
 
 Bitstream: [19 x 8 bits] symbol weights, see `_weights`; then 32-bit little-endian range coder words holding
 V rank symbols (one categorical model), followed by the low bits of the symbols that have any (uniform models).
@@ -25,7 +25,7 @@ REACH = 256  # most vertices that one search looks at: 1024 saves 0.3 bit per ve
 EXACT_RANKS = 8  # ranks below this have a symbol of their own; above, two symbols per octave and the rest as plain bits
 ESCAPE = EXACT_RANKS + 2 * 5  # the last symbol, after five octaves (8..255): not found within REACH
 N_SYMBOLS = ESCAPE + 1
-SHORT_ROW = 64  # neighbours that are sorted in place
+SHORT_LIST = 64  # neighbours that are sorted by insertion
 MAX_VERTICES = (1 << 24) - 1  # constriction's largest uniform alphabet
 
 
@@ -41,7 +41,7 @@ def encode_order(visits: Array, points: Array, faces: Array) -> bytes:
         raise InputError(f"{n_vertices} vertices: a vertex order holds at most {MAX_VERTICES}; use reorder=True")
     ranks = np.full(n_vertices, -1, np.int64)
     jumps = np.zeros(n_vertices, np.int64)
-    _compiled_walk()(*_neighbours(points, faces), REACH, ranks, jumps, visits.astype(np.int64), False)
+    _compiled_traverse()(*_neighbours(points, faces), REACH, ranks, jumps, visits.astype(np.int64), False)
 
     symbols, low, sizes = _split(ranks, jumps)
     table = _quantised(np.bincount(symbols, minlength=N_SYMBOLS))
@@ -58,7 +58,7 @@ def encode_order(visits: Array, points: Array, faces: Array) -> bytes:
 def decode_order(data: bytes, points: Array, faces: Array) -> Array:
     """The inverse of `encode_order`: visits (V,) int64, always a permutation, or CorruptFile.
 
-    A range coder cannot tell every change of its bytes: lengths and checksums are the container's.
+    A range coder cannot notice every change of its bytes: lengths and checksums are the container's.
     """
     import constriction
 
@@ -84,7 +84,7 @@ def decode_order(data: bytes, points: Array, faces: Array) -> Array:
         raise corrupt_section("order", "bytes left over")
     ranks, jumps = _joined(symbols, low)
     visits = np.zeros(n_vertices, np.int64)
-    n_done = _compiled_walk()(*_neighbours(points, faces), REACH, ranks, jumps, visits, True)
+    n_done = _compiled_traverse()(*_neighbours(points, faces), REACH, ranks, jumps, visits, True)
     if n_done != n_vertices:
         raise corrupt_section("order", f"no vertex has the rank sent for vertex {n_done}")
     return visits
@@ -129,17 +129,17 @@ def _weights(table: Array) -> Float64:
 
 
 def _neighbours(points: Array, faces: Array) -> tuple[Array, Array]:
-    """Rows of neighbours (starts (V + 1,), neighbours (E,)), nearest first: triangle edges, and vertices at one point."""
+    """Lists of neighbours (starts (V + 1,), neighbours (E,)), nearest first: triangle edges, and vertices at one point."""
     rows = np.ascontiguousarray(points, np.int64)
     by_point = sort_rows(rows)
     same = (rows[by_point[1:]] == rows[by_point[:-1]]).all(axis=1)
     twins = np.c_[by_point[1:], by_point[:-1]][same]
-    starts, neighbours = _compiled_rows()(rows, np.ascontiguousarray(faces, np.int64), twins)
+    starts, neighbours = _compiled_lists()(rows, np.ascontiguousarray(faces, np.int64), twins)
     return starts, neighbours
 
 
-def _rows(points: Array, faces: Array, twins: Array) -> tuple[Array, Array]:
-    """The rows of `_neighbours`: each sorted by squared distance, then by number; nobody twice."""
+def _sorted_lists(points: Array, faces: Array, twins: Array) -> tuple[Array, Array]:
+    """The lists of `_neighbours`: each sorted by squared distance, then by number; nobody twice."""
     n_vertices = len(points)
     starts = np.zeros(n_vertices + 1, np.int64)
     for t in range(len(faces)):
@@ -162,34 +162,34 @@ def _rows(points: Array, faces: Array, twins: Array) -> tuple[Array, Array]:
             neighbours[end[twins[t, k]]] = twins[t, 1 - k]
             end[twins[t, k]] += 1
     kept = 0
-    distance = np.empty(SHORT_ROW, np.int64)
+    distance = np.empty(SHORT_LIST, np.int64)
     for v in range(n_vertices):
-        row = neighbours[starts[v] : end[v]]
-        n = len(row)
-        if n <= SHORT_ROW:  # insertion sort: no allocation
+        own = neighbours[starts[v] : end[v]]
+        n = len(own)
+        if n <= SHORT_LIST:  # insertion sort: no allocation
             for i in range(n):
-                y = row[i]
+                y = own[i]
                 dx, dy, dz = points[y, 0] - points[v, 0], points[y, 1] - points[v, 1], points[y, 2] - points[v, 2]
                 d = dx * dx + dy * dy + dz * dz  # may wrap round beyond 30 bits, at both ends alike
                 j = i
-                while j > 0 and (distance[j - 1] > d or (distance[j - 1] == d and row[j - 1] > y)):
-                    distance[j], row[j] = distance[j - 1], row[j - 1]
+                while j > 0 and (distance[j - 1] > d or (distance[j - 1] == d and own[j - 1] > y)):
+                    distance[j], own[j] = distance[j - 1], own[j - 1]
                     j -= 1
-                distance[j], row[j] = d, y
+                distance[j], own[j] = d, y
         else:
-            row = np.sort(row)
-            apart = points[row] - points[v]
-            row = row[np.argsort((apart * apart).sum(axis=1), kind="mergesort")]
+            own = np.sort(own)
+            apart = points[own] - points[v]
+            own = own[np.argsort((apart * apart).sum(axis=1), kind="mergesort")]
         starts[v] = kept
         for i in range(n):
-            if i == 0 or row[i] != row[i - 1]:
-                neighbours[kept] = row[i]
+            if i == 0 or own[i] != own[i - 1]:
+                neighbours[kept] = own[i]
                 kept += 1
     starts[n_vertices] = kept
     return starts, neighbours[:kept].copy()
 
 
-def _walk(starts: Array, neighbours: Array, reach: int, ranks: Array, jumps: Array, visits: Array, decoding: bool) -> int:
+def _traverse(starts: Array, neighbours: Array, reach: int, ranks: Array, jumps: Array, visits: Array, decoding: bool) -> int:
     """Fill ranks and jumps from visits, or (decoding) visits from them; one body, so that the two cannot differ.
 
     Returns the number of vertices done; fewer than V means that a rank or a jump points nowhere.
@@ -199,7 +199,7 @@ def _walk(starts: Array, neighbours: Array, reach: int, ranks: Array, jumps: Arr
     seen_by = np.full(n_vertices, -1, np.int64)  # the last search that saw a vertex
     queue = np.empty(min(reach, n_vertices) + 1, np.int64)
     left = np.arange(n_vertices)  # the vertices not visited, in the order that removals by swapping leave
-    place = np.arange(n_vertices)
+    position = np.arange(n_vertices)
     first_left = 0
     for v in range(n_vertices):
         target = -1
@@ -248,27 +248,27 @@ def _walk(starts: Array, neighbours: Array, reach: int, ranks: Array, jumps: Arr
                 return v
             if not decoding:
                 ranks[v] = rank if found else -1
-                jumps[v] = place[target]
+                jumps[v] = position[target]
         visits[v] = target
         visited[target] = True
-        hole = place[target]
+        hole = position[target]
         last = left[n_vertices - 1 - v]
         left[hole] = last
-        place[last] = hole
+        position[last] = hole
         while first_left < n_vertices and visited[first_left]:
             first_left += 1
     return n_vertices
 
 
 @functools.cache
-def _compiled_rows() -> Callable[..., tuple[Array, Array]]:
+def _compiled_lists() -> Callable[..., tuple[Array, Array]]:
     from gvpipe.compiled import compiled
 
-    return compiled(_rows)
+    return compiled(_sorted_lists)
 
 
 @functools.cache
-def _compiled_walk() -> Callable[..., int]:
+def _compiled_traverse() -> Callable[..., int]:
     from gvpipe.compiled import compiled
 
-    return compiled(_walk)
+    return compiled(_traverse)

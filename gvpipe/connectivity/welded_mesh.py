@@ -1,10 +1,10 @@
 """Triangles, lattice positions of points, seams and vertex order of a mesh <-> bytes.
 
 Vertices that share a trajectory are one *point*: seams, hard edges and triangle soups become the surfaces that they draw, and
-are coded once. The mesh over points, with positions, is that of `connectivity`; `copies` tells which vertex each corner uses.
+are coded once. The mesh over points, with positions, is that of `base_mesh`; `seams` signals which vertex each corner uses.
 
-Mesh stream: [varint] length, mesh of points (`connectivity`, codec order); [varint] length, counts; differences (`copies`).
-Order stream: `copies`.
+Mesh stream: [varint] length, mesh of points (`base_mesh`, codec order); [varint] length, counts; corners (`seams`).
+Order stream: `seams`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from gvpipe.mesh.unique_rows import smallest_first
 
 @dataclass(frozen=True)
 class WeldedMesh:
-    """A mesh and its points, numbered as the coder walks over the surface.
+    """A mesh and its points, numbered in the order of the coder's traversal.
 
     Args:
         faces: ``(T, 3)`` triangles over V vertices.
@@ -65,7 +65,7 @@ def encode_points(
     place = np.argsort(streams.permutation)
     point_faces = smallest_first(base.faces.astype(np.int64))
     coded = encode_seams(faces, place[points], point_faces, len(lattice), reorder, across)
-    mesh = pack_block(streams.mesh) + pack_block(coded.counts) + coded.copies
+    mesh = pack_block(streams.mesh) + pack_block(coded.counts) + coded.corners
     decoded = WeldedMesh(coded.faces.astype(np.int32), coded.points, base.points, point_faces.astype(np.int32))
     return EncodedMesh(mesh, coded.order, coded.permutation), decoded
 

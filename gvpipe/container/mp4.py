@@ -2,8 +2,8 @@
 
 The file is the video as any player opens it, plus one ``uuid`` box with the payload after everything else, where
 players skip it and no sample offset moves, plus one short metadata tag. The tag survives remuxing and the box does not: so
-a file that lost its box says so. The tag is a comment, because FFmpeg drops names that it does not know unless told to
-keep them. The payload repeats the tag's content id and holds a checksum of the video's samples, so that a box or a video
+a file that lost its box says so. The tag is a comment, because FFmpeg drops names that it does not know unless an option
+keeps them. The payload repeats the tag's content id and holds a checksum of the video's samples, so that a box or a video
 from another file is noticed::
 
     tag     = "comment" -> "gvpipe <container version> <content id>"

@@ -1,7 +1,7 @@
 """Segments: the runs of frames that a codec codes apart from each other, so that each decodes alone.
 
-A header tells how many there are, and the quantisation step of each where a codec chooses it by segment; what it tells is
-checked against the number of frames here.
+A header has their number, and the quantisation step of each where a codec chooses it by segment. Both are checked here
+against the number of frames.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def cut(n_frames: int, longest: int, most: int) -> list[int]:
 
 
 def read_segments(bitstream: Bitstream, most: int, key: str = "segments") -> int:
-    """How many segments a header tells of; raises `CorruptFile` if above ``most``, or if one is empty or too long."""
+    """How many segments a header has; raises `CorruptFile` if above ``most``, or if one is empty or too long."""
     segments = bitstream.integer(key, 1, min(most, bitstream.n_frames))
     if count_longest(bitstream.n_frames, segments) > MAX_SEGMENT:
         raise CorruptFile(f"header: {bitstream.n_frames} frames in {segments} {key}; at most {MAX_SEGMENT} each are allowed")

@@ -1,6 +1,6 @@
 """A bound on every vertex of every frame: corrections for the vertices that a codec leaves too far off.
 
-A vertex farther than the bound from where it was is moved by a whole multiple of a step along each axis. Of the
+A vertex farther than the bound from its true position is displaced by a whole multiple of a step along each axis. Of the
 roundings that bring it within the bound, the one with the fewest steps is coded: most corrections have one axis that is not 0.
 The step is the largest whose nearest lattice point always lies within the bound, whatever float32 then rounds.
 
@@ -56,7 +56,7 @@ class Bound:
         """For distances up to ``largest`` of a sequence whose coordinates have magnitudes up to ``coordinate``, model units.
 
         A float32 result lies up to half a unit in the last place off its lattice point; or, where such units are coarse
-        beside the bound, no farther from its aim, a float32 itself, than twice the lattice point is.
+        beside the bound, no farther from its target, a float32 itself, than twice the lattice point is.
         """
         reach = np.array(min(coordinate + largest, float(np.finfo(np.float32).max)), np.float32)
         unit = float(np.spacing(reach))
@@ -127,8 +127,8 @@ class _Corrected:
     level_faces: Callable[[int], Int32]
     group: Callable[[int], tuple[int, int]]
 
-    def __init__(self, reader: FrameReader, moves: DisplacementReader) -> None:
-        self._reader, self._moves = reader, moves
+    def __init__(self, reader: FrameReader, displacements: DisplacementReader) -> None:
+        self._reader, self._displacements = reader, displacements
         if isinstance(reader, LevelReader):
             self.levels, self.level_faces = reader.levels, reader.level_faces
         if isinstance(reader, GroupReader):
@@ -149,7 +149,7 @@ class _Corrected:
         if lod and isinstance(self._reader, LevelReader):
             return self._reader.read(start, stop, lod=lod)
         result = self._reader.read(start, stop)
-        self._moves.apply(start, result)
+        self._displacements.apply(start, result)
         return result
 
 

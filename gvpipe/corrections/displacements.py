@@ -1,14 +1,15 @@
-"""Sparse moves of vertices, in whole multiples of a step: a section that any reader's frames can be moved by.
+"""Sparse displacements of vertices, in whole multiples of a step: a section that corrects any reader's frames.
 
-What: some vertices of some frames, and by how many steps each goes along x, y and z. Why: what few vertices need, and need
-for a while, costs least as runs; `gvpipe.corrections.bound` keeps bounds by it, codecs send outliers.
+What: some vertices of some frames, and by how many steps each is displaced along x, y and z. Why: few vertices need
+corrections, for several frames on end, and these cost least as runs. `gvpipe.corrections.bound` keeps error bounds by it,
+codecs send outliers.
 
-Frames are coded in groups, each alone, so that random access costs one small group more. In a group, positions
-``vertex * frames + frame`` are coded as runs::
+Frames are coded in groups, each alone, so that random access costs one small group more. In a group, the numbers
+``vertex * frames + frame`` of what is displaced are coded as runs::
 
     section = [float64] step, [varint] frames per group, for each group [varint] bytes; groups
-    group   = nothing, if no vertex moves; else [varint] runs R, then blocks, each [varint] bytes, [integers]:
-              R gaps, R lengths less 1, x, y and z of each position in steps
+    group   = nothing, if no vertex is displaced; else [varint] runs R, then blocks, each [varint] bytes, [integers]:
+              R gaps, R lengths less 1, x, y and z of each displacement in steps
 """
 
 from __future__ import annotations
@@ -27,16 +28,16 @@ from gvpipe.errors import corrupt_section
 
 HEAD = struct.Struct("<d")
 MAX_POSITIONS = 1 << 20  # of a group, unless one frame has more
-MAX_STEPS = 1 << 38  # magnitude of a move, steps
-NEAR = 3  # magnitudes of the axes before that are told apart, in the contexts of y and z
+MAX_STEPS = 1 << 38  # magnitude of a displacement, steps
+NEAR = 3  # magnitudes of the axes before that the contexts of y and z distinguish
 
 
 @dataclass(frozen=True)
 class Displacements:
-    """Moves in a group of frames.
+    """Displacements in a group of frames.
 
     Args:
-        frames, vertices: ``(C,)`` what moves, sorted by vertex, then frame; frames count from the group's first.
+        frames, vertices: ``(C,)`` what is displaced, sorted by vertex, then frame; frames count from the group's first.
         steps: ``(C, 3)`` by how many steps.
     """
 
@@ -46,14 +47,20 @@ class Displacements:
 
 
 def encode_displacements(step: float, group: int, groups: list[bytes]) -> bytes:
-    """Return the section of a step, model units, for groups of so many frames (`encode_group`); empty if nothing moves."""
+    """Return the section; empty if nothing is displaced.
+
+    Args:
+        step: model units.
+        group: frames per group.
+        groups: bytes of every group, in order (`encode_group`).
+    """
     if not any(groups):
         return b""
     return HEAD.pack(step) + varint(group) + b"".join(varint(len(coded)) for coded in groups) + b"".join(groups)
 
 
 def encode_group(found: Displacements, n_frames: int) -> bytes:
-    """Return a group of so many frames."""
+    """Return the bytes of a group of ``n_frames`` frames; empty if nothing is displaced."""
     at = found.vertices * n_frames + found.frames  # ascending
     if not len(at):
         return b""
@@ -74,33 +81,33 @@ def encode_group(found: Displacements, n_frames: int) -> bytes:
 
 @dataclass(frozen=True)
 class PointVertices:
-    """Vertices that are moved together: those of number n are ``vertices[starts[n]:starts[n + 1]]``."""
+    """Vertices that are displaced together: those of point p are ``vertices[starts[p]:starts[p + 1]]``."""
 
     vertices: Int64
     starts: Int64
 
     @classmethod
-    def of(cls, vertices: Int64, numbers: Int64, n_numbers: int) -> PointVertices:
-        """Group ``vertices (M,)`` by their ``numbers (M,)``, 0..n - 1."""
-        order = np.argsort(numbers, kind="stable")
-        return cls(vertices[order], np.concatenate([[0], np.cumsum(np.bincount(numbers, minlength=n_numbers))]))
+    def of(cls, vertices: Int64, points: Int64, n_points: int) -> PointVertices:
+        """Group ``vertices (M,)`` by their ``points (M,)``, 0..P - 1."""
+        order = np.argsort(points, kind="stable")
+        return cls(vertices[order], np.concatenate([[0], np.cumsum(np.bincount(points, minlength=n_points))]))
 
-    def spread(self, moves: Displacements) -> Displacements:
-        """Moves of numbers as moves of all their vertices."""
-        counts = np.diff(self.starts)[moves.vertices]
+    def spread(self, found: Displacements) -> Displacements:
+        """Displacements of points as displacements of all their vertices."""
+        counts = np.diff(self.starts)[found.vertices]
         own = np.repeat(np.arange(len(counts)), counts)
-        place = np.arange(len(own)) - np.repeat(np.cumsum(counts) - counts, counts)
-        return Displacements(moves.frames[own], self.vertices[self.starts[moves.vertices[own]] + place], moves.steps[own])
+        rank = np.arange(len(own)) - np.repeat(np.cumsum(counts) - counts, counts)
+        return Displacements(found.frames[own], self.vertices[self.starts[found.vertices[own]] + rank], found.steps[own])
 
 
 class DisplacementReader:
-    """Moves by group; the last group is kept.
+    """Displacements by group; the last group is kept.
 
     Args:
         data: the section.
-        n_frames, n_vertices: F, and how many vertices, or numbers that vertices share, there are moves for.
+        n_frames, n_vertices: F, and how many vertices, or points that vertices share, there are displacements for.
         name: of the section, for messages.
-        shared: which vertices share a number; None: a number is a vertex.
+        shared: the vertices of each point; None: the section displaces vertices.
 
     Raises:
         CorruptFile: here or later: the section is not what `encode_displacements` writes.
@@ -122,13 +129,13 @@ class DisplacementReader:
         self._last: tuple[int, Displacements] | None = None
 
     def apply(self, start: int, frames: Float32) -> None:
-        """Move the vertices of ``frames (n, V, 3)``, model units, the first of which is ``start``; raises `CorruptFile`."""
+        """Displace vertices of ``frames (n, V, 3)``, model units, which start at frame ``start``; raises `CorruptFile`."""
         stop = start + len(frames)
         for number in range(start // self.group, -(-stop // self.group) if len(frames) else 0):
             found = self._read(number)
-            places = found.frames + (number * self.group - start)
-            asked = (places >= 0) & (places < len(frames))
-            at = places[asked], found.vertices[asked]
+            numbers = found.frames + (number * self.group - start)
+            asked = (numbers >= 0) & (numbers < len(frames))
+            at = numbers[asked], found.vertices[asked]
             frames[at] = displace(frames[at], found.steps[asked], self.step)
             if not np.isfinite(frames[at]).all():
                 raise corrupt_section(self._name, "a position is larger than float32 can hold")
@@ -137,8 +144,8 @@ class DisplacementReader:
         last = self._last  # once: other threads may read too
         if last is None or last[0] != number:
             n_frames = min(self.group, self._n_frames - number * self.group)
-            moves = decode_group(self._groups[number], n_frames, self._n_vertices, self._name)
-            last = self._last = (number, self._shared.spread(moves) if self._shared else moves)
+            found = decode_group(self._groups[number], n_frames, self._n_vertices, self._name)
+            last = self._last = (number, self._shared.spread(found) if self._shared else found)
         return last[1]
 
 
@@ -170,7 +177,7 @@ def decode_group(data: bytes, n_frames: int, n_vertices: int, name: str) -> Disp
 
 
 def displace(points: Float32, steps: NDArray[np.generic], step: float) -> Float32:
-    """Points ``(C, 3)``, moved by so many steps: worked out in float64, then rounded."""
+    """Return ``points (C, 3)``, model units, displaced by ``steps (C, 3)`` of a ``step``: in float64, then rounded."""
     with np.errstate(over="ignore"):
         return (points.astype(np.float64) + np.asarray(steps, np.float64) * step).astype(np.float32)
 
@@ -181,5 +188,5 @@ def most_frames(n_vertices: int) -> int:
 
 
 def _context(*axes: Int64) -> Int64:
-    """By how far the axes before are moved."""
+    """Contexts ``(C,)``: how many steps the axes before are displaced by."""
     return np.asarray(np.minimum(np.abs(np.stack(axes)).sum(axis=0), NEAR))

@@ -19,7 +19,7 @@ class BlockStream(NamedTuple):
 
     Args:
         state: ``(3,)`` of `gvpipe.entropy.range_decoder`; changes as blocks are taken.
-        words: range-coded data.
+        words: ``(W,)`` range-coded data.
         edges: ``(C, N + 1)`` of each context's table.
         sizes: ``(C,)`` how many symbols each context has: 0 it is empty, 1 nothing is sent.
     """

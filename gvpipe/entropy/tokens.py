@@ -45,6 +45,11 @@ def tokenise(values: Int64) -> tuple[Int64, Int64, Int64]:
 
 
 def untokenise(tokens: Int64, cursor: Cursor) -> Int64:
+    """Return the values ``(n,)`` of ``tokens (n,)`` and of the low bits, which ``cursor`` holds to its end.
+
+    Raises:
+        CorruptFile: the low bits have another length.
+    """
     bits = (tokens - DIRECT) // 2 + 5
     n_extra = np.where(tokens < DIRECT, 0, bits - 2)
     total = int(n_extra.sum())

@@ -277,7 +277,7 @@ class VideoReader:
             raise corrupt(f"the video does not decode ({exc})") from exc
         wanted = (self.profile.pixel_format, *self.shape)
         if len(pictures) != len(packets) or any((p.format.name, p.height, p.width) != wanted for p in pictures):
-            raise corrupt("the video does not decode to the pictures that the header tells of")
+            raise corrupt("the video does not decode to the pictures that the header describes")
         return [self._luma(picture) for picture in pictures]
 
     def _luma(self, picture: Any) -> Plane:
@@ -288,7 +288,7 @@ class VideoReader:
 
 
 class PlainPackets:
-    """Takes out what decoders do not need: x264 tells all of its options in the first picture, 0.6 KB."""
+    """Takes out what decoders do not need: x264 writes all of its options into the first picture, 0.6 KB."""
 
     def __init__(self, stream: Any) -> None:
         self._stream = stream

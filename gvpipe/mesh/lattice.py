@@ -13,6 +13,10 @@ from gvpipe.arrays import Float64, Floats, Int32, Integers
 class Lattice:
     """Points ``origin + step * i`` for integer i, the same step along all axes.
 
+    >>> lattice = Lattice((0.0, 0.0, 0.0), 0.5)
+    >>> lattice.points_at(lattice.quantise(np.array([[0.1, 0.6, 1.4]]))).tolist()
+    [[0.0, 0.5, 1.5]]
+
     Args:
         origin: three coordinates, model units.
         step: lattice constant, model units, > 0.
@@ -42,6 +46,6 @@ class Lattice:
         """Return the nearest lattice indices, ``(V, 3) int32``."""
         return np.rint((points.astype(np.float64) - self.origin) / self.step).astype(np.int32)
 
-    def place(self, indices: Integers) -> Float64:
+    def points_at(self, indices: Integers) -> Float64:
         """Return the lattice points, ``(V, 3)``, model units."""
         return np.asarray(np.asarray(self.origin) + indices * self.step)

@@ -14,16 +14,19 @@ from gvpipe.errors import corrupt_section
 
 
 def used_vertices(faces: Array, n_vertices: int) -> Array:
+    """The vertices, of V, that ``faces (T, 3)`` use, ascending."""
     return np.flatnonzero(np.bincount(faces.ravel(), minlength=n_vertices))
 
 
 def encode_table(rows: Array) -> bytes:
+    """Return ``rows (n, 3)`` of integers that int32 holds as deflated byte planes of their differences."""
     differences = np.diff(rows, axis=0, prepend=0).astype("<i4")
     planes = differences.view(np.uint8).reshape(len(rows), 12).T
     return zlib.compress(planes.tobytes(), 9) if len(rows) else b""
 
 
 def decode_table(data: bytes, n_rows: int) -> Array:
+    """Mirror of `encode_table`: ``(n, 3) int64``; raises `CorruptFile` if the bytes are not what it writes."""
     inflate = zlib.decompressobj()
     try:
         planes = inflate.decompress(data, 12 * n_rows + 1) if n_rows else b""
@@ -58,6 +61,15 @@ def sort_rows(rows: Array) -> Array:
 
 
 def smallest_first(faces: Array) -> Array:
-    """Rotate each triangle so that its smallest index leads; winding stays."""
-    turns = faces.argmin(axis=1)[:, None] if len(faces) else np.zeros((0, 1), np.int64)
-    return np.take_along_axis(faces, (turns + np.arange(3)) % 3, axis=1)
+    """Rotate each of ``faces (T, 3)`` so that its smallest index leads; winding stays.
+
+    >>> smallest_first(np.array([[5, 2, 7]])).tolist()
+    [[2, 7, 5]]
+    """
+    return np.take_along_axis(faces, corners_from_smallest(faces), axis=1)
+
+
+def corners_from_smallest(faces: Array) -> Array:
+    """``(T, 3)`` the corners 0..2 of each of ``faces (T, 3)`` in the order in which its smallest index leads."""
+    first = faces.argmin(axis=1)[:, None] if len(faces) else np.zeros((0, 1), np.int64)
+    return (first + np.arange(3)) % 3

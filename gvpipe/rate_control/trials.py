@@ -129,7 +129,7 @@ def _correct(bitstream: Bitstream, reference: MeshSequence, reader: FrameReader,
     if not isinstance(reader, RepeatedFramesReader):
         section, errors = encode_corrections(reference, reader, bound)
         return _with(bitstream, section), errors
-    section, _ = encode_corrections(reader.holds.distinct(reference), reader.distinct, bound)  # repeated frames: once
+    section, _ = encode_corrections(reader.repeated.distinct(reference), reader.distinct, bound)  # repeated frames: once
     bitstream = _with(bitstream, section)
     return bitstream, measure_errors(reference, open_reader(bitstream).read)
 

@@ -1,4 +1,4 @@
-"""Sequences as trajectories: points that vertices share, their mesh and spread, and blocks of trajectories.
+"""Sequences as trajectories: welded points, their connectivity and spread, and the trajectories of a segment.
 
 Vertices with one trajectory (seams, triangle soups) are one point, coded once.
 """
@@ -20,7 +20,7 @@ from gvpipe.sequence import MeshSequence
 
 @dataclass(frozen=True)
 class CodedConnectivity:
-    """A sequence's mesh as it is coded, and the points whose trajectories are still to be.
+    """A sequence's connectivity as it is coded, and the points whose trajectories are still to be.
 
     Args:
         coded: the mesh's sections.
@@ -55,8 +55,8 @@ def survey(sequence: MeshSequence, report: Progress) -> tuple[Int64, float]:
     spread = Spread()
     for first, block in sequence.chunks():
         spread.add(block)
-        rows = np.ascontiguousarray((block + np.float32(0)).swapaxes(0, 1)).reshape(sequence.n_vertices, -1)  # no minus zero
-        _, ids = np.unique(rows.view(np.dtype((np.void, rows.shape[1] * 4))).ravel(), return_inverse=True)
+        vectors = np.ascontiguousarray((block + np.float32(0)).swapaxes(0, 1)).reshape(sequence.n_vertices, -1)  # no minus zero
+        _, ids = np.unique(vectors.view(np.dtype((np.void, vectors.shape[1] * 4))).ravel(), return_inverse=True)
         _, points = np.unique(points * sequence.n_vertices + ids, return_inverse=True)
         report("read", (first + len(block)) / sequence.n_frames)
     _, first_vertex = np.unique(points, return_index=True)

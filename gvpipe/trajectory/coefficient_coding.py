@@ -26,8 +26,9 @@ from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import InputError, corrupt_section
+from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.contexts import MAX_LEVEL, N_CONTEXTS, ONE, context_inputs, level_bounds
-from gvpipe.trajectory.prediction import CausalOrder, predict_vectors
+from gvpipe.trajectory.prediction import predict_vectors
 
 LARGEST = 1 << 36  # magnitude of a residual, in steps; sums of its forecasts stay below 2**58
 MAX_VALUES = 1 << 27  # of a section: vectors times components
@@ -49,7 +50,7 @@ def encode_vectors(
         causal: the order of the vectors.
         predictor: one of `gvpipe.trajectory.prediction.PREDICTORS`.
         beta: exponent of the radial function (rbf).
-        given: ``(n, R)`` decoded vectors that ``causal`` leaves out (`gvpipe.trajectory.prediction.leave_out`); contexts take
+        given: ``(n, R)`` decoded vectors that ``causal`` leaves out (`gvpipe.trajectory.causal_order.leave_out`); contexts take
             their residuals for 0.
 
     Raises:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Int64
-from gvpipe.trajectory.prediction import CausalOrder
+from gvpipe.trajectory.causal_order import CausalOrder
 
 SHORT = (16, 10, 6, 4)  # weights of a vector's earlier components, the latest first
 LONG = (16, 14, 13, 12, 11, 10, 9, 8, 7, 6, 6, 5, 5, 4, 4, 3)
@@ -30,7 +30,7 @@ class ContextInputs(NamedTuple):
     Args:
         blocks: ``(B + 1,)`` bounds of the blocks that are coded.
         rank: ``(n,)`` of each vector in the order.
-        starts, neighbours, ring_sizes: of `gvpipe.trajectory.prediction.CausalOrder`.
+        starts, neighbours, ring_sizes: of `gvpipe.trajectory.causal_order.CausalOrder`.
         usual: ``(R,)`` mean magnitudes of the components, in 1 / ONE.
         roots: ``2 ** (i / 16)`` rounded down.
         logs: of the smallest numbers, in 1 / PER_OCTAVE: looked up, not searched for.

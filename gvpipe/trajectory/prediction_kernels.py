@@ -1,6 +1,6 @@
 """Kernels of `gvpipe.trajectory.prediction`: for each predictor one loop over vectors and components, to code and to decode.
 
-All take a `gvpipe.trajectory.prediction.VectorCoding` and fill ``decoded``, and ``residuals`` where there is a target.
+All take a `VectorCoding` and fill ``decoded``, and ``residuals`` where there is a target.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Float64
+from gvpipe.arrays import Float64, Int64
 from gvpipe.compiled import compiled
-from gvpipe.trajectory.prediction import VectorCoding
+from gvpipe.trajectory.causal_order import CausalOrder
 
 ROUND_UP = 0.42  # added before a residual's magnitude is cut to whole steps: 0.5 would cost 1.5 % more at equal error
 DOUBT = 1e-4  # of kalman: part of a weight's variance that a component leaves at least, so that rounding cannot grow
@@ -19,6 +19,24 @@ RIDGE, COARSE_RIDGE = 4.0, 64.0  # of lsp, in squared steps: draws weights that 
 NUGGET = 16  # of rbf, in units of step**beta: what quantisation adds to the radial function between two vectors
 EVERY = 4  # rbf's weights are solved for each of the first components, then for every fourth: distances hardly change
 FIRST = 12
+
+
+class VectorCoding(NamedTuple):
+    """What a predictor codes or decodes, component after component.
+
+    Args:
+        causal: the order.
+        step: quantisation step of every component.
+        residuals: ``(m, R)`` of the first m vectors of the order, in steps.
+        decoded: ``(n, R)`` components, by vector, in the order of transmission. Given vectors are there already.
+        target: ``(n, R)`` what to code; ``(0, 0)``: decode.
+    """
+
+    causal: CausalOrder
+    step: float
+    residuals: Int64
+    decoded: Float64
+    target: Float64
 
 
 class LeastSquares(NamedTuple):

@@ -43,9 +43,9 @@ def read_frames(start: int, stop: int, bounds: list[int], points: Integers, deco
             continue
         segment = decode(s)
         for frame in range(first, last):  # one by one, so that a frame's sums do not depend on what else is read
-            rows = slice(3 * (frame - begin), 3 * (frame - begin + 1))
-            placed = segment.basis.vectors[rows] @ segment.coefficients + segment.basis.mean[rows, None]  # (3, P)
-            np.take(placed, points, axis=1, out=buffer)
+            axes = slice(3 * (frame - begin), 3 * (frame - begin + 1))
+            positions = segment.basis.vectors[axes] @ segment.coefficients + segment.basis.mean[axes, None]  # (3, P)
+            np.take(positions, points, axis=1, out=buffer)
             if not np.abs(buffer).max(initial=0) <= MAX_FLOAT32:
                 raise corrupt(f"frame {frame} does not decode to finite positions")
             result[frame - start] = buffer.T

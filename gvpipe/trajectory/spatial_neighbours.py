@@ -15,7 +15,7 @@ import numpy as np
 
 from gvpipe.arrays import Int32
 from gvpipe.mesh.hierarchy import Hierarchy
-from gvpipe.trajectory.prediction import CausalOrder
+from gvpipe.trajectory.causal_order import CausalOrder
 
 OVERSHOOT = 0.2
 RING_VARIANCE, FAR_VARIANCE = 0.3, 0.1  # of the weights

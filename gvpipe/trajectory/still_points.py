@@ -25,9 +25,9 @@ from gvpipe.container.segments import LARGEST_STEP, SMALLEST_STEP
 from gvpipe.errors import corrupt_section
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import Basis, fit_coefficients
+from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.coded_points import CodedConnectivity
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_vectors, encode_vectors
-from gvpipe.trajectory.prediction import CausalOrder
 from gvpipe.trajectory.spatial_neighbours import traversal_order
 from gvpipe.trajectory.still_vertices import decode_flags, encode_flags, find_still
 

@@ -3,7 +3,7 @@
 A vertex is still if it has one position in all frames, each coordinate compared exactly. A codec that signals still vertices
 codes one position of each and returns it in every frame: nothing shimmers, and stillness costs hardly a bit.
 
-Bool are coded as run lengths, since still vertices are neighbours along the surface::
+Flags are coded as run lengths, since still vertices are neighbours along the surface::
 
     flags = [varint] m, [integers] m lengths: moving, still, moving, ...; the first may be 0; the last run is left out
 """
@@ -34,7 +34,11 @@ def find_still(sequence: MeshSequence) -> Bool:
 
 
 def encode_flags(flags: Bool) -> bytes:
-    """Code ``flags (n,)``."""
+    """Return the bytes of ``flags (n,)``.
+
+    >>> decode_flags(encode_flags(np.array([False, True, True])), 3, "example").tolist()
+    [False, True, True]
+    """
     ends = np.flatnonzero(np.diff(flags, prepend=False))
     return varint(len(ends)) + encode_integers(np.diff(ends, prepend=0))
 

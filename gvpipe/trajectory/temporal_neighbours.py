@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.trajectory.prediction import CausalOrder
+from gvpipe.trajectory.causal_order import CausalOrder
 
 MAX_NEIGHBOURS = 6  # frames that predict a frame
 VARIANCE = 0.02  # prior variance of a weight

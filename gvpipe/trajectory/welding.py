@@ -1,4 +1,4 @@
-"""Points: vertices that go together through all frames, as those along seams and of triangle soups do."""
+"""Welded points: vertices that share a trajectory, as those along seams and of triangle soups do."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from gvpipe.arrays import Float32, Int64
 from gvpipe.mesh.topology import components
 from gvpipe.sequence import MeshSequence
 
-ROUNDS = 64  # groups that leave a group one by one, in one chunk; what is left then is told apart exactly
-NEAREST = 8  # places looked at for each, itself among them
+ROUNDS = 64  # groups that leave a group one by one, in one chunk; what is left then is compared exactly
+NEAREST = 8  # distinct positions searched around each, itself among them
 
 
 def find_points(sequence: MeshSequence, tolerance: float = 0.0) -> Int64:
@@ -23,7 +23,7 @@ def find_points(sequence: MeshSequence, tolerance: float = 0.0) -> Int64:
         sequence: the animation.
         tolerance: largest distance, model units.
     """
-    groups = _near_rows(sequence.read(0, 1)[0], tolerance)
+    groups = _group_nearby(sequence.read(0, 1)[0], tolerance)
     shared = np.flatnonzero(np.bincount(groups)[groups] > 1)  # vertices that are not alone
     for _, block in sequence.chunks():
         if not len(shared):
@@ -34,19 +34,19 @@ def find_points(sequence: MeshSequence, tolerance: float = 0.0) -> Int64:
     return np.asarray(np.argsort(np.argsort(first))[number.ravel()], np.int64)
 
 
-def _near_rows(rows: Float32, tolerance: float) -> Int64:
-    """A number for each of ``rows (n, 3)``, equal where they are, and where rows within the tolerance join them."""
-    groups = _equal_rows(rows)
+def _group_nearby(positions: Float32, tolerance: float) -> Int64:
+    """A number for each of ``positions (n, 3)``, equal where they are, and where positions within the tolerance join them."""
+    groups = _group_equal(positions)
     if not tolerance > 0:
         return groups
     from scipy import sparse
     from scipy.spatial import KDTree
 
-    places = rows[np.unique(groups, return_index=True)[1]].astype(np.float64)
-    found = KDTree(places).query(places, k=np.arange(1, min(NEAREST, len(places)) + 1))
+    distinct = positions[np.unique(groups, return_index=True)[1]].astype(np.float64)
+    found = KDTree(distinct).query(distinct, k=np.arange(1, min(NEAREST, len(distinct)) + 1))
     distance, other = np.asarray(found[0]), np.asarray(found[1])
     start, end = np.nonzero(distance <= tolerance)
-    links = sparse.csr_array((np.ones(len(start)), (start, other[start, end])), shape=(len(places),) * 2)
+    links = sparse.csr_array((np.ones(len(start)), (start, other[start, end])), shape=(len(distinct),) * 2)
     return np.asarray(components(links)[1][groups], np.int64)
 
 
@@ -63,15 +63,15 @@ def _split(frames: Float32, groups: Int64, tolerance: float, free: int) -> Int64
         together = np.unique(groups[left], return_inverse=True)[1].ravel()  # those that leave one group together stay together
         groups[left] = free + together
         free += int(together.max()) + 1
-    own = _equal_rows(np.ascontiguousarray(frames[:, left].swapaxes(0, 1)).reshape(len(left), -1))
+    own = _group_equal(np.ascontiguousarray(frames[:, left].swapaxes(0, 1)).reshape(len(left), -1))
     pair = np.unique(np.stack([groups[left], own], axis=1), axis=0, return_inverse=True)[1]
     groups[left] = free + pair.ravel()
     return groups
 
 
-def _equal_rows(rows: Float32) -> Int64:
-    """A number for each of ``rows (n, m)``, equal where they are; minus zero is zero."""
-    keys = np.ascontiguousarray(rows + np.float32(0))
+def _group_equal(vectors: Float32) -> Int64:
+    """A number for each of ``vectors (n, m)``, equal where they are; minus zero is zero."""
+    keys = np.ascontiguousarray(vectors + np.float32(0))
     return np.asarray(
         np.unique(keys.view(np.dtype((np.void, 4 * keys.shape[1]))).ravel(), return_inverse=True)[1], np.int64
     ).ravel()

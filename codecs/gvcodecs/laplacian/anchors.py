@@ -19,7 +19,7 @@ import numpy as np
 
 from gvpipe.arrays import Bool, Int32, Integers
 from gvpipe.mesh.hierarchy import Hierarchy
-from gvpipe.trajectory.prediction import CausalOrder, leave_out, select_vectors
+from gvpipe.trajectory.causal_order import CausalOrder, leave_out, select_vectors
 
 ANCHOR_CHOICES = ("hierarchy", "walk")
 SMALL = 4  # points of components that are all anchors

@@ -21,7 +21,7 @@ from scipy import sparse
 
 from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.mesh.hierarchy import Hierarchy
-from gvpipe.trajectory.prediction import CausalOrder
+from gvpipe.trajectory.causal_order import CausalOrder
 
 DELTA_PREDICTIONS = ("kalman", "rigid", "none")
 N_KNOWN = {"kalman": 20, "rigid": 15, "none": 0}  # known points, at most; 15 is the paper's k

@@ -16,7 +16,7 @@ from gvcodecs.laplacian.operators import laplacian
 from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy
 from gvpipe.mesh.topology import adjacency, components, unique_edges
-from gvpipe.trajectory.prediction import CausalOrder
+from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.spatial_neighbours import hierarchy_order
 
 

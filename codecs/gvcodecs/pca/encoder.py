@@ -26,9 +26,10 @@ from gvpipe.container.segments import MAX_SEGMENT, cut
 from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import MAX_COMPONENTS, Reduced, reduce_trajectories
+from gvpipe.trajectory.causal_order import CausalOrder, leave_out
 from gvpipe.trajectory.coded_points import code_connectivity, read_trajectories
 from gvpipe.trajectory.coefficient_coding import encode_vectors
-from gvpipe.trajectory.prediction import PREDICTORS, CausalOrder, leave_out
+from gvpipe.trajectory.prediction import PREDICTORS
 from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
 
 LEFT = 0.93  # part of the error asked of `reduce_trajectories` that is left: small coefficients err by less than steps do

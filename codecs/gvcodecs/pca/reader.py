@@ -15,8 +15,8 @@ from gvpipe.container.segments import segment_starts
 from gvpipe.errors import InputError
 from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy, level_faces
 from gvpipe.trajectory.basis import decode_basis
+from gvpipe.trajectory.causal_order import CausalOrder, leave_out
 from gvpipe.trajectory.coefficient_coding import decode_vectors
-from gvpipe.trajectory.prediction import CausalOrder, leave_out
 from gvpipe.trajectory.reconstruction import Segment, read_frames
 from gvpipe.trajectory.spatial_neighbours import OVERSHOOT, hierarchy_order
 from gvpipe.trajectory.still_points import read_still

@@ -111,7 +111,7 @@ def decode_clip(data: bytes, n_frames: int, surface: Surface, name: str) -> Floa
     origins, axes = local_frames(seed_points)
     result = np.zeros((n_frames, n_vertices, 3))
     result[:, dictionary.members] = dictionary.to_world(dictionary.rebuild(sums, step), place(lattice, origins), axes)
-    result[:, seeds.ravel()] = lattice.place(seed_points).reshape(n_frames, -1, 3)
+    result[:, seeds.ravel()] = lattice.points_at(seed_points).reshape(n_frames, -1, 3)
     if not np.abs(result).max() <= LARGEST:
         raise cursor.corrupt("a position is larger than float32 can hold")
     return result.astype(np.float32)

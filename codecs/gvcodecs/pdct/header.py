@@ -62,9 +62,9 @@ def check_lattice(values: Any) -> Lattice:
 
 def surface_of(mesh: BaseMesh, lattice: Lattice) -> Surface:
     """What all clips share where every vertex is a point; signals follow the codec's order, a walk over the surface."""
-    return Surface(lattice.place(mesh.points), mesh.faces, np.argsort(mesh.visits))
+    return Surface(lattice.points_at(mesh.points), mesh.faces, np.argsort(mesh.visits))
 
 
 def surface_of_points(mesh: WeldedMesh, lattice: Lattice) -> Surface:
     """What all clips share, from the decoded base frame; points are numbered along the walk."""
-    return Surface(lattice.place(mesh.lattice), mesh.point_faces, np.arange(len(mesh.lattice)))
+    return Surface(lattice.points_at(mesh.lattice), mesh.point_faces, np.arange(len(mesh.lattice)))

@@ -1,7 +1,7 @@
 /**
  * The pictures of a geometry video by WebCodecs: groups of pictures are decoded ahead and kept, a clock says which frame is due.
  *
- * A picture is shown for one frame or more (`format/holds.js`). Every picture has its number, so seeking and looping are exact in every browser. The clock stands still while a picture that
+ * A picture is shown for one frame or more (`format/repeated_frames.js`). Every picture has its number, so seeking and looping are exact in every browser. The clock stands still while a picture that
  * is due is not there yet; a page too slow for every picture gets those that are due, and none is queued.
  */
 
@@ -16,7 +16,7 @@ const LONGEST_STEP = 1000; // ms that the clock goes on at once: a hidden page i
 
 export class DecodedPictures {
   /**
-   * @param {Uint8Array} file @param {number} fps @param {import("./format/holds.js").Holds} holds
+   * @param {Uint8Array} file @param {number} fps @param {import("./format/repeated_frames.js").Holds} holds
    * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
    * @returns {Promise<DecodedPictures>} its first group decoded
    * @throws {GeometryVideoError} kind "unsupported": this browser's WebCodecs cannot decode it
@@ -41,7 +41,7 @@ export class DecodedPictures {
   /**
    * The same clock for a file without pictures, whose frames all have the levels of no residual.
    *
-   * @param {number} fps @param {import("./format/holds.js").Holds} holds @param {Uint8Array} levels
+   * @param {number} fps @param {import("./format/repeated_frames.js").Holds} holds @param {Uint8Array} levels
    * @returns {Promise<DecodedPictures>}
    */
   static async without(fps, holds, levels) {

@@ -9,7 +9,7 @@
 import { DecodedPictures } from "./decoded_pictures.js";
 import { readContainer } from "./format/boxes.js";
 import { GeometryVideoError } from "./format/errors.js";
-import { readHolds } from "./format/holds.js";
+import { readHolds } from "./format/repeated_frames.js";
 import { readPayload } from "./format/payload.js";
 import { checkCodec } from "./mcgv/header.js";
 import { McgvReader } from "./mcgv/reader.js";

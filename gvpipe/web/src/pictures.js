@@ -8,7 +8,7 @@ import { VideoPictures } from "./video_pictures.js";
  * WebCodecs, or where a browser has none that reads the video (pages of plain http, old browsers), `<video>`.
  *
  * @param {Uint8Array} file @param {number} fps
- * @param {import("./format/holds.js").Holds} holds which picture each frame shows
+ * @param {import("./format/repeated_frames.js").Holds} holds which picture each frame shows
  * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
  * @returns {Promise<DecodedPictures|VideoPictures>} with `levels()`, `seek`, `play`, `pause` and `close`
  */

@@ -7,7 +7,7 @@
  * Chromium plays: the video's clock leads, and whoever draws late gets the picture of that moment. It loops by seeking. Firefox
  * announces other pictures than it draws while it plays (and times that go on growing where the element loops by itself), so
  * there every frame that is due is sought. So it is in every browser where frames repeat: the video has each picture once, and its
- * clock knows no holds (`format/holds.js`).
+ * clock knows no holds (`format/repeated_frames.js`).
  */
 
 import { GeometryVideoError } from "./format/errors.js";
@@ -17,7 +17,7 @@ const SHOWN_WITHIN = 1000; // ms after `seeked` in which the browser says what i
 
 export class VideoPictures {
   /**
-   * @param {Uint8Array} file @param {number} fps @param {import("./format/holds.js").Holds} holds
+   * @param {Uint8Array} file @param {number} fps @param {import("./format/repeated_frames.js").Holds} holds
    * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
    * @returns {Promise<VideoPictures>}
    */

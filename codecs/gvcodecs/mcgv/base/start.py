@@ -97,12 +97,12 @@ def begin(job: Job, step: float, wanted: float, point: Int64 | None = None) -> S
         is_still[0] = False
     moving = np.flatnonzero(~is_still)
     points = Points.moving(mesh, moving)
-    base = lattice.place(mesh.lattice[moving])
+    base = lattice.points_at(mesh.lattice[moving])
     sequence = given.reordered(sources[moving], points.faces)
     if still.all():
         sequence = MeshSequence(np.broadcast_to(base.astype(np.float32), sequence.positions.shape), points.faces, given.fps)
     rests = is_still[mesh.point]
-    off = first[coded.permutation[rests]] - lattice.place(mesh.lattice[mesh.point[rests]])
+    off = first[coded.permutation[rests]] - lattice.points_at(mesh.lattice[mesh.point[rests]])
     return Start(
         sequence=sequence,
         point=point,

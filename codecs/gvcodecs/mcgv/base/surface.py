@@ -67,7 +67,7 @@ def read_surface(bitstream: Bitstream, header: Header) -> DecodedBase:
     if bitstream.version < 3:
         base = read_base(bitstream)
         points, point, members = weld_vertices(base.points, base.faces, base.visits)
-        own, placed = np.arange(len(base.points)), header.base.place(base.points)
+        own, placed = np.arange(len(base.points)), header.base.points_at(base.points)
         order = np.argsort(base.visits)
         rest = placed.astype(np.float32)
         return DecodedBase(base.faces, rest, own, own, base.points, placed, point, members, points, order)
@@ -78,7 +78,7 @@ def read_surface(bitstream: Bitstream, header: Header) -> DecodedBase:
     if not len(moves):
         raise CorruptFile("section 'still' is corrupt: one point at least has samples; get the file again from its source")
     slot = np.cumsum(~still) - 1
-    placed = header.base.place(mesh.lattice)
+    placed = header.base.points_at(mesh.lattice)
     vertices = np.flatnonzero(~still[mesh.point])
     own = np.arange(len(moves))
     return DecodedBase(

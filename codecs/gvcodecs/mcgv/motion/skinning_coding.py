@@ -25,8 +25,8 @@ from gvpipe.trajectory.basis import (
     find_principal,
     fit_coefficients,
 )
+from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
-from gvpipe.trajectory.prediction import CausalOrder
 
 
 @dataclass(frozen=True)

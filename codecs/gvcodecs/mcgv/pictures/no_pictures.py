@@ -12,7 +12,7 @@ from gvcodecs.mcgv.motion.contract import locate
 
 
 class NoPictures:
-    """Reads as a `gvpipe.video.VideoReader` does; a group of pictures is what shares a chunk of transforms.
+    """Reads as a `gvpipe.media.video.VideoReader` does; a group of pictures is what shares a chunk of transforms.
 
     Args:
         bounds: first frame of every segment, and F.

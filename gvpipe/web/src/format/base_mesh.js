@@ -3,6 +3,7 @@
  * carries, then the loose vertices and triangles beside it, all in the user's vertex order in the end.
  */
 
+import { VERTEX_ORDER_MAX_VERTICES as MAX_VERTICES } from "../constants.js";
 import { Cursor } from "./cursor.js";
 import { decodeDraco } from "./draco.js";
 import { corrupt } from "./errors.js";
@@ -10,7 +11,6 @@ import { inflate } from "./inflate.js";
 import { previousEqual } from "./points.js";
 import { decodeOrder } from "./vertex_order.js";
 
-const MAX_VERTICES = 2 ** 24 - 1;
 const MAX_COORDINATE = 2 ** 25; // squared distances between lattice points stay exact in doubles; gvpipe writes up to 2^22
 
 /**

@@ -3,13 +3,13 @@
  * Mirrors `gvpipe.container.mp4`; `docs/format.md`, section 1. The video itself is the browser's affair.
  */
 
+import { BITSTREAM_VERSION as CONTAINER_VERSION, MP4_BOX_UUID as UUID, MP4_MAX_BOXES as MAX_BOXES } from "../constants.js";
 import { crc32 } from "./checksum.js";
 import { AGAIN, GeometryVideoError } from "./errors.js";
 
-const UUID = [0x6a, 0x1f, 0x0c, 0x52, 0x3d, 0x7b, 0x4e, 0x0e, 0x9c, 0x55, 0x67, 0xe4, 0xf0, 0xa7, 0xd1, 0xb9];
+export { CONTAINER_VERSION };
+
 const TAG = /gvpipe (\d{1,9}) ([0-9a-f]{32})/;
-const MAX_BOXES = 1 << 16;
-export const CONTAINER_VERSION = 1;
 
 /**
  * @typedef {object} Container

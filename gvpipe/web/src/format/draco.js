@@ -3,12 +3,10 @@
  * as `gvpipe.connectivity.base_mesh` wrote them.
  */
 
+import { BASE_MESH_DRACO_PREFIX as PREFIX, BASE_MESH_MAX_PER_BYTE as MAX_PER_BYTE } from "../constants.js";
 import createDraco from "draco3d/draco_decoder_nodejs.js";
 import wasmBinary from "draco3d/draco_decoder.wasm";
 import { corrupt } from "./errors.js";
-
-const PREFIX = [0x44, 0x52, 0x41, 0x43, 0x4f, 2, 2, 1, 1, 0, 0]; // version 2.2, triangles, Edgebreaker, no metadata
-const MAX_PER_BYTE = 1024; // no allocation beyond what this many bytes can honestly hold
 
 let draco = null;
 

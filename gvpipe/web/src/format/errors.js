@@ -1,6 +1,8 @@
 /** The one kind of error that the player raises on purpose; its text is one line, fit to be shown to a user. */
 
-export const AGAIN = "get the file again from its source";
+import { ERRORS_REMEDY as AGAIN } from "../constants.js";
+
+export { AGAIN };
 
 /**
  * @property {"load"|"not-geometry-video"|"newer"|"stripped"|"truncated"|"corrupt"|"unsupported"} kind what went wrong; the

@@ -1,12 +1,15 @@
 /** Blocks of range-coded integers. Mirrors `gvpipe.entropy.integers.decode_integers`; `docs/format.md`, section 3. */
 
+import {
+  INTEGERS_MAX_CONTEXTS as MAX_CONTEXTS,
+  TOKENS_DIRECT as DIRECT,
+  TOKENS_MAX_TOKENS as MAX_TOKENS,
+  TOKENS_TABLE_TOTAL as TABLE_TOTAL,
+} from "../constants.js";
 import { Cursor } from "./cursor.js";
 import { RangeDecoder, categoricalEdges } from "./range_decoder.js";
 
-export const DIRECT = 16; // folded values that are tokens of their own
-export const MAX_TOKENS = DIRECT + 2 * (40 - 4);
-const MAX_CONTEXTS = 1 << 16;
-export const TABLE_TOTAL = 4096;
+export { DIRECT, MAX_TOKENS, TABLE_TOTAL };
 
 /**
  * @param {Uint8Array} data one whole block

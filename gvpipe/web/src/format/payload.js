@@ -1,16 +1,20 @@
 /** The payload: named sections with checksums, and a JSON header. Mirrors `gvpipe.container.bitstream`; `docs/format.md`, section 2. */
 
+import {
+  BITSTREAM_MAGIC as MAGIC,
+  BITSTREAM_MAX_FRAMES as MAX_FRAMES,
+  BITSTREAM_MAX_HEADER as MAX_HEADER,
+  BITSTREAM_MAX_NAME as MAX_NAME,
+  BITSTREAM_MAX_SECTIONS as MAX_SECTIONS,
+  BITSTREAM_MAX_VERTICES as MAX_VERTICES,
+} from "../constants.js";
 import { CONTAINER_VERSION, newerContainer } from "./boxes.js";
 import { crc32 } from "./checksum.js";
 import { Cursor } from "./cursor.js";
 import { AGAIN, GeometryVideoError, corrupt } from "./errors.js";
 import { inflate } from "./inflate.js";
 
-const MAGIC = "gvpipe\r\n";
-const MAX_SECTIONS = 4096;
-const MAX_NAME = 64;
-const MAX_HEADER = 1 << 20;
-const LIMITS = { version: [1, 1 << 16], frames: [1, 1 << 24], vertices: [1, 1 << 28], triangles: [0, 1 << 29] };
+const LIMITS = { version: [1, 1 << 16], frames: [1, MAX_FRAMES], vertices: [1, MAX_VERTICES], triangles: [0, 1 << 29] };
 
 /** A geometry video's header and sections. */
 export class Payload {
@@ -43,7 +47,8 @@ export async function readPayload(container) {
 }
 
 function readTable(cursor) {
-  if (String.fromCharCode(...cursor.take(Math.min(cursor.left, MAGIC.length))) !== MAGIC) {
+  const start = cursor.take(Math.min(cursor.left, MAGIC.length));
+  if (!MAGIC.every((byte, i) => start[i] === byte)) {
     throw new GeometryVideoError("corrupt", `the payload does not start with gvpipe's magic; ${AGAIN}`);
   }
   const [version, count] = [cursor.u16(), cursor.u16()];

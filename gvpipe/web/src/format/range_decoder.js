@@ -10,10 +10,10 @@
  * Range encoding, 1979.
  */
 
+import { RANGE_DECODER_PRECISION as PRECISION } from "../constants.js";
 import { corrupt } from "./errors.js";
 
 const WORD = 2 ** 32;
-const PRECISION = 24;
 export const TOTAL = 2 ** PRECISION;
 
 export class RangeDecoder {

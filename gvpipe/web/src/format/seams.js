@@ -1,104 +1,72 @@
 /**
- * Which copy of its point each corner uses, told along edges. Mirrors `gvpipe.seams` and its kernels; `docs/format.md`, section
- * 5.8.
+ * Which vertex each corner of a mesh of points uses. Mirrors `gvpipe.connectivity.seams.decode_copies`; `docs/format.md`, sections 5.5 and
+ * 6.1.
  */
 
+import { SEAMS_MAX_SEAM_VERTICES as MAX_SEAM_VERTICES, VERTEX_ORDER_MAX_VERTICES as MAX_VERTICES } from "../constants.js";
 import { corrupt } from "./errors.js";
 import { decodeIntegers } from "./integers.js";
-
-const LOOK = 32; // corners before, of the same point, that are looked at
-const [SAME, SINGLE, LATER, NEW] = [0, 1, 2, 3]; // why a copy is likely, best first
+import { decodeSeams } from "./edge_seams.js";
+import { decodeOrder } from "./vertex_order.js";
 
 /**
- * @param {Uint8Array} data the rest of section `mesh`
- * @param {Uint32Array} pointFaces (T, 3) triangles over points, flat @param {Int32Array} counts (P) copies of each point
- * @param {Uint32Array} corners of points with more than one copy, by point, then by number
- * @returns {Uint32Array} (3 T) the copy that each corner uses
+ * @param {Uint8Array} counts @param {Uint8Array} copies parts of section `mesh`
+ * @param {Uint8Array} order section
+ * @param {Uint32Array} pointFaces (T, 3) triangles over points, smallest point first, flat
+ * @param {number} nPoints P @param {boolean} across whether seams are coded across edges (`edge_seams.js`)
+ * @returns {{faces: Uint32Array, point: Int32Array}} triangles (T, 3) over vertices, flat, and the point of each vertex (V)
  */
-export function decodeSeams(data, pointFaces, counts, corners) {
+export function decodeCopies(counts, copies, order, pointFaces, nPoints, across) {
+  const { faces, point } = decodeCorners(counts, copies, pointFaces, nPoints, across);
+  if (order.length === 0) return { faces, point };
+  const n = point.length;
+  const lattice = new Int32Array(3 * n); // for the walk: equal where points are
+  for (let v = 0; v < n; v++) lattice[3 * v] = point[v];
+  const visits = new Int32Array(n);
+  decodeOrder(order, lattice, faces, visits);
+  const rank = new Int32Array(n); // the user's vertex of each of the codec's
+  visits.forEach((visit, v) => (rank[visit] = v));
+  return { faces: faces.map((vertex) => rank[vertex]), point: visits.map((visit) => point[visit]) };
+}
+
+/** The same in the codec's order: the vertices of point 0, then those of point 1, and so on. */
+function decodeCorners(countsData, data, pointFaces, nPoints, across) {
+  const counts = decodeIntegers(countsData, nPoints, null, "mesh").map((others) => others + 1);
+  const starts = new Float64Array(nPoints + 1); // first vertex of each point, and V
+  for (let p = 0; p < nPoints; p++) {
+    starts[p + 1] = starts[p] + counts[p];
+    if (counts[p] < 1 || starts[p + 1] > MAX_VERTICES) throw corrupt("mesh", "a number of copies is out of range");
+  }
+  const where = sharedCorners(pointFaces, counts);
+  const copies = across ? decodeSeams(data, pointFaces, counts, where) : decodeDifferences(data, pointFaces, counts, where);
+  const faces = pointFaces.map((p, corner) => starts[p] + copies[corner]);
+  const point = new Int32Array(starts[nPoints]);
+  for (let p = 0; p < nPoints; p++) point.fill(p, starts[p], starts[p + 1]);
+  return { faces, point };
+}
+
+function decodeDifferences(data, pointFaces, counts, where) {
+  const contexts = Uint8Array.from(where, (corner) => Math.min(counts[pointFaces[corner]], MAX_SEAM_VERTICES));
+  const differences = decodeIntegers(data, where.length, contexts, "mesh");
   const copies = new Uint32Array(pointFaces.length);
-  const told = []; // places in `corners` of those that are not their point's first
-  const contexts = [];
-  walk(pointFaces, counts, corners, copies, (i, context) => {
-    told.push(i);
-    contexts.push(context);
-  });
-  const places = decodeIntegers(data, told.length, Uint8Array.from(contexts), "mesh");
-  let next = 0;
-  walk(pointFaces, counts, corners, copies, null, () => places[next++]);
+  for (let i = 0, before = -1, copy = 0; i < where.length; i++) {
+    const p = pointFaces[where[i]];
+    copy = p === before ? copy + differences[i] : 0; // a point's first corner uses its first copy
+    if (copy < 0 || copy >= counts[p]) throw corrupt("mesh", "a corner uses a copy that does not exist");
+    copies[where[i]] = copy;
+    before = p;
+  }
   return copies;
 }
 
-/** Tell each corner's context to `tell`; or, without, fill copies, each from its place, which `take` gives. */
-function walk(flat, counts, corners, copies, tell, take) {
-  for (let i = 0, begin = 0, used = 0; i < corners.length; i++) {
-    const x = corners[i];
-    const p = flat[x];
-    if (i === 0 || flat[corners[i - 1]] !== p) {
-      [begin, used] = [i, 1];
-      continue;
-    }
-    let [known, single, later] = [0, 0, 0];
-    const listed = []; // of [copy, reason]: best reason first, then highest number
-    for (let j = Math.max(begin, i - LOOK); j < i; j++) {
-      const y = corners[j];
-      for (const own of others(x)) {
-        const q = flat[own];
-        for (const other of others(y)) {
-          if (flat[other] !== q) continue;
-          let reason = SAME;
-          if (counts[q] === 1) {
-            single++;
-            reason = SINGLE;
-          } else if (q >= p) {
-            later++;
-            reason = LATER;
-          } else {
-            known++;
-            if (copies[own] !== copies[other]) continue;
-          }
-          if (!tell) note(listed, copies[y], reason);
-        }
-      }
-    }
-    if (tell) {
-      tell(i, 9 * Math.min(known, 2) + 3 * Math.min(single, 2) + Math.min(later, 2));
-      continue;
-    }
-    if (used < counts[p]) note(listed, used, NEW);
-    const copy = copyAt(listed, used, take());
-    if (copy < 0) throw corrupt("mesh", "a corner uses a copy that does not exist");
-    copies[x] = copy;
-    if (copy === used) used++;
-  }
-}
-
-/** The next and the previous corner of a corner's triangle. */
-function others(corner) {
-  const first = corner - (corner % 3);
-  return [first + ((corner + 1) % 3), first + ((corner + 2) % 3)];
-}
-
-function note(listed, copy, reason) {
-  const at = listed.findIndex((one) => one[0] === copy);
-  if (at >= 0) {
-    if (listed[at][1] <= reason) return;
-    listed.splice(at, 1);
-  }
-  let k = listed.length;
-  while (k > 0 && (listed[k - 1][1] > reason || (listed[k - 1][1] === reason && listed[k - 1][0] < copy))) k--;
-  listed.splice(k, 0, [copy, reason]);
-}
-
-/** The copy at a place: listed ones first, then the other used ones from the highest number down; -1 if there is none. */
-function copyAt(listed, used, place) {
-  if (place < 0) return -1;
-  if (place < listed.length) return listed[place][0];
-  const first = used - 1 - (place - listed.length);
-  for (let copy = first; copy >= 0; ) {
-    const above = listed.filter(([one]) => copy <= one && one < used).length;
-    if (first - above === copy) return copy;
-    copy = first - above;
-  }
-  return -1;
+/** Corners of points with more than one copy, in order of point and corner. */
+function sharedCorners(pointFaces, counts) {
+  const ends = new Uint32Array(counts.length + 1);
+  for (const p of pointFaces) if (counts[p] > 1) ends[p + 1]++;
+  for (let p = 0; p < counts.length; p++) ends[p + 1] += ends[p];
+  const corners = new Uint32Array(ends[counts.length]);
+  pointFaces.forEach((p, corner) => {
+    if (counts[p] > 1) corners[ends[p]++] = corner;
+  });
+  return corners;
 }

@@ -3,14 +3,15 @@
  * Mirrors `gvpipe.connectivity.vertex_order.decode_order`; `docs/format.md`, section 4.
  */
 
+import {
+  VERTEX_ORDER_ESCAPE as ESCAPE,
+  VERTEX_ORDER_EXACT_RANKS as EXACT_RANKS,
+  VERTEX_ORDER_N_SYMBOLS as N_SYMBOLS,
+  VERTEX_ORDER_REACH as REACH,
+} from "../constants.js";
 import { Cursor } from "./cursor.js";
 import { previousEqual } from "./points.js";
 import { RangeDecoder, categoricalEdges } from "./range_decoder.js";
-
-const REACH = 256; // most vertices that one search looks at
-const EXACT_RANKS = 8;
-const ESCAPE = EXACT_RANKS + 2 * 5;
-const N_SYMBOLS = ESCAPE + 1;
 
 /**
  * @param {Uint8Array} data section `order`, not empty

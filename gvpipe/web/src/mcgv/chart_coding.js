@@ -1,10 +1,8 @@
 /** The chart of every point. Mirrors `gvcodecs.mcgv.layout.chart_coding.decode_charts` and its kernels; `docs/format.md`, section 5.5. */
 
+import { CHART_CODING_CONTEXTS as CONTEXTS, CHART_KERNELS_MAX_NEAR as MAX_NEAR } from "../constants.js";
 import { Cursor } from "../format/cursor.js";
 import { decodeIntegers } from "../format/integers.js";
-
-const CONTEXTS = 5;
-const MAX_NEAR = 8; // known neighbours that count: the last ones
 
 /**
  * @param {Uint8Array} data section `charts`

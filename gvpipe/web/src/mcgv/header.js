@@ -1,17 +1,23 @@
 /** What the reader of an `mcgv` bitstream must know beside its sections. Mirrors `gvcodecs.mcgv.header.Header`. */
 
+import {
+  BROWSER_PROFILE as PROFILE,
+  BROWSER_VERSION as VERSION,
+  SEGMENTS_HUGE as HUGE,
+  HEADER_MAX_CLUSTERS as MAX_CLUSTERS,
+  HEADER_MAX_SEGMENTS as MAX_SEGMENTS,
+  HEADER_OF_PICTURES as OF_PICTURES,
+  HEADER_PLACEMENTS as PLACEMENTS,
+  HEADER_PREDICTIONS as PREDICTIONS,
+  SEGMENTS_TINY as TINY,
+  VIDEO_MAX_SIDE as MAX_SIDE,
+} from "../constants.js";
 import { GeometryVideoError, corrupt } from "../format/errors.js";
 import { checkInteger, checkNumber } from "../format/payload.js";
 
+export { VERSION, PROFILE };
+
 export const CODEC = "mcgv";
-export const VERSION = 4;
-export const PROFILE = "h264-8"; // the one that a browser gives back sample by sample
-const OF_PICTURES = ["placement", "profile", "block", "width", "height", "residual_step"]; // keys of files that have some
-const PREDICTIONS = ["blended", "affine"];
-const PLACEMENTS = ["halves", "charts", "tiles"];
-const MAX_SIDE = 16384;
-const LARGE = 1e39;
-const SMALL = 1e-60;
 
 /** Throw unless the payload is of this codec, in a version that it can read. */
 export function checkCodec(header) {
@@ -60,7 +66,7 @@ export function readHeader(header) {
     width: checkInteger(settings, "width", 2, MAX_SIDE),
     height: checkInteger(settings, "height", 2, Math.floor(MAX_SIDE / 3)),
     ...readMotion(header),
-    residualStep: checkNumber(settings, "residual_step", SMALL, LARGE),
+    residualStep: checkNumber(settings, "residual_step", TINY, HUGE),
     outliers: "outliers" in settings,
     pictures: true,
   };
@@ -79,15 +85,15 @@ export function readHeader(header) {
 function readMotion(header) {
   const settings = header.settings;
   const base = settings.base;
-  if (!Array.isArray(base) || base.length !== 4 || !base.every((v) => Math.abs(v) < LARGE) || !(base[3] > 0)) {
+  if (!Array.isArray(base) || base.length !== 4 || !base.every((v) => Math.abs(v) < HUGE) || !(base[3] > 0)) {
     throw corrupt("header", `base is ${JSON.stringify(base)}`);
   }
   return {
-    clusters: checkInteger(settings, "clusters", 1, 1024),
-    segments: checkInteger(settings, "segments", 1, Math.min(1 << 16, header.frames)),
+    clusters: checkInteger(settings, "clusters", 1, MAX_CLUSTERS),
+    segments: checkInteger(settings, "segments", 1, Math.min(MAX_SEGMENTS, header.frames)),
     origin: base.slice(0, 3),
     baseStep: base[3],
-    transformStep: checkNumber(settings, "transform_step", SMALL, LARGE),
+    transformStep: checkNumber(settings, "transform_step", TINY, HUGE),
   };
 }
 

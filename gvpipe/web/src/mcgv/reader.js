@@ -1,17 +1,17 @@
 /**
  * From an `mcgv` bitstream and the levels of its pictures to positions, any frame in any order. Mirrors the codec's reader.
- * Frames are distinct ones here (`format/holds.js`).
+ * Frames are distinct ones here (`format/repeated_frames.js`).
  */
 
 import { AGAIN, GeometryVideoError, corrupt } from "../format/errors.js";
-import { Moves } from "../format/moves.js";
-import { AffineMotion } from "./affine_motion.js";
-import { BlendedMotion } from "./blended_motion.js";
+import { Moves } from "../format/displacements.js";
+import { AffineMotion } from "./affine.js";
+import { BlendedMotion } from "./blended.js";
 import { decodeCharts } from "./chart_coding.js";
-import { placeCharts } from "./chart_placement.js";
+import { placeCharts } from "./tiles.js";
 import { readHeader } from "./header.js";
-import { decodeClusters, decodePixels, decodeSlotClusters } from "./layout.js";
-import { place } from "./placement.js";
+import { decodeClusters, decodePixels, decodeSlotClusters } from "./layout_coding.js";
+import { place } from "./kd_tree.js";
 import { readSurface } from "./surface.js";
 
 const ZERO = 128; // the level of a zero residual

@@ -5,13 +5,12 @@
  * show one position, and vertices that stand still have neither sample nor motion. Before, every vertex was a slot.
  */
 
+import { SURFACE_STILL as STILL } from "../constants.js";
 import { decodeBase } from "../format/base_mesh.js";
 import { AGAIN, GeometryVideoError, corrupt } from "../format/errors.js";
-import { decodePoints } from "../format/point_mesh.js";
-import { decodeFlags } from "../format/stillness.js";
-import { Points, weldVertices } from "./points.js";
-
-const STILL = "still"; // section: which points never move
+import { decodePoints } from "../format/welded_mesh.js";
+import { decodeFlags } from "../format/still_vertices.js";
+import { Points, weldVertices } from "./welded_points.js";
 
 export class Surface {
   /**

@@ -1,10 +1,9 @@
 /** The clusters that points follow. Mirrors `gvcodecs.mcgv.motion.weight_coding.decode_weights`; `docs/format.md`, section 5. */
 
+import { WEIGHT_CODING_COUNT_CONTEXTS as COUNT_CONTEXTS } from "../constants.js";
 import { Cursor } from "../format/cursor.js";
 import { decodeIntegers } from "../format/integers.js";
 import { INFLUENCES, TOTAL, restore } from "./weight_kernels.js";
-
-const COUNT_CONTEXTS = 4;
 
 /**
  * @typedef {object} Weights

@@ -4,9 +4,13 @@
  * A point's list holds the clusters that its known neighbours follow, heaviest first, equal ones by number.
  */
 
-export const INFLUENCES = 4; // most clusters that a point follows
-export const TOTAL = 64; // weights are integers that add up to this
-const MAX_NEAR = 8; // known neighbours that count: the last ones
+import {
+  SKINNING_INFLUENCES as INFLUENCES,
+  SKINNING_TOTAL as TOTAL,
+  WEIGHT_KERNELS_MAX_NEAR as MAX_NEAR,
+} from "../constants.js";
+
+export { INFLUENCES, TOTAL };
 
 /**
  * Fill `weights` from the numbers of the section, points in order.

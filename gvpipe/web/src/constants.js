@@ -1,0 +1,155 @@
+// Made by tools/web_constants.py from gvpipe's Python modules; edit those, and run it again.
+
+// gvpipe.connectivity.base_mesh
+export const BASE_MESH_DRACO_PREFIX = [68, 82, 65, 67, 79, 2, 2, 1, 1, 0, 0];
+export const BASE_MESH_MAX_PER_BYTE = 1024;
+
+// gvpipe.connectivity.edge_seam_kernels
+export const EDGE_SEAM_KERNELS_LOOK = 32;
+export const EDGE_SEAM_KERNELS_SAME = 0;
+export const EDGE_SEAM_KERNELS_SINGLE = 1;
+export const EDGE_SEAM_KERNELS_LATER = 2;
+export const EDGE_SEAM_KERNELS_NEW = 3;
+
+// gvpipe.connectivity.seams
+export const SEAMS_MAX_SEAM_VERTICES = 7;
+
+// gvpipe.connectivity.vertex_order
+export const VERTEX_ORDER_REACH = 256;
+export const VERTEX_ORDER_EXACT_RANKS = 8;
+export const VERTEX_ORDER_ESCAPE = 18;
+export const VERTEX_ORDER_N_SYMBOLS = 19;
+export const VERTEX_ORDER_MAX_VERTICES = 16777215;
+
+// gvpipe.container.bitstream
+export const BITSTREAM_MAGIC = [103, 118, 112, 105, 112, 101, 13, 10];
+export const BITSTREAM_VERSION = 1;
+export const BITSTREAM_MAX_SECTIONS = 4096;
+export const BITSTREAM_MAX_NAME = 64;
+export const BITSTREAM_MAX_HEADER = 1048576;
+export const BITSTREAM_MAX_FRAMES = 16777216;
+export const BITSTREAM_MAX_VERTICES = 268435456;
+
+// gvpipe.container.mp4
+export const MP4_BOX_UUID = [106, 31, 12, 82, 61, 123, 78, 14, 156, 85, 103, 228, 240, 167, 209, 185];
+export const MP4_MAX_BOXES = 65536;
+
+// gvpipe.container.segments
+export const SEGMENTS_TINY = 1e-60;
+export const SEGMENTS_HUGE = 1e+39;
+
+// gvpipe.corrections.displacements
+export const DISPLACEMENTS_MAX_POSITIONS = 1048576;
+export const DISPLACEMENTS_NEAR = 3;
+
+// gvpipe.entropy.block_coder
+export const BLOCK_CODER_PARAMETRIC = 1;
+
+// gvpipe.entropy.integers
+export const INTEGERS_MAX_CONTEXTS = 65536;
+
+// gvpipe.entropy.parametric_tables
+export const PARAMETRIC_TABLES_N_TOKENS = 40;
+export const PARAMETRIC_TABLES_RATIO_BITS = 12;
+export const PARAMETRIC_TABLES_RATIOS = [240, 455, 646, 819, 1047, 1365, 1712, 2048, 2223, 2393, 2571, 2730, 2882, 3030, 3159, 3276, 3383, 3480, 3565, 3640, 3705, 3763, 3812, 3855, 3922, 3971, 4007, 4032, 4051, 4064];
+export const PARAMETRIC_TABLES_TOTAL = 1048576;
+export const PARAMETRIC_TABLES_ZEROS = 256;
+
+// gvpipe.entropy.range_decoder
+export const RANGE_DECODER_PRECISION = 24;
+
+// gvpipe.entropy.tokens
+export const TOKENS_DIRECT = 16;
+export const TOKENS_TABLE_TOTAL = 4096;
+export const TOKENS_MAX_TOKENS = 88;
+export const TOKENS_CHUNK = 16;
+
+// gvpipe.errors
+export const ERRORS_REMEDY = "get the file again from its source";
+
+// gvpipe.media.video
+export const VIDEO_MAX_SIDE = 16384;
+
+// gvpipe.repeated_frames
+export const REPEATED_FRAMES_SECTION = "holds";
+
+// gvpipe.trajectory.basis
+export const BASIS_MAX_COMPONENTS = 16384;
+export const BASIS_MAX_SCALE = 512;
+export const BASIS_PER_OCTAVE = 8;
+export const BASIS_LEAST_OUTSIDE = 0.2;
+
+// gvpipe.trajectory.coefficient_coding
+export const COEFFICIENT_CODING_LARGEST = 68719476736;
+export const COEFFICIENT_CODING_MAX_VALUES = 134217728;
+
+// gvpipe.trajectory.contexts
+export const CONTEXTS_SHORT = [16, 10, 6, 4];
+export const CONTEXTS_LONG = [16, 14, 13, 12, 11, 10, 9, 8, 7, 6, 6, 5, 5, 4, 4, 3];
+export const CONTEXTS_ONE = 64;
+export const CONTEXTS_PER_OCTAVE = 16;
+export const CONTEXTS_MAX_LEVEL = 160;
+export const CONTEXTS_FLOOR_SPAN = 128;
+export const CONTEXTS_FLOOR_NEAR = 16;
+export const CONTEXTS_POWERS = [12, 4, 4, 8, 7];
+export const CONTEXTS_POWER_ONE = 20;
+export const CONTEXTS_LOWEST = -10;
+export const CONTEXTS_HIGHEST = 16;
+export const CONTEXTS_N_CONTEXTS = 27;
+export const CONTEXTS_N_NEAR = 6;
+
+// gvpipe.trajectory.prediction_kernels
+export const PREDICTION_KERNELS_DOUBT = 0.0001;
+
+// gvpipe.trajectory.temporal_neighbours
+export const TEMPORAL_NEIGHBOURS_MAX_NEIGHBOURS = 6;
+export const TEMPORAL_NEIGHBOURS_VARIANCE = 0.02;
+export const TEMPORAL_NEIGHBOURS_MIN_BLOCK = 48;
+export const TEMPORAL_NEIGHBOURS_CUBIC = new Map([[-3, -0.0625], [-1, 0.5625], [1, 0.5625], [3, -0.0625]]);
+export const TEMPORAL_NEIGHBOURS_LINEAR = new Map([[-1, 0.5], [1, 0.5]]);
+export const TEMPORAL_NEIGHBOURS_OFFSETS = [-1, 1, -3, 3, -2, -5, 5, -4];
+
+// gvcodecs.mcgv.base.surface
+export const SURFACE_STILL = "still";
+
+// gvcodecs.mcgv.browser
+export const BROWSER_VERSION = 4;
+export const BROWSER_PROFILE = "h264-8";
+
+// gvcodecs.mcgv.header
+export const HEADER_OF_PICTURES = ["placement", "profile", "block", "width", "height", "residual_step"];
+export const HEADER_PREDICTIONS = ["blended", "affine"];
+export const HEADER_PLACEMENTS = ["halves", "charts", "tiles"];
+export const HEADER_MAX_CLUSTERS = 1024;
+export const HEADER_MAX_SEGMENTS = 65536;
+
+// gvcodecs.mcgv.layout.chart_coding
+export const CHART_CODING_CONTEXTS = 5;
+
+// gvcodecs.mcgv.layout.chart_kernels
+export const CHART_KERNELS_MAX_NEAR = 8;
+
+// gvcodecs.mcgv.layout.coding
+export const CODING_CONTEXTS = 4;
+
+// gvcodecs.mcgv.layout.kd_tree
+export const KD_TREE_COMMON = 90;
+export const KD_TREE_FRAME = 4;
+export const KD_TREE_MOMENT_BITS = 10;
+export const KD_TREE_SPREAD = 2;
+export const KD_TREE_MAX_COORDINATE = 1048576;
+
+// gvcodecs.mcgv.motion.affine_coding
+export const AFFINE_CODING_MAX_CLASS = 63;
+
+// gvcodecs.mcgv.motion.skinning
+export const SKINNING_INFLUENCES = 4;
+export const SKINNING_TOTAL = 64;
+export const SKINNING_FLAT = 1e-06;
+export const SKINNING_LEAST_ENERGY = 1e-09;
+
+// gvcodecs.mcgv.motion.weight_coding
+export const WEIGHT_CODING_COUNT_CONTEXTS = 4;
+
+// gvcodecs.mcgv.motion.weight_kernels
+export const WEIGHT_KERNELS_MAX_NEAR = 8;

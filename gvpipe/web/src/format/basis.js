@@ -1,0 +1,42 @@
+/** Principal trajectories of a segment. Mirrors `gvpipe.trajectory.basis.decode_basis`; `docs/format.md`, section 6. */
+
+import {
+  BASIS_LEAST_OUTSIDE as LEAST_OUTSIDE,
+  BASIS_MAX_COMPONENTS as MAX_COMPONENTS,
+  BASIS_MAX_SCALE as MAX_SCALE,
+  BASIS_PER_OCTAVE as PER_OCTAVE,
+} from "../constants.js";
+import { Cursor } from "./cursor.js";
+import { frameRows } from "./temporal_neighbours.js";
+import { decodeIntegers } from "./integers.js";
+import { MAX_VALUES, decodeRows } from "./coefficient_coding.js";
+
+/**
+ * @typedef {object} Basis
+ * @property {number} components R
+ * @property {Float64Array} columns (3F, 1 + R) flat: the mean trajectory, then the principal ones
+ *
+ * @param {Uint8Array} data
+ * @param {number} frames of the segment @param {number} points whose trajectories these are
+ * @param {number} step quantisation step, model units
+ * @param {string} name of the section, for messages
+ * @returns {Basis}
+ */
+export function decodeBasis(data, frames, points, step, name) {
+  const cursor = new Cursor(data, name);
+  const components = cursor.varint(Math.min(MAX_COMPONENTS, 3 * frames), "the number of components");
+  const levels = decodeIntegers(cursor.take(cursor.varint(cursor.left, "a length")), components, null, name);
+  const scales = [Math.sqrt(points)];
+  let level = 0;
+  for (const difference of levels) {
+    level += difference;
+    if (Math.abs(level) > MAX_SCALE) throw cursor.corrupt("a scale is out of range");
+    scales.push(step * 2 ** (level / PER_OCTAVE));
+  }
+  const width = components + 1;
+  if (3 * frames * width > MAX_VALUES) throw cursor.corrupt(`${components} components over ${frames} frames`);
+  const coarse = step / Math.sqrt(Math.max(LEAST_OUTSIDE, 1 - width / (3 * frames)));
+  const columns = decodeRows(cursor.rest(), width, coarse, frameRows(frames), name);
+  for (let i = 0; i < columns.length; i++) columns[i] /= scales[i % width];
+  return { components, columns };
+}

@@ -1,0 +1,60 @@
+/**
+ * Frames that repeat the frame before them: the file codes only *distinct* frames, and for how many frames each is shown. Mirrors
+ * `gvpipe.repeated_frames`; `docs/format.md`, section 10.
+ */
+
+import { REPEATED_FRAMES_SECTION as SECTION } from "../constants.js";
+import { Cursor } from "./cursor.js";
+import { decodeIntegers } from "./integers.js";
+import { Payload } from "./payload.js";
+
+export class Holds {
+  /**
+   * @param {number} frames F
+   * @param {Uint32Array|null} starts (D) the frame at which each distinct frame is shown first; null: no frame repeats another
+   */
+  constructor(frames, starts = null) {
+    this.frames = frames;
+    this.starts = starts;
+    /** D, the number of distinct frames. */
+    this.distinct = starts ? starts.length : frames;
+  }
+
+  /** Which distinct frame a frame shows, 0..D - 1. */
+  distinctOf(frame) {
+    if (!this.starts) return frame;
+    let [low, high] = [0, this.distinct - 1]; // the last that starts at the frame or before
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (this.starts[middle] <= frame) low = middle;
+      else high = middle - 1;
+    }
+    return low;
+  }
+
+  /** The payload as the codec knows it: of the distinct frames. */
+  distinctPayload({ header, sections }) {
+    return new Payload({ ...header, frames: this.distinct }, sections);
+  }
+}
+
+/**
+ * @param {Payload} payload
+ * @returns {Holds}
+ * @throws {GeometryVideoError} the runs are not those of the header's number of frames
+ */
+export function readHolds({ header: { frames }, sections }) {
+  if (!sections.has(SECTION)) return new Holds(frames);
+  const cursor = new Cursor(sections.get(SECTION), SECTION);
+  const distinct = cursor.varint(frames, "the number of distinct frames");
+  const repeats = decodeIntegers(cursor.rest(), distinct, null, SECTION); // run lengths less 1
+  const starts = new Uint32Array(distinct);
+  let end = 0;
+  for (let d = 0; d < distinct; d++) {
+    starts[d] = end;
+    end += repeats[d] + 1;
+    if (repeats[d] < 0 || end > frames) break;
+  }
+  if (end !== frames || repeats.some((n) => n < 0)) throw cursor.corrupt(`its runs do not add up to ${frames} frames`);
+  return new Holds(frames, starts);
+}

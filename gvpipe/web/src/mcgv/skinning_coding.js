@@ -1,0 +1,51 @@
+/** A blend's transforms over a segment. Mirrors `gvcodecs.mcgv.motion.skinning_coding`; `docs/format.md`, section 5. */
+
+import { Cursor } from "../format/cursor.js";
+import { decodeRows } from "../format/coefficient_coding.js";
+import { decodeBasis } from "../format/basis.js";
+
+export class Trajectories {
+  /**
+   * @param {Uint8Array} data section `transforms.s`
+   * @param {number} clusters K @param {number} frames of the segment
+   * @param {number} step quantisation step, model units
+   * @param {string} name of the section, for messages
+   */
+  constructor(data, clusters, frames, step, name) {
+    const cursor = new Cursor(data, name);
+    this.basis = decodeBasis(cursor.take(cursor.varint(cursor.left, "a length")), frames, 4 * clusters, step, name);
+    /** (4K, R) flat. */
+    this.coefficients = decodeRows(cursor.rest(), this.basis.components, step, loneRows(4 * clusters), name);
+    this.n = 4 * clusters;
+  }
+
+  /** Rows of equal weight (4K, 3), flat, of one frame of the segment: `mean + coefficients @ vectors`. */
+  rows(frame) {
+    const { coefficients, n } = this;
+    const { columns, components } = this.basis;
+    const rows = new Float64Array(3 * n);
+    const width = components + 1;
+    const at = 3 * frame * width;
+    for (let i = 0, row = 0; i < n; i++) {
+      let x = columns[at];
+      let y = columns[at + width];
+      let z = columns[at + 2 * width];
+      for (let c = at + 1; c < at + width; c++) {
+        const coefficient = coefficients[row++];
+        x += coefficient * columns[c];
+        y += coefficient * columns[c + width];
+        z += coefficient * columns[c + 2 * width];
+      }
+      rows[3 * i] = x;
+      rows[3 * i + 1] = y;
+      rows[3 * i + 2] = z;
+    }
+    return rows;
+  }
+}
+
+/** Rows in their own order, none predicted from another. */
+function loneRows(n) {
+  const order = Array.from({ length: n }, (_, i) => i);
+  return { order, starts: Array(n + 1).fill(0), near: [], weights: [], variances: [], rings: Array(n).fill(0), blocks: [0, n] };
+}

@@ -1,0 +1,70 @@
+"""Layout by halving: the pixels of the format's description, neighbours side by side."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from placing import halved
+from surfaces import awkward_surfaces, check_layout
+
+from gvcodecs.mcgv.layout.kd_tree import choose_size, place_points
+from gvpipe.errors import CorruptFile, InputError
+from gvpipe.mesh.lattice import Lattice
+
+
+@pytest.mark.parametrize("name", awkward_surfaces())
+@pytest.mark.parametrize("block", [8, 16])
+def test_placement_follows_its_description(name: str, block: int) -> None:
+    """The same pixels as a recursion in Python's integers; one pixel each, also in the tightest plane and with groups."""
+    points = np.asarray(awkward_surfaces()[name][0])
+    groups = np.random.default_rng(9).integers(0, 5, len(points))
+    for bits, labels in ((4, None), (12, None), (12, groups), (20, groups)):
+        lattice = Lattice.over(points, bits).quantise(points)
+        width, height = choose_size(len(points), block)
+        for size in ((width, height), (width + 3 * block, height), (block, block * -(-len(points) // block**2))):
+            layout = place_points(lattice, labels, *size, block)
+            assert (layout.width, layout.height) == size
+            check_layout(layout, np.zeros(len(points), np.int32), block)
+            wanted = halved(lattice.tolist(), None if labels is None else labels.tolist(), *size, block)
+            assert layout.pixel.tolist() == wanted
+
+
+def test_placement_keeps_neighbours_together() -> None:
+    """A regular sheet comes out as it is; two sheets that overlap come apart as groups."""
+    x, y = np.meshgrid(np.arange(32), np.arange(32))
+    sheet = np.stack([10 * x.ravel(), 10 * y.ravel(), 0 * x.ravel()], axis=1)
+    shuffled = np.random.default_rng(0).permutation(len(sheet))
+    layout = place_points(sheet[shuffled], None, 32, 32, 16)
+    rows, columns = np.divmod(layout.pixel[np.argsort(shuffled)].reshape(32, 32), 32)
+    assert (np.abs(np.diff(rows, axis=0)) + np.abs(np.diff(columns, axis=0)) == 1).all()
+    assert (np.abs(np.diff(rows, axis=1)) + np.abs(np.diff(columns, axis=1)) == 1).all()
+    both, group = np.concatenate([sheet, sheet + np.array([160, 1, 1])]), np.repeat([0, 1], len(sheet))
+    apart = place_points(both, group, 64, 32, 16).pixel % 64 // 32
+    assert len(np.unique(np.c_[apart, group], axis=0)) == 2
+    mixed = place_points(both, None, 64, 32, 16).pixel % 64 // 32
+    assert len(np.unique(np.c_[mixed, group], axis=0)) == 4
+
+
+@given(st.integers(1, 5000), st.sampled_from([8, 16]))
+@settings(max_examples=120)
+def test_automatic_planes_are_small_and_fair(n_vertices: int, block: int) -> None:
+    """Whole blocks, room for all, less than a row of blocks too many, sides within three to one (or all that there are)."""
+    width, height = choose_size(n_vertices, block)
+    assert width % block == height % block == 0
+    needed = -(-n_vertices // block**2)
+    assert needed <= (width // block) * (height // block) < needed + max(width, height) // block
+    assert max(width, height) <= 3 * min(width, height)
+
+
+def test_placement_refuses_planes_too_small() -> None:
+    with pytest.raises(InputError, match="16x16"):
+        place_points(np.zeros((257, 3), np.int64), None, 16, 16, 16)
+
+
+def test_lattices_too_fine_for_halves_are_corrupt() -> None:
+    points = np.array([[0, 0, 0], [1, 2, (1 << 20) - 1]])
+    assert sorted(place_points(points, None, 16, 16, 16).pixel) == sorted(set(place_points(points, None, 16, 16, 16).pixel))
+    with pytest.raises(CorruptFile, match="too fine"):
+        place_points(points + 1, None, 16, 16, 16)

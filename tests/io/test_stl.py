@@ -1,0 +1,46 @@
+"""STL has no shared vertices: they are welded in order of appearance."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mesh_files import grid, same_bits
+
+from gvpipe import io
+from gvpipe.errors import InputError
+
+
+def test_stl_is_welded_in_order_of_appearance(tmp_path: Path) -> None:
+    sequence = grid()
+    io.write(sequence, tmp_path / "%d.stl")
+    read = io.read(tmp_path)
+    assert read.n_vertices == sequence.n_vertices - 1  # the unused vertex is not in the file
+    first_seen = np.unique(read.faces.ravel(), return_index=True)[1]
+    assert (np.diff(first_seen) > 0).all()
+    assert same_bits(read.read(0, 4)[:, read.faces], sequence.read(0, 4)[:, sequence.faces])
+
+
+def test_stl_that_tears(tmp_path: Path) -> None:
+    sequence = grid()
+    io.write(sequence, tmp_path / "%d.stl")
+    data = bytearray((tmp_path / "2.stl").read_bytes())
+    data[84 + 50 * 3 + 12 : 84 + 50 * 3 + 16] = struct.pack("<f", 99)  # triangle 3, corner 0, x
+    (tmp_path / "2.stl").write_bytes(data)
+    read = io.read(tmp_path)
+    with pytest.raises(InputError, match=r"of triangle \d+ shares a vertex with another in 0.stl but not in 2.stl"):
+        read.read(0, 4)
+
+
+def test_stl_text_and_other_count(tmp_path: Path) -> None:
+    triangle = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 {} 0\nendloop\nendfacet\n"
+    (tmp_path / "1.stl").write_text("solid a\n" + triangle.format(1) * 2 + "endsolid a\n")
+    (tmp_path / "2.stl").write_text("solid a\n" + triangle.format(2) * 2 + "endsolid a\n")
+    (tmp_path / "3.stl").write_text("solid a\n" + triangle.format(1) + "endsolid a\n")
+    read = io.read(tmp_path)
+    assert read.faces.tolist() == [[0, 1, 2], [0, 1, 2]]
+    assert read.read(1, 2)[0].tolist() == [[0, 0, 0], [1, 0, 0], [0, 2, 0]]
+    with pytest.raises(InputError, match=r"3.stl has 1 triangles, 1.stl has 2"):
+        read.read(2, 3)

@@ -1,0 +1,28 @@
+"""The poster is a grey picture of the mesh that lasts."""
+
+from __future__ import annotations
+
+import io
+
+import av
+import numpy as np
+import pytest
+
+from gvpipe.rasterizer.camera import framing
+from gvpipe.rasterizer.renderer import Renderer
+from gvpipe.rendering.poster import make_poster, paint
+from gvpipe.sequence import MeshSequence
+
+
+def test_poster_is_a_grey_picture_of_the_mesh_that_lasts(sequence: MeshSequence) -> None:
+    first = sequence.read(0, 1)[0]
+    data = make_poster(first, sequence.faces, 25.0, 11)
+    with av.open(io.BytesIO(data)) as film:
+        (picture,) = film.decode(video=0)
+        assert film.streams.video[0].duration * film.streams.video[0].time_base == pytest.approx(11 / 25)
+    luma = picture.to_ndarray()[:160].astype(int)  # the Y plane of yuv420p
+    assert np.abs(luma - paint(first, sequence.faces)).mean() < 4
+    camera = framing(sequence, [0])
+    seen = Renderer(sequence.faces, first, (160, 160), samples=1).visible(first, camera) >= 0
+    assert 0.1 < seen.mean() < 0.9
+    assert np.abs(luma[~seen] - luma[0, 0]).mean() < 6 and (luma[seen] < luma[0, 0] - 15).mean() > 0.9

@@ -1,0 +1,786 @@
+"""What browsers make of geometry videos: the module's positions, the player's picture and manners, and its errors."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import io
+import re
+import shutil
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import browsers
+import numpy as np
+import numpy.typing as npt
+import pages
+import pytest
+from folders import DATA, DOCS, GOLDEN
+from pages import FRAMES, LOAD, check_frames, run
+from PIL import Image
+from sequences import awkward, held, patched, rigid, waving
+
+import gvpipe
+from gvcodecs.mcgv.base.surface import read_surface
+from gvcodecs.mcgv.header import Header
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.mp4 import read_file, write_file
+from gvpipe.corrections.bound import Bound, encode_corrections
+from gvpipe.errors import CorruptFile
+from gvpipe.registry import make_codec, open_reader
+from gvpipe.repeated_frames import RepeatedFrames, add_repeated_frames
+from gvpipe.sequence import MeshSequence
+
+pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())
+slow = pytest.mark.slow  # the default run has one test of exact positions and one of the player
+
+PLAYER_PAGE = (DOCS / "player.md").read_text("utf-8")
+SAMBA = DATA / "samba.npz"
+FAST = {"preset": "ultrafast", "clusters": 3, "gop": 4}
+KINDS: dict[str, dict[str, Any]] = {  # how vertices move, and where their pixels are: all that a file may be
+    "affine": {"prediction": "affine", "placement": "charts"},
+    "affine-halves": {"prediction": "affine", "placement": "halves"},
+    "blended": {"prediction": "blended", "placement": "halves"},
+    "blended-charts": {"prediction": "blended", "placement": "charts"},
+    "tiles": {"prediction": "blended", "placement": "tiles"},
+    "outliers": {"prediction": "affine", "clusters": 1, "quality": 100},
+}
+LARGEST_ERROR = 0.001  # model units, of the file with corrections
+LENGTHS = [2] * 13 + [9]  # frames that each picture is shown for, where frames repeat
+
+Mask = npt.NDArray[np.bool_]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
+    """A folder with both pages and both bundles, and its address."""
+    folder = tmp_path_factory.mktemp("site")
+    pages.write_pages(folder)
+    with browsers.served(folder) as address:
+        yield folder, address
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    with browsers.browser("chromium", tmp_path_factory.mktemp("profile")) as driver:
+        yield driver
+
+
+@pytest.fixture
+def module(browser: Any, site: tuple[Path, str]) -> Callable[..., Any]:
+    """``module(body, *arguments)`` runs an asynchronous function's body in a page that has imported the module."""
+    browser.get(f"{site[1]}/module.html")
+    return lambda body, *arguments: run(browser, body, *arguments)
+
+
+@pytest.fixture
+def player(browser: Any, site: tuple[Path, str]) -> Callable[..., Any]:
+    """The same in a page with a player, which is `element` there."""
+    browser.get(f"{site[1]}/player.html")
+    return lambda body, *arguments: run(browser, "const element = document.querySelector('geometry-video');" + body, *arguments)
+
+
+def _encode(site: tuple[Path, str], sequence: MeshSequence, name: str = "x.mp4", **settings: Any) -> Path:
+    gvpipe.encode(sequence, site[0] / name, **{**FAST, **settings})
+    return site[0] / name
+
+
+@slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_frames_of_a_sample_equal_pythons(kind: str, module: Callable[..., Any], site: tuple[Path, str], samples: Path) -> None:
+    gvpipe.encode(samples / "creature.npz", site[0] / "creature.mp4", preset="fast", **KINDS[kind])
+    check_frames(module, site[0] / "creature.mp4")
+
+
+@slow
+@pytest.mark.skipif(not SAMBA.exists(), reason="no ../shared/data")
+@pytest.mark.parametrize("kind", ["affine", "blended", "tiles"])
+def test_frames_of_samba_equal_pythons(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    gvpipe.encode(SAMBA, site[0] / "samba.mp4", preset="veryfast", **KINDS[kind])
+    check_frames(module, site[0] / "samba.mp4")
+
+
+@slow
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("sequence", awkward().values(), ids=lambda sequence: sequence.name)
+def test_frames_of_awkward_inputs_equal_pythons(
+    sequence: MeshSequence, kind: str, module: Callable[..., Any], site: tuple[Path, str]
+) -> None:
+    check_frames(module, _encode(site, sequence, **KINDS[kind]))
+
+
+@slow
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("reorder", [False, True])
+def test_frames_of_seams_and_still_vertices_equal_pythons(
+    reorder: bool, kind: str, module: Callable[..., Any], site: tuple[Path, str]
+) -> None:
+    """Slots are fewer than vertices: pixels, weights and outliers are theirs, and some vertices have none."""
+    path = _encode(site, patched(), reorder=reorder, **KINDS[kind])
+    bitstream = read_file(path)
+    header = Header.of(bitstream)
+    surface = read_surface(bitstream, header)
+    assert surface.n_slots < len(surface.vertices) < bitstream.n_vertices
+    assert header.outliers or kind != "outliers"
+    check_frames(module, path)
+
+
+@slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_frames_of_what_never_moves_equal_pythons(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    """One distinct frame; and, where the codec is asked directly, nothing but still points."""
+    sequence, path = patched(still=1.0), site[0] / "x.mp4"
+    check_frames(module, _encode(site, sequence, **KINDS[kind]))
+    write_file(make_codec("mcgv", {**FAST, **KINDS[kind]}).encode(sequence).bitstream, path)
+    assert "still" in read_file(path).sections
+    check_frames(module, path)
+
+
+@pytest.mark.parametrize("lengths", [[1] * 60, [3, *[1] * 58, 5]], ids=["", "held"])
+@pytest.mark.parametrize("settings", [{}, {"segment": 25, "reorder": True}], ids=str)
+def test_frames_without_pictures_equal_pythons(
+    settings: dict[str, Any], lengths: list[int], module: Callable[..., Any], site: tuple[Path, str]
+) -> None:
+    gvpipe.encode(held(rigid(), lengths), site[0] / "x.mp4", **settings)
+    assert read_file(site[0] / "x.mp4").header["pictures"] is False
+    check_frames(module, site[0] / "x.mp4")
+
+
+def test_a_file_without_pictures_plays(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    gvpipe.encode(rigid(), site[0] / "x.mp4")
+    shown = module(
+        """const video = await GeometryVideo.load(args[0]);
+        const shown = [];
+        await new Promise((ended, failed) => video.play((_, k) => shown.push(k), { rate: 4, ended, failed }));
+        video.close();
+        return shown;""",
+        "x.mp4",
+    )
+    assert shown == sorted(shown) and shown[0] == 0 and shown[-1] == 59
+
+
+@pytest.mark.parametrize("fps", [0.5, 12.0, 29.97, 59.94, 240.0])
+def test_frames_at_any_rate(fps: float, module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    check_frames(module, _encode(site, dataclasses.replace(waving(8, 30), fps=fps)))
+
+
+@slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_frames_of_several_segments_in_the_codecs_order(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    settings = {"segment": 11, "reorder": True, "quality": 95, **KINDS[kind]}
+    check_frames(module, _encode(site, waving(10, 50), **settings))
+
+
+@slow
+@pytest.mark.parametrize("kind", ["affine-halves", "blended", "tiles"])
+def test_frames_on_the_finest_lattice(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    """Where integers are largest: sums that decide pixels and contexts must be exact still."""
+    check_frames(module, _encode(site, waving(20, 12), base_bits=20, quality=100, **KINDS[kind]))
+
+
+@slow
+def test_frames_are_corrected(module: Callable[..., Any], site: tuple[Path, str], kinds: dict[str, Bitstream]) -> None:
+    """Files with a bound on every vertex keep it in the browser: all frames, over several groups of corrections."""
+    sequence, bitstream = patched(), kinds["corrected"]
+    write_file(bitstream, site[0] / "corrected.mp4")
+    check_frames(module, site[0] / "corrected.mp4")
+    frames = module(FRAMES, "corrected.mp4", [*range(12)])["frames"]
+    found = np.stack([np.frombuffer(base64.b64decode(text), "<f4").reshape(-1, 3) for text in frames])
+    plain = open_reader(kinds["patched"]).read(0, 12)
+    before, after = (np.linalg.norm(sequence.positions - p, axis=2).max() for p in (plain, found))
+    assert after <= LARGEST_ERROR < before
+
+
+@slow
+@pytest.mark.parametrize("bound", [None, "0.02%"], ids=["", "max-error"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_repeated_frames_equal_pythons(
+    kind: str, bound: str | None, module: Callable[..., Any], site: tuple[Path, str]
+) -> None:
+    """Every frame twice, the last held: the file codes each once, and so do its segments and corrections."""
+    sequence = held(waving(9, len(LENGTHS)), LENGTHS)
+    path = _encode(site, sequence, segment=6, max_error=bound, **KINDS[kind])
+    assert {"holds", *(["corrections"] if bound else [])} <= set(read_file(path).sections)
+    check_frames(module, path, count=sum(LENGTHS))
+
+
+def test_frames_of_golden_files(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    versions = set()
+    for path in sorted(GOLDEN.glob("mcgv-*.mp4")):
+        bitstream = read_file(path)
+        if bitstream.header.get("profile", "h264-8") == "h264-8" and "transform" not in bitstream.header:
+            versions.add(bitstream.version)
+            shutil.copy(path, site[0])
+            check_frames(module, site[0] / path.name, gvpipe.read(path.with_suffix(".npz")))
+    assert versions >= {1, 2, 3, 4}
+
+
+@slow
+def test_bounds_hold_what_never_moves(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    path = _encode(site, patched(), prediction="blended")
+    bounds = module(FRAMES, path.name, [0])["bounds"]
+    positions = np.asarray(gvpipe.decode(path).positions[:])
+    still = (positions == positions[0]).all(axis=(0, 2))
+    assert still.any() and not still.all()
+    assert (bounds["min"] <= positions[0, still].min(axis=0)).all()
+    assert (bounds["max"] >= positions[0, still].max(axis=0)).all()
+
+
+@slow
+@pytest.mark.parametrize("kind", ["affine", "blended"])
+def test_bounds_hold_the_motion(kind: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    path = _encode(site, waving(), quality=95, **{"clusters": 12, **KINDS[kind]})
+    bounds = module(FRAMES, path.name, [0])["bounds"]
+    positions = np.asarray(gvpipe.decode(path).positions[:])
+    low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
+    slack = 0.2 * np.linalg.norm(high - low)
+    assert (bounds["min"] <= low + 0.02).all() and (bounds["min"] >= low - slack).all()
+    assert (bounds["max"] >= high - 0.02).all() and (bounds["max"] <= high + slack).all()
+
+
+@slow
+def test_module_plays_every_frame_that_is_due(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    path = _encode(site, waving(10, 24))
+    frames, matches = module(
+        """const video = await GeometryVideo.load(args[0]);
+        const played = new Map();
+        await new Promise((resolve, reject) =>
+          video.play((positions, k) => played.set(k, positions.slice()), { rate: 0.5, ended: resolve }).catch(reject));
+        let matches = 0;
+        for (const [k, positions] of played) if ((await video.frame(k)).every((x, i) => x === positions[i])) matches++;
+        return [[...played.keys()], matches];""",
+        path.name,
+    )
+    assert frames == sorted(set(frames))
+    assert len(frames) >= 8  # of 24; on an idle machine all
+    assert matches == len(frames)
+
+
+@slow
+@pytest.mark.parametrize("decoder", ["", "delete window.VideoDecoder;"], ids=["webcodecs", "video"])
+def test_repeated_frames_play_in_order(decoder: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    """From a frame sought to the end, at the sequence's own pace; each with its own positions."""
+    path = _encode(site, held(waving(10, len(LENGTHS)), LENGTHS))
+    shown, wrong, seconds, after = module(
+        decoder
+        + """const video = await GeometryVideo.load(args[0]);
+        const wanted = [];
+        for (let k = 0; k < video.frameCount; k++) wanted.push(await video.frame(k));
+        const same = (positions, k) => positions.every((x, i) => x === wanted[k][i]);
+        await video.frame(5);
+        const [shown, wrong] = [[], []];
+        const start = performance.now();
+        const show = (positions, k) => (shown.push(k), same(positions, k) || wrong.push(k));
+        await new Promise((resolve, reject) => video.play(show, { ended: resolve, failed: reject }).catch(reject));
+        const seconds = (performance.now() - start) / 1000;
+        const after = [];
+        for (const k of [34, 26, 25, 0, 13, 12]) after.push(same(await video.frame(k), k));
+        return [shown, wrong, seconds, after];""",
+        path.name,
+    )
+    assert shown == sorted(set(shown)) and shown[0] in range(5, 12) and shown[-1] == sum(LENGTHS) - 1, shown
+    assert len(shown) >= 10  # of 30; on an idle machine all
+    assert not wrong and all(after), (wrong, after)
+    assert seconds > 0.8 * 30 / 24
+
+
+@slow
+def test_overlapping_requests_are_answered_in_turn(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    path = _encode(site, waving(10, 24))
+    same = module(
+        """const video = await GeometryVideo.load(args[0]);
+        const together = await Promise.all([20, 3, 11, 0].map((k) => video.frame(k)));
+        const outside = await video.frame(24).catch((error) => error.name);
+        const alone = [];
+        for (const k of [20, 3, 11, 0]) alone.push(await video.frame(k));
+        return [alone.every((frame, i) => frame.every((x, j) => x === together[i][j])), outside];""",
+        path.name,
+    )
+    assert same == [True, "RangeError"]
+
+
+# --- files that cannot be played ---------------------------------------------------------------------------------------------
+
+
+def _flipped(data: bytes, position: int) -> bytes:
+    return data[:position] + bytes([data[position] ^ 0x55]) + data[position + 1 :]
+
+
+def _remuxed(data: bytes) -> bytes:
+    """The video and its tags without gvpipe's box."""
+    size = 0
+    while data[size + 4 : size + 8] != b"uuid":
+        size += struct.unpack_from(">I", data, size)[0]
+    return data[:size]
+
+
+BROKEN: dict[str, tuple[str, Callable[[bytes], bytes]]] = {
+    "empty": ("truncated", lambda data: b""),
+    "half": ("truncated", lambda data: data[: len(data) // 2]),
+    "one byte short": ("truncated", lambda data: data[:-1]),
+    "no MP4": ("not-geometry-video", lambda data: b"<!doctype html><p>Not found</p>"),
+    "stripped": ("stripped", _remuxed),
+    "foreign": ("not-geometry-video", lambda data: _remuxed(data).replace(b"gvpipe 1 ", b"someone 1")),
+    "newer": ("newer", lambda data: data.replace(b"gvpipe\r\n\x01\x00", b"gvpipe\r\n\x02\x00")),
+    "stray bytes": ("corrupt", lambda data: data + bytes(16)),
+    "last section": ("corrupt", lambda data: _flipped(data, len(data) - 5)),
+    "magic": ("corrupt", lambda data: _flipped(data, data.index(b"gvpipe\r\n"))),
+    "table": ("corrupt", lambda data: _flipped(data, data.index(b"gvpipe\r\n") + 14)),
+    "picture": ("corrupt", lambda data: _flipped(data, data.index(b"mdat") + 900)),
+    "other file's id": (
+        "corrupt",
+        lambda data: data.replace(data[(i := data.index(b"gvpipe 1 ")) : i + 41], b"gvpipe 1 " + b"0" * 32),
+    ),
+}
+
+
+@slow
+@pytest.mark.parametrize("case", BROKEN)
+def test_broken_files_are_told_apart(case: str, module: Callable[..., Any], site: tuple[Path, str], video_bytes: bytes) -> None:
+    kind, damage = BROKEN[case]
+    (site[0] / "broken.mp4").write_bytes(damage(video_bytes))
+    found = module(
+        """const load = GeometryVideo.load(args[0]);
+        return load.then(() => "loaded", (e) => [e instanceof GeometryVideoError, e.kind, e.message])""",
+        "broken.mp4",
+    )
+    assert found[:2] == [True, kind], found
+    assert "\n" not in found[2]
+
+
+@slow
+def test_a_damaged_index_gives_one_clear_error(module: Callable[..., Any], site: tuple[Path, str], video_bytes: bytes) -> None:
+    """No checksum covers the video's tables: whatever they hold, the file opens or there is one error of ours."""
+    first, end = video_bytes.index(b"stbl"), video_bytes.index(b"mdat")
+    positions = np.random.default_rng(5).integers(first, end - 8, 60).tolist()
+    for kind in (b"stsz", b"stco", b"stsc", b"stts", b"ctts", b"stss"):
+        if kind in video_bytes:
+            positions += [video_bytes.index(kind) + offset for offset in (8, 9, 11, 15)]  # numbers of rows, and the first row
+    for i, position in enumerate(positions):
+        (site[0] / f"i{i}.mp4").write_bytes(_flipped(video_bytes, position))
+    outcomes = module(
+        """const outcomes = [];
+        for (let i = 0; i < args[0]; i++) {
+          const outcome = await GeometryVideo.load(`i${i}.mp4`).then((video) => (video.close(), "loaded"),
+            (error) => (error instanceof GeometryVideoError ? error.kind : String(error.stack)));
+          outcomes.push(outcome);
+        }
+        return outcomes;""",
+        len(positions),
+    )
+    assert set(outcomes) <= {"loaded", "corrupt", "unsupported", "not-geometry-video"}, outcomes
+    assert outcomes.count("corrupt") > 10
+
+
+@slow
+def test_a_file_that_is_not_there(module: Callable[..., Any]) -> None:
+    for address in ("nothing.mp4", "http://127.0.0.1:9/x.mp4"):
+        assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", address) == "load"
+
+
+KLT = {"prediction": "blended", "transform": "klt"}
+
+
+@slow
+@pytest.mark.parametrize("settings", [{"codec": "pca"}, {"profile": "precise"}, {"image": "jpeg"}, KLT], ids=str)
+def test_files_not_for_browsers_say_so(settings: dict[str, str], module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    gvpipe.encode(waving(6, 5), site[0] / "other.mp4", **settings)
+    kind, message = module("return GeometryVideo.load(args[0]).catch((error) => [error.kind, error.message])", "other.mp4")
+    assert kind == "unsupported"
+    assert "export-html" in message
+
+
+@slow
+@pytest.mark.parametrize(("field", "value"), [("n_frames", 12), ("n_frames", 1 << 24), ("n_vertices", 71), ("n_triangles", 1)])
+def test_counts_that_do_not_fit_are_noticed(
+    field: str, value: int, module: Callable[..., Any], site: tuple[Path, str], video: Path
+) -> None:
+    write_file(dataclasses.replace(read_file(video), **{field: value}), site[0] / "counts.mp4")
+    assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", "counts.mp4") == "corrupt"
+
+
+@pytest.fixture(scope="module")
+def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Bitstream]:
+    """A small file of each kind."""
+    path = tmp_path_factory.mktemp("kinds") / "x.mp4"
+    found = {}
+    for kind, settings in KINDS.items():
+        gvpipe.encode(waving(9, 12), path, **{**FAST, **settings})
+        found[kind] = read_file(path)
+    sequence = patched()
+    gvpipe.encode(sequence, path, **{**FAST, "prediction": "blended"})
+    found["patched"] = plain = read_file(path)
+    bound = Bound.of(LARGEST_ERROR, float(np.abs(sequence.positions).max()))
+    section, _ = encode_corrections(sequence, open_reader(plain), bound)
+    found["corrected"] = dataclasses.replace(plain, sections={**plain.sections, "corrections": section})
+    gvpipe.encode(held(waving(9, len(LENGTHS)), LENGTHS), path, **FAST)
+    found["held"] = read_file(path)
+    gvpipe.encode(waving(9, 12), path, preset="ultrafast", quality=30)
+    found["calm"] = read_file(path)
+    assert "outliers" not in found["calm"].sections
+    return found
+
+
+@slow
+@pytest.mark.parametrize(
+    ("kind", "settings"),
+    [
+        ("affine", {"width": 16}),
+        ("affine", {"height": 0}),
+        ("affine", {"block": 7}),
+        ("affine", {"clusters": 2000}),
+        ("affine", {"segments": 99}),
+        ("affine", {"base": [0, 0, 1]}),
+        ("affine", {"residual_step": -1}),
+        ("blended", {"prediction": "guessed"}),
+        ("blended", {"prediction": None}),
+        ("blended", {"prediction": "affine"}),
+        ("blended", {"placement": "anywhere"}),
+        ("blended", {"placement": "charts"}),
+        ("blended", {"block": 4}),
+        ("tiles", {"block": 4}),
+        ("tiles", {"prediction": "affine"}),
+        ("blended", {"clusters": 1}),
+        ("affine-halves", {"prediction": "blended"}),
+        ("blended-charts", {"placement": ["charts"]}),
+        ("outliers", {"outliers": 1}),
+        ("calm", {"outliers": True}),
+    ],
+    ids=str,
+)
+def test_settings_out_of_range_are_noticed(
+    kind: str, settings: dict[str, Any], module: Callable[..., Any], site: tuple[Path, str], kinds: dict[str, Bitstream]
+) -> None:
+    bitstream = kinds[kind]
+    write_file(dataclasses.replace(bitstream, header={**bitstream.header, **settings}), site[0] / "settings.mp4")
+    assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", "settings.mp4") == "corrupt"
+
+
+@slow
+@pytest.mark.parametrize(
+    ("kind", "section"),
+    [
+        ("affine", "mesh"),
+        ("affine", "order"),
+        ("affine", "pixels"),
+        ("affine", "clusters"),
+        ("affine", "transforms.0"),
+        ("affine-halves", "clusters"),
+        ("blended", "mesh"),
+        ("blended", "weights"),
+        ("blended", "transforms.0"),
+        ("tiles", "charts"),
+        ("corrected", "corrections"),
+        ("outliers", "outliers"),
+        ("patched", "mesh"),
+        ("patched", "order"),
+        ("patched", "still"),
+        ("patched", "weights"),
+        ("held", "holds"),
+    ],
+)
+def test_hostile_sections_give_one_clear_error(
+    kind: str, section: str, module: Callable[..., Any], site: tuple[Path, str], kinds: dict[str, Bitstream]
+) -> None:
+    """Sections changed, cut or lengthened under right checksums: JavaScript's own checks, and no other error ever."""
+    bitstream = kinds[kind]
+    data = bitstream.sections[section]
+    rng = np.random.default_rng(11)
+    variants = [b"", data[: len(data) // 2], data[:-1], data + b"\0", bytes(len(data)), b"\xff" * len(data)]
+    variants += [_flipped(data, int(position)) for position in rng.integers(0, len(data), 40)]
+    wanted = []
+    for i, variant in enumerate(variants):
+        path = site[0] / f"h{i}.mp4"
+        write_file(dataclasses.replace(bitstream, sections={**bitstream.sections, section: variant}), path)
+        wanted.append(_outcome(path))
+    outcomes = module(
+        """const outcomes = [];
+        for (let i = 0; i < args[0]; i++) {
+          const outcome = await GeometryVideo.load(`h${i}.mp4`).then((video) => (video.close(), "loaded"),
+            (error) => (error instanceof GeometryVideoError ? error.kind : String(error.stack)));
+          outcomes.push(outcome);
+        }
+        return outcomes;""",
+        len(variants),
+    )
+    assert set(outcomes) <= {"loaded", "corrupt"}, [outcome for outcome in outcomes if outcome not in ("loaded", "corrupt")]
+    assert outcomes[2] == "corrupt"  # cut short
+    differing = [(i, found, python) for i, (found, python) in enumerate(zip(outcomes, wanted, strict=True)) if found != python]
+    assert not differing, differing  # JavaScript refuses what Python refuses
+
+
+@slow
+@pytest.mark.parametrize("lengths", [[5, 0, 7], [3, 4], [14, -2], [1] * 13, [1 << 38, 5], [12], [6, 6], []], ids=str)
+def test_wrong_holds_are_refused(
+    lengths: list[int], module: Callable[..., Any], site: tuple[Path, str], kinds: dict[str, Bitstream]
+) -> None:
+    """Runs that do not add up to the header's frames, or that are not of as many pictures as the video has."""
+    plain = kinds["blended"]
+    wrong = add_repeated_frames(plain, RepeatedFrames(np.array(lengths, np.int64)), plain.version)
+    path = site[0] / "holds.mp4"
+    write_file(dataclasses.replace(wrong, n_frames=plain.n_frames), path)
+    assert _outcome(path) == "corrupt"
+    assert module("return GeometryVideo.load(args[0]).catch((error) => error.kind)", path.name) == "corrupt"
+
+
+def _outcome(path: Path) -> str:
+    try:
+        sequence = gvpipe.decode(path)
+        sequence.read(0, sequence.n_frames)
+    except CorruptFile:
+        return "corrupt"
+    return "loaded"
+
+
+# --- the player --------------------------------------------------------------------------------------------------------------
+
+PAINTED = "await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(resolve, 50))));"
+
+
+def silhouette(points: npt.NDArray[np.float64], faces: npt.NDArray[np.int32], size: tuple[int, int]) -> Mask:
+    """Which pixels of a picture triangles cover, by the CPU renderer; ``points (V, 2)`` in pixels."""
+    width, height = size
+    flat = np.column_stack([points[:, 0], height - points[:, 1], np.zeros(len(points))]).astype(np.float32)
+    field = 28.0  # degrees; at this distance a unit is a pixel
+    distance = height / 2 / np.tan(np.radians(field) / 2)
+    camera = gvpipe.Camera((width / 2, height / 2, 0.0), distance, azimuth=0.0, elevation=0.0, field_of_view=field)
+    mask: Mask = gvpipe.Renderer(faces, flat, size, samples=1).visible(flat, camera) >= 0
+    return mask
+
+
+@slow
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_the_picture_shows_the_mesh(
+    up: str, player: Callable[..., Any], browser: Any, site: tuple[Path, str], samples: Path
+) -> None:
+    if not (site[0] / "creature.mp4").exists():
+        gvpipe.encode(samples / "creature.npz", site[0] / "creature.mp4", preset="fast")
+    projection, box = player(
+        f"""element.setAttribute("up", args[1]); {LOAD}
+        await element.seek(70); {PAINTED}
+        const {{ x, y, width, height }} = element.shadowRoot.querySelector("canvas").getBoundingClientRect();
+        return [element.projection, [x, y, width, height]];""",
+        "creature.mp4",
+        up,
+    )
+    x, y, width, height = (round(value) for value in box)
+    shown = np.asarray(Image.open(io.BytesIO(browser.get_screenshot_as_png())).convert("RGB"), int)[
+        y : y + height, x : x + width
+    ]
+    drawn = np.abs(shown - [255, 0, 255]).max(axis=2) > 30
+    with gvpipe.open(site[0] / "creature.mp4") as video:
+        homogeneous = np.column_stack([video[70], np.ones(video.shape[1])]) @ np.reshape(projection, (4, 4))
+        points = (homogeneous[:, :2] / homogeneous[:, 3:] * [0.5, -0.5] + 0.5) * [width, height]
+        expected = silhouette(points, video.faces, (width, height))
+    assert expected.sum() > 2000
+    assert (drawn & expected).sum() / (drawn | expected).sum() > 0.93
+    inside = shown[drawn & expected]
+    assert inside.std(axis=0).max() > 10  # shaded, not one flat colour
+
+
+@slow
+def test_seek_pause_and_end(player: Callable[..., Any], site: tuple[Path, str]) -> None:
+    path = _encode(site, waving(10, 36))
+    result = player(
+        f"""{LOAD}
+        const result = {{ start: [element.currentFrame, element.paused] }};
+        await element.seek(20);
+        result.sought = [element.currentFrame, element.paused];
+        await Promise.all([30, 2, 17, 9].map((k) => element.seek(k)));
+        result.last = element.currentFrame;
+        const frames = [];
+        element.addEventListener("frame", (event) => frames.push(event.detail));
+        const until = (test) => new Promise((resolve) => element.addEventListener("frame", () => test() && resolve()));
+        element.play();
+        await until(() => frames.length >= 3);
+        element.pause();
+        result.paused = [element.currentFrame, element.paused];
+        await new Promise((resolve) => setTimeout(resolve, 300));
+        result.still = [element.currentFrame, frames.length];
+        result.played = frames.slice();
+        const ended = new Promise((resolve) => element.addEventListener("ended", resolve, {{ once: true }}));
+        element.play();
+        await ended;
+        result.end = [element.currentFrame, element.paused];
+        frames.length = 0;
+        element.play();
+        await until(() => frames.length >= 3);
+        result.again = [frames[0], element.paused];
+        element.pause();
+        return result;""",
+        path.name,
+    )
+    assert result["start"] == [0, True]
+    assert result["sought"] == [20, True]
+    assert result["last"] == 9  # of many calls in a row the last counts
+    assert result["played"] == sorted(set(result["played"])) and result["played"][0] >= 9
+    assert result["paused"] == [result["played"][-1], True]
+    assert result["still"] == [result["played"][-1], len(result["played"])]
+    assert result["end"][0] >= 34 and result["end"][1] is True
+    assert result["again"] == [0, False]  # from the start
+
+
+@slow
+def test_loop_and_speed(player: Callable[..., Any], site: tuple[Path, str]) -> None:
+    path = _encode(site, waving(10, 24))  # one second long
+    frames = player(
+        f"""element.setAttribute("loop", ""); {LOAD}
+        element.setAttribute("speed", "2");
+        const frames = [];
+        element.addEventListener("frame", (event) => frames.push(event.detail));
+        element.play();
+        await new Promise((resolve) => setTimeout(resolve, 3000));
+        const paused = element.paused;
+        element.pause();
+        return paused ? null : frames;""",
+        path.name,
+    )
+    assert frames is not None
+    turns = int((np.diff(frames) < 0).sum())
+    assert 2 <= turns <= 7  # 6 on an idle machine
+
+
+@slow
+def test_late_frames_are_dropped_not_queued(player: Callable[..., Any], site: tuple[Path, str]) -> None:
+    """A page that needs 100 ms for each frame of 24 a second still plays a second in about a second."""
+    path = _encode(site, waving(10, 48))
+    seconds, frames = player(
+        f"""{LOAD}
+        const frames = [];
+        element.addEventListener("frame", (event) => {{
+          frames.push(event.detail);
+          for (const end = performance.now() + 100; performance.now() < end; );
+        }});
+        const ended = new Promise((resolve) => element.addEventListener("ended", resolve));
+        const start = performance.now();
+        element.play();
+        await ended;
+        return [(performance.now() - start) / 1000, frames];""",
+        path.name,
+    )
+    assert seconds < 4  # queued, it would be 4.8 and more
+    assert frames == sorted(set(frames)) and 4 <= len(frames) <= 24
+
+
+@slow
+def test_controls_by_mouse_and_keyboard(player: Callable[..., Any], browser: Any, site: tuple[Path, str]) -> None:
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    path = _encode(site, waving(10, 24))
+    player(LOAD, path.name)
+    root = browser.find_element("css selector", "geometry-video").shadow_root
+    state = "await element.seek(element.currentFrame); return [element.currentFrame, element.paused]"
+
+    def press(*keys: str) -> Any:
+        ActionChains(browser).send_keys(*keys).perform()
+        return player("await new Promise((resolve) => setTimeout(resolve, 300));" + state)
+
+    root.find_element("css selector", "[data-act=forward]").click()
+    player("for (let i = 0; i < 5; i++) element.shadowRoot.querySelector('[data-act=forward]').click()")
+    assert press() == [6, True]  # each counts, however fast they come
+    root.find_element("css selector", "canvas").click()
+    assert press(Keys.END) == [23, True]
+    assert press(Keys.ARROW_LEFT) == [22, True]
+    assert press(Keys.HOME) == [0, True]
+    before = player("return element.projection")
+    ActionChains(browser).key_down(Keys.SHIFT).send_keys(Keys.ARROW_RIGHT).key_up(Keys.SHIFT).perform()
+    turned = player("return element.projection")
+    assert not np.allclose(before, turned)
+    ActionChains(browser).send_keys("r").perform()
+    assert np.allclose(player("return element.projection"), before)
+    ActionChains(browser).drag_and_drop_by_offset(root.find_element("css selector", "canvas"), 80, 10).perform()
+    assert not np.allclose(before, player("return element.projection"))
+    ActionChains(browser).send_keys("wl>").perform()
+    attributes = "return ['wireframe', 'loop', 'speed'].map((name) => element.getAttribute(name))"
+    assert player(attributes) == ["", "", "2"]
+    ActionChains(browser).send_keys(" ").perform()
+    assert player("return element.paused") is False
+    ActionChains(browser).send_keys("c").perform()
+    assert player("return element.hasAttribute('follow')")
+    fullscreen = "await new Promise((resolve) => setTimeout(resolve, 500)); return document.fullscreenElement === element"
+    root.find_element("css selector", "[data-act=fullscreen]").click()
+    assert player(fullscreen)
+    ActionChains(browser).send_keys("f").perform()
+    assert not player(fullscreen)
+
+
+@slow
+def test_size_and_bit_rate_are_shown(player: Callable[..., Any], site: tuple[Path, str]) -> None:
+    path = _encode(site, waving(10, 48))
+    facts = player(f"{LOAD} return element.shadowRoot.querySelector('.facts').textContent", path.name).replace("\xa0", " ")
+    size = path.stat().st_size
+    for fact in (
+        "100 vertices",
+        "162 triangles",
+        "48 frames at 24 fps",
+        f"{size / 1e3:.1f} kB",
+        f"{8 * size / 2e3:.0f} kbit/s",
+    ):
+        assert fact in facts
+
+
+@slow
+def test_a_corrupt_file_shows_an_error_in_the_page(
+    player: Callable[..., Any], site: tuple[Path, str], video_bytes: bytes
+) -> None:
+    (site[0] / "broken.mp4").write_bytes(_flipped(video_bytes, len(video_bytes) - 5))
+    shown = player(
+        """const failed = new Promise((resolve) => element.addEventListener("error", resolve, { once: true }));
+        element.setAttribute("src", "broken.mp4");
+        await failed;
+        const message = element.shadowRoot.querySelector("[role=alert]");
+        return [message.textContent, message.checkVisibility(), element.shadowRoot.querySelector(".bar").inert];"""
+    )
+    assert "is corrupt: its checksum does not match" in shown[0]
+    assert shown[1:] == [True, True]
+    recovered = player(f"{LOAD} return element.shadowRoot.querySelector('.message').textContent", _encode(site, waving()).name)
+    assert recovered == ""
+
+
+# --- the page of one file ----------------------------------------------------------------------------------------------------
+
+
+def test_exported_page_opens_from_a_disk_and_plays(browser: Any, video: Path, tmp_path: Path) -> None:
+    gvpipe.export_html(video, tmp_path / "page.html")
+    browser.get((tmp_path / "page.html").as_uri())
+    frames, requests, title = run(
+        browser,
+        """const element = document.querySelector("geometry-video");
+        const frames = new Set();
+        await new Promise((resolve, reject) => {
+          element.addEventListener("frame", (event) => frames.add(event.detail) && frames.size > 5 && resolve());
+          element.addEventListener("error", (event) => reject(event.detail));
+          setTimeout(() => reject(new Error(`only frames ${[...frames]}`)), 20000);
+        });
+        const requests = performance.getEntriesByType("resource").map((entry) => entry.name);
+        return [[...frames], requests, document.title];""",
+    )
+    assert set(frames) <= set(range(11))
+    assert all(request.startswith(("blob:", "data:")) for request in requests), requests
+    assert title == "tube"
+
+
+@slow
+def test_the_element_as_the_docs_show_it(browser: Any, site: tuple[Path, str]) -> None:
+    _encode(site, waving(10, 24), "walk.mp4")
+    (page,) = re.findall(r"```html\n(.*?)```", PLAYER_PAGE, re.DOTALL)
+    (site[0] / "docs.html").write_text(page)
+    browser.get(f"{site[1]}/docs.html")
+    played = """const element = document.querySelector("geometry-video");
+        await new Promise((resolve) => element.addEventListener("frame", () => !element.paused && resolve()));
+        return element.video.frameCount;"""
+    assert run(browser, played) == 24
+
+
+@slow
+def test_the_module_as_the_docs_show_it(module: Callable[..., Any], browser: Any, site: tuple[Path, str]) -> None:
+    _encode(site, waving(10, 24), "walk.mp4")
+    (script,) = re.findall(r"```js\n(.*?)```", PLAYER_PAGE, re.DOTALL)
+    drawn = "window.draw = (positions, indices) => { window.drawn = [positions.length, indices.length] };"
+    (site[0] / "docs.html").write_text(f"<!doctype html><script>{drawn}</script><script type=module>{script}</script>")
+    browser.get(f"{site[1]}/docs.html")
+    wait = "while (!window.drawn) await new Promise((resolve) => setTimeout(resolve, 50)); return window.drawn;"
+    assert run(browser, wait) == [300, 3 * 162]
