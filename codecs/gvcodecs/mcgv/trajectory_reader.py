@@ -22,6 +22,7 @@ from gvcodecs.mcgv.reader import read_layout
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvpipe.arrays import Float32, Float64, Int32
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.cursor import Cursor
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import VideoReader
@@ -124,7 +125,7 @@ class TrajectoryReader:
             n_frames = self._bounds[s + 1] - self._bounds[s]
             data = self._bitstream.section(name)
             samples, step = self._samples(s), self._images.steps[s]
-            basis, coefficients = decode_segment(data, samples, step, self._shared.matrix, point, n_frames, name)
+            basis, coefficients = decode_segment(Cursor(data, name), samples, step, self._shared.matrix, point, n_frames)
             self._segment = _Segment(s, basis, coefficients)
         return self._segment
 

@@ -36,7 +36,7 @@ def _predict(job: Job, start: Start) -> tuple[CodedMotion, Layout]:
     job.report("segment", 0)
     clusters = segment(start.sequence, start.base, start.points.neighbours, job.settings.clusters or CLUSTERS)
     layout = lay_out(job, start, clusters, clusters)
-    motion = code_affine(start.sequence, start.base, clusters, start.bounds, step, job.report)
+    motion = code_affine(start, clusters, step, job.report)
     if start.placement == "halves":
         section = encode_slot_clusters(clusters)
     else:

@@ -11,5 +11,5 @@ from gvcodecs.mcgv.motion.skinning_fit import Fitted
 
 def code_skinning_alone(job: Job, start: Start, fitted: Fitted) -> Coded:
     """Code what a start holds as a blend alone."""
-    motion = code_blended(start.sequence, start.base, start.points, fitted, start.bounds, start.step, job.report)
+    motion = code_blended(start, fitted, job.report)
     return Coded(None, {"clusters": motion.n_clusters, "transform_step": motion.step}, motion.sections, b"", motion.predict)

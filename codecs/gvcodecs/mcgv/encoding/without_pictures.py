@@ -39,7 +39,8 @@ def omit_pictures(trials: Trials, step: float, wanted: float, band: tuple[float,
         wanted: the target error.
         band: least and most part of it that is close enough.
     """
-    alone, idle = trials.alone, trials.are_pictures_idle(step)
+    alone = trials.alone
+    idle = trials.are_pictures_idle(step) and alone(step).error <= wanted
     if not idle and not _are_pictures_dear(trials, step, wanted):
         return None
     aimed = mend(alone, step, wanted, band, SLOPE, MAX_ROUNDS)
