@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.base.start import Start, begin
 from gvcodecs.mcgv.job import Job
 from gvcodecs.mcgv.motion.skinning import Weights
@@ -44,11 +45,15 @@ class Anchor:
 
 def rebase(job: Job, candidate: Candidate, step: float, wanted: float) -> Candidate:
     """The same points and blend, without pictures, on the base frame of another step and target error, model units."""
+    from gvcodecs.mcgv.motion.weight_order_kernels import sort_by_rank
+
     given, fitted = candidate.start, candidate.fitted
     assert fitted
     start = dataclasses.replace(begin(job, step, wanted, given.point), pictures=False)
     number = np.empty(len(given.point), np.int64)
     number[given.point[given.sources]] = np.arange(len(given.sources))
     before = number[start.point[start.sources]]  # the number that each point had
-    weights = Weights(fitted.weights.clusters[before], fitted.weights.weights[before])
-    return Candidate(start, Fitted(weights, fitted.n_clusters))
+    clusters, weights = fitted.weights.clusters[before], fitted.weights.weights[before]
+    causal = causal_neighbours(start.points.neighbours)  # other numbers, other causal neighbours: ranks change
+    sort_by_rank(causal.starts, causal.near, clusters, weights)
+    return Candidate(start, Fitted(Weights(clusters, weights), fitted.n_clusters))

@@ -83,12 +83,14 @@ def _begin(job: Job, step: float, wanted: float, fitted_for: float) -> tuple[Tri
 
 def _fit_again(trials: Trials, step: float, wanted: float) -> tuple[Trials, float]:
     """Where the error is far off, another step wants another blend, and another base frame; return what costs less."""
-    first = trials.cheapest(step)
+    if trials.are_pictures_idle(step) and FAR[0] <= trials.alone(step).error / wanted <= FAR[1]:
+        return trials, step
+    first = trials(step)
     if FAR[0] <= first.error / wanted <= FAR[1]:
         return trials, step
     factor = _limited(math.log(SECOND * wanted / max(first.error, LEAST * wanted)))
     others, other_step = _begin(trials.job, step * factor, wanted, 0.0)
-    return (trials, step) if cost(first) < cost(others.cheapest(other_step)) else (others, other_step)
+    return (trials, step) if cost(first) < cost(others(other_step)) else (others, other_step)
 
 
 def _limited(move: float) -> float:

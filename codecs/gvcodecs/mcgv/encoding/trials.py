@@ -50,10 +50,6 @@ class Trials:
             return False
         return self.alone(step).error <= ROUNDING * step
 
-    def cheapest(self, step: float) -> Aimed:
-        """Code with a step, model units, and with pictures where they may take away errors."""
-        return self.alone(step) if self.are_pictures_idle(step) else self(step)
-
 
 def encode(job: Job, candidate: Candidate, step: float) -> Encoded:
     """Code a candidate with a step, model units."""
