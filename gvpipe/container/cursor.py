@@ -64,7 +64,7 @@ class Cursor:
     def __init__(self, data: bytes, name: str) -> None:
         self._data = data
         self._position = 0
-        self._name = name
+        self.name = name
 
     @property
     def left(self) -> int:
@@ -113,4 +113,4 @@ class Cursor:
 
     def corrupt(self, what: str) -> CorruptFile:
         """Return the error that says ``what`` is wrong in this section."""
-        return corrupt_section(self._name, f"{what}")
+        return corrupt_section(self.name, f"{what}")

@@ -10,12 +10,12 @@ from functools import cached_property
 
 import numpy as np
 
-from gvcodecs.mcgv.base.surface import Surface, read_surface
+from gvcodecs.mcgv.base.surface import DecodedBase, read_surface
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.chart_coding import SECTION as CHARTS
 from gvcodecs.mcgv.layout.chart_coding import decode_charts
 from gvcodecs.mcgv.layout.coding import decode_clusters, decode_pixels, decode_slot_clusters
-from gvcodecs.mcgv.layout.kd_tree import place
+from gvcodecs.mcgv.layout.kd_tree import place_points
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.tiles import place_charts
 from gvcodecs.mcgv.motion.affine import AffineMotion
@@ -38,8 +38,8 @@ class McgvReader:
         CorruptFile: here or later: a section does not hold what it must.
     """
 
-    def __init__(self, bitstream: Bitstream) -> None:
-        self._header, self._bitstream = Header.of(bitstream), bitstream
+    def __init__(self, bitstream: Bitstream, header: Header) -> None:
+        self._header, self._bitstream = header, bitstream
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
         self._video = _open_video(bitstream, self._header, self._bounds)
         if self._video.n_frames != bitstream.n_frames:
@@ -58,7 +58,7 @@ class McgvReader:
         return self._surface.faces
 
     @cached_property
-    def _surface(self) -> Surface:
+    def _surface(self) -> DecodedBase:
         return read_surface(self._bitstream, self._header)
 
     @cached_property
@@ -112,7 +112,7 @@ def _open_video(bitstream: Bitstream, header: Header, bounds: list[int]) -> Vide
     return VideoReader(bitstream.video, header.profile, header.width, 3 * header.height)
 
 
-def read_layout(bitstream: Bitstream, header: Header, surface: Surface, groups: Integers | None = None) -> Layout:
+def read_layout(bitstream: Bitstream, header: Header, surface: DecodedBase, groups: Integers | None = None) -> Layout:
     """The slots' pixels in a file; by halves, ``groups (S,)`` belong together, connected pieces if not given.
 
     Raises:
@@ -124,7 +124,7 @@ def read_layout(bitstream: Bitstream, header: Header, surface: Surface, groups: 
         raise CorruptFile(f"header: planes of {header.width}x{header.height} do not hold {surface.n_slots} samples")
     if header.placement == "halves":
         groups = surface.points.pieces()[surface.point] if groups is None else groups
-        return place(surface.lattice, groups, header.width, header.height, header.block)
+        return place_points(surface.lattice, groups, header.width, header.height, header.block)
     if header.placement == "tiles":
         charts = decode_charts(bitstream.section(CHARTS), surface.points.neighbours)
         return place_charts(surface.lattice, charts[surface.point], header.width, header.height, header.block)

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from gvcodecs.mcgv.base.surface import Surface, read_surface
+from gvcodecs.mcgv.base.surface import DecodedBase, read_surface
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.motion.contract import locate
@@ -22,6 +22,7 @@ from gvcodecs.mcgv.reader import read_layout
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvpipe.arrays import Float32, Float64, Int32
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.cursor import Cursor
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import VideoReader
@@ -83,7 +84,7 @@ class TrajectoryReader:
         return self._surface.faces
 
     @cached_property
-    def _surface(self) -> Surface:
+    def _surface(self) -> DecodedBase:
         return read_surface(self._bitstream, self._header)
 
     @cached_property
@@ -124,7 +125,7 @@ class TrajectoryReader:
             n_frames = self._bounds[s + 1] - self._bounds[s]
             data = self._bitstream.section(name)
             samples, step = self._samples(s), self._images.steps[s]
-            basis, coefficients = decode_segment(data, samples, step, self._shared.matrix, point, n_frames, name)
+            basis, coefficients = decode_segment(Cursor(data, name), samples, step, self._shared.matrix, point, n_frames)
             self._segment = _Segment(s, basis, coefficients)
         return self._segment
 

@@ -24,7 +24,7 @@ STILL = "still"  # section: which points never move
 
 
 @dataclass(frozen=True)
-class Surface:
+class DecodedBase:
     """The base frame, and its S slots.
 
     Args:
@@ -62,7 +62,7 @@ class Surface:
             positions[:, still] = self.rest[still]
 
 
-def read_surface(bitstream: Bitstream, header: Header) -> Surface:
+def read_surface(bitstream: Bitstream, header: Header) -> DecodedBase:
     """Decode the sections ``mesh``, ``order`` and ``still``; raises `CorruptFile`."""
     if bitstream.version < 3:
         base = read_base(bitstream)
@@ -70,7 +70,7 @@ def read_surface(bitstream: Bitstream, header: Header) -> Surface:
         own, placed = np.arange(len(base.points)), header.base.points_at(base.points)
         order = np.argsort(base.visits)
         rest = placed.astype(np.float32)
-        return Surface(base.faces, rest, own, own, base.points, placed, point, members, points, order)
+        return DecodedBase(base.faces, rest, own, own, base.points, placed, point, members, points, order)
     mesh = read_points(bitstream, across=bitstream.version > 3)
     n_points = len(mesh.lattice)
     still = decode_flags(bitstream.section(STILL), n_points, STILL) if STILL in bitstream.sections else np.zeros(n_points, bool)
@@ -81,7 +81,7 @@ def read_surface(bitstream: Bitstream, header: Header) -> Surface:
     placed = header.base.points_at(mesh.lattice)
     vertices = np.flatnonzero(~still[mesh.point])
     own = np.arange(len(moves))
-    return Surface(
+    return DecodedBase(
         faces=mesh.faces,
         rest=placed.astype(np.float32)[mesh.point],
         vertices=vertices,

@@ -1,10 +1,10 @@
 """The chart of every point as bytes: most points lie in the chart of their neighbours.
 
-Points are visited in the codec's order. The charts of a point's known neighbours are listed, most frequent first
-(`chart_kernels`); the point tells the rank of its own in that list. One that is not listed is told by number: charts are
-numbered as they first occur::
+Points are visited in the codec's order. The charts of a point's causal neighbours are listed, most frequent first
+(`chart_kernels`). The rank of the point's own chart in that list is coded. One that is not listed is signalled by number:
+charts are numbered as they first occur::
 
-    section = [varint] length, [integers] rank of each point, in the context of min(known neighbours, 4);
+    section = [varint] length, [integers] rank of each point, in the context of min(causal neighbours, 4);
               [varint] count, [integers] for each point whose rank is its list's length: 0 for a new chart, else how many
               charts ago its own first occurred
 """
@@ -16,7 +16,7 @@ from scipy import sparse
 
 from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighbours
 from gvpipe.arrays import Int64, Integers
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 
 SECTION = "charts"
@@ -33,11 +33,11 @@ def encode_charts(charts: Int64, neighbours: sparse.csr_array) -> bytes:
     """Return the section for ``charts (P,)`` of `number_charts`, points adjacent as in ``neighbours (P, P)``."""
     from gvcodecs.mcgv.layout.chart_kernels import describe
 
-    known = causal_neighbours(neighbours)
+    causal = causal_neighbours(neighbours)
     ranks, numbers = np.empty(len(charts), np.int64), np.empty(len(charts), np.int64)
-    count = describe(known.starts, known.near, charts, ranks, numbers)
-    first = encode_integers(ranks, _contexts(known))
-    return varint(len(first)) + first + varint(count) + encode_integers(numbers[:count])
+    count = describe(causal.starts, causal.near, charts, ranks, numbers)
+    first = encode_integers(ranks, _contexts(causal))
+    return pack_block(first) + varint(count) + encode_integers(numbers[:count])
 
 
 def decode_charts(data: bytes, neighbours: sparse.csr_array) -> Int64:
@@ -45,17 +45,17 @@ def decode_charts(data: bytes, neighbours: sparse.csr_array) -> Int64:
     from gvcodecs.mcgv.layout.chart_kernels import restore
 
     cursor = Cursor(data, SECTION)
-    known = causal_neighbours(neighbours)
-    n_points = len(known.starts) - 1
-    ranks = decode_integers(cursor.take(cursor.varint(cursor.left, "a length")), n_points, _contexts(known), SECTION)
+    causal = causal_neighbours(neighbours)
+    n_points = len(causal.starts) - 1
+    ranks = decode_integers(cursor.block(), n_points, _contexts(causal), SECTION)
     count = cursor.varint(n_points, "the number of charts told by number")
     numbers = decode_integers(cursor.rest(), count, name=SECTION)
     charts = np.empty(n_points, np.int64)
-    wrong = restore(known.starts, known.near, ranks, numbers, charts)
+    wrong = restore(causal.starts, causal.near, ranks, numbers, charts)
     if wrong >= 0:
         raise cursor.corrupt(f"the chart of point {wrong} makes no sense")
     return charts
 
 
-def _contexts(known: CausalNeighbours) -> Int64:
-    return np.asarray(np.minimum(np.diff(known.starts), CONTEXTS - 1))
+def _contexts(causal: CausalNeighbours) -> Int64:
+    return np.asarray(np.minimum(np.diff(causal.starts), CONTEXTS - 1))

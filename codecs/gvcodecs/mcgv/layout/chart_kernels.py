@@ -1,7 +1,7 @@
 """Compiled loops over the charts of points: what they are predicted from, as numbers to code and back.
 
-A point's *list* holds the charts of its known neighbours (`near`: adjacent points of lower number, the last `MAX_NEAR` of
-them), most frequent first; of equal ones, that of the neighbour of highest number. A chart's *rank* is its place there.
+A point's *list* holds the charts of its causal neighbours (`near`: adjacent points of lower number, the last `MAX_NEAR` of
+them), most frequent first; of equal ones, that of the neighbour of highest number. A chart's *rank* is its index there.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import numpy as np
 from gvpipe.arrays import Int64
 from gvpipe.compiled import compiled
 
-MAX_NEAR = 8  # known neighbours that count: the last ones
+MAX_NEAR = 8  # causal neighbours that count: the last ones
 
 
 @compiled
-def list_known(point: int, starts: Int64, near: Int64, charts: Int64, listed: Int64, counts: Int64) -> int:
+def list_causal(point: int, starts: Int64, near: Int64, charts: Int64, listed: Int64, counts: Int64) -> int:
     """Fill ``listed (8,)`` and ``counts (8,)`` with a point's list; return its length."""
     n = 0
     for entry in range(starts[point + 1] - 1, max(starts[point], starts[point + 1] - MAX_NEAR) - 1, -1):
@@ -41,7 +41,7 @@ def describe(starts: Int64, near: Int64, charts: Int64, ranks: Int64, numbers: I
     listed, counts = np.empty(MAX_NEAR, np.int64), np.empty(MAX_NEAR, np.int64)
     n_charts, used = 0, 0
     for point in range(len(charts)):
-        n, rank = list_known(point, starts, near, charts, listed, counts), 0
+        n, rank = list_causal(point, starts, near, charts, listed, counts), 0
         while rank < n and listed[rank] != charts[point]:
             rank += 1
         ranks[point] = rank
@@ -58,7 +58,7 @@ def restore(starts: Int64, near: Int64, ranks: Int64, numbers: Int64, charts: In
     listed, counts = np.empty(MAX_NEAR, np.int64), np.empty(MAX_NEAR, np.int64)
     n_charts, used = 0, 0
     for point in range(len(charts)):
-        n, rank = list_known(point, starts, near, charts, listed, counts), ranks[point]
+        n, rank = list_causal(point, starts, near, charts, listed, counts), ranks[point]
         if rank < 0 or rank > n:
             return point
         if rank < n:

@@ -6,7 +6,7 @@ import numpy as np
 
 from gvcodecs.mcgv.layout.layout import Layout
 from gvpipe.arrays import Int32, Int64
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile
 
@@ -18,7 +18,7 @@ def encode_pixels(layout: Layout) -> bytes:
     y, x = np.divmod(layout.pixel, layout.width)
     dx, dy = np.diff(x, prepend=0), np.diff(y, prepend=0)
     columns = encode_integers(dx)
-    return varint(len(columns)) + columns + encode_integers(dy, _context(dx))
+    return pack_block(columns) + encode_integers(dy, _context(dx))
 
 
 def decode_pixels(data: bytes, order: Int64, width: int, height: int) -> Layout:
@@ -28,7 +28,7 @@ def decode_pixels(data: bytes, order: Int64, width: int, height: int) -> Layout:
         CorruptFile: a slot has no pixel of its own inside the plane.
     """
     cursor = Cursor(data, "pixels")
-    columns = cursor.take(cursor.varint(cursor.left, "a length"))
+    columns = cursor.block()
     dx = decode_integers(columns, len(order), name="pixels")
     dy = decode_integers(cursor.rest(), len(order), _context(dx), "pixels")
     x, y = np.cumsum(dx), np.cumsum(dy)

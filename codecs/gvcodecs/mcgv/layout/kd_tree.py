@@ -70,7 +70,7 @@ def choose_size(n_vertices: int, block: int) -> tuple[int, int]:
     return int(widths[best]) * block, int(heights[best]) * block
 
 
-def place(points: Integers, groups: Integers | None, width: int, height: int, block: int) -> Layout:
+def place_points(points: Integers, groups: Integers | None, width: int, height: int, block: int) -> Layout:
     """Give each vertex a pixel.
 
     Args:
@@ -91,7 +91,7 @@ def place(points: Integers, groups: Integers | None, width: int, height: int, bl
 
 
 def check_room(points: Integers, width: int, height: int) -> None:
-    """Raise what `place` raises, for ``points (V, 3)`` on their lattice."""
+    """Raise what `place_points` raises, for ``points (V, 3)`` on their lattice."""
     if points.max(initial=0) >= MAX_COORDINATE:
         raise CorruptFile("section 'mesh' is corrupt: its lattice is too fine for placement by halves; get the file again")
     if width * height < len(points):
@@ -104,7 +104,7 @@ def fill(cells: Cells, order: Int64, points: Int64, width: int, block: int, shif
     Args:
         cells: with no more vertices than pixels each; their runs of ``order (V,)``, which are vertices.
         points: ``(V, 3)`` all coordinates from 0.
-        block: as in `place`.
+        block: as in `place_points`.
         shift: of moments where cells turn as their points do; None: they keep their directions.
     """
     while (cells.side > 1).any():

@@ -23,7 +23,7 @@ class Padding:
     """The linear map from vertex values to whole planes, for one layout."""
 
     def __init__(self, layout: Layout, block: int) -> None:
-        self._layout = layout
+        self.layout = layout
         laplacian = _laplacian(block)
         pixels = _pixels_by_block(layout.width, layout.height, block)  # (blocks, block**2)
         vertex = np.full(layout.width * layout.height, -1)
@@ -37,11 +37,11 @@ class Padding:
     def fill(self, values: Floats, background: float) -> Float64:
         """Return planes ``(n, height, width)`` for vertex values ``(n, V)``; blocks without a vertex are ``background``."""
         columns = np.ascontiguousarray(values.T, dtype=np.float64)  # (V, n): a block's vertices are rows
-        planes = np.full((self._layout.width * self._layout.height, len(values)), background)
-        planes[self._layout.pixel] = columns
+        planes = np.full((self.layout.width * self.layout.height, len(values)), background)
+        planes[self.layout.pixel] = columns
         for free, vertices, weights in self._blocks:
             planes[free] = weights @ columns[vertices]
-        return planes.T.reshape(len(values), self._layout.height, self._layout.width)
+        return planes.T.reshape(len(values), self.layout.height, self.layout.width)
 
 
 def _pixels_by_block(width: int, height: int, block: int) -> Int64:

@@ -9,7 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvcodecs.mcgv.base.surface import Surface
+from gvcodecs.mcgv.base.start import Start
+from gvcodecs.mcgv.base.surface import DecodedBase
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.motion.affine_coding import decode_transforms, dequantise, encode_transforms, quantise
@@ -18,32 +19,21 @@ from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
 from gvpipe.arrays import Array, Float32, Float64, Int32
 from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.sequence import MeshSequence
 
 
-def code_affine(
-    sequence: MeshSequence, base: Float64, clusters: Int32, bounds: list[int], step: float, report: Progress
-) -> CodedMotion:
-    """Fit and code the transforms of every segment.
-
-    Args:
-        sequence: of the S sample points.
-        base: ``(S, 3)`` their decoded base positions, model units.
-        clusters: ``(S,)`` theirs, 0..K-1.
-        bounds: first frame of every segment, and F.
-        step: of quantisation, model units.
-        report: takes progress.
-    """
-    predictor = AffinePredictor(base, clusters, int(clusters.max()) + 1)
+def code_affine(start: Start, clusters: Int32, step: float, report: Progress) -> CodedMotion:
+    """Fit and code the transforms of every segment, for clusters ``(P,)`` and a quantisation step, model units."""
+    bounds = start.bounds
+    predictor = AffinePredictor(start.base, clusters, int(clusters.max()) + 1)
     segments = []
-    for s, (start, stop) in enumerate(pairwise(bounds)):
-        fitted = np.concatenate([predictor.fit(block) for _, block in sequence.chunks(start, stop)])
+    for s, (begin, end) in enumerate(pairwise(bounds)):
+        fitted = np.concatenate([predictor.fit(block) for _, block in start.sequence.chunks(begin, end)])
         segments.append(quantise(fitted, predictor.rest, step))
         report("transforms", (s + 1) / (len(bounds) - 1))
 
-    def predict(start: int, stop: int) -> Float64:
-        s = locate(bounds, start)
-        lattice = segments[s][start - bounds[s] : stop - bounds[s]]
+    def predict(first: int, stop: int) -> Float64:
+        s = locate(bounds, first)
+        lattice = segments[s][first - bounds[s] : stop - bounds[s]]
         return predictor.predict(dequantise(lattice, predictor.rest, step))
 
     coded = {f"transforms.{s}": encode_transforms(lattice) for s, lattice in enumerate(segments)}
@@ -65,7 +55,7 @@ class AffineMotion:
         self,
         bitstream: Bitstream,
         header: Header,
-        surface: Surface,
+        surface: DecodedBase,
         clusters: Int32,
         layout: Layout,
         bounds: list[int],

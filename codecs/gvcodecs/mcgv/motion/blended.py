@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
-from gvcodecs.mcgv.base.surface import Surface
-from gvcodecs.mcgv.base.welded_points import Points
+from gvcodecs.mcgv.base.start import Start
+from gvcodecs.mcgv.base.surface import DecodedBase
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
@@ -19,40 +19,28 @@ from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
 from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.sequence import MeshSequence
 
 CHUNK = 16  # frames whose transforms are made at a time
 
 
-def code_blended(
-    sequence: MeshSequence, base: Float64, points: Points, fitted: Fitted, bounds: list[int], step: float, report: Progress
-) -> CodedMotion:
-    """Code skinning weights, and the transforms of every segment.
-
-    Args:
-        sequence: of the welded points that move.
-        base: ``(P, 3)`` their decoded base positions, model units.
-        points: their triangles and adjacency.
-        fitted: their skinning weights.
-        bounds: first frame of every segment, and F.
-        step: of quantisation, model units.
-        report: takes progress.
-    """
+def code_blended(start: Start, fitted: Fitted, report: Progress) -> CodedMotion:
+    """Code the points' skinning weights, and the transforms of every segment with the start's step."""
+    base, bounds = start.base, start.bounds
     fit = BlendFit(Blend(base, fitted.weights, fitted.n_clusters))
-    coded = {"weights": encode_weights(fitted.weights, causal_neighbours(points.neighbours))}
+    coded = {"weights": encode_weights(fitted.weights, causal_neighbours(start.points.neighbours))}
     segments: list[Trajectories] = []
-    for s, (start, stop) in enumerate(pairwise(bounds)):
-        transforms = [fit.fit(_columns(block - base)) for _, block in sequence.chunks(start, stop)]
-        coded[f"transforms.{s}"], decoded = encode_trajectories(np.hstack(transforms), step)
+    for s, (begin, end) in enumerate(pairwise(bounds)):
+        transforms = [fit.fit(_columns(block - base)) for _, block in start.sequence.chunks(begin, end)]
+        coded[f"transforms.{s}"], decoded = encode_trajectories(np.hstack(transforms), start.step)
         segments.append(decoded)
         report("transforms", (s + 1) / (len(bounds) - 1))
 
-    def predict(start: int, stop: int) -> Float64:
-        s = locate(bounds, start)
-        moved = fit.matrix @ segments[s].rows(start - bounds[s], stop - bounds[s])  # (P, 3n)
-        return np.asarray(base + moved.reshape(len(moved), stop - start, 3).swapaxes(0, 1))
+    def predict(first: int, stop: int) -> Float64:
+        s = locate(bounds, first)
+        moved = fit.matrix @ segments[s].rows(first - bounds[s], stop - bounds[s])  # (P, 3n)
+        return np.asarray(base + moved.reshape(len(moved), stop - first, 3).swapaxes(0, 1))
 
-    return CodedMotion(fitted.n_clusters, step, coded, predict)
+    return CodedMotion(fitted.n_clusters, start.step, coded, predict)
 
 
 class BlendedMotion:
@@ -70,7 +58,7 @@ class BlendedMotion:
         self,
         bitstream: Bitstream,
         header: Header,
-        surface: Surface,
+        surface: DecodedBase,
         layout: Layout,
         bounds: list[int],
         first: Trajectories | None = None,

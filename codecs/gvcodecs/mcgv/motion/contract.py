@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from gvcodecs.mcgv.base.surface import Surface
+from gvcodecs.mcgv.base.surface import DecodedBase
 from gvcodecs.mcgv.layout.layout import Layout
 from gvpipe.arrays import Array, Float32, Float64, Int64
 
@@ -52,7 +52,7 @@ class Samples:
             a picture from one end to the other takes half the time.
     """
 
-    def __init__(self, surface: Surface, layout: Layout) -> None:
+    def __init__(self, surface: DecodedBase, layout: Layout) -> None:
         pixel = layout.pixel[surface.slot]
         order = np.argsort(pixel, kind="stable")
         self.vertices, self.slots = surface.vertices[order], surface.slot[order]

@@ -2,89 +2,91 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from gvcodecs.mcgv.base.start import Start
+from gvcodecs.mcgv.job import Job
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding import Padding
 from gvcodecs.mcgv.motion.contract import CodedMotion
 from gvcodecs.mcgv.pictures.outliers import OutlierWriter
-from gvcodecs.mcgv.pictures.quantiser import Magnitudes, Quantiser
+from gvcodecs.mcgv.pictures.quantiser import ImageQuantiser, Magnitudes, choose_quantiser
 from gvpipe.arrays import Float64
-from gvpipe.codec import Progress
 from gvpipe.media.video import B_FRAMES, Plane, Profile, VideoWriter
-from gvpipe.sequence import MeshSequence
 
 SMALL = 60, 2000  # bytes a frame, and of a file's own: B-frames save a third of the pictures' at best, and cost 8 each
 
+Residuals = Iterator[tuple[int, Float64]]
+"""The first frame, and ``(n, P, 3)`` residuals, model units, of it and those after it."""
 
-def measure_residuals(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> Magnitudes:
+
+@dataclass(frozen=True)
+class CodedFrames:
+    """Residuals as they are coded.
+
+    Args:
+        step: model units per level of the pictures.
+        video: one picture per frame.
+        outliers: the section, empty if the pictures hold everything.
+    """
+
+    step: float
+    video: bytes
+    outliers: bytes
+
+
+def measure_residuals(start: Start, motion: CodedMotion) -> Magnitudes:
     """The magnitudes of all residuals, model units."""
     magnitudes = Magnitudes()
-    for _, residual in _residuals(sequence, motion, bounds):
+    for _, residual in _residuals(start, motion):
         magnitudes.add(residual)
     return magnitudes
 
 
-def code_frames(
-    sequence: MeshSequence,
-    motion: CodedMotion,
-    bounds: list[int],
-    layout: Layout,
-    block: int,
-    profile: Profile,
-    quantiser: Quantiser,
-    outliers: OutlierWriter,
-    gop: int,
-    preset: str,
-    report: Progress,
-) -> bytes:
-    """Code the residuals of a sequence as a video, one picture per frame.
+def code_frames(job: Job, start: Start, motion: CodedMotion, layout: Layout, magnitudes: Magnitudes) -> CodedFrames:
+    """Code what a prediction leaves, of such magnitudes, as one picture per frame and outliers."""
+    settings, profile = job.settings, job.settings.video_profile
+    quantiser = choose_quantiser(start.step, profile, magnitudes)
+    outliers = OutlierWriter(profile, quantiser.step, start.step, settings.gop, start.sequence.n_vertices)
+    padding = Padding(layout, settings.block)
 
-    Args:
-        sequence: the animation.
-        motion: its prediction.
-        bounds: first frame of every segment, and F.
-        layout: the vertices' pixels, in blocks of side ``block``.
-        profile, gop, preset: of the video; gop is its frames per group of pictures.
-        quantiser: of the image coder, and the residuals' step.
-        outliers: told of all residuals, for what pictures cannot hold.
-        report: told of the part that is done.
-    """
-    padding = Padding(layout, block)
-    shape = (3 * layout.height, layout.width)
+    def collected() -> Residuals:
+        for first, residual in _residuals(start, motion):
+            yield first, residual
+            outliers.add(residual)
+            job.report("video", (first + len(residual)) / start.sequence.n_frames)
 
-    def code(b_frames: int, tell: Callable[[int, Float64], None]) -> bytes:
-        with VideoWriter(profile, shape[1], shape[0], sequence.fps, quantiser.level, gop, preset, b_frames) as writer:
-            for first, residual in _residuals(sequence, motion, bounds):
-                for picture in _pictures(residual, padding, profile, quantiser.step):
-                    writer.add(picture)
-                tell(first, residual)
-            return writer.finish()
-
-    def tell(first: int, residual: Float64) -> None:
-        outliers.add(residual)
-        report("video", (first + len(residual)) / sequence.n_frames)
-
-    report("video", 0)
-    video = code(B_FRAMES, tell)
-    if profile.codec == "h264" and len(video) < SMALL[0] * sequence.n_frames + SMALL[1]:
-        video = min(video, code(0, lambda first, residual: None), key=len)
-    return video
+    job.report("video", 0)
+    video = _write_video(job, padding, quantiser, collected(), B_FRAMES)
+    if profile.codec == "h264" and len(video) < SMALL[0] * start.sequence.n_frames + SMALL[1]:
+        video = min(video, _write_video(job, padding, quantiser, _residuals(start, motion), 0), key=len)
+    return CodedFrames(quantiser.step, video, outliers.finish())
 
 
-def _residuals(sequence: MeshSequence, motion: CodedMotion, bounds: list[int]) -> Iterator[tuple[int, Float64]]:
-    """Yield ``(first frame, (n, V, 3) residuals)`` of the whole sequence (equation 4)."""
-    for start, stop in pairwise(bounds):
-        for first, block in sequence.chunks(start, stop):
+def _write_video(job: Job, padding: Padding, quantiser: ImageQuantiser, residuals: Residuals, b_frames: int) -> bytes:
+    settings, profile, layout = job.settings, job.settings.video_profile, padding.layout
+    width, height, fps = layout.width, 3 * layout.height, job.sequence.fps
+    with VideoWriter(profile, width, height, fps, quantiser.level, settings.gop, settings.preset, b_frames) as writer:
+        for _, residual in residuals:
+            for picture in _pictures(residual, padding, profile, quantiser.step):
+                writer.add(picture)
+        return writer.finish()
+
+
+def _residuals(start: Start, motion: CodedMotion) -> Residuals:
+    """Yield the residuals of all frames (equation 4)."""
+    for begin, end in pairwise(start.bounds):
+        for first, block in start.sequence.chunks(begin, end):
             yield first, block - motion.predict(first, first + len(block))
 
 
 def _pictures(residual: Float64, padding: Padding, profile: Profile, step: float) -> Iterator[Plane]:
     """Yield one picture per frame: the padded x, y and z planes, one below the other."""
-    values = residual.swapaxes(1, 2).reshape(3 * len(residual), -1)  # (n, V, 3) -> (3n, V)
+    values = residual.swapaxes(1, 2).reshape(3 * len(residual), -1)  # (n, P, 3) -> (3n, P)
     levels = np.rint(padding.fill(values / step, 0.0)) + profile.middle
     planes = np.clip(levels, profile.low, profile.high).astype(profile.dtype)
     yield from planes.reshape(len(residual), -1, planes.shape[2])

@@ -26,7 +26,7 @@ BINS = 49  # low bits of a float64 that a magnitude's bin leaves out: eight bins
 
 
 @dataclass(frozen=True)
-class Quantiser:
+class ImageQuantiser:
     """The image coder's setting and the residual's step, model units per level."""
 
     level: int
@@ -53,7 +53,7 @@ class Magnitudes:
         return min(float(np.array((bin_ + 1) << BINS, np.int64).view(np.float64)), self.largest)
 
 
-def choose_quantiser(effective: float, profile: Profile, magnitudes: Magnitudes) -> Quantiser:
+def choose_quantiser(effective: float, profile: Profile, magnitudes: Magnitudes) -> ImageQuantiser:
     """Choose for an effective step, model units, and residuals of such magnitudes."""
     largest = magnitudes.largest
     reach = largest
@@ -64,8 +64,8 @@ def choose_quantiser(effective: float, profile: Profile, magnitudes: Magnitudes)
     wanted = effective / finest  # levels
     if profile.codec == "mjpeg":
         level = min(max(math.floor(wanted * (1 + 1e-9)), 1), JPEG_STEPS)
-        return Quantiser(level, finest * max(1.0, wanted / level))
+        return ImageQuantiser(level, finest * max(1.0, wanted / level))
     highest = QP_RANGE[1] + 6 * (profile.depth - 8)
     level = math.floor(6 * math.log2(max(wanted, 1e-9) / QP_STEP))
     level = min(max(level, QP_RANGE[0]), highest)
-    return Quantiser(level, finest * max(1.0, wanted / (QP_STEP * 2 ** (level / 6))))
+    return ImageQuantiser(level, finest * max(1.0, wanted / (QP_STEP * 2 ** (level / 6))))

@@ -31,7 +31,7 @@ from scipy import sparse
 from gvcodecs.mcgv.motion.skinning import BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import decode_coefficients, encode_coefficients
 from gvpipe.arrays import Float64, Int64
-from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import InputError
 from gvpipe.trajectory.basis import Basis, decode_basis, reduce_trajectories
@@ -73,35 +73,33 @@ def encode_segment(trajectories: Float64, fit: BlendFit, largest: float, error: 
     step, head, coefficients = reduced.step, reduced.basis, reduced.coefficients
     rows, transforms = encode_coefficients(fit.fit(coefficients), step)
     left = (coefficients - fit.matrix @ transforms) / step
-    section = varint(len(head)) + head + varint(len(rows)) + rows + _encode_outliers(left, largest)
+    section = pack_block(head) + pack_block(rows) + _encode_outliers(left, largest)
     return CodedSegment(step, section, np.ascontiguousarray(left.T))
 
 
 def decode_segment(
-    data: bytes, samples: Float64, step: float, matrix: sparse.csr_array, point: Int64, n_frames: int, name: str
+    cursor: Cursor, samples: Float64, step: float, matrix: sparse.csr_array, point: Int64, n_frames: int
 ) -> tuple[Basis, Float64]:
     """Mirror of `encode_segment`: the basis, and the vertices' coefficients ``(R, V)``, model units.
 
     Args:
-        data: the section.
+        cursor: over the section.
         samples: ``(R, V)`` what the planes hold, steps; changed where vertices are outliers.
         step: D, model units.
         matrix: ``(P, 4K)`` of the blend; point: ``(V,)`` the point of each vertex.
         n_frames: of the segment.
-        name: of the section, for messages.
 
     Raises:
         CorruptFile: the section is not what the encoder writes.
     """
     n_components, n_vertices = samples.shape
-    cursor = Cursor(data, name)
-    head = cursor.take(cursor.varint(cursor.left, "a length"))
-    rows = cursor.take(cursor.varint(cursor.left, "a length"))
-    basis = decode_basis(head, n_frames, n_vertices, step, name)
+    head = cursor.block()
+    rows = cursor.block()
+    basis = decode_basis(head, n_frames, n_vertices, step, cursor.name)
     if basis.vectors.shape[1] != n_components:
         raise cursor.corrupt(f"{basis.vectors.shape[1]} components where the header says {n_components}")
-    transforms = decode_coefficients(rows, matrix.shape[1] // 4, n_components, step, name)
-    _decode_outliers(cursor, samples, name)
+    transforms = decode_coefficients(rows, matrix.shape[1] // 4, n_components, step, cursor.name)
+    _decode_outliers(cursor, samples)
     samples *= step
     samples += np.ascontiguousarray((matrix @ transforms).T)[:, point]
     return basis, samples
@@ -114,16 +112,16 @@ def _encode_outliers(left: Float64, largest: float) -> bytes:
     if np.abs(values).max(initial=0) >= MAX_OUTLIER:
         raise InputError("the vertices move too far for the quality asked for; ask for a lower one")
     gaps = encode_integers(np.diff(places, prepend=0))
-    return varint(len(places)) + varint(len(gaps)) + gaps + encode_integers(values.astype(np.int64))
+    return varint(len(places)) + pack_block(gaps) + encode_integers(values.astype(np.int64))
 
 
-def _decode_outliers(cursor: Cursor, samples: Float64, name: str) -> None:
+def _decode_outliers(cursor: Cursor, samples: Float64) -> None:
     count = cursor.varint(samples.size, "the number of outliers")
-    gaps = decode_integers(cursor.take(cursor.varint(cursor.left, "a length")), count, name=name)
+    gaps = decode_integers(cursor.block(), count, name=cursor.name)
     places = np.cumsum(gaps)
     wrong = (gaps < 0) | (gaps >= samples.size) | (places >= samples.size)
     if wrong.any() or (gaps[1:] == 0).any():
         raise cursor.corrupt("an outlier's place is out of range")
-    values = decode_integers(cursor.rest(), count, name=name)
+    values = decode_integers(cursor.rest(), count, name=cursor.name)
     vertices, components = np.divmod(places, max(1, len(samples)))
     samples[components, vertices] = values

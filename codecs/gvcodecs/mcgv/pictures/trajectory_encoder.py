@@ -14,7 +14,8 @@ from itertools import pairwise
 import numpy as np
 
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
-from gvcodecs.mcgv.base.welded_points import Points
+from gvcodecs.mcgv.base.start import Start
+from gvcodecs.mcgv.job import Job
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding import Padding
 from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
@@ -23,9 +24,7 @@ from gvcodecs.mcgv.motion.weight_coding import encode_weights
 from gvcodecs.mcgv.pictures.trajectories import PLANES, count_pictures, encode_segment
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvpipe.arrays import Float64
-from gvpipe.codec import Progress
 from gvpipe.media.video import Plane, Profile, VideoWriter
-from gvpipe.sequence import MeshSequence
 
 FINENESS = {"h264-8": 3, "h264-10": 6}  # levels per step: rounding to levels adds a ninth or a thirty-sixth to a step's noise
 FIT_STEP = 1.5  # times the quantisation step: the precision at which the blend is chosen
@@ -42,58 +41,44 @@ class CodedTrajectories:
     video: bytes
 
 
-def code_trajectories(
-    sequence: MeshSequence,
-    base: Float64,
-    points: Points,
-    fitted: Fitted,
-    layout: Layout,
-    block: int,
-    bounds: list[int],
-    step: float,
-    profile: Profile,
-    preset: str,
-    report: Progress,
-) -> CodedTrajectories:
-    """Code a sequence, with an error about that of frames coded with a quantisation step, model units.
+def code_trajectories(job: Job, start: Start, fitted: Fitted, layout: Layout) -> CodedTrajectories:
+    """Code the points of a start, with an error about that of frames coded with its step.
 
     Args:
-        sequence: the points' animation.
-        base: ``(P, 3)`` their decoded base positions, model units; points: what joins them.
-        fitted: their blend, fitted for `FIT_STEP` steps.
-        layout: the points' pixels, in blocks of side ``block``.
-        bounds: first frame of every segment, and F.
-        step: quantisation step of positions that leaves the error wanted, model units.
-        profile, preset: of the video.
+        job: settings, and who hears of progress.
+        start: points, base frame and step.
+        fitted: the points' blend, fitted for `FIT_STEP` steps.
+        layout: the points' pixels.
     """
-    fit = BlendFit(Blend(base, fitted.weights, fitted.n_clusters))
-    sections = {"weights": encode_weights(fitted.weights, causal_neighbours(points.neighbours))}
-    fineness = FINENESS[profile.name]
+    settings, profile, bounds = job.settings, job.settings.video_profile, start.bounds
+    fit = BlendFit(Blend(start.base, fitted.weights, fitted.n_clusters))
+    sections = {"weights": encode_weights(fitted.weights, causal_neighbours(start.points.neighbours))}
+    fineness, level = FINENESS[profile.name], LEVEL[profile.name]
     largest = profile.amplitude / fineness
-    padding = Padding(layout, block)
+    padding = Padding(layout, settings.block)
     components, steps = [], []
-    shape = (PLANES * layout.height, layout.width)
-    with VideoWriter(profile, shape[1], shape[0], sequence.fps, LEVEL[profile.name], 1, preset) as writer:
-        for s, (start, stop) in enumerate(pairwise(bounds)):
-            trajectories = _trajectories(sequence, base, start, stop)
-            error = trajectories.size * step * step / 12
+    width, height = layout.width, PLANES * layout.height
+    with VideoWriter(profile, width, height, start.sequence.fps, level, 1, settings.preset) as writer:
+        for s, (first, stop) in enumerate(pairwise(bounds)):
+            trajectories = _trajectories(start, first, stop)
+            error = trajectories.size * start.step * start.step / 12
             coded = encode_segment(trajectories, fit, largest, error)
             sections[f"trajectories.{s}"] = coded.section
             components.append(len(coded.left))
             steps.append(coded.step)
             for picture in _pictures(coded.left * fineness, padding, profile):
                 writer.add(picture)
-            report("video", (s + 1) / (len(bounds) - 1))
+            job.report("video", (s + 1) / (len(bounds) - 1))
         video = writer.finish()
     return CodedTrajectories(fitted.n_clusters, TrajectoryHeader(fineness, tuple(components), tuple(steps)), sections, video)
 
 
-def _trajectories(sequence: MeshSequence, base: Float64, start: int, stop: int) -> Float64:
-    """Displacements from the base frame, ``(P, 3n)``, of the frames ``start`` to ``stop``."""
-    result = np.empty((len(base), stop - start, 3))
-    for first, block in sequence.chunks(start, stop):
-        result[:, first - start : first - start + len(block)] = block.swapaxes(0, 1) - base[:, None]
-    return result.reshape(len(base), -1)  # (P, n, 3) -> (P, 3n)
+def _trajectories(start: Start, first: int, stop: int) -> Float64:
+    """Displacements from the base frame, ``(P, 3n)``, of the frames ``first`` to ``stop``."""
+    result = np.empty((len(start.base), stop - first, 3))
+    for frame, block in start.sequence.chunks(first, stop):
+        result[:, frame - first : frame - first + len(block)] = block.swapaxes(0, 1) - start.base[:, None]
+    return result.reshape(len(start.base), -1)  # (P, n, 3) -> (P, 3n)
 
 
 def _pictures(levels: Float64, padding: Padding, profile: Profile) -> Iterator[Plane]:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from sequences import awkward
 
 from gvcodecs.mcgv import Mcgv
+from gvcodecs.mcgv.base.base_lattice import choose_lattice
 from gvcodecs.mcgv.base.distinct_positions import keep_apart
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.sequence import MeshSequence
@@ -22,7 +23,7 @@ def test_base_frame_tells_places_apart(name: str) -> None:
     first = sequence.read(0, 1)[0][np.unique(find_points(sequence), return_index=True)[1]]
     counts, steps = [], []
     for codec in (Mcgv(prediction="blended", quality=0), Mcgv(prediction="blended", base_bits=16)):
-        lattice = codec._lattice(first, 1e3)
+        lattice = choose_lattice(codec, first, 1e3)
         steps.append(lattice.step)
         counts.append(len(np.unique(keep_apart(lattice, first), axis=0)))
     assert counts[0] >= 0.99 * counts[1]

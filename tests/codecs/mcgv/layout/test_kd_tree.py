@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from placing import halved
 from surfaces import awkward_surfaces, check_layout
 
-from gvcodecs.mcgv.layout.kd_tree import choose_size, place
+from gvcodecs.mcgv.layout.kd_tree import choose_size, place_points
 from gvpipe.errors import CorruptFile, InputError
 from gvpipe.mesh.lattice import Lattice
 
@@ -24,7 +24,7 @@ def test_placement_follows_its_description(name: str, block: int) -> None:
         lattice = Lattice.over(points, bits).quantise(points)
         width, height = choose_size(len(points), block)
         for size in ((width, height), (width + 3 * block, height), (block, block * -(-len(points) // block**2))):
-            layout = place(lattice, labels, *size, block)
+            layout = place_points(lattice, labels, *size, block)
             assert (layout.width, layout.height) == size
             check_layout(layout, np.zeros(len(points), np.int32), block)
             wanted = halved(lattice.tolist(), None if labels is None else labels.tolist(), *size, block)
@@ -36,14 +36,14 @@ def test_placement_keeps_neighbours_together() -> None:
     x, y = np.meshgrid(np.arange(32), np.arange(32))
     sheet = np.stack([10 * x.ravel(), 10 * y.ravel(), 0 * x.ravel()], axis=1)
     shuffled = np.random.default_rng(0).permutation(len(sheet))
-    layout = place(sheet[shuffled], None, 32, 32, 16)
+    layout = place_points(sheet[shuffled], None, 32, 32, 16)
     rows, columns = np.divmod(layout.pixel[np.argsort(shuffled)].reshape(32, 32), 32)
     assert (np.abs(np.diff(rows, axis=0)) + np.abs(np.diff(columns, axis=0)) == 1).all()
     assert (np.abs(np.diff(rows, axis=1)) + np.abs(np.diff(columns, axis=1)) == 1).all()
     both, group = np.concatenate([sheet, sheet + np.array([160, 1, 1])]), np.repeat([0, 1], len(sheet))
-    apart = place(both, group, 64, 32, 16).pixel % 64 // 32
+    apart = place_points(both, group, 64, 32, 16).pixel % 64 // 32
     assert len(np.unique(np.c_[apart, group], axis=0)) == 2
-    mixed = place(both, None, 64, 32, 16).pixel % 64 // 32
+    mixed = place_points(both, None, 64, 32, 16).pixel % 64 // 32
     assert len(np.unique(np.c_[mixed, group], axis=0)) == 4
 
 
@@ -60,11 +60,11 @@ def test_automatic_planes_are_small_and_fair(n_vertices: int, block: int) -> Non
 
 def test_placement_refuses_planes_too_small() -> None:
     with pytest.raises(InputError, match="16x16"):
-        place(np.zeros((257, 3), np.int64), None, 16, 16, 16)
+        place_points(np.zeros((257, 3), np.int64), None, 16, 16, 16)
 
 
 def test_lattices_too_fine_for_halves_are_corrupt() -> None:
     points = np.array([[0, 0, 0], [1, 2, (1 << 20) - 1]])
-    assert sorted(place(points, None, 16, 16, 16).pixel) == sorted(set(place(points, None, 16, 16, 16).pixel))
+    assert sorted(place_points(points, None, 16, 16, 16).pixel) == sorted(set(place_points(points, None, 16, 16, 16).pixel))
     with pytest.raises(CorruptFile, match="too fine"):
-        place(points + 1, None, 16, 16, 16)
+        place_points(points + 1, None, 16, 16, 16)

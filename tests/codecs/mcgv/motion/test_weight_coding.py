@@ -9,8 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
+from gvcodecs.mcgv.motion.skinning import Weights
 from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
 from gvcodecs.mcgv.motion.weight_kernels import MAX_LISTED, cluster_of, rank_of
+from gvcodecs.mcgv.motion.weight_order_kernels import sort_by_rank
+from gvpipe.arrays import Int32
 from gvpipe.errors import CorruptFile
 
 
@@ -37,6 +40,26 @@ def test_weights_round_trip(n_clusters: int, own: float) -> None:
     assert np.array_equal(decoded.clusters * (decoded.weights > 0), weights.clusters * (weights.weights > 0))
     if own == 0 and n_clusters == 1:
         assert len(data) < 40  # following costs next to nothing
+
+
+def test_weights_of_points_that_are_numbered_anew() -> None:
+    """Their ranks are others; every point keeps its clusters and weights."""
+    _, neighbours = sheet()
+    weights, causal = random_weights(neighbours, 9, seed=4, own=1.0), causal_neighbours(neighbours)
+    order = np.random.default_rng(5).permutation(len(weights.clusters))
+    clusters, parts = weights.clusters[order], weights.weights[order]
+    given_parts = _by_cluster(clusters, parts, 9)
+    sort_by_rank(causal, Weights(clusters, parts))
+    assert np.array_equal(_by_cluster(clusters, parts, 9), given_parts)
+    decoded = decode_weights(encode_weights(Weights(clusters, parts), causal), neighbours, 9)
+    assert np.array_equal(_by_cluster(decoded.clusters, decoded.weights, 9), given_parts)
+
+
+def _by_cluster(clusters: Int32, parts: Int32, n_clusters: int) -> Int32:
+    """Weights ``(P, K)``."""
+    result = np.zeros((len(clusters), n_clusters), np.int32)
+    np.add.at(result, (np.arange(len(clusters))[:, None], clusters), parts)
+    return result
 
 
 def test_hostile_weights() -> None:

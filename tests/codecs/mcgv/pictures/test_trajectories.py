@@ -58,7 +58,7 @@ def test_a_segment_comes_back_within_its_error(largest: float) -> None:
     coded = encode_segment(trajectories, fit, largest, error)
     samples = np.clip(np.rint(coded.left * 6) / 6, -largest, largest)
     assert (np.abs(coded.left) > 3.0).any()
-    basis, coefficients = decode_segment(coded.section, samples, coded.step, fit.matrix, point, 30, "s")
+    basis, coefficients = decode_segment(Cursor(coded.section, "s"), samples, coded.step, fit.matrix, point, 30)
     decoded = (basis.vectors @ coefficients + basis.mean[:, None]).T
     assert np.square(decoded - trajectories).sum() < 1.5 * error
 
@@ -77,7 +77,7 @@ def test_affine_motion_leaves_nothing_to_the_planes() -> None:
 def test_outliers_come_back_where_they_were(n_vertices: int, n_components: int, seed: int) -> None:
     left = np.random.default_rng(seed).normal(0, 40, (n_vertices, n_components))
     samples = np.zeros((n_components, n_vertices))
-    _decode_outliers(Cursor(_encode_outliers(left, 30.0), "s"), samples, "s")
+    _decode_outliers(Cursor(_encode_outliers(left, 30.0), "s"), samples)
     assert np.array_equal(samples.T, np.where(np.abs(left) > 30.0, np.rint(left), 0))
 
 
@@ -86,7 +86,7 @@ def test_outliers_out_of_place_are_corrupt(gaps: list[int]) -> None:
     coded = encode_integers(np.array(gaps))
     data = varint(len(gaps)) + varint(len(coded)) + coded + encode_integers(np.ones(len(gaps), np.int64))
     with pytest.raises(CorruptFile, match="outlier"):
-        _decode_outliers(Cursor(data, "s"), np.zeros((3, 3)), "s")
+        _decode_outliers(Cursor(data, "s"), np.zeros((3, 3)))
 
 
 def test_one_wild_vertex_is_sent_apart(tmp_path: Path) -> None:

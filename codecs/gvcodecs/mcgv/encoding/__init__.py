@@ -1,0 +1,1 @@
+"""From a sequence to a bitstream: the routes, and the search for the step that leaves the target error."""

@@ -1,0 +1,58 @@
+"""What an encode is made from but for its step, and what the search for the step remembers of one."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
+from gvcodecs.mcgv.base.start import Start, begin
+from gvcodecs.mcgv.job import Job
+from gvcodecs.mcgv.motion.skinning import Weights
+from gvcodecs.mcgv.motion.skinning_fit import Fitted
+from gvpipe.rate_control.step_search import StepTrial
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A start and its blend; no blend: affine prediction."""
+
+    start: Start
+    fitted: Fitted | None
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """An encode that was measured: from what, its step and error, model units, and `StepTrial.slope`."""
+
+    candidate: Candidate
+    step: float
+    error: float
+    slope: float
+
+    @classmethod
+    def of(cls, candidate: Candidate, aimed: StepTrial) -> Anchor:
+        """Of an encode of a candidate."""
+        return cls(candidate, aimed.step, aimed.error, aimed.slope)
+
+    def distance(self, wanted: float) -> float:
+        """How far a target error is from the error measured, as a logarithm."""
+        return math.log(wanted) - math.log(self.error)
+
+
+def rebase(job: Job, candidate: Candidate, step: float, wanted: float) -> Candidate:
+    """The same points and blend, without pictures, on the base frame of another step and target error, model units."""
+    from gvcodecs.mcgv.motion.weight_order_kernels import sort_by_rank
+
+    given, fitted = candidate.start, candidate.fitted
+    assert fitted
+    start = dataclasses.replace(begin(job, step, wanted, given.point), pictures=False)
+    number = np.empty(len(given.point), np.int64)
+    number[given.point[given.sources]] = np.arange(len(given.sources))
+    before = number[start.point[start.sources]]  # the number that each point had
+    weights = Weights(fitted.weights.clusters[before], fitted.weights.weights[before])
+    sort_by_rank(causal_neighbours(start.points.neighbours), weights)  # other numbers, other causal neighbours, other ranks
+    return Candidate(start, Fitted(weights, fitted.n_clusters))

@@ -1,0 +1,28 @@
+"""Charts for placement by tiles: as published, they refine a partition by motion."""
+
+from __future__ import annotations
+
+from gvcodecs.mcgv.base.start import Start
+from gvcodecs.mcgv.job import Job
+from gvcodecs.mcgv.layout.chart_coding import number_charts
+from gvcodecs.mcgv.layout.parameterization import parameterize
+from gvcodecs.mcgv.motion.skinning_fit import Motions
+from gvpipe.arrays import Int64
+
+PART = 250  # points of a part by motion that charts refine: xatlas takes more than ten times as long per point for all at once
+
+
+def motions_of(job: Job, start: Start) -> Motions:
+    """The points' motions over all frames."""
+    return job.memo(f"motions {start.key}", lambda: Motions(start.sequence, start.base, start.points.neighbours))
+
+
+def charts_of(job: Job, start: Start) -> Int64:
+    """The chart ``(P,)`` of every point."""
+
+    def find() -> Int64:
+        n_parts = max(1, start.points.n_points // PART)
+        parts = motions_of(job, start).clustering.start(n_parts).weights.clusters[:, 0]
+        return number_charts(parameterize(start.base, start.points.faces, parts).chart)
+
+    return job.memo(f"charts {start.key}", find)

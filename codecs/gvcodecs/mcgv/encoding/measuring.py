@@ -1,0 +1,35 @@
+"""The error that an encode leaves: by its reader, or, without pictures, by the prediction that the encoder has."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+
+from gvcodecs.mcgv.base.start import Start
+from gvcodecs.mcgv.job import Job
+from gvcodecs.mcgv.opening import open_reader
+from gvpipe.arrays import Float64
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.rate_control.step_search import root_mean_square
+
+
+def measure_decoded(job: Job, start: Start, bitstream: Bitstream) -> float:
+    """Root mean square error of vertices, model units, of a bitstream that is decoded."""
+    job.report("measure", 0)
+    own = job.sequence.reordered(start.coded.permutation, start.faces)
+    return root_mean_square(own, open_reader(bitstream))
+
+
+def measure_predicted(job: Job, start: Start, predict: Callable[[int, int], Float64]) -> float:
+    """The same of a prediction, as in `CodedMotion`: a reader would have to decode the mesh first."""
+    job.report("measure", 0)
+    vertices, points = start.moving()
+    given, total = job.sequence, job.sequence.n_frames * start.still_error
+    for begin, end in pairwise(start.bounds):
+        for first, block in given.chunks(begin, end):
+            off = block[:, vertices] - predict(first, first + len(block))[:, points]
+            total += float(np.vdot(off, off))
+    return math.sqrt(total / (given.n_frames * given.n_vertices))

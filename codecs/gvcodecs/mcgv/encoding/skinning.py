@@ -1,0 +1,27 @@
+"""The skinning that a search starts from."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+from gvcodecs.mcgv.base.start import Start
+from gvcodecs.mcgv.encoding.charts import charts_of, motions_of
+from gvcodecs.mcgv.job import Job
+from gvcodecs.mcgv.motion.skinning_fit import Fitted, fit_blend
+
+
+def fit_skinning(job: Job, start: Start, wanted: float) -> tuple[Fitted, float]:
+    """Return a blend that leaves about a root mean square error of vertices, model units, and the step that fits it.
+
+    ``wanted`` 0: the step is that of the start.
+    """
+    job.report("segment", 0)
+    motions = motions_of(job, start)
+    needs_charts = start.placement == "tiles" and not job.settings.may_omit_pictures  # else pictures may never be tried
+    with ThreadPoolExecutor(1) as pool:  # charts beside the blend, whose loops hold no lock
+        charts = pool.submit(charts_of, job, start) if needs_charts else None
+        found = fit_blend(motions, start.step, job.settings.clusters, wanted / math.sqrt(start.moving_part))
+        if charts:
+            charts.result()
+    return found

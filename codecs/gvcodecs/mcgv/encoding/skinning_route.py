@@ -1,0 +1,15 @@
+"""Blended prediction without pictures: frames are their prediction."""
+
+from __future__ import annotations
+
+from gvcodecs.mcgv.base.start import Start
+from gvcodecs.mcgv.encoding.coded import Coded
+from gvcodecs.mcgv.job import Job
+from gvcodecs.mcgv.motion.blended import code_blended
+from gvcodecs.mcgv.motion.skinning_fit import Fitted
+
+
+def code_skinning_alone(job: Job, start: Start, fitted: Fitted) -> Coded:
+    """Code what a start holds as a blend alone."""
+    motion = code_blended(start, fitted, job.report)
+    return Coded(None, {"clusters": motion.n_clusters, "transform_step": motion.step}, motion.sections, b"", motion.predict)

@@ -1,0 +1,98 @@
+"""From a target error to a bitstream: which start, which blend, which step, and whether there are pictures.
+
+1. Guess a step from the target error, code the base frame for it, and fit a blend.
+2. Encode and measure. Where the error is far off, fit another blend for another step.
+3. Where pictures do not pay, do without, and look for the base frame that makes the file smallest (`without_pictures`).
+4. Mend the step until the error is close enough.
+
+What was measured (`Anchor`) serves encodes of the same sequence at other qualities.
+"""
+
+from __future__ import annotations
+
+import math
+
+from gvcodecs.mcgv.base.start import begin
+from gvcodecs.mcgv.encoding.candidate import Anchor, Candidate
+from gvcodecs.mcgv.encoding.sizes import cost
+from gvcodecs.mcgv.encoding.skinning import fit_skinning
+from gvcodecs.mcgv.encoding.trials import Trials, encode
+from gvcodecs.mcgv.encoding.without_pictures import approach, omit_pictures, refine
+from gvcodecs.mcgv.job import Job
+from gvpipe.codec import Encoded
+from gvpipe.metrics.vertex_errors import measure_spread
+from gvpipe.quality_scale import error_of
+from gvpipe.rate_control.step_search import SLOPE, StepTrial, find_step
+
+GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
+BAND = {"blended": (0.9, 0.99), "affine": (1.0, 1.1)}  # of the target error: the published mode is no finer than asked
+LARGE, FINE = 1_000_000, 0.81  # vertices of all frames, from which on another encode is not made for an error so fine
+FAR = 0.75, 1.4  # of the target error: what a blend is kept for
+MAX_MOVE = math.log(4)  # of the step's logarithm, at once
+REUSED = 0.35  # of the error's logarithm, away from that measured: up to there a blend serves another quality
+SECOND = 0.9  # part of the target error that the second blend is fitted for
+LEAST = 1e-9  # part of the target error, below which an error is none
+
+
+def encode_to_target(job: Job) -> Encoded:
+    """Code a sequence with the error that its quality asks for."""
+    wanted = error_of(job.settings.quality) / 100 * job.memo("spread", lambda: measure_spread(job.sequence))
+    anchors = job.memo("anchors", list[Anchor])
+    if anchors:  # what was measured at another quality serves this one
+        anchor = min(anchors, key=lambda anchor: abs(anchor.distance(wanted)))
+        if not anchor.candidate.fitted or abs(anchor.distance(wanted)) < REUSED:
+            return _reuse(job, anchor, wanted)
+    trials, aimed = _aim(job, wanted)
+    anchors.append(Anchor.of(trials.candidate, aimed))
+    if not job.memo.is_shared and not trials.candidate.start.pictures:  # who searches a quality asks for no more than its error
+        aimed = refine(trials, aimed, wanted)
+    return aimed.encoded
+
+
+def _reuse(job: Job, anchor: Anchor, wanted: float) -> Encoded:
+    """Code from what an anchor was made from."""
+    step = anchor.step * _limited(anchor.distance(wanted) / anchor.slope)
+    if anchor.candidate.start.pictures:
+        return encode(job, anchor.candidate, step)
+    return approach(Trials(job, anchor.candidate), anchor, step, wanted).encoded
+
+
+def _aim(job: Job, wanted: float) -> tuple[Trials, StepTrial]:
+    """Code with the step that leaves about a target error, model units."""
+    trials, step = _begin(job, GUESS[job.settings.prediction] * wanted, wanted, wanted)
+    if trials.candidate.fitted:
+        trials, step = _fit_again(trials, step, wanted)
+    low, high = BAND[job.settings.prediction]
+    if job.sequence.n_frames * job.sequence.n_vertices > LARGE:
+        low = min(low, FINE)
+    if job.settings.may_omit_pictures:
+        found = omit_pictures(trials, step, wanted, (low, high))
+        if found:
+            return found
+    return trials, find_step(trials, step, wanted, (low, high), SLOPE)
+
+
+def _begin(job: Job, step: float, wanted: float, fitted_for: float) -> tuple[Trials, float]:
+    """A start for a step and a target error, the blend for another (0: for the step), and the step that fits it."""
+    start = begin(job, step, wanted)
+    if not job.settings.is_blended:
+        return Trials(job, Candidate(start, None)), step
+    fitted, step = fit_skinning(job, start, fitted_for)
+    return Trials(job, Candidate(start, fitted)), step
+
+
+def _fit_again(trials: Trials, step: float, wanted: float) -> tuple[Trials, float]:
+    """Where the error is far off, another step wants another blend, and another base frame; return what costs less."""
+    if trials.are_pictures_idle(step) and FAR[0] <= trials.alone(step).error / wanted <= FAR[1]:
+        return trials, step
+    first = trials(step)
+    if FAR[0] <= first.error / wanted <= FAR[1]:
+        return trials, step
+    factor = _limited(math.log(SECOND * wanted / max(first.error, LEAST * wanted)))
+    others, other_step = _begin(trials.job, step * factor, wanted, 0.0)
+    return (trials, step) if cost(first) < cost(others(other_step)) else (others, other_step)
+
+
+def _limited(move: float) -> float:
+    """The factor of a step whose logarithm moves by so much, or as far as it may at once."""
+    return math.exp(min(max(move, -MAX_MOVE), MAX_MOVE))
