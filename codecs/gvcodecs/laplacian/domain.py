@@ -11,8 +11,8 @@ from gvcodecs.laplacian.anchors import Anchors, choose_anchors
 from gvcodecs.laplacian.delta_rows import border_order, delta_causal_order, delta_order
 from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian, thin_hubs
 from gvcodecs.laplacian.header import CoefficientCoding
+from gvcodecs.laplacian.laplace_operators import laplacian
 from gvcodecs.laplacian.mesh_scale import fineness
-from gvcodecs.laplacian.operators import laplacian
 from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy
 from gvpipe.mesh.topology import adjacency, components, unique_edges

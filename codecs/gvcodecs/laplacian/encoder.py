@@ -2,8 +2,9 @@
 
 Vasa, Marras, Hormann and Brunnett, "Compressing dynamic meshes with geometric Laplacians", 2014. The steps, each a module of
 its own: connectivity (`gvpipe.connectivity.topology_only`), average mesh in edge shape space (`average`) and its coding
-(`average_coding`), principal trajectories (`gvpipe.trajectory.basis`), Laplacian (`operators`) with anchors (`anchors`) and its
-inverse (`system`), prediction of delta trajectories (`delta_rows`), range coding (`gvpipe.trajectory.coefficient_coding`).
+(`average_coding`), principal trajectories (`gvpipe.trajectory.basis`), Laplacian (`laplace_operators`) with anchors
+(`anchors`) and its inverse (`extended_laplacian`), prediction of delta trajectories (`delta_rows`),
+range coding (`gvpipe.trajectory.coefficient_coding`).
 
 Points that never move have a position in place of a trajectory (`gvpipe.trajectory.still_points`); they are anchors that cost
 nothing.
@@ -38,7 +39,7 @@ from gvcodecs.laplacian.header import (
     CoefficientCoding,
     Header,
 )
-from gvcodecs.laplacian.operators import OPERATORS
+from gvcodecs.laplacian.laplace_operators import OPERATORS
 from gvcodecs.laplacian.reader import LaplacianReader
 from gvpipe.arrays import Int64
 from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress

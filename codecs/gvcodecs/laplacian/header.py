@@ -20,7 +20,7 @@ from typing import Any
 
 from gvcodecs.laplacian.anchors import ANCHOR_CHOICES
 from gvcodecs.laplacian.delta_rows import DELTA_PREDICTIONS
-from gvcodecs.laplacian.operators import OPERATORS
+from gvcodecs.laplacian.laplace_operators import OPERATORS
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import read_segments, read_steps
 

@@ -2,7 +2,7 @@
 
 Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video: A Compact Representation for 3D Animations", 2007. The steps:
 
-1. `base`: weld vertices to points, code the base frame, and find the points that move (`base.start`).
+1. `base`: weld vertices to points, code the base frame, and find the points that move (`base.base_frame`).
 2. `motion`: predict frames by affine motions of clusters, blended or as published.
 3. `layout`: give each point a pixel.
 4. `pictures`: code residuals of frames, or coefficients of trajectories, as a video.
@@ -18,9 +18,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gvcodecs.mcgv.browser import browser_obstacle
+from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.target_search import encode_to_target
-from gvcodecs.mcgv.job import Job
-from gvcodecs.mcgv.opening import open_reader
+from gvcodecs.mcgv.reader_choice import open_reader
 from gvcodecs.mcgv.settings import Settings
 from gvpipe.blas import one_blas_thread
 from gvpipe.codec import Encoded, FrameReader, Memo, Progress

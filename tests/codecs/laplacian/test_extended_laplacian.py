@@ -12,7 +12,7 @@ from tubes import CODING, kg, surface_of, tube
 from gvcodecs.laplacian import Laplacian
 from gvcodecs.laplacian.domain import build_domain
 from gvcodecs.laplacian.extended_laplacian import MAX_NEIGHBOURS, ExtendedLaplacian, thin_hubs
-from gvcodecs.laplacian.operators import laplacian
+from gvcodecs.laplacian.laplace_operators import laplacian
 from gvpipe.sequence import MeshSequence
 
 

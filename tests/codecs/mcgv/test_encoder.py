@@ -10,7 +10,7 @@ from sequences import grid, waving
 
 import gvpipe
 from gvcodecs.mcgv import Mcgv
-from gvcodecs.mcgv.base import start
+from gvcodecs.mcgv.base import base_frame
 from gvpipe.container import bitstream
 from gvpipe.metrics.vertex_errors import measure_errors
 from gvpipe.quality_scale import error_of
@@ -30,7 +30,7 @@ def test_any_float32_scale(sequence: MeshSequence, scale: float) -> None:
 
 @pytest.mark.parametrize(
     ("n_frames", "segments", "n_sections"),
-    [(60, 40, 50), pytest.param(4200, start.MAX_SEGMENTS, bitstream.MAX_SECTIONS, marks=pytest.mark.slow)],
+    [(60, 40, 50), pytest.param(4200, base_frame.MAX_SEGMENTS, bitstream.MAX_SECTIONS, marks=pytest.mark.slow)],
 )
 def test_more_segments_than_sections_are_not_written(
     n_frames: int, segments: int, n_sections: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -39,8 +39,8 @@ def test_more_segments_than_sections_are_not_written(
 
     Small limits, no farther apart, stand for the real ones.
     """
-    assert n_sections - segments <= bitstream.MAX_SECTIONS - start.MAX_SEGMENTS
-    monkeypatch.setattr(start, "MAX_SEGMENTS", segments)
+    assert n_sections - segments <= bitstream.MAX_SECTIONS - base_frame.MAX_SEGMENTS
+    monkeypatch.setattr(base_frame, "MAX_SEGMENTS", segments)
     monkeypatch.setattr(bitstream, "MAX_SECTIONS", n_sections)
     away = np.linspace(0, 1, n_frames, dtype=np.float32)[:, None, None]
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)

@@ -9,10 +9,10 @@ import dataclasses
 
 import numpy as np
 
-from gvcodecs.mcgv.base.start import Start
-from gvcodecs.mcgv.encoding.coded import Coded
+from gvcodecs.mcgv.base.base_frame import Start
+from gvcodecs.mcgv.encode_job import Job
+from gvcodecs.mcgv.encoding.coded_route import Coded
 from gvcodecs.mcgv.encoding.placement import lay_out
-from gvcodecs.mcgv.job import Job
 from gvcodecs.mcgv.layout.coding import encode_clusters, encode_slot_clusters
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.motion.affine import code_affine

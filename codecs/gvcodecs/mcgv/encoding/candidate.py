@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gvcodecs.mcgv.base.base_frame import Start, begin
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
-from gvcodecs.mcgv.base.start import Start, begin
-from gvcodecs.mcgv.job import Job
+from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.motion.skinning import Weights
 from gvcodecs.mcgv.motion.skinning_fit import Fitted
 from gvpipe.rate_control.step_search import StepTrial

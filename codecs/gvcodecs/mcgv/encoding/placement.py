@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvcodecs.mcgv.base.start import Start
-from gvcodecs.mcgv.encoding.charts import charts_of
-from gvcodecs.mcgv.job import Job
+from gvcodecs.mcgv.base.base_frame import Start
+from gvcodecs.mcgv.encode_job import Job
+from gvcodecs.mcgv.encoding.tile_charts import charts_of
 from gvcodecs.mcgv.layout.chart_coding import SECTION as CHARTS
 from gvcodecs.mcgv.layout.chart_coding import encode_charts
+from gvcodecs.mcgv.layout.chart_parameterization import parameterize
 from gvcodecs.mcgv.layout.kd_tree import choose_size, place_points
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.packing import pack
-from gvcodecs.mcgv.layout.parameterization import parameterize
 from gvcodecs.mcgv.layout.tiles import place_charts
 from gvpipe.arrays import Int32, Integers
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from gvcodecs.mcgv.base.start import Start
+from gvcodecs.mcgv.base.base_frame import Start
+from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.affine_route import code_published
-from gvcodecs.mcgv.encoding.coded import Coded
+from gvcodecs.mcgv.encoding.coded_route import Coded
 from gvcodecs.mcgv.encoding.frames_route import code_frame_pictures
 from gvcodecs.mcgv.encoding.skinning_route import code_skinning_alone
 from gvcodecs.mcgv.encoding.trajectory_route import code_trajectory_pictures
-from gvcodecs.mcgv.job import Job
 from gvcodecs.mcgv.motion.skinning_fit import Fitted
 
 

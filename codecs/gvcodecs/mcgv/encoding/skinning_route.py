@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from gvcodecs.mcgv.base.start import Start
-from gvcodecs.mcgv.encoding.coded import Coded
-from gvcodecs.mcgv.job import Job
+from gvcodecs.mcgv.base.base_frame import Start
+from gvcodecs.mcgv.encode_job import Job
+from gvcodecs.mcgv.encoding.coded_route import Coded
 from gvcodecs.mcgv.motion.blended import code_blended
 from gvcodecs.mcgv.motion.skinning_fit import Fitted
 

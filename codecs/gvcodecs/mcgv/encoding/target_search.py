@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import math
 
-from gvcodecs.mcgv.base.start import begin
+from gvcodecs.mcgv.base.base_frame import begin
+from gvcodecs.mcgv.encode_job import Job
+from gvcodecs.mcgv.encoding.bitstream_sizes import cost
 from gvcodecs.mcgv.encoding.candidate import Anchor, Candidate
-from gvcodecs.mcgv.encoding.sizes import cost
-from gvcodecs.mcgv.encoding.skinning import fit_skinning
-from gvcodecs.mcgv.encoding.trials import Trials, encode
+from gvcodecs.mcgv.encoding.initial_skinning import fit_skinning
+from gvcodecs.mcgv.encoding.step_trials import StepTrials, encode
 from gvcodecs.mcgv.encoding.without_pictures import approach, omit_pictures, refine
-from gvcodecs.mcgv.job import Job
 from gvpipe.codec import Encoded
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of
@@ -54,10 +54,10 @@ def _reuse(job: Job, anchor: Anchor, wanted: float) -> Encoded:
     step = anchor.step * _limited(anchor.distance(wanted) / anchor.slope)
     if anchor.candidate.start.pictures:
         return encode(job, anchor.candidate, step)
-    return approach(Trials(job, anchor.candidate), anchor, step, wanted).encoded
+    return approach(StepTrials(job, anchor.candidate), anchor, step, wanted).encoded
 
 
-def _aim(job: Job, wanted: float) -> tuple[Trials, StepTrial]:
+def _aim(job: Job, wanted: float) -> tuple[StepTrials, StepTrial]:
     """Code with the step that leaves about a target error, model units."""
     trials, step = _begin(job, GUESS[job.settings.prediction] * wanted, wanted, wanted)
     if trials.candidate.fitted:
@@ -72,16 +72,16 @@ def _aim(job: Job, wanted: float) -> tuple[Trials, StepTrial]:
     return trials, find_step(trials, step, wanted, (low, high), SLOPE)
 
 
-def _begin(job: Job, step: float, wanted: float, fitted_for: float) -> tuple[Trials, float]:
+def _begin(job: Job, step: float, wanted: float, fitted_for: float) -> tuple[StepTrials, float]:
     """A start for a step and a target error, the blend for another (0: for the step), and the step that fits it."""
     start = begin(job, step, wanted)
     if not job.settings.is_blended:
-        return Trials(job, Candidate(start, None)), step
+        return StepTrials(job, Candidate(start, None)), step
     fitted, step = fit_skinning(job, start, fitted_for)
-    return Trials(job, Candidate(start, fitted)), step
+    return StepTrials(job, Candidate(start, fitted)), step
 
 
-def _fit_again(trials: Trials, step: float, wanted: float) -> tuple[Trials, float]:
+def _fit_again(trials: StepTrials, step: float, wanted: float) -> tuple[StepTrials, float]:
     """Where the error is far off, another step wants another blend, and another base frame; return what costs less."""
     if trials.are_pictures_idle(step) and FAR[0] <= trials.alone(step).error / wanted <= FAR[1]:
         return trials, step

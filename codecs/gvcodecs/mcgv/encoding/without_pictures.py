@@ -6,9 +6,9 @@ They take little time, so that more encodes than elsewhere are made.
 from __future__ import annotations
 
 from gvcodecs.mcgv.base.base_lattice import base_step
+from gvcodecs.mcgv.encoding.bitstream_sizes import cost, count_bytes, count_picture_bytes
 from gvcodecs.mcgv.encoding.candidate import Anchor, rebase
-from gvcodecs.mcgv.encoding.sizes import cost, count_bytes, count_picture_bytes
-from gvcodecs.mcgv.encoding.trials import Trials
+from gvcodecs.mcgv.encoding.step_trials import StepTrials
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.rate_control.step_search import SLOPE, StepTrial, find_step
 
@@ -25,12 +25,14 @@ MAX_TRANSFORMS = 0.2  # part of the bytes that transforms may take for that to b
 FINE_BAND = 0.8, 1.0  # part of that error which is close enough
 
 
-def approach(trials: Trials, anchor: Anchor, step: float, wanted: float) -> StepTrial:
+def approach(trials: StepTrials, anchor: Anchor, step: float, wanted: float) -> StepTrial:
     """Come close to a target error from an anchor; it follows the step less: base frame and blend have errors of their own."""
     return find_step(trials, step, wanted, NARROW, anchor.slope, MAX_ROUNDS)
 
 
-def omit_pictures(trials: Trials, step: float, wanted: float, band: tuple[float, float]) -> tuple[Trials, StepTrial] | None:
+def omit_pictures(
+    trials: StepTrials, step: float, wanted: float, band: tuple[float, float]
+) -> tuple[StepTrials, StepTrial] | None:
     """Meet a target error, model units, without pictures; None where pictures pay, or the blend cannot reach it.
 
     Args:
@@ -49,7 +51,7 @@ def omit_pictures(trials: Trials, step: float, wanted: float, band: tuple[float,
     return _choose_base(alone, aimed, wanted, band)
 
 
-def refine(trials: Trials, aimed: StepTrial, wanted: float) -> StepTrial:
+def refine(trials: StepTrials, aimed: StepTrial, wanted: float) -> StepTrial:
     """A file without pictures, or the same blend with `FINE_PART` of the target error where that costs next to nothing.
 
     Parts that move rigidly are exact but for the rounding of base and transforms.
@@ -59,14 +61,14 @@ def refine(trials: Trials, aimed: StepTrial, wanted: float) -> StepTrial:
         return aimed
     wanted, most = FINE_PART * wanted, FINE_COST * n_bytes
     step = aimed.step * FINE_PART ** (1 / SLOPE)
-    finer = Trials(trials.job, rebase(trials.job, trials.candidate, step, wanted))
+    finer = StepTrials(trials.job, rebase(trials.job, trials.candidate, step, wanted))
     if count_bytes(finer(step).bitstream) > most:
         return aimed
     fine = find_step(finer, step, wanted, FINE_BAND, SLOPE, MAX_ROUNDS)
     return fine if fine.error <= wanted and count_bytes(fine.bitstream) <= most else aimed
 
 
-def _are_pictures_dear(trials: Trials, step: float, wanted: float) -> bool:
+def _are_pictures_dear(trials: StepTrials, step: float, wanted: float) -> bool:
     """Whether a blend alone costs less than with pictures, and leaves no error that a finer step cannot take away."""
     whole = trials(step)
     if count_picture_bytes(whole.bitstream) < SPARED * count_bytes(whole.bitstream):
@@ -79,14 +81,16 @@ def _are_pictures_dear(trials: Trials, step: float, wanted: float) -> bool:
     return aimed.error <= wanted
 
 
-def _choose_base(trials: Trials, aimed: StepTrial, wanted: float, band: tuple[float, float]) -> tuple[Trials, StepTrial]:
+def _choose_base(
+    trials: StepTrials, aimed: StepTrial, wanted: float, band: tuple[float, float]
+) -> tuple[StepTrials, StepTrial]:
     """The same blend and error on the base frame that makes the file smallest: coarser ones are tried."""
     job, n_bytes = trials.job, count_bytes(aimed.bitstream)
     for coarsest in COARSEST if len(aimed.bitstream.sections["mesh"]) > LARGE_BASE * n_bytes else COARSEST[:1]:
         lattice_step = min(base_step(aimed.step, job.sequence.n_frames), coarsest * wanted)
         if lattice_step < REBASED * trials.candidate.start.lattice.step:
             continue
-        others = Trials(job, rebase(job, trials.candidate, aimed.step, coarsest * wanted))
+        others = StepTrials(job, rebase(job, trials.candidate, aimed.step, coarsest * wanted))
         other = find_step(others, aimed.step, wanted, band, SLOPE, MAX_ROUNDS)
         if other.error <= wanted and count_bytes(other.bitstream) < count_bytes(aimed.bitstream):
             trials, aimed = others, other

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from gvcodecs.mcgv.layout.chart_parameterization import Atlas
 from gvcodecs.mcgv.layout.layout import Layout
-from gvcodecs.mcgv.layout.parameterization import Atlas
 from gvpipe.arrays import Bool, Float64, Int64
 from gvpipe.errors import InputError
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvcodecs.mcgv.base.start import Start
+from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.base.surface import DecodedBase
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.layout import Layout

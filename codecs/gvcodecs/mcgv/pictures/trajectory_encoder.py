@@ -13,9 +13,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
-from gvcodecs.mcgv.base.start import Start
-from gvcodecs.mcgv.job import Job
+from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding import Padding
 from gvcodecs.mcgv.motion.skinning import Blend, BlendFit

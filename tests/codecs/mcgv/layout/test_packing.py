@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from surfaces import awkward_surfaces, bumpy_sheet, check_layout
 
+from gvcodecs.mcgv.layout.chart_parameterization import Atlas, parameterize
 from gvcodecs.mcgv.layout.coding import (
     decode_clusters,
     decode_pixels,
@@ -17,7 +18,6 @@ from gvcodecs.mcgv.layout.coding import (
     encode_slot_clusters,
 )
 from gvcodecs.mcgv.layout.packing import pack
-from gvcodecs.mcgv.layout.parameterization import Atlas, parameterize
 from gvpipe.errors import InputError
 
 

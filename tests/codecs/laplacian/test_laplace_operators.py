@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from sequences import awkward, grid
 
-from gvcodecs.laplacian.operators import LEAST, OPERATORS, laplacian
+from gvcodecs.laplacian.laplace_operators import LEAST, OPERATORS, laplacian
 from gvpipe.mesh.topology import adjacency, components
 
 GEOMETRIC = [operator for operator in OPERATORS if operator != "tutte"]

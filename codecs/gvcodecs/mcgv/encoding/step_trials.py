@@ -6,12 +6,12 @@ import dataclasses
 import math
 from functools import cached_property
 
-from gvcodecs.mcgv.base.start import Start
+from gvcodecs.mcgv.base.base_frame import Start
+from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.candidate import Candidate
-from gvcodecs.mcgv.encoding.coded import Coded
-from gvcodecs.mcgv.encoding.measuring import measure_decoded, measure_predicted
+from gvcodecs.mcgv.encoding.coded_route import Coded
+from gvcodecs.mcgv.encoding.error_measuring import measure_decoded, measure_predicted
 from gvcodecs.mcgv.encoding.routes import code
-from gvcodecs.mcgv.job import Job
 from gvpipe.codec import Encoded
 from gvpipe.rate_control.step_search import StepTrial
 
@@ -19,7 +19,7 @@ ROUNDING = math.sqrt(1 / 12)  # steps, root mean square, that rounding to steps 
 IDLE_FRAMES = 24  # from which on pictures that change nothing take more bytes than the poster in their place, about
 
 
-class Trials:
+class StepTrials:
     """Codes a candidate and measures, once for each step."""
 
     def __init__(self, job: Job, candidate: Candidate) -> None:
@@ -39,10 +39,10 @@ class Trials:
         return self._done[step]
 
     @cached_property
-    def alone(self) -> Trials:
+    def alone(self) -> StepTrials:
         """Of the same candidate without pictures."""
         start = dataclasses.replace(self.candidate.start, pictures=False)
-        return Trials(self.job, dataclasses.replace(self.candidate, start=start))
+        return StepTrials(self.job, dataclasses.replace(self.candidate, start=start))
 
     def are_pictures_idle(self, step: float) -> bool:
         """Whether the blend alone leaves less than pictures of a step, model units, would: these round to steps."""

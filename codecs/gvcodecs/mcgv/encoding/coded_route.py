@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gvcodecs.mcgv.base.start import Start
+from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.base.surface import STILL
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.coding import encode_pixels

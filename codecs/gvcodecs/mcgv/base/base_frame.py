@@ -8,7 +8,7 @@ import numpy as np
 
 from gvcodecs.mcgv.base.base_lattice import base_step, choose_lattice, quantise_base
 from gvcodecs.mcgv.base.welded_points import Points
-from gvcodecs.mcgv.job import Job
+from gvcodecs.mcgv.encode_job import Job
 from gvpipe.arrays import Bool, Float64, Int32, Int64
 from gvpipe.connectivity.base_mesh import EncodedMesh
 from gvpipe.connectivity.welded_mesh import encode_points

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 
-from gvcodecs.mcgv.base.start import Start
-from gvcodecs.mcgv.encoding.charts import charts_of, motions_of
-from gvcodecs.mcgv.job import Job
+from gvcodecs.mcgv.base.base_frame import Start
+from gvcodecs.mcgv.encode_job import Job
+from gvcodecs.mcgv.encoding.tile_charts import charts_of, motions_of
 from gvcodecs.mcgv.motion.skinning_fit import Fitted, fit_blend
 
 

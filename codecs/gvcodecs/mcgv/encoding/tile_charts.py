@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from gvcodecs.mcgv.base.start import Start
-from gvcodecs.mcgv.job import Job
+from gvcodecs.mcgv.base.base_frame import Start
+from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.layout.chart_coding import number_charts
-from gvcodecs.mcgv.layout.parameterization import parameterize
+from gvcodecs.mcgv.layout.chart_parameterization import parameterize
 from gvcodecs.mcgv.motion.skinning_fit import Motions
 from gvpipe.arrays import Int64
 

@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvcodecs.mcgv.base.start import Start
-from gvcodecs.mcgv.job import Job
-from gvcodecs.mcgv.opening import open_reader
+from gvcodecs.mcgv.base.base_frame import Start
+from gvcodecs.mcgv.encode_job import Job
+from gvcodecs.mcgv.reader_choice import open_reader
 from gvpipe.arrays import Float64
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.rate_control.step_search import root_mean_square
