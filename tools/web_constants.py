@@ -1,7 +1,7 @@
 """The constants that the web player shares with Python: python tools/web_constants.py writes gvpipe/web/src/constants.js.
 
 A constant has the name of its module and its own: ``REACH`` of `gvpipe.connectivity.vertex_order` is ``VERTEX_ORDER_REACH``.
-`tests/test_export.py` compares the file with what this script makes.
+`tests/web/test_export.py` compares the file with what this script makes.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ SHARED = {
     "gvpipe.entropy.integers": "MAX_CONTEXTS",
     "gvpipe.entropy.parametric_tables": "N_TOKENS RATIO_BITS RATIOS TOTAL ZEROS",
     "gvpipe.entropy.range_decoder": "PRECISION",
+    "gvpipe.entropy.series": "MAX_CLASS",
     "gvpipe.entropy.tokens": "DIRECT TABLE_TOTAL MAX_TOKENS CHUNK",
     "gvpipe.errors": "REMEDY",
     "gvpipe.media.video": "MAX_SIDE",
@@ -43,10 +44,9 @@ SHARED = {
     "gvcodecs.mcgv.layout.chart_kernels": "MAX_NEAR",
     "gvcodecs.mcgv.layout.coding": "CONTEXTS",
     "gvcodecs.mcgv.layout.kd_tree": "COMMON FRAME MOMENT_BITS SPREAD MAX_COORDINATE",
-    "gvcodecs.mcgv.motion.affine_coding": "MAX_CLASS",
     "gvcodecs.mcgv.motion.skinning": "INFLUENCES TOTAL FLAT LEAST_ENERGY",
     "gvcodecs.mcgv.motion.weight_coding": "COUNT_CONTEXTS",
-    "gvcodecs.mcgv.motion.weight_kernels": "MAX_NEAR",
+    "gvcodecs.mcgv.motion.weight_kernels": "MAX_NEIGHBOURS",
 }
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Finished
-from folders import SAMPLES
+from folders import ROOT, SAMPLES
 from sequences import waving
 
 import gvpipe
@@ -180,7 +180,7 @@ def test_player_reads_what_encode_writes() -> None:
 
 
 def test_the_player_s_constants_are_python_s() -> None:
-    script = runpy.run_path(str(Path(__file__).parents[1] / "tools" / "web_constants.py"))
+    script = runpy.run_path(str(ROOT / "tools" / "web_constants.py"))
     assert (WEB / "src" / "constants.js").read_text("utf-8") == script["make"](), "run tools/web_constants.py"
 
 

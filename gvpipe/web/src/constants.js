@@ -58,6 +58,9 @@ export const PARAMETRIC_TABLES_ZEROS = 256;
 // gvpipe.entropy.range_decoder
 export const RANGE_DECODER_PRECISION = 24;
 
+// gvpipe.entropy.series
+export const SERIES_MAX_CLASS = 63;
+
 // gvpipe.entropy.tokens
 export const TOKENS_DIRECT = 16;
 export const TOKENS_TABLE_TOTAL = 4096;
@@ -139,9 +142,6 @@ export const KD_TREE_MOMENT_BITS = 10;
 export const KD_TREE_SPREAD = 2;
 export const KD_TREE_MAX_COORDINATE = 1048576;
 
-// gvcodecs.mcgv.motion.affine_coding
-export const AFFINE_CODING_MAX_CLASS = 63;
-
 // gvcodecs.mcgv.motion.skinning
 export const SKINNING_INFLUENCES = 4;
 export const SKINNING_TOTAL = 64;
@@ -152,4 +152,4 @@ export const SKINNING_LEAST_ENERGY = 1e-09;
 export const WEIGHT_CODING_COUNT_CONTEXTS = 4;
 
 // gvcodecs.mcgv.motion.weight_kernels
-export const WEIGHT_KERNELS_MAX_NEAR = 8;
+export const WEIGHT_KERNELS_MAX_NEIGHBOURS = 8;

@@ -3,7 +3,7 @@
  * Mirrors `gvcodecs.mcgv.motion.affine_coding`; `docs/format.md`, section 5.
  */
 
-import { AFFINE_CODING_MAX_CLASS as MAX_CLASS } from "../constants.js";
+import { SERIES_MAX_CLASS as MAX_CLASS } from "../constants.js";
 import { Cursor } from "../format/cursor.js";
 import { decodeIntegers } from "../format/integers.js";
 
