@@ -51,7 +51,7 @@ from gvpipe.trajectory.basis import MAX_COMPONENTS, reduce_trajectories, squared
 from gvpipe.trajectory.coded_points import CodedConnectivity, code_connectivity, read_trajectories
 from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
 
-FIRST = 1.0  # of the error wanted, asked of `reduce_trajectories` in a first encode, before drift is known
+FIRST = 1.0  # of the target error, asked of `reduce_trajectories` in a first encode, before drift is known
 NOISE = 3.0  # squared error that rounding of deltas leaves, in that of coefficients rounded alike, about
 POINT_COST, ROW_COST = 0.1, 5.0  # of a component: deltas cost little, so that components are paid for by their basis
 
@@ -100,15 +100,17 @@ class Laplacian(BaseCodec):
 
     def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         start = self._start(sequence, memo, report)
-        wanted = start.shared.target_error(self.quality)
+        target_error = start.shared.target_error(self.quality)
         anchors = memo("anchors", list[Anchor])
-        known = step_between(anchors, wanted)
-        if known is not None or not start.still.n_moving or self.components:
-            return self._code(sequence, start, known or FIRST * wanted, report).encoded
-        aimed = find_step(lambda asked: self._code(sequence, start, asked, report), first_step(anchors, wanted, FIRST), wanted)
-        if aimed.error > wanted / NEAR:  # else the step hardly matters, and tells nothing of other errors
-            anchors.append(Anchor(aimed.step, aimed.error))
-        return aimed.encoded
+        found_step = step_between(anchors, target_error)
+        if found_step is not None or not start.still.n_moving or self.components:
+            return self._code(sequence, start, found_step or FIRST * target_error, report).encoded
+        trial = find_step(
+            lambda asked: self._code(sequence, start, asked, report), first_step(anchors, target_error, FIRST), target_error
+        )
+        if trial.error > target_error / NEAR:  # else the step hardly matters, and tells nothing of other errors
+            anchors.append(Anchor(trial.step, trial.error))
+        return trial.encoded
 
     def _start(self, sequence: MeshSequence, memo: Memo, report: Progress) -> _Start:
         """What does not depend on the step: mesh and average as coded, what coefficients are coded with; and still points."""

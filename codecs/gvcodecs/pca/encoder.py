@@ -66,9 +66,9 @@ class Pca(BaseCodec):
 
     def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         shared = code_connectivity(sequence, self.reorder, memo, report)
-        mesh, wanted = shared.mesh, shared.target_error(self.quality)
+        mesh, target_error = shared.mesh, shared.target_error(self.quality)
         causal = memo("order", lambda: causal_order(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor))
-        data, still = code_still(sequence, shared, wanted, memo)
+        data, still = code_still(sequence, shared, target_error, memo)
         causal, moving = leave_out(causal, still.flags), shared.members[~still.flags]
         bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
         n_segments = len(bounds) - 1
@@ -77,7 +77,7 @@ class Pca(BaseCodec):
         for s, (start, stop) in enumerate(pairwise(bounds) if still.n_moving else []):
             report("segments", s / n_segments)
             trajectories = read_trajectories(sequence, start, stop, moving)
-            error = (wanted / LEFT) ** 2 * still.n_moving * (stop - start)
+            error = (target_error / LEFT) ** 2 * still.n_moving * (stop - start)
             reduced = reduce_trajectories(trajectories, error, self.components, most=still.most_components)
             steps.append(reduced.step)
             sections[f"basis.{s}"] = reduced.basis

@@ -87,12 +87,12 @@ class Pdct(BaseCodec):
 
     def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         report("base", 0)
-        wanted = error_of(self.quality) / 100 * memo("spread", lambda: measure_spread(sequence))
-        start = self._start(sequence, wanted, memo)
+        target_error = error_of(self.quality) / 100 * memo("spread", lambda: measure_spread(sequence))
+        start = self._start(sequence, target_error, memo)
         anchors = memo("anchors", list[Anchor])
-        known = step_between(anchors, wanted)
-        if known is not None or not len(start.surface.traversal) or self.kept:
-            return self._code(sequence, start, known or FIRST * wanted, memo, report)
+        found_step = step_between(anchors, target_error)
+        if found_step is not None or not len(start.surface.traversal) or self.kept:
+            return self._code(sequence, start, found_step or FIRST * target_error, memo, report)
         own = sequence.reordered(start.coded.permutation, start.mesh.faces)
 
         def attempt(step: float) -> StepTrial:
@@ -100,10 +100,10 @@ class Pdct(BaseCodec):
             report("measure", 0)
             return StepTrial(encoded, step, root_mean_square(own, self.reader(encoded.bitstream)))
 
-        aimed = find_step(attempt, first_step(anchors, wanted, FIRST), wanted)
-        if aimed.error > wanted / NEAR:  # else the step hardly matters, and tells nothing of other errors
-            anchors.append(Anchor(aimed.step, aimed.error))
-        return aimed.encoded
+        trial = find_step(attempt, first_step(anchors, target_error, FIRST), target_error)
+        if trial.error > target_error / NEAR:  # else the step hardly matters, and tells nothing of other errors
+            anchors.append(Anchor(trial.step, trial.error))
+        return trial.encoded
 
     @classmethod
     def reader(cls, bitstream: Bitstream) -> FrameReader:
@@ -124,8 +124,8 @@ class Pdct(BaseCodec):
         step = max(step, SMALLEST * diagonal_of(frames)) or SMALLEST
         return encode_clip(frames, surface, DeltaQuantiser(step, float(self.fineness), self.kept), clusters, self.seed_bits)
 
-    def _start(self, sequence: MeshSequence, wanted: float, memo: Memo) -> _Start:
-        """Code points and connectivity, and still points to an error wanted, model units."""
+    def _start(self, sequence: MeshSequence, target_error: float, memo: Memo) -> _Start:
+        """Code points and connectivity, and still points to a target error, model units."""
         still = memo("still", lambda: find_still(sequence))
         points = memo("points", lambda: find_points(sequence))
         first = sequence.read(0, 1)[0]
@@ -137,7 +137,7 @@ class Pdct(BaseCodec):
         sections = {"mesh": coded.mesh, "order": coded.order}
         flags = still[sources]  # vertices of one trajectory move, or stand still, together
         if flags.any():
-            sections[SECTION] = encode_still(flags, first[sources], surface, STILL * wanted)
+            sections[SECTION] = encode_still(flags, first[sources], surface, STILL * target_error)
         return _Start(coded, mesh, lattice, sources, surface.without(np.flatnonzero(flags)), sections)
 
     def _code(self, sequence: MeshSequence, start: _Start, step: float, memo: Memo, report: Progress) -> Encoded:

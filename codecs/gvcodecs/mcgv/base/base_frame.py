@@ -73,7 +73,7 @@ class Start:
         return vertices, own[vertices]
 
 
-def begin(job: Job, step: float, wanted: float, point: Int64 | None = None) -> Start:
+def begin(job: Job, step: float, target_error: float, point: Int64 | None = None) -> Start:
     """Code the base frame for a quantisation step and a target error, model units, and see the sequence as the decoder will.
 
     ``point (V,)`` is the point of each vertex, if that is known.
@@ -85,7 +85,7 @@ def begin(job: Job, step: float, wanted: float, point: Int64 | None = None) -> S
     if point is None:
         point = _weld(given, still, MERGED * step)
     members = np.unique(point, return_index=True)[1]
-    lattice = choose_lattice(settings, first[members], min(base_step(step, given.n_frames), wanted))
+    lattice = choose_lattice(settings, first[members], min(base_step(step, given.n_frames), target_error))
     positions = quantise_base(settings, lattice, first[members])
     coded, mesh = job.memo(
         f"base {lattice.step} {len(members)}",

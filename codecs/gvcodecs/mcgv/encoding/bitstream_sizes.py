@@ -13,9 +13,9 @@ POSTER = 1200  # bytes that stand in place of pictures, about
 FALL = 0.2  # bytes of one blend go with the error to the power of about minus this
 
 
-def cost(aimed: StepTrial) -> float:
+def cost(trial: StepTrial) -> float:
     """Bytes, as if at equal error."""
-    return count_bytes(aimed.bitstream) * math.pow(aimed.error, FALL)
+    return count_bytes(trial.bitstream) * math.pow(trial.error, FALL)
 
 
 def count_bytes(bitstream: Bitstream) -> int:

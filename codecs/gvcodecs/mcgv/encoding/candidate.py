@@ -34,22 +34,22 @@ class Anchor:
     slope: float
 
     @classmethod
-    def of(cls, candidate: Candidate, aimed: StepTrial) -> Anchor:
+    def of(cls, candidate: Candidate, trial: StepTrial) -> Anchor:
         """Of an encode of a candidate."""
-        return cls(candidate, aimed.step, aimed.error, aimed.slope)
+        return cls(candidate, trial.step, trial.error, trial.slope)
 
-    def distance(self, wanted: float) -> float:
+    def distance(self, target_error: float) -> float:
         """How far a target error is from the error measured, as a logarithm."""
-        return math.log(wanted) - math.log(self.error)
+        return math.log(target_error) - math.log(self.error)
 
 
-def rebase(job: Job, candidate: Candidate, step: float, wanted: float) -> Candidate:
+def rebase(job: Job, candidate: Candidate, step: float, target_error: float) -> Candidate:
     """The same points and blend, without pictures, on the base frame of another step and target error, model units."""
     from gvcodecs.mcgv.motion.weight_order_kernels import sort_by_rank
 
     given, fitted = candidate.start, candidate.fitted
     assert fitted
-    start = dataclasses.replace(begin(job, step, wanted, given.point), pictures=False)
+    start = dataclasses.replace(begin(job, step, target_error, given.point), pictures=False)
     number = np.empty(len(given.point), np.int64)
     number[given.point[given.sources]] = np.arange(len(given.sources))
     before = number[start.point[start.sources]]  # the number that each point had

@@ -11,17 +11,17 @@ from gvcodecs.mcgv.encoding.tile_charts import charts_of, motions_of
 from gvcodecs.mcgv.motion.skinning_fit import Fitted, fit_blend
 
 
-def fit_skinning(job: Job, start: Start, wanted: float) -> tuple[Fitted, float]:
+def fit_skinning(job: Job, start: Start, target_error: float) -> tuple[Fitted, float]:
     """Return a blend that leaves about a root mean square error of vertices, model units, and the step that fits it.
 
-    ``wanted`` 0: the step is that of the start.
+    ``target_error`` 0: the step is that of the start.
     """
     job.report("segment", 0)
     motions = motions_of(job, start)
     needs_charts = start.placement == "tiles" and not job.settings.may_omit_pictures  # else pictures may never be tried
     with ThreadPoolExecutor(1) as pool:  # charts beside the blend, whose loops hold no lock
         charts = pool.submit(charts_of, job, start) if needs_charts else None
-        found = fit_blend(motions, start.step, job.settings.clusters, wanted / math.sqrt(start.moving_part))
+        found = fit_blend(motions, start.step, job.settings.clusters, target_error / math.sqrt(start.moving_part))
         if charts:
             charts.result()
     return found

@@ -36,60 +36,60 @@ LEAST = 1e-9  # part of the target error, below which an error is none
 
 def encode_to_target(job: Job) -> Encoded:
     """Code a sequence with the error that its quality asks for."""
-    wanted = error_of(job.settings.quality) / 100 * job.memo("spread", lambda: measure_spread(job.sequence))
+    target_error = error_of(job.settings.quality) / 100 * job.memo("spread", lambda: measure_spread(job.sequence))
     anchors = job.memo("anchors", list[Anchor])
     if anchors:  # what was measured at another quality serves this one
-        anchor = min(anchors, key=lambda anchor: abs(anchor.distance(wanted)))
-        if not anchor.candidate.fitted or abs(anchor.distance(wanted)) < REUSED:
-            return _reuse(job, anchor, wanted)
-    trials, aimed = _aim(job, wanted)
-    anchors.append(Anchor.of(trials.candidate, aimed))
+        anchor = min(anchors, key=lambda anchor: abs(anchor.distance(target_error)))
+        if not anchor.candidate.fitted or abs(anchor.distance(target_error)) < REUSED:
+            return _reuse(job, anchor, target_error)
+    trials, trial = _aim(job, target_error)
+    anchors.append(Anchor.of(trials.candidate, trial))
     if not job.memo.is_shared and not trials.candidate.start.pictures:  # who searches a quality asks for no more than its error
-        aimed = refine(trials, aimed, wanted)
-    return aimed.encoded
+        trial = refine(trials, trial, target_error)
+    return trial.encoded
 
 
-def _reuse(job: Job, anchor: Anchor, wanted: float) -> Encoded:
+def _reuse(job: Job, anchor: Anchor, target_error: float) -> Encoded:
     """Code from what an anchor was made from."""
-    step = anchor.step * _limited(anchor.distance(wanted) / anchor.slope)
+    step = anchor.step * _limited(anchor.distance(target_error) / anchor.slope)
     if anchor.candidate.start.pictures:
         return encode(job, anchor.candidate, step)
-    return approach(StepTrials(job, anchor.candidate), anchor, step, wanted).encoded
+    return approach(StepTrials(job, anchor.candidate), anchor, step, target_error).encoded
 
 
-def _aim(job: Job, wanted: float) -> tuple[StepTrials, StepTrial]:
+def _aim(job: Job, target_error: float) -> tuple[StepTrials, StepTrial]:
     """Code with the step that leaves about a target error, model units."""
-    trials, step = _begin(job, GUESS[job.settings.prediction] * wanted, wanted, wanted)
+    trials, step = _begin(job, GUESS[job.settings.prediction] * target_error, target_error, target_error)
     if trials.candidate.fitted:
-        trials, step = _fit_again(trials, step, wanted)
+        trials, step = _fit_again(trials, step, target_error)
     low, high = BAND[job.settings.prediction]
     if job.sequence.n_frames * job.sequence.n_vertices > LARGE:
         low = min(low, FINE)
     if job.settings.may_omit_pictures:
-        found = omit_pictures(trials, step, wanted, (low, high))
+        found = omit_pictures(trials, step, target_error, (low, high))
         if found:
             return found
-    return trials, find_step(trials, step, wanted, (low, high), SLOPE)
+    return trials, find_step(trials, step, target_error, (low, high), SLOPE)
 
 
-def _begin(job: Job, step: float, wanted: float, fitted_for: float) -> tuple[StepTrials, float]:
+def _begin(job: Job, step: float, target_error: float, fitted_for: float) -> tuple[StepTrials, float]:
     """A start for a step and a target error, the blend for another (0: for the step), and the step that fits it."""
-    start = begin(job, step, wanted)
+    start = begin(job, step, target_error)
     if not job.settings.is_blended:
         return StepTrials(job, Candidate(start, None)), step
     fitted, step = fit_skinning(job, start, fitted_for)
     return StepTrials(job, Candidate(start, fitted)), step
 
 
-def _fit_again(trials: StepTrials, step: float, wanted: float) -> tuple[StepTrials, float]:
+def _fit_again(trials: StepTrials, step: float, target_error: float) -> tuple[StepTrials, float]:
     """Where the error is far off, another step wants another blend, and another base frame; return what costs less."""
-    if trials.are_pictures_idle(step) and FAR[0] <= trials.alone(step).error / wanted <= FAR[1]:
+    if trials.are_pictures_idle(step) and FAR[0] <= trials.alone(step).error / target_error <= FAR[1]:
         return trials, step
     first = trials(step)
-    if FAR[0] <= first.error / wanted <= FAR[1]:
+    if FAR[0] <= first.error / target_error <= FAR[1]:
         return trials, step
-    factor = _limited(math.log(SECOND * wanted / max(first.error, LEAST * wanted)))
-    others, other_step = _begin(trials.job, step * factor, wanted, 0.0)
+    factor = _limited(math.log(SECOND * target_error / max(first.error, LEAST * target_error)))
+    others, other_step = _begin(trials.job, step * factor, target_error, 0.0)
     return (trials, step) if cost(first) < cost(others(other_step)) else (others, other_step)
 
 

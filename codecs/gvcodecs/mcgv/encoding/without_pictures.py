@@ -25,76 +25,76 @@ MAX_TRANSFORMS = 0.2  # part of the bytes that transforms may take for that to b
 FINE_BAND = 0.8, 1.0  # part of that error which is close enough
 
 
-def approach(trials: StepTrials, anchor: Anchor, step: float, wanted: float) -> StepTrial:
+def approach(trials: StepTrials, anchor: Anchor, step: float, target_error: float) -> StepTrial:
     """Come close to a target error from an anchor; it follows the step less: base frame and blend have errors of their own."""
-    return find_step(trials, step, wanted, NARROW, anchor.slope, MAX_ROUNDS)
+    return find_step(trials, step, target_error, NARROW, anchor.slope, MAX_ROUNDS)
 
 
 def omit_pictures(
-    trials: StepTrials, step: float, wanted: float, band: tuple[float, float]
+    trials: StepTrials, step: float, target_error: float, band: tuple[float, float]
 ) -> tuple[StepTrials, StepTrial] | None:
     """Meet a target error, model units, without pictures; None where pictures pay, or the blend cannot reach it.
 
     Args:
         trials: of a blend with pictures.
         step: that leaves about this error, model units.
-        wanted: the target error.
+        target_error: root mean square over vertices, model units.
         band: least and most part of it that is close enough.
     """
     alone = trials.alone
-    idle = trials.are_pictures_idle(step) and alone(step).error <= wanted
-    if not idle and not _are_pictures_dear(trials, step, wanted):
+    idle = trials.are_pictures_idle(step) and alone(step).error <= target_error
+    if not idle and not _are_pictures_dear(trials, step, target_error):
         return None
-    aimed = find_step(alone, step, wanted, band, SLOPE, MAX_ROUNDS)
-    if aimed.error > wanted or (not idle and cost(aimed) >= cost(trials(step))):
+    trial = find_step(alone, step, target_error, band, SLOPE, MAX_ROUNDS)
+    if trial.error > target_error or (not idle and cost(trial) >= cost(trials(step))):
         return None
-    return _choose_base(alone, aimed, wanted, band)
+    return _choose_base(alone, trial, target_error, band)
 
 
-def refine(trials: StepTrials, aimed: StepTrial, wanted: float) -> StepTrial:
+def refine(trials: StepTrials, trial: StepTrial, target_error: float) -> StepTrial:
     """A file without pictures, or the same blend with `FINE_PART` of the target error where that costs next to nothing.
 
     Parts that move rigidly are exact but for the rounding of base and transforms.
     """
-    n_bytes = count_bytes(aimed.bitstream)
-    if _count_transform_bytes(aimed.bitstream) > MAX_TRANSFORMS * n_bytes:
-        return aimed
-    wanted, most = FINE_PART * wanted, FINE_COST * n_bytes
-    step = aimed.step * FINE_PART ** (1 / SLOPE)
-    finer = StepTrials(trials.job, rebase(trials.job, trials.candidate, step, wanted))
+    n_bytes = count_bytes(trial.bitstream)
+    if _count_transform_bytes(trial.bitstream) > MAX_TRANSFORMS * n_bytes:
+        return trial
+    target_error, most = FINE_PART * target_error, FINE_COST * n_bytes
+    step = trial.step * FINE_PART ** (1 / SLOPE)
+    finer = StepTrials(trials.job, rebase(trials.job, trials.candidate, step, target_error))
     if count_bytes(finer(step).bitstream) > most:
-        return aimed
-    fine = find_step(finer, step, wanted, FINE_BAND, SLOPE, MAX_ROUNDS)
-    return fine if fine.error <= wanted and count_bytes(fine.bitstream) <= most else aimed
+        return trial
+    fine = find_step(finer, step, target_error, FINE_BAND, SLOPE, MAX_ROUNDS)
+    return fine if fine.error <= target_error and count_bytes(fine.bitstream) <= most else trial
 
 
-def _are_pictures_dear(trials: StepTrials, step: float, wanted: float) -> bool:
+def _are_pictures_dear(trials: StepTrials, step: float, target_error: float) -> bool:
     """Whether a blend alone costs less than with pictures, and leaves no error that a finer step cannot take away."""
     whole = trials(step)
     if count_picture_bytes(whole.bitstream) < SPARED * count_bytes(whole.bitstream):
         return False
-    aimed = trials.alone(step)
-    if cost(aimed) > cost(whole):
+    trial = trials.alone(step)
+    if cost(trial) > cost(whole):
         return False
-    if aimed.error > wanted:
-        aimed = trials.alone(step * (FINER_THAN * wanted / aimed.error) ** (1 / SLOPE))
-    return aimed.error <= wanted
+    if trial.error > target_error:
+        trial = trials.alone(step * (FINER_THAN * target_error / trial.error) ** (1 / SLOPE))
+    return trial.error <= target_error
 
 
 def _choose_base(
-    trials: StepTrials, aimed: StepTrial, wanted: float, band: tuple[float, float]
+    trials: StepTrials, trial: StepTrial, target_error: float, band: tuple[float, float]
 ) -> tuple[StepTrials, StepTrial]:
     """The same blend and error on the base frame that makes the file smallest: coarser ones are tried."""
-    job, n_bytes = trials.job, count_bytes(aimed.bitstream)
-    for coarsest in COARSEST if len(aimed.bitstream.sections["mesh"]) > LARGE_BASE * n_bytes else COARSEST[:1]:
-        lattice_step = min(base_step(aimed.step, job.sequence.n_frames), coarsest * wanted)
+    job, n_bytes = trials.job, count_bytes(trial.bitstream)
+    for coarsest in COARSEST if len(trial.bitstream.sections["mesh"]) > LARGE_BASE * n_bytes else COARSEST[:1]:
+        lattice_step = min(base_step(trial.step, job.sequence.n_frames), coarsest * target_error)
         if lattice_step < REBASED * trials.candidate.start.lattice.step:
             continue
-        others = StepTrials(job, rebase(job, trials.candidate, aimed.step, coarsest * wanted))
-        other = find_step(others, aimed.step, wanted, band, SLOPE, MAX_ROUNDS)
-        if other.error <= wanted and count_bytes(other.bitstream) < count_bytes(aimed.bitstream):
-            trials, aimed = others, other
-    return trials, aimed
+        others = StepTrials(job, rebase(job, trials.candidate, trial.step, coarsest * target_error))
+        other = find_step(others, trial.step, target_error, band, SLOPE, MAX_ROUNDS)
+        if other.error <= target_error and count_bytes(other.bitstream) < count_bytes(trial.bitstream):
+            trials, trial = others, other
+    return trials, trial
 
 
 def _count_transform_bytes(bitstream: Bitstream) -> int:

@@ -50,7 +50,7 @@ GROWTH = (
 ROUNDS = 3  # steps tried
 ROUNDED = 0.025  # squared steps that rounding a number of the transforms leaves: many are of components too small to be coded
 PICTURED = 0.45  # steps, root mean square, that pictures leave of a point's residual
-AIM = 0.88  # of the error wanted, what a blend is to leave: coding adds to it
+AIM = 0.88  # of the target error, what a blend is to leave: coding adds to it
 CLOSE = 0.18  # logarithm of the error left over that
 SLOPE = 0.75  # of its logarithm over the step's
 MOST_MOVED = 3.0  # times, the step at once
@@ -115,14 +115,14 @@ class Motions:
         )
 
 
-def fit_blend(motions: Motions, step: float, n_clusters: int, wanted: float = 0.0) -> tuple[Fitted, float]:
+def fit_blend(motions: Motions, step: float, n_clusters: int, target_error: float = 0.0) -> tuple[Fitted, float]:
     """Fit a blend; return it, and the quantisation step it was fitted for.
 
     Args:
         motions: of the points.
-        step: quantisation step of positions, model units: what an error is worth.
+        step: quantisation step of positions, model units; it weighs errors against bits.
         n_clusters: K, about; 0: as many as pay.
-        wanted: root mean square error of a point, model units, that a blend should leave: the step moves until it does, about.
+        target_error: root mean square over points, model units. The step changes until the blend leaves about this error.
             0: the step stays.
     """
     starts = [motions.clustering.start(n_clusters or 1)]
@@ -133,9 +133,9 @@ def fit_blend(motions: Motions, step: float, n_clusters: int, wanted: float = 0.
         best = min(tried, key=lambda trial: trial.cost)
         starts = [trial.fitted for trial in tried]
         left = motions.error(problem, best, step)
-        if not wanted or not left > 0 or abs(math.log(AIM * wanted / left)) < CLOSE:
+        if not target_error or not left > 0 or abs(math.log(AIM * target_error / left)) < CLOSE:
             break
-        step *= min(max((AIM * wanted / left) ** (1 / SLOPE), 1 / MOST_MOVED), MOST_MOVED)
+        step *= min(max((AIM * target_error / left) ** (1 / SLOPE), 1 / MOST_MOVED), MOST_MOVED)
     return _alternate(problem, best, LAST_PASSES), step
 
 
