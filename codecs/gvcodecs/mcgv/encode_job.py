@@ -8,6 +8,8 @@ from gvcodecs.mcgv.settings import Settings
 from gvpipe.codec import Memo, Progress
 from gvpipe.sequence import MeshSequence
 
+LARGE = 1_500_000  # vertices of all frames
+
 
 @dataclass(frozen=True)
 class Job:
@@ -24,3 +26,8 @@ class Job:
     sequence: MeshSequence
     memo: Memo
     report: Progress
+
+    @property
+    def is_large(self) -> bool:
+        """Whether time counts more than the last percent of bytes: fewer encodes are tried."""
+        return self.sequence.n_frames * self.sequence.n_vertices > LARGE

@@ -26,7 +26,7 @@ from gvpipe.rate_control.step_search import SLOPE, StepTrial, find_step
 
 GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
 BAND = {"blended": (0.9, 0.99), "affine": (1.0, 1.1)}  # of the target error: the published mode is no finer than asked
-LARGE, FINE = 1_000_000, 0.81  # vertices of all frames, from which on another encode is not made for an error so fine
+FINE = 0.81  # part of the target error, from which on the first encode of a large sequence is kept
 FAR = 0.75, 1.4  # of the target error: what a blend is kept for
 MAX_MOVE = math.log(4)  # of the step's logarithm, at once
 REUSED = 0.35  # of the error's logarithm, away from that measured: up to there a blend serves another quality
@@ -62,14 +62,16 @@ def _aim(job: Job, target_error: float) -> tuple[StepTrials, StepTrial]:
     trials, step = _begin(job, GUESS[job.settings.prediction] * target_error, target_error, target_error)
     if trials.candidate.fitted:
         trials, step = _fit_again(trials, step, target_error)
-    low, high = BAND[job.settings.prediction]
-    if job.sequence.n_frames * job.sequence.n_vertices > LARGE:
-        low = min(low, FINE)
+    band = BAND[job.settings.prediction]
     if job.settings.may_omit_pictures:
-        found = omit_pictures(trials, step, target_error, (low, high))
+        found = omit_pictures(trials, step, target_error, band)
         if found:
             return found
-    return trials, find_step(trials, step, target_error, (low, high), SLOPE)
+    if job.settings.is_blended and job.is_large:
+        first = trials(step)
+        if FINE <= first.error / target_error <= band[1]:
+            return trials, first
+    return trials, find_step(trials, step, target_error, band, SLOPE)
 
 
 def _begin(job: Job, step: float, target_error: float, fitted_for: float) -> tuple[StepTrials, float]:

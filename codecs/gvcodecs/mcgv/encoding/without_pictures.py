@@ -48,7 +48,7 @@ def omit_pictures(
     trial = find_step(alone, step, target_error, band, SLOPE, MAX_ROUNDS)
     if trial.error > target_error or (not idle and cost(trial) >= cost(trials(step))):
         return None
-    return _choose_base(alone, trial, target_error, band)
+    return (alone, trial) if trials.job.is_large else _choose_base(alone, trial, target_error, band)
 
 
 def refine(trials: StepTrials, trial: StepTrial, target_error: float) -> StepTrial:
