@@ -1,9 +1,10 @@
 """Animated triangle meshes as small MP4 geometry videos.
 
->>> import gvpipe
->>> report = gvpipe.encode("samples/creature.npz", "creature.mp4")  # doctest: +SKIP
->>> with gvpipe.open("creature.mp4") as video:  # doctest: +SKIP
-...     positions = video[10]  # (V, 3) float32
+Examples:
+    >>> import gvpipe
+    >>> report = gvpipe.encode("samples/creature.npz", "creature.mp4")  # doctest: +SKIP
+    >>> with gvpipe.open("creature.mp4") as video:  # doctest: +SKIP
+    ...     positions = video[10]  # (V, 3) float32
 
 Everything named in ``__all__`` loads on first use, so that importing gvpipe costs nothing.
 """

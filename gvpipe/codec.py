@@ -31,9 +31,10 @@ class Memo:
     Args:
         is_shared: whether other encodes follow, as in a search for a quality.
 
-    >>> memo = Memo()
-    >>> memo("mesh", lambda: "made"), memo("mesh", lambda: "made again")
-    ('made', 'made')
+    Examples:
+        >>> memo = Memo()
+        >>> memo("mesh", lambda: "made"), memo("mesh", lambda: "made again")
+        ('made', 'made')
     """
 
     def __init__(self, is_shared: bool = True) -> None:

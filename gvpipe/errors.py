@@ -65,8 +65,9 @@ class CorruptFile(FormatError):
 def corrupt(what: str) -> CorruptFile:
     """Return the error for a file of which ``what`` says what does not hold; the remedy is added.
 
-    >>> str(corrupt("its video is damaged"))
-    'its video is damaged; get the file again from its source'
+    Examples:
+        >>> str(corrupt("its video is damaged"))
+        'its video is damaged; get the file again from its source'
     """
     return CorruptFile(f"{what}; {REMEDY}")
 

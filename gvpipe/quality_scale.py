@@ -20,8 +20,9 @@ BELOW, ABOVE = math.log(5) / 25, math.log(7) / 25  # fall of the logarithm per u
 def error_of(quality: float) -> float:
     """Return the target error, percent (`gvpipe.metrics.vertex_errors`), of a quality, 0..100.
 
-    >>> error_of(75), round(error_of(50), 6)
-    (0.14, 0.7)
+    Examples:
+        >>> error_of(75), round(error_of(50), 6)
+        (0.14, 0.7)
     """
     return ERROR * math.exp((MIDDLE - quality) * fall_at(quality))
 
@@ -29,8 +30,9 @@ def error_of(quality: float) -> float:
 def quality_of(error: float) -> float:
     """Mirror of `error_of`: the quality, 0..100, whose target error comes closest to ``error``, percent, above 0.
 
-    >>> quality_of(0.14), quality_of(100)
-    (75.0, 0.0)
+    Examples:
+        >>> quality_of(0.14), quality_of(100)
+        (75.0, 0.0)
     """
     fall = math.log(ERROR / error)
     return on_scale(MIDDLE + fall / (BELOW if fall < 0 else ABOVE))

@@ -38,8 +38,9 @@ class RepeatedFrames:
     Args:
         lengths: ``(D,)``, each 1 at least.
 
-    >>> RepeatedFrames(np.array([2, 1, 3])).starts.tolist()
-    [0, 2, 3, 6]
+    Examples:
+        >>> RepeatedFrames(np.array([2, 1, 3])).starts.tolist()
+        [0, 2, 3, 6]
     """
 
     lengths: Int64

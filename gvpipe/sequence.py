@@ -51,14 +51,15 @@ class MeshSequence:
             position in memory that is not finite (frames that load later are checked when they load).
         TypeError: positions, faces, fps or attributes are of no such type.
 
-    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
-    >>> sequence = MeshSequence(np.array([corners, np.add(corners, [0, 0, 0.5])]), np.array([[0, 1, 2]]), fps=25)
-    >>> sequence
-    <MeshSequence sequence: 2 frames of 3 vertices, 1 triangles, 25 fps>
-    >>> sequence[1][:, 2].tolist()  # z of the second frame's vertices
-    [0.5, 0.5, 0.5]
-    >>> sequence.part(1, 2).shape
-    (1, 3, 3)
+    Examples:
+        >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+        >>> sequence = MeshSequence(np.array([corners, np.add(corners, [0, 0, 0.5])]), np.array([[0, 1, 2]]), fps=25)
+        >>> sequence
+        <MeshSequence sequence: 2 frames of 3 vertices, 1 triangles, 25 fps>
+        >>> sequence[1][:, 2].tolist()  # z of the second frame's vertices
+        [0.5, 0.5, 0.5]
+        >>> sequence.part(1, 2).shape
+        (1, 3, 3)
     """
 
     positions: Frames

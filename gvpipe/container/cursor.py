@@ -24,8 +24,9 @@ MAX_VARINT_BYTES = 10
 def varint(value: int) -> bytes:
     """Return ``value`` (0..2**64-1) as a varint; raises ValueError beyond.
 
-    >>> varint(300).hex()
-    'ac02'
+    Examples:
+        >>> varint(300).hex()
+        'ac02'
     """
     if not 0 <= value < 1 << 64:
         raise ValueError(f"varint of {value}: it must lie in 0..2**64-1")
@@ -40,8 +41,9 @@ def varint(value: int) -> bytes:
 def pack_block(data: bytes) -> bytes:
     """Return ``data`` behind the varint of its length; `Cursor.block` reads it.
 
-    >>> pack_block(b"abc")
-    b'\\x03abc'
+    Examples:
+        >>> pack_block(b"abc")
+        b'\\x03abc'
     """
     return varint(len(data)) + data
 
@@ -49,9 +51,10 @@ def pack_block(data: bytes) -> bytes:
 class Cursor:
     """Reads one section from its start to its end; every read is checked against what is left.
 
-    >>> cursor = Cursor(varint(300) + pack_block(b"abc"), "example")
-    >>> cursor.varint(1000), cursor.block(), cursor.left
-    (300, b'abc', 0)
+    Examples:
+        >>> cursor = Cursor(varint(300) + pack_block(b"abc"), "example")
+        >>> cursor.varint(1000), cursor.block(), cursor.left
+        (300, b'abc', 0)
 
     Args:
         data: the section.

@@ -29,10 +29,11 @@ PARAMETRIC = 1  # kind of a table that two numbers describe
 class BlockEncoder:
     """Collects blocks; tables and bytes are made when all are there.
 
-    >>> coder = BlockEncoder(2)
-    >>> coder.add(np.array([0, 1, -1]), np.array([0, 0, 1]))
-    >>> BlockDecoder(coder.finish(), 2, "example").take(np.array([0, 0, 1])).tolist()
-    [0, 1, -1]
+    Examples:
+        >>> coder = BlockEncoder(2)
+        >>> coder.add(np.array([0, 1, -1]), np.array([0, 0, 1]))
+        >>> BlockDecoder(coder.finish(), 2, "example").take(np.array([0, 0, 1])).tolist()
+        [0, 1, -1]
     """
 
     def __init__(self, n_contexts: int) -> None:

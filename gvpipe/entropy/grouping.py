@@ -11,8 +11,9 @@ from gvpipe.arrays import Integers
 def group_by_context(contexts: Integers) -> list[tuple[int, NDArray[np.intp]]]:
     """Contexts ``(n,)`` that occur, ascending, and the indices of each one's values, ascending.
 
-    >>> [(context, values.tolist()) for context, values in group_by_context(np.array([5, 0, 5]))]
-    [(0, [1]), (5, [0, 2])]
+    Examples:
+        >>> [(context, values.tolist()) for context, values in group_by_context(np.array([5, 0, 5]))]
+        [(0, [1]), (5, [0, 2])]
     """
     order = np.argsort(contexts, kind="stable")
     bounds = np.flatnonzero(np.diff(contexts[order])) + 1

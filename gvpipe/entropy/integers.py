@@ -32,8 +32,9 @@ _EMPTY = np.zeros(0, np.intp)
 def encode_integers(values: Integers, contexts: Integers | None = None) -> bytes:
     """Range code ``values`` (any shape, read in C order); returns one block of bytes.
 
-    >>> decode_integers(encode_integers(np.array([3, -1, 0])), 3).tolist()
-    [3, -1, 0]
+    Examples:
+        >>> decode_integers(encode_integers(np.array([3, -1, 0])), 3).tolist()
+        [3, -1, 0]
 
     Args:
         values: signed integers, magnitude below 2**39.

@@ -43,8 +43,9 @@ def shape(ratio: int) -> Int64:
 def table(zero: int, ratio: int) -> Int64:
     """Return frequencies ``(N_TOKENS,)`` for ``zero`` in 0..255 and the ratio of that index.
 
-    >>> table(128, 10)[:3].tolist()
-    [524288, 89464, 89464]
+    Examples:
+        >>> table(128, 10)[:3].tolist()
+        [524288, 89464, 89464]
     """
     frequencies = np.maximum(1, shape(ratio) * (ZEROS - zero) // ZEROS)
     frequencies[0] = max(1, TOTAL * zero // ZEROS)

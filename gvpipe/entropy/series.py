@@ -22,9 +22,10 @@ FIRST_CLASS = 63  # of the first frame's differences, where these have a context
 def encode_series(series: Int64, orders: tuple[int, ...], first_apart: bool = False) -> bytes:
     """Return a section for ``series (n, m)``, n frames of m integers.
 
-    >>> series = np.array([[5, 0], [7, 1], [9, 0]])
-    >>> decode_series(Cursor(encode_series(series, (1, 2)), "series"), (3, 2), (1, 2), "series").tolist()
-    [[5, 0], [7, 1], [9, 0]]
+    Examples:
+        >>> series = np.array([[5, 0], [7, 1], [9, 0]])
+        >>> decode_series(Cursor(encode_series(series, (1, 2)), "series"), (3, 2), (1, 2), "series").tolist()
+        [[5, 0], [7, 1], [9, 0]]
 
     Args:
         series: magnitudes of their differences are below 2**39.

@@ -13,9 +13,10 @@ from gvpipe.arrays import Float64, Floats, Int32, Integers
 class Lattice:
     """Points ``origin + step * i`` for integer i, the same step along all axes.
 
-    >>> lattice = Lattice((0.0, 0.0, 0.0), 0.5)
-    >>> lattice.points_at(lattice.quantise(np.array([[0.1, 0.6, 1.4]]))).tolist()
-    [[0.0, 0.5, 1.5]]
+    Examples:
+        >>> lattice = Lattice((0.0, 0.0, 0.0), 0.5)
+        >>> lattice.points_at(lattice.quantise(np.array([[0.1, 0.6, 1.4]]))).tolist()
+        [[0.0, 0.5, 1.5]]
 
     Args:
         origin: three coordinates, model units.

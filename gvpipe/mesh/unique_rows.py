@@ -63,8 +63,9 @@ def sort_rows(rows: Array) -> Array:
 def smallest_first(faces: Array) -> Array:
     """Rotate each of ``faces (T, 3)`` so that its smallest index leads; winding stays.
 
-    >>> smallest_first(np.array([[5, 2, 7]])).tolist()
-    [[2, 7, 5]]
+    Examples:
+        >>> smallest_first(np.array([[5, 2, 7]])).tolist()
+        [[2, 7, 5]]
     """
     return np.take_along_axis(faces, corners_from_smallest(faces), axis=1)
 

@@ -66,13 +66,14 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: FramesDo
             correspond.
         TypeError: one of them is no sequence.
 
-    >>> import gvpipe
-    >>> corners = np.array([[[0, 0, 0], [3, 0, 0], [0, 4, 0]]], float)  # one frame; its diagonal is 5
-    >>> still = gvpipe.MeshSequence(corners, [[0, 1, 2]])
-    >>> raised = gvpipe.MeshSequence(corners + [0, 0, 0.5], [[0, 1, 2]])
-    >>> errors = gvpipe.compare(still, raised)
-    >>> errors.rmse, errors.rmse_diag
-    (0.5, 0.1)
+    Examples:
+        >>> import gvpipe
+        >>> corners = np.array([[[0, 0, 0], [3, 0, 0], [0, 4, 0]]], float)  # one frame; its diagonal is 5
+        >>> still = gvpipe.MeshSequence(corners, [[0, 1, 2]])
+        >>> raised = gvpipe.MeshSequence(corners + [0, 0, 0.5], [[0, 1, 2]])
+        >>> errors = gvpipe.compare(still, raised)
+        >>> errors.rmse, errors.rmse_diag
+        (0.5, 0.1)
     """
     for role, given in (("reference", reference), ("distorted", distorted)):
         if not isinstance(given, MeshSequence):

@@ -34,6 +34,12 @@ RAMP = 256  # steps of a colour map
 GLOSS = 0.05  # of the highlight
 
 
+def check_size(size: tuple[int, int]) -> None:
+    """Raise `InputError` for a width or height, pixels, that a picture cannot have."""
+    if not all(SIZE_RANGE[0] <= side <= SIZE_RANGE[1] for side in size):
+        raise InputError(f"a picture of {size[0]}x{size[1]}; sides of {SIZE_RANGE[0]} to {SIZE_RANGE[1]} pixels can be")
+
+
 class Renderer:
     """Paints frames of one mesh. It keeps its buffers, so an instance serves one thread at a time.
 
@@ -51,8 +57,7 @@ class Renderer:
     def __init__(
         self, faces: Int32, base: Float32, size: tuple[int, int] = (512, 512), shading: str = "smooth", samples: int = 2
     ) -> None:
-        if not all(SIZE_RANGE[0] <= side <= SIZE_RANGE[1] for side in size):
-            raise InputError(f"a picture of {size[0]}x{size[1]}; sides of {SIZE_RANGE[0]} to {SIZE_RANGE[1]} pixels can be")
+        check_size(size)
         if shading not in SHADINGS:
             raise InputError(f"shading {shading!r}; {' or '.join(SHADINGS)} is needed")
         if not SAMPLES_RANGE[0] <= samples <= SAMPLES_RANGE[1]:

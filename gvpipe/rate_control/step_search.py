@@ -95,8 +95,9 @@ def step_between(anchors: Sequence[Anchor], target_error: float) -> float | None
 
     Between two anchors the logarithm of the step is interpolated; beside one, steps are in proportion to errors.
 
-    >>> step_between([Anchor(step=0.1, error=0.1), Anchor(step=4.0, error=1.0)], 1.5)
-    6.0
+    Examples:
+        >>> step_between([Anchor(step=0.1, error=0.1), Anchor(step=4.0, error=1.0)], 1.5)
+        6.0
     """
     ordered = sorted(anchors, key=lambda anchor: anchor.error)
     for low, high in pairwise(ordered):

@@ -19,7 +19,7 @@ from gvpipe.atomic import atomic_path
 from gvpipe.codec import Progress
 from gvpipe.errors import InputError
 from gvpipe.rasterizer.camera import Camera, framing, middle_of, used_vertices
-from gvpipe.rasterizer.renderer import Renderer
+from gvpipe.rasterizer.renderer import Renderer, check_size
 from gvpipe.rendering.error_map import ErrorMap
 from gvpipe.rendering.picture_files import STILL, WRITERS
 from gvpipe.sequence import MeshSequence
@@ -143,6 +143,7 @@ def check_output(path: Path, options: PictureOptions) -> str:
     if options.turntable and suffix == STILL:
         raise InputError(f"{path}: a turntable moves; end the name in .gif or .mp4")
     width, height = options.size
+    check_size(options.size)
     if suffix == ".mp4" and (width % 2 or height % 2):
         raise InputError(f"a picture of {width}x{height}; MP4 needs even sides")
     return suffix

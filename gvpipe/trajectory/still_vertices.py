@@ -36,8 +36,9 @@ def find_still(sequence: MeshSequence) -> Bool:
 def encode_flags(flags: Bool) -> bytes:
     """Return the bytes of ``flags (n,)``.
 
-    >>> decode_flags(encode_flags(np.array([False, True, True])), 3, "example").tolist()
-    [False, True, True]
+    Examples:
+        >>> decode_flags(encode_flags(np.array([False, True, True])), 3, "example").tolist()
+        [False, True, True]
     """
     ends = np.flatnonzero(np.diff(flags, prepend=False))
     return varint(len(ends)) + encode_integers(np.diff(ends, prepend=0))

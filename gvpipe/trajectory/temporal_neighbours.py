@@ -25,8 +25,9 @@ OFFSETS = (-1, 1, -3, 3, -2, -5, 5, -4)  # frames that may be decoded, those tha
 def temporal_order(n_frames: int) -> CausalOrder:
     """Return the order of the 3 F vectors of ``n_frames`` frames.
 
-    >>> (temporal_order(5).order[::3] // 3).tolist()
-    [0, 4, 2, 1, 3]
+    Examples:
+        >>> (temporal_order(5).order[::3] // 3).tolist()
+        [0, 4, 2, 1, 3]
     """
     order, weights_of = [0], [dict[int, float]()]  # frame to weight
     is_done = {0}

@@ -170,3 +170,10 @@ def test_disk_errors_leave_nothing(sequence: MeshSequence, tmp_path: Path) -> No
     with pytest.raises(OutputError):
         gvpipe.render(sequence, tmp_path / "folder.png")
     assert [path.name for path in tmp_path.iterdir()] == ["folder.png"]
+
+
+@pytest.mark.parametrize("size", [(0, 0), (10, 0), (16, 9000)])
+def test_a_size_that_no_picture_has_is_refused(size: tuple[int, int], tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="sides of 16 to 8192 pixels can be"):
+        gvpipe.render(waving(4, 2), tmp_path / "a.png", size=size)
+    assert not list(tmp_path.iterdir())

@@ -10,9 +10,9 @@
 ``clusters``       affine: [integers] placement charts: cluster of each block that holds a slot, in raster order,
                    difference from the block before; halves: of each slot in the codec's order, from the slot before
 ``weights``        blended: which clusters each point follows (`weight_coding`)
-``transforms.N``   transforms of segment N (affine: `transforms`, blended: `trajectories`)
+``transforms.N``   transforms of segment N (affine: `affine_coding`, blended: `skinning_coding`)
 ``outliers``       what residuals exceed the pictures' levels by (`outliers`); absent if nothing
-``trajectories.N`` klt, in place of ``transforms.N``: principal trajectories of segment N (`trajectory_images`)
+``trajectories.N`` klt, in place of ``transforms.N``: principal trajectories of segment N (`pictures.trajectories`)
 =================  ==========================================================================================
 
 Files without pictures (version 4) have ``mesh``, ``order``, ``still``, ``weights`` and ``transforms.N`` alone; the header's key

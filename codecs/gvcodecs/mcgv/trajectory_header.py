@@ -1,4 +1,4 @@
-"""What a header says of trajectory images (`trajectory_images`) in place of a frame's steps."""
+"""What a header says of trajectory images (`pictures.trajectories`) in place of a frame's steps."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """A blend's transforms over a segment as bytes: principal trajectories.
 
-The transforms of a segment, in coordinates of equal weight (`blending`), are a matrix of trajectories ``(4K, 3n)``: smooth in
+The transforms of a segment, in coordinates of equal weight (`skinning`), are a matrix of trajectories ``(4K, 3n)``: smooth in
 time, and alike from cluster to cluster. They are coded as such: a mean, the principal trajectories that pay
 (`gvpipe.trajectory.basis`), and their coefficients. Both with one quantisation step, that of the residual's coefficients: an
 error of either kind is an error of positions, and costs the same::

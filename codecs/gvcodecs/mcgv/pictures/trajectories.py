@@ -1,7 +1,7 @@
 """Trajectory images: a segment's vertices as a few numbers each, and those numbers as pictures (``transform="klt"``).
 
 What: the vertices' displacements from the base frame are trajectories, ``(V, 3n)``. Their principal trajectories (a temporal
-Karhunen-Loeve transform, `gvpipe.trajectory.basis`) turn a vertex into R coefficients. The blend (`blending`) predicts them: a
+Karhunen-Loeve transform, `gvpipe.trajectory.basis`) turn a vertex into R coefficients. The blend (`skinning`) predicts them: a
 cluster's affine motion is four coefficients per principal trajectory, and a point takes the weighted mean of its clusters'.
 What is left is painted into planes, one per principal trajectory, three to a picture, coded as intra pictures of H.264.
 

@@ -1,7 +1,7 @@
 """Trajectory images of a whole sequence: blend, segments and their pictures, one segment in memory at a time.
 
 Pictures are coded as intra pictures, since components have nothing in common, all with one quantisation parameter: a plane has
-``FINENESS`` levels per step (`trajectory_images`), and the coder's own quantiser sees a step as one step. Measured on
+``FINENESS`` levels per step (`pictures.trajectories`), and the coder's own quantiser sees a step as one step. Measured on
 chicken, cow, samba and horse_gallop: docs/experiments/mcgv-trajectory-images.md.
 """
 

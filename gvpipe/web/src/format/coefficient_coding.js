@@ -1,6 +1,6 @@
 /**
  * Rows of coefficients from bytes: residuals in contexts of their expected magnitude, then prediction. Mirrors
- * `gvpipe.trajectory.coefficient_coding.decode_rows`; `docs/format.md`, section 6.
+ * `gvpipe.trajectory.coefficient_coding.decode_vectors`; `docs/format.md`, section 6.
  *
  * Contexts are integers, and must be Python's: all sums here stay below 2^53.
  */

@@ -1,5 +1,5 @@
 /**
- * Which vertex each corner of a mesh of points uses. Mirrors `gvpipe.connectivity.seams.decode_copies`; `docs/format.md`, sections 5.5 and
+ * Which vertex each corner of a mesh of points uses. Mirrors `gvpipe.connectivity.seams.decode_seams`; `docs/format.md`, sections 5.5 and
  * 6.1.
  */
 

@@ -13,7 +13,7 @@ export class Points {
   }
 
   /**
-   * Adjacent points of lower number: `earlier_neighbours` of `weight_coding`.
+   * Adjacent points of lower number: `causal_neighbours` of `weight_coding`.
    *
    * @returns {{starts: Int32Array, near: Int32Array}} `starts` (P + 1) bounds in `near`; each point's are ascending
    */
