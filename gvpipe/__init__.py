@@ -16,6 +16,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gvpipe.api import Info, Report, decode, encode, info, open, read, render, write
+    from gvpipe.asset.attribute import Attribute
+    from gvpipe.asset.field import Field
+    from gvpipe.asset.material import Image, Material, Texture
+    from gvpipe.asset.metadata import Metadata
+    from gvpipe.asset.part import Part
     from gvpipe.errors import GvpipeError
     from gvpipe.metrics.comparison import Comparison, compare
     from gvpipe.player import Player
@@ -27,15 +32,22 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "Attribute",
     "Camera",
     "Comparison",
     "ExportReport",
+    "Field",
     "GvpipeError",
+    "Image",
     "Info",
+    "Material",
     "MeshSequence",
+    "Metadata",
+    "Part",
     "Player",
     "Renderer",
     "Report",
+    "Texture",
     "compare",
     "decode",
     "encode",
@@ -49,6 +61,11 @@ __all__ = [
 
 _HOMES = {
     "gvpipe.api": ("Info", "Report", "decode", "encode", "info", "open", "read", "render", "write"),
+    "gvpipe.asset.attribute": ("Attribute",),
+    "gvpipe.asset.field": ("Field",),
+    "gvpipe.asset.material": ("Image", "Material", "Texture"),
+    "gvpipe.asset.metadata": ("Metadata",),
+    "gvpipe.asset.part": ("Part",),
     "gvpipe.errors": ("GvpipeError",),
     "gvpipe.metrics.comparison": ("Comparison", "compare"),
     "gvpipe.player": ("Player",),

@@ -24,7 +24,7 @@ class Permuted:
         return self._read(start, stop)[:, self._permutation]
 
 
-class Part:
+class Span:
     """``n_frames`` frames from ``start`` on."""
 
     def __init__(self, read: Read, start: int, n_frames: int, n_vertices: int) -> None:

@@ -19,11 +19,25 @@ from numpy.typing import NDArray
 
 from gvpipe.arguments import check_number, show
 from gvpipe.arrays import Array, Float32, Float64, Floats, Frames, Int32, Integers
+from gvpipe.asset.attribute import as_attribute
+from gvpipe.asset.field import as_field
+from gvpipe.asset.material import Image, Material, check_materials
+from gvpipe.asset.metadata import NO_METADATA, Metadata
+from gvpipe.asset.part import Part, check_parts
+from gvpipe.asset.polygons import as_polygons
 from gvpipe.errors import InputError
-from gvpipe.frame_views import Narrowed, Part, Permuted, Shifted
+from gvpipe.frame_views import Narrowed, Permuted, Shifted, Span
 from gvpipe.notes import ASSUMED_FPS, show_origin
 from gvpipe.origin import as_origin, choose_origin, narrow, rounding
 
+BARE: dict[str, Any] = {
+    "attributes": {},
+    "fields": {},
+    "parts": (),
+    "polygons": None,
+    "materials": (),
+    "images": (),
+}
 CHUNK_BYTES = 16 << 20  # positions handed out at a time by `chunks`: large enough to vectorise, small beside any budget
 
 
@@ -40,16 +54,22 @@ class MeshSequence:
             it is kept to measure errors against, so it must not change afterwards.
         faces: ``(T, 3) int32``, counter-clockwise seen from outside.
         fps: frames per second.
-        attributes: static arrays by name: ``uv (V, 2)``, ``normal (V, 3)``, ``color (V, 4) uint8`` per vertex, or the
-            same per corner with first dimension ``3 T``.
+        attributes: static numbers by name, as arrays or `gvpipe.Attribute`; here they are `gvpipe.Attribute`. An array has
+            one row per vertex, per corner (``3 T``) or per triangle: ``uv (V, 2)``, ``normal (V, 3)``, ``color (V, 4) uint8``.
         name: where the sequence came from, for messages.
         origin: ``(3,) float64``, model units: what to add to positions; 0 unless the mesh is far from there for its size.
         notes: what a reader did that its user should know, a line each.
+        fields: animated numbers by name, as arrays ``(F, V)``, ``(F, V, C)`` or the same per triangle, or `gvpipe.Field`.
+        parts: the named meshes that it consists of, whose triangles follow each other; none: one mesh without a name.
+        polygons: ``(P,)`` corners of each polygon, whose fans are the triangles, in order; None: all are triangles.
+        materials: what the parts look like.
+        images: what the materials' textures show.
+        metadata: up axis, unit, start time, source, texts.
 
     Raises:
         InputError: a wrong shape, no frame, no vertex, an index out of range, an fps that is not a positive number, a
-            position in memory that is not finite (frames that load later are checked when they load).
-        TypeError: positions, faces, fps or attributes are of no such type.
+            position in memory that is not finite (frames that load later are checked when they load), an image that is none.
+        TypeError: positions, faces, fps, attributes or fields are of no such type.
 
     Examples:
         >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
@@ -65,10 +85,16 @@ class MeshSequence:
     positions: Frames
     faces: Int32
     fps: float = 30.0
-    attributes: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
+    attributes: Mapping[str, Any] = field(default_factory=dict)
     name: str = "sequence"
     origin: Float64 = field(default_factory=lambda: np.zeros(3))
     notes: tuple[str, ...] = ()
+    fields: Mapping[str, Any] = field(default_factory=dict)
+    parts: tuple[Part, ...] = ()
+    polygons: Int32 | None = None
+    materials: tuple[Material, ...] = ()
+    images: tuple[Image, ...] = ()
+    metadata: Metadata = NO_METADATA
     _exact: Frames | None = field(default=None, init=False)  # absolute; what float32 rounded
     _rounding: float = field(default=0.0, init=False)
 
@@ -85,20 +111,34 @@ class MeshSequence:
             self._narrow_lazily(given)
         check_number(self.fps, "fps")
         object.__setattr__(self, "fps", float(self.fps))
-        if not isinstance(self.attributes, Mapping):
-            raise TypeError(f"attributes are {show(self.attributes)}; arrays by name are needed, such as {{'uv': uv}}")
         shape = tuple(self.positions.shape)
         if len(shape) != 3 or shape[2] != 3 or shape[0] < 1 or shape[1] < 1:
             raise InputError(f"{self.name}: positions have shape {shape}; (frames >= 1, vertices >= 1, 3) is needed")
         object.__setattr__(self, "faces", _as_faces(self.faces, shape[1], self.name))
         if not (np.isfinite(self.fps) and 0 < self.fps <= 100_000):
             raise InputError(f"{self.name}: fps is {self.fps}; a number above 0 and up to 100000 is needed")
-        for key, values in self.attributes.items():
-            if len(values) not in (shape[1], 3 * len(self.faces)):
-                raise InputError(
-                    f"{self.name}: attribute {key!r} has {len(values)} rows; one per vertex ({shape[1]}) or per corner "
-                    f"({3 * len(self.faces)}) is needed"
-                )
+        self._check_asset()
+
+    def _check_asset(self) -> None:
+        """Check what lies beside the positions; attributes and fields become `Attribute` and `Field`."""
+        for what, example in (("attributes", "{'uv': uv}"), ("fields", "{'stress': stress}")):
+            if not isinstance(getattr(self, what), Mapping):
+                raise TypeError(f"{what} are {show(getattr(self, what))}; arrays by name are needed, such as {example}")
+        materials, images = tuple(self.materials), tuple(self.images)
+        check_materials(materials, images, self.name)
+        parts = check_parts(self.parts, self.faces, self.n_vertices, len(materials), self.name)
+        checked = {
+            "materials": materials,
+            "images": images,
+            "parts": parts,
+            "polygons": None if self.polygons is None else as_polygons(self.polygons, self.faces, parts, self.name),
+        }
+        for key, value in checked.items():
+            object.__setattr__(self, key, value)
+        attributes = {key: as_attribute(key, given, self.rows, self.name) for key, given in self.attributes.items()}
+        object.__setattr__(self, "attributes", attributes)
+        fields = {key: as_field(key, given, self.n_frames, self.rows, self.name) for key, given in self.fields.items()}
+        object.__setattr__(self, "fields", fields)
 
     def _narrow(self, positions: Array) -> None:
         """Round an array in memory, keep it if that lost anything, and find its origin."""
@@ -132,6 +172,12 @@ class MeshSequence:
     def shape(self) -> tuple[int, ...]:
         """``(F, V, 3)``."""
         return (self.n_frames, self.n_vertices, 3)
+
+    @property
+    def rows(self) -> dict[str, int]:
+        """How many rows an attribute has on each domain (`gvpipe.asset.attribute.DOMAINS`)."""
+        n_triangles = len(self.faces)
+        return {"vertex": self.n_vertices, "corner": 3 * n_triangles, "triangle": n_triangles, "part": len(self.parts)}
 
     def __len__(self) -> int:
         return self.n_frames
@@ -200,13 +246,18 @@ class MeshSequence:
             faces: ``(T, 3) int32`` triangles, in the new order.
         """
         exact = None if self._exact is None else Permuted(self.read_absolute, len(self), permutation)
-        return self._derived(Permuted(self.read, len(self), permutation), exact, faces=faces, attributes={})
+        return self._derived(Permuted(self.read, len(self), permutation), exact, **BARE, faces=faces)
+
+    def bare(self) -> MeshSequence:
+        """Return the positions, triangles and fps alone, without anything that lies beside them."""
+        return self._derived(self.positions, self._exact, **BARE)
 
     def part(self, start: int, stop: int) -> MeshSequence:
-        """Return frames ``start`` to ``stop`` as a sequence; they still load when read."""
+        """Return frames ``start`` to ``stop`` as a sequence with all that lies beside them; they still load when read."""
         size = stop - start, self.n_vertices
-        exact = None if self._exact is None else Part(self.read_absolute, start, *size)
-        return self._derived(Part(self.read, start, *size), exact, attributes={})
+        exact = None if self._exact is None else Span(self.read_absolute, start, *size)
+        fields = {name: each.part(start, stop) for name, each in self.fields.items()}
+        return self._derived(Span(self.read, start, *size), exact, fields=fields)
 
     def local(self) -> MeshSequence:
         """Return the sequence with its origin left out: the same float32 positions, relative to nothing."""
@@ -259,8 +310,12 @@ def numbers_of(sequence: MeshSequence) -> dict[str, str]:
         "vertices": str(sequence.n_vertices),
         "triangles": str(len(sequence.faces)),
     }
+    if len(sequence.parts) > 1:
+        numbers["parts"] = str(len(sequence.parts))
     if sequence.attributes:
         numbers["attributes"] = ", ".join(sequence.attributes)
+    if sequence.fields:
+        numbers["fields"] = ", ".join(f"{name} ({each.unit})" if each.unit else name for name, each in sequence.fields.items())
     if sequence.origin.any():
         numbers["origin"] = show_origin(sequence.origin)
     return numbers

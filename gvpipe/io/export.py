@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
+
 from gvpipe.atomic import atomic_path, output_error
 from gvpipe.errors import InputError
 from gvpipe.io.formats import FRAME_FORMATS
@@ -37,7 +39,8 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> None:
             f"{path}: frames cannot be written as {target.suffix or 'a file without extension'}; give a folder that "
             f"ends in '/', or a name with %04d and one of {', '.join(writable)}"
         )
-    encode = entry.encoder(sequence.faces, sequence.attributes, sequence.n_vertices, sequence.origin)
+    attributes = {name: np.asarray(each) for name, each in sequence.attributes.items() if each.domain in ("vertex", "corner")}
+    encode = entry.encoder(sequence.faces, attributes, sequence.n_vertices, sequence.origin)
     pattern = match_pattern(path)
     if pattern is None and sequence.n_frames > 1:
         raise InputError(

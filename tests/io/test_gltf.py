@@ -162,4 +162,4 @@ def test_glb_normals_are_those_of_the_file(tmp_path: Path, included: bool) -> No
     read = io.read(tmp_path / "a.glb")
     assert set(read.attributes) == ({"normal"} if included else set())
     for values in read.attributes.values():
-        np.testing.assert_allclose(values.astype(float), np.array([[0, 0.6, 0.8]] * 3), atol=1e-6)
+        np.testing.assert_allclose(np.asarray(values), np.array([[0, 0.6, 0.8]] * 3), atol=1e-6)

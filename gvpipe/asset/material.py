@@ -1,0 +1,164 @@
+"""Materials after glTF's metallic-roughness model, and the images that their textures show.
+
+Source: Khronos, glTF 2.0 specification, section 3.9 (materials), and its extensions KHR_texture_transform and
+KHR_materials_unlit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+from gvpipe.asset.attribute import check_word
+from gvpipe.errors import InputError
+
+ALPHA_MODES = ("opaque", "mask", "blend")
+WRAPS = ("repeat", "mirror", "clamp")
+FILTERS = ("linear", "nearest")
+MAX_SIDE = 16384  # pixels of an image
+SIGNATURES = (  # first bytes of pictures
+    b"\x89PNG\r\n\x1a\n",
+    b"\xff\xd8\xff",  # JPEG
+    b"RIFF",  # WebP
+    b"\xabKTX 20\xbb\r\n\x1a\n",
+    b"\x76\x2f\x31\x01",  # OpenEXR
+    b"BM",
+    b"GIF8",
+    b"II*\0",  # TIFF
+    b"MM\0*",
+    b"DDS ",
+)
+
+
+@dataclass(frozen=True)
+class Image:
+    """A picture as it came.
+
+    Args:
+        name: for people, and for the file that it is written to.
+        media_type: such as ``"image/png"``.
+        data: the file's bytes.
+
+    Raises:
+        InputError: they are no picture, or one of more than `MAX_SIDE` pixels a side.
+    """
+
+    name: str
+    media_type: str
+    data: bytes
+
+    def __post_init__(self) -> None:
+        check_image(self)
+
+    def __repr__(self) -> str:
+        return f"<Image {self.name}: {self.media_type}, {len(self.data)} bytes>"
+
+
+@dataclass(frozen=True)
+class Texture:
+    """How a material shows an image.
+
+    Args:
+        image: index into the sequence's images.
+        uv: name of the attribute with its coordinates; (0, 0) is the lower left of the image, as in OBJ and USD.
+        scale: of normals, or strength of occlusion.
+        wrap: beyond 0..1 along u and v: ``"repeat"``, ``"mirror"`` or ``"clamp"``.
+        filter: ``"linear"`` or ``"nearest"``.
+        offset, rotation, tiling: as KHR_texture_transform has them, of coordinates (u, 1 - v) from the upper left:
+            offset + R(rotation, radians) (tiling * coordinates).
+    """
+
+    image: int
+    uv: str = "uv"
+    scale: float = 1.0
+    wrap: tuple[str, str] = ("repeat", "repeat")
+    filter: str = "linear"
+    offset: tuple[float, float] = (0.0, 0.0)
+    rotation: float = 0.0
+    tiling: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Material:
+    """How a part looks.
+
+    Args:
+        name: for people.
+        base_color: linear RGBA, 0..1.
+        base_color_texture, metallic_roughness_texture, normal_texture, occlusion_texture, emissive_texture: or None.
+        metallic, roughness: 0..1.
+        emissive: linear RGB.
+        alpha_mode: ``"opaque"``, ``"mask"`` (cut out below ``alpha_cutoff``) or ``"blend"``.
+        double_sided: whether back faces show.
+        unlit: whether it shows its base colour without light.
+    """
+
+    name: str = ""
+    base_color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    base_color_texture: Texture | None = None
+    metallic: float = 0.0
+    roughness: float = 1.0
+    metallic_roughness_texture: Texture | None = None
+    normal_texture: Texture | None = None
+    occlusion_texture: Texture | None = None
+    emissive: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    emissive_texture: Texture | None = None
+    alpha_mode: str = "opaque"
+    alpha_cutoff: float = 0.5
+    double_sided: bool = False
+    unlit: bool = False
+
+    @property
+    def textures(self) -> dict[str, Texture]:
+        """Its textures by field name."""
+        named = ((field.name, getattr(self, field.name)) for field in fields(self))
+        return {name: value for name, value in named if isinstance(value, Texture)}
+
+
+def check_materials(materials: tuple[Material, ...], images: tuple[Image, ...], where: str) -> None:
+    """Raise `InputError` for an image index out of range, a word or a number that cannot be."""
+    for number, material in enumerate(materials):
+        name = f"{where}: material {number} ({material.name!r})"
+        check_word("alpha mode", material.alpha_mode, ALPHA_MODES, name)
+        factors = (*material.base_color, *material.emissive, material.metallic, material.roughness, material.alpha_cutoff)
+        if not (len(factors) == 10 and all(math.isfinite(factor) for factor in factors)):
+            raise InputError(f"{name} has a factor that is not a finite number, or too few of them")
+        for role, texture in material.textures.items():
+            if not 0 <= texture.image < len(images):
+                raise InputError(f"{name}: {role} shows image {texture.image}; there are {len(images)} images")
+            check_word("filter", texture.filter, FILTERS, name)
+            for wrap in texture.wrap:
+                check_word("wrap", wrap, WRAPS, name)
+
+
+def check_image(image: Image) -> None:
+    """Raise `InputError` unless the bytes are a picture of at most `MAX_SIDE` pixels a side.
+
+    A picture that Pillow cannot open is checked by its first bytes alone.
+    """
+    if not any(image.data.startswith(signature) for signature in SIGNATURES):
+        raise InputError(
+            f"image {image.name!r} ({image.media_type}, {len(image.data)} bytes) is not a picture; export it as PNG or JPEG"
+        )
+    size = image_size(image.data)
+    if size and max(size) > MAX_SIDE:
+        raise InputError(
+            f"image {image.name!r} has {size[0]} x {size[1]} pixels; at most {MAX_SIDE} a side are allowed, so make it smaller"
+        )
+
+
+def image_size(data: bytes) -> tuple[int, int] | None:
+    """Width and height in pixels, or None where Pillow cannot open it; no pixel is decoded."""
+    import io
+    import warnings
+
+    from PIL import Image as Pillow
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of large pictures, whose side is checked instead
+            with Pillow.open(io.BytesIO(data)) as opened:
+                width, height = opened.size
+                return width, height
+    except Exception:  # damaged files raise nearly anything inside Pillow
+        return None

@@ -1,0 +1,44 @@
+"""What a scene says of itself: its up axis, its unit, its start, its source, and free texts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from gvpipe.asset.attribute import check_word
+from gvpipe.errors import InputError
+
+UP_AXES = ("", "x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Metadata:
+    """What a scene says of itself.
+
+    Args:
+        up_axis: ``"x"``, ``"y"`` or ``"z"``; ``""``: unknown.
+        metres_per_unit: length of a model unit; None: unknown.
+        start_time: of frame 0, seconds.
+        source: name of the program or file that it came from.
+        texts: anything else, by name.
+    """
+
+    up_axis: str = ""
+    metres_per_unit: float | None = None
+    start_time: float = 0.0
+    source: str = ""
+    texts: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_word("up axis", self.up_axis, UP_AXES, "metadata")
+        unit = self.metres_per_unit
+        if unit is not None and not (math.isfinite(unit) and unit > 0):
+            raise InputError(f"metadata: a unit of {unit} metres; a length above 0 is needed")
+        if not math.isfinite(self.start_time):
+            raise InputError(f"metadata: the start time is {self.start_time}; seconds are needed")
+        if not all(isinstance(key, str) and isinstance(text, str) for key, text in self.texts.items()):
+            raise InputError("metadata: texts are not all texts by name; make texts of them")
+
+
+NO_METADATA = Metadata()
