@@ -64,14 +64,14 @@ def order_by_corners(triangles: Int32, opposite: Int64, n_entries: int) -> Entry
                 a, b = flat[_next(c)], flat[_previous(c)]
                 if is_done[a] and is_done[b]:
                     o = flat[opposite[c]] if opposite[c] >= 0 else NONE
-                    gates[n_gates] = (a, b, o if o >= 0 and is_done[o] else NONE, c)
+                    _fill(gates, n_gates, a, b, (o if o >= 0 and is_done[o] else NONE, c))
                     n_gates += 1
                 c = lists.after[c]
             c = lists.head[entry] if n_gates == first else NONE
             while c >= 0:  # else whatever shares a triangle
                 a, b = flat[_next(c)], flat[_previous(c)]
                 if is_done[a] or is_done[b]:
-                    gates[n_gates] = (a if is_done[a] else b, NONE, NONE, c)
+                    _fill(gates, n_gates, a if is_done[a] else b, NONE, (NONE, c))
                     n_gates += 1
                 c = lists.after[c]
             order[n] = entry
@@ -115,6 +115,11 @@ def order_by_edges(opposite: Int64) -> EntryOrder:
             starts[n] = n_gates
             entry = _pop(is_done, stacks)
     return EntryOrder(order, starts, gates[:n_gates].copy())
+
+
+@compiled
+def _fill(gates: Int64, place: int, a: int, b: int, rest: tuple[int, int]) -> None:
+    gates[place, 0], gates[place, 1], gates[place, 2], gates[place, 3] = a, b, rest[0], rest[1]
 
 
 @compiled
