@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 from gvpipe.arrays import Array
 from gvpipe.atomic import atomic_path
 from gvpipe.errors import InputError
-from gvpipe.io.mesh import ATTRIBUTES, as_color
+from gvpipe.io.mesh import as_color
 from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS
 from gvpipe.sequence import MeshSequence
 
+ATTRIBUTES = {"uv": (2,), "normal": (3,), "color": (3, 4)}  # name: columns that are understood
 
-def write_npz(sequence: MeshSequence, path: Path) -> None:
+
+def write_npz(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     """Write the sequence as float32, or as float64 where it has an origin, which is added; some frames at a time.
 
     Raises:
@@ -40,6 +42,7 @@ def write_npz(sequence: MeshSequence, path: Path) -> None:
         for name, values in statics.items():
             with archive.open(_member(name), "w", force_zip64=True) as file:
                 np.lib.format.write_array(file, values, allow_pickle=False)
+    return ()
 
 
 def read_npz(path: Path, fps: float | None = None) -> MeshSequence:
