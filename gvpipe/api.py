@@ -170,8 +170,10 @@ def read(path: Source, fps: float | None = None) -> MeshSequence:
     return sequence if fps is None else sequence.with_fps(fps)
 
 
-def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> None:
+def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> list[str]:
     """Write a mesh sequence as ``.npz``, or as frame files named by a pattern (``out/%04d.obj``), numbered from ``start``.
+
+    Returns notes: what the format cannot hold, a line each.
 
     Raises:
         InputError: the path names no format that can be written.
@@ -181,7 +183,7 @@ def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> None:
     if not isinstance(sequence, MeshSequence):
         raise TypeError(f"gvpipe.write's sequence is {show(sequence)}; a MeshSequence is needed")
     check_path(path, "gvpipe.write's path")
-    write_sequence(sequence, path, start)
+    return list(write_sequence(sequence, path, start))
 
 
 def encode(

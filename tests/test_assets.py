@@ -47,7 +47,7 @@ def test_a_scene_goes_through_a_file(codec: str, settings: dict[str, Any], tmp_p
         assert polygons_of(decoded) == polygons_of(source)
     assert [part.name for part in decoded.parts] == ["left", "right"]
     assert decoded.polygons is not None
-    assert sorted(decoded.polygons.tolist()) == sorted(source.polygons)
+    assert sorted(decoded.polygons.tolist()) == sorted(np.asarray(source.polygons).tolist())
     assert decoded.materials == source.materials
     assert decoded.images == source.images
     assert decoded.metadata == source.metadata

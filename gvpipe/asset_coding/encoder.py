@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Int32
+from gvpipe.arrays import Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, image_size
@@ -24,16 +24,19 @@ from gvpipe.asset_coding.options import NO_OPTIONS, AssetOptions
 from gvpipe.asset_coding.pictures import limit_image
 from gvpipe.asset_coding.scan import scan_field
 from gvpipe.attributes.attribute_coding import encode_attribute
+from gvpipe.attributes.corner_sharing import entries_of
 from gvpipe.attributes.surface import Surface
-from gvpipe.attributes.triangle_order import Arrangement, encode_arrangement
-from gvpipe.codec import Codec, Encoded, FrameReader
+from gvpipe.attributes.triangle_order import Arrangement, SourceCorners, encode_arrangement
+from gvpipe.codec import Codec, Encoded
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.mesh import FieldMesh
+from gvpipe.fields.values import FieldBound
 from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence
 
 ARRANGEMENT = "arrangement"
+CODING = 1  # of attributes and fields
 
 
 @dataclass(frozen=True)
@@ -120,24 +123,25 @@ class AssetCoder:
         if self.is_empty:
             return encoded.bitstream
         reader, same_bits = open_reader(encoded.bitstream), getattr(codec, "same_bits", True)
-        permutation = np.asarray(encoded.permutation)
+        permutation = np.asarray(encoded.permutation, np.int64)
         place = np.empty(len(permutation), np.int32)
         place[permutation] = np.arange(len(permutation))
-        arranged, arrangement = self._arrange(reader.faces, place)
-        surface = Surface(
-            arrangement.faces, len(permutation), reader.read(0, 1)[0] if same_bits else None, len(self._sequence.parts)
-        )
+        parts = tuple(_placed(part, self._sequence.faces, place) for part in self._sequence.parts)
+        arranged, arrangement, sources = self._arrange(reader.faces, place, parts)
+        positions = reader.read(0, 1)[0] if same_bits else None
+        surface = Surface(arrangement.faces, len(permutation), positions, len(parts))
         sections = dict(encoded.bitstream.sections)
         if arranged:
             sections[ARRANGEMENT] = arranged
-        attributes = self._add_attributes(sections, permutation, arrangement, surface)
-        fields = self._add_fields(sections, permutation, arrangement, reader)
+        origins = Origins(permutation, sources.corners, sources.triangles)
+        attributes = self._add_attributes(sections, origins, surface)
+        fields = self._add_fields(sections, origins, surface)
         images = []
         for number, image in enumerate(self.plan.images):
             images.append(ListedImage(image.name, image.media_type, f"image.{number}"))
             sections[images[-1].section] = image.data
         directory = Directory(
-            parts=tuple(_placed(part, self._sequence.faces, place) for part in self._sequence.parts),
+            parts=parts,
             geometry=same_bits,
             attributes=attributes,
             fields=fields,
@@ -147,68 +151,87 @@ class AssetCoder:
         )
         return dataclasses.replace(encoded.bitstream, sections={**sections, SECTION: pack_directory(directory)})
 
-    def _arrange(self, decoded: Int32, place: Int32) -> tuple[bytes, Arrangement]:
+    def _arrange(self, decoded: Int32, place: Int32, parts: tuple[Part, ...]) -> tuple[bytes, Arrangement, SourceCorners]:
         sequence = self._sequence
-        labels = np.zeros(len(decoded), np.int32)
-        for number, part in enumerate(sequence.parts):
-            labels[part.triangles[0] : part.triangles[1]] = number
-        return encode_arrangement(decoded, place[sequence.faces], sequence.polygons, labels)
+        labels = np.repeat(np.arange(len(parts)), [part.triangles[1] - part.triangles[0] for part in parts]) if parts else None
+        return encode_arrangement(
+            decoded,
+            place[sequence.faces],
+            polygons=sequence.polygons,
+            parts=labels,
+            n_parts=max(len(parts), 1),
+            vertex_starts=vertex_starts(parts, sequence.n_vertices),
+        )
 
-    def _add_attributes(
-        self, sections: dict[str, bytes], permutation: Int32, arrangement: Arrangement, surface: Surface
-    ) -> tuple[Listed, ...]:
-        rows = {"vertex": permutation, "corner": arrangement.source_corners, "triangle": arrangement.source_triangles}
-        listed = []
+    def _add_attributes(self, sections: dict[str, bytes], origins: Origins, surface: Surface) -> tuple[Listed, ...]:
+        listed, references = [], []
         for number, (name, (attribute, found)) in enumerate(self.plan.attributes.items()):
             section = f"attribute.{number}"
-            moved = attribute.select(rows[attribute.domain]) if attribute.domain in rows else attribute
+            rows = origins.of(attribute.domain)
+            moved = attribute if rows is None else attribute.select(rows)
             sections[section] = encode_attribute(
-                moved.values, moved.indices, attribute.domain, attribute.kind, found.bound, surface
+                moved.values,
+                moved.indices,
+                surface,
+                domain=attribute.domain,
+                kind=attribute.kind,
+                bound=found.bound,
+                references=references,
             )
-            listed.append(
-                Listed(
-                    name=name,
-                    kind=attribute.kind,
-                    domain=attribute.domain,
-                    components=attribute.values.shape[1],
-                    dtype=attribute.dtype.name,
-                    unit=attribute.unit,
-                    bound=found.bound,
-                    coding=1,
-                    section=section,
-                )
-            )
+            if attribute.domain == "corner" and moved.indices is not None:
+                references.append(entries_of(moved.indices, surface))
+            listed.append(_listed(name, attribute, attribute.values.shape[1], found.bound, section))
         return tuple(listed)
 
-    def _add_fields(
-        self, sections: dict[str, bytes], permutation: Int32, arrangement: Arrangement, reader: FrameReader
-    ) -> tuple[Listed, ...]:
+    def _add_fields(self, sections: dict[str, bytes], origins: Origins, surface: Surface) -> tuple[Listed, ...]:
         listed = []
-        key = hashlib.sha256(arrangement.faces.tobytes()).digest()
+        key = hashlib.sha256(surface.faces.tobytes()).digest()
         meshes: dict[str, FieldMesh] = {}
-        for number, (name, (field, found, (low, high))) in enumerate(self.plan.fields.items()):
+        for number, (name, (field, found, span)) in enumerate(self.plan.fields.items()):
             section = f"field.{number}"
             if (name, key) not in self._fields:
-                if field.domain not in meshes:
-                    meshes[field.domain] = FieldMesh(arrangement.faces, self._sequence.n_vertices, field.domain)
-                moved = field.select(permutation if field.domain == "vertex" else arrangement.source_triangles)
-                self._fields[name, key] = encode_field(moved.read, len(field), meshes[field.domain], found.bound)
-            sections[section] = self._fields[name, key]
-            listed.append(
-                Listed(
-                    name=name,
-                    kind=field.kind,
-                    domain=field.domain,
-                    components=field.n_components if len(field.shape) == 3 else 0,
-                    dtype=field.dtype.name,
-                    unit=field.unit,
-                    bound=found.bound,
-                    coding=1,
-                    section=section,
-                    range=(low, high),
+                mesh = meshes.setdefault(field.domain, FieldMesh(surface.faces, surface.n_vertices, field.domain))
+                rows = origins.of(field.domain)
+                assert rows is not None  # fields are on vertices or triangles
+                self._fields[name, key] = encode_field(
+                    field.select(rows).read, len(field), mesh, _field_bound(found), name, holes=found.holes
                 )
-            )
+            sections[section] = self._fields[name, key]
+            components = field.n_components if len(field.shape) == 3 else 0
+            listed.append(_listed(name, field, components, found.bound, section, span))
         return tuple(listed)
+
+
+@dataclass(frozen=True)
+class Origins:
+    """The source's row of each row that is decoded: ``vertices (V,)``, ``corners (3T,)``, ``triangles (T,)``."""
+
+    vertices: Int64
+    corners: Int64
+    triangles: Int64
+
+    def of(self, domain: str) -> Int64 | None:
+        """Of a domain; None for parts, which keep their order."""
+        return {"vertex": self.vertices, "corner": self.corners, "triangle": self.triangles}.get(domain)
+
+
+def vertex_starts(parts: tuple[Part, ...], n_vertices: int) -> Int64 | None:
+    """``(n_parts + 1,)`` first vertex of each part, and V, where parts follow each other; else None."""
+    starts = [part.vertices[0] for part in parts]
+    stops = [part.vertices[1] for part in parts]
+    if not parts or [*starts[1:], n_vertices] != stops or starts[0]:
+        return None
+    return np.array([*starts, n_vertices])
+
+
+def _listed(
+    name: str, given: Attribute | Field, components: int, bound: float, section: str, span: tuple[float, float] | None = None
+) -> Listed:
+    return Listed(name, given.kind, given.domain, components, given.dtype.name, given.unit, bound, CODING, section, span)
+
+
+def _field_bound(found: Precision) -> FieldBound:
+    return FieldBound(found.bound) if found.bound else FieldBound(exact=True)
 
 
 def _placed(part: Part, faces: Int32, place: Int32) -> Part:

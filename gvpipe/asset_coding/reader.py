@@ -22,17 +22,16 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part, check_parts
 from gvpipe.asset.polygons import as_polygons
 from gvpipe.asset_coding.directory import SECTION, VERSION, Directory, Listed, unpack_directory
-from gvpipe.asset_coding.encoder import ARRANGEMENT
+from gvpipe.asset_coding.encoder import ARRANGEMENT, CODING, vertex_starts
 from gvpipe.attributes.attribute_coding import decode_attribute
 from gvpipe.attributes.surface import Surface
 from gvpipe.attributes.triangle_order import Arrangement, decode_arrangement
 from gvpipe.codec import FrameReader
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.errors import InputError, corrupt, corrupt_section, in_file
+from gvpipe.errors import InputError, corrupt_section, in_file
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.reader import FieldReader
 
-CODING = 1  # of attributes and fields that this version reads
 Thing = TypeVar("Thing")
 Lock = AbstractContextManager[bool]
 
@@ -72,12 +71,10 @@ class AssetReader:
 
     @cached_property
     def _arrangement(self) -> Arrangement:
-        n_parts = max(len(self.directory.parts), 1)
-        if ARRANGEMENT not in self._bitstream.sections or self.directory.version > VERSION:
-            if n_parts > 1:
-                raise corrupt(f"section {ARRANGEMENT!r} is missing")
-            return decode_arrangement(b"", self._reader.faces, n_parts)
-        return decode_arrangement(self._bitstream.section(ARRANGEMENT), self._reader.faces, n_parts)
+        parts = self.directory.parts
+        data = b"" if self.directory.version > VERSION else self._bitstream.sections.get(ARRANGEMENT, b"")
+        starts = vertex_starts(parts, self._bitstream.n_vertices)
+        return decode_arrangement(data, self._reader.faces, max(len(parts), 1), starts, ARRANGEMENT)
 
     @property
     def faces(self) -> Int32:
@@ -131,7 +128,17 @@ class AssetReader:
 
     def _attribute(self, listed: Listed) -> Attribute:
         data = self._bitstream.section(listed.section)
-        values, indices = decode_attribute(data, listed.domain, listed.kind, self._surface, listed.section)
+        references = []
+        if listed.domain == "corner":
+            earlier = self.directory.attributes[: self.directory.attributes.index(listed)]
+            references = [self.attributes[each.name].indices for each in earlier if each.domain == "corner"]
+        values, indices = decode_attribute(
+            data,
+            self._surface,
+            listed.section,
+            domain=listed.domain,
+            references=[each for each in references if each is not None],
+        )
         try:
             made = Attribute(values, listed.domain, listed.kind, indices, listed.unit, f"attribute {listed.name!r}")
         except InputError as exc:

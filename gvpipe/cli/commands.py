@@ -201,8 +201,8 @@ def decode(source: str, target: str, start: int, stop: int | None, lod: int, loc
         start, stop = api.frame_range(player, start, stop)
         level = player.level(lod)
         sequence = replace(level.part(start, stop), positions=_Part(level, start, stop, progress))
-        api.write(sequence.local() if local else sequence, path, start)
-    noticed = [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
+        noticed = api.write(sequence.local() if local else sequence, path, start)
+    noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": player.fps}

@@ -9,15 +9,12 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Literal
 
 from gvpipe.arrays import Int32
 from gvpipe.fields.dual_mesh import dual_triangles
 from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.spatial_neighbours import hierarchy_order
-
-Domain = Literal["vertex", "triangle"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +24,12 @@ class FieldMesh:
     Args:
         faces: ``(T, 3) int32`` triangles, as the decoder has them.
         n_vertices: V.
-        domain: which rows a field has.
+        domain: which rows a field has, ``"vertex"`` or ``"triangle"``.
     """
 
     faces: Int32
     n_vertices: int
-    domain: Domain = "vertex"
+    domain: str = "vertex"
 
     @property
     def n_rows(self) -> int:
