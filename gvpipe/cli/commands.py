@@ -266,14 +266,14 @@ def export_html(source: str, target: str, up: str, quality: float | None, out: O
 @output_options
 def play(source: str, up: str, out: Output) -> None:
     """Play a geometry video in your browser; print the path of the page where there is none."""
-    import tempfile
     from pathlib import Path
 
     from gvpipe import web
+    from gvpipe.atomic import lasting_folder
     from gvpipe.web.browser import open_page
 
     with source_path(source) as path, out.progress() as progress:
-        page = Path(tempfile.mkdtemp(prefix="gvpipe-")) / f"{Path(path).stem}.html"  # stays: the browser reads it later
+        page = Path(lasting_folder()) / f"{Path(path).stem}.html"  # stays: the browser reads it later
         report = web.export_html(path, page, up, None, progress)
     _tell_conversion(out, report)
     is_open = open_page(page)
