@@ -115,7 +115,7 @@ def encode(
     an .npz or a geometry video on standard input. OUTPUT - is standard output.
     """
     from gvpipe import api
-    from gvpipe.rate_control.purposes import candidates
+    from gvpipe.rate_control.purposes import candidates, name_with
     from gvpipe.registry import codec_class
 
     if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
@@ -154,7 +154,8 @@ def encode(
     for tried in report.tried:
         keys = [key for key in ("bpvf", "rmse_diag", "kg", "max_diag") if tried[key] is not None]
         measures = ", ".join(f"{key} {tried[key]:.4g}" for key in keys)
-        out.text(f"  {tried['codec']} at quality {tried['quality']:.4g}: {tried['bytes']} bytes, {measures}")
+        codec_name = name_with(tried["codec"], tried["settings"])
+        out.text(f"  {codec_name} at quality {tried['quality']:.4g}: {tried['bytes']} bytes, {measures}")
     if report.reason:
         out.text(report.reason)
     _print_sections(out, report.sections, report.vertices * report.frames)
