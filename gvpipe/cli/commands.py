@@ -2,7 +2,7 @@
 
 What is printed, and how much of it, is `gvpipe.cli.console`'s; ``-`` in place of a file's name is `gvpipe.cli.pipes`'.
 
-Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage.
+Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ def encode(
     an .npz or a geometry video on standard input. OUTPUT - is standard output.
     """
     from gvpipe import api
-    from gvpipe.rate_control.purposes import candidates
+    from gvpipe.rate_control.purposes import candidates, name_with
     from gvpipe.registry import codec_class
 
     if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
@@ -173,7 +173,8 @@ def encode(
     for tried in report.tried:
         keys = [key for key in ("bpvf", "rmse_diag", "kg", "max_diag") if tried[key] is not None]
         measures = ", ".join(f"{key} {tried[key]:.4g}" for key in keys)
-        out.text(f"  {tried['codec']} at quality {tried['quality']:.4g}: {tried['bytes']} bytes, {measures}")
+        codec_name = name_with(tried["codec"], tried["settings"])
+        out.text(f"  {codec_name} at quality {tried['quality']:.4g}: {tried['bytes']} bytes, {measures}")
     if report.reason:
         out.text(report.reason)
     _print_sections(out, report.sections, report.vertices * report.frames)
@@ -292,18 +293,23 @@ def export_html(source: str, target: str, up: str, quality: float | None, out: O
 @click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="The axis that stands upright.")
 @output_options
 def play(source: str, up: str, out: Output) -> None:
-    """Play a geometry video in your browser; print the path of the page where there is none."""
-    import tempfile
+    """Play a geometry video in your browser.
+
+    Where no browser can be opened, the page's path is printed. The page is one file and needs no network.
+    """
     from pathlib import Path
 
     from gvpipe import web
+    from gvpipe.atomic import lasting_folder
     from gvpipe.web.browser import open_page
 
     with source_path(source) as path, out.progress() as progress:
-        page = Path(tempfile.mkdtemp(prefix="gvpipe-")) / f"{Path(path).stem}.html"  # stays: the browser reads it later
+        page = Path(lasting_folder()) / f"{Path(path).stem}.html"  # stays: the browser reads it later
         report = web.export_html(path, page, up, None, progress)
     _tell_conversion(out, report)
     is_open = open_page(page)
+    if not is_open:
+        out.note("no browser can be opened here; open the page that is printed in one, here or on another computer")
     out.json({"page": str(page), "opened": is_open, **report.to_json()})
     out.text(f"{shown(source, STDIN)} plays in your browser" if is_open else page)
 
@@ -328,6 +334,8 @@ def render(source: str, target: str, size: str, out: Output, **options: Any) -> 
     from gvpipe import api
     from gvpipe.rendering.films import parse_size
 
+    if options["error_max"] is not None and not options["error_of"]:
+        raise click.UsageError("--error-max ends the colours of errors; give --error-of too", click.get_current_context())
     pixels = parse_size(size)
     with source_path(source) as path, out.progress() as progress:
         api.render(path, target, size=pixels, progress=progress, **options)
