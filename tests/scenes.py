@@ -77,10 +77,10 @@ def _attributes(rest: Array, faces: Array, rng: np.random.Generator) -> dict[str
     keys, index = np.unique(np.concatenate([corners[:, None], uv], axis=1), axis=0, return_inverse=True)
     normal = np.stack([0.1 * rest[:, 0], 0.2 * rest[:, 1], np.ones(len(rest))], axis=1)
     return {
-        "uv": Attribute(keys[:, 1:], "corner", "uv", index.reshape(-1)),
+        "uv": Attribute(keys[:, 1:], "corner", "uv", index.reshape(-1).astype(np.int32)),
         "normal": Attribute(normal / np.linalg.norm(normal, axis=1, keepdims=True), "vertex", "normal"),
         "color": Attribute(rng.integers(0, 255, (len(rest), 4), np.uint8), "vertex", "color"),
         "mass": Attribute(rng.random(len(rest)), unit="kg"),
         "group": Attribute(rng.integers(-3, 3, len(faces)), "triangle"),
-        "density": Attribute([1.5, 7.8], "part", "scalar"),
+        "density": Attribute(np.array([1.5, 7.8]), "part", "scalar"),
     }

@@ -110,8 +110,8 @@ class AssetCoder:
     def is_empty(self) -> bool:
         """Whether there is nothing beside positions and triangles."""
         given = self._sequence
-        beside = (self.plan.attributes, self.plan.fields, given.parts, given.materials, given.images)
-        return not any(map(len, beside)) and given.polygons is None and given.metadata == NO_METADATA
+        is_bare = not (self.plan.attributes or self.plan.fields or given.parts or given.materials or given.images)
+        return is_bare and given.polygons is None and given.metadata == NO_METADATA
 
     def add(self, encoded: Encoded, codec: Codec) -> Bitstream:
         """Return the bitstream with the asset's sections.
@@ -164,7 +164,8 @@ class AssetCoder:
         )
 
     def _add_attributes(self, sections: dict[str, bytes], origins: Origins, surface: Surface) -> tuple[Listed, ...]:
-        listed, references = [], []
+        listed: list[Listed] = []
+        references: list[Int32] = []  # of corner attributes, which tell where others are likely to have seams
         for number, (name, (attribute, found)) in enumerate(self.plan.attributes.items()):
             section = f"attribute.{number}"
             rows = origins.of(attribute.domain)

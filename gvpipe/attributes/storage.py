@@ -167,9 +167,7 @@ def read_storage(cursor: Cursor, n_entries: int) -> Storage:
         if n == 0:
             raise cursor.corrupt("the octahedral lattice has no points")
         return Storage(number, dtype, n_components, n=n, zeros=_read_zeros(cursor, n_entries))
-    return Storage(
-        number, dtype, n_components, table=_read_table(cursor, n_entries * n_components) if number == RANKS else None
-    )
+    return Storage(number, dtype, n_components, table=_read_table(cursor, n_entries * n_components) if number == RANKS else None)
 
 
 def _steps(values: Float32, bound: float) -> list[float]:
@@ -208,3 +206,4 @@ def _read_table(cursor: Cursor, most: int) -> Int64:
     if total > 2.0**64 or (table[1:] <= table[:-1]).any():
         raise cursor.corrupt("distinct values are out of range")
     return table
+

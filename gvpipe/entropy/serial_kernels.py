@@ -32,7 +32,9 @@ class SerialCoder(NamedTuple):
 
 def empty_stream() -> BlockStream:
     """The stream of an encoder, which reads nothing."""
-    return BlockStream(np.zeros(3, np.uint64), np.zeros(0, np.uint32), np.zeros((0, 1), np.uint64), np.zeros(0, np.int64))
+    return BlockStream(
+        np.zeros(3, np.uint64), np.zeros(0, np.uint32), np.zeros((0, 1), np.uint64), np.zeros(0, np.int64)
+    )
 
 
 @compiled
