@@ -446,6 +446,7 @@ def _code(
     if isinstance(given, Codec):
         if target is None:
             encoded = encode_sequence(given, sequence, progress)
+            progress("asset", 0.0)
             return _Coded(given, dataclasses.replace(encoded, bitstream=asset.add(encoded, given)))
         choice = meet(target, given, sequence, progress, asset=asset)
     else:

@@ -113,6 +113,7 @@ class Trials:
             bound = Bound.of(self._bound, memo("coordinate", lambda: _largest_coordinate(self._sequence)))
             bitstream, errors = _correct(bitstream, reference, reader, bound)
         if self._asset is not None:
+            report("asset", 0.0)
             bitstream = self._asset.add(dataclasses.replace(encoded, bitstream=bitstream), codec)
         size = file_size(bitstream)
         report("measure", 1.0)
