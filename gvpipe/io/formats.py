@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from gvpipe.io.gltf import GltfLoader, encode_glb
 from gvpipe.io.mesh import EncoderMaker, Loader
-from gvpipe.io.obj import ObjLoader, encode_obj
+from gvpipe.io.obj import ObjLoader
+from gvpipe.io.obj_writer import encode_obj
 from gvpipe.io.off import OffLoader, encode_off
 from gvpipe.io.ply import encode_ply, load_ply
 from gvpipe.io.stl import StlLoader, encode_stl
