@@ -20,6 +20,7 @@ from gvpipe.rasterizer.textures import decode_image, largest_side, pack
 SRGB_ROLES = ("base_color_texture", "emissive_texture")  # the others hold numbers
 INVISIBLE = 1 / 512  # alpha of what is see-through but left out
 MAX_EMISSION = 1e4
+FARTHEST_UV = 1e6  # times the image's side; float32 has no part of a texel left there
 BARE = Material(double_sided=True)  # of triangles without one
 
 
@@ -165,10 +166,11 @@ class _Textures:
             self._uv.append(np.zeros((len(self._of_triangles), 3, 2), np.float32))
         chosen = self._of_triangles == material
         uv = corners[chosen].astype(np.float64) * (1, -1) + (0, 1)
-        turn = texture.rotation
-        u, v = uv[..., 0] * texture.tiling[0], uv[..., 1] * texture.tiling[1]
-        turned = np.stack([np.cos(turn) * u + np.sin(turn) * v, np.cos(turn) * v - np.sin(turn) * u], axis=-1)
-        self._uv[row][chosen] = turned + texture.offset
+        with np.errstate(over="ignore", invalid="ignore"):
+            cos, sin = np.cos(texture.rotation), np.sin(texture.rotation)
+            u, v = uv[..., 0] * texture.tiling[0], uv[..., 1] * texture.tiling[1]
+            moved = np.stack([cos * u + sin * v, cos * v - sin * u], axis=-1) + texture.offset
+        self._uv[row][chosen] = np.clip(np.nan_to_num(moved), -FARTHEST_UV, FARTHEST_UV)
 
 
 def _flags(material: Material) -> int:
