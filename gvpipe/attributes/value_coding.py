@@ -92,7 +92,7 @@ def _methods(storage: Storage, layout: EntryLayout) -> list[int]:
     has_shape = layout.surface.positions is not None and layout.domain != "part"
     if storage.id in (DIRECTIONS, TANGENTS):
         methods = [octahedral_kernels.LAST, octahedral_kernels.MEAN]
-        return [*methods, octahedral_kernels.SURFACE, octahedral_kernels.PLACE] if has_shape else methods
+        return list(range(octahedral_kernels.PLACE_CORRECTED + 1)) if has_shape else methods
     methods = [linear_kernels.LAST, linear_kernels.MEAN, linear_kernels.PARALLELOGRAM]
     has_plane = has_shape and storage.n_components == 2 and layout.domain in ("vertex", "corner")
     return [*methods, linear_kernels.CONFORMAL, linear_kernels.AFFINE] if has_plane else methods
@@ -104,12 +104,12 @@ def _code(coder: SerialCoder, storage: Storage, choice: Choice, codes: Int64, pr
     entries = prepared.entries._replace(flags=choice.flags, shift=choice.shift)
     positions = surface.positions if surface.positions is not None else np.zeros((0, 3), np.float32)
     if storage.id in (DIRECTIONS, TANGENTS):
-        from gvpipe.attributes.octahedral_kernels import PLACE, SURFACE, Octahedral, code_octahedral, corner_normals
+        from gvpipe.attributes.octahedral_kernels import PLACE, PLACE_CORRECTED, SURFACE, SURFACE_CORRECTED, Octahedral, code_octahedral, corner_normals
 
         normals = np.zeros((0, 3))
-        if method == SURFACE:
+        if method in (SURFACE, SURFACE_CORRECTED):
             normals = corner_normals(surface.faces, positions, prepared.owners, len(codes))
-        elif method == PLACE:
+        elif method in (PLACE, PLACE_CORRECTED):
             places = entries.places
             normals = corner_normals(surface.faces, positions, places[prepared.owners], int(places.max()) + 1)[places]
         code_octahedral(coder, entries, Octahedral(method, storage.n, normals), codes)
