@@ -97,9 +97,9 @@ def corner_normals(triangles: Int32, positions: Float32, places: Int64, n_places
 @compiled
 def _edge(positions: Float32, a: int, b: int) -> tuple[float, float, float]:
     return (
-        float(positions[b, 0]) - float(positions[a, 0]),
-        float(positions[b, 1]) - float(positions[a, 1]),
-        float(positions[b, 2]) - float(positions[a, 2]),
+        np.float64(positions[b, 0]) - np.float64(positions[a, 0]),
+        np.float64(positions[b, 1]) - np.float64(positions[a, 1]),
+        np.float64(positions[b, 2]) - np.float64(positions[a, 2]),
     )
 
 
@@ -128,9 +128,7 @@ def _predict(entries: Entries, octahedral: Octahedral, i: int, codes: Int64, gue
 
 
 @compiled
-def _correct(
-    gates: Int64, normals: Float64, codes: Int64, normal: tuple[float, float, float]
-) -> tuple[float, float, float]:
+def _correct(gates: Int64, normals: Float64, codes: Int64, normal: tuple[float, float, float]) -> tuple[float, float, float]:
     """A unit normal, moved by half the mean by which earlier normals differ from those of the surface."""
     x, y, z = _unit(normal[0], normal[1], normal[2])
     dx = dy = dz = 0.0
