@@ -3,9 +3,9 @@
     python tools/measure_fields.py bracket.npz plate.npz --peers fields.csv
     python tools/measure_fields.py plate.npz --field displacement --positions own --modes prediction derived
 
-A file has ``faces (T, 3)``, ``vertices (F, V, 3)``, and each field as ``field_NAME (F, V)`` or ``(F, V, C)``. Components that
-are 0 everywhere count for nothing. Peers are a table of comma-separated values with the columns ``sequence``, ``field``, ``peer`` and
-``bits_per_value``.
+A file has ``faces (T, 3)``, ``vertices (F, V, 3)``, and each field as ``field_NAME (F, V)`` or ``(F, V, C)``. Components
+that are 0 everywhere count for nothing. Peers are a table of comma-separated values with the columns ``sequence``, ``field``,
+``peer`` and ``bits_per_value``.
 """
 
 from __future__ import annotations
