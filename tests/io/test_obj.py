@@ -280,3 +280,15 @@ def test_many_parts(tmp_path: Path) -> None:
     text = "".join(f"g part {i}\nusemtl m{i % 7}\nf {i % 4 + 1} 2 3\n" for i in range(10_000))
     read = io.read(obj_file(tmp_path, SQUARE + text))
     assert len(read.parts) == 10_000 and read.parts[-1].name == "part 9999" and len(read.materials) == 7
+
+
+WORDS = ["newmtl a", "newmtl", "map_Kd", "-s", "-o 1 2", "-bm", "x.png", "norm", "Kd", "1", "nan", "d", "-halo"]
+WORDS += ["Tr", "\n", " ", "é", "\\"]
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.sampled_from(WORDS), max_size=30))
+def test_any_material_file_is_read(tmp_path: Path, words: list[str]) -> None:
+    (tmp_path / "a.mtl").write_text("newmtl a\n" + " ".join(words))
+    read = io.read(obj_file(tmp_path, SQUARE + "mtllib a.mtl\nusemtl a\nf 1 2 3\n"))
+    assert len(read.materials) == 1
