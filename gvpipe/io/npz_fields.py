@@ -92,6 +92,8 @@ class NpzField:
             if not self._is_fortran:
                 for data in iter(lambda: file.read(BLOCK_BYTES), b""):
                     made.write(data)
+                if made.tell() != self._bytes_frame * self.shape[0]:
+                    raise ValueError("it ends early")
                 return made
             for at, rows in self._rows(file):
                 for frame, values in enumerate(np.ascontiguousarray(rows.T)):

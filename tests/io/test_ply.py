@@ -118,7 +118,9 @@ IMAGES = (Image("cloth", "image/png", picture()),)
 def test_an_asset_as_ply(tmp_path: Path) -> None:
     sheet = asset(parts=(Part("", (0, 9), (0, 8), 0),), materials=(Material("", base_color_texture=Texture(0)),), images=IMAGES)
     notes = io.write(sheet, tmp_path / "%d.ply")
-    assert notes == ("PLY has no place for polygons, metadata; left out (.npz holds everything)",)  # flow differs in polygons
+    assert notes == (
+        "PLY has no place for polygons, metadata, units; left out (.npz holds everything)",
+    )  # flow differs in polygons
     read = io.read(tmp_path)
     assert read.polygons is None and np.array_equal(read.faces, sheet.faces)
     assert (read.materials[0].base_color_texture, read.images) == (Texture(0), IMAGES)
@@ -203,3 +205,10 @@ def test_mutated_ply_is_read_or_refused(tmp_path: Path, changes: list[tuple[int,
     (tmp_path / "a.ply").write_bytes(bytes(data))
     with contextlib.suppress(InputError):
         io.read(tmp_path / "a.ply")
+
+
+def test_normals_of_nothing_become_zeros(tmp_path: Path) -> None:
+    head = PLY_HEAD.format("ascii", "property float nx\nproperty float ny\nproperty float nz\n")
+    rows = [f"{row} {normal}" for row, normal in zip(PLY_ROWS, ["0 0 1", "nan nan nan", "0 1 0", "1 0 0"], strict=True)]
+    (tmp_path / "a.ply").write_text(head + "\n".join(rows) + "\n3 0 1 2\n3 0 2 3\n")
+    assert io.read(tmp_path / "a.ply").attributes["normal"].tolist() == [[0, 0, 1], [0, 0, 0], [0, 1, 0], [1, 0, 0]]
