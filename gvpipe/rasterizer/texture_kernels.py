@@ -87,9 +87,14 @@ def _footprint(longer: float, shorter: float, count: int) -> tuple[int, int, flo
     if longer <= 1.0:
         return 1, 0, 0.0
     n_taps = int(math.sqrt(min(longer / max(shorter, 1.0), float(MAX_TAPS * MAX_TAPS))) + 0.5)
-    place = min(max(0.5 * math.log2(longer / (n_taps * n_taps)), 0.0), count - 1.0)
-    level = min(int(place), max(count - 2, 0))
-    return n_taps, level, min(max(2.0 * (place - level) - 0.5, 0.0), 1.0)
+    longer /= n_taps * n_taps
+    level = 0  # found by steps: a logarithm would take as long as all the rest
+    while longer >= 4.0 and level < count - 1:
+        longer *= 0.25
+        level += 1
+    if level >= count - 1:
+        return n_taps, level, 0.0
+    return n_taps, level, min(max(2.0 * math.sqrt(max(longer, 1.0)) - 2.5, 0.0), 1.0)
 
 
 @compiled
