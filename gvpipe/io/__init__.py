@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from gvpipe.errors import InputError
+from gvpipe.io.alembic import read_alembic
 from gvpipe.io.export import write_frames
 from gvpipe.io.frames import read_frames
 from gvpipe.io.npz import read_npz, write_npz
@@ -25,6 +26,7 @@ USD = (".usda", ".usdc", ".usd", ".usdz")
 READERS: dict[str, Callable[[Path, ReadOptions], MeshSequence]] = {
     ".npz": lambda path, options: read_npz(path, options.fps),
     **dict.fromkeys(USD, read_usd),
+    ".abc": read_alembic,
 }
 WRITERS: dict[str, Callable[[MeshSequence, Path], None]] = {".npz": write_npz}
 

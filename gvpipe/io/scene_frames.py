@@ -1,7 +1,7 @@
 """Positions of a scene's meshes, evaluated when frames are read.
 
-Every mesh has a `Motion`: a function of time. Meshes that stand still are evaluated once. Memory holds no frames but those asked
-for.
+Every mesh has a `Motion`: a function of time. Meshes that stand still are evaluated once. Memory holds the frames asked for
+alone.
 """
 
 from __future__ import annotations
@@ -103,6 +103,45 @@ class SceneFrames:
 def one_line(exc: BaseException) -> str:
     """The text of a library's error as one short line."""
     return " ".join(str(exc).split())[:200] or type(exc).__name__
+
+
+def even_times(samples: Float64, fps: float | None, default: float, where: str) -> tuple[Float64, float, tuple[str, ...]]:
+    """Return the times of frames for samples at given times, frames per second, and notes.
+
+    Frames are the samples where those are even, else as far apart as most samples.
+
+    Args:
+        samples: sorted, seconds.
+        fps: instead of the samples' own rate.
+        default: frames per second where nothing moves.
+        where: the file, for messages.
+    """
+    samples = samples[np.isfinite(samples)]
+    if len(samples) < 2:
+        start = float(samples[0]) if len(samples) else 0.0
+        return np.array([start]), fps or default, ()
+    gaps = np.diff(samples)
+    gaps = gaps[gaps > 1e-6]
+    start, stop, step = float(samples[0]), float(samples[-1]), 1 / fps if fps else float(np.median(gaps))
+    rate = fps or _whole(1 / step)
+    times = frame_times(start, stop, step, where)
+    return times, rate, between_note(samples, start, step, rate, 1.0)
+
+
+def between_note(samples: Float64, start: float, step: float, fps: float, codes: float) -> tuple[str, ...]:
+    """Of samples that lie between frames; ``codes`` units of time are a second."""
+    at = (samples - start) / step
+    between = int((np.abs(at - np.rint(at)) > 1e-2).sum())
+    if not between:
+        return ()
+    finest = codes / max(float(np.diff(samples).min(initial=step)), 1e-9)
+    dense = f"; they are as dense as {finest:.4g} a second (fps, --fps)" if finest > 1.01 * fps else ""
+    return (f"{between} of {len(samples)} samples lie between the frames, at {fps:.6g} a second, and were left out{dense}",)
+
+
+def _whole(rate: float) -> float:
+    """A rate without the rounding of the times that it was computed from."""
+    return float(round(rate)) if abs(rate - round(rate)) < 1e-3 else round(rate, 6)
 
 
 def frame_times(start: float, stop: float, step: float, where: str) -> Float64:

@@ -72,13 +72,13 @@ def _rows(layer: Layer, domain: str, mesh: SceneMesh, fans: Fans) -> Int64:
     own = np.arange(len(layer.values)) if layer.indices is None else layer.indices.astype(np.int64)
     if layer.domain == "constant":
         sizes = {"vertex": mesh.n_vertices, "corner": len(fans.corner_source), "polygon": len(fans.triangle_source)}
-        return np.zeros(sizes[domain], np.int64) + own[0]
+        return np.full(sizes[domain], own[0], np.int64)
     if layer.domain == "corner":
         return np.asarray(own[fans.corner_source])
     if layer.domain == "vertex":
         return np.asarray(own if domain == "vertex" else own[mesh.corners[fans.corner_source]])
     triangles = own[fans.triangle_source]
-    return triangles if domain == "polygon" else np.repeat(triangles, 3)
+    return np.asarray(triangles if domain == "polygon" else np.repeat(triangles, 3))
 
 
 def _shared(layer: Layer, rows: Int64) -> tuple[Array, Int64]:

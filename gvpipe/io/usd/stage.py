@@ -15,7 +15,7 @@ import numpy as np
 from gvpipe.arrays import Float64
 from gvpipe.errors import InputError
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_frames import frame_times, one_line
+from gvpipe.io.scene_frames import between_note, frame_times, one_line
 
 EXTRA = "USD files need the package usd-core; install it by: pip install 'gvpipe[usd]'"
 SIGNATURES = {  # first bytes by extension; .usd is text or binary
@@ -115,15 +115,7 @@ def stage_times(
     step = codes / options.fps if options.fps else _step(stage, codes, inside)
     fps = codes / step
     times = frame_times(start, stop, step, where)
-    notes: tuple[str, ...] = ()
-    between = inside[np.abs((inside - start) / step - np.rint((inside - start) / step)) > 1e-3]
-    if len(between):
-        finest = codes / max(float(np.diff(inside).min(initial=step)), 1e-9)
-        dense = f"; they are as dense as {finest:.4g} a second (fps, --fps)" if finest > 1.01 * fps else ""
-        notes = (
-            f"{len(between)} of {len(inside)} samples lie between the frames, at {fps:g} a second, and were left out{dense}",
-        )
-    return times, fps, notes
+    return times, fps, between_note(inside, start, step, fps, codes)
 
 
 def _step(stage: Any, codes: float, samples: Float64) -> float:
