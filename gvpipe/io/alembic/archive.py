@@ -83,6 +83,16 @@ def alembic_errors(path: Path) -> Iterator[None]:
         raise InputError(f"{path} cannot be read as Alembic: {reason}; export it again") from exc
 
 
+def sample_of(held: Any, number: int) -> Any:
+    """Sample ``number`` of a property or a schema.
+
+    It is asked for by its time, since the library takes a selector's integer for a time, too.
+    """
+    from alembic3d import Abc
+
+    return held.getValue(Abc.ISampleSelector(float(held.getTimeSampling().getSampleTime(number))))
+
+
 def find_meshes(archive: Any) -> tuple[list[Node], list[str]]:
     """Return the polygon meshes and subdivision cages in the order of the archive, and names of schemas that were left out."""
     found: list[Node] = []

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gvpipe.arrays import Array, Float64
-from gvpipe.io.alembic.archive import Node
+from gvpipe.io.alembic.archive import Node, sample_of
 
 CLOSE = 1e-6  # seconds within which a time is a sample's
 
@@ -46,15 +46,13 @@ class AlembicMotion:
 
     def world(self, time: float) -> Float64:
         """``(4, 4)`` from the mesh's space into the world's, applied to rows."""
-        from alembic3d import Abc
-
         total = np.eye(4)
         for parent in self.node.parents:
             low, high, part = _around(parent.schema, time)
-            first = parent.schema.getValue(Abc.ISampleSelector(low))
+            first = sample_of(parent.schema, low)
             matrix = np.array(first.getMatrix(), np.float64)
             if part:
-                matrix += part * (np.array(parent.schema.getValue(Abc.ISampleSelector(high)).getMatrix(), np.float64) - matrix)
+                matrix += part * (np.array(sample_of(parent.schema, high).getMatrix(), np.float64) - matrix)
             total = total @ matrix
             if not first.getInheritsXforms():
                 break
@@ -62,9 +60,7 @@ class AlembicMotion:
 
 
 def _sample(positions: Any, number: int) -> Float64:
-    from alembic3d import Abc
-
-    return np.array(positions.getValue(Abc.ISampleSelector(number)), np.float64).reshape(-1, 3)
+    return np.array(sample_of(positions, number), np.float64).reshape(-1, 3)
 
 
 def _around(schema: Any, time: float) -> tuple[int, int, float]:

@@ -15,7 +15,7 @@ from gvpipe.arrays import Int64
 from gvpipe.asset.material import Material
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
-from gvpipe.io.alembic.archive import Node, alembic_errors, find_meshes, open_archive
+from gvpipe.io.alembic.archive import Node, alembic_errors, find_meshes, open_archive, sample_of
 from gvpipe.io.alembic.motion import AlembicMotion
 from gvpipe.io.alembic.params import layers_of
 from gvpipe.io.options import ReadOptions
@@ -99,15 +99,13 @@ def _read_mesh(motion: AlembicMotion, materials: list[str], time: float, where: 
 
 def _polygons(node: Node, where: str) -> tuple[Int64, Int64]:
     """Corners per polygon and the vertex of each corner; raises `InputError` where they change."""
-    from alembic3d import Abc
-
     found = []
     for held in (node.schema.getFaceCountsProperty(), node.schema.getFaceIndicesProperty()):
         first = np.array(held.getValue(), np.int64).reshape(-1)
         for number in range(1, held.getNumSamples()):
             if held.isConstant():
                 break
-            if not np.array_equal(np.array(held.getValue(Abc.ISampleSelector(number)), np.int64).reshape(-1), first):
+            if not np.array_equal(np.array(sample_of(held, number), np.int64).reshape(-1), first):
                 raise InputError(
                     f"{where}: the topology of mesh {node.path} changes at frame {number}; export it with constant topology"
                 )
