@@ -14,10 +14,11 @@ from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_frames import SceneFrames
 from gvpipe.io.scene_layers import join_layers
 from gvpipe.io.scene_mesh import SceneMesh, join
+from gvpipe.io.usd.fields import join_fields
 from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.meshes import find_meshes, groups_of, polygons_of
 from gvpipe.io.usd.motion import Skins, UsdMotion
-from gvpipe.io.usd.primvars import layers_of
+from gvpipe.io.usd.primvars import layers_of, sampled_of
 from gvpipe.io.usd.stage import open_stage, outside_note, stage_times, usd_errors
 from gvpipe.sequence import MeshSequence
 
@@ -59,7 +60,9 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
     meshes = [mesh for mesh, _ in read]
     joined = join(meshes, where)
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
-    left = list(dict.fromkeys(name for _, names in read for name in names))
+    sampled = [sampled_of(found.meshes[number], mesh, float(times[0])) for number, mesh in zip(kept, meshes, strict=True)]
+    fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times)
+    left = list(dict.fromkeys(name for names in (*(names for _, names in read), torn) for name in names))
     left_note = (f"primvars that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()
     return MeshSequence(
         frames,
@@ -69,6 +72,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
         where,
         frames.origin,
         (*found.notes, *time_notes, *materials.notes(), *layer_notes, *left_note, *outside_note(stage, path)),
+        fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,
         materials=tuple(materials.materials),
