@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from gvpipe.errors import InputError
-from gvpipe.io.alembic import read_alembic
+from gvpipe.io.alembic import read_alembic, write_alembic
 from gvpipe.io.export import write_frames
 from gvpipe.io.frames import read_frames
 from gvpipe.io.npz import read_npz, write_npz
@@ -38,6 +38,7 @@ WRITERS: dict[str, Callable[[MeshSequence, Path], tuple[str, ...] | None]] = {
     ".mdd": write_mdd,
     ".npy": write_npy,
     **dict.fromkeys(USD, write_usd),
+    ".abc": write_alembic,
 }
 
 

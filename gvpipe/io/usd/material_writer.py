@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from gvpipe.asset.material import Material, Texture
+from gvpipe.io.usd.names import identifier, name_prim
 from gvpipe.sequence import MeshSequence
 
 WRAPS = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp"}
@@ -39,17 +40,18 @@ class MaterialWriter:
         UsdShade.MaterialBindingAPI.Apply(prim).Bind(self._written[number])
 
     def _write(self, material: Material) -> Any:
-        from pxr import Gf, Sdf, Tf, UsdGeom, UsdShade
+        from pxr import Gf, Sdf, UsdGeom, UsdShade
 
         if not self._written:
             UsdGeom.Scope.Define(self._stage, self._scope)
-        name, number = str(Tf.MakeValidIdentifier(material.name)) if material.name else "material", 1
+        name, number = identifier(material.name) if material.name else "material", 1
         plain = name
         while name in self._taken:
             name, number = f"{plain}_{number}", number + 1
         self._taken.add(name)
         path = f"{self._scope}/{name}"
         made = UsdShade.Material.Define(self._stage, path)
+        name_prim(made.GetPrim(), material.name)
         surface = UsdShade.Shader.Define(self._stage, f"{path}/surface")
         surface.CreateIdAttr("UsdPreviewSurface")
         made.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")

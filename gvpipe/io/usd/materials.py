@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.asset.material import Material, Texture
+from gvpipe.io.usd.names import name_of
 from gvpipe.io.usd.textures import CHANNELS, Textures
 
 WRAPS = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp", "black": "clamp", "useMetadata": "repeat"}
@@ -62,7 +63,7 @@ class Materials:
         return (*said, *self.textures.notes)
 
     def _read(self, bound: Any) -> Material:
-        name = bound.GetPrim().GetName()
+        name = name_of(bound.GetPrim())
         surface = bound.ComputeSurfaceSource()[0]
         if not surface or surface.GetIdAttr().Get() != "UsdPreviewSurface":
             self.plain.append(name)

@@ -51,7 +51,7 @@ def write_field(name: str, field: Field, meshes: list[tuple[Any, ExportMesh]], s
 def _write_color(drawn: Any, layer: Layer) -> None:
     colors = as_unit_range(layer.values)
     _write(drawn, "displayColor", layer, colors[:, :3])
-    if colors.shape[1] == 4 and (colors[:, 3] < 1).any():
+    if colors.shape[1] == 4:
         _write(drawn, "displayOpacity", Layer("", "scalar", layer.domain, colors[:, 3:], layer.indices), colors[:, 3:])
 
 

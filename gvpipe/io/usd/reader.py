@@ -18,6 +18,7 @@ from gvpipe.io.usd.fields import join_fields
 from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.meshes import find_meshes, groups_of, polygons_of
 from gvpipe.io.usd.motion import Skins, UsdMotion
+from gvpipe.io.usd.names import name_of, parent_path
 from gvpipe.io.usd.primvars import layers_of, sampled_of
 from gvpipe.io.usd.stage import open_stage, outside_note, stage_times, usd_errors
 from gvpipe.sequence import MeshSequence
@@ -92,8 +93,9 @@ def _read_mesh(mesh: Any, motion: UsdMotion, materials: Materials, time: float, 
     whole = turn if turn.ndim == 2 else turn.mean(axis=0)
     is_left = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
     is_mirrored = bool(np.linalg.det(whole) < 0)  # a mirror turns the winding round
-    parent = str(prim.GetParent().GetPath()).strip("/")
-    plain = SceneMesh(prim.GetName(), parent, motion.n_vertices, counts, corners, groups, bound, is_left != is_mirrored)
+    plain = SceneMesh(
+        name_of(prim), parent_path(prim), motion.n_vertices, counts, corners, groups, bound, is_left != is_mirrored
+    )
     layers, uv_names, left = layers_of(mesh, plain, time, turn)
     materials.name_uv(bound, uv_names)
     return replace(plain, layers=layers), left

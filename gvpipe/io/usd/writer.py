@@ -20,11 +20,12 @@ from gvpipe.errors import InputError, OutputError
 from gvpipe.io.scene_export import ExportMesh, export_meshes, uncovered
 from gvpipe.io.scene_frames import one_line
 from gvpipe.io.usd.material_writer import MaterialWriter
+from gvpipe.io.usd.names import ADDED, identifier, name_prim
 from gvpipe.io.usd.primvar_writer import write_field, write_primvars
 from gvpipe.io.usd.stage import EXTRA
 from gvpipe.sequence import MeshSequence
 
-ROOT = "root"
+ROOT = "root"  # of meshes that have no common node
 
 
 def write_usd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
@@ -65,7 +66,7 @@ def _write_package(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
         with atomic_path(path) as temporary:
             package = folder / "package.usdz"
             writer = zip_writer.CreateNew(str(package))
-            writer.AddFile(str(stage), f"{_identifier(path.stem)}.usdc")
+            writer.AddFile(str(stage), f"{identifier(path.stem)}.usdc")
             for name in image_names(sequence):
                 writer.AddFile(str(folder / "textures" / name), f"textures/{name}")
             writer.Save()
@@ -89,7 +90,10 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str) -
     meshes = export_meshes(sequence, name)
     paths = _paths(meshes)
     root = paths[0].split("/")[1]
-    stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, f"/{root}").GetPrim())
+    top = UsdGeom.Xform.Define(stage, f"/{root}").GetPrim()
+    stage.SetDefaultPrim(top)
+    if any(path.count("/") > len(mesh.parent.split("/")) + bool(mesh.parent) for path, mesh in zip(paths, meshes, strict=True)):
+        top.SetCustomDataByKey(ADDED, True)
     materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, image_names(sequence))
     said: list[str] = []
     drawn = [_define(stage, where, mesh, sequence, materials, said) for where, mesh in zip(paths, meshes, strict=True)]
@@ -117,11 +121,14 @@ def _define(
     from pxr import UsdGeom, UsdShade, Vt
 
     parent = ""
-    for name in where.split("/")[1:-1]:
+    names = where.split("/")[1:-1]
+    given = [name for name in mesh.parent.split("/") if name]
+    for name, shown in zip(names, [*names[: len(names) - len(given)], *given], strict=True):
         parent += f"/{name}"
-        if not stage.GetPrimAtPath(parent):
-            UsdGeom.Xform.Define(stage, parent)
+        if parent == f"/{names[0]}" or not stage.GetPrimAtPath(parent):
+            name_prim(UsdGeom.Xform.Define(stage, parent).GetPrim(), shown)
     drawn = UsdGeom.Mesh.Define(stage, where)
+    name_prim(drawn.GetPrim(), mesh.name)
     drawn.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     drawn.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(mesh.counts, np.int32)))
     drawn.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.corners.astype(np.int32)))
@@ -189,7 +196,7 @@ def _paths(meshes: list[ExportMesh]) -> list[str]:
     result: list[str] = []
     taken: set[str] = set()
     for chain in chains:
-        path = "/" + "/".join(_identifier(name) for name in (chain if shared else [ROOT, *chain]))
+        path = "/" + "/".join(identifier(name) for name in (chain if shared else [ROOT, *chain]))
         free, number = path, 1
         while free in taken:
             free, number = f"{path}_{number}", number + 1
@@ -226,7 +233,7 @@ def _write_images(sequence: MeshSequence, folder: Path) -> None:
 
 
 def _notes(sequence: MeshSequence, meshes: list[ExportMesh]) -> tuple[str, ...]:
-    said = []
+    said = [] if sequence.metadata.metres_per_unit else ["the length of a unit is unknown; the stage says 1 metre"]
     lost = uncovered(sequence, meshes)
     if lost:
         said.append(f"{lost} vertices belong to no part; USD holds meshes alone, so they were left out")
@@ -238,9 +245,3 @@ def _notes(sequence: MeshSequence, meshes: list[ExportMesh]) -> tuple[str, ...]:
     if unlit:
         said.append(f"UsdPreviewSurface has no unlit materials; {', '.join(unlit[:5])} are lit in the file")
     return tuple(said)
-
-
-def _identifier(name: str) -> str:
-    from pxr import Tf
-
-    return str(Tf.MakeValidIdentifier(name)) if name else "mesh"
