@@ -6,6 +6,7 @@ alone.
 
 from __future__ import annotations
 
+import re
 import threading
 from collections.abc import Sequence
 from typing import Protocol
@@ -101,8 +102,16 @@ class SceneFrames:
 
 
 def one_line(exc: BaseException) -> str:
-    """The text of a library's error as one short line."""
-    return " ".join(str(exc).split())[:200] or type(exc).__name__
+    """The text of a library's error as one short line, without where in the library's sources it arose."""
+    try:
+        text = str(exc)
+    except UnicodeError:  # it quotes a damaged file
+        return "its text is damaged"
+    usd = re.search(r" in file \S+ : '(.*?)'?\s*(?:$|Error in)", text, re.DOTALL)
+    text = re.sub(r"parse error matching .*? at '", "parse error at '", usd[1], flags=re.DOTALL) if usd else text
+    alembic = text.rsplit("EXCEPTION:", 1)
+    text = alembic[-1] if len(alembic) > 1 else text
+    return " ".join(text.split())[:200] or type(exc).__name__
 
 
 def even_times(samples: Float64, fps: float | None, default: float, where: str) -> tuple[Float64, float, tuple[str, ...]]:

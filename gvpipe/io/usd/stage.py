@@ -68,7 +68,7 @@ def usd_errors(path: Path) -> Iterator[None]:
     except InputError:
         raise
     except (Tf.ErrorException, RuntimeError, ValueError, TypeError, OverflowError, MemoryError) as exc:
-        raise InputError(f"{path} cannot be read as USD: {_reason(exc)}; export it again") from exc
+        raise InputError(f"{path} cannot be read as USD: {one_line(exc)}; export it again") from exc
     finally:
         silencer.TakeUncoalescedDiagnostics()
         del silencer
@@ -134,9 +134,3 @@ def _head(path: Path) -> bytes:
             return file.read(16)
     except OSError as exc:
         raise InputError(f"{path} cannot be read: {exc.strerror}; check the path") from exc
-
-
-def _reason(exc: BaseException) -> str:
-    """What the library says, without where in its sources."""
-    said = re.search(r" : '(.*?)'\s*$", str(exc), re.MULTILINE)
-    return one_line(RuntimeError(said[1] if said else str(exc)))
