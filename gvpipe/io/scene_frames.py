@@ -75,18 +75,24 @@ class SceneFrames:
             self.rounding = max(self.rounding, rounding(exact, block[i : i + 1], self.origin))
         return block
 
+    def at(self, time: float) -> Float64:
+        """Positions ``(V, 3)`` at any time of the file's own, with the origin; raises `InputError`."""
+        return self._evaluate_at(time, f"({self._unit} {time:g})")
+
     def _evaluate(self, frame: int) -> Float64:
-        result = np.empty(self.shape[1:], np.float64)
         time = float(self.times[frame])
+        return self._evaluate_at(time, f"frame {frame} ({self._unit} {time:g})")
+
+    def _evaluate_at(self, time: float, moment: str) -> Float64:
+        result = np.empty(self.shape[1:], np.float64)
         with self._lock:
             for number, motion in enumerate(self._motions):
                 span = slice(self._starts[number], self._starts[number + 1])
                 still = self._still[number]
-                result[span] = self._checked(motion, frame, time) if still is None else still
+                result[span] = self._checked(motion, time, moment) if still is None else still
         return result
 
-    def _checked(self, motion: Motion, frame: int, time: float) -> Array:
-        moment = f"frame {frame} ({self._unit} {time:g})"
+    def _checked(self, motion: Motion, time: float, moment: str) -> Array:
         try:
             positions = motion.at(time)
         except InputError:
