@@ -110,7 +110,7 @@ def read_npy(path: Path, options: ReadOptions, read_mesh: MeshReader) -> MeshSeq
     """
     try:
         array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (OSError, ValueError, TypeError, EOFError, SyntaxError, OverflowError, MemoryError) as exc:
+    except Exception as exc:  # damaged headers raise nearly anything inside NumPy
         raise InputError(f"{path} cannot be read as .npy ({' '.join(str(exc).split())[:150]}); write it by numpy.save") from exc
     if not isinstance(array, np.ndarray) or array.ndim != 3 or array.shape[2] != 3 or array.dtype.kind not in "fiu":
         shape = f"shape {array.shape} and type {array.dtype}" if isinstance(array, np.ndarray) else "several arrays"

@@ -9,9 +9,8 @@ import numpy as np
 
 from gvpipe.arrays import Array, Float64
 from gvpipe.asset.attribute import MAX_COMPONENTS
+from gvpipe.io.scene_fields import Sampled
 from gvpipe.io.scene_mesh import Layer, SceneMesh
-from gvpipe.io.usd.fields import DOMAINS as FIELD_DOMAINS
-from gvpipe.io.usd.fields import Sampled
 
 DOMAINS = {"constant": "constant", "uniform": "polygon", "varying": "vertex", "vertex": "vertex", "faceVarying": "corner"}
 UV_NAME = re.compile(r"^(st|uv|map|uvmap|uvset|texcoord)[_\d]*$", re.IGNORECASE)
@@ -68,14 +67,31 @@ def sampled_of(mesh: Any, polygons: SceneMesh, time: float) -> dict[str, Sampled
 
     found = {}
     for primvar in UsdGeom.PrimvarsAPI(mesh.GetPrim()).GetPrimvarsWithValues():
-        name, kind, domain = primvar.GetPrimvarName(), _kind(primvar), FIELD_DOMAINS.get(primvar.GetInterpolation())
-        if kind is None or domain is None or name in OWN[1:] or name.startswith("skel:") or _is_uv(name, primvar):
+        name, kind, domain = primvar.GetPrimvarName(), _kind(primvar), DOMAINS[primvar.GetInterpolation()]
+        if (
+            kind is None
+            or domain not in ("vertex", "polygon")
+            or name in OWN[1:]
+            or name.startswith("skel:")
+            or _is_uv(name, primvar)
+        ):
             continue
         if primvar.ValueMightBeTimeVarying() and not primvar.IsIndexed() and primvar.GetElementSize() == 1:
             layer = _layer(name, kind, primvar, polygons, time)
             if layer is not None:
-                found["color" if name == "displayColor" else name] = Sampled(primvar, kind, domain, mesh.GetPrim().GetStage())
+                found["color" if name == "displayColor" else name] = Sampled(Values(primvar), kind, domain)
     return found
+
+
+class Values:
+    """The values of a primvar at a time code."""
+
+    def __init__(self, primvar: Any) -> None:
+        self._primvar = primvar
+        self._stage = primvar.GetAttr().GetStage()  # primvars do not keep their stage alive
+
+    def __call__(self, time: float) -> Array:
+        return np.array(self._primvar.Get(time))
 
 
 def _normals(mesh: Any, primvar: Any, polygons: SceneMesh, time: float, turn: Float64) -> Layer | None:

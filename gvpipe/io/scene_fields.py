@@ -1,10 +1,9 @@
-"""Primvars that change over time, as fields of the sequence."""
+"""Numbers of a scene's meshes that change over time, as fields of the sequence."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -13,35 +12,31 @@ from gvpipe.asset.field import Field
 from gvpipe.errors import InputError
 from gvpipe.io.scene_mesh import Fans
 
-DOMAINS = {"vertex": "vertex", "varying": "vertex", "uniform": "polygon"}
-
 
 @dataclass(frozen=True)
 class Sampled:
-    """A primvar that changes, on one mesh.
+    """Numbers that change, on one mesh.
 
     Args:
-        primvar: the UsdGeom.Primvar.
+        at: gives ``(rows,)`` or ``(rows, C)`` at a time of the file's own.
         kind: as of `gvpipe.Field`.
         domain: ``"vertex"`` or ``"polygon"``.
-        owner: what must live as long as the primvar.
     """
 
-    primvar: Any
+    at: Callable[[float], Array]
     kind: str
     domain: str
-    owner: Any
 
 
-class PrimvarFrames:
-    """Values ``(F, R)`` or ``(F, R, C)`` of a primvar on all meshes, evaluated when sliced; 0 where it is missing."""
+class FieldFrames:
+    """Values ``(F, R)`` or ``(F, R, C)`` of one name on all meshes, evaluated when sliced; 0 where it is missing."""
 
     def __init__(
         self, name: str, found: Sequence[Sampled | None], sizes: Sequence[int], fans: Sequence[Fans], times: Array
     ) -> None:
         self._name, self._found, self._fans, self._times = name, found, fans, times
         present = next(each for each in found if each is not None)
-        first = np.array(present.primvar.Get(float(times[0])))
+        first = present.at(float(times[0]))
         self._is_polygon = present.domain == "polygon"
         self._sizes = [len(each.triangle_source) for each in fans] if self._is_polygon else list(sizes)
         tail = () if first.ndim == 1 else (first.shape[1],)
@@ -60,10 +55,10 @@ class PrimvarFrames:
         return block
 
     def _values(self, sampled: Sampled, frame: int, size: int, fans: Fans) -> Array:
-        values = np.array(sampled.primvar.Get(float(self._times[frame])))
+        values = sampled.at(float(self._times[frame]))
         needed = size if not self._is_polygon else int(fans.triangle_source.max(initial=-1)) + 1
         if values.shape[1:] != self.shape[2:] or len(values) < needed or (not self._is_polygon and len(values) != size):
-            raise InputError(f"primvar {self._name} has {len(values)} values in frame {frame}; {needed} are needed")
+            raise InputError(f"field {self._name} has {len(values)} values in frame {frame}; {needed} are needed")
         return np.asarray(values[fans.triangle_source] if self._is_polygon else values)
 
 
@@ -73,10 +68,10 @@ def join_fields(
     """Return the fields by name, and the names of those whose meshes disagree.
 
     Args:
-        found: of each mesh, its changing primvars by name.
+        found: of each mesh, what changes by name.
         sizes: vertices of each mesh.
         fans: triangles of each mesh.
-        times: time codes of the frames.
+        times: of the frames.
     """
     fields: dict[str, Field] = {}
     left: list[str] = []
@@ -86,7 +81,7 @@ def join_fields(
             left.append(name)
             continue
         kind, domain = next((each.kind, each.domain) for each in own if each is not None)
-        frames = PrimvarFrames(name, own, sizes, fans, times)
+        frames = FieldFrames(name, own, sizes, fans, times)
         if len(frames.shape) == 2:
             kind = "" if kind != "label" else kind
         fields[name] = Field(frames, "triangle" if domain == "polygon" else "vertex", kind, name=name)
