@@ -76,11 +76,12 @@ def read(
     return read_frames(path, fps)
 
 
-def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) -> None:
-    """Write a mesh sequence.
+def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) -> tuple[str, ...]:
+    """Write a mesh sequence; returns what the format cannot hold, a line each.
 
     Args:
-        path: an ``.npz``, a pattern of frame files (``out/%04d.obj``) or a folder (existing, or ending in ``/``).
+        path: an ``.npz``, a scene (``.usda``, ``.usdc``, ``.usd``, ``.usdz``, ``.abc``), a point cache (``.pc2``, ``.mdd``,
+            ``.npy``), a pattern of frame files (``out/%04d.obj``) or a folder (existing, or ending in ``/``).
         start: number of the first frame file.
 
     Raises:
@@ -90,6 +91,6 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
     path = os.fspath(path)
     writer = WRITERS.get(Path(path).suffix.lower())
     if writer is not None and not path.endswith(("/", os.sep)):
-        writer(sequence, Path(path))
-    else:
-        write_frames(sequence, path, start)
+        return writer(sequence, Path(path)) or ()
+    write_frames(sequence, path, start)
+    return ()

@@ -219,11 +219,13 @@ def test_meshes_that_are_not_shown_are_left_out(tmp_path: Path) -> None:
         token visibility = "invisible"
         def Mesh "m" {{ {TRIANGLE} }}
     }}
+    def Sphere "ball" {{}}
     def Mesh "helper" {{ {TRIANGLE} uniform token purpose = "guide"
     }}
     """
     read = io.read(stage(tmp_path, body))
     assert [part.name for part in read.parts] == ["seen"]
+    assert any("no meshes were left out: 1 Sphere" in note for note in read.notes)
     assert any("2 meshes are invisible, guides or proxies" in note for note in read.notes)
 
 

@@ -58,6 +58,9 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
     cages = sum("SubD" in motion.node.kind for motion in motions)
     if cages:
         notes.append(f"{cages} meshes are cages of subdivision surfaces; the cages were read as they are")
+    drawn = sorted(set(others) & {"Points", "Curve", "NuPatch"})
+    if drawn:
+        notes.append(f"{', '.join(drawn)} beside the meshes were left out")
     samples = np.unique(np.fromiter((time for motion in motions for time in motion.samples()), np.float64))
     times, fps, time_notes = even_times(samples, options.fps, DEFAULT_FPS, where)
     frames = SceneFrames(motions, times, where, "second")
