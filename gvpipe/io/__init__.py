@@ -11,23 +11,54 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from gvpipe.errors import InputError
+from gvpipe.io.alembic import read_alembic, write_alembic
 from gvpipe.io.export import write_frames
 from gvpipe.io.frames import read_frames
 from gvpipe.io.npz import read_npz, write_npz
+from gvpipe.io.options import ReadOptions
+from gvpipe.io.point_cache import read_mdd, read_npy, read_pc2, write_mdd, write_npy, write_pc2
+from gvpipe.io.usd import read_usd, write_usd
 from gvpipe.sequence import MeshSequence
 
 __all__ = ["READERS", "WRITERS", "read", "write"]
 
-READERS: dict[str, Callable[[Path, float | None], MeshSequence]] = {".npz": read_npz}
-WRITERS: dict[str, Callable[[MeshSequence, Path], tuple[str, ...]]] = {".npz": write_npz}
+USD = (".usda", ".usdc", ".usd", ".usdz")
+
+READERS: dict[str, Callable[[Path, ReadOptions], MeshSequence]] = {
+    ".npz": lambda path, options: read_npz(path, options.fps),
+    **dict.fromkeys(USD, read_usd),
+    ".abc": read_alembic,
+    ".pc2": lambda path, options: read_pc2(path, options, _mesh_of),
+    ".mdd": lambda path, options: read_mdd(path, options, _mesh_of),
+    ".npy": lambda path, options: read_npy(path, options, _mesh_of),
+}
+WRITERS: dict[str, Callable[[MeshSequence, Path], tuple[str, ...] | None]] = {
+    ".npz": write_npz,
+    ".pc2": write_pc2,
+    ".mdd": write_mdd,
+    ".npy": write_npy,
+    **dict.fromkeys(USD, write_usd),
+    ".abc": write_alembic,
+}
 
 
-def read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], fps: float | None = None) -> MeshSequence:
+def _mesh_of(path: str | os.PathLike[str]) -> MeshSequence:
+    """The mesh that belongs to a point cache, from any file but another cache."""
+    return read(path)
+
+
+def read(
+    path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    fps: float | None = None,
+    mesh: str | os.PathLike[str] | None = None,
+) -> MeshSequence:
     """Read a mesh sequence.
 
     Args:
-        path: an ``.npz``, or frame files as a folder, a glob (``walk/*.obj``), a pattern (``walk/%04d.obj``,
+        path: an ``.npz``, a scene (``.usd``, ``.usda``, ``.usdc``, ``.usdz``, ``.abc``), a point cache (``.pc2``, ``.mdd``,
+            ``.npy``), or frame files as a folder, a glob (``walk/*.obj``), a pattern (``walk/%04d.obj``,
             ``walk/####.obj``, ``walk/$F4.obj``), one file or a list of files.
+        mesh: the mesh of a point cache (``.pc2``, ``.mdd``, ``.npy``).
         fps: frames per second; overrides the file's. Frame files, and archives without one, have 30 by default.
 
     Raises:
@@ -41,7 +72,7 @@ def read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], fps: f
     if reader is not None and not os.path.isdir(path):
         if not os.path.isfile(path):
             raise InputError(f"{path}: no such file; check the path")
-        return reader(Path(path), fps)
+        return reader(Path(path), ReadOptions(fps, mesh=mesh))
     return read_frames(path, fps)
 
 
@@ -49,7 +80,8 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
     """Write a mesh sequence; returns what the format cannot hold, a line each.
 
     Args:
-        path: an ``.npz``, a pattern of frame files (``out/%04d.obj``) or a folder (existing, or ending in ``/``).
+        path: an ``.npz``, a scene (``.usda``, ``.usdc``, ``.usd``, ``.usdz``, ``.abc``), a point cache (``.pc2``, ``.mdd``,
+            ``.npy``), a pattern of frame files (``out/%04d.obj``) or a folder (existing, or ending in ``/``).
         start: number of the first frame file.
 
     Raises:
@@ -59,5 +91,5 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
     path = os.fspath(path)
     writer = WRITERS.get(Path(path).suffix.lower())
     if writer is not None and not path.endswith(("/", os.sep)):
-        return writer(sequence, Path(path))
+        return writer(sequence, Path(path)) or ()
     return write_frames(sequence, path, start)
