@@ -12,44 +12,70 @@ from pathlib import Path
 
 from gvpipe.errors import InputError
 from gvpipe.io.export import write_frames
+from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames import read_frames
+from gvpipe.io.gltf import read_animated, write_animated
 from gvpipe.io.npz import read_npz, write_npz
+from gvpipe.io.pattern import match_pattern
 from gvpipe.sequence import MeshSequence
 
 __all__ = ["READERS", "WRITERS", "read", "write"]
 
-READERS: dict[str, Callable[[Path, float | None], MeshSequence]] = {".npz": read_npz}
-WRITERS: dict[str, Callable[[MeshSequence, Path], tuple[str, ...]]] = {".npz": write_npz}
+# a reader takes a path, fps and the name of a clip; None: the file is a frame
+READERS: dict[str, Callable[[Path, float | None, str | None], MeshSequence | None]] = {
+    ".npz": lambda path, fps, clip: read_npz(path, fps),
+    ".glb": read_animated,
+    ".gltf": read_animated,
+}
+HAVE_CLIPS = (".glb", ".gltf")
+WRITERS: dict[str, Callable[[MeshSequence, Path], tuple[str, ...]]] = {".npz": write_npz, ".glb": write_animated}
 
 
-def read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], fps: float | None = None) -> MeshSequence:
+def read(
+    path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], fps: float | None = None, clip: str | None = None
+) -> MeshSequence:
     """Read a mesh sequence.
 
     Args:
-        path: an ``.npz``, or frame files as a folder, a glob (``walk/*.obj``), a pattern (``walk/%04d.obj``,
-            ``walk/####.obj``, ``walk/$F4.obj``), one file or a list of files.
-        fps: frames per second; overrides the file's. Frame files, and archives without one, have 30 by default.
+        path: an ``.npz``, an animated ``.glb`` or ``.gltf``, or frame files as a folder, a glob (``walk/*.obj``), a pattern
+            (``walk/%04d.obj``, ``walk/####.obj``, ``walk/$F4.obj``), one file or a list of files.
+        fps: frames per second; overrides the file's. Frame files, and archives without one, have 30 by default. An animated
+            glTF file is sampled at it; by default at the rate of its keys.
+        clip: name of the animation to read, of a file that has several; None: the first.
 
     Raises:
         InputError: the path or what it holds cannot be used. Frame files after the first are read, and may raise it,
             when their positions are.
     """
     if not isinstance(path, str | os.PathLike):
+        _refuse_clip(clip, "a list of files")
         return read_frames([os.fspath(file) for file in path], fps)
     path = os.fspath(path)
-    reader = READERS.get(Path(path).suffix.lower())
-    if reader is not None and not os.path.isdir(path):
+    suffix = Path(path).suffix.lower()
+    if suffix not in HAVE_CLIPS or not os.path.isfile(path):
+        _refuse_clip(clip, path)
+    reader = READERS.get(suffix)
+    # a pattern of frames may end in .glb, too
+    if reader is not None and (os.path.isfile(path) or (suffix not in FRAME_FORMATS and not os.path.isdir(path))):
         if not os.path.isfile(path):
             raise InputError(f"{path}: no such file; check the path")
-        return reader(Path(path), fps)
+        sequence = reader(Path(path), fps, clip)
+        if sequence is not None:
+            return sequence
     return read_frames(path, fps)
+
+
+def _refuse_clip(clip: str | None, name: str) -> None:
+    if clip is not None:
+        raise InputError(f"{name} has no clips; clip={clip!r} is for a single {' or '.join(HAVE_CLIPS)}")
 
 
 def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) -> tuple[str, ...]:
     """Write a mesh sequence; returns what the format cannot hold, a line each.
 
     Args:
-        path: an ``.npz``, a pattern of frame files (``out/%04d.obj``) or a folder (existing, or ending in ``/``).
+        path: an ``.npz``, an animated ``.glb``, a pattern of frame files (``out/%04d.obj``) or a folder (existing, or ending in
+            ``/``).
         start: number of the first frame file.
 
     Raises:
@@ -57,7 +83,10 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
         OutputError: a file cannot be written; nothing half-written is left.
     """
     path = os.fspath(path)
-    writer = WRITERS.get(Path(path).suffix.lower())
-    if writer is not None and not path.endswith(("/", os.sep)):
+    suffix = Path(path).suffix.lower()
+    writer = WRITERS.get(suffix)
+    # .glb may be a frame, too: of a pattern, or of a sequence of one
+    is_frame = suffix in FRAME_FORMATS and (sequence.n_frames == 1 or match_pattern(path) is not None or os.path.isdir(path))
+    if writer is not None and not path.endswith(("/", os.sep)) and not is_frame:
         return writer(sequence, Path(path))
     return write_frames(sequence, path, start)
