@@ -140,7 +140,7 @@ def as_values(given: Any, name: str) -> Array:
     if values.dtype.kind not in "fiu":
         raise InputError(f"{name} has type {values.dtype}; numbers are needed")
     with np.errstate(over="ignore"):
-        return values.astype(np.float32) if values.dtype.kind == "f" else values
+        return values.astype(np.float32, copy=False) if values.dtype.kind == "f" else values
 
 
 def check_word(what: str, word: object, words: tuple[str, ...], name: str) -> None:

@@ -16,14 +16,15 @@ from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames import read_frames
 from gvpipe.io.gltf import read_animated, write_animated
 from gvpipe.io.npz import read_npz, write_npz
+from gvpipe.io.options import ReadOptions
 from gvpipe.io.pattern import match_pattern
 from gvpipe.sequence import MeshSequence
 
 __all__ = ["READERS", "WRITERS", "read", "write"]
 
-# a reader takes a path, fps and the name of a clip; None: the file is a frame
-READERS: dict[str, Callable[[Path, float | None, str | None], MeshSequence | None]] = {
-    ".npz": lambda path, fps, clip: read_npz(path, fps),
+# a reader returns None for a file that is a frame
+READERS: dict[str, Callable[[Path, ReadOptions], MeshSequence | None]] = {
+    ".npz": lambda path, options: read_npz(path, options.fps),
     ".glb": read_animated,
     ".gltf": read_animated,
 }
@@ -59,7 +60,7 @@ def read(
     if reader is not None and (os.path.isfile(path) or (suffix not in FRAME_FORMATS and not os.path.isdir(path))):
         if not os.path.isfile(path):
             raise InputError(f"{path}: no such file; check the path")
-        sequence = reader(Path(path), fps, clip)
+        sequence = reader(Path(path), ReadOptions(fps, clip))
         if sequence is not None:
             return sequence
     return read_frames(path, fps)

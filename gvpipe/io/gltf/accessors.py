@@ -24,7 +24,7 @@ MAX_STRIDE = 252
 
 @dataclass(frozen=True, eq=False)
 class Accessors:
-    """The arrays of a document, each decoded once.
+    """The arrays of a document, each decoded once but for the sparse ones, of which there may be one per frame.
 
     Args:
         document: the file.
@@ -48,6 +48,8 @@ class Accessors:
         accessor, name = self.document.item("accessors", number)
         if text(accessor, "type") not in kinds:
             raise ValueError(f"{where} is of type {text(accessor, 'type')!r} ({name}); {' or '.join(kinds)} is needed")
+        if "sparse" in accessor:
+            return self._decode(accessor, name)
         if number not in self._arrays:
             self._arrays[number] = self._decode(accessor, name)
         return self._arrays[number]
@@ -82,7 +84,6 @@ class Accessors:
             values = np.zeros((count, width), dtype)
         sparse = child(accessor, "sparse", name)
         if sparse:
-            values = values.copy()
             rows, replaced = self._sparse(sparse, width, dtype, count, name)
             values[rows] = replaced
         values.flags.writeable = False

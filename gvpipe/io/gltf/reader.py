@@ -21,6 +21,7 @@ from gvpipe.io.gltf.poses import Poses
 from gvpipe.io.gltf.scene import Scene, read_scene
 from gvpipe.io.gltf.scene_attributes import attribute_names, scene_attributes
 from gvpipe.io.mesh import FrameValues, Mesh
+from gvpipe.io.options import NO_OPTIONS, ReadOptions
 from gvpipe.notes import DEFAULT_FPS
 from gvpipe.origin import choose_origin
 from gvpipe.sequence import MeshSequence
@@ -117,13 +118,12 @@ def frame_count(clip: Clip, fps: float) -> int:
     return rounded_up((clip.stop - clip.start) * fps) + 1
 
 
-def read_animated(path: Path, fps: float | None = None, clip: str | None = None) -> MeshSequence | None:
+def read_animated(path: Path, options: ReadOptions = NO_OPTIONS) -> MeshSequence | None:
     """Read an animated file as a sequence; None if nothing in it is animated and no clip is asked for.
 
     Args:
         path: of the file.
-        fps: frames per second; None: the rate of its densest keys, at least 24.
-        clip: name of the animation; None: the first.
+        options: frames per second, by default the rate of its densest keys, at least 24; the clip, by default the first.
 
     Raises:
         InputError: it cannot be read, or has no such clip.
@@ -131,11 +131,11 @@ def read_animated(path: Path, fps: float | None = None, clip: str | None = None)
     try:
         document = load_document(path)
         names = clip_names(document)
-        if not names and clip is None:
+        if not names and options.clip is None:
             return None
         if not names:
-            raise ValueError(f"it has no animation, so no clip {clip!r}")
-        return _sequence(path, read_scene(document, clip), fps, names)
+            raise ValueError(f"it has no animation, so no clip {options.clip!r}")
+        return _sequence(path, read_scene(document, options.clip), options.fps, names)
     except InputError as exc:
         raise InputError(str(exc) if str(path) in str(exc) else f"{path}: {exc}") from exc
     except Exception as exc:  # damaged files may raise nearly anything inside numpy
