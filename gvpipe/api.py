@@ -146,9 +146,7 @@ class _StageClock:
             self.progress(stage, done)
 
 
-def read(
-    path: Source, fps: float | None = None, clip: str | None = None, mesh: StrPath | None = None
-) -> MeshSequence:
+def read(path: Source, fps: float | None = None, clip: str | None = None, mesh: StrPath | None = None) -> MeshSequence:
     """Read a mesh sequence, or a geometry video as one.
 
     Args:
