@@ -106,12 +106,16 @@ def seams_that_differ(source: gvpipe.MeshSequence, decoded: gvpipe.MeshSequence)
             continue
         a = (np.arange(len(ours)) if ours.indices is None else ours.indices)[corners]
         b = np.arange(len(theirs)) if theirs.indices is None else theirs.indices
-        a, b = (
-            np.unique(np.stack([decoded.faces.reshape(-1), each], axis=1), axis=0, return_inverse=True)[1] for each in (a, b)
-        )
-        if len(np.unique(np.stack([a.reshape(-1), b.reshape(-1)], axis=1), axis=0)) != max(a.max(), b.max(), -1) + 1:
+        a, b = (values_by_vertex(decoded.faces, each) for each in (a, b))
+        if len(np.unique(np.stack([a, b], axis=1), axis=0)) != max(a.max(initial=-1), b.max(initial=-1)) + 1:
             wrong.append(f"seams of {name}")
     return wrong
+
+
+def values_by_vertex(faces: Any, indices: Any) -> Any:
+    """Numbers ``(3T,)``, equal where two corners of one vertex share a value."""
+    pairs = np.stack([faces.reshape(-1), indices], axis=1)
+    return np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1)
 
 
 def polygons_of(sequence: gvpipe.MeshSequence) -> list[tuple[int, ...]]:
