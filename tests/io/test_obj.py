@@ -18,8 +18,8 @@ from gvpipe.asset.field import Field
 from gvpipe.asset.material import Material, Texture
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
+from gvpipe.attributes.surface_normals import surface_normals
 from gvpipe.errors import InputError
-from gvpipe.io.own_normals import own_normals
 from gvpipe.sequence import MeshSequence
 
 
@@ -246,16 +246,14 @@ def test_pictures_that_cannot_be_used(tmp_path: Path, name: str, message: str) -
 
 def test_normals_of_a_series(tmp_path: Path) -> None:
     moving = grid(6)
-    smooth = own_normals(moving[0], moving.faces, moving.faces.reshape(-1).astype(np.int64), "angle")
+    smooth = surface_normals(moving[0:1], moving.faces, moving.faces.reshape(-1), "angle")[0]
     own = MeshSequence(moving[0:6], moving.faces, attributes={"normal": np.concatenate([smooth, np.zeros((1, 3), "f4")])})
     assert io.write(own, tmp_path / "own" / "%d.obj") == ()
     read = io.read(tmp_path / "own")
     assert set(read.attributes) == {"normal"} and read.fields == {} and read.notes[1:] == ()
     last = io.read(tmp_path / "own" / "5.obj")
-    entries = moving.faces.reshape(-1).astype(np.int64)
-    np.testing.assert_allclose(
-        last.attributes["normal"][:36], own_normals(moving[5], moving.faces, entries, "angle"), atol=1e-6
-    )
+    expected = surface_normals(moving[5:6], moving.faces, moving.faces.reshape(-1), "angle")[0]
+    np.testing.assert_allclose(last.attributes["normal"][:36], expected, atol=1e-6)
 
     turning = np.random.default_rng(4).normal(size=(6, 37, 3)).astype(np.float32)
     turning[:, 36] = 0  # no corner shows it
