@@ -1,0 +1,192 @@
+/** Numbers predicted along the surface: texture coordinates, colours, scalars, vectors. Mirrors `gvpipe.attributes.linear_kernels`. */
+
+import { History } from "./history.js";
+
+export const [LAST, MEAN, PARALLELOGRAM, CONFORMAL] = [0, 1, 2, 3]; // methods
+const MAX_CODE = 2 ** 38;
+
+/** Codes of float32: their bits, ordered as the values are. */
+const word = new Float32Array(1);
+const bits = new Int32Array(word.buffer);
+
+/** The float32 of an ordered code; NaN and infinities where the bits are theirs. */
+export function floatOf(code) {
+  bits[0] = code >= 0 ? code : -(code + 1) - 2 ** 31;
+  return word[0];
+}
+
+function orderedCode(value) {
+  word[0] = value;
+  return bits[0] >= 0 ? bits[0] : -(bits[0] + 2 ** 31) - 1;
+}
+
+export class LinearDecoder {
+  /**
+   * @param {import("../format/serial_decoder.js").SerialDecoder} coder
+   * @param {object} entries of `prepareEntries`
+   * @param {{method: number, flags: number, shift: number}} how
+   * @param {{isFloat: boolean, components: number}} values
+   * @param {import("./surface.js").Surface} surface
+   */
+  constructor(coder, entries, how, { isFloat, components }, surface) {
+    const n = entries.order.length;
+    this.coder = coder;
+    this.method = how.method;
+    this.isFloat = isFloat;
+    this.components = components;
+    this.faces = surface.faces;
+    this.positions = surface.positions;
+    this.codes = new Float64Array(n * components);
+    this.numbers = isFloat ? new Float64Array(n * components) : this.codes; // what is predicted
+    this.history = new History(coder, entries, how, this.codes, components, components);
+    this.gates = entries.gates;
+    this.guess = new Float64Array(components);
+    this.side = 1; // on which the last texture triangle lay
+    this.shape = [0, 0, 0]; // of `#coordinates`
+  }
+
+  /** @returns {Float64Array} (N, C) codes */
+  decode() {
+    const { history, codes, numbers, components } = this;
+    const { order, starts } = history;
+    for (let i = 0; i < order.length; i++) {
+      const entry = order[i];
+      const match = history.match(i);
+      if (match >= 0) {
+        for (let c = 0; c < components; c++) {
+          codes[entry * components + c] = codes[match * components + c];
+          numbers[entry * components + c] = numbers[match * components + c];
+        }
+      } else {
+        this.#predict(i);
+        this.#decodeResiduals(i, entry);
+      }
+      if (this.method >= CONFORMAL) this.#noteSide(starts[i], starts[i + 1], entry);
+      history.remember(entry, match >= 0);
+    }
+    return codes;
+  }
+
+  #decodeResiduals(i, entry) {
+    const { history, codes, numbers, components, isFloat } = this;
+    let previous = 0;
+    for (let c = 0; c < components; c++) {
+      const residual = this.coder.value(history.context(i, c, previous));
+      const code = this.#round(this.guess[c]) + residual;
+      const isCode = isFloat ? code >= -(2 ** 31) && code < 2 ** 31 : Math.abs(code) < MAX_CODE;
+      if (!isCode) throw this.coder.corrupt("a value is out of range");
+      codes[entry * components + c] = code;
+      if (isFloat) {
+        const value = floatOf(code);
+        numbers[entry * components + c] = Math.abs(value) < Infinity ? value : 0;
+      }
+      previous = Math.abs(residual);
+      history.magnitudes[entry * components + c] = previous;
+    }
+  }
+
+  /** The code nearest to a predicted value; 0 for one that is none. */
+  #round(guess) {
+    if (this.isFloat) return orderedCode(guess);
+    return Math.abs(guess) < MAX_CODE ? Math.floor(guess + 0.5) : 0;
+  }
+
+  /** Fill `guess` for entry i of the order. */
+  #predict(i) {
+    const { guess, numbers, components, gates, method, history } = this;
+    const { order, starts } = history;
+    const [begin, end] = [starts[i], starts[i + 1]];
+    if (begin === end || method === LAST) {
+      const from = begin === end ? (i > 0 ? order[i - 1] : -1) : gates[4 * begin];
+      for (let c = 0; c < components; c++) guess[c] = from >= 0 ? numbers[from * components + c] : 0;
+      return;
+    }
+    const isComplete = gates[4 * begin + 1] >= 0;
+    if (isComplete && method >= CONFORMAL && this.#predictByShape(begin, end)) return;
+    guess.fill(0);
+    let n = isComplete && method >= PARALLELOGRAM ? this.#addParallelograms(begin, end) : 0;
+    if (n === 0) {
+      for (let g = begin; g < end; g++) {
+        for (let k = 0; k < (isComplete ? 2 : 1); k++) {
+          n++;
+          for (let c = 0; c < components; c++) guess[c] += numbers[gates[4 * g + k] * components + c];
+        }
+      }
+    }
+    for (let c = 0; c < components; c++) guess[c] /= n;
+  }
+
+  #addParallelograms(begin, end) {
+    const { guess, numbers, components, gates } = this;
+    let n = 0;
+    for (let g = begin; g < end; g++) {
+      const [a, b, o] = [gates[4 * g] * components, gates[4 * g + 1] * components, gates[4 * g + 2] * components];
+      if (o < 0) continue;
+      n++;
+      for (let c = 0; c < components; c++) guess[c] += numbers[a + c] + numbers[b + c] - numbers[o + c];
+    }
+    return n;
+  }
+
+  /** Fill `guess` with the average over the gates whose triangles have an edge of some length; false without one. */
+  #predictByShape(begin, end) {
+    const { guess, numbers, gates, faces, shape } = this;
+    let n = 0;
+    guess[0] = guess[1] = 0;
+    for (let g = begin; g < end; g++) {
+      const [a, b, o, corner] = [2 * gates[4 * g], 2 * gates[4 * g + 1], 2 * gates[4 * g + 2], gates[4 * g + 3]];
+      const first = corner - (corner % 3);
+      this.#measure(faces[corner], faces[first + ((corner + 1) % 3)], faces[first + ((corner + 2) % 3)]);
+      const [along, above, squared] = shape;
+      if (!(squared > 0)) continue;
+      const du = numbers[b] - numbers[a];
+      const dv = numbers[b + 1] - numbers[a + 1];
+      let turn = this.side;
+      if (o >= 0) {
+        const cross = du * (numbers[o + 1] - numbers[a + 1]) - dv * (numbers[o] - numbers[a]);
+        if (cross !== 0) turn = cross > 0 ? -1 : 1;
+      }
+      guess[0] += numbers[a] + along * du - turn * above * dv;
+      guess[1] += numbers[a + 1] + along * dv + turn * above * du;
+      n++;
+    }
+    if (n) {
+      guess[0] /= n;
+      guess[1] /= n;
+    }
+    return n > 0;
+  }
+
+  /** Of vertex x over the edge from a to b: place along it, height over it, both in units of its length, whose square is last. */
+  #measure(x, a, b) {
+    const { positions, shape } = this;
+    let [squared, dot, height] = [0, 0, 0];
+    for (let axis = 0; axis < 3; axis++) {
+      const origin = positions[3 * a + axis];
+      const edge = positions[3 * b + axis] - origin;
+      const own = positions[3 * x + axis] - origin;
+      squared += edge * edge;
+      dot += edge * own;
+      height += own * own;
+    }
+    if (!(squared > 0 && height < Infinity)) {
+      shape.fill(0);
+      return;
+    }
+    const along = dot / squared;
+    shape[0] = along;
+    shape[1] = Math.sqrt(Math.max(0, height / squared - along * along));
+    shape[2] = squared;
+  }
+
+  /** Note on which side of an edge a texture triangle lies. */
+  #noteSide(begin, end, entry) {
+    const { numbers, gates } = this;
+    if (begin === end || gates[4 * begin + 1] < 0) return;
+    const [a, b] = [2 * gates[4 * begin], 2 * gates[4 * begin + 1]];
+    const du = numbers[b] - numbers[a];
+    const dv = numbers[b + 1] - numbers[a + 1];
+    const cross = du * (numbers[2 * entry + 1] - numbers[a + 1]) - dv * (numbers[2 * entry] - numbers[a]);
+    if (cross !== 0) this.side = cross > 0 ? 1 : -1;
+  }
+}
