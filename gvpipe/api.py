@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,8 @@ import numpy as np
 
 from gvpipe import notes
 from gvpipe.arguments import StrPath, check_path, show
+from gvpipe.asset_coding.encoder import AssetCoder
+from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.codec import Codec, Encoded, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import bytes_by_part, write_file
@@ -39,7 +41,8 @@ if TYPE_CHECKING:
 
 Source = StrPath | Sequence[StrPath]
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
-KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose")  # of `encode`
+ASSET = ("attributes", "fields", "textures")
+KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", *ASSET)  # of `encode`
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class Report:
     Args:
         bpvf: bits per vertex and frame of the whole file.
         seconds: the whole as ``encode``, then each stage.
-        not_carried: attributes of the sequence that the file does not hold.
+        not_carried: names of attributes and fields of the sequence that the file does not hold.
         sections: as in `Info`.
         tried: where a target was given, or codec ``auto``: every encode that was measured (`gvpipe.rate_control.trials.Trial`).
         reason: why the encode in the file was chosen among those.
@@ -87,6 +90,14 @@ class Info:
         levels: vertex counts of the levels of detail, the mesh itself first.
         settings: the bitstream's header.
         origin: to add to positions, model units.
+        parts: name, ranges of vertices and triangles, name of the material, parent.
+        attributes: name, kind, domain, components, type, unit, bound (degrees for normals) and bytes of each.
+        fields: the same, with range.
+        polygons: how many faces have each number of corners.
+        materials: names.
+        images: name, media type, width, height and bytes.
+        metadata: up axis, unit, start time, source, texts.
+        notes: what a user should know, a line each.
     """
 
     codec: str
@@ -102,6 +113,14 @@ class Info:
     levels: list[int]
     settings: dict[str, Any]
     origin: list[float]
+    parts: list[dict[str, Any]]
+    attributes: list[dict[str, Any]]
+    fields: list[dict[str, Any]]
+    polygons: dict[str, int]
+    materials: list[str]
+    images: list[dict[str, Any]]
+    metadata: dict[str, Any]
+    notes: list[str]
 
     def to_json(self) -> dict[str, Any]:
         """The information as JSON values."""
@@ -151,8 +170,10 @@ def read(path: Source, fps: float | None = None) -> MeshSequence:
     return sequence if fps is None else sequence.with_fps(fps)
 
 
-def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> None:
+def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> list[str]:
     """Write a mesh sequence as ``.npz``, or as frame files named by a pattern (``out/%04d.obj``), numbered from ``start``.
+
+    Returns notes: what the format cannot hold, a line each.
 
     Raises:
         InputError: the path names no format that can be written.
@@ -162,7 +183,7 @@ def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> None:
     if not isinstance(sequence, MeshSequence):
         raise TypeError(f"gvpipe.write's sequence is {show(sequence)}; a MeshSequence is needed")
     check_path(path, "gvpipe.write's path")
-    write_sequence(sequence, path, start)
+    return list(write_sequence(sequence, path, start))
 
 
 def encode(
@@ -177,6 +198,9 @@ def encode(
     target_bpvf: float | None = None,
     max_error: float | str | None = None,
     purpose: str | None = None,
+    attributes: Mapping[str, float | str] | None = None,
+    fields: Mapping[str, float | str] | None = None,
+    textures: int | str | None = None,
     **settings: Any,
 ) -> Report:
     """Encode a sequence into a geometry video.
@@ -197,6 +221,11 @@ def encode(
         max_error: a bound that every vertex of every frame keeps: model units, or a part of the diagonal such as ``"0.05%"``.
         purpose: what the file is for: ``"web"`` (browsers play it as it is), ``"stream"`` (starts at once, jumps fast, in
             bounded memory) or ``"archive"`` (the smallest); see `gvpipe.rate_control.purposes`.
+        attributes: by name, the largest error of a static attribute: a number (degrees for normals), a part of its range
+            such as ``"0.1%"``, ``"exact"``, or ``"none"`` to leave it out. Defaults: `gvpipe.asset_coding.bounds`.
+        fields: the same for animated fields; ``"0.1%,nan=keep"`` keeps NaN as holes.
+        textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
+            both: ``"1024,webp"``. None: bytes as they came.
 
     Raises:
         InputError: the source, a setting or the path cannot be used, or no quality meets the target.
@@ -211,7 +240,8 @@ def encode(
     clock = _StageClock(progress)
     sequence = _open_source(source, path, fps)
     target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
-    coded = _code(sequence, given, target, clock)
+    asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
+    coded = _code(sequence, given, target, asset, clock)
     size, bitstream = _write(sequence, coded, path, clock)
     clock("", 1.0)
     return Report(
@@ -224,11 +254,11 @@ def encode(
         bytes=size,
         bpvf=8 * size / (bitstream.n_vertices * bitstream.n_frames),
         seconds={"encode": time.perf_counter() - clock.started, **clock.seconds},
-        not_carried=sorted(sequence.attributes),
+        not_carried=sorted(asset.plan.left_out),
         sections=bytes_by_part(bitstream, size),
         tried=[trial.to_json() for trial in coded.tried],
         reason=coded.reason,
-        notes=_notes(sequence, target),
+        notes=_notes(sequence, target, asset.plan.left_out),
     )
 
 
@@ -243,7 +273,11 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0)
     start, stop = frame_range(player, start, stop)
     # positions before faces: the video decodes on other threads while the mesh does on this one
     positions = np.asarray(player.level(lod).positions[start:stop]) if lod else player[start:stop]
-    return MeshSequence(positions, player.level(lod).faces, player.fps, name=player.path, origin=player.origin)
+    if lod:
+        return MeshSequence(positions, player.level(lod).faces, player.fps, name=player.path, origin=player.origin)
+    whole = player.sequence()
+    fields = {name: each.part(start, stop) for name, each in whole.fields.items()}
+    return dataclasses.replace(whole, positions=positions, fields=fields)
 
 
 def open(path: StrPath) -> Player:
@@ -337,6 +371,7 @@ def info(path: StrPath) -> Info:
         levels=player.levels,
         settings=dict(bitstream.header),
         origin=list(bitstream.origin),
+        **player.list_asset(),
     )
 
 
@@ -404,14 +439,18 @@ class _Coded:
     reason: str = ""
 
 
-def _code(sequence: MeshSequence, given: Codec | Sequence[Codec], target: Target | None, progress: Progress) -> _Coded:
+def _code(
+    sequence: MeshSequence, given: Codec | Sequence[Codec], target: Target | None, asset: AssetCoder, progress: Progress
+) -> _Coded:
     """Encode, at the quality that meets the target, with the codec that does so in the smallest file."""
     if isinstance(given, Codec):
         if target is None:
-            return _Coded(given, encode_sequence(given, sequence, progress))
-        choice = meet(target, given, sequence, progress)
+            encoded = encode_sequence(given, sequence, progress)
+            progress("asset", 0.0)
+            return _Coded(given, dataclasses.replace(encoded, bitstream=asset.add(encoded, given)))
+        choice = meet(target, given, sequence, progress, asset=asset)
     else:
-        choice = choose_codec(given, sequence, target or default_target(given), progress)
+        choice = choose_codec(given, sequence, target or default_target(given), progress, asset)
     trial = choice.trial
     check = partial(choice.trials.check, trial.encoded.permutation)
     return _Coded(trial.codec, trial.encoded, check, choice.tried, choice.reason)
@@ -428,12 +467,12 @@ def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progr
     return write_file(bitstream, path, coded.check), bitstream
 
 
-def _notes(sequence: MeshSequence, target: Target | None) -> list[str]:
+def _notes(sequence: MeshSequence, target: Target | None, left_out: Sequence[str]) -> list[str]:
     """What a user should know, a line each."""
     diagonal = frame_diagonal(sequence)
     loose = notes.loose_bound(target.value, diagonal) if target and target.measure == "max" else ()
-    left_out = notes.not_carried(sorted(sequence.attributes))
-    return [*sequence.notes, *loose, *notes.rounded(sequence.rounding, diagonal), *left_out]
+    rounded = notes.rounded(sequence.rounding, diagonal)
+    return [*sequence.notes, *loose, *rounded, *notes.not_carried(sorted(left_out))]
 
 
 def _is_among(path: StrPath, source: MeshSequence | Source) -> bool:

@@ -19,6 +19,9 @@ or value, the limit and what to do about it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 REMEDY = "get the file again from its source"
 
 
@@ -75,3 +78,14 @@ def corrupt(what: str) -> CorruptFile:
 def corrupt_section(name: str, what: str) -> CorruptFile:
     """Return the error for a section of which ``what`` says what does not hold; name and remedy are added."""
     return corrupt(f"section {name!r} is corrupt: {what}")
+
+
+@contextmanager
+def in_file(path: str) -> Iterator[None]:
+    """Put the file's name before the message of any `FormatError` that is raised inside; nothing for an empty name."""
+    try:
+        yield
+    except FormatError as exc:
+        if not path:
+            raise
+        raise type(exc)(f"{path}: {exc}") from exc

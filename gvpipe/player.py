@@ -6,18 +6,25 @@ import contextlib
 import operator
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from types import TracebackType
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
 from gvpipe.arguments import check_path
 from gvpipe.arrays import Float32, Float64, Int32
+from gvpipe.asset.attribute import Attribute
+from gvpipe.asset.field import Field
+from gvpipe.asset.material import Image, Material
+from gvpipe.asset.metadata import Metadata
+from gvpipe.asset.part import Part
+from gvpipe.asset_coding.listing import list_asset
+from gvpipe.asset_coding.reader import AssetReader
 from gvpipe.codec import GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file
-from gvpipe.errors import FormatError, InputError
+from gvpipe.errors import InputError, in_file
 from gvpipe.frame_cache import FrameCache
 from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence, describe, numbers_of
@@ -40,10 +47,9 @@ class Player:
         check_path(path, "the geometry video")
         self.path = os.fspath(path)
         self.bitstream: Bitstream = read_file(path)
-        try:
+        with in_file(self.path):
             self._reader = open_reader(self.bitstream)
-        except FormatError as exc:
-            raise type(exc)(f"{self.path}: {exc}") from exc
+            self._asset = AssetReader(self.bitstream, self._reader, self.path)
         self._lock = threading.Lock()
         group = self._reader.group if isinstance(self._reader, GroupReader) else _alone
         self._cache = FrameCache(self._read, group, len(self), 12 * self.bitstream.n_vertices)
@@ -51,7 +57,56 @@ class Player:
     @property
     def faces(self) -> Int32:
         """``(T, 3) int32`` triangles."""
-        return self._reader.faces
+        with in_file(self.path):
+            return self._asset.faces
+
+    @property
+    def attributes(self) -> Mapping[str, Attribute]:
+        """Static numbers by name, decoded when they are asked for."""
+        return self._asset.attributes
+
+    @property
+    def fields(self) -> Mapping[str, Field]:
+        """Animated numbers by name: ``video.fields["stress"][10:20]`` decodes no more than it must, and no positions."""
+        return self._asset.fields
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The named meshes that it consists of."""
+        with in_file(self.path):
+            return self._asset.parts
+
+    @property
+    def polygons(self) -> Int32 | None:
+        """``(P,)`` corners of each polygon, whose fans are the triangles, in order; None: all are triangles."""
+        with in_file(self.path):
+            return self._asset.polygons
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """What the parts look like."""
+        return self._asset.materials
+
+    @property
+    def images(self) -> tuple[Image, ...]:
+        """What the materials' textures show."""
+        with in_file(self.path):
+            return self._asset.images
+
+    @property
+    def metadata(self) -> Metadata:
+        """What the scene says of itself."""
+        return self._asset.metadata
+
+    def list_asset(self) -> dict[str, Any]:
+        """What it holds beside positions, as JSON values (`gvpipe.Info`)."""
+        with in_file(self.path):
+            return list_asset(self._asset, self.bitstream)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know of the file, a line each."""
+        return self._asset.notes
 
     @property
     def fps(self) -> float:
@@ -86,8 +141,22 @@ class Player:
         return (self.bitstream.n_frames, self.bitstream.n_vertices, 3)
 
     def sequence(self) -> MeshSequence:
-        """The video as a sequence whose frames are decoded when they are read."""
-        return MeshSequence(self, self.faces, self.fps, name=self.path, origin=self.origin)
+        """The video as a sequence whose frames, and frames of fields, are decoded when they are read."""
+        return MeshSequence(
+            self,
+            self.faces,
+            self.fps,
+            self.attributes,
+            self.path,
+            self.origin,
+            self.notes,
+            self.fields,
+            self.parts,
+            self.polygons,
+            self.materials,
+            self.images,
+            self.metadata,
+        )
 
     def __len__(self) -> int:
         return self.bitstream.n_frames
@@ -139,13 +208,10 @@ class Player:
         self._cache.close()
 
     def _read(self, start: int, stop: int, lod: int = 0) -> Float32:
-        with self._lock:
-            try:
-                if lod and isinstance(self._reader, LevelReader):
-                    return self._reader.read(start, stop, lod=lod)
-                return self._reader.read(start, stop)
-            except FormatError as exc:
-                raise type(exc)(f"{self.path}: {exc}") from exc
+        with self._lock, in_file(self.path):
+            if lod and isinstance(self._reader, LevelReader):
+                return self._reader.read(start, stop, lod=lod)
+            return self._reader.read(start, stop)
 
 
 def _alone(frame: int) -> tuple[int, int]:

@@ -11,10 +11,10 @@ rates of another codec). What is null was not recorded.
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import re
-import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -154,14 +154,19 @@ def fill(page: str) -> str:
     return MARKED.sub(lambda found: "\n".join((found[1].rstrip(), *TABLES[found[2]](), found[3])), page)
 
 
-def main(arguments: list[str]) -> None:
+def main() -> None:
     """Write the tables, or print the points of a file."""
-    if arguments[:1] == ["points"]:
-        print(tables(BenchReport.read(arguments[1]).curves))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    points = commands.add_parser("points", help="print every point of a file of results")
+    points.add_argument("file", metavar="FILE.json")
+    options = parser.parse_args()
+    if options.command == "points":
+        print(tables(BenchReport.read(options.file).curves))
         return
     for page in PAGES:
         page.write_text(fill(page.read_text("utf-8")), "utf-8")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

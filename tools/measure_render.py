@@ -1,8 +1,8 @@
-"""Frames a second that the painter makes: python tools/measure_render.py FILE [SIZE]."""
+"""How many frames the rasterizer draws per second: ``python tools/measure_render.py FILE [SIZE]``."""
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 
 import gvpipe
@@ -11,7 +11,17 @@ from gvpipe.rasterizer.camera import framing
 ROUNDS = 5  # the best of which counts: other work only ever slows one down
 
 
-def main(path: str, size: int = 512) -> None:
+def main() -> None:
+    """Measure, and print a line per number of samples."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", metavar="FILE", help="a sequence or a geometry video")
+    parser.add_argument("size", metavar="SIZE", nargs="?", type=int, default=512, help="pixels [default: 512]")
+    options = parser.parse_args()
+    measure(options.file, options.size)
+
+
+def measure(path: str, size: int) -> None:
+    """Draw the first frames of a sequence with 1, 4 and 9 samples per pixel, pictures of ``size`` pixels a side."""
     sequence = gvpipe.read(path)
     frames = sequence.read(0, min(len(sequence), 50))
     camera = framing(sequence)
@@ -32,4 +42,4 @@ def main(path: str, size: int = 512) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], *map(int, sys.argv[2:3]))
+    main()

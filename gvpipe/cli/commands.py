@@ -2,7 +2,7 @@
 
 What is printed, and how much of it, is `gvpipe.cli.console`'s; ``-`` in place of a file's name is `gvpipe.cli.pipes`'.
 
-Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage.
+Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -91,6 +91,21 @@ def cli() -> None:
 @click.option("--segment", type=int, help="Most frames per segment. [default: 500]")
 @click.option("--fps", type=float, help="Frames per second, instead of the input's.")
 @click.option("--reorder", is_flag=True, help="Let the codec choose the vertex order: smaller.")
+@click.option(
+    "--attribute",
+    "attributes",
+    multiple=True,
+    metavar="NAME=BOUND",
+    help="Largest error of an attribute: a number (degrees for normals), 0.1% of its range, exact or none; repeat for more.",
+)
+@click.option(
+    "--field",
+    "fields",
+    multiple=True,
+    metavar="NAME=BOUND",
+    help="The same for an animated field; 0.1%,nan=keep keeps NaN as holes.",
+)
+@click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp.")
 @output_options
 def encode(
     sources: tuple[str, ...],
@@ -106,6 +121,9 @@ def encode(
     segment: int | None,
     fps: float | None,
     reorder: bool,
+    attributes: tuple[str, ...],
+    fields: tuple[str, ...],
+    textures: str | None,
     out: Output,
 ) -> None:
     """Encode a mesh sequence as a geometry video.
@@ -115,7 +133,7 @@ def encode(
     an .npz or a geometry video on standard input. OUTPUT - is standard output.
     """
     from gvpipe import api
-    from gvpipe.rate_control.purposes import candidates
+    from gvpipe.rate_control.purposes import candidates, name_with
     from gvpipe.registry import codec_class
 
     if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
@@ -139,7 +157,8 @@ def encode(
     )
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
-        report = api.encode(source, path, chosen, progress, fps, **targets)  # type: ignore[arg-type]  # by name
+        beside = {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
+        report = api.encode(source, path, chosen, progress, fps, **targets, **beside, textures=textures)  # type: ignore[arg-type]  # by name
     out = out.carrying(target)
     for note in report.notes:
         out.note(note)
@@ -154,7 +173,8 @@ def encode(
     for tried in report.tried:
         keys = [key for key in ("bpvf", "rmse_diag", "kg", "max_diag") if tried[key] is not None]
         measures = ", ".join(f"{key} {tried[key]:.4g}" for key in keys)
-        out.text(f"  {tried['codec']} at quality {tried['quality']:.4g}: {tried['bytes']} bytes, {measures}")
+        codec_name = name_with(tried["codec"], tried["settings"])
+        out.text(f"  {codec_name} at quality {tried['quality']:.4g}: {tried['bytes']} bytes, {measures}")
     if report.reason:
         out.text(report.reason)
     _print_sections(out, report.sections, report.vertices * report.frames)
@@ -175,17 +195,15 @@ def decode(source: str, target: str, start: int, stop: int | None, lod: int, loc
     standard output. FILE - is a geometry video on standard input.
     """
     from gvpipe import api, notes
-    from gvpipe.sequence import MeshSequence
 
     out = out.carrying(target)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         player = api.open(given)
         start, stop = api.frame_range(player, start, stop)
         level = player.level(lod)
-        part = _Part(level, start, stop, progress)
-        sequence = MeshSequence(part, level.faces, player.fps, name=given, origin=player.origin)
-        api.write(sequence.local() if local else sequence, path, start)
-    noticed = [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
+        sequence = replace(level.part(start, stop), positions=_Part(level, start, stop, progress))
+        noticed = api.write(sequence.local() if local else sequence, path, start)
+    noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": player.fps}
@@ -201,6 +219,7 @@ def decode(source: str, target: str, start: int, stop: int | None, lod: int, loc
 def info(source: str, out: Output) -> None:
     """Tell what a geometry video (- for standard input) holds and where its bytes go."""
     from gvpipe import api, notes
+    from gvpipe.cli.asset_lines import asset_lines
 
     with source_path(source) as path, out.progress():
         found = api.info(path)
@@ -212,6 +231,10 @@ def info(source: str, out: Output) -> None:
     out.text("frame 0 lies in " + " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True)) + place)
     if len(found.levels) > 1:
         out.text("levels of detail, vertices: " + ", ".join(f"{lod}: {count}" for lod, count in enumerate(found.levels)))
+    for line in asset_lines(found):
+        out.text(line)
+    for note in found.notes:
+        out.note(note)
     out.text(f"{_size(found.bytes)}, {found.bpvf:.3f} bits per vertex and frame:")
     _print_sections(out, found.sections, found.vertices * found.frames)
 
@@ -234,8 +257,13 @@ def compare(reference: str, distorted: str, out: Output) -> None:
     values = result.to_json()
     out.json(values)
     for name, value in values.items():
-        if name != "frames":
+        if name not in ("frames", "attributes", "fields"):
             out.text(f"{name:<14} {'not defined' if value is None else format(value, '.6g')}")
+    for kind, errors in (("attribute", result.attributes), ("field", result.fields)):
+        for name, error in errors.items():
+            largest, mean = error["max"], error["mean"]
+            measured = "one side lacks it" if largest is None else f"largest error {largest:.4g}, mean {mean:.4g}"
+            out.text(f"{kind} {name}: {measured}")
 
 
 @cli.command("export-html")
@@ -265,18 +293,23 @@ def export_html(source: str, target: str, up: str, quality: float | None, out: O
 @click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="The axis that stands upright.")
 @output_options
 def play(source: str, up: str, out: Output) -> None:
-    """Play a geometry video in your browser; print the path of the page where there is none."""
-    import tempfile
+    """Play a geometry video in your browser.
+
+    Where no browser can be opened, the page's path is printed. The page is one file and needs no network.
+    """
     from pathlib import Path
 
     from gvpipe import web
+    from gvpipe.atomic import lasting_folder
     from gvpipe.web.browser import open_page
 
     with source_path(source) as path, out.progress() as progress:
-        page = Path(tempfile.mkdtemp(prefix="gvpipe-")) / f"{Path(path).stem}.html"  # stays: the browser reads it later
+        page = Path(lasting_folder()) / f"{Path(path).stem}.html"  # stays: the browser reads it later
         report = web.export_html(path, page, up, None, progress)
     _tell_conversion(out, report)
     is_open = open_page(page)
+    if not is_open:
+        out.note("no browser can be opened here; open the page that is printed in one, here or on another computer")
     out.json({"page": str(page), "opened": is_open, **report.to_json()})
     out.text(f"{shown(source, STDIN)} plays in your browser" if is_open else page)
 
@@ -301,6 +334,8 @@ def render(source: str, target: str, size: str, out: Output, **options: Any) -> 
     from gvpipe import api
     from gvpipe.rendering.films import parse_size
 
+    if options["error_max"] is not None and not options["error_of"]:
+        raise click.UsageError("--error-max ends the colours of errors; give --error-of too", click.get_current_context())
     pixels = parse_size(size)
     with source_path(source) as path, out.progress() as progress:
         api.render(path, target, size=pixels, progress=progress, **options)
@@ -432,6 +467,16 @@ def _parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:
             raise click.UsageError(f"--set {pair}: KEY=VALUE is needed, such as --set clusters=30")
         settings[key.strip()] = value.strip()
     return settings
+
+
+def _parse_bounds(option: str, texts: tuple[str, ...]) -> dict[str, str]:
+    bounds = {}
+    for text in texts:
+        name, equals, bound = text.partition("=")
+        if not (name and equals and bound):
+            raise click.UsageError(f"{option} {text}: NAME=BOUND is needed, such as {option} {name or 'uv'}=0.1%")
+        bounds[name] = bound
+    return bounds
 
 
 def _tell_conversion(out: Output, report: ExportReport) -> None:

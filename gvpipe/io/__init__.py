@@ -19,7 +19,7 @@ from gvpipe.sequence import MeshSequence
 __all__ = ["READERS", "WRITERS", "read", "write"]
 
 READERS: dict[str, Callable[[Path, float | None], MeshSequence]] = {".npz": read_npz}
-WRITERS: dict[str, Callable[[MeshSequence, Path], None]] = {".npz": write_npz}
+WRITERS: dict[str, Callable[[MeshSequence, Path], tuple[str, ...]]] = {".npz": write_npz}
 
 
 def read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], fps: float | None = None) -> MeshSequence:
@@ -45,8 +45,8 @@ def read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], fps: f
     return read_frames(path, fps)
 
 
-def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) -> None:
-    """Write a mesh sequence.
+def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) -> tuple[str, ...]:
+    """Write a mesh sequence; returns what the format cannot hold, a line each.
 
     Args:
         path: an ``.npz``, a pattern of frame files (``out/%04d.obj``) or a folder (existing, or ending in ``/``).

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from gvpipe.arrays import Float64, Int32
 from gvpipe.io.gltf import GltfLoader, encode_glb
-from gvpipe.io.mesh import Attributes, Encoder, Loader
+from gvpipe.io.mesh import EncoderMaker, Loader
 from gvpipe.io.obj import ObjLoader, encode_obj
 from gvpipe.io.off import OffLoader, encode_off
 from gvpipe.io.ply import encode_ply, load_ply
@@ -20,12 +19,11 @@ class FrameFormat:
 
     Args:
         loader: makes a loader for one sequence.
-        encoder: makes a writer for one sequence from faces, attributes, the number of vertices and the origin. The writer
-            adds the origin to positions; `InputError` if the format cannot hold the sums. None: read only.
+        encoder: makes an encoder of frames (`gvpipe.io.mesh.FrameEncoder`) for one sequence. None: read only.
     """
 
     loader: Callable[[], Loader]
-    encoder: Callable[[Int32, Attributes, int, Float64], Encoder] | None = None
+    encoder: EncoderMaker | None = None
 
 
 FRAME_FORMATS = {

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,10 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe import notes
-from gvpipe.arrays import Float32, Float64, Int32
+from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.errors import InputError
-from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, concatenate
+from gvpipe.io.concatenate import concatenate
+from gvpipe.io.mesh import FrameEncoder, Mesh, as_color, as_faces
+from gvpipe.sequence import MeshSequence
 
+Attributes = Mapping[str, NDArray[np.generic]]
 MAGIC = b"glTF"
 TRIANGLES = 4  # glTF's mode of primitives; above it strips and fans, below it points and lines
 GLB_HEAD = struct.Struct("<4sIIII")  # magic, version, bytes of the file, bytes and type of the first chunk
@@ -132,8 +136,8 @@ def _attributes(geometry: Any, transform: Float64, with_normals: bool) -> Attrib
     return {name: values for name, values in attributes.items() if len(values) == len(geometry.vertices)}
 
 
-def encode_glb(faces: Int32, attributes: Attributes, n_vertices: int, origin: Float64) -> Encoder:
-    """A writer of frames with these faces, texture coordinates and colours where there is one per vertex.
+def encode_glb(sequence: MeshSequence, shared: str) -> FrameEncoder:
+    """An encoder of frames with texture coordinates and colours where there is one per vertex.
 
     glTF has no corner attributes: they would need vertices split along seams, and vertex order goes first. Its positions are
     float32, so an origin becomes the node's translation.
@@ -143,14 +147,15 @@ def encode_glb(faces: Int32, attributes: Attributes, n_vertices: int, origin: Fl
 
     make_visual: Any = TextureVisuals
     uv, color = (
-        values if values is not None and len(values) == n_vertices else None
-        for values in (attributes.get("uv"), attributes.get("color"))
+        np.asarray(each) if each is not None and each.domain == "vertex" else None
+        for each in (sequence.attributes.get("uv"), sequence.attributes.get("color"))
     )
+    faces, origin = sequence.faces, sequence.origin
 
     place = np.eye(4)
     place[:3, 3] = origin
 
-    def encode(positions: Float32) -> bytes:
+    def encode(positions: Float32, fields: Mapping[str, Array]) -> bytes:
         mesh: Any = Trimesh(positions, faces, process=False, validate=False)
         if uv is not None:
             mesh.visual = make_visual(uv=uv)
@@ -165,4 +170,4 @@ def encode_glb(faces: Int32, attributes: Attributes, n_vertices: int, origin: Fl
         exported: bytes = scene.export(file_type="glb")
         return exported
 
-    return encode
+    return FrameEncoder(encode)

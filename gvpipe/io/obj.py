@@ -12,15 +12,15 @@ Understood: ``v`` (with w, with vertex colours), ``vt``, ``vn``, ``f`` (polygons
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gvpipe import notes
-from gvpipe.arrays import Bool, Float32, Float64, Floats, Int32, Int64, UInt8
-from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, fan, per_vertex
+from gvpipe.arrays import Array, Bool, Float32, Float64, Floats, Int32, Int64, UInt8
+from gvpipe.io.mesh import FrameEncoder, Mesh, as_color, as_faces, as_polygons, fan, indexed
 from gvpipe.io.text import (
     clean_lines,
     count_tokens,
@@ -31,6 +31,7 @@ from gvpipe.io.text import (
     parse_integers,
     token_starts,
 )
+from gvpipe.sequence import MeshSequence
 
 
 class ObjLoader:
@@ -62,7 +63,7 @@ class ObjLoader:
         self._faces = faces
         # relative indices depend on where the face lines stand, so equal lines need not mean equal faces
         self._face_lines = b"" if b"-" in face_lines.tobytes() else face_lines.tobytes()
-        return Mesh(positions, faces, _attributes(lines, parsed, faces, values, counts), notes.cut(parsed.counts))
+        return Mesh(positions, faces, _attributes(lines, parsed, faces, values, counts), polygons=as_polygons(parsed.counts))
 
 
 @dataclass(frozen=True)
@@ -165,9 +166,9 @@ def _resolve(raw: Int64, parsed: _Faces, seen: Int64) -> Int64:
     return (raw - 1)[parsed.triangles]
 
 
-def _attributes(lines: _Lines, parsed: _Faces, faces: Int32, values: Float64, counts: Int64) -> dict[str, NDArray[np.generic]]:
+def _attributes(lines: _Lines, parsed: _Faces, faces: Int32, values: Float64, counts: Int64) -> dict[str, Any]:
     """Texture coordinates, normals (zeros for corners that have none) and the colours of the ``v`` lines given."""
-    attributes: dict[str, NDArray[np.generic]] = {}
+    attributes: dict[str, Any] = {}
     for name, keyword, width, raw in (("uv", b"vt", 2, parsed.vt), ("normal", b"vn", 3, parsed.vn)):
         if not raw.any():
             continue
@@ -175,9 +176,7 @@ def _attributes(lines: _Lines, parsed: _Faces, faces: Int32, values: Float64, co
         index = _resolve(raw, parsed, lines.counts_before(b"f", keyword)).reshape(-1)
         if (index < -1).any() or (index >= len(table)).any():
             raise ValueError(f"a face refers to a {keyword.decode()!r} entry outside 1..{len(table)}")
-        found = per_vertex(np.vstack([table, np.zeros((1, width), np.float32)])[index], faces, len(counts))
-        if found is not None:
-            attributes[name] = found
+        attributes[name] = indexed(table, index, faces, len(counts), name)
     if (counts == counts[0]).all() and counts[0] in (6, 7):  # x y z [w] r g b
         attributes["color"] = as_color(values.reshape(len(counts), -1)[:, -3:])
     return attributes
@@ -187,11 +186,13 @@ def _fits(faces: Int32, positions: Floats) -> bool:
     return int(faces.max()) < len(positions)
 
 
-def encode_obj(faces: Int32, attributes: Attributes, n_vertices: int, origin: Float64) -> Encoder:
-    """A writer of frames with these faces; texture coordinates and vertex colours go into each.
+def encode_obj(sequence: MeshSequence, shared: str) -> FrameEncoder:
+    """An encoder of frames; texture coordinates and vertex colours go into each.
 
     Normals do not: those of the first frame would be wrong in all others, and readers compute them.
     """
+    faces, origin, n_vertices = sequence.faces, sequence.origin, sequence.n_vertices
+    attributes = {name: np.asarray(each) for name, each in sequence.attributes.items()}
     uv, color = attributes.get("uv"), attributes.get("color")
     v = faces.astype(np.int64) + 1
     if uv is None:
@@ -201,7 +202,7 @@ def encode_obj(faces: Int32, attributes: Attributes, n_vertices: int, origin: Fl
         pairs = np.stack([v, vt], axis=2)  # (T, 3) twice -> (T, 3, 2)
         tail = format_rows("vt %.9g %.9g\n", uv) + format_rows("f %d/%d %d/%d %d/%d\n", pairs)
 
-    def encode(positions: Float32) -> bytes:
+    def encode(positions: Float32, fields: Mapping[str, Array]) -> bytes:
         if color is None or len(color) != n_vertices:  # OBJ has no place for corner colours
             head = format_positions("v {0} {0} {0}\n", positions, origin)
         else:
@@ -209,4 +210,4 @@ def encode_obj(faces: Int32, attributes: Attributes, n_vertices: int, origin: Fl
             head = format_positions("v {0} {0} {0} %.4f %.4f %.4f\n", positions, origin, rgb)
         return (head + tail).encode("ascii")
 
-    return encode
+    return FrameEncoder(encode)

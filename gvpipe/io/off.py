@@ -7,14 +7,15 @@ triangles and drops colours. Vertex colours are kept; other per-vertex values ar
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from gvpipe import notes
-from gvpipe.arrays import Float32, Float64, Int32, Int64
-from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, fan
+from gvpipe.arrays import Array, Float32, Float64, Int32, Int64, UInt8
+from gvpipe.io.mesh import FrameEncoder, Mesh, as_color, as_faces, as_polygons, fan
 from gvpipe.io.text import clean_lines, count_tokens, format_positions, format_rows, line_spans, parse_floats, parse_integers
+from gvpipe.sequence import MeshSequence
 
 HEADER = re.compile(rb"\s*(ST)?(C)?(N)?OFF\b")
 
@@ -56,7 +57,7 @@ class OffLoader:
         if self._faces is None:
             self._faces, self._face_lines = faces, face_lines
         colors = _colors(values, counts, first) if header[2] and not header[1] else {}
-        return Mesh(positions, faces, colors, notes.cut(n_corners))
+        return Mesh(positions, faces, colors, polygons=as_polygons(n_corners))
 
 
 def _parse_rows(text: bytes) -> tuple[Float64, Int64, Int64]:
@@ -80,7 +81,7 @@ def _parse_faces(text: bytes, n_vertices: int) -> tuple[Int32, Int64]:
     return as_faces(values[at].astype(np.int64)[triangles], n_vertices), n_corners
 
 
-def _colors(values: Float64, counts: Int64, first: Int64) -> Attributes:
+def _colors(values: Float64, counts: Int64, first: Int64) -> dict[str, UInt8]:
     """The last four columns, or three where rows are too short for four."""
     if (counts != counts[0]).any() or counts[0] < 6:
         return {}
@@ -88,17 +89,19 @@ def _colors(values: Float64, counts: Int64, first: Int64) -> Attributes:
     return {"color": as_color(values[(first + counts[0] - width)[:, None] + np.arange(width)])}
 
 
-def encode_off(faces: Int32, attributes: Attributes, n_vertices: int, origin: Float64) -> Encoder:
-    """A writer of frames with these faces, and with colours if there is one per vertex."""
-    color = attributes.get("color")
+def encode_off(sequence: MeshSequence, shared: str) -> FrameEncoder:
+    """An encoder of frames, with polygons, and with colours if there is one per vertex."""
+    faces, origin, n_vertices = sequence.faces, sequence.origin, sequence.n_vertices
+    given = sequence.attributes.get("color")
+    color = None if given is None or given.domain != "vertex" else as_color(np.asarray(given))
     tail = format_rows("3 %d %d %d\n", faces)
 
-    def encode(positions: Float32) -> bytes:
-        if color is None or len(color) != n_vertices:
+    def encode(positions: Float32, fields: Mapping[str, Array]) -> bytes:
+        if color is None:
             head = f"OFF\n{n_vertices} {len(faces)} 0\n" + format_positions("{0} {0} {0}\n", positions, origin)
         else:
             rows = format_positions("{0} {0} {0} %d %d %d %d\n", positions, origin, color)
             head = f"COFF\n{n_vertices} {len(faces)} 0\n" + rows
         return (head + tail).encode("ascii")
 
-    return encode
+    return FrameEncoder(encode)

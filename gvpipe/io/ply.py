@@ -5,17 +5,16 @@ Vertex order is the file's. Attributes are per corner where the file has them pe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gvpipe import notes
-from gvpipe.arrays import Array, Float32, Float64, Int32
-from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_color, as_faces, fan, per_vertex
+from gvpipe.arrays import Array, Float32, Int32
+from gvpipe.io.mesh import FrameEncoder, Mesh, as_color, as_faces, as_polygons, fan, indexed
 from gvpipe.io.ply_elements import Columns, Lists, read_elements
+from gvpipe.sequence import MeshSequence
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 NORMAL_NAMES = ("nx", "ny", "nz")
@@ -39,7 +38,7 @@ def load_ply(path: Path) -> Mesh:
         raise ValueError("its vertices lack x, y or z")
     polygons = _polygons(face)
     faces = as_faces(polygons.values[fan(polygons.lengths)], len(positions))
-    return Mesh(positions, faces, _attributes(vertex, face, faces, len(positions)), notes.cut(polygons.lengths))
+    return Mesh(positions, faces, _attributes(vertex, face, faces, len(positions)), polygons=as_polygons(polygons.lengths))
 
 
 def _polygons(face: Columns) -> Lists:
@@ -51,16 +50,16 @@ def _polygons(face: Columns) -> Lists:
     return usual[0] if usual else next(iter(lists.values()))
 
 
-def _attributes(vertex: Columns, face: Columns, faces: Int32, n_vertices: int) -> dict[str, NDArray[np.generic]]:
-    attributes: dict[str, NDArray[np.generic]] = {}
+def _attributes(vertex: Columns, face: Columns, faces: Int32, n_vertices: int) -> dict[str, Any]:
+    attributes: dict[str, Any] = {}
     for pair in UV_NAMES:
         uv = _stack(vertex, pair)
         if uv is not None:
             attributes["uv"] = uv.astype(np.float32)
     corners = face.get("texcoord")  # a list (u, v, u, v, u, v) per triangle
     if isinstance(corners, Lists) and (corners.lengths == 6).all() and len(corners.values) == faces.size * 2:
-        found = per_vertex(corners.values.reshape(-1, 2).astype(np.float32), faces, n_vertices)
-        attributes |= {} if found is None else {"uv": found}
+        table = corners.values.reshape(-1, 2).astype(np.float32)
+        attributes["uv"] = indexed(table, np.arange(len(table)), faces, n_vertices, "uv")
     normal = _stack(vertex, NORMAL_NAMES)
     if normal is not None:
         attributes["normal"] = normal.astype(np.float32)
@@ -78,11 +77,13 @@ def _stack(columns: Columns, names: Sequence[str]) -> Array | None:
     return np.stack(numbers, axis=1) if len(numbers) == len(names) else None
 
 
-def encode_ply(faces: Int32, attributes: Attributes, n_vertices: int, origin: Float64) -> Encoder:
-    """A writer of frames with these faces, texture coordinates and vertex colours (normals: see `encode_obj`).
+def encode_ply(sequence: MeshSequence, shared: str) -> FrameEncoder:
+    """An encoder of frames with texture coordinates and vertex colours (normals: see `encode_obj`).
 
     Coordinates are ``double`` where they count from an origin.
     """
+    faces, origin, n_vertices = sequence.faces, sequence.origin, sequence.n_vertices
+    attributes = {name: np.asarray(each) for name, each in sequence.attributes.items()}
     uv, color = attributes.get("uv"), attributes.get("color")
     vertex_fields: list[tuple[str, str]] = [(name, "<f8" if origin.any() else "<f4") for name in "xyz"]
     face_fields: list[tuple[Any, ...]] = [("n", "u1"), ("vertex_indices", "<i4", 3)]
@@ -119,9 +120,9 @@ def encode_ply(faces: Int32, attributes: Attributes, n_vertices: int, origin: Fl
         ]
     ).encode("ascii")
 
-    def encode(positions: Float32) -> bytes:
+    def encode(positions: Float32, fields: Mapping[str, Array]) -> bytes:
         for i, name in enumerate("xyz"):
             vertices[name] = positions[:, i] + origin[i] if origin.any() else positions[:, i]
         return header + vertices.tobytes() + polygons.tobytes()
 
-    return encode
+    return FrameEncoder(encode)

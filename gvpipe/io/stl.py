@@ -8,16 +8,18 @@ refused. Reading is trimesh's; writing is one structured array.
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Float64, Int32, Int64
+from gvpipe.arrays import Array, Float32, Float64, Int32, Int64
 from gvpipe.errors import InputError
-from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_faces
+from gvpipe.io.losses import lost_notes
+from gvpipe.io.mesh import FrameEncoder, Mesh, as_faces
 from gvpipe.origin import choose_origin, narrow
-from gvpipe.sequence import check_finite
+from gvpipe.sequence import MeshSequence, check_finite
 
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 HEADER_BYTES = 80
@@ -85,12 +87,13 @@ def _weld(corners: Float32) -> tuple[Int64, Int64]:
     return first[by_appearance], rank[inverse]
 
 
-def encode_stl(faces: Int32, attributes: Attributes, n_vertices: int, origin: Float64) -> Encoder:
-    """A writer of frames with these faces; STL holds nothing but triangles.
+def encode_stl(sequence: MeshSequence, shared: str) -> FrameEncoder:
+    """An encoder of frames; STL holds nothing but triangles.
 
     Raises:
         InputError: there is an origin.
     """
+    faces, origin = sequence.faces, sequence.origin
     if origin.any():
         place = ", ".join(f"{x:.17g}" for x in origin)
         raise InputError(
@@ -100,7 +103,7 @@ def encode_stl(faces: Int32, attributes: Attributes, n_vertices: int, origin: Fl
     records = np.zeros(len(faces), RECORD)
     header = b"gvpipe".ljust(HEADER_BYTES) + struct.pack("<I", len(faces))
 
-    def encode(positions: Float32) -> bytes:
+    def encode(positions: Float32, fields: Mapping[str, Array]) -> bytes:
         corners = positions[faces]  # (T, 3, 3)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -108,4 +111,4 @@ def encode_stl(faces: Int32, attributes: Attributes, n_vertices: int, origin: Fl
         records["corners"] = corners
         return header + bytes(records.tobytes())
 
-    return encode
+    return FrameEncoder(encode, notes=lost_notes(sequence, "STL", {}))

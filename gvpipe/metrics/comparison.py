@@ -11,13 +11,15 @@ and R. Klein, Simple and efficient compression of animation sequences, 2005 (``d
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
 from gvpipe.arguments import show
+from gvpipe.arrays import Integers
 from gvpipe.errors import InputError
 from gvpipe.mesh.topology import unique_edges
+from gvpipe.metrics.asset_errors import AssetErrors, compare_attributes, compare_fields
 from gvpipe.metrics.correspondence import canonical_triangles, match_vertices
 from gvpipe.metrics.hausdorff import Hausdorff
 from gvpipe.metrics.sted import Sted
@@ -34,6 +36,7 @@ class Comparison:
 
     Model units: ``rmse``, ``max``, ``hausdorff`` and both values per frame. Fractions of the reference's frame-0
     bounding-box diagonal: ``rmse_diag``, ``max_diag``. Percent: ``kg`` and ``da``. Without unit: the ``sted`` values.
+    ``attributes`` and ``fields`` have the largest and mean error of each, in its own unit, degrees for normals and tangents.
     """
 
     rmse: float
@@ -47,6 +50,8 @@ class Comparison:
     sted_temporal: float | None
     hausdorff: float | None
     frames: list[dict[str, float]]
+    attributes: AssetErrors = field(default_factory=dict)
+    fields: AssetErrors = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:
         """The same values under the same names, ready for `json.dumps`; what is not defined is ``null``."""
@@ -78,7 +83,8 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: FramesDo
     for role, given in (("reference", reference), ("distorted", distorted)):
         if not isinstance(given, MeshSequence):
             raise TypeError(f"compare's {role} is {show(given)}; a MeshSequence is needed, such as gvpipe.read(path)")
-    distorted = aligned(reference, distorted)
+    given, pairing = distorted, pair_vertices(reference, distorted)
+    distorted = distorted if pairing is None else distorted.reordered(np.argsort(pairing), reference.faces)
     n_frames = reference.n_frames
     edges = unique_edges(reference.faces)
     diagonal = frame_diagonal(reference)
@@ -99,6 +105,7 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: FramesDo
                 progress(first + start + len(a), n_frames)
     found = errors.result(diagonal)
     spatial, temporal = sted.spatial(), sted.temporal()
+    same = np.arange(reference.n_vertices) if pairing is None else pairing
     return Comparison(
         **asdict(found),
         da=ratio(100 * errors.mean.mean(), diagonal),
@@ -107,11 +114,23 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: FramesDo
         sted_temporal=temporal,
         hausdorff=hausdorff.result(),
         frames=[{"rmse": float(r), "max": float(m)} for r, m in zip(errors.rmse, errors.largest, strict=True)],
+        attributes=compare_attributes(reference, given, same),
+        fields=compare_fields(reference, given, same),
     )
 
 
 def aligned(reference: MeshSequence, distorted: MeshSequence) -> MeshSequence:
-    """Return ``distorted`` in the reference's vertex order, or raise `InputError` if the two do not belong together."""
+    """Return ``distorted`` in the reference's vertex order; raises `InputError` as `pair_vertices`."""
+    pairing = pair_vertices(reference, distorted)
+    return distorted if pairing is None else distorted.reordered(np.argsort(pairing), reference.faces)
+
+
+def pair_vertices(reference: MeshSequence, distorted: MeshSequence) -> Integers | None:
+    """Return ``(V,)`` the reference's vertex of each vertex of ``distorted``; None if they are in the same order.
+
+    Raises:
+        InputError: the two do not belong together.
+    """
     counts = (
         ("frames", reference.n_frames, distorted.n_frames),
         ("vertices", reference.n_vertices, distorted.n_vertices),
@@ -124,7 +143,7 @@ def aligned(reference: MeshSequence, distorted: MeshSequence) -> MeshSequence:
                 "vertices are compared by index"
             )
     if np.array_equal(canonical_triangles(reference.faces), canonical_triangles(distorted.faces)):
-        return distorted
+        return None
     pairing = match_vertices(reference, distorted)
     if pairing is None:
         raise InputError(
@@ -132,4 +151,4 @@ def aligned(reference: MeshSequence, distorted: MeshSequence) -> MeshSequence:
             f"{len(reference.faces)} triangles, but not the same triangles, in whatever vertex order; compare a sequence with "
             "what was made from it"
         )
-    return distorted.reordered(np.argsort(pairing), reference.faces)
+    return pairing

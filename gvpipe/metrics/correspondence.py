@@ -47,6 +47,24 @@ def canonical_triangles(faces: Integers) -> Integers:
     return turned[np.lexsort(turned.T[::-1])]
 
 
+def match_corners(faces: Integers, others: Integers) -> Int64:
+    """Return ``(3T,)`` the corner of ``faces (T, 3)`` for each corner of ``others (T, 3)``.
+
+    Both are the same triangles over the same vertices, in any order and rotation. Those that occur several times are paired in
+    order.
+
+    Examples:
+        >>> match_corners(np.array([[0, 1, 2], [0, 2, 3]]), np.array([[2, 3, 0], [0, 1, 2]])).tolist()
+        [4, 5, 3, 0, 1, 2]
+    """
+    result = np.empty((len(faces), 3), np.int64)
+    (ours, turn), (theirs, other_turn) = _turned(faces), _turned(others)
+    order, other = (np.lexsort(turned.T[::-1]) for turned in (ours, theirs))
+    corners = 3 * order[:, None] + turn[order]
+    result[other[:, None], other_turn[other]] = corners
+    return result.reshape(-1)
+
+
 def _paths(sequence: MeshSequence, shift: Float64 | float = 0.0) -> Float64:
     return (sequence.sample(FRAMES) + shift).swapaxes(0, 1).reshape(sequence.n_vertices, -1)
 

@@ -16,6 +16,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
+from gvpipe.asset_coding.encoder import AssetCoder
 from gvpipe.codec import Codec, Progress
 from gvpipe.errors import InputError
 from gvpipe.quality_scale import error_of
@@ -40,7 +41,13 @@ def default_target(codecs: Sequence[Codec]) -> Target:
     return Target("kg", error_of(max(codec.quality for codec in codecs)))
 
 
-def choose_codec(codecs: Sequence[Codec], sequence: MeshSequence, target: Target, progress: Progress | None = None) -> Choice:
+def choose_codec(
+    codecs: Sequence[Codec],
+    sequence: MeshSequence,
+    target: Target,
+    progress: Progress | None = None,
+    asset: AssetCoder | None = None,
+) -> Choice:
     """Encode with the most promising candidates, and choose one of the encodes.
 
     Args:
@@ -48,6 +55,7 @@ def choose_codec(codecs: Sequence[Codec], sequence: MeshSequence, target: Target
         sequence: to encode.
         target: for each of them.
         progress: called with the stages of every encode.
+        asset: what is coded beside the positions, the same for all candidates; estimates leave it out.
 
     Returns:
         The choice; its ``tried`` has the encodes of the whole sequence, of all finalists.
@@ -68,7 +76,7 @@ def choose_codec(codecs: Sequence[Codec], sequence: MeshSequence, target: Target
     for codec in ranking:
         if len(finalists) < n_finalists:
             try:
-                finalists.append(meet(target, codec, sequence, progress))
+                finalists.append(meet(target, codec, sequence, progress, asset=asset))
             except InputError as exc:
                 failures.append(str(exc))
     if not finalists:
@@ -93,7 +101,7 @@ def _estimate(codec: Codec, sequence: MeshSequence, target: Target, progress: Pr
     """The estimated cost (infinity: it does not meet the target), and the settings at the quality that met it."""
     n_sample = min(SAMPLE, sequence.n_frames)
     try:
-        trial = meet(target, codec, sequence.part(0, n_sample), progress, is_rough=True).trial
+        trial = meet(target, codec, sequence.part(0, n_sample).bare(), progress, is_rough=True).trial
     except InputError:
         return float("inf"), codec
     quality = trial.codec.quality

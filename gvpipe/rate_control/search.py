@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from gvpipe.asset_coding.encoder import AssetCoder
 from gvpipe.codec import Codec, Progress
 from gvpipe.metrics.vertex_errors import frame_diagonal, measure_spread
 from gvpipe.quality_scale import quality_of
@@ -35,23 +36,29 @@ class Choice:
 
 
 def meet(
-    target: Target, codec: Codec, sequence: MeshSequence, progress: Progress | None = None, is_rough: bool = False
+    target: Target,
+    codec: Codec,
+    sequence: MeshSequence,
+    progress: Progress | None = None,
+    is_rough: bool = False,
+    asset: AssetCoder | None = None,
 ) -> Choice:
     """Encode at the quality that meets a target, within 3 % or, for estimates, roughly.
 
-    The search starts at the quality of that rmse or KG error, for other targets at the codec's own.
+    The search starts at the quality of that rmse or KG error, for other targets at the codec's own. What ``asset`` codes beside
+    the positions counts as bytes of the file.
 
     Raises:
         InputError: no quality meets it.
     """
     if target.measure == "max":
-        trials = Trials(codec, sequence, target.value, progress)
+        trials = Trials(codec, sequence, target.value, progress, asset)
         trial, tried = find_smallest(trials, target.value, codec.quality, ROUGH_GAIN if is_rough else LEAST_GAIN)
         reason = (
             f"quality {trial.codec.quality:.4g} is the smallest of {len(tried)}, {trial.corrections} bytes of it corrections"
         )
         return Choice(trial, trials, tried, reason)
-    trials = Trials(codec, sequence, None, progress)
+    trials = Trials(codec, sequence, None, progress, asset)
     tolerance = ROUGH_TOLERANCE if is_rough else TOLERANCE
     trial, tried = find_quality(trials, target, _start(target, codec, sequence, tolerance), tolerance)
     found = target.of(trial)

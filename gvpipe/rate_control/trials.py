@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from gvpipe.arrays import Integers
+from gvpipe.asset_coding.encoder import AssetCoder
 from gvpipe.codec import Codec, Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import file_size
 from gvpipe.corrections.bound import SECTION, Bound, encode_corrections
 from gvpipe.errors import InputError
 from gvpipe.metrics.vertex_errors import Errors, measure_errors
+from gvpipe.rate_control.purposes import own_settings
 from gvpipe.registry import encode_sequence, open_reader
 from gvpipe.rendering.poster import poster_of
 from gvpipe.repeated_frames import RepeatedFramesReader
@@ -60,6 +62,7 @@ class Trial:
         """Return settings and results as JSON values (``tried`` of `gvpipe.Report`)."""
         return {
             "codec": self.codec.id,
+            "settings": own_settings(self.codec),
             "quality": self.codec.quality,
             "bytes": self.bytes,
             "bpvf": self.bpvf,
@@ -78,13 +81,19 @@ class Trials:
         sequence: to encode.
         bound: largest distance of a vertex from where it was, model units; None: whatever the quality gives.
         progress: called with the stages of every encode.
+        asset: what is coded beside the positions; None: nothing.
     """
 
     def __init__(
-        self, codec: Codec, sequence: MeshSequence, bound: float | None = None, progress: Progress | None = None
+        self,
+        codec: Codec,
+        sequence: MeshSequence,
+        bound: float | None = None,
+        progress: Progress | None = None,
+        asset: AssetCoder | None = None,
     ) -> None:
         self.codec = codec
-        self._sequence, self._bound, self._progress = sequence, bound, progress
+        self._sequence, self._bound, self._progress, self._asset = sequence, bound, progress, asset
         self._memo = Memo()
 
     def __call__(self, quality: float) -> Trial:
@@ -103,6 +112,9 @@ class Trials:
         else:
             bound = Bound.of(self._bound, memo("coordinate", lambda: _largest_coordinate(self._sequence)))
             bitstream, errors = _correct(bitstream, reference, reader, bound)
+        if self._asset is not None:
+            report("asset", 0.0)
+            bitstream = self._asset.add(dataclasses.replace(encoded, bitstream=bitstream), codec)
         size = file_size(bitstream)
         report("measure", 1.0)
         bpvf = 8 * size / (bitstream.n_vertices * bitstream.n_frames)

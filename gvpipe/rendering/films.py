@@ -130,6 +130,8 @@ def write_pictures(
         OutputError: the file cannot be written; no part of it is left.
     """
     suffix = check_output(path, options)
+    if options.error_max is not None and reference is None:
+        raise InputError("error_max ends the colours of errors; give error_of too")
     film = _plan(sequence, suffix, options, reference)
     with atomic_path(path) as temporary:
         WRITERS[suffix](film, temporary, progress)

@@ -61,7 +61,7 @@ def test_ply_binary_orders_and_other_properties(tmp_path: Path, order: str) -> N
     read = io.read(tmp_path / "a.ply")
     assert read.read(0, 1)[0].tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     assert read.faces.tolist() == [[0, 1, 2], [0, 2, 3], [3, 2, 1], [3, 1, 0]]
-    assert "2 of 2 faces have more than 3 corners" in read.notes[0]
+    assert read.polygons is not None and read.polygons.tolist() == [4, 4]
 
 
 @pytest.mark.parametrize("faces", [[[0, 1, 2], [0, 1, 2, 3], [2, 3, 0]], [[0, 1, 2, 3], [0, 1, 2], [2, 3, 0]]])

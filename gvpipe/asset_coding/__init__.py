@@ -1,0 +1,1 @@
+"""What lies beside any codec's sections: an asset's attributes, fields, parts, polygons, materials, images and metadata."""

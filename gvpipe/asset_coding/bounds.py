@@ -1,0 +1,101 @@
+"""How finely attributes and fields are kept: what a user asked for, and what holds where nothing was asked.
+
+| kind | default |
+| --- | --- |
+| uv | 1/4 texel of the largest image, 1/8192 without images |
+| normal, tangent | 1 degree |
+| colours, labels, integers | exact |
+| others | 0.1 % of their range |
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from gvpipe.arguments import did_you_mean
+from gvpipe.errors import SettingError
+
+TEXELS = 0.25
+UV = 1 / 8192
+DEGREES = 1.0
+PART = 1e-3  # of the range
+KEEP_NAN = ",nan=keep"
+
+Given = Mapping[str, float | str]
+
+
+@dataclass(frozen=True)
+class Precision:
+    """How finely one attribute or field is kept.
+
+    Args:
+        is_kept: whether it is in the file at all.
+        bound: largest error of a number, degrees for normals and tangents; 0: exact.
+        holes: whether NaN is kept as it is.
+    """
+
+    is_kept: bool = True
+    bound: float = 0.0
+    holes: bool = False
+
+
+NOT_KEPT = Precision(is_kept=False)
+
+
+def precision(given: float | str | None, kind: str, is_float: bool, spread: float, texels: int, what: str) -> Precision:
+    """Return the precision of one attribute or field.
+
+    Args:
+        given: ``"none"``, ``"exact"``, a number, a part of the range such as ``"0.1%"``, each with ``",nan=keep"`` behind it
+            if a field has holes; None: the default.
+        kind: of the numbers.
+        is_float: whether they are floating-point numbers.
+        spread: largest less smallest value.
+        texels: side of the largest image, 0 without images.
+        what: it is, for messages.
+
+    Raises:
+        SettingError: the text is none of these, or the bound is no number above 0.
+    """
+    text = "" if given is None else str(given).strip().lower()
+    holes = text.endswith(KEEP_NAN)
+    text = text.removesuffix(KEEP_NAN)
+    if text == "none":
+        return NOT_KEPT
+    if text == "exact" or (not text and (not is_float or kind in ("color", "label"))):
+        return Precision(holes=holes)
+    if not text:
+        return Precision(bound=_default(kind, spread, texels), holes=holes)
+    bound = _parse(text, spread, what)
+    return Precision(bound=bound if is_float else max(math.floor(bound), 0), holes=holes)
+
+
+def check_names(given: Given, names: Iterable[str], what: str) -> None:
+    """Raise `SettingError` for a bound of an attribute or field that the sequence does not have."""
+    known = list(names)
+    for name in given:
+        if name not in known:
+            there = f"there are {', '.join(known)}" if known else "there are none"
+            raise SettingError(f"the sequence has no {what} {name!r}; {there}{did_you_mean(name, known)}")
+
+
+def _default(kind: str, spread: float, texels: int) -> float:
+    if kind in ("normal", "tangent"):
+        return DEGREES
+    if kind == "uv":
+        return TEXELS / texels if texels else UV
+    return PART * spread
+
+
+def _parse(text: str, spread: float, what: str) -> float:
+    try:
+        bound = float(text.removesuffix("%")) * (spread / 100 if text.endswith("%") else 1.0)
+    except ValueError:
+        bound = math.nan
+    if not math.isfinite(bound) or bound < 0 or (bound == 0 and not text.endswith("%")):
+        raise SettingError(
+            f"{what}: the bound {text!r} is none; a number above 0, a part of the range such as 0.1%, exact or none is needed"
+        )
+    return bound

@@ -1,0 +1,246 @@
+"""An asset's attributes, fields, parts, polygons, images and metadata, coded beside the sections of any codec.
+
+What is coded refers to triangles and vertices as the decoder has them. So an asset is coded for a bitstream that exists. Fields
+depend on its connectivity alone, and are coded once for all encodes of a search.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from gvpipe.arrays import Int32, Int64
+from gvpipe.asset.attribute import Attribute
+from gvpipe.asset.field import Field
+from gvpipe.asset.material import Image, image_size
+from gvpipe.asset.metadata import NO_METADATA
+from gvpipe.asset.part import Part
+from gvpipe.asset_coding.bounds import Precision, check_names, precision
+from gvpipe.asset_coding.directory import SECTION, Directory, Listed, ListedImage, pack_directory
+from gvpipe.asset_coding.options import NO_OPTIONS, AssetOptions
+from gvpipe.asset_coding.pictures import limit_image
+from gvpipe.asset_coding.scan import scan_field
+from gvpipe.attributes.attribute_coding import encode_attribute
+from gvpipe.attributes.corner_sharing import entries_of
+from gvpipe.attributes.surface import Surface
+from gvpipe.attributes.triangle_order import Arrangement, SourceCorners, encode_arrangement
+from gvpipe.codec import Codec, Encoded
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.fields.encoder import encode_field
+from gvpipe.fields.mesh import FieldMesh
+from gvpipe.fields.values import FieldBound
+from gvpipe.registry import open_reader
+from gvpipe.sequence import MeshSequence
+
+ARRANGEMENT = "arrangement"
+CODING = 1  # of attributes and fields
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is coded, and how finely: everything that does not depend on a bitstream.
+
+    Args:
+        attributes, fields: by name, with their precision, and for fields their range.
+        images: as they go into the file.
+        left_out: names of what a user asked to leave out.
+    """
+
+    attributes: dict[str, tuple[Attribute, Precision]]
+    fields: dict[str, tuple[Field, Precision, tuple[float, float]]]
+    images: tuple[Image, ...]
+    left_out: tuple[str, ...]
+
+
+def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Plan:
+    """Return what of a sequence's asset is coded.
+
+    Raises:
+        SettingError: a bound is none, or names nothing of the sequence.
+        InputError: a field holds infinite numbers, or NaN that is not to be kept; an image cannot be made smaller.
+    """
+    check_names(options.attributes, sequence.attributes, "attribute")
+    check_names(options.fields, sequence.fields, "field")
+    images = tuple(limit_image(image, options.textures) for image in sequence.images)
+    texels = max((max(image_size(image.data) or (0,)) for image in images), default=0)
+    attributes, fields, left_out = {}, {}, []
+    for name, attribute in sequence.attributes.items():
+        values = attribute.values
+        spread = float(values.max() - values.min()) if values.size else 0.0
+        found = precision(
+            options.attributes.get(name), attribute.kind, values.dtype.kind == "f", spread, texels, f"attribute {name!r}"
+        )
+        if found.is_kept:
+            attributes[name] = attribute, found
+        else:
+            left_out.append(name)
+    for name, field in sequence.fields.items():
+        given = options.fields.get(name)
+        is_float = field.dtype.kind == "f"
+        holes = precision(given, field.kind, is_float, 1.0, texels, f"field {name!r}")
+        if not holes.is_kept:
+            left_out.append(name)
+            continue
+        low, high = scan_field(name, field, holes.holes, sequence.name)
+        found = precision(given, field.kind, is_float, high - low, texels, f"field {name!r}")
+        fields[name] = field, found, (low, high)
+    return Plan(attributes, fields, images, tuple(left_out))
+
+
+class AssetCoder:
+    """Codes one sequence's asset beside any of its bitstreams.
+
+    Args:
+        sequence: whose asset it is.
+        options: what a user asks.
+
+    Raises:
+        InputError: as `plan_asset`.
+    """
+
+    def __init__(self, sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> None:
+        self._sequence = sequence
+        self.plan = plan_asset(sequence, options)
+        self._fields: dict[tuple[str, bytes], bytes] = {}
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing beside positions and triangles."""
+        given = self._sequence
+        is_bare = not (self.plan.attributes or self.plan.fields or given.parts or given.materials or given.images)
+        return is_bare and given.polygons is None and given.metadata == NO_METADATA
+
+    def add(self, encoded: Encoded, codec: Codec) -> Bitstream:
+        """Return the bitstream with the asset's sections.
+
+        Args:
+            encoded: without them.
+            codec: that made it. Attributes are predicted from frame 0, if it decodes to the same bits on every machine.
+        """
+        if self.is_empty:
+            return encoded.bitstream
+        reader, same_bits = open_reader(encoded.bitstream), getattr(codec, "same_bits", True)
+        permutation = np.asarray(encoded.permutation, np.int64)
+        place = np.empty(len(permutation), np.int32)
+        place[permutation] = np.arange(len(permutation))
+        parts = tuple(_placed(part, self._sequence.faces, place) for part in self._sequence.parts)
+        arranged, arrangement, sources = self._arrange(reader.faces, place, parts)
+        positions = reader.read(0, 1)[0] if same_bits else None
+        surface = Surface(arrangement.faces, len(permutation), positions, len(parts))
+        sections = dict(encoded.bitstream.sections)
+        if arranged:
+            sections[ARRANGEMENT] = arranged
+        origins = Origins(permutation, sources.corners, sources.triangles)
+        attributes = self._add_attributes(sections, origins, surface)
+        fields = self._add_fields(sections, origins, surface)
+        images = []
+        for number, image in enumerate(self.plan.images):
+            images.append(ListedImage(image.name, image.media_type, f"image.{number}"))
+            sections[images[-1].section] = image.data
+        directory = Directory(
+            parts=parts,
+            geometry=same_bits,
+            attributes=attributes,
+            fields=fields,
+            materials=self._sequence.materials,
+            images=tuple(images),
+            metadata=self._sequence.metadata,
+        )
+        return dataclasses.replace(encoded.bitstream, sections={**sections, SECTION: pack_directory(directory)})
+
+    def _arrange(self, decoded: Int32, place: Int32, parts: tuple[Part, ...]) -> tuple[bytes, Arrangement, SourceCorners]:
+        sequence = self._sequence
+        labels = np.repeat(np.arange(len(parts)), [part.triangles[1] - part.triangles[0] for part in parts]) if parts else None
+        return encode_arrangement(
+            decoded,
+            place[sequence.faces],
+            polygons=sequence.polygons,
+            parts=labels,
+            n_parts=max(len(parts), 1),
+            vertex_starts=vertex_starts(parts, sequence.n_vertices),
+        )
+
+    def _add_attributes(self, sections: dict[str, bytes], origins: Origins, surface: Surface) -> tuple[Listed, ...]:
+        listed: list[Listed] = []
+        references: list[Int32] = []  # of corner attributes, which tell where others are likely to have seams
+        for number, (name, (attribute, found)) in enumerate(self.plan.attributes.items()):
+            section = f"attribute.{number}"
+            rows = origins.of(attribute.domain)
+            moved = attribute if rows is None else attribute.select(rows)
+            sections[section] = encode_attribute(
+                moved.values,
+                moved.indices,
+                surface,
+                domain=attribute.domain,
+                kind=attribute.kind,
+                bound=found.bound,
+                references=references,
+            )
+            if attribute.domain == "corner" and moved.indices is not None:
+                references.append(entries_of(moved.indices, surface))
+            listed.append(_listed(name, attribute, attribute.values.shape[1], found.bound, section))
+        return tuple(listed)
+
+    def _add_fields(self, sections: dict[str, bytes], origins: Origins, surface: Surface) -> tuple[Listed, ...]:
+        listed = []
+        key = hashlib.sha256(surface.faces.tobytes()).digest()
+        meshes: dict[str, FieldMesh] = {}
+        for number, (name, (field, found, span)) in enumerate(self.plan.fields.items()):
+            section = f"field.{number}"
+            if (name, key) not in self._fields:
+                mesh = meshes.setdefault(field.domain, FieldMesh(surface.faces, surface.n_vertices, field.domain))
+                rows = origins.of(field.domain)
+                assert rows is not None  # fields are on vertices or triangles
+                self._fields[name, key] = encode_field(
+                    field.select(rows).read, len(field), mesh, _field_bound(found), name, holes=found.holes
+                )
+            sections[section] = self._fields[name, key]
+            components = field.n_components if len(field.shape) == 3 else 0
+            listed.append(_listed(name, field, components, found.bound, section, span))
+        return tuple(listed)
+
+
+@dataclass(frozen=True)
+class Origins:
+    """The source's row of each row that is decoded: ``vertices (V,)``, ``corners (3T,)``, ``triangles (T,)``."""
+
+    vertices: Int64
+    corners: Int64
+    triangles: Int64
+
+    def of(self, domain: str) -> Int64 | None:
+        """Of a domain; None for parts, which keep their order."""
+        return {"vertex": self.vertices, "corner": self.corners, "triangle": self.triangles}.get(domain)
+
+
+def vertex_starts(parts: tuple[Part, ...], n_vertices: int) -> Int64 | None:
+    """``(n_parts + 1,)`` first vertex of each part, and V, where parts follow each other; else None."""
+    starts = [part.vertices[0] for part in parts]
+    stops = [part.vertices[1] for part in parts]
+    if not parts or [*starts[1:], n_vertices] != stops or starts[0]:
+        return None
+    return np.array([*starts, n_vertices])
+
+
+def _listed(
+    name: str, given: Attribute | Field, components: int, bound: float, section: str, span: tuple[float, float] | None = None
+) -> Listed:
+    return Listed(name, given.kind, given.domain, components, given.dtype.name, given.unit, bound, CODING, section, span)
+
+
+def _field_bound(found: Precision) -> FieldBound:
+    return FieldBound(found.bound) if found.bound else FieldBound(exact=True)
+
+
+def _placed(part: Part, faces: Int32, place: Int32) -> Part:
+    """A part with the range of its vertices as they are decoded: its own, unless the codec's order was allowed."""
+    low, high = part.vertices
+    own = place[low:high]
+    if not len(own) or (own[0] == low and (np.diff(own) == 1).all()):
+        return part
+    corners = place[faces[part.triangles[0] : part.triangles[1]]]
+    used = np.concatenate([own, corners.reshape(-1)])
+    return dataclasses.replace(part, vertices=(int(used.min()), int(used.max()) + 1))

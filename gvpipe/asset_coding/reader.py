@@ -1,0 +1,205 @@
+"""An asset as a file holds it: the mirror of `gvpipe.asset_coding.encoder`.
+
+Attributes and fields are decoded when they are asked for.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
+from functools import cached_property
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from gvpipe.arrays import Array, Int32
+from gvpipe.asset.attribute import Attribute
+from gvpipe.asset.field import Field
+from gvpipe.asset.material import Image, Material
+from gvpipe.asset.metadata import Metadata
+from gvpipe.asset.part import Part, check_parts
+from gvpipe.asset.polygons import as_polygons
+from gvpipe.asset_coding.directory import SECTION, VERSION, Directory, Listed, unpack_directory
+from gvpipe.asset_coding.encoder import ARRANGEMENT, CODING, vertex_starts
+from gvpipe.attributes.attribute_coding import decode_attribute
+from gvpipe.attributes.surface import Surface
+from gvpipe.attributes.triangle_order import Arrangement, decode_arrangement
+from gvpipe.codec import FrameReader
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.errors import InputError, corrupt_section, in_file
+from gvpipe.fields.mesh import FieldMesh
+from gvpipe.fields.reader import FieldReader
+
+Thing = TypeVar("Thing")
+Lock = AbstractContextManager[bool]
+
+
+class AssetReader:
+    """All that lies beside positions in one bitstream.
+
+    Args:
+        bitstream: that holds it, or nothing of it.
+        reader: of its frames.
+        path: of the file, for messages.
+
+    Raises:
+        CorruptFile: here or later: a section is not what `AssetCoder` writes.
+    """
+
+    def __init__(self, bitstream: Bitstream, reader: FrameReader, path: str = "") -> None:
+        self._bitstream, self._reader, self._path = bitstream, reader, path
+        self._lock: Lock = threading.RLock()
+        self._meshes: dict[str, FieldMesh] = {}
+        self.directory = Directory()
+        if SECTION in bitstream.sections:
+            self.directory = unpack_directory(bitstream.section(SECTION), bitstream.n_vertices)
+        newer = [each.name for each in (*self.directory.attributes, *self.directory.fields) if each.coding != CODING]
+        self.skipped = ("all of it",) if self.directory.version > VERSION else tuple(newer)
+        attributes = {each.name: each for each in self.directory.attributes if each.coding == CODING}
+        fields = {each.name: each for each in self.directory.fields if each.coding == CODING}
+        self.attributes: Mapping[str, Attribute] = _Lazy(attributes, self._attribute, self._lock, path)
+        self.fields: Mapping[str, Field] = _Lazy(fields, self._field, self._lock, path)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What this version of gvpipe skips, a line."""
+        if not self.skipped:
+            return ()
+        return (f"a newer gvpipe wrote beside the positions what this one skips: {', '.join(self.skipped)}",)
+
+    @cached_property
+    def _arrangement(self) -> Arrangement:
+        parts = self.directory.parts
+        data = b"" if self.directory.version > VERSION else self._bitstream.sections.get(ARRANGEMENT, b"")
+        starts = vertex_starts(parts, self._bitstream.n_vertices)
+        return decode_arrangement(data, self._reader.faces, max(len(parts), 1), starts, ARRANGEMENT)
+
+    @property
+    def faces(self) -> Int32:
+        """``(T, 3) int32`` triangles, those of a part and of a polygon after each other."""
+        return self._arrangement.faces
+
+    @cached_property
+    def polygons(self) -> Int32 | None:
+        """``(P,)`` corners of each polygon, None if all are triangles."""
+        counts = self._arrangement.polygons
+        try:
+            return None if counts is None else as_polygons(counts, self.faces, self.parts, "the file")
+        except InputError as exc:
+            raise corrupt_section(ARRANGEMENT, str(exc)) from exc
+
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """The named meshes of the scene."""
+        parts = self.directory.parts
+        starts = self._arrangement.part_starts.tolist()
+        placed = [dataclasses.replace(each, triangles=(starts[i], starts[i + 1])) for i, each in enumerate(parts)]
+        try:
+            return check_parts(placed, self.faces, self._bitstream.n_vertices, len(self.materials), "the file")
+        except InputError as exc:
+            raise corrupt_section(SECTION, str(exc)) from exc
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """What the parts look like."""
+        return self.directory.materials
+
+    @cached_property
+    def images(self) -> tuple[Image, ...]:
+        """What the materials' textures show."""
+        try:
+            return tuple(
+                Image(each.name, each.media_type, self._bitstream.section(each.section)) for each in self.directory.images
+            )
+        except InputError as exc:
+            raise corrupt_section(SECTION, str(exc)) from exc
+
+    @property
+    def metadata(self) -> Metadata:
+        """What the scene says of itself."""
+        return self.directory.metadata
+
+    @cached_property
+    def _surface(self) -> Surface:
+        positions = self._reader.read(0, 1)[0] if self.directory.geometry else None
+        return Surface(self.faces, self._bitstream.n_vertices, positions, len(self.directory.parts))
+
+    def _attribute(self, listed: Listed) -> Attribute:
+        data = self._bitstream.section(listed.section)
+        references = []
+        if listed.domain == "corner":
+            earlier = self.directory.attributes[: self.directory.attributes.index(listed)]
+            references = [self.attributes[each.name].indices for each in earlier if each.domain == "corner"]
+        values, indices = decode_attribute(
+            data,
+            self._surface,
+            listed.section,
+            domain=listed.domain,
+            references=[each for each in references if each is not None],
+        )
+        try:
+            made = Attribute(values, listed.domain, listed.kind, indices, listed.unit, f"attribute {listed.name!r}")
+        except InputError as exc:
+            raise corrupt_section(listed.section, str(exc)) from exc
+        n_triangles = len(self.faces)
+        rows = {
+            "vertex": self._bitstream.n_vertices,
+            "corner": 3 * n_triangles,
+            "triangle": n_triangles,
+            "part": len(self.directory.parts),
+        }
+        wanted = (rows[listed.domain], listed.components)
+        if made.shape != wanted or made.dtype.name != listed.dtype:
+            raise corrupt_section(listed.section, f"it holds {made.shape} {made.dtype}, not {wanted} {listed.dtype}")
+        return made
+
+    def _field(self, listed: Listed) -> Field:
+        if listed.domain not in self._meshes:
+            self._meshes[listed.domain] = FieldMesh(self.faces, self._bitstream.n_vertices, listed.domain)
+        data, mesh = self._bitstream.section(listed.section), self._meshes[listed.domain]
+        reader = FieldReader(data, self._bitstream.n_frames, mesh, listed.section)
+        values = _FieldValues(reader, self._bitstream.n_frames, mesh.n_rows, listed, self._lock, self._path)
+        return Field(values, listed.domain, listed.kind, listed.unit, listed.range, f"field {listed.name!r}")
+
+
+class _FieldValues:
+    """A field's frames, decoded when they are sliced."""
+
+    def __init__(self, reader: FieldReader, n_frames: int, n_rows: int, listed: Listed, lock: Lock, path: str) -> None:
+        self._reader, self._lock, self._listed, self._path = reader, lock, listed, path
+        self.dtype = np.dtype(listed.dtype)
+        self.shape: tuple[int, ...] = (n_frames, n_rows, listed.components) if listed.components else (n_frames, n_rows)
+
+    def __getitem__(self, key: slice, /) -> Array:
+        start, stop, _ = key.indices(self.shape[0])
+        with self._lock, in_file(self._path):
+            block = self._reader.read(start, max(start, stop))
+        if block.shape[1:] != (self.shape[1], self._listed.components or 1) or block.dtype != self.dtype:
+            raise corrupt_section(self._listed.section, "it does not hold what the section 'asset' lists")
+        return block if self._listed.components else block[:, :, 0]
+
+
+class _Lazy(Mapping[str, Thing], Generic[Thing]):
+    """Things by name, each made when it is first asked for."""
+
+    def __init__(self, listed: Mapping[str, Listed], make: Callable[[Listed], Thing], lock: Lock, path: str) -> None:
+        self._listed, self._make, self._lock, self._path = listed, make, lock, path
+        self._made: dict[str, Thing] = {}
+
+    def __getitem__(self, name: str, /) -> Thing:
+        with self._lock:
+            if name not in self._made:
+                with in_file(self._path):
+                    self._made[name] = self._make(self._listed[name])
+            return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._listed)
+
+    def __len__(self) -> int:
+        return len(self._listed)
+
+    def __repr__(self) -> str:
+        return f"<{', '.join(self._listed) or 'none'}>"

@@ -1,0 +1,44 @@
+"""What `gvpipe info` prints of an asset: a line for each kind of thing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gvpipe.api import Info
+
+MOST = 12  # names in a line
+
+
+def asset_lines(info: Info) -> Iterator[str]:
+    """Yield the lines; none for a file of positions and triangles alone."""
+    if info.parts:
+        yield f"parts: {_names([part['name'] for part in info.parts])}"
+    if info.polygons:
+        yield "polygons: " + ", ".join(f"{count} of {corners} corners" for corners, count in info.polygons.items())
+    for kind, listed in (("attribute", info.attributes), ("field", info.fields)):
+        for each in listed:
+            yield f"{kind} {_described(each)}"
+    if info.materials:
+        yield f"materials: {_names(info.materials)}"
+    for image in info.images:
+        size = "x".join(map(str, image["size"])) if image["size"] else "size unknown"
+        yield f"image {image['name']}: {image['media_type']}, {size}, {image['bytes']} bytes"
+    said = {key: value for key, value in info.metadata.items() if value and key != "texts"} | info.metadata["texts"]
+    if said:
+        yield "metadata: " + ", ".join(f"{key} {value}" for key, value in said.items())
+
+
+def _described(each: dict[str, Any]) -> str:
+    unit = f" {each['unit']}" if each["unit"] else ""
+    span = f", {each['range'][0]:g}..{each['range'][1]:g}{unit}" if each.get("range") else ""
+    measure = " degrees" if each["kind"] in ("normal", "tangent") else unit
+    bound = f"within {each['bound']:.4g}{measure}" if each["bound"] else "exact"
+    shape = f"{each['components']} x {each['type']} per {each['domain']}"
+    return f"{each['name']}: {each['kind']}, {shape}{span}, {bound}, {each['bytes']} bytes"
+
+
+def _names(names: list[str]) -> str:
+    shown = ", ".join(name or "(no name)" for name in names[:MOST])
+    return f"{len(names)}: {shown}" + (", ..." if len(names) > MOST else "")
