@@ -4,9 +4,9 @@
                 stream (`gvpipe.entropy.serial_coder`)
     corner attributes start with [varint] bytes of their sharing, sharing (`gvpipe.attributes.corner_sharing`)
 
-Values are coded entry after entry in an order that follows the surface (`gvpipe.attributes.entry_order`). Each is predicted from
-values before it, by the method that leaves the fewest bytes (`linear_kernels`, `octahedral_kernels`). What a residual's size is
-likely to be follows from the residuals of its neighbours.
+Values are coded entry after entry in an order that follows the surface (`gvpipe.attributes.entry_order`). Each is predicted
+from values before it, by the method that leaves the fewest bytes (`linear_kernels`, `octahedral_kernels`). The residuals of its
+neighbours are the context of its own.
 """
 
 from __future__ import annotations

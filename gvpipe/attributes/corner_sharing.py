@@ -15,6 +15,7 @@ entry of the corner before it, a new one, or an older one of the vertex. Three t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from gvpipe.attributes.surface import Surface
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.errors import InputError
 from gvpipe.mesh.unique_rows import row_ids
+
+if TYPE_CHECKING:
+    from gvpipe.attributes.sharing_kernels import Corners
 
 WHOLE, LOOSE, SHARED, CODED, GUIDED = range(5)  # modes: one entry per vertex; one per corner; as the reference; two streams
 MAX_TRIED = 4  # references, the last ones, that an encoder tries
@@ -106,7 +110,7 @@ def _n_contexts(reference: Int32 | None) -> int:
     return N_CONTEXTS if reference is None else N_CONTEXTS_REFERENCE
 
 
-def _corners(surface: Surface, reference: Int32 | None) -> Array:
+def _corners(surface: Surface, reference: Int32 | None) -> Corners:
     from gvpipe.attributes.sharing_kernels import Corners
 
     guide = np.zeros(0, np.int64) if reference is None else reference.astype(np.int64)

@@ -94,7 +94,9 @@ def order_by_edges(opposite: Int64) -> EntryOrder:
     gates = np.full((len(opposite), 4), NONE, np.int64)
     is_done = np.zeros(n_entries, np.bool_)
     completes = np.zeros(n_entries, np.int64)
-    stacks = _Stacks(np.full(LEVELS, NONE), np.empty(len(opposite), np.int64), np.empty(len(opposite), np.int64), np.zeros(1, np.int64))
+    stacks = _Stacks(
+        np.full(LEVELS, NONE), np.empty(len(opposite), np.int64), np.empty(len(opposite), np.int64), np.zeros(1, np.int64)
+    )
     n, n_gates = 0, 0
     for seed in range(n_entries):
         entry = seed

@@ -77,10 +77,10 @@ def _round(guess: float, is_float: bool, bits: Float32) -> int:
     if is_float:
         bits[0] = guess
         key = np.int64(bits.view(np.int32)[0])
-        return key if key >= 0 else -(key + (1 << 31)) - 1
+        return int(key if key >= 0 else -(key + (1 << 31)) - 1)
     if not abs(guess) < MAX_CODE:
         return 0
-    return np.int64(np.floor(guess + 0.5))
+    return int(np.floor(guess + 0.5))
 
 
 @compiled
@@ -168,7 +168,7 @@ def _predict_by_shape(
 
 @compiled
 def _coordinates(linear: Linear, x: int, a: int, b: int) -> tuple[float, float, float]:
-    """Of vertex x over the edge from a to b: place along it, height over it, both in units of its length, whose square is last."""
+    """Of vertex x over the edge from a to b: place along it and height, in units of its length; then the length's square."""
     squared = dot = height = 0.0
     for axis in range(3):
         origin = float(linear.positions[a, axis])

@@ -1,7 +1,7 @@
 """Kernels that linear and octahedral prediction share: equal values nearby, and the context of a residual.
 
-A *candidate* is a distinct value of an earlier entry at the same place, or of an earlier neighbour. Where seams split a surface,
-or few values recur, its number replaces a residual.
+A *candidate* is a distinct value of an earlier entry at the same place, or of an earlier neighbour. Where seams split a
+surface, or few values recur, its number replaces a residual.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ def _add_candidate(candidates: Int64, n: int, entry: int, codes: Int64) -> int:
 
 @compiled
 def _are_equal(codes: Int64, a: int, b: int) -> bool:
+    equal = True
     for c in range(codes.shape[1]):
-        if codes[a, c] != codes[b, c]:
-            return False
-    return True
+        equal = equal and codes[a, c] == codes[b, c]
+    return equal

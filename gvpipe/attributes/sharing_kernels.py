@@ -48,7 +48,10 @@ def code_sharing(coder: SerialCoder, mesh: Corners, n_vertices: int, entries: In
     most = 1
     for v in range(n_vertices):
         most = max(most, lists.degree[v])
-    fan, turned = _Fan(np.empty(most, np.int64), np.empty(most, np.int64)), _Fan(np.empty(most, np.int64), np.empty(most, np.int64))
+    fan, turned = (
+        _Fan(np.empty(most, np.int64), np.empty(most, np.int64)),
+        _Fan(np.empty(most, np.int64), np.empty(most, np.int64)),
+    )
     is_visited = np.zeros(len(flat), np.bool_)
     given = entries.copy()
     coded = np.full(len(flat), -1, np.int64)  # of each given entry, its number in the order of coding

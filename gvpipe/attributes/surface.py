@@ -39,6 +39,10 @@ class Surface:
         bits = (self.positions + np.float32(0)).view(np.int32)  # no negative zeros
         return np.asarray(row_ids(bits.astype(np.int64))[0], np.int64)
 
+    def welded(self) -> Surface:
+        """The surface with vertices of one position as one: normals may then be shared across seams of other attributes."""
+        return Surface(self.places[self.faces].astype(np.int32), int(self.places.max(initial=-1)) + 1, None, self.n_parts)
+
     @cached_property
     def opposite(self) -> Int64:
         """`opposite_corners` of the faces."""
