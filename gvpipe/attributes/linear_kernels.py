@@ -171,8 +171,8 @@ def _coordinates(linear: Linear, x: int, a: int, b: int) -> tuple[float, float, 
     """Of vertex x over the edge from a to b: place along it and height, in units of its length; then the length's square."""
     squared = dot = height = 0.0
     for axis in range(3):
-        origin = float(linear.positions[a, axis])
-        edge, own = float(linear.positions[b, axis]) - origin, float(linear.positions[x, axis]) - origin
+        origin = np.float64(linear.positions[a, axis])  # float() would stay float32 in compiled code
+        edge, own = np.float64(linear.positions[b, axis]) - origin, np.float64(linear.positions[x, axis]) - origin
         squared += edge * edge
         dot += edge * own
         height += own * own

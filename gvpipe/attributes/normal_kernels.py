@@ -31,7 +31,7 @@ def _add_triangle(points: Float32, face: Int32, entries: Int32, rule: int, edges
     """Add a triangle's normal, weighted, to the sums of its corners' entries."""
     for k in range(3):  # edge k leads from corner k to the next
         for axis in range(3):
-            edges[k, axis] = float(points[face[(k + 1) % 3], axis]) - float(points[face[k], axis])
+            edges[k, axis] = np.float64(points[face[(k + 1) % 3], axis]) - np.float64(points[face[k], axis])
     x = edges[0, 1] * edges[1, 2] - edges[0, 2] * edges[1, 1]
     y = edges[0, 2] * edges[1, 0] - edges[0, 0] * edges[1, 2]
     z = edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0]

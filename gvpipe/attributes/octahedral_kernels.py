@@ -96,10 +96,11 @@ def corner_normals(triangles: Int32, positions: Float32, places: Int64, n_places
 
 @compiled
 def _edge(positions: Float32, a: int, b: int) -> tuple[float, float, float]:
+    # np.float64: in compiled code float() of a float32 stays float32, and other decoders would have to know that
     return (
-        float(positions[b, 0]) - float(positions[a, 0]),
-        float(positions[b, 1]) - float(positions[a, 1]),
-        float(positions[b, 2]) - float(positions[a, 2]),
+        np.float64(positions[b, 0]) - np.float64(positions[a, 0]),
+        np.float64(positions[b, 1]) - np.float64(positions[a, 1]),
+        np.float64(positions[b, 2]) - np.float64(positions[a, 2]),
     )
 
 

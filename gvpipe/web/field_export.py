@@ -27,13 +27,14 @@ from gvpipe.arrays import Array, Float32
 from gvpipe.asset.field import Field
 from gvpipe.errors import InputError
 
-CODING = "web"
+CODING = 256  # of these fields in section `asset`
 COLOURS = 1023  # halves of it are the least number of levels that a range gets, but for fields with a coarser bound
 MAX_GROUP = 32  # frames
 GROUP_VALUES = 1 << 21  # at most in a group, unless one frame has more: what the player unpacks at a time
 MAX_LEVEL = 65535
 HEAD = struct.Struct("<Iddd")
 ORDERS = 3
+MAX_VALUES = 1 << 26  # of a frame
 PASS_VALUES = 1 << 22  # read at a time to find the range
 FAST, SMALL = 1, 9  # levels of zlib
 
@@ -85,8 +86,8 @@ def encode_web_field(field: Field, bound: float = 0.0) -> WebField:
         InputError: a frame has too many values for a browser.
     """
     n_frames, n_values = len(field), field.shape[1] * field.n_components
-    if n_values > 1 << 26:
-        raise InputError(f"{field.name} has {n_values} values a frame; the web player shows up to {1 << 26}")
+    if n_values > MAX_VALUES:
+        raise InputError(f"{field.name} has {n_values} values a frame; the web player shows up to {MAX_VALUES}")
     low, high, largest = find_range(field)
     lattice, kept = choose_lattice(low, high, bound, field.dtype.kind in "iu")
     size = max(1, min(MAX_GROUP, n_frames, GROUP_VALUES // n_values))

@@ -1,5 +1,15 @@
 // Made by tools/web_constants.py from gvpipe's Python modules; edit those, and run it again.
 
+// gvpipe.asset_coding.directory
+export const DIRECTORY_SECTION = "asset";
+export const DIRECTORY_VERSION = 1;
+export const DIRECTORY_MOST = 65536;
+export const DIRECTORY_MAX_BYTES = 67108864;
+
+// gvpipe.asset_coding.encoder
+export const ENCODER_ARRANGEMENT = "arrangement";
+export const ENCODER_CODING = 1;
+
 // gvpipe.connectivity.base_mesh
 export const BASE_MESH_DRACO_PREFIX = [68, 82, 65, 67, 79, 2, 2, 1, 1, 0, 0];
 export const BASE_MESH_MAX_PER_BYTE = 1024;
@@ -111,6 +121,11 @@ export const TEMPORAL_NEIGHBOURS_MIN_BLOCK = 48;
 export const TEMPORAL_NEIGHBOURS_CUBIC = new Map([[-3, -0.0625], [-1, 0.5625], [1, 0.5625], [3, -0.0625]]);
 export const TEMPORAL_NEIGHBOURS_LINEAR = new Map([[-1, 0.5], [1, 0.5]]);
 export const TEMPORAL_NEIGHBOURS_OFFSETS = [-1, 1, -3, 3, -2, -5, 5, -4];
+
+// gvpipe.web.field_export
+export const FIELD_EXPORT_CODING = 256;
+export const FIELD_EXPORT_ORDERS = 3;
+export const FIELD_EXPORT_MAX_VALUES = 67108864;
 
 // gvcodecs.mcgv.base.surface
 export const SURFACE_STILL = "still";

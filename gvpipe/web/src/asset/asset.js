@@ -3,6 +3,15 @@
  * `gvpipe.asset` models; `docs/format.md` has the members.
  */
 
+import {
+  DIRECTORY_MAX_BYTES as MAX_BYTES,
+  DIRECTORY_MOST as MAX_ITEMS,
+  DIRECTORY_SECTION as SECTION,
+  DIRECTORY_VERSION as VERSION,
+  ENCODER_ARRANGEMENT as ARRANGEMENT,
+  ENCODER_CODING as CODING,
+  FIELD_EXPORT_CODING as WEB_CODING,
+} from "../constants.js";
 import { decodeAttribute } from "../attributes/attribute_coding.js";
 import { Surface } from "../attributes/surface.js";
 import { decodeArrangement } from "../attributes/triangle_order.js";
@@ -12,12 +21,9 @@ import { AssetEntry } from "./asset_entry.js";
 import { readImages, readMaterials } from "./materials.js";
 import { WebField } from "./web_field.js";
 
-const SECTION = "asset";
-const ARRANGEMENT = "arrangement";
-const VERSION = 1;
-const MAX_BYTES = 2 ** 24; // of JSON
-const MAX_ITEMS = 65536;
+const MAX_PARTS = 2 ** 22;
 const MAX_COMPONENTS = 64;
+const HUGE = 3.5e38; // above float32's largest number
 export const KINDS = ["uv", "normal", "tangent", "color", "scalar", "vector", "label"];
 export const DOMAINS = ["vertex", "corner", "triangle", "part"];
 const WIDTHS = { uv: [2], normal: [3], tangent: [3, 4], color: [3, 4] }; // components of a kind; others have any number
@@ -52,7 +58,7 @@ export async function readAsset(payload, video) {
   const notes = [];
   const { parts, indices, polygons } = readParts(list, payload, video, materials.length);
   const positions = list.flag("geometry", false) ? await video.frame(0) : null;
-  const attributes = readAttributes(list, payload, new Surface(indices, video.vertexCount, positions, parts.length || 1));
+  const attributes = readAttributes(list, payload, new Surface(indices, video.vertexCount, positions, parts.length), notes);
   const fields = readFields(list, payload, video, notes);
   const metadata = list.given.metadata ?? {};
   return { indices, parts, attributes, fields, materials, images, polygons, metadata, notes };
@@ -68,7 +74,7 @@ async function readJson(data) {
 }
 
 function readParts(list, payload, { indices: decoded, vertexCount }, nMaterials) {
-  const parts = list.list("parts", decoded.length + MAX_ITEMS).map((given, number) => {
+  const parts = list.list("parts", MAX_PARTS).map((given, number) => {
     const entry = new AssetEntry(given, `part ${number}`);
     const [start, stop] = entry.numbers("vertices", 2, undefined, 0, vertexCount);
     if (!(Number.isInteger(start) && Number.isInteger(stop) && start <= stop)) throw corrupt(SECTION, `part ${number}: its vertices are none`);
@@ -88,9 +94,10 @@ function vertexStarts(parts, vertexCount) {
   return isOwn ? starts : null;
 }
 
-function readAttributes(list, payload, surface) {
+function readAttributes(list, payload, surface, notes) {
   const attributes = new Map();
   const references = [];
+  let isBeyond = false;
   for (const given of list.list("attributes", MAX_ITEMS)) {
     const entry = new AssetEntry(given, "an attribute");
     const name = entry.text("name");
@@ -98,6 +105,11 @@ function readAttributes(list, payload, surface) {
     const domain = entry.word("domain", DOMAINS);
     const kind = entry.word("kind", KINDS);
     if (attributes.has(name)) throw corrupt(SECTION, `there are two attributes ${name}`);
+    if (isBeyond || entry.integer("coding", undefined, 0, MAX_ITEMS) !== CODING) {
+      notes.push(`attribute ${name} is not shown: a newer gvpipe wrote it`);
+      isBeyond ||= domain === "corner"; // later ones may refer to it
+      continue;
+    }
     const { values, components, type, corners } = decodeAttribute(payload.section(section), surface, section, domain, references);
     if (WIDTHS[kind] && !WIDTHS[kind].includes(components)) throw corrupt(SECTION, `attribute ${name} has ${components} components`);
     if (corners) references.push(corners);
@@ -114,9 +126,9 @@ function readFields(list, payload, video, notes) {
     const name = entry.text("name");
     const domain = entry.word("domain", ["vertex", "triangle"]);
     const dtype = entry.text("dtype");
-    const coding = entry.text("coding");
+    const coding = entry.integer("coding", undefined, 0, MAX_ITEMS);
     if (fields.has(name)) throw corrupt(SECTION, `there are two fields ${name}`);
-    if (coding !== "web") {
+    if (coding !== WEB_CODING) {
       notes.push(`field ${name} is not shown: gvpipe export-html makes a page that shows it`);
       continue;
     }
@@ -126,8 +138,8 @@ function readFields(list, payload, video, notes) {
       kind: entry.word("kind", KINDS),
       components: entry.integer("components", undefined, 0, MAX_COMPONENTS),
       unit: entry.text("unit", ""),
-      bound: entry.number("bound", 0, 0, Number.MAX_VALUE),
-      range: given.range == null ? null : entry.numbers("range", 2, undefined, -Number.MAX_VALUE, Number.MAX_VALUE),
+      bound: entry.number("bound", 0, 0, HUGE),
+      range: given.range == null ? null : entry.numbers("range", 2, undefined, -HUGE, HUGE),
       section: entry.text("section"),
       fullScale: FULL_SCALES[dtype] ?? 1,
     };

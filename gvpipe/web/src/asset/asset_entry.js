@@ -45,7 +45,7 @@ export class AssetEntry {
   }
 
   #read(name, otherwise, isSound) {
-    const value = Object.hasOwn(this.given, name) ? this.given[name] : undefined;
+    const value = (Object.hasOwn(this.given, name) ? this.given[name] : undefined) ?? undefined; // null counts as left out
     if (value === undefined && otherwise !== undefined) return otherwise;
     if (!isSound(value)) throw this.#wrong(`'${name}'`, value);
     return value;

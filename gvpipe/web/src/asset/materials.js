@@ -9,7 +9,7 @@ const TEXTURES = [
   "occlusion_texture",
   "emissive_texture",
 ];
-const LARGEST = 1e6; // of a factor
+const HUGE = 3.5e38; // above float32's largest number
 
 /**
  * @typedef {object} Texture
@@ -28,12 +28,12 @@ export function readMaterials(list, nImages) {
     const entry = new AssetEntry(given, `material ${number}`);
     const material = {
       name: entry.text("name", ""),
-      base_color: entry.numbers("base_color", 4, [1, 1, 1, 1], 0, LARGEST),
-      metallic: entry.number("metallic", 0, 0, LARGEST),
-      roughness: entry.number("roughness", 1, 0, LARGEST),
-      emissive: entry.numbers("emissive", 3, [0, 0, 0], 0, LARGEST),
+      base_color: entry.numbers("base_color", 4, [1, 1, 1, 1], -HUGE, HUGE),
+      metallic: entry.number("metallic", 0, -HUGE, HUGE),
+      roughness: entry.number("roughness", 1, -HUGE, HUGE),
+      emissive: entry.numbers("emissive", 3, [0, 0, 0], -HUGE, HUGE),
       alpha_mode: entry.word("alpha_mode", ["opaque", "mask", "blend"], "opaque"),
-      alpha_cutoff: entry.number("alpha_cutoff", 0.5, -LARGEST, LARGEST),
+      alpha_cutoff: entry.number("alpha_cutoff", 0.5, -HUGE, HUGE),
       double_sided: entry.flag("double_sided", false),
       unlit: entry.flag("unlit", false),
     };
@@ -48,12 +48,12 @@ function readTexture(entry, nImages) {
   return {
     image: entry.integer("image", undefined, 0, nImages - 1),
     uv: entry.text("uv", "uv"),
-    scale: entry.number("scale", 1, -LARGEST, LARGEST),
+    scale: entry.number("scale", 1, -HUGE, HUGE),
     wrap: entry.words("wrap", 2, ["repeat", "mirror", "clamp"], ["repeat", "repeat"]),
     filter: entry.word("filter", ["linear", "nearest"], "linear"),
-    offset: entry.numbers("offset", 2, [0, 0], -LARGEST, LARGEST),
-    rotation: entry.number("rotation", 0, -LARGEST, LARGEST),
-    tiling: entry.numbers("tiling", 2, [1, 1], -LARGEST, LARGEST),
+    offset: entry.numbers("offset", 2, [0, 0], -HUGE, HUGE),
+    rotation: entry.number("rotation", 0, -HUGE, HUGE),
+    tiling: entry.numbers("tiling", 2, [1, 1], -HUGE, HUGE),
   };
 }
 

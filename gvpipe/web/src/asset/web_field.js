@@ -3,11 +3,11 @@
  * Mirrors `gvpipe.web.field_export`, which describes the bytes.
  */
 
+import { FIELD_EXPORT_MAX_VALUES as MAX_VALUES, FIELD_EXPORT_ORDERS as ORDERS } from "../constants.js";
 import { Cursor } from "../format/cursor.js";
 import { corrupt } from "../format/errors.js";
 import { inflate } from "../format/inflate.js";
 
-const MAX_GROUP_VALUES = 2 ** 26;
 const KEPT = 3; // groups in memory: the one shown, the next, and the one before
 
 export class WebField {
@@ -47,7 +47,7 @@ export class WebField {
     this.largest = cursor.f64();
     const isSound = [this.#low, this.#step, this.largest].every(Number.isFinite) && this.#step > 0 && this.largest >= 0;
     if (!isSound || this.#groupFrames < 1 || this.#groupFrames > frames) throw cursor.corrupt("its head is not as gvpipe writes it");
-    if (this.#groupFrames * rows * this.components > MAX_GROUP_VALUES) throw cursor.corrupt("its groups are too large");
+    if (this.#groupFrames * rows * this.components > MAX_VALUES) throw cursor.corrupt("its groups are too large");
     const bytes = cursor.words(Math.ceil(frames / this.#groupFrames));
     this.#starts = [cursor.position];
     for (const count of bytes) this.#starts.push(this.#starts.at(-1) + count);
@@ -109,10 +109,10 @@ export class WebField {
     const frames = Math.min(this.#groupFrames, this.frameCount - group * this.#groupFrames);
     const count = frames * this.rowCount * this.components;
     const wrong = (what) => corrupt(`field ${this.name}`, what);
-    if (data.length < 1 || data[0] > 5) throw wrong("a group is not as gvpipe writes it");
+    if (data.length < 1 || data[0] >= 2 * ORDERS) throw wrong("a group is not as gvpipe writes it");
     const planes = await inflate(data.subarray(1), 2 * count, wrong);
     if (planes.length !== 2 * count) throw wrong(`a group has ${planes.length} bytes, ${2 * count} are needed`);
-    const levels = restore(planes, frames, this.components, data[0] % 3, data[0] >= 3);
+    const levels = restore(planes, frames, this.components, data[0] % ORDERS, data[0] >= ORDERS);
     this.#groups.set(group, levels);
     if (this.#groups.size > KEPT) this.#groups.delete(this.#groups.keys().next().value);
     return levels;

@@ -20,7 +20,7 @@ export function plainMaterial(hasColours) {
 export function makeMaterial(given, textures, channels, { hasColours, hasGpu }) {
   const Lit = hasGpu ? MeshStandardMaterial : MeshLambertMaterial;
   const material = given.unlit ? new MeshBasicMaterial(OFFSET) : new Lit(OFFSET);
-  const [red, green, blue, alpha] = given.base_color;
+  const [red, green, blue, alpha] = given.base_color.map((factor) => Math.min(1, Math.max(0, factor)));
   material.name = given.name;
   material.color.setRGB(red, green, blue, LinearSRGBColorSpace);
   material.map = textures.make(given.base_color_texture, channels, true);
@@ -45,8 +45,8 @@ function setAlpha(material, given, alpha) {
 
 function setSurface(material, given, textures, channels) {
   if (material.isMeshStandardMaterial) {
-    material.metalness = Math.min(1, given.metallic);
-    material.roughness = Math.min(1, given.roughness);
+    material.metalness = Math.min(1, Math.max(0, given.metallic));
+    material.roughness = Math.min(1, Math.max(0, given.roughness));
     material.metalnessMap = material.roughnessMap = textures.make(given.metallic_roughness_texture, channels, false);
   }
   material.normalMap = textures.make(given.normal_texture, channels, false);
@@ -55,10 +55,5 @@ function setSurface(material, given, textures, channels) {
   material.aoMap = textures.make(given.occlusion_texture, channels, false);
   material.aoMapIntensity = given.occlusion_texture?.scale ?? 1;
   material.emissiveMap = textures.make(given.emissive_texture, channels, true);
-  material.emissive.setRGB(...given.emissive, LinearSRGBColorSpace);
-}
-
-/** Whether anything shines like metal, and so needs something to reflect. */
-export function isMetal(given) {
-  return !given.unlit && given.metallic > 0;
+  material.emissive.setRGB(...given.emissive.map((factor) => Math.max(0, factor)), LinearSRGBColorSpace);
 }
