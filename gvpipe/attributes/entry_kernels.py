@@ -1,4 +1,4 @@
-"""Kernels of `gvpipe.attributes.entry_order`: the order in which entries are coded, and the earlier entries that predict each.
+"""Kernels of `gvpipe.attributes.entry_layout`: the order in which entries are coded, and the earlier entries that predict each.
 
 An entry is next if it completes most triangles, so that most predictions are averages; among equals, the one found last. The
 idea of this order is that of Draco's traversal by prediction degree (Google, 2016, `max_prediction_degree_traverser`).

@@ -108,8 +108,7 @@ def store_directions(values: Float32, degrees: float, n: int | None = None) -> t
 def restore(storage: Storage, codes: Int64, cursor: Cursor) -> Array:
     """Return the values ``(N, C)`` of ``codes``; raises `CorruptFile`, in the name of ``cursor``, for codes without a value."""
     if storage.id == FLOATS:
-        keys = np.where(codes >= 0, codes, -(codes + 1) - (1 << 31))
-        return keys.astype(np.int32).view(np.float32)
+        return float_values(codes)
     if storage.id == STEPS:
         values = _from_steps(codes, storage.step)
         if not np.isfinite(values).all():
@@ -127,6 +126,11 @@ def restore(storage: Storage, codes: Int64, cursor: Cursor) -> Array:
     if codes.size and (int(codes.min()) < limits.min or int(codes.max()) > limits.max):
         raise cursor.corrupt(f"a value does not fit {storage.dtype}")
     return codes.astype(storage.dtype)
+
+
+def float_values(codes: Int64) -> Float32:
+    """The float32 values of the codes of FLOATS."""
+    return np.where(codes >= 0, codes, -(codes + 1) - (1 << 31)).astype(np.int32).view(np.float32)
 
 
 def pack_storage(storage: Storage) -> bytes:

@@ -14,7 +14,7 @@ from sequences import grid
 from shapes import ball
 
 from gvpipe.attributes.attribute_coding import decode_attribute, encode_attribute
-from gvpipe.attributes.entry_order import DOMAINS
+from gvpipe.attributes.entry_layout import DOMAINS
 from gvpipe.attributes.surface import Surface
 from gvpipe.errors import CorruptFile, InputError
 
@@ -84,7 +84,9 @@ def some_values(n: int, seed: int = 0) -> list[tuple[str, Values, float]]:
 @each_surface
 @pytest.mark.parametrize("domain", DOMAINS)
 def test_every_kind_comes_back(surface: Surface, domain: str) -> None:
-    n = {"vertex": surface.n_vertices, "triangle": len(surface.faces), "part": surface.n_parts, "corner": surface.faces.size}[domain]
+    n = {"vertex": surface.n_vertices, "triangle": len(surface.faces), "part": surface.n_parts, "corner": surface.faces.size}[
+        domain
+    ]
     for kind, values, bound in some_values(n):
         indices = None if domain != "corner" else np.random.default_rng(1).permutation(n) // 4 * 2 % max(n, 1)
         round_trip(values, surface, domain, kind, bound, indices)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from attribute_meshes import each_surface, quilt, surfaces
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from attribute_meshes import each_surface, quilt, surfaces
 from gvpipe.attributes.corner_sharing import GUIDED, LOOSE, SHARED, WHOLE, decode_sharing, encode_sharing, entries_of
 from gvpipe.attributes.surface import Surface
 from gvpipe.container.cursor import Cursor
