@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,19 +91,35 @@ def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Pl
     return Plan(attributes, fields, images, tuple(left_out))
 
 
+@dataclass(frozen=True)
+class FieldCoding:
+    """Another coding of fields than that of `gvpipe.fields`.
+
+    Args:
+        id: its number in section ``asset``.
+        encode: from a field, and the bound that it may have (0: exact), to a section and the bound that this keeps.
+    """
+
+    id: int
+    encode: Callable[[Field, float], tuple[bytes, float]]
+
+
 class AssetCoder:
     """Codes one sequence's asset beside any of its bitstreams.
 
     Args:
         sequence: whose asset it is.
         options: what a user asks.
+        fields: how fields are coded; None: by `gvpipe.fields`.
 
     Raises:
         InputError: as `plan_asset`.
     """
 
-    def __init__(self, sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> None:
-        self._sequence = sequence
+    def __init__(
+        self, sequence: MeshSequence, options: AssetOptions = NO_OPTIONS, fields: FieldCoding | None = None
+    ) -> None:
+        self._sequence, self._coding = sequence, fields
         self.plan = plan_asset(sequence, options)
         self._fields: dict[tuple[str, bytes], bytes] = {}
 
@@ -186,21 +203,30 @@ class AssetCoder:
 
     def _add_fields(self, sections: dict[str, bytes], origins: Origins, surface: Surface) -> tuple[Listed, ...]:
         listed = []
-        key = hashlib.sha256(surface.faces.tobytes()).digest()
         meshes: dict[str, FieldMesh] = {}
         for number, (name, (field, found, span)) in enumerate(self.plan.fields.items()):
             section = f"field.{number}"
-            if (name, key) not in self._fields:
-                mesh = meshes.setdefault(field.domain, FieldMesh(surface.faces, surface.n_vertices, field.domain))
-                rows = origins.of(field.domain)
-                assert rows is not None  # fields are on vertices or triangles
-                self._fields[name, key] = encode_field(
-                    field.select(rows).read, len(field), mesh, _field_bound(found), name, holes=found.holes
-                )
-            sections[section] = self._fields[name, key]
+            rows = origins.of(field.domain)
+            assert rows is not None  # fields are on vertices or triangles
+            moved, bound, coding = field.select(rows), found.bound, CODING
+            if self._coding:
+                coding = self._coding.id
+                sections[section], bound = self._coding.encode(moved, bound)
+            else:
+                if field.domain not in meshes:
+                    meshes[field.domain] = FieldMesh(surface.faces, surface.n_vertices, field.domain)
+                sections[section] = self._code_field(name, moved, found, meshes[field.domain])
             components = field.n_components if len(field.shape) == 3 else 0
-            listed.append(_listed(name, field, components, found.bound, section, span))
+            own = _listed(name, field, components, bound, section, span)
+            listed.append(dataclasses.replace(own, coding=coding))
         return tuple(listed)
+
+    def _code_field(self, name: str, field: Field, found: Precision, mesh: FieldMesh) -> bytes:
+        """The section of a field, coded once for all bitstreams of the same triangles."""
+        key = name, hashlib.sha256(mesh.faces.tobytes()).digest()
+        if key not in self._fields:
+            self._fields[key] = encode_field(field.read, len(field), mesh, _field_bound(found), name, holes=found.holes)
+        return self._fields[key]
 
 
 @dataclass(frozen=True)

@@ -111,6 +111,7 @@ function readAttributes(list, payload, surface, notes) {
       continue;
     }
     const { values, components, type, corners } = decodeAttribute(payload.section(section), surface, section, domain, references);
+    if (components !== given.components || type !== given.dtype) throw corrupt(section, "it does not hold what section 'asset' lists");
     if (WIDTHS[kind] && !WIDTHS[kind].includes(components)) throw corrupt(SECTION, `attribute ${name} has ${components} components`);
     if (corners) references.push(corners);
     const [unit, fullScale] = [entry.text("unit", ""), FULL_SCALES[type] ?? 1];
