@@ -1,8 +1,8 @@
 """Bytes of static attributes beside Draco's, for glTF and OBJ files.
 
 Draco's bytes are those of its file with the attribute less those without, at compression level 10. Both code the same mesh:
-vertices of one position are one, corners have values. Steps are Draco's of 12 bits for texture coordinates, range / (2^12 - 1), and
-of 8 bits for normals, the octahedral lattice of 2^8 - 1 points a side. Colours are exact.
+vertices of one position are one, corners have values. Steps are Draco's of 12 bits for texture coordinates, range / (2^12 - 1),
+and of 8 bits for normals, the octahedral lattice of 2^8 - 1 points a side. Colours are exact.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def read_obj(path: Path) -> Iterator[Mesh]:
         if head in values:
             values[head].append([float(x) for x in fields])
         elif head == "f":
-            fan = [tuple(int(x) - 1 if x else 0 for x in (field.split("/") + ["", ""])[:3]) for field in fields]
+            fan = [tuple(int(x) - 1 if x else 0 for x in [*field.split("/"), "", ""][:3]) for field in fields]
             corners += [triple for i in range(1, len(fan) - 1) for triple in (fan[0], fan[i], fan[i + 1])]
     triples, faces = np.unique(np.array(corners), axis=0, return_inverse=True)
     found = {kind: np.array(values[key], np.float32) for kind, key in (("uv", "vt"), ("normal", "vn")) if values[key]}
@@ -99,12 +99,12 @@ def draco_bytes(mesh: Mesh, kind: str) -> int:
     options: dict[str, Any] = {"quantization_bits": BITS_POSITION, "compression_level": 10}
     points, faces = mesh.positions.astype(np.float32), mesh.faces.astype(np.uint32)
     values = mesh.attributes[kind].astype(np.uint8 if kind == "color" else np.float64)
-    with_it = {
+    every: dict[str, dict[str, Any]] = {
         "uv": {"tex_coord": values, "tex_coord_quantization_bits": BITS_UV},
         "normal": {"normals": values, "normal_quantization_bits": BITS_NORMAL},
         "color": {"colors": values},
-    }[kind]
-    return len(DracoPy.encode(points, faces, **options, **with_it)) - len(DracoPy.encode(points, faces, **options))
+    }
+    return len(DracoPy.encode(points, faces, **options, **every[kind])) - len(DracoPy.encode(points, faces, **options))
 
 
 def store(values: Array, kind: str) -> tuple[storage.Storage, Array]:

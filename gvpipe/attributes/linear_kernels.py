@@ -27,12 +27,14 @@ class Linear(NamedTuple):
         method: one of the above; the last two need two components and positions.
         is_float: codes are the ordered bits of float32 values, and these are predicted.
         triangles: ``(T, 3)`` vertices.
+        opposite: ``(3T,)`` corners over entries.
         positions: ``(V, 3)`` of vertices; none without geometry.
     """
 
     method: int
     is_float: bool
     triangles: Int32
+    opposite: Int64
     positions: Float32
 
 
@@ -152,13 +154,22 @@ def _predict_by_shape(
         if not squared > 0.0:
             continue
         du, dv = numbers[b, 0] - numbers[a, 0], numbers[b, 1] - numbers[a, 1]
-        turn = side
+        across_u, across_v = -side * dv, side * du  # what a step across the edge, as long as the edge, changes
         if o >= 0:
-            cross = du * (numbers[o, 1] - numbers[a, 1]) - dv * (numbers[o, 0] - numbers[a, 0])
+            ou, ov = numbers[o, 0] - numbers[a, 0], numbers[o, 1] - numbers[a, 1]
+            cross = du * ov - dv * ou
             if cross != 0.0:
                 turn = -1.0 if cross > 0.0 else 1.0
-        guess[0] += numbers[a, 0] + along * du - turn * above * dv
-        guess[1] += numbers[a, 1] + along * dv + turn * above * du
+                across_u, across_v = -turn * dv, turn * du
+            if linear.method == AFFINE:
+                third = linear.opposite[corner]
+                o_along, o_above, _ = _coordinates(
+                    linear, linear.triangles[third // 3, third % 3], linear.triangles[t, (k + 1) % 3], linear.triangles[t, (k + 2) % 3]
+                )
+                if o_above > 0.25 * above:
+                    across_u, across_v = (o_along * du - ou) / o_above, (o_along * dv - ov) / o_above
+        guess[0] += numbers[a, 0] + along * du + above * across_u
+        guess[1] += numbers[a, 1] + along * dv + above * across_v
         n += 1
     if n:
         guess[0] /= n

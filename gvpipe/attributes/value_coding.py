@@ -15,6 +15,7 @@ import numpy as np
 
 from gvpipe.arrays import Int64
 from gvpipe.attributes.entry_layout import EntryLayout
+from gvpipe.attributes.surface import opposite_corners
 from gvpipe.attributes.storage import DIRECTIONS, FLOATS, TANGENTS, Storage, float_values
 from gvpipe.container.cursor import Cursor
 
@@ -42,6 +43,7 @@ class Prepared(NamedTuple):
     layout: EntryLayout
     entries: Entries
     owners: Int64
+    opposite: Int64
 
 
 def encode_codes(storage: Storage, codes: Int64, layout: EntryLayout) -> bytes:
@@ -50,7 +52,7 @@ def encode_codes(storage: Storage, codes: Int64, layout: EntryLayout) -> bytes:
         return bytes(3)
     from gvpipe.entropy.serial_coder import SerialEncoder, estimate_bytes
 
-    prepared = Prepared(layout, layout.entries(), layout.owners)
+    prepared = Prepared(layout, layout.entries(), layout.owners, opposite_corners(layout.owners.reshape(-1, 3)))
     has_twins = int(prepared.entries.places.max()) + 1 < len(codes)
 
     def encode(choice: Choice) -> SerialEncoder:
@@ -77,7 +79,7 @@ def decode_codes(cursor: Cursor, storage: Storage, layout: EntryLayout) -> Int64
         from gvpipe.entropy.serial_coder import SerialDecoder
 
         coder = SerialDecoder(cursor.rest(), _n_contexts(choice), cursor.name)
-        _code(coder.coder, storage, choice, codes, Prepared(layout, layout.entries(), layout.owners))
+        _code(coder.coder, storage, choice, codes, Prepared(layout, layout.entries(), layout.owners, opposite_corners(layout.owners.reshape(-1, 3))))
         coder.end()
     cursor.end()
     return codes
@@ -93,7 +95,7 @@ def _methods(storage: Storage, layout: EntryLayout) -> list[int]:
         return [*methods, octahedral_kernels.SURFACE, octahedral_kernels.PLACE] if has_shape else methods
     methods = [linear_kernels.LAST, linear_kernels.MEAN, linear_kernels.PARALLELOGRAM]
     has_plane = has_shape and storage.n_components == 2 and layout.domain in ("vertex", "corner")
-    return [*methods, linear_kernels.CONFORMAL] if has_plane else methods
+    return [*methods, linear_kernels.CONFORMAL, linear_kernels.AFFINE] if has_plane else methods
 
 
 def _code(coder: SerialCoder, storage: Storage, choice: Choice, codes: Int64, prepared: Prepared) -> None:
@@ -117,7 +119,7 @@ def _code(coder: SerialCoder, storage: Storage, choice: Choice, codes: Int64, pr
     numbers = codes.astype(np.float64)
     if storage.id == FLOATS:
         numbers = float_values(codes).astype(np.float64)
-    code_linear(coder, entries, Linear(method, storage.id == FLOATS, surface.faces, positions), codes, numbers)
+    code_linear(coder, entries, Linear(method, storage.id == FLOATS, surface.faces, prepared.opposite, positions), codes, numbers)
 
 
 def _n_contexts(choice: Choice) -> int:

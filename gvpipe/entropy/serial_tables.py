@@ -22,7 +22,7 @@ TOTALS = (64, 256, 1024, TABLE_TOTAL)  # that are tried, beside the counts thems
 
 def write_tables(counts: Int64) -> tuple[bytes, list[Int64]]:
     """Return the bytes of the tables for ``counts (C, MAX_TOKENS)``, and each one's frequencies, none for empty contexts."""
-    is_used = counts.any(axis=1)
+    is_used = np.asarray(counts.any(axis=1))
     described = [_describe(own) if used else (b"", np.zeros(0, np.int64)) for own, used in zip(counts, is_used, strict=True)]
     mask = np.packbits(is_used, bitorder="little").tobytes()
     return mask + b"".join(head for head, _ in described), [table for _, table in described]
