@@ -1,39 +1,19 @@
 /**
  * The order in which an attribute's entries are coded, and the *gates* of each: the earlier entries that predict it. Mirrors
- * `gvpipe.attributes.entry_order` and its kernels.
+ * `gvpipe.attributes.entry_kernels`.
  */
 
-import { linkCorners, nextCorner, oppositeCorners, previousCorner } from "./corners.js";
+import { linkCorners, nextCorner, previousCorner } from "./corners.js";
 
 const LEVELS = 4; // entries that complete this many triangles less one, or more, are alike
 
-/** How many values an attribute has. @param {Uint32Array|null} corners (3T) entries, of domain corner */
-export function countEntries(domain, surface, corners) {
-  if (domain === "corner") return corners.reduce((most, entry) => Math.max(most, entry + 1), 0);
-  return { vertex: surface.nVertices, triangle: surface.faces.length / 3, part: surface.nParts }[domain];
-}
-
-/** (3T) the entry that each corner uses; 0 on the domain part. */
-export function cornerOwners(domain, { faces }, corners) {
-  if (domain === "corner") return corners;
-  if (domain === "vertex") return faces;
-  return Uint32Array.from(faces, (_, c) => (domain === "triangle" ? Math.floor(c / 3) : 0));
-}
-
 /**
- * @returns {{order: Int32Array, starts: Int32Array, gates: Int32Array, places: Uint32Array}} (N) entries, (N + 1) bounds of gates,
- *   (M, 4) entries a, b of a triangle with the entry, the entry across their edge, and the entry's corner, -1: none; (N) a number
- *   for each entry, equal at one place
+ * @typedef {object} EntryOrder
+ * @property {Int32Array} order (N) entries
+ * @property {Int32Array} starts (N + 1) bounds of each one's gates, in that order
+ * @property {Int32Array} gates (M, 4) entries a, b of a triangle with the entry, the entry across their edge, and the entry's corner;
+ *   -1: none
  */
-export function prepareEntries(domain, surface, corners) {
-  const n = countEntries(domain, surface, corners);
-  const places = Uint32Array.from({ length: n }, (_, i) => i);
-  if (domain === "part") return { order: places, starts: new Int32Array(n + 1), gates: new Int32Array(0), places };
-  if (domain === "triangle") return { ...orderByEdges(surface.opposite), places };
-  if (domain === "vertex") return { ...orderByCorners(surface.faces, surface.opposite, n), places: surface.places };
-  corners.forEach((entry, c) => (places[entry] = surface.places[surface.faces[c]]));
-  return { ...orderByCorners(corners, oppositeCorners(corners), n), places };
-}
 
 /** Entries still to come, by how many triangles they complete. */
 class Stacks {
@@ -99,7 +79,8 @@ class Gates {
   }
 }
 
-function orderByCorners(flat, opposite, nEntries) {
+/** Order the entries of corners. @returns {EntryOrder} */
+export function orderByCorners(flat, opposite, nEntries) {
   const { head, after } = linkCorners(flat, nEntries);
   const order = new Int32Array(nEntries);
   const starts = new Int32Array(nEntries + 1);
@@ -137,7 +118,8 @@ function addGates(gates, entry, { flat, opposite, head, after, isDone }) {
   }
 }
 
-function orderByEdges(opposite) {
+/** Order triangles, by their neighbours. @returns {EntryOrder} */
+export function orderByEdges(opposite) {
   const nEntries = opposite.length / 3;
   const order = new Int32Array(nEntries);
   const starts = new Int32Array(nEntries + 1);

@@ -1,8 +1,9 @@
 /** Numbers predicted along the surface: texture coordinates, colours, scalars, vectors. Mirrors `gvpipe.attributes.linear_kernels`. */
 
+import { nextCorner, previousCorner } from "./corners.js";
 import { History } from "./history.js";
 
-export const [LAST, MEAN, PARALLELOGRAM, CONFORMAL] = [0, 1, 2, 3]; // methods
+export const [LAST, PARALLELOGRAM, CONFORMAL, AFFINE] = [0, 2, 3, 4]; // methods; 1 is the mean
 const MAX_CODE = 2 ** 38;
 
 /** Codes of float32: their bits, ordered as the values are. */
@@ -27,8 +28,9 @@ export class LinearDecoder {
    * @param {{method: number, flags: number, shift: number}} how
    * @param {{isFloat: boolean, components: number}} values
    * @param {import("./surface.js").Surface} surface
+   * @param {Int32Array|null} opposite (3T) corners over entries, for method AFFINE
    */
-  constructor(coder, entries, how, { isFloat, components }, surface) {
+  constructor(coder, entries, how, { isFloat, components }, surface, opposite) {
     const n = entries.order.length;
     this.coder = coder;
     this.method = how.method;
@@ -36,13 +38,15 @@ export class LinearDecoder {
     this.components = components;
     this.faces = surface.faces;
     this.positions = surface.positions;
+    this.opposite = opposite;
     this.codes = new Float64Array(n * components);
     this.numbers = isFloat ? new Float64Array(n * components) : this.codes; // what is predicted
     this.history = new History(coder, entries, how, this.codes, components, components);
     this.gates = entries.gates;
     this.guess = new Float64Array(components);
     this.side = 1; // on which the last texture triangle lay
-    this.shape = [0, 0, 0]; // of `#coordinates`
+    this.shape = [0, 0, 0]; // of `#measure`
+    this.across = [0, 0]; // of `#findAcross`
   }
 
   /** @returns {Float64Array} (N, C) codes */
@@ -130,24 +134,19 @@ export class LinearDecoder {
 
   /** Fill `guess` with the average over the gates whose triangles have an edge of some length; false without one. */
   #predictByShape(begin, end) {
-    const { guess, numbers, gates, faces, shape } = this;
+    const { guess, numbers, gates, faces, shape, across } = this;
     let n = 0;
     guess[0] = guess[1] = 0;
     for (let g = begin; g < end; g++) {
-      const [a, b, o, corner] = [2 * gates[4 * g], 2 * gates[4 * g + 1], 2 * gates[4 * g + 2], gates[4 * g + 3]];
-      const first = corner - (corner % 3);
-      this.#measure(faces[corner], faces[first + ((corner + 1) % 3)], faces[first + ((corner + 2) % 3)]);
+      const [a, b, corner] = [2 * gates[4 * g], 2 * gates[4 * g + 1], gates[4 * g + 3]];
+      this.#measure(faces[corner], faces[nextCorner(corner)], faces[previousCorner(corner)]);
       const [along, above, squared] = shape;
       if (!(squared > 0)) continue;
       const du = numbers[b] - numbers[a];
       const dv = numbers[b + 1] - numbers[a + 1];
-      let turn = this.side;
-      if (o >= 0) {
-        const cross = du * (numbers[o + 1] - numbers[a + 1]) - dv * (numbers[o] - numbers[a]);
-        if (cross !== 0) turn = cross > 0 ? -1 : 1;
-      }
-      guess[0] += numbers[a] + along * du - turn * above * dv;
-      guess[1] += numbers[a + 1] + along * dv + turn * above * du;
+      this.#findAcross(g, du, dv, above);
+      guess[0] += numbers[a] + along * du + above * across[0];
+      guess[1] += numbers[a + 1] + along * dv + above * across[1];
       n++;
     }
     if (n) {
@@ -155,6 +154,29 @@ export class LinearDecoder {
       guess[1] /= n;
     }
     return n > 0;
+  }
+
+  /** Fill `across` with what a step across the edge of gate g, as long as the edge, changes. */
+  #findAcross(g, du, dv, above) {
+    const { numbers, gates, faces, shape, across } = this;
+    across[0] = -this.side * dv;
+    across[1] = this.side * du;
+    const [a, o, corner] = [2 * gates[4 * g], 2 * gates[4 * g + 2], gates[4 * g + 3]];
+    if (o < 0) return;
+    const ou = numbers[o] - numbers[a];
+    const ov = numbers[o + 1] - numbers[a + 1];
+    const cross = du * ov - dv * ou;
+    if (cross !== 0) {
+      const turn = cross > 0 ? -1 : 1;
+      across[0] = -turn * dv;
+      across[1] = turn * du;
+    }
+    if (this.method !== AFFINE) return;
+    this.#measure(faces[this.opposite[corner]], faces[nextCorner(corner)], faces[previousCorner(corner)]);
+    const [along, height] = shape;
+    if (!(height > 0.25 * above)) return;
+    across[0] = (along * du - ou) / height;
+    across[1] = (along * dv - ov) / height;
   }
 
   /** Of vertex x over the edge from a to b: place along it, height over it, both in units of its length, whose square is last. */
