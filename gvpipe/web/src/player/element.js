@@ -144,21 +144,24 @@ export class GeometryVideoElement extends HTMLElement {
     this.#unload();
     const loading = this.#loading;
     this.#say("Loading …");
+    let video = null;
     try {
-      const video = await GeometryVideo.load(typeof source === "string" && source[0] === "#" ? embedded(source) : source);
+      video = await GeometryVideo.load(typeof source === "string" && source[0] === "#" ? embedded(source) : source);
       if (loading !== this.#loading) return video.close();
-      this.video = video;
-      this.#positions = await video.frame(0);
-      if (loading !== this.#loading) return undefined;
+      const positions = await video.frame(0);
+      if (loading !== this.#loading) return video.close();
       this.#stage ??= openStage(this.shadowRoot.querySelector("canvas"));
-      await this.#stage.setMesh(video, this.#positions, this.getAttribute("up") ?? "y");
-      if (loading !== this.#loading) return undefined;
-      this.#stage.setWireframe(this.hasAttribute("wireframe"));
-      this.#stage.setFollowing(this.hasAttribute("follow"));
+      await this.#stage.setMesh(video, positions, this.getAttribute("up") ?? "y");
+      if (loading !== this.#loading) return video.close();
+      this.#positions = positions;
     } catch (error) {
+      video?.close();
       if (loading === this.#loading) this.#fail(error);
       return undefined;
     }
+    this.video = video;
+    this.#stage.setWireframe(this.hasAttribute("wireframe"));
+    this.#stage.setFollowing(this.hasAttribute("follow"));
     this.#say("");
     const { model } = this.#stage;
     model.onError = (error) => this.#fail(error);

@@ -40,5 +40,6 @@ export function formatNumber(value, span) {
   const size = Math.max(Math.abs(value), span);
   if (size >= 1e6 || size < 1e-3) return value.toExponential(2).replace("e+", "e");
   const decimals = Math.min(6, Math.max(0, 2 - Math.floor(Math.log10(span || size))));
-  return value.toFixed(decimals);
+  const text = value.toFixed(decimals);
+  return Number(text) === 0 ? "0" : text;
 }

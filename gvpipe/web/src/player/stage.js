@@ -46,6 +46,7 @@ export class Stage {
     this.isFollowing = false; // whether the camera goes where the mesh goes
     this.isFramed = false; // whether the view is still the first one, which follows the picture's shape
     this.model = null;
+    this.turn = 0; // counts meshes, so that a late one does not replace its successor
     this.pending = 0;
     this.observer = new ResizeObserver(() => this.#resize());
     this.observer.observe(canvas);
@@ -60,8 +61,9 @@ export class Stage {
     this.halfBox = max.map((high, axis) => ((high - min[axis]) / 2) * this.scale);
     const { centre, scale, hasGpu } = this;
     const anisotropy = hasGpu ? Math.min(MAX_ANISOTROPY, this.renderer.capabilities.getMaxAnisotropy()) : 1;
+    const turn = ++this.turn;
     const model = await Model.open(video, positions, { centre, scale, hasGpu, anisotropy, environment: () => this.#environment() });
-    this.clear(); // another mesh may have come meanwhile
+    if (turn !== this.turn) return model.dispose(); // another mesh has come meanwhile, or the stage is closed
     this.model = model;
     model.onChange = () => this.requestRender();
     const all = Uint32Array.from({ length: video.vertexCount }, (_, v) => v);
@@ -71,6 +73,7 @@ export class Stage {
     this.camera.up.set(0, up === "z" ? 0 : 1, up === "z" ? 1 : 0);
     this.#resize();
     this.resetView();
+    return undefined;
   }
 
   /** Show `positions (V, 3)`, model units, of frame k. */
@@ -171,6 +174,7 @@ export class Stage {
   }
 
   close() {
+    this.turn++;
     this.clear();
     cancelAnimationFrame(this.pending);
     this.observer.disconnect();
