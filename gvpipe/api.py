@@ -292,16 +292,23 @@ def render(
     frame: int | None = None,
     size: int | tuple[int, int] = 512,
     view: str | tuple[float, float] = "three-quarter",
-    up: str = "y",
+    up: str | None = None,
     turntable: bool = False,
     follow: bool = False,
     error_of: MeshSequence | StrPath | None = None,
     error_max: float | None = None,
     shading: str = "smooth",
     camera: Camera | None = None,
+    field: str | None = None,
+    colormap: str | None = None,
+    field_range: tuple[float, float] | str | None = None,
+    parts: str | Sequence[str] = (),
+    plain: bool = False,
     progress: Progress | None = None,
-) -> None:
-    """Paint a sequence, or a geometry video, as ``.png``, ``.gif`` or ``.mp4``.
+) -> list[str]:
+    """Paint a sequence, or a geometry video, as ``.png``, ``.gif`` or ``.mp4``; return what should be known, a line each.
+
+    Materials, textures and vertex colours show if the sequence has them.
 
     Args:
         source: a sequence, or what `gvpipe.read` takes.
@@ -310,17 +317,23 @@ def render(
         size: pixels, one number for a square or ``(width, height)``; even for MP4.
         view: ``"three-quarter"``, ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``, ``"bottom"`` or
             ``(azimuth, elevation)`` in degrees.
-        up: the world's axis that is up: ``"x"``, ``"y"`` or ``"z"``.
+        up: the world's axis that is up: ``"x"``, ``"y"`` or ``"z"``; None: what the sequence's metadata says, else y.
         turntable: let the camera go once around.
         follow: let the camera go with the mesh, which then stays in the middle of the picture.
         error_of: a reference; colours then show each vertex' distance from it, with a legend.
         error_max: where the colours end, percent of the reference's diagonal, instead of at the largest error drawn.
         shading: ``"smooth"`` or ``"flat"``.
         camera: instead of the one that frames the whole motion from ``view``.
+        field: name of a field; colours then show its values, or its vectors' lengths, with a legend. What has no value is grey.
+        colormap: of the field: ``"viridis"`` (default), ``"magma"``, ``"coolwarm"``, ``"gray"`` or ``"errors"``.
+        field_range: the values at the ends of the colours; ``"symmetric"``: about 0. By default the range of the frames drawn.
+        parts: the name of the part to paint, or several; none: all.
+        plain: paint the shape alone, without materials and colours.
         progress: called with ``"render"`` and the part that is done.
 
     Raises:
-        InputError: a value that cannot be, a sequence without triangles, a reference that does not fit.
+        InputError: a value that cannot be, a sequence without triangles, a reference that does not fit, an unknown field or
+            part, a texture without its uv attribute.
         OutputError: the file cannot be written; no part of it is left.
     """
     from gvpipe.rendering.films import PictureOptions, check_output, write_pictures
@@ -337,13 +350,19 @@ def render(
         error_max=error_max,
         shading=shading,
         camera=camera,
+        field=field,
+        colormap=colormap,
+        limits=field_range,
+        parts=(parts,) if isinstance(parts, str) else tuple(parts),
+        plain=plain,
     )
     check_output(target, options)
     for given in (source, error_of):
         if given is not None and _is_among(path, given):
             raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
     reference = error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of)
-    write_pictures(source if isinstance(source, MeshSequence) else read(source), target, options, reference, progress)
+    sequence = source if isinstance(source, MeshSequence) else read(source)
+    return list(write_pictures(sequence, target, options, reference, progress))
 
 
 def info(path: StrPath) -> Info:

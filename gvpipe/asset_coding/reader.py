@@ -14,7 +14,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int32
+from gvpipe.arrays import Array, Float32, Int32
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, Material
@@ -32,6 +32,7 @@ from gvpipe.errors import InputError, corrupt_section, in_file
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.reader import FieldReader
 
+Read = Callable[[int, int], Float32]
 Thing = TypeVar("Thing")
 Lock = AbstractContextManager[bool]
 
@@ -43,13 +44,15 @@ class AssetReader:
         bitstream: that holds it, or nothing of it.
         reader: of its frames.
         path: of the file, for messages.
+        read: as ``reader.read``, but from any thread; None: ``reader.read``.
 
     Raises:
         CorruptFile: here or later: a section is not what `AssetCoder` writes.
     """
 
-    def __init__(self, bitstream: Bitstream, reader: FrameReader, path: str = "") -> None:
+    def __init__(self, bitstream: Bitstream, reader: FrameReader, path: str = "", read: Read | None = None) -> None:
         self._bitstream, self._reader, self._path = bitstream, reader, path
+        self._read = read or reader.read
         self._lock: Lock = threading.RLock()
         self._meshes: dict[str, FieldMesh] = {}
         self.directory = Directory()
@@ -123,7 +126,7 @@ class AssetReader:
 
     @cached_property
     def _surface(self) -> Surface:
-        positions = self._reader.read(0, 1)[0] if self.directory.geometry else None
+        positions = self._read(0, 1)[0] if self.directory.geometry else None
         return Surface(self.faces, self._bitstream.n_vertices, positions, len(self.directory.parts))
 
     def _attribute(self, listed: Listed) -> Attribute:

@@ -15,8 +15,8 @@ import numpy as np
 
 from gvpipe.arrays import Int64
 from gvpipe.attributes.entry_layout import EntryLayout
-from gvpipe.attributes.surface import opposite_corners
 from gvpipe.attributes.storage import DIRECTIONS, FLOATS, TANGENTS, Storage, float_values
+from gvpipe.attributes.surface import opposite_corners
 from gvpipe.container.cursor import Cursor
 
 if TYPE_CHECKING:

@@ -7,9 +7,12 @@ from dataclasses import dataclass
 
 from gvpipe.io.gltf import GltfLoader, encode_glb
 from gvpipe.io.mesh import EncoderMaker, Loader
-from gvpipe.io.obj import ObjLoader, encode_obj
-from gvpipe.io.off import OffLoader, encode_off
-from gvpipe.io.ply import encode_ply, load_ply
+from gvpipe.io.obj import ObjLoader
+from gvpipe.io.obj_writer import encode_obj
+from gvpipe.io.off import OffLoader
+from gvpipe.io.off_writer import encode_off
+from gvpipe.io.ply import PlyLoader
+from gvpipe.io.ply_writer import encode_ply
 from gvpipe.io.stl import StlLoader, encode_stl
 
 
@@ -28,7 +31,7 @@ class FrameFormat:
 
 FRAME_FORMATS = {
     ".obj": FrameFormat(ObjLoader, encode_obj),
-    ".ply": FrameFormat(lambda: load_ply, encode_ply),
+    ".ply": FrameFormat(PlyLoader, encode_ply),
     ".stl": FrameFormat(StlLoader, encode_stl),
     ".off": FrameFormat(OffLoader, encode_off),
     ".glb": FrameFormat(GltfLoader, encode_glb),

@@ -14,9 +14,10 @@ from gvpipe.fields import head
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.reader import FieldReader
-from gvpipe.fields.segment import MODES
+from gvpipe.fields.segment import MODES as ALL_MODES
 from gvpipe.fields.values import FieldBound, to_integers
 
+MODES = ALL_MODES[:3]  # without positions
 FIELDS = sorted((DATA / "fields").glob("*.npz"))
 
 
