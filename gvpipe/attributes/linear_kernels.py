@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Float32, Float64, Int32, Int64
-from gvpipe.attributes.match_kernels import Entries, code_match, near_magnitude, new_history, remember, residual_context
+from gvpipe.attributes.entry_kernels import EntryOrder
+from gvpipe.attributes.match_kernels import N_CLASSES, Entries, code_match, near_magnitude, new_history, remember, residual_context
 from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
 
@@ -54,10 +55,11 @@ def code_linear(coder: SerialCoder, entries: Entries, linear: Linear, codes: Int
             numbers[entry] = numbers[match]
         else:
             _predict(entries, linear, i, numbers, guess, side[0])
-            previous = 0
+            previous, least = 0, _least_class(order, i)
             for c in range(n_components):
                 base = _round(guess[c], linear.is_float, bits)
-                context = residual_context(c, (near_magnitude(entries, history, i, c) + 2 * previous) >> entries.shift)
+                near = near_magnitude(entries, history, i, c) + 2 * previous
+                context = residual_context(c, near >> entries.shift, least)
                 residual = code_value(coder, context, codes[entry, c] - base)
                 if not coder.encodes:
                     code = base + residual
@@ -71,6 +73,15 @@ def code_linear(coder: SerialCoder, entries: Entries, linear: Linear, codes: Int
         if linear.method >= CONFORMAL:
             _note_side(order.gates, order.starts[i], order.starts[i + 1], entry, numbers, side)
         remember(entries, history, entry, match >= 0)
+
+
+@compiled
+def _least_class(order: EntryOrder, i: int) -> int:
+    """The class that residuals of entry i of the order have at least: without a triangle they are large."""
+    first = order.starts[i]
+    if first == order.starts[i + 1]:
+        return N_CLASSES - 1
+    return N_CLASSES - 2 if order.gates[first, 1] < 0 else 0
 
 
 @compiled

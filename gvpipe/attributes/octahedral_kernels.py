@@ -54,7 +54,7 @@ def code_octahedral(coder: SerialCoder, entries: Entries, octahedral: Octahedral
         _to_chart(codes[entry], axis, flip, n, chart)
         previous = 0
         for c in range(2):
-            context = residual_context(c, (near_magnitude(entries, history, i, c) + 2 * previous) >> entries.shift)
+            context = residual_context(c, (near_magnitude(entries, history, i, c) + 2 * previous) >> entries.shift, 0)
             residual = code_value(coder, context, chart[c] - guess[(axis + 1 + c) % 3])
             chart[c] = guess[(axis + 1 + c) % 3] + residual
             previous = abs(residual)
@@ -64,7 +64,7 @@ def code_octahedral(coder: SerialCoder, entries: Entries, octahedral: Octahedral
             chart[0] = chart[1] = 0
         _from_chart(chart, axis, flip, n, codes[entry])
         if codes.shape[1] == 4:
-            context = residual_context(1, (2 * history.magnitudes[order.order[i - 1], 2] if i > 0 else 0) >> entries.shift)
+            context = residual_context(1, (2 * history.magnitudes[order.order[i - 1], 2] if i > 0 else 0) >> entries.shift, 0)
             differs = code_value(coder, context, 1 if codes[entry, 3] != guess[3] else 0)
             codes[entry, 3] = guess[3] if differs == 0 else -guess[3]
             history.magnitudes[entry, 2] = min(abs(differs), 1)
