@@ -33,6 +33,7 @@ SHARED = {
     "gvpipe.entropy.tokens": "DIRECT TABLE_TOTAL MAX_TOKENS CHUNK",
     "gvpipe.errors": "REMEDY",
     "gvpipe.media.video": "MAX_SIDE",
+    "gvpipe.rasterizer.colormaps": "MAGMA VIRIDIS",
     "gvpipe.repeated_frames": "SECTION",
     "gvpipe.trajectory.basis": "MAX_COMPONENTS MAX_SCALE PER_OCTAVE LEAST_OUTSIDE",
     "gvpipe.trajectory.coefficient_coding": "LARGEST MAX_VALUES",

@@ -7,6 +7,7 @@ by `gvpipe.web.field_export`.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 
 from gvpipe.asset.field import Field
 from gvpipe.asset_coding.directory import SECTION, Listed, pack_directory, unpack_directory
@@ -23,13 +24,16 @@ def with_web_fields(player: Player) -> Bitstream:
     bitstream = player.bitstream
     if not player.fields:
         return bitstream
+    shown = shown_fields(player.fields)
     directory = unpack_directory(bitstream.section(SECTION), bitstream.n_vertices)
     sections = dict(bitstream.sections)
     listed = []
     for each in directory.fields:
-        if each.name in player.fields:
-            sections[each.section], own = _code_again(each, player.fields[each.name])
+        if each.name in shown:
+            sections[each.section], own = _code_again(each, shown[each.name])
             listed.append(own)
+        elif each.name in player.fields:
+            del sections[each.section]
         else:
             listed.append(each)
     sections[SECTION] = pack_directory(dataclasses.replace(directory, fields=tuple(listed)))
@@ -43,9 +47,15 @@ def carry_asset(player: Player, encoded: Encoded, codec: Codec) -> Bitstream:
     """
     directory = player.directory
     attributes = {each.name: each.bound or "exact" for each in directory.attributes if each.name in player.attributes}
-    fields = {each.name: f"{each.bound or 'exact'},nan=keep" for each in directory.fields if each.name in player.fields}
-    coder = AssetCoder(player.sequence(), AssetOptions.of(attributes, fields, None), FieldCoding(CODING, _encode))
+    shown = shown_fields(player.fields)
+    fields = {each.name: f"{each.bound or 'exact'},nan=keep" for each in directory.fields if each.name in shown}
+    coder = AssetCoder(dataclasses.replace(player.sequence(), fields=shown), AssetOptions.of(attributes, fields, None), FieldCoding(CODING, _encode))
     return coder.add(encoded, codec)
+
+
+def shown_fields(fields: Mapping[str, Field]) -> dict[str, Field]:
+    """Those that the player shows: it computes normals itself."""
+    return {name: field for name, field in fields.items() if field.kind != "normal"}
 
 
 def _code_again(listed: Listed, field: Field) -> tuple[bytes, Listed]:

@@ -129,6 +129,10 @@ function readFields(list, payload, video, notes) {
     const dtype = entry.text("dtype");
     const coding = entry.integer("coding", undefined, 0, MAX_ITEMS);
     if (fields.has(name)) throw corrupt(SECTION, `there are two fields ${name}`);
+    if (given.kind === "normal") {
+      notes.push(`field ${name} is not used: light falls on normals computed from the surface`);
+      continue;
+    }
     if (coding !== WEB_CODING) {
       notes.push(`field ${name} is not shown: gvpipe export-html makes a page that shows it`);
       continue;

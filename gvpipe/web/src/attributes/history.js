@@ -15,14 +15,14 @@ export function countContexts(flags) {
   return N_RESIDUAL_CONTEXTS + (flags ? N_MATCH_CONTEXTS : 0);
 }
 
-/** The context of a residual of which `magnitude`, an integer, is expected. */
-export function residualContext(component, magnitude) {
+/** The context of a residual of which `magnitude`, an integer, is expected, and of which the class is `least` at least. */
+export function residualContext(component, magnitude, least) {
   let bits = 0;
   while (magnitude > 0 && bits < N_CLASSES - 1) {
     magnitude = Math.floor(magnitude / 2);
     bits++;
   }
-  return bits + (component > 0 ? N_CLASSES : 0);
+  return Math.max(bits, least) + (component > 0 ? N_CLASSES : 0);
 }
 
 /** Entries in order, and what is remembered of those that are done. */
@@ -75,7 +75,7 @@ export class History {
     this.matched[entry] = isMatch ? 1 : 0;
   }
 
-  /** Twice the mean magnitude of the residuals of the entries that predict entry i of the order. */
+  /** Four times the mean magnitude of the residuals of the entries that predict entry i of the order. */
   nearMagnitude(i, component) {
     const { starts, gates, magnitudes, nMagnitudes } = this;
     let [total, n] = [0, 0];
@@ -88,12 +88,19 @@ export class History {
       }
     }
     if (n === 0 && i > 0) [total, n] = [magnitudes[this.order[i - 1] * nMagnitudes + component], 1];
-    return n ? Math.floor((2 * total) / n) : 0;
+    return n ? Math.floor((4 * total) / n) : 0;
   }
 
   /** The context of a component's residual; `previous` is the magnitude of that of the component before. */
-  context(i, component, previous) {
-    return residualContext(component, Math.floor((this.nearMagnitude(i, component) + 2 * previous) / this.scale));
+  context(i, component, previous, least) {
+    return residualContext(component, Math.floor((this.nearMagnitude(i, component) + 2 * previous) / this.scale), least);
+  }
+
+  /** The class that residuals of entry i of the order have at least: without a triangle they are large. */
+  leastClass(i) {
+    const { starts, gates } = this;
+    if (starts[i] === starts[i + 1]) return N_CLASSES - 1;
+    return gates[4 * starts[i] + 1] < 0 ? N_CLASSES - 2 : 0;
   }
 
   copy(entry, from) {

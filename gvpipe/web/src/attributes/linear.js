@@ -73,9 +73,10 @@ export class LinearDecoder {
 
   #decodeResiduals(i, entry) {
     const { history, codes, numbers, components, isFloat } = this;
+    const least = history.leastClass(i);
     let previous = 0;
     for (let c = 0; c < components; c++) {
-      const residual = this.coder.value(history.context(i, c, previous));
+      const residual = this.coder.value(history.context(i, c, previous, least));
       const code = this.#round(this.guess[c]) + residual;
       const isCode = isFloat ? code >= -(2 ** 31) && code < 2 ** 31 : Math.abs(code) < MAX_CODE;
       if (!isCode) throw this.coder.corrupt("a value is out of range");

@@ -48,7 +48,7 @@ export class OctahedralDecoder {
     const chart = [0, 0];
     let previous = 0;
     for (let c = 0; c < 2; c++) {
-      const residual = this.coder.value(history.context(i, c, previous));
+      const residual = this.coder.value(history.context(i, c, previous, 0));
       chart[c] = guess[(axis + 1 + c) % 3] + residual;
       previous = Math.abs(residual);
       history.magnitudes[3 * entry + c] = previous;
@@ -70,7 +70,7 @@ export class OctahedralDecoder {
   #decodeSign(i, entry) {
     const { history, guess } = this;
     const near = i > 0 ? 2 * history.magnitudes[3 * history.order[i - 1] + 2] : 0;
-    const differs = this.coder.value(residualContext(1, Math.floor(near / history.scale)));
+    const differs = this.coder.value(residualContext(1, Math.floor(near / history.scale), 0));
     this.codes[4 * entry + 3] = differs === 0 ? guess[3] : -guess[3];
     history.magnitudes[3 * entry + 2] = Math.min(Math.abs(differs), 1);
   }

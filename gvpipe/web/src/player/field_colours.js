@@ -12,6 +12,7 @@ import {
 } from "three";
 import { HOLE, SIZE, colourTable } from "./colormaps.js";
 import { OFFSET } from "./materials.js";
+import { toLinear } from "./vertex_attributes.js";
 
 const UV_CHANNEL = 3; // the last of three.js's uv sets; materials have the others
 const UV_NAME = `uv${UV_CHANNEL}`;
@@ -73,17 +74,19 @@ export class FieldColours {
     const { values, rows } = this;
     const { components } = this.field;
     const { array } = this.attribute;
-    const scale = 1 / this.field.fullScale;
+    const { fullScale } = this.field;
     for (let r = 0; r < rows.length; r++) {
-      for (let i = 0; i < 3; i++) array[3 * r + i] = values[rows[r] * components + i] * scale || 0;
+      for (let i = 0; i < 3; i++) {
+        const value = values[rows[r] * components + i] / fullScale || 0;
+        array[3 * r + i] = fullScale > 1 ? toLinear(value) : value; // integers are sRGB
+      }
     }
   }
 }
 
 /** (SIZE + 1, 3): the colour map and the colour of holes as linear light, for vertices of their own. */
 export function linearTable(colormap) {
-  const bytes = [...colourTable(colormap), ...HOLE];
-  return Float32Array.from(bytes, (byte) => (byte <= 10 ? byte / 255 / 12.92 : ((byte / 255 + 0.055) / 1.055) ** 2.4));
+  return Float32Array.from([...colourTable(colormap), ...HOLE], (byte) => toLinear(byte / 255));
 }
 
 /** The colours' range: that of the field, from 0 for lengths; about 0 for a diverging map. */

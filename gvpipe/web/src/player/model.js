@@ -163,7 +163,7 @@ export class Model {
       this.geometry.setAttribute(channel ? `uv${channel}` : "uv", new BufferAttribute(array, 2));
     }
     if (this.colours) {
-      this.geometry.setAttribute("color", new BufferAttribute(colourArray(this.colours, rowsOf(this.colours)), 4));
+      this.geometry.setAttribute("color", new BufferAttribute(colourArray(this.colours, rowsOf(this.colours), !this.#video.materials.length), 4));
     }
     for (const object of this.group.children) object.geometry = this.geometry;
     if (this.#surface) this.#update();

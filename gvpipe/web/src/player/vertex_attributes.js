@@ -41,11 +41,25 @@ export function uvArray({ values }, entries) {
   return array;
 }
 
-/** (R, 4): linear colours, 0..1. @param {Uint32Array} entries (R) */
-export function colourArray({ values, components, fullScale }, entries) {
+/**
+ * (R, 4): linear colours, 0..1.
+ *
+ * @param {Uint32Array} entries (R)
+ * @param {boolean} isAlone whether there are no materials: integers are then sRGB, as in PLY; beside materials linear, as in glTF
+ */
+export function colourArray({ values, components, fullScale }, entries, isAlone) {
   const array = new Float32Array(4 * entries.length).fill(1);
+  const isSrgb = isAlone && fullScale > 1;
   for (let r = 0; r < entries.length; r++) {
-    for (let i = 0; i < components; i++) array[4 * r + i] = values[components * entries[r] + i] / fullScale;
+    for (let i = 0; i < components; i++) {
+      const value = Math.min(1, Math.max(0, values[components * entries[r] + i] / fullScale));
+      array[4 * r + i] = isSrgb && i < 3 ? toLinear(value) : value;
+    }
   }
   return array;
+}
+
+/** Linear light of an sRGB value, both 0..1. */
+export function toLinear(value) {
+  return value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4;
 }
