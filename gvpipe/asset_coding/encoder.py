@@ -116,9 +116,7 @@ class AssetCoder:
         InputError: as `plan_asset`.
     """
 
-    def __init__(
-        self, sequence: MeshSequence, options: AssetOptions = NO_OPTIONS, fields: FieldCoding | None = None
-    ) -> None:
+    def __init__(self, sequence: MeshSequence, options: AssetOptions = NO_OPTIONS, fields: FieldCoding | None = None) -> None:
         self._sequence, self._coding = sequence, fields
         self.plan = plan_asset(sequence, options)
         self._fields: dict[tuple[str, bytes], bytes] = {}

@@ -49,7 +49,11 @@ def carry_asset(player: Player, encoded: Encoded, codec: Codec) -> Bitstream:
     attributes = {each.name: each.bound or "exact" for each in directory.attributes if each.name in player.attributes}
     shown = shown_fields(player.fields)
     fields = {each.name: f"{each.bound or 'exact'},nan=keep" for each in directory.fields if each.name in shown}
-    coder = AssetCoder(dataclasses.replace(player.sequence(), fields=shown), AssetOptions.of(attributes, fields, None), FieldCoding(CODING, _encode))
+    coder = AssetCoder(
+        dataclasses.replace(player.sequence(), fields=shown),
+        AssetOptions.of(attributes, fields, None),
+        FieldCoding(CODING, _encode),
+    )
     return coder.add(encoded, codec)
 
 

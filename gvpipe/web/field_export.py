@@ -99,7 +99,7 @@ def encode_web_field(field: Field, bound: float = 0.0) -> WebField:
 
 
 def find_range(field: Field) -> tuple[float, float, float]:
-    """The smallest and the largest finite value and the largest Euclidean length of a row; ``(inf, -inf, 0)`` of holes alone."""
+    """The smallest and the largest finite value, and the largest length of a row; ``(inf, -inf, 0)`` of holes alone."""
     low, high, largest = math.inf, -math.inf, 0.0
     count = max(1, PASS_VALUES // (field.shape[1] * field.n_components))
     for start in range(0, len(field), count):
@@ -148,4 +148,3 @@ def _residuals(levels: Array, order: int, rows: int) -> Array:
 def _planes(residuals: Array) -> bytes:
     folded = np.where(residuals < 0, -2 * residuals - 1, 2 * residuals).astype(np.uint16).ravel()
     return (folded & 255).astype(np.uint8).tobytes() + (folded >> 8).astype(np.uint8).tobytes()
-

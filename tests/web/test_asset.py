@@ -1,4 +1,4 @@
-"""What an asset has beside positions, as the module reads it in a browser: Python's values bit by bit, and errors for damage."""
+"""What an asset has beside positions, as the module reads it: Python's values bit by bit, and errors for damage."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from asset_files import write_asset
 from pages import TEXT, check_frames
 from sequences import awkward, waving
 
-import gvpipe
 from gvpipe import Attribute, Field, Image, Material, Part, Texture
 from gvpipe.container.mp4 import read_file
 from gvpipe.player import Player
@@ -30,11 +29,13 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(browsers.missing()), rea
 READ = f"""{TEXT} const video = await GeometryVideo.load(args[0]);
     const attributes = {{}};
     for (const [name, {{ values, indices, components, domain, kind, unit, type }}] of video.attributes) {{
-      attributes[name] = {{ values: text(Float64Array.from(values)), indices: indices && text(indices), components, domain, kind, unit, type }};
+      const own = {{ values: text(Float64Array.from(values)), indices: indices && text(indices) }};
+      attributes[name] = {{ ...own, components, domain, kind, unit, type }};
     }}
     const {{ parts, polygons, notes, materials }} = video;
     const images = video.images.map(({{ name, mediaType, data }}) => [name, mediaType, text(data.slice())]);
-    return {{ attributes, parts, polygons: polygons && [...polygons], notes, materials, images, indices: text(video.indices) }};"""
+    const counts = polygons && [...polygons];
+    return {{ attributes, parts, polygons: counts, notes, materials, images, indices: text(video.indices) }};"""
 FIELD = f"""{TEXT} const video = await GeometryVideo.load(args[0]);
     const field = video.fields.get(args[1]);
     const frames = [];
@@ -114,7 +115,7 @@ def rebuilt(sequence: MeshSequence, **changes: Any) -> MeshSequence:
 
 
 def quads(n: int = 7, n_frames: int = 6) -> MeshSequence:
-    """Two waving sheets of quads, of which some are triangles and one is a hexagon, as three parts; the first two share a sheet."""
+    """Two waving sheets of quads, triangles and hexagons, as three parts; the first two share a sheet."""
     sheet = waving(n, n_frames)
     y, x = np.divmod(np.arange(n * n), n)
     corners = np.flatnonzero((x < n - 1) & (y < n - 1))
@@ -130,7 +131,7 @@ def quads(n: int = 7, n_frames: int = 6) -> MeshSequence:
     ends = np.cumsum(counts - 2)
     first, half, end = int(ends[9]), int(ends[len(polygons) // 2 - 1]), int(ends[-1])
     one = sheet.read(0, n_frames)
-    both = np.concatenate([one, one + np.float32([1.5, 0, 0])], axis=1)
+    both = np.concatenate([one, one + np.array([1.5, 0, 0], np.float32)], axis=1)
     parts = (
         Part("sheet", (0, n * n), (0, first), 0),
         Part("sheet", (0, n * n), (first, half)),

@@ -1,4 +1,4 @@
-"""Pictures of assets in the player: textures, colours, fields, parts and hard edges, by the pixels where points of the mesh lie."""
+"""Pictures of assets in the player: textures, colours, fields, parts, hard edges, by pixels where points of the mesh lie."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def sheet(**changes: Any) -> MeshSequence:
     """The unit square of 2 x 2 quads at z = 0, which turns a little."""
     y, x = np.divmod(np.arange(9), 3)
     points = np.c_[x / 2, y / 2, 0 * x].astype(np.float32)
-    frames = np.stack([points, points + np.float32([0, 0, 0.05]) * points[:, :1]])
+    frames = np.stack([points, points + np.array([0, 0, 0.05], np.float32) * points[:, :1]])
     cells = np.array([[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [3, 4, 7], [3, 7, 6], [4, 5, 8], [4, 8, 7]])
     return MeshSequence(frames, cells, 24.0, **changes)
 
@@ -81,7 +81,7 @@ def textured(texture: Texture, **changes: Any) -> MeshSequence:
 
 
 def near(pixel: Pixels, colour: npt.ArrayLike, by: int = 3) -> bool:
-    return bool(pixel[3] == 255 and np.abs(pixel[:3] - colour).max() <= by)
+    return bool(pixel[3] == 255 and np.abs(pixel[:3] - np.asarray(colour, int)).max() <= by)
 
 
 def test_a_textured_quad_shows_its_picture(player: Player, site: Site) -> None:
@@ -169,16 +169,22 @@ def test_fields_show_their_colours(player: Player, site: Site) -> None:
 
 
 def test_menus_choose_fields_maps_and_parts(player: Player, site: Site) -> None:
-    one, two = sheet(), np.asarray(sheet().positions[0:2]) + np.float32([1.2, 0, 0])
+    one, two = sheet(), np.asarray(sheet().positions[0:2]) + np.array([1.2, 0, 0], np.float32)
     both = np.concatenate([np.asarray(one.positions[0:2]), two], axis=1)
-    parts = [Part("left", (0, 9), (0, 8), 0), Part("right", (9, 18), (8, 16), 1)]
-    materials = [Material(base_color=(1, 0, 0, 1), unlit=True), Material(base_color=(0, 0, 1, 1), unlit=True)]
+    parts = (Part("left", (0, 9), (0, 8), 0), Part("right", (9, 18), (8, 16), 1))
+    materials = (Material(base_color=(1, 0, 0, 1), unlit=True), Material(base_color=(0, 0, 1, 1), unlit=True))
     sequence = MeshSequence(
-        both, np.concatenate([one.faces, one.faces + 9]), 24.0, parts=parts, materials=materials, fields={"x": both[:, :, 0] - 1}
+        both,
+        np.concatenate([one.faces, one.faces + 9]),
+        24.0,
+        parts=parts,
+        materials=materials,
+        fields={"x": both[:, :, 0] - 1},
     )
     shot = show(player, sequence, site)
     assert near(shot(0.5, 0.5, 0), [255, 0, 0]) and near(shot(1.7, 0.5, 0), [0, 0, 255])
-    click = "[...element.shadowRoot.querySelectorAll('.panel li')].find((row) => row.innerText === args[0]).querySelector('input').click();"
+    click = """const rows = [...element.shadowRoot.querySelectorAll('.panel li')];
+        rows.find((row) => row.innerText === args[0]).querySelector('input').click();"""
     player("element.shadowRoot.querySelector('.panel details').open = true")
     shot = again(player, click, "left")
     assert shot(0.5, 0.5, 0)[3] == 0 and near(shot(1.7, 0.5, 0), [0, 0, 255])
@@ -199,8 +205,8 @@ def test_hard_edges_are_hard_in_every_frame(player: Player, site: Site) -> None:
     """A roof whose vertices are shared: smooth without normals, with a ridge where corners have two."""
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 0.5, 0.5], [1, 0.5, 0.5], [0, 1, 0], [1, 1, 0]], np.float32)
     faces = np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]])
-    frames = np.stack([points, points * np.float32([1, 1, 0.4])])
-    sides = np.float32([[0, -0.7071068, 0.7071068], [0, 0.7071068, 0.7071068]])
+    frames = np.stack([points, points * np.array([1, 1, 0.4], np.float32)])
+    sides = np.array([[0, -0.7071068, 0.7071068], [0, 0.7071068, 0.7071068]], np.float32)
     normal = Attribute(sides, "corner", "normal", indices=np.repeat([0, 0, 1, 1], 3).astype(np.int32))
     steps = {}
     for name, attributes in {"hard": {"normal": normal}, "smooth": {}}.items():
@@ -232,7 +238,9 @@ def test_pictures_that_browsers_cannot_show_are_said(player: Player, site: Site)
 
 def test_playing_a_field_keeps_up(player: Player, site: Site) -> None:
     """Several groups of frames, looped: every frame shown has the field's values of that frame."""
-    frames = np.repeat(np.asarray(sheet().positions[0:1]), 80, axis=0) + np.linspace(0, 0.2, 80, dtype=np.float32)[:, None, None]
+    frames = (
+        np.repeat(np.asarray(sheet().positions[0:1]), 80, axis=0) + np.linspace(0, 0.2, 80, dtype=np.float32)[:, None, None]
+    )
     values = (np.arange(80)[:, None] / 79 + np.zeros((1, 9))).astype(np.float32)
     show(player, MeshSequence(frames, sheet().faces, 60.0, fields={"time": values}), site, field="time", loop="")
     wrong, shown = player(
