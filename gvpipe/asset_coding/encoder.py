@@ -97,11 +97,12 @@ class FieldCoding:
 
     Args:
         id: its number in section ``asset``.
-        encode: from a field, and the bound that it may have (0: exact), to a section and the bound that this keeps.
+        encode: from a field, the mesh's ``faces (T, 3)`` and the bound that it may have (0: exact), to a section and the bound
+            that this keeps.
     """
 
     id: int
-    encode: Callable[[Field, float], tuple[bytes, float]]
+    encode: Callable[[Field, Int32, float], tuple[bytes, float]]
 
 
 class AssetCoder:
@@ -209,7 +210,7 @@ class AssetCoder:
             moved, bound, coding = field.select(rows), found.bound, CODING
             if self._coding:
                 coding = self._coding.id
-                sections[section], bound = self._coding.encode(moved, bound)
+                sections[section], bound = self._coding.encode(moved, surface.faces, bound)
             else:
                 if field.domain not in meshes:
                     meshes[field.domain] = FieldMesh(surface.faces, surface.n_vertices, field.domain)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
+from gvpipe.arrays import Int32
 from gvpipe.asset.field import Field
 from gvpipe.asset_coding.directory import SECTION, Listed, pack_directory, unpack_directory
 from gvpipe.asset_coding.encoder import AssetCoder, FieldCoding
@@ -30,7 +31,7 @@ def with_web_fields(player: Player) -> Bitstream:
     listed = []
     for each in directory.fields:
         if each.name in shown:
-            sections[each.section], own = _code_again(each, shown[each.name])
+            sections[each.section], own = _code_again(each, shown[each.name], player.faces)
             listed.append(own)
         elif each.name in player.fields:
             del sections[each.section]
@@ -62,12 +63,12 @@ def shown_fields(fields: Mapping[str, Field]) -> dict[str, Field]:
     return {name: field for name, field in fields.items() if field.kind != "normal"}
 
 
-def _code_again(listed: Listed, field: Field) -> tuple[bytes, Listed]:
-    coded = encode_web_field(field, listed.bound)
+def _code_again(listed: Listed, field: Field, faces: Int32) -> tuple[bytes, Listed]:
+    coded = encode_web_field(field, faces, listed.bound)
     bound = listed.bound + coded.bound  # the file's own error is still there
     return coded.data, dataclasses.replace(listed, coding=CODING, bound=bound, range=coded.range)
 
 
-def _encode(field: Field, bound: float) -> tuple[bytes, float]:
-    coded = encode_web_field(field, bound)
+def _encode(field: Field, faces: Int32, bound: float) -> tuple[bytes, float]:
+    coded = encode_web_field(field, faces, bound)
     return coded.data, bound + coded.bound

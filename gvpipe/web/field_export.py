@@ -10,7 +10,8 @@ The residual of a level is its difference from a prediction modulo 2^16, folded 
 
 - order 0 predicts 0, order 1 the frame before, order 2 the line through the two frames before; the first frame of a group
   is predicted by 0, its second by the first if the order is not 0;
-- where ``rows`` is 1, and in frames predicted by 0, what is left is predicted by what is left of the row before.
+- where ``rows`` is 1, and in frames predicted by 0, what is left is predicted by what is left of the *parent*: of a vertex its
+  last neighbour before it, of triangles and of vertices without one the row before; the first row has none.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32
+from gvpipe.arrays import Array, Float32, Int32, Int64
 from gvpipe.asset.field import Field
 from gvpipe.errors import InputError
 
@@ -74,11 +75,12 @@ class Lattice:
         return np.where(levels == 0, np.nan, values).astype(np.float32)
 
 
-def encode_web_field(field: Field, bound: float = 0.0) -> WebField:
+def encode_web_field(field: Field, faces: Int32, bound: float = 0.0) -> WebField:
     """Code a field for the web player.
 
     Args:
         field: read twice, some frames at a time.
+        faces: ``(T, 3)`` of the mesh, over the field's vertices.
         bound: that the field itself keeps; the coding's is that or 1/1023 of the range, whichever is larger. Integers of at
             most 65535 levels are exact.
 
@@ -91,8 +93,10 @@ def encode_web_field(field: Field, bound: float = 0.0) -> WebField:
     low, high, largest = find_range(field)
     lattice, kept = choose_lattice(low, high, bound, field.dtype.kind in "iu")
     size = max(1, min(MAX_GROUP, n_frames, GROUP_VALUES // n_values))
+    parents = find_parents(field.shape[1], faces if field.domain == "vertex" else faces[:0])
     groups = [
-        encode_group(lattice.levels(field.read(start, min(start + size, n_frames)))) for start in range(0, n_frames, size)
+        encode_group(lattice.levels(field.read(start, min(start + size, n_frames))), parents)
+        for start in range(0, n_frames, size)
     ]
     head = HEAD.pack(size, lattice.low, lattice.step, largest) + np.array([len(group) for group in groups], "<u4").tobytes()
     return WebField(head + b"".join(groups), kept, (low, high) if low <= high else None)
@@ -125,15 +129,29 @@ def choose_lattice(low: float, high: float, bound: float, is_integer: bool) -> t
     return Lattice(low, 2 * kept), kept + rounding
 
 
-def encode_group(levels: Array) -> bytes:
+def find_parents(n_rows: int, faces: Int32) -> Int64:
+    """``(R,)`` the row that predicts each row: its last neighbour before it, without one the row before; -1 for row 0.
+
+    Examples:
+        >>> find_parents(5, np.array([[0, 4, 1]], np.int32)).tolist()
+        [-1, 0, 1, 2, 1]
+    """
+    ends = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    ends = ends[ends[:, 0] != ends[:, 1]]
+    parents = np.full(n_rows, -1, np.int64)
+    np.maximum.at(parents, ends.max(axis=1), ends.min(axis=1))
+    return np.where(parents < 0, np.arange(n_rows) - 1, parents)
+
+
+def encode_group(levels: Array, parents: Int64) -> bytes:
     """Code ``(n, R, C)`` levels, by the prediction that deflates them best."""
     choices = itertools.product(range(ORDERS if len(levels) > 1 else 1), (0, 1))
-    planes = {(order, rows): _planes(_residuals(levels, order, rows)) for order, rows in choices}
+    planes = {(order, rows): _planes(_residuals(levels, parents, order, rows)) for order, rows in choices}
     order, rows = min(planes, key=lambda key: len(zlib.compress(planes[key], FAST)))
     return bytes([order + ORDERS * rows]) + zlib.compress(planes[order, rows], SMALL)
 
 
-def _residuals(levels: Array, order: int, rows: int) -> Array:
+def _residuals(levels: Array, parents: Int64, order: int, rows: int) -> Array:
     """What is left of levels ``(n, R, C)``, modulo 2^16 as integers of -2^15..2^15 - 1."""
     left = levels.copy()
     if order:
@@ -141,7 +159,7 @@ def _residuals(levels: Array, order: int, rows: int) -> Array:
     if order == 2:
         left[2:] -= levels[1:-1] - levels[:-2]
     first = len(left) if rows or order == 0 else 1  # frames whose rows predict each other
-    left[:first, 1:] -= left[:first, :-1].copy()
+    left[:first, 1:] -= left[:first, parents[1:]]
     return ((left + 32768) & 65535) - 32768
 
 

@@ -266,9 +266,7 @@ def test_an_asset_is_exact_and_shows_its_picture(name: str, player: Callable[...
         fields={"height": gvpipe.Field(np.stack([points[:, 1], points[:, 0]]))},
         parts=(gvpipe.Part("sheet", (0, 25), (0, 32), 0),),
         materials=(gvpipe.Material(base_color_texture=gvpipe.Texture(0), unlit=True),),
-        images=(
-            gvpipe.Image("checks", "image/png", picture([[[230, 20, 20], [10, 200, 30]], [[20, 30, 220], [240, 240, 240]]])),
-        ),
+        images=(gvpipe.Image("checks", "image/png", checks),),
     )
     written = write_asset(site[0] / "asset.mp4", sheet)
     values, rows, png, projection = player(

@@ -22,11 +22,14 @@ from gvpipe.asset_coding.directory import unpack_directory
 from gvpipe.container.mp4 import read_file
 from gvpipe.errors import InputError
 from gvpipe.web import field_export
-from gvpipe.web.field_export import CODING, COLOURS, HEAD, ORDERS, encode_web_field
+from gvpipe.web.field_export import CODING, COLOURS, HEAD, ORDERS, encode_web_field, find_parents
+
+NO_FACES = np.zeros((0, 3), np.int32)
 
 
-def restored(data: bytes, shape: tuple[int, int, int]) -> npt.NDArray[np.float64]:
+def restored(data: bytes, shape: tuple[int, int, int], faces: npt.NDArray[np.int32] = NO_FACES) -> npt.NDArray[np.float64]:
     """The values ``(F, R, C)`` of a section, by the module's formula."""
+    parents = find_parents(shape[1], faces)
     size, low, step, _ = HEAD.unpack_from(data)
     n_groups = -(-shape[0] // size)
     lengths = np.frombuffer(data, "<u4", n_groups, HEAD.size)
@@ -41,7 +44,8 @@ def restored(data: bytes, shape: tuple[int, int, int]) -> npt.NDArray[np.float64
         order, by_rows = group[0] % ORDERS, group[0] >= ORDERS
         for k in range(n):
             if by_rows or order == 0 or k == 0:
-                left[k] = left[k].cumsum(axis=0)
+                for row in range(1, shape[1]):
+                    left[k, row] += left[k, parents[row]]
             if order and k:
                 left[k] += left[k - 1] if order == 1 or k == 1 else 2 * left[k - 1] - left[k - 2]
         levels = left & 65535
@@ -60,7 +64,7 @@ def test_every_value_keeps_the_bound(shape: tuple[int, int, int], scale: float) 
     values = noise(shape) * np.float32(scale)
     if shape[0] > 3:
         values[2:4, ::2] = np.nan
-    coded = encode_web_field(Field(values))
+    coded = encode_web_field(Field(values), NO_FACES)
     found = restored(coded.data, shape)
     assert np.array_equal(np.isnan(found), np.isnan(values))
     span = float(np.nanmax(values)) - float(np.nanmin(values))
@@ -72,27 +76,27 @@ def test_every_value_keeps_the_bound(shape: tuple[int, int, int], scale: float) 
 def test_small_steps_on_large_numbers_keep_what_is_stated() -> None:
     """Where float32 itself is coarser than 1/1023 of the range, the bound says so."""
     values = (1e6 + noise((9, 20, 1)) / 50).astype(np.float32)
-    coded = encode_web_field(Field(values))
+    coded = encode_web_field(Field(values), NO_FACES)
     found = restored(coded.data, (9, 20, 1)).astype(np.float32).astype(float)
     assert np.abs(found - values).max() <= coded.bound < 0.2
 
 
 def test_a_coarser_bound_of_the_file_takes_fewer_bytes() -> None:
     field = Field(noise((40, 200)))
-    fine, coarse = encode_web_field(field), encode_web_field(field, 1.0)
+    fine, coarse = encode_web_field(field, NO_FACES), encode_web_field(field, NO_FACES, 1.0)
     assert coarse.bound == 1.0 and len(coarse.data) < 0.6 * len(fine.data)
 
 
 def test_integers_are_exact() -> None:
     values = np.random.default_rng(1).integers(-3000, 60000, (4, 9, 2)).astype(np.int32)
-    coded = encode_web_field(Field(values))
+    coded = encode_web_field(Field(values), NO_FACES)
     assert coded.bound == 0 and np.array_equal(restored(coded.data, values.shape), values)
 
 
 def test_constant_fields_and_fields_of_holes_take_few_bytes() -> None:
     for value in (3.5, np.nan):
         values = np.full((64, 500), value, np.float32)
-        coded = encode_web_field(Field(values))
+        coded = encode_web_field(Field(values), NO_FACES)
         assert len(coded.data) < 200
         assert np.array_equal(restored(coded.data, (64, 500, 1))[:, :, 0], values, equal_nan=True)
     assert coded.range is None
@@ -102,13 +106,23 @@ def test_frames_that_follow_each_other_take_fewer_bytes() -> None:
     rng = np.random.default_rng(0)
     smooth = np.sin(6 * rng.random(400) + np.arange(64)[:, None] / 50).astype(np.float32)
     shuffled = smooth[rng.permutation(64)]
-    assert len(encode_web_field(Field(smooth)).data) < 0.5 * len(encode_web_field(Field(shuffled)).data)
+    assert len(encode_web_field(Field(smooth), NO_FACES).data) < 0.5 * len(encode_web_field(Field(shuffled), NO_FACES).data)
+
+
+def test_neighbours_predict_each_other() -> None:
+    """Of a sheet in random order: neighbours lie anywhere among the rows."""
+    sheet = waving(20, 8)
+    field = Field(np.asarray(sheet.positions[0:8])[:, :, 2])
+    faces = sheet.faces
+    coded = encode_web_field(field, faces)
+    assert len(coded.data) < 0.9 * len(encode_web_field(field, NO_FACES).data)
+    assert np.abs(restored(coded.data, (8, 400, 1), faces)[:, :, 0] - field[0:8]).max() <= coded.bound
 
 
 def test_a_field_too_large_for_a_browser_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(field_export, "MAX_VALUES", 99)
     with pytest.raises(InputError, match="100 values a frame; the web player shows up to 99"):
-        encode_web_field(Field(np.zeros((2, 100))))
+        encode_web_field(Field(np.zeros((2, 100))), NO_FACES)
 
 
 def asset() -> gvpipe.MeshSequence:
@@ -145,7 +159,7 @@ def test_pages_carry_the_asset(codec: str, tmp_path: Path) -> None:
     heat, cell = directory.fields
     assert heat.coding == cell.coding == CODING and (heat.unit, heat.components, cell.components) == ("K", 0, 2)
     source = asset()
-    values = restored(bitstream.section(heat.section), (10, 128, 1))[:, :, 0]
+    values = restored(bitstream.section(heat.section), (10, 128, 1), shown.faces)[:, :, 0]
     assert np.abs(values - source.fields["heat"].read(0, 10)[:, :, 0]).max() <= heat.bound
     rows = {tuple(sorted(face)): row for row, face in enumerate(source.faces.tolist())}
     order = [rows[tuple(sorted(face))] for face in shown.faces.tolist()]

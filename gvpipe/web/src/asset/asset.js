@@ -19,7 +19,7 @@ import { corrupt } from "../format/errors.js";
 import { inflate } from "../format/inflate.js";
 import { AssetEntry } from "./asset_entry.js";
 import { readImages, readMaterials } from "./materials.js";
-import { WebField } from "./web_field.js";
+import { WebField, findParents } from "./web_field.js";
 
 const MAX_PARTS = 2 ** 22;
 const MAX_COMPONENTS = 64;
@@ -120,8 +120,9 @@ function readAttributes(list, payload, surface, notes) {
   return attributes;
 }
 
-function readFields(list, payload, video, notes) {
+function readFields(list, payload, { frameCount, vertexCount, triangleCount, indices }, notes) {
   const fields = new Map();
+  const parents = {}; // by domain
   for (const given of list.list("fields", MAX_ITEMS)) {
     const entry = new AssetEntry(given, "a field");
     const name = entry.text("name");
@@ -148,8 +149,8 @@ function readFields(list, payload, video, notes) {
       section: entry.text("section"),
       fullScale: FULL_SCALES[dtype] ?? 1,
     };
-    const rows = domain === "vertex" ? video.vertexCount : video.triangleCount;
-    fields.set(name, new WebField(checked, payload.section(checked.section), video.frameCount, rows));
+    parents[domain] ??= domain === "vertex" ? findParents(vertexCount, indices) : findParents(triangleCount, []);
+    fields.set(name, new WebField(checked, payload.section(checked.section), frameCount, parents[domain]));
   }
   return fields;
 }

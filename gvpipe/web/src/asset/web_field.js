@@ -12,6 +12,7 @@ const KEPT = 3; // groups in memory: the one shown, the next, and the one before
 
 export class WebField {
   #data;
+  #parents;
   #groupFrames;
   #low;
   #step;
@@ -23,9 +24,11 @@ export class WebField {
    * @param {object} entry of section `asset`, checked
    * @param {Uint8Array} data its section
    * @param {number} frames F
-   * @param {number} rows R
+   * @param {Int32Array} parents (R) the row that predicts each row (`findParents`)
    */
-  constructor(entry, data, frames, rows) {
+  constructor(entry, data, frames, parents) {
+    const rows = parents.length;
+    this.#parents = parents;
     this.name = entry.name;
     this.kind = entry.kind;
     this.domain = entry.domain;
@@ -112,7 +115,7 @@ export class WebField {
     if (data.length < 1 || data[0] >= 2 * ORDERS) throw wrong("a group is not as gvpipe writes it");
     const planes = await inflate(data.subarray(1), 2 * count, wrong);
     if (planes.length !== 2 * count) throw wrong(`a group has ${planes.length} bytes, ${2 * count} are needed`);
-    const levels = restore(planes, frames, this.components, data[0] % ORDERS, data[0] >= ORDERS);
+    const levels = restore(planes, frames, this, this.#parents, data[0]);
     this.#groups.set(group, levels);
     if (this.#groups.size > KEPT) this.#groups.delete(this.#groups.keys().next().value);
     return levels;
@@ -120,7 +123,9 @@ export class WebField {
 }
 
 /** Levels (n, R, C) of two planes of bytes. Sums are modulo 2^16, as `Uint16Array` has them. */
-function restore(planes, frames, components, order, isByRows) {
+function restore(planes, frames, { components }, parents, mode) {
+  const order = mode % ORDERS;
+  const isByRows = mode >= ORDERS;
   const count = planes.length / 2;
   const size = count / frames;
   const levels = new Uint16Array(count);
@@ -131,11 +136,30 @@ function restore(planes, frames, components, order, isByRows) {
   for (let frame = 0; frame < frames; frame++) {
     const start = frame * size;
     if (isByRows || order === 0 || frame === 0) {
-      for (let i = start + components; i < start + size; i++) levels[i] += levels[i - components];
+      for (let row = 1; row < parents.length; row++) {
+        const [own, parent] = [start + row * components, start + parents[row] * components];
+        for (let i = 0; i < components; i++) levels[own + i] += levels[parent + i];
+      }
     }
     if (order === 0 || frame === 0) continue;
     if (order === 1 || frame === 1) for (let i = start; i < start + size; i++) levels[i] += levels[i - size];
     else for (let i = start; i < start + size; i++) levels[i] += 2 * levels[i - size] - levels[i - 2 * size];
   }
   return levels;
+}
+
+/**
+ * (R) the row that predicts each row: its last neighbour before it, without one the row before; -1 for row 0.
+ *
+ * @param {number} nRows @param {Uint32Array} indices (3T) of vertices; none for rows that are triangles
+ */
+export function findParents(nRows, indices) {
+  const parents = new Int32Array(nRows).fill(-1);
+  for (let c = 0; c < indices.length; c++) {
+    const a = indices[c];
+    const b = indices[c % 3 < 2 ? c + 1 : c - 2];
+    if (a !== b) parents[Math.max(a, b)] = Math.max(parents[Math.max(a, b)], Math.min(a, b));
+  }
+  for (let row = 0; row < nRows; row++) if (parents[row] < 0) parents[row] = row - 1;
+  return parents;
 }
