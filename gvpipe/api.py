@@ -472,7 +472,8 @@ def _code(
         choice = choose_codec(given, sequence, target or default_target(given), progress, asset)
     trial = choice.trial
     check = partial(choice.trials.check, trial.encoded.permutation)
-    return _Coded(trial.codec, trial.encoded, check, choice.tried, choice.reason)
+    encoded = dataclasses.replace(trial.encoded, bitstream=asset.add(trial.encoded, trial.codec))
+    return _Coded(trial.codec, encoded, check, choice.tried, choice.reason)
 
 
 def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progress) -> tuple[int, Bitstream]:

@@ -2,7 +2,8 @@
 
 Section of such a field::
 
-    section = [8 bits] rule of `gvpipe.attributes.surface_normals.RULES`, [8 bits] 1: vertices that coincide in frame 0 share a normal
+    section = [8 bits] rule, its place in `gvpipe.attributes.surface_normals.RULES`,
+              [8 bits] 1: vertices that coincide in frame 0 share a normal, or 0
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int32, Int64
+from gvpipe.arrays import Array, Int64
 from gvpipe.asset.field import Field
 from gvpipe.asset_coding.scan import chunks
 from gvpipe.attributes.surface import Surface
@@ -87,5 +88,3 @@ def _holds(rule: NormalRule, given: Field, reader: FrameReader, surface: Surface
         largest_error(block.astype(np.float64), rule.normals(reader.read(first, first + len(block)), surface)) <= bound
         for first, block in chunks(given)
     )
-
-
