@@ -85,29 +85,23 @@ def decode_sharing(cursor: Cursor, surface: Surface, references: Sequence[Int32]
 
 
 def _encode_fans(entries: Int32, surface: Surface, reference: Int32 | None) -> bytes:
-    from gvpipe.attributes.sharing_kernels import code_sharing
+    from gvpipe.attributes.sharing_kernels import N_CONTEXTS, code_sharing
     from gvpipe.entropy.serial_coder import SerialEncoder
 
-    coder = SerialEncoder(_n_contexts(reference), len(entries))
+    coder = SerialEncoder(N_CONTEXTS, len(entries))
     code_sharing(coder.coder, _corners(surface, reference), surface.n_vertices, entries.astype(np.int64))
     return coder.finish()
 
 
 def _decode_fans(cursor: Cursor, surface: Surface, reference: Int32 | None) -> Int32:
-    from gvpipe.attributes.sharing_kernels import code_sharing
+    from gvpipe.attributes.sharing_kernels import N_CONTEXTS, code_sharing
     from gvpipe.entropy.serial_coder import SerialDecoder
 
-    coder = SerialDecoder(cursor.rest(), _n_contexts(reference), cursor.name)
+    coder = SerialDecoder(cursor.rest(), N_CONTEXTS, cursor.name)
     entries = np.zeros(surface.faces.size, np.int64)
     code_sharing(coder.coder, _corners(surface, reference), surface.n_vertices, entries)
     coder.end()
     return _by_first_corner(entries)
-
-
-def _n_contexts(reference: Int32 | None) -> int:
-    from gvpipe.attributes.sharing_kernels import N_CONTEXTS, N_CONTEXTS_REFERENCE
-
-    return N_CONTEXTS if reference is None else N_CONTEXTS_REFERENCE
 
 
 def _corners(surface: Surface, reference: Int32 | None) -> Corners:

@@ -38,7 +38,7 @@ class Choice(NamedTuple):
 
 
 class Prepared(NamedTuple):
-    """A layout, its entries in order, and the entry ``(3T,)`` of each corner."""
+    """A layout, its entries in order, the entry ``(3T,)`` of each corner, and the corners opposite over entries."""
 
     layout: EntryLayout
     entries: Entries
@@ -52,7 +52,7 @@ def encode_codes(storage: Storage, codes: Int64, layout: EntryLayout) -> bytes:
         return bytes(3)
     from gvpipe.entropy.serial_coder import SerialEncoder, estimate_bytes
 
-    prepared = Prepared(layout, layout.entries(), layout.owners, opposite_corners(layout.owners.reshape(-1, 3)))
+    prepared = _prepare(layout)
     has_twins = int(prepared.entries.places.max()) + 1 < len(codes)
 
     def encode(choice: Choice) -> SerialEncoder:
@@ -79,10 +79,15 @@ def decode_codes(cursor: Cursor, storage: Storage, layout: EntryLayout) -> Int64
         from gvpipe.entropy.serial_coder import SerialDecoder
 
         coder = SerialDecoder(cursor.rest(), _n_contexts(choice), cursor.name)
-        _code(coder.coder, storage, choice, codes, Prepared(layout, layout.entries(), layout.owners, opposite_corners(layout.owners.reshape(-1, 3))))
+        _code(coder.coder, storage, choice, codes, _prepare(layout))
         coder.end()
     cursor.end()
     return codes
+
+
+def _prepare(layout: EntryLayout) -> Prepared:
+    owners = layout.owners
+    return Prepared(layout, layout.entries(), owners, opposite_corners(owners.reshape(-1, 3)))
 
 
 def _methods(storage: Storage, layout: EntryLayout) -> list[int]:
@@ -92,7 +97,7 @@ def _methods(storage: Storage, layout: EntryLayout) -> list[int]:
     has_shape = layout.surface.positions is not None and layout.domain != "part"
     if storage.id in (DIRECTIONS, TANGENTS):
         methods = [octahedral_kernels.LAST, octahedral_kernels.MEAN]
-        return [*methods, octahedral_kernels.SURFACE, octahedral_kernels.PLACE] if has_shape else methods
+        return list(range(octahedral_kernels.PLACE_CORRECTED + 1)) if has_shape else methods
     methods = [linear_kernels.LAST, linear_kernels.MEAN, linear_kernels.PARALLELOGRAM]
     has_plane = has_shape and storage.n_components == 2 and layout.domain in ("vertex", "corner")
     return [*methods, linear_kernels.CONFORMAL, linear_kernels.AFFINE] if has_plane else methods
@@ -104,22 +109,24 @@ def _code(coder: SerialCoder, storage: Storage, choice: Choice, codes: Int64, pr
     entries = prepared.entries._replace(flags=choice.flags, shift=choice.shift)
     positions = surface.positions if surface.positions is not None else np.zeros((0, 3), np.float32)
     if storage.id in (DIRECTIONS, TANGENTS):
-        from gvpipe.attributes.octahedral_kernels import PLACE, SURFACE, Octahedral, code_octahedral, corner_normals
+        from gvpipe.attributes import octahedral_kernels as kernels
 
         normals = np.zeros((0, 3))
-        if method == SURFACE:
-            normals = corner_normals(surface.faces, positions, prepared.owners, len(codes))
-        elif method == PLACE:
+        if method in (kernels.SURFACE, kernels.SURFACE_CORRECTED):
+            normals = kernels.corner_normals(surface.faces, positions, prepared.owners, len(codes))
+        elif method in (kernels.PLACE, kernels.PLACE_CORRECTED):
             places = entries.places
-            normals = corner_normals(surface.faces, positions, places[prepared.owners], int(places.max()) + 1)[places]
-        code_octahedral(coder, entries, Octahedral(method, storage.n, normals), codes)
+            own = places[prepared.owners]
+            normals = kernels.corner_normals(surface.faces, positions, own, int(places.max()) + 1)[places]
+        kernels.code_octahedral(coder, entries, kernels.Octahedral(method, storage.n, normals), codes)
         return
     from gvpipe.attributes.linear_kernels import Linear, code_linear
 
     numbers = codes.astype(np.float64)
     if storage.id == FLOATS:
         numbers = float_values(codes).astype(np.float64)
-    code_linear(coder, entries, Linear(method, storage.id == FLOATS, surface.faces, prepared.opposite, positions), codes, numbers)
+    linear = Linear(method, storage.id == FLOATS, surface.faces, prepared.opposite, positions)
+    code_linear(coder, entries, linear, codes, numbers)
 
 
 def _n_contexts(choice: Choice) -> int:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sequences import grid
 from shapes import ball
 
-from gvpipe.attributes.attribute_coding import decode_attribute, encode_attribute
+from gvpipe.attributes.attribute_coding import WELDED, decode_attribute, encode_attribute
 from gvpipe.attributes.entry_layout import DOMAINS, count_values
 from gvpipe.attributes.surface import Surface
 from gvpipe.errors import CorruptFile, InputError
@@ -99,7 +99,7 @@ def test_an_attribute_that_follows_the_surface_takes_few_bits() -> None:
     for positions in (sheet.positions, None):
         known = Surface(sheet.faces, 1600, positions)
         turned = grid(40)[0][:, :2] @ np.array([[0.6, 0.8], [-0.8, 0.6]])
-        assert len(round_trip(turned.astype(np.float32), known, "vertex", "uv", 1e-4)) < 0.8 * 1600 / 8
+        assert len(round_trip(turned.astype(np.float32), known, "vertex", "uv", 1e-4)) < 2.5 * 1600 / 8
     assert len(round_trip(points, surface, "vertex", "normal", 1.0)) < 2 * len(points) / 8
     assert len(round_trip(flat, surface, "vertex", "uv", 1e-3)) < 6 * len(points) / 8
 
@@ -119,7 +119,7 @@ def test_seams_and_equal_values_on_both_sides_are_cheap() -> None:
 def test_labels_of_patches_cost_their_borders() -> None:
     surface, patch = quilt(30)
     labels = np.array([1 << 40, 7, -5, 100])[patch[::3]][:, None]
-    assert len(round_trip(labels, surface, "triangle", "label", 0)) < 110
+    assert len(round_trip(labels, surface, "triangle", "label", 0)) < len(labels) / 8
 
 
 def test_the_decoder_needs_no_positions_that_the_encoder_had_none_of() -> None:
@@ -181,3 +181,16 @@ def test_damaged_attributes_are_corrupt_or_values(data: st.DataObject) -> None:
         return
     assert len(decoded) == surface.n_vertices
     assert decoded.dtype.kind != "f" or not np.isnan(decoded).any() or kind in ("uv", "normal", "vector", "tangent")
+
+
+def test_welded_vertices_need_their_corners() -> None:
+    """Bytes of a mesh with seams do not decode on one without."""
+    surface, patch = quilt(6)
+    assert surface.positions is not None
+    pairs, split = np.unique(np.stack([surface.faces.ravel(), patch], axis=1), axis=0, return_inverse=True)
+    apart = Surface(split.reshape(-1, 3).astype(np.int32), len(pairs), surface.positions[pairs[:, 0]])
+    colours = np.random.default_rng(0).integers(0, 256, (surface.n_vertices, 3)).astype(np.uint8)[pairs[:, 0]]
+    data = round_trip(colours, apart, "vertex", "color", 0)
+    assert data[0] == WELDED
+    with pytest.raises(CorruptFile, match="cannot be"):
+        decode_attribute(data, surface, "x", domain="vertex")
