@@ -16,7 +16,7 @@ from uuid import UUID
 TARGET = Path(__file__).parents[1] / "gvpipe" / "web" / "src" / "constants.js"
 SHARED = {
     "gvpipe.asset_coding.directory": "SECTION VERSION MOST MAX_BYTES",
-    "gvpipe.asset_coding.encoder": "ARRANGEMENT CODING",
+    "gvpipe.asset_coding.encoder": "ARRANGEMENT CODED",
     "gvpipe.connectivity.base_mesh": "DRACO_PREFIX MAX_PER_BYTE",
     "gvpipe.connectivity.edge_seam_kernels": "LOOK SAME SINGLE LATER NEW",
     "gvpipe.connectivity.seams": "MAX_SEAM_VERTICES",

@@ -8,7 +8,7 @@ export const DIRECTORY_MAX_BYTES = 67108864;
 
 // gvpipe.asset_coding.encoder
 export const ENCODER_ARRANGEMENT = "arrangement";
-export const ENCODER_CODING = 1;
+export const ENCODER_CODED = 1;
 
 // gvpipe.connectivity.base_mesh
 export const BASE_MESH_DRACO_PREFIX = [68, 82, 65, 67, 79, 2, 2, 1, 1, 0, 0];

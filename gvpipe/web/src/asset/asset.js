@@ -9,7 +9,7 @@ import {
   DIRECTORY_SECTION as SECTION,
   DIRECTORY_VERSION as VERSION,
   ENCODER_ARRANGEMENT as ARRANGEMENT,
-  ENCODER_CODING as CODING,
+  ENCODER_CODED as CODED,
   FIELD_EXPORT_CODING as WEB_CODING,
 } from "../constants.js";
 import { decodeAttribute } from "../attributes/attribute_coding.js";
@@ -105,7 +105,7 @@ function readAttributes(list, payload, surface, notes) {
     const domain = entry.word("domain", DOMAINS);
     const kind = entry.word("kind", KINDS);
     if (attributes.has(name)) throw corrupt(SECTION, `there are two attributes ${name}`);
-    if (isBeyond || entry.integer("coding", undefined, 0, MAX_ITEMS) !== CODING) {
+    if (isBeyond || entry.integer("coding", undefined, 0, MAX_ITEMS) !== CODED) {
       notes.push(`attribute ${name} is not shown: a newer gvpipe wrote it`);
       isBeyond ||= domain === "corner"; // later ones may refer to it
       continue;

@@ -10,7 +10,6 @@ const [WHOLE, , SHARED, CODED, GUIDED] = [0, 1, 2, 3, 4]; // modes; 1: one entry
 const [SAME, NEW, OLDER] = [0, 1, 2]; // symbols; an older entry's number is added to the last
 const [UNLINKED, UNKNOWN, JOINED, CUT] = [0, 1, 2, 3]; // what is known of the edge between two corners of a fan
 const N_CONTEXTS = 12;
-const N_CONTEXTS_REFERENCE = 36;
 
 /**
  * @param {import("../format/cursor.js").Cursor} cursor read to its end
@@ -28,7 +27,7 @@ export function decodeSharing(cursor, surface, references) {
     reference = references[cursor.varint(references.length - 1, "the number of a reference")];
   }
   if (mode === CODED || mode === GUIDED) {
-    const coder = new SerialDecoder(cursor.rest(), reference ? N_CONTEXTS_REFERENCE : N_CONTEXTS, cursor.name);
+    const coder = new SerialDecoder(cursor.rest(), N_CONTEXTS, cursor.name);
     const entries = new Fans(coder, surface, reference).decode();
     coder.end();
     return numberByFirst(entries, faces.length);
@@ -93,11 +92,10 @@ class Fans {
   }
 
   #context(i, edge, cuts) {
-    const context = edge * 3 + Math.min(cuts, 2);
     const { reference, corners } = this;
-    if (!reference) return context;
-    if (i === 0) return context * 3;
-    return context * 3 + (reference[corners[i]] !== reference[corners[i - 1]] ? 1 : 2);
+    if (!reference) return edge * 3 + Math.min(cuts, 2);
+    if (i === 0) return edge * 3;
+    return edge * 3 + (reference[corners[i]] !== reference[corners[i - 1]] ? 1 : 2);
   }
 
   /** Fill `corners` and `edges` with the fan of a corner; return how many cuts are known in it. */

@@ -4,6 +4,7 @@ import { nextCorner, previousCorner } from "./corners.js";
 import { History } from "./history.js";
 
 export const [LAST, PARALLELOGRAM, CONFORMAL, AFFINE] = [0, 2, 3, 4]; // methods; 1 is the mean
+const LEAST_HEIGHT = 0.25; // of a triangle whose map is trusted, in heights of the triangle that is predicted by it
 const MAX_CODE = 2 ** 38;
 
 /** Codes of float32: their bits, ordered as the values are. */
@@ -157,27 +158,28 @@ export class LinearDecoder {
     return n > 0;
   }
 
-  /** Fill `across` with what a step across the edge of gate g, as long as the edge, changes. */
+  /** Fill `across` with what changes in the plane with a step in space across the edge of gate g, as long as the edge. */
   #findAcross(g, du, dv, above) {
     const { numbers, gates, faces, shape, across } = this;
-    across[0] = -this.side * dv;
-    across[1] = this.side * du;
     const [a, o, corner] = [2 * gates[4 * g], 2 * gates[4 * g + 2], gates[4 * g + 3]];
-    if (o < 0) return;
-    const ou = numbers[o] - numbers[a];
-    const ov = numbers[o + 1] - numbers[a + 1];
-    const cross = du * ov - dv * ou;
-    if (cross !== 0) {
-      const turn = cross > 0 ? -1 : 1;
-      across[0] = -turn * dv;
-      across[1] = turn * du;
+    let turn = this.side;
+    if (o >= 0) {
+      const ou = numbers[o] - numbers[a];
+      const ov = numbers[o + 1] - numbers[a + 1];
+      if (this.method === AFFINE) {
+        this.#measure(faces[this.opposite[corner]], faces[nextCorner(corner)], faces[previousCorner(corner)]);
+        const [along, height] = shape;
+        if (height > LEAST_HEIGHT * above) {
+          across[0] = (along * du - ou) / height;
+          across[1] = (along * dv - ov) / height;
+          return;
+        }
+      }
+      const cross = du * ov - dv * ou;
+      if (cross !== 0) turn = cross > 0 ? -1 : 1;
     }
-    if (this.method !== AFFINE) return;
-    this.#measure(faces[this.opposite[corner]], faces[nextCorner(corner)], faces[previousCorner(corner)]);
-    const [along, height] = shape;
-    if (!(height > 0.25 * above)) return;
-    across[0] = (along * du - ou) / height;
-    across[1] = (along * dv - ov) / height;
+    across[0] = -turn * dv;
+    across[1] = turn * du;
   }
 
   /** Of vertex x over the edge from a to b: place along it, height over it, both in units of its length, whose square is last. */

@@ -2,7 +2,7 @@
 
 import { History, residualContext } from "./history.js";
 
-export const [MEAN, SURFACE, PLACE] = [1, 2, 3]; // methods; 0 predicts by the last one
+export const [MEAN, SURFACE, PLACE, SURFACE_CORRECTED, PLACE_CORRECTED] = [1, 2, 3, 4, 5]; // methods; 0 is the last one
 
 export class OctahedralDecoder {
   /**
@@ -85,6 +85,7 @@ export class OctahedralDecoder {
     let [x, y, z] = [0, 0, 0];
     if (method >= SURFACE) {
       [x, y, z] = [normals[3 * entry], normals[3 * entry + 1], normals[3 * entry + 2]];
+      if (method >= SURFACE_CORRECTED) [x, y, z] = this.#correct(begin, end, unit(x, y, z));
     } else if (method === MEAN) {
       for (let g = begin; g < end; g++) {
         for (let k = 0; k < 2; k++) {
@@ -101,6 +102,26 @@ export class OctahedralDecoder {
       [x, y, z] = [codes[at], codes[at + 1], codes[at + 2]];
     }
     this.#toLattice(x, y, z);
+  }
+
+  /** A unit normal, moved by half the mean by which earlier normals differ from those of the surface. */
+  #correct(begin, end, [x, y, z]) {
+    const { codes, width, normals } = this;
+    const { gates } = this.history;
+    let [dx, dy, dz, n] = [0, 0, 0, 0];
+    for (let g = begin; g < end; g++) {
+      for (let k = 0; k < 2; k++) {
+        const other = gates[4 * g + k];
+        if (other < 0) continue;
+        const [ux, uy, uz] = unit(codes[width * other], codes[width * other + 1], codes[width * other + 2]);
+        const [vx, vy, vz] = unit(normals[3 * other], normals[3 * other + 1], normals[3 * other + 2]);
+        dx += ux - vx;
+        dy += uy - vy;
+        dz += uz - vz;
+        n++;
+      }
+    }
+    return n ? [x + (0.5 * dx) / n, y + (0.5 * dy) / n, z + (0.5 * dz) / n] : [x, y, z];
   }
 
   /** Fill `guess` with a lattice point close to a direction; (0, 0, n) without one. */
@@ -150,4 +171,10 @@ function mainAxis(point) {
   let axis = 0;
   for (let k = 1; k < 3; k++) if (Math.abs(point[k]) > Math.abs(point[axis])) axis = k;
   return axis;
+}
+
+/** A direction with length 1; zero stays zero. */
+function unit(x, y, z) {
+  const length = Math.sqrt(x * x + y * y + z * z);
+  return length > 0 && length < Infinity ? [x / length, y / length, z / length] : [0, 0, 0];
 }

@@ -4,7 +4,7 @@ import { SerialDecoder } from "../format/serial_decoder.js";
 import { oppositeCorners } from "./corners.js";
 import { countContexts } from "./history.js";
 import { AFFINE, LinearDecoder, PARALLELOGRAM } from "./linear.js";
-import { MEAN, OctahedralDecoder, PLACE, SURFACE, cornerNormals } from "./octahedral.js";
+import { MEAN, OctahedralDecoder, PLACE, PLACE_CORRECTED, SURFACE, cornerNormals } from "./octahedral.js";
 import { DIRECTIONS, FLOATS, TANGENTS } from "./storage.js";
 
 const MAX_FLAGS = 3;
@@ -34,7 +34,7 @@ export function decodeCodes(cursor, storage, layout) {
 /** Methods are numbered from 0 up; those of geometry come last. */
 function lastMethod({ id, components }, { domain, surface }) {
   const hasShape = surface.positions !== null && domain !== "part";
-  if (id === DIRECTIONS || id === TANGENTS) return hasShape ? PLACE : MEAN;
+  if (id === DIRECTIONS || id === TANGENTS) return hasShape ? PLACE_CORRECTED : MEAN;
   return hasShape && components === 2 && domain !== "triangle" ? AFFINE : PARALLELOGRAM;
 }
 
@@ -42,7 +42,7 @@ function decodeBy(how, coder, { id, n, components }, layout) {
   const entries = layout.entries();
   const { surface } = layout;
   if (id === DIRECTIONS || id === TANGENTS) {
-    const normals = how.method >= SURFACE ? surfaceNormals(layout, entries.places, how.method === PLACE) : null;
+    const normals = how.method >= SURFACE ? surfaceNormals(layout, entries.places, [PLACE, PLACE_CORRECTED].includes(how.method)) : null;
     return new OctahedralDecoder(coder, entries, how, { n, width: components }, normals).decode();
   }
   const opposite = how.method === AFFINE ? oppositeCorners(layout.owners) : null;
