@@ -146,12 +146,14 @@ class _StageClock:
             self.progress(stage, done)
 
 
-def read(path: Source, fps: float | None = None) -> MeshSequence:
+def read(path: Source, fps: float | None = None, clip: str | None = None) -> MeshSequence:
     """Read a mesh sequence, or a geometry video as one.
 
     Args:
-        path: an ``.npz``, an ``.mp4``, or frame files as a folder, a glob, a ``%04d`` pattern, a list or one file.
-        fps: frames per second; overrides the file's. Frame files have 30 by default.
+        path: an ``.npz``, an ``.mp4``, an animated ``.glb`` or ``.gltf``, or frame files as a folder, a glob, a ``%04d``
+            pattern, a list or one file.
+        fps: frames per second; overrides the file's. Frame files have 30 by default, glTF files the rate of their keys.
+        clip: name of the animation to read, of a glTF file that has several; None: the first.
 
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
@@ -161,11 +163,13 @@ def read(path: Source, fps: float | None = None) -> MeshSequence:
         for file in path:
             check_path(file, "a file of gvpipe.read's list")
         if len(path) != 1:
-            return read_sequence(path, fps)
+            return read_sequence(path, fps, clip)
         path = path[0]
     one = check_path(path, "what gvpipe.read is given", "a list of frame files or ")
     if Path(one).suffix.lower() not in VIDEO_SUFFIXES:
-        return read_sequence(one, fps)
+        return read_sequence(one, fps, clip)
+    if clip is not None:
+        raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
     sequence = Player(one).sequence()
     return sequence if fps is None else sequence.with_fps(fps)
 

@@ -196,15 +196,18 @@ def _learn(state: Filter, n: int, value: float, change: float) -> None:
         error = value - state.guesses[f]
         variance = state.noises[f] * NOISE[f] + FLOOR[f]
         for a in range(n):
-            total = 0.0
-            for b in range(n):
-                total += covariance[a, b] * signals[b]
-            direction[a] = total
-            variance += (1 + DOUBT) * total * signals[a]
+            direction[a] = 0.0
+        for b in range(n):  # each sum over b in order; side by side for all a
+            own, signal = covariance[b], signals[b]
+            for a in range(n):
+                direction[a] += own[a] * signal
+        for a in range(n):
+            variance += (1 + DOUBT) * direction[a] * signals[a]
         for a in range(n):
             gain = direction[a] / variance
             weights[a] += gain * error
+            own = covariance[a]
             for b in range(n):
-                covariance[a, b] -= gain * direction[b]
+                own[b] -= gain * direction[b]
         state.noises[f] += MEMORY[f] * (change * change - state.noises[f])
         state.errors[f] += TRUST * (error * error - state.errors[f])

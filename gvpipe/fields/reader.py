@@ -11,7 +11,7 @@ from gvpipe.errors import InputError
 from gvpipe.fields.derived import Motion, Positions, Span
 from gvpipe.fields.head import read_head
 from gvpipe.fields.mesh import FieldMesh
-from gvpipe.fields.segment import Place, decode_segment
+from gvpipe.fields.segment import Place, decode_segment, read_mode
 
 
 class FieldReader:
@@ -49,6 +49,11 @@ class FieldReader:
     def shape(self) -> tuple[int, int, int]:
         """F, R, C."""
         return self._n_frames, self._mesh.n_rows, self._head.components
+
+    @property
+    def modes(self) -> list[str]:
+        """How each segment is coded: names of `gvpipe.fields.segment.MODES`. Raises `CorruptFile`."""
+        return [read_mode(segment, self._name) for segment in self._segments]
 
     def read(self, start: int, stop: int) -> Array:
         """Return frames ``start`` to ``stop``: ``(stop - start, R, C)``, in the field's unit; NaN where there are holes.

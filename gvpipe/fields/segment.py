@@ -108,6 +108,17 @@ def decode_segment(data: bytes, shape: tuple[int, ...], dtype: np.dtype[np.gener
     return result
 
 
+def read_mode(data: bytes, name: str) -> str:
+    """Which of `MODES` a segment is coded in; constant ones are ``exact``. Raises `CorruptFile`."""
+    cursor = Cursor(data, name)
+    cursor.block()
+    cursor.block()
+    mode = cursor.take(1)[0]
+    if mode >= len(MODES):
+        raise cursor.corrupt(f"its mode is {mode}")
+    return MODES[mode]
+
+
 def _decode_numbers(cursor: Cursor, mode: int, kept: tuple[int, Int64], place: Place) -> Float64:
     """Numbers ``(D, R, K)`` of the K components that are not constant; ``kept`` is K and the distinct frame of each frame."""
     n_components, of_frames = kept

@@ -134,8 +134,10 @@ def load_mesh(loader: Loader, path: Path, frame: int) -> Mesh:
     """
     try:
         mesh = loader(path)
-    except InputError:
-        raise
+    except InputError as exc:
+        if path.name in str(exc):
+            raise
+        raise InputError(f"{path}: {exc}") from exc
     except Exception as exc:  # damaged files raise nearly anything inside NumPy, json and trimesh
         reason = getattr(exc, "strerror", None) or " ".join(str(exc).split())[:200] or type(exc).__name__
         raise InputError(f"{path} cannot be read as {path.suffix[1:].upper()}: {reason}; export this frame again") from exc

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Array, Float32, Int32, Int64
-from gvpipe.io.own_normals import entries_of, own_normals, own_rule
+from gvpipe.attributes.surface_normals import surface_normals
+from gvpipe.io.own_normals import entries_of, own_rule
 from gvpipe.sequence import MeshSequence
 
 
@@ -37,7 +38,7 @@ class FrameNormals:
             return np.asarray(fields["normal"], np.float32)
         if np.array_equal(positions, self.positions):
             return self.first
-        own = own_normals(positions, self.faces, self.entries, self.rule)
+        own: Float32 = surface_normals(positions[None], self.faces, self.entries, self.rule)[0]
         if self.indices is not None:
             return own
         result = np.zeros((len(positions), 3), np.float32)

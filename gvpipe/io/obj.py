@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from gvpipe.arrays import Float32, Float64, Floats, Int32, Int64
-from gvpipe.io.mesh import FrameValues, Mesh, as_color, as_faces, as_polygons, fan, indexed
+from gvpipe.io.mesh import FrameValues, Mesh, as_color, as_faces, as_normals, as_polygons, fan, indexed
 from gvpipe.io.obj_lines import NAMED, Faces, Lines, columns
 from gvpipe.io.obj_parts import label_faces, load_materials, make_parts, sort_faces
 from gvpipe.io.text import clean_lines
@@ -111,7 +111,7 @@ def _table(lines: Lines, keyword: bytes, index: Int64) -> Float32:
     table = columns(*lines.table(keyword), 2 if keyword == b"vt" else 3).astype(np.float32)
     if (index < -1).any() or (index >= len(table)).any():
         raise ValueError(f"a face refers to a {keyword.decode()!r} entry outside 1..{len(table)}")
-    return table
+    return as_normals(table) if keyword == b"vn" else table
 
 
 def _normals(lines: Lines, corners: Faces, by_vertex: bool, n_vertices: int) -> FrameValues:

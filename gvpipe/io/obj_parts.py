@@ -75,20 +75,34 @@ def make_parts(keys: list[Key], labels: Int64, faces: Int32, materials: tuple[Ma
     stops = np.searchsorted(labels, np.arange(len(keys)), side="right")
     starts = np.concatenate([[0], stops[:-1]])
     lows, highs = np.minimum.reduceat(faces.min(axis=1), starts), np.maximum.reduceat(faces.max(axis=1), starts)
-    ranges: dict[tuple[str, str], tuple[int, int]] = {}  # vertices, of all parts of one mesh
-    for key, low, high in zip(keys, lows.tolist(), highs.tolist(), strict=True):
-        before = ranges.get(key[:2], (low, high + 1))
-        ranges[key[:2]] = (min(low, before[0]), max(high + 1, before[1]))
+    vertices = _vertex_ranges(keys, [(low, high + 1) for low, high in zip(lows.tolist(), highs.tolist(), strict=True)])
+    triangles = zip(starts.tolist(), stops.tolist(), strict=True)
     return tuple(
-        Part(
-            key.group or key.object,
-            ranges[key[:2]],
-            (start, stop),
-            numbers.get(key.material),
-            key.object if key.group else "",
-        )
-        for key, start, stop in zip(keys, starts.tolist(), stops.tolist(), strict=True)
+        Part(key.group or key.object, used, held, numbers.get(key.material), key.object if key.group else "")
+        for key, used, held in zip(keys, vertices, triangles, strict=True)
     )
+
+
+def _vertex_ranges(keys: list[Key], used: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Ranges of vertices, given those that the parts' triangles use: parts of one mesh that share vertices have one range."""
+    meshes: dict[tuple[str, str], list[int]] = {}
+    for number, key in enumerate(keys):
+        meshes.setdefault(key[:2], []).append(number)
+    ranges = list(used)
+    for numbers in meshes.values():
+        spans: list[tuple[int, int, list[int]]] = []  # first vertex, the one after the last, parts
+        for number in sorted(numbers, key=lambda one: used[one]):
+            start, stop = used[number]
+            if spans and start < spans[-1][1]:
+                low, high, before = spans.pop()
+                before.append(number)
+                spans.append((low, max(high, stop), before))
+            else:
+                spans.append((start, stop, [number]))
+        for low, high, members in spans:
+            for number in members:
+                ranges[number] = (low, high)
+    return ranges
 
 
 def load_materials(

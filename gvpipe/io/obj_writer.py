@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,9 +33,10 @@ def encode_obj(sequence: MeshSequence, shared: str) -> FrameEncoder:
     table, vt = (None, None) if uv is None else _indexed(uv, sequence.faces)
     normals = frame_normals(sequence)
     library, names, beside, lost = _materials(sequence, shared)
-    body = "" if table is None else format_rows("vt %.9g %.9g\n", table)
+    body = b"" if table is None else format_rows("vt %.9g %.9g\n", table).encode("ascii")
     vn = None if normals is None else sequence.faces.reshape(-1) if normals.indices is None else normals.indices
-    tail = _faces(sequence, vt, vn, names)
+    tail = _faces(sequence, vt, vn, names).encode("utf-8")
+    head = library.encode("utf-8")
     color = _colors(sequence)
     origin = sequence.origin
 
@@ -46,12 +48,14 @@ def encode_obj(sequence: MeshSequence, shared: str) -> FrameEncoder:
             form = "%.4f" if rgb.dtype == np.uint8 else "%.9g"
             text = format_positions(f"v {{0}} {{0}} {{0}} {form} {form} {form}\n", positions, origin, _parts_of_one(rgb[:, :3]))
         own = "" if normals is None else format_rows("vn %.9g %.9g %.9g\n", normals.of(positions, fields))
-        return (library + text + body + own + tail).encode("utf-8")
+        return head + text.encode("ascii") + body + own.encode("ascii") + tail
 
     wanted = [name for name in ("normal", "color") if _is_vertex_field(sequence, name)]
     held = {"polygons", "parts", "materials", *wanted} | ({"uv"} if uv is not None else set())
     held |= ({"normal"} if normals is not None else set()) | ({"color"} if color is not None else set())
-    return FrameEncoder(encode, tuple(wanted), (*lost_notes(sequence, "OBJ", held), *not_held("MTL", lost)), beside)
+    opaque = color is None or color.shape[1] == 3 or bool((_parts_of_one(color[:, 3:]) == 1).all())
+    notes = lost_notes(sequence, "OBJ", held, () if opaque else ("alpha of colours",))
+    return FrameEncoder(encode, tuple(wanted), (*notes, *not_held("MTL", lost)), beside)
 
 
 def _indexed(each: Attribute, faces: Int32) -> tuple[Array, Int32]:
@@ -103,9 +107,8 @@ def _faces(sequence: MeshSequence, vt: Int32 | None, vn: Int32 | None, names: Se
     lines = {count: "f" + form * count + "\n" for count in np.unique(counts).tolist()}
     ends = np.concatenate([[0], np.cumsum(counts)])
     first_triangles = np.concatenate([[0], np.cumsum(counts - 2)])
-    parts = sequence.parts or (Part("", (0, 0), (0, n_triangles)),)
     texts, before = [], Part("", (0, 0), (0, 0))
-    for part in parts:
+    for part in _distinct(sequence.parts) or [Part("", (0, 0), (0, n_triangles))]:
         first, stop = np.searchsorted(first_triangles, part.triangles).tolist()
         if stop > first:
             rows = corners[ends[first] : ends[stop]].reshape(-1).tolist()
@@ -115,12 +118,26 @@ def _faces(sequence: MeshSequence, vt: Int32 | None, vn: Int32 | None, names: Se
     return "".join(texts)
 
 
+def _distinct(parts: Sequence[Part]) -> list[Part]:
+    """The parts with names that tell them apart: a reader joins what has the same object, group and material."""
+    taken: set[tuple[str, str, int | None]] = set()
+    result = []
+    for part in parts:
+        name, parent = _one_line(part.name), _one_line(part.parent)
+        stem, number = name, 0
+        while (name, parent, part.material) in taken:
+            number += 1
+            name = f"{stem}_{number}"
+        taken.add((name, parent, part.material))
+        result.append(replace(part, name=name, parent=parent))
+    return result
+
+
 def _heading(part: Part, before: Part, names: Sequence[str]) -> str:
     """The lines that say to which object, group and material the faces behind them belong."""
     text = ""
     if (part.name, part.parent) != (before.name, before.parent):
-        name, parent = _one_line(part.name), _one_line(part.parent)
-        text = f"o {parent}\ng {name}\n" if parent else f"o {name}\n"
+        text = f"o {part.parent}\ng {part.name}\n" if part.parent else f"o {part.name}\n"
     if part.material != before.material:
         text += f"usemtl {names[part.material] if part.material is not None else ''}\n"
     return text

@@ -16,7 +16,7 @@ import numpy as np
 
 from gvpipe.arrays import Array, Float64, Int32, Int64
 from gvpipe.asset.attribute import Attribute
-from gvpipe.io.mesh import FrameValues, Mesh, as_color, as_faces, as_polygons, fan
+from gvpipe.io.mesh import FrameValues, Mesh, as_color, as_faces, as_normals, as_polygons, fan
 from gvpipe.io.text import clean_lines, count_tokens, line_spans, parse_floats, parse_integers
 
 HEADER = re.compile(rb"\s*(ST)?(C)?(N)?OFF\b")
@@ -66,7 +66,7 @@ class OffLoader:
         self._faces, self._face_lines = faces, face_lines
         attributes: dict[str, Any] = {}
         if "uv" in columns:
-            attributes["uv"] = Attribute(columns["uv"], "vertex", "uv")
+            attributes["uv"] = Attribute(columns["uv"], "vertex", "uv", name="uv")
         if colors is not None:
             attributes["face_color" if "color" in columns else "color"] = Attribute(colors, "triangle", "color")
         return Mesh(positions, faces, attributes, polygons=as_polygons(n_corners), animated=animated)
@@ -106,7 +106,7 @@ def _vertex_columns(values: Float64, counts: Int64, flags: tuple[bool, bool, boo
     if (counts != n).any() or width < 0 or (has_color and width not in (3, 4)):
         return {}
     rows = values.reshape(len(counts), n)
-    columns: dict[str, Array] = {"normal": rows[:, 3:6].astype(np.float32)} if has_normal else {}
+    columns: dict[str, Array] = {"normal": as_normals(rows[:, 3:6])} if has_normal else {}
     start = 3 + 3 * has_normal
     if has_color:
         columns["color"] = as_color(rows[:, start : start + width])

@@ -26,7 +26,7 @@ from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.asset.attribute import MAX_COMPONENTS, Attribute
 from gvpipe.asset.material import Material, Texture
 from gvpipe.asset.part import Part
-from gvpipe.io.mesh import FrameValues, Mesh, as_color, as_faces, as_polygons, fan, indexed
+from gvpipe.io.mesh import FrameValues, Mesh, as_color, as_faces, as_normals, as_polygons, fan, indexed
 from gvpipe.io.pictures import Pictures
 from gvpipe.io.ply_elements import Columns, Lists, read_comments, read_elements
 from gvpipe.io.sharing import shared_by_vertex
@@ -104,7 +104,7 @@ def _uv(vertex: Columns, face: Columns, counts: Int64, faces: Int32, n_vertices:
         values, indices = shared_by_vertex(rows, faces)
         return {"uv": indexed(values, indices.astype(np.int64), faces, n_vertices, "uv")}
     found = [uv for uv in (_stack(vertex, pair) for pair in UV_NAMES) if uv is not None]
-    return {"uv": Attribute(found[0], "vertex", "uv")} if found else {}
+    return {"uv": Attribute(found[0], "vertex", "uv", name="uv")} if found else {}
 
 
 def _animated(vertex: Columns, face: Columns, counts: Int64) -> Animated:
@@ -151,7 +151,7 @@ def _values(columns: list[Array], name: str, domain: str, repeats: Int64 | None)
     if kind == "color":
         values = _color(values)
     if kind == "normal":
-        values = values.astype(np.float32)
+        values = as_normals(values)
     return FrameValues(values if repeats is None else np.repeat(values, repeats, axis=0), domain, kind)
 
 

@@ -99,6 +99,8 @@ def _read_header(data: bytes) -> tuple[str, dict[str, _Element], int]:
                 pass
             case ["element", name, count] if name not in elements:
                 elements[name] = _Element(int(count), {})
+            case ["property", *_, key] if name and key in elements[name].properties:
+                raise ValueError(f"its header has two properties {key!r} of element {name!r}")
             case ["property", "list", length, kind, key] if name and length in TYPES and kind in TYPES:
                 elements[name].properties[key] = _Property(order + TYPES[kind], order + TYPES[length])
             case ["property", kind, key] if name and kind in TYPES:

@@ -26,6 +26,7 @@ def empty_fragments(count: int) -> Fragments:
         np.empty(count, np.int32),
         np.empty((count, 2), np.int64),
         np.empty(count, np.int64),
+        np.empty(count, np.int64),
         np.empty(count, np.bool_),
         np.empty((count, 3, 3)),
         np.empty(count, np.bool_),
@@ -47,7 +48,13 @@ def gather(triangles: Array, samples: int, at: tuple[int, int], starts: Array, f
         samples: per pixel and axis.
         starts: ``(pixels + 1,)``, to be filled: each pixel's first fragment; a pixel without any sees the background alone.
     """
-    of, places, widths, is_last = fragments.triangles, fragments.places, fragments.widths, fragments.is_last
+    of, places, widths, is_last, counts = (
+        fragments.triangles,
+        fragments.places,
+        fragments.widths,
+        fragments.is_last,
+        fragments.counts,
+    )
     n_layers, (left, y) = triangles.shape[0], at
     n = 0
     for pixel in range(len(starts) - 1):
@@ -68,7 +75,7 @@ def gather(triangles: Array, samples: int, at: tuple[int, int], starts: Array, f
                 t = triangles[layer, row + i, column + j]
                 if t < 0 and layer < n_layers - 1:
                     continue
-                of[n], is_last[n] = t, layer == n_layers - 1
+                of[n], is_last[n], counts[n] = t, layer == n_layers - 1, 1
                 if differ == 0:
                     places[n, 0], places[n, 1] = (2 * column + samples) * SNAP // 2, (2 * row + samples) * SNAP // 2
                     widths[n] = samples * SNAP
@@ -76,6 +83,37 @@ def gather(triangles: Array, samples: int, at: tuple[int, int], starts: Array, f
                     places[n, 0], places[n, 1] = (column + j) * SNAP + HALF, (row + i) * SNAP + HALF
                     widths[n] = SNAP
                 n += 1
+    starts[-1] = n
+    return n
+
+
+@compiled
+def merge(starts: Array, fragments: Fragments) -> int:
+    """Make one of each pixel's fragments on one triangle, in their middle; return how many are left.
+
+    It is for scenes without see-through layers, whose textures cost more than the search for equal triangles.
+    """
+    of, places, widths, counts = fragments.triangles, fragments.places, fragments.widths, fragments.counts
+    n = 0
+    for pixel in range(len(starts) - 1):
+        first, end, start = starts[pixel], starts[pixel + 1], n
+        starts[pixel] = start
+        for k in range(first, end):
+            found = start
+            while found < n and of[found] != of[k]:
+                found += 1
+            if found == n:
+                of[n], widths[n], counts[n] = of[k], widths[k], 1
+                places[n, 0], places[n, 1] = places[k, 0], places[k, 1]
+                n += 1
+            else:
+                places[found, 0] += places[k, 0]
+                places[found, 1] += places[k, 1]
+                counts[found] += 1
+        for k in range(start, n):
+            places[k, 0] //= counts[k]
+            places[k, 1] //= counts[k]
+            widths[k] = int(widths[k] * np.sqrt(float(counts[k])))
     starts[-1] = n
     return n
 

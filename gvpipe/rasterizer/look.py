@@ -8,17 +8,19 @@ from typing import Any, Protocol
 import numpy as np
 
 from gvpipe.arguments import did_you_mean
-from gvpipe.arrays import Array, Float32, Float64, Int32
+from gvpipe.arrays import Array, Bool, Float32, Float64, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.material import WRAPS, Image, Material, Texture
 from gvpipe.asset.part import Part
 from gvpipe.errors import InputError
+from gvpipe.rasterizer.alpha_ranges import reach_alpha
 from gvpipe.rasterizer.colours import to_linear
 from gvpipe.rasterizer.scene import BLENDED, CLAY, CULLED, NO_LOOK, ROLES, TESTED, UNLIT, Look
 from gvpipe.rasterizer.textures import decode_image, largest_side, pack
 
 SRGB_ROLES = ("base_color_texture", "emissive_texture")  # the others hold numbers
 INVISIBLE = 1 / 512  # alpha of what is see-through but left out
+OPAQUE = 1 - 1 / 512
 MAX_EMISSION = 1e4
 FARTHEST_UV = 1e6  # times the image's side; float32 has no part of a texel left there
 BARE = Material(double_sided=True)  # of triangles without one
@@ -70,6 +72,12 @@ def look_of(asset: Asset) -> tuple[Look, tuple[str, ...]]:
         slots[m] = textures.add(m, materials[m])
     flags = [_flags(material) for material in materials]
     flags[-1] |= 0 if len(colours) else CLAY
+    for m in [m for m in np.flatnonzero(used).tolist() if flags[m] & TESTED]:
+        for kept, which in _without_holes(m, materials[m], textures, colours):
+            of_triangles[which] = len(materials)  # the same material, but for its flags
+            materials.append(materials[m])
+            flags.append(flags[m] & ~(TESTED | BLENDED) | kept)
+            slots = np.concatenate([slots, slots[m : m + 1]])
     base = np.clip([material.base_color for material in materials], 0, 1)
     return Look(
         of_triangles=of_triangles,
@@ -97,11 +105,23 @@ def see_through(look: Look) -> tuple[Int32, Int32]:
     return np.flatnonzero(~is_blended).astype(np.int32), np.flatnonzero(is_blended).astype(np.int32)
 
 
+def _without_holes(number: int, material: Material, textures: _Textures, colours: Float32) -> list[tuple[int, Int64]]:
+    """Triangles of a cut-out or see-through material that need no test, by the flags that they keep."""
+    of_triangles = textures.of_triangles
+    chosen = np.flatnonzero(of_triangles == number)
+    factor = min(max(material.base_color[3], 0.0), 1.0) * (float(colours[chosen, :, 3].min()) if len(colours) else 1.0)
+    if material.alpha_mode == "mask":
+        return [(0, chosen[textures.reach(material, chosen, material.alpha_cutoff, factor)])]
+    opaque = textures.reach(material, chosen, OPAQUE, factor)
+    visible = textures.reach(material, chosen, INVISIBLE, factor) & ~opaque
+    return [(0, chosen[opaque]), (BLENDED, chosen[visible])]
+
+
 class _Textures:
     """The textures of all materials: rows of tables that grow material by material."""
 
     def __init__(self, asset: Asset, of_triangles: Int32) -> None:
-        self._asset, self._of_triangles = asset, of_triangles
+        self._asset, self.of_triangles = asset, of_triangles
         self._side = largest_side(asset.images)
         self._images: dict[tuple[int, bool], int | None] = {}
         self._decoded: dict[int, Array | None] = {}
@@ -133,6 +153,14 @@ class _Textures:
             self.scales.append(float(np.clip(texture.scale, -1e3, 1e3)))
         return result
 
+    def reach(self, material: Material, triangles: Int64, limit: float, factor: float) -> Bool:
+        """Which triangles of a material have an alpha of ``limit`` or more all over, given the factor of their texture's."""
+        texture = material.base_color_texture
+        pixels = None if texture is None else self._decoded.get(texture.image)
+        if pixels is None or limit > factor:
+            return np.full(len(triangles), factor >= limit)
+        return reach_alpha(pixels[:, :, 3], self._uv[0][triangles], limit / factor if factor > 0 else 0.0)
+
     def coordinates(self) -> Float32:
         """``(S, T, 3, 2)``."""
         return np.stack(self._uv) if self._uv else NO_LOOK.uv
@@ -163,8 +191,8 @@ class _Textures:
         where = f"{self._asset.name}: material {material} ({name!r})"
         corners = _corners(self._asset, texture.uv, where)
         if row == len(self._uv):
-            self._uv.append(np.zeros((len(self._of_triangles), 3, 2), np.float32))
-        chosen = self._of_triangles == material
+            self._uv.append(np.zeros((len(self.of_triangles), 3, 2), np.float32))
+        chosen = self.of_triangles == material
         uv = corners[chosen].astype(np.float64) * (1, -1) + (0, 1)
         with np.errstate(over="ignore", invalid="ignore"):
             cos, sin = np.cos(texture.rotation), np.sin(texture.rotation)

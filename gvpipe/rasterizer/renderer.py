@@ -33,6 +33,7 @@ SIZE_RANGE = (16, 8192)  # pixels, of either side
 SAMPLES_RANGE = (1, 8)  # per pixel and axis
 THREADS = min(4, os.cpu_count() or 1)
 GLOSS = 0.05  # of the highlight
+EVENNESS = 0.5  # of the light on a field
 MAX_LAYERS = 4  # see-through surfaces that a sample shows, one behind the other
 
 
@@ -80,6 +81,7 @@ class Renderer:
             back=to_linear(BACK),
             background=to_linear(BACKGROUND),
             gloss=GLOSS,
+            evenness=0.0,
             rows=np.zeros((0, 3), np.int32),
             values=np.zeros(0),
             ramp=to_linear(colormap("errors")),
@@ -111,7 +113,8 @@ class Renderer:
         """
         base = asset.read(0, 1)[0]
         painter = cls(asset.faces, base, size, shading, samples)
-        painter._paint = painter._paint._replace(ramp=to_linear(colormap(colors)))
+        if colors != "errors":
+            painter._paint = painter._paint._replace(ramp=to_linear(colormap(colors)), evenness=EVENNESS)
         given = asset.attributes.get("normal")
         if painter._smooth and given is not None:
             painter._set_normals(*shared_normals(painter._faces, base, given))

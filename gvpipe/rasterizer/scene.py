@@ -90,6 +90,7 @@ class Paint(NamedTuple):
         front, back: ``(3,) float64``, colours of the two sides, without values.
         background: ``(3,) float64``.
         gloss: of the highlight.
+        evenness: 0..1, the part of the light that comes from everywhere, so that dark colours can be told apart.
         rows: ``(T, 3) int32``, the value of each corner; T = 0 for none.
         values: ``(n,) float64`` in 0..1, shown as colours of ``ramp``; NaN: no value.
         ramp: ``(n, 3) float64``, colours of values from 0 to 1, in even steps.
@@ -101,6 +102,7 @@ class Paint(NamedTuple):
     back: Float64
     background: Float64
     gloss: float
+    evenness: float
     rows: Int32
     values: Float64
     ramp: Float64
@@ -170,6 +172,7 @@ class Fragments(NamedTuple):
         triangles: ``(n,) int32``, -1 for the background.
         places: ``(n, 2) int64``, across and down, in 1/256 of a sample.
         widths: ``(n,) int64``, of the square that each stands for, in 1/256 of a sample.
+        counts: ``(n,) int64``, how many samples of the pixel each stands for.
         is_last: ``(n,) bool``, whether it is the farthest of its sample: what is before it is see-through.
         weights: ``(n, 3, 3) float64``, barycentric on the surface, and their changes over one width across and one down.
         outside: ``(n,) bool``, whether the front is seen.
@@ -184,6 +187,7 @@ class Fragments(NamedTuple):
     triangles: Int32
     places: Int64
     widths: Int64
+    counts: Int64
     is_last: Bool
     weights: Float64
     outside: Bool

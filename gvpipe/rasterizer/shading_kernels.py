@@ -6,7 +6,7 @@ import numpy as np
 
 from gvpipe.arrays import Array
 from gvpipe.compiled import compiled
-from gvpipe.rasterizer.fragment_kernels import base_colours, empty_fragments, gather, weigh
+from gvpipe.rasterizer.fragment_kernels import base_colours, empty_fragments, gather, merge, weigh
 from gvpipe.rasterizer.light_kernels import light_materials, light_paint, resolve
 from gvpipe.rasterizer.normal_kernels import bump_normals, seen_normals
 from gvpipe.rasterizer.scene import NORMAL, ROLES, Fragments, Look, Paint, Scene
@@ -27,10 +27,13 @@ def shade(triangles: Array, scene: Scene, look: Look, paint: Paint, rows: tuple[
     """
     width, samples = picture.shape[1], triangles.shape[1] // picture.shape[0]
     fragments = empty_fragments(STRETCH * samples * samples * triangles.shape[0])
+    has_textures = len(look.textures) > 0 and triangles.shape[0] == 1
     for y in range(rows[0], rows[1]):
         for left in range(0, width, STRETCH):
             starts = np.empty(min(STRETCH, width - left) + 1, np.int64)
             n = gather(triangles, samples, (left, y), starts, fragments)
+            if n > 0 and has_textures:
+                n = merge(starts, fragments)
             if n > 0:
                 _light(scene, look, paint, fragments, n)
             resolve(paint, starts, fragments, picture, (left, y))

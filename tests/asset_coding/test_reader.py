@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenes import scene
+from asset_scene import scene
 
 import gvpipe
 from gvpipe.asset_coding.directory import SECTION, Directory, pack_directory, unpack_directory

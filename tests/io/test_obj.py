@@ -17,8 +17,9 @@ from gvpipe import io
 from gvpipe.asset.field import Field
 from gvpipe.asset.material import Material, Texture
 from gvpipe.asset.metadata import Metadata
+from gvpipe.asset.part import Part
+from gvpipe.attributes.surface_normals import surface_normals
 from gvpipe.errors import InputError
-from gvpipe.io.own_normals import own_normals
 from gvpipe.sequence import MeshSequence
 
 
@@ -95,6 +96,7 @@ BAD_OBJ = {
     "bad corner": (SQUARE + "f 1 2 x\n", "cannot be read as OBJ"),
     "four parts": (SQUARE + "f 1/1/1/1 2 3\n", "not a corner"),
     "texture index": (SQUARE + "vt 0 0\nf 1/1 2/2 3/1\n", "'vt' entry outside 1..1"),
+    "texture nan": (SQUARE + "vt 0 nan\nf 1/1 2/1 3/1\n", "uv: value 0 is [0.0, nan]; finite numbers are needed"),
     "nan": ("v 0 0 0\nv 1 nan 0\nv 1 1 0\nf 1 2 3\n", "frame 0, vertex 1 is [1.0, nan, 0.0]"),
     "too large": ("v 0 0 0\nv 1 1e39 0\nv 1 1 0\nf 1 2 3\n", "float32 can hold"),
     "nul": ("v 0 0 0\0\0\nf 1 1 1\n", "cannot be read as OBJ"),
@@ -146,7 +148,7 @@ def test_what_obj_cannot_hold_is_said(tmp_path: Path) -> None:
     given = asset(materials=(material, material))
     notes = io.write(given, tmp_path / "a_%d.obj")
     assert notes == (
-        "OBJ has no place for weight, id, stress, flow, metadata; left out (.npz holds everything)",
+        "OBJ has no place for weight, id, stress, flow, metadata, alpha of colours; left out (.npz holds everything)",
         "MTL has no place for double-sided or unlit materials, occlusion textures; left out (.npz holds everything)",
     )
     assert "newmtl a\n" in (tmp_path / "a.mtl").read_text() and "newmtl a_1\n" in (tmp_path / "a.mtl").read_text()
@@ -244,16 +246,14 @@ def test_pictures_that_cannot_be_used(tmp_path: Path, name: str, message: str) -
 
 def test_normals_of_a_series(tmp_path: Path) -> None:
     moving = grid(6)
-    smooth = own_normals(moving[0], moving.faces, moving.faces.reshape(-1).astype(np.int64), "angle")
+    smooth = surface_normals(moving[0:1], moving.faces, moving.faces.reshape(-1), "angle")[0]
     own = MeshSequence(moving[0:6], moving.faces, attributes={"normal": np.concatenate([smooth, np.zeros((1, 3), "f4")])})
     assert io.write(own, tmp_path / "own" / "%d.obj") == ()
     read = io.read(tmp_path / "own")
     assert set(read.attributes) == {"normal"} and read.fields == {} and read.notes[1:] == ()
     last = io.read(tmp_path / "own" / "5.obj")
-    entries = moving.faces.reshape(-1).astype(np.int64)
-    np.testing.assert_allclose(
-        last.attributes["normal"][:36], own_normals(moving[5], moving.faces, entries, "angle"), atol=1e-6
-    )
+    expected = surface_normals(moving[5:6], moving.faces, moving.faces.reshape(-1), "angle")[0]
+    np.testing.assert_allclose(last.attributes["normal"][:36], expected, atol=1e-6)
 
     turning = np.random.default_rng(4).normal(size=(6, 37, 3)).astype(np.float32)
     turning[:, 36] = 0  # no corner shows it
@@ -280,3 +280,36 @@ def test_many_parts(tmp_path: Path) -> None:
     text = "".join(f"g part {i}\nusemtl m{i % 7}\nf {i % 4 + 1} 2 3\n" for i in range(10_000))
     read = io.read(obj_file(tmp_path, SQUARE + text))
     assert len(read.parts) == 10_000 and read.parts[-1].name == "part 9999" and len(read.materials) == 7
+
+
+WORDS = ["newmtl a", "newmtl", "map_Kd", "-s", "-o 1 2", "-bm", "x.png", "norm", "Kd", "1", "nan", "d", "-halo"]
+WORDS += ["Tr", "\n", " ", "é", "\\"]
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.sampled_from(WORDS), max_size=30))
+def test_any_material_file_is_read(tmp_path: Path, words: list[str]) -> None:
+    (tmp_path / "a.mtl").write_text("newmtl a\n" + " ".join(words))
+    read = io.read(obj_file(tmp_path, SQUARE + "mtllib a.mtl\nusemtl a\nf 1 2 3\n"))
+    assert len(read.materials) == 1
+
+
+def test_parts_of_one_name_stay_apart(tmp_path: Path) -> None:
+    faces = np.arange(18, dtype=np.int32).reshape(-1, 3)
+    parts = tuple(
+        Part(name, (3 * i, 3 * i + 3), (i, i + 1), material)
+        for i, (name, material) in enumerate([("a", 0), ("a", 1), ("a %d", None), ("a", 0), ("a", 0), ("", 1)])
+    )
+    given_parts = MeshSequence(np.zeros((1, 18, 3)), faces, parts=parts, materials=(Material("m"), Material("n")))
+    io.write(given_parts, tmp_path / "a.obj")
+    read = io.read(tmp_path / "a.obj")
+    assert [part.name for part in read.parts] == ["a", "a", "a %d", "a_1", "a_2", ""]
+    assert [(part.vertices, part.triangles, part.material) for part in read.parts] == [
+        (part.vertices, part.triangles, part.material) for part in parts
+    ]
+    assert np.array_equal(read.faces, faces) and read.notes == ()
+
+
+def test_parts_that_share_vertices_have_one_range(tmp_path: Path) -> None:
+    read = io.read(obj_file(tmp_path, SQUARE + "o a\nusemtl x\nf 1 2 3\nusemtl y\nf 2 3 4\n"))
+    assert [part.vertices for part in read.parts] == [(0, 4), (0, 4)]

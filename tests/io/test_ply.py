@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from assets import assert_same_attribute, asset, faces_of, picture
-from mesh_files import PLY_ROWS, grid, same_bits
+from hypothesis import given
+from hypothesis import strategies as st
+from mesh_files import PLY_ROWS, fast, grid, same_bits
 
 from gvpipe import io
 from gvpipe.asset.field import Field
@@ -90,6 +93,7 @@ def test_ply_binary_polygons_that_differ(tmp_path: Path, faces: list[list[int]],
 
 
 PLY_WRONG = {
+    "twice": ("property float y", "property float x", "its header has two properties 'x' of element 'vertex'"),
     "type": ("property float x", "property half x", "its header holds 'property half x', which is not PLY's"),
     "no y": ("property float y", "property float w", "its vertices lack x, y or z"),
     "no list": ("property list uchar int vertex_indices", "property int a", "its faces have no list vertex_indices or"),
@@ -112,31 +116,32 @@ IMAGES = (Image("cloth", "image/png", picture()),)
 
 
 def test_an_asset_as_ply(tmp_path: Path) -> None:
-    given = asset(parts=(Part("", (0, 9), (0, 8), 0),), materials=(Material("", base_color_texture=Texture(0)),), images=IMAGES)
-    notes = io.write(given, tmp_path / "%d.ply")
-    assert notes == ("PLY has no place for polygons, metadata; left out (.npz holds everything)",)  # flow differs in polygons
+    sheet = asset(parts=(Part("", (0, 9), (0, 8), 0),), materials=(Material("", base_color_texture=Texture(0)),), images=IMAGES)
+    notes = io.write(sheet, tmp_path / "%d.ply")
+    # flow differs within polygons, so that triangles are written
+    assert notes == ("PLY has no place for polygons, metadata, units; left out (.npz holds everything)",)
     read = io.read(tmp_path)
-    assert read.polygons is None and np.array_equal(read.faces, given.faces)
+    assert read.polygons is None and np.array_equal(read.faces, sheet.faces)
     assert (read.materials[0].base_color_texture, read.images) == (Texture(0), IMAGES)
-    assert same_bits(read.read(0, 3), given.read(0, 3))
+    assert same_bits(read.read(0, 3), sheet.read(0, 3))
     assert set(read.attributes) == {"uv", "color", "weight", "id"} and set(read.fields) == {"stress", "flow"}
-    assert_same_attribute(read.attributes["uv"], given.attributes["uv"], given.faces)
+    assert_same_attribute(read.attributes["uv"], sheet.attributes["uv"], sheet.faces)
     for name in ("color", "weight", "id"):
-        assert same_bits(read.attributes[name], given.attributes[name])
+        assert same_bits(read.attributes[name], sheet.attributes[name])
     for name in ("stress", "flow"):
-        assert same_bits(read.fields[name][1:3], given.fields[name][1:3])
-        assert read.fields[name].domain == given.fields[name].domain
+        assert same_bits(read.fields[name][1:3], sheet.fields[name][1:3])
+        assert read.fields[name].domain == sheet.fields[name].domain
 
 
 def test_ply_polygons_and_their_numbers(tmp_path: Path) -> None:
     sides = np.array([3, 3, 4, 4, 5, 5, 6, 7], np.int16)  # equal in the triangles of each quad
     kept = {"uv": asset().attributes["uv"], "side": sides}
-    given = asset(1, attributes=kept, fields={}, materials=(), images=(), parts=())
-    io.write(given, tmp_path / "a.ply")
+    sheet = asset(1, attributes=kept, fields={}, materials=(), images=(), parts=())
+    io.write(sheet, tmp_path / "a.ply")
     read = io.read(tmp_path / "a.ply")
     assert read.polygons is not None and read.polygons.tolist() == [4, 4, 4, 3, 3]
-    assert np.array_equal(read.faces, given.faces)
-    assert_same_attribute(read.attributes["uv"], given.attributes["uv"], given.faces)
+    assert np.array_equal(read.faces, sheet.faces)
+    assert_same_attribute(read.attributes["uv"], sheet.attributes["uv"], sheet.faces)
     assert read.attributes["side"].domain == "triangle" and same_bits(read.attributes["side"], sides[:, None])
 
 
@@ -182,9 +187,27 @@ def test_a_number_that_changes_late_is_a_field(tmp_path: Path) -> None:
 
 def test_ply_names_that_mean_something_else(tmp_path: Path) -> None:
     values = np.arange(37, dtype=np.float32)
-    given = grid(1, attributes={"x": values, "u": values, "v": values, "two words": values, "e_0": values})
-    io.write(given, tmp_path / "a.ply")
+    sheet = grid(1, attributes={"x": values, "u": values, "v": values, "two words": values, "e_0": values})
+    io.write(sheet, tmp_path / "a.ply")
     read = io.read(tmp_path / "a.ply")
     assert set(read.attributes) == {"x_", "u_", "v_", "two_words", "e_0"}
     assert all(same_bits(each, values[:, None]) for each in read.attributes.values())
-    assert same_bits(read.read(0, 1), given.read(0, 1))
+    assert same_bits(read.read(0, 1), sheet.read(0, 1))
+
+
+@fast
+@given(st.lists(st.tuples(st.integers(0, 400), st.integers(0, 255)), min_size=1, max_size=4), st.sampled_from(RAGGED))
+def test_mutated_ply_is_read_or_refused(tmp_path: Path, changes: list[tuple[int, int]], faces: list[list[int]]) -> None:
+    data = bytearray(ply_binary("<", faces))
+    for at, byte in changes:
+        data[at % len(data)] = byte
+    (tmp_path / "a.ply").write_bytes(bytes(data))
+    with contextlib.suppress(InputError):
+        io.read(tmp_path / "a.ply")
+
+
+def test_normals_of_nothing_become_zeros(tmp_path: Path) -> None:
+    head = PLY_HEAD.format("ascii", "property float nx\nproperty float ny\nproperty float nz\n")
+    rows = [f"{row} {normal}" for row, normal in zip(PLY_ROWS, ["0 0 1", "nan nan nan", "0 1 0", "1 0 0"], strict=True)]
+    (tmp_path / "a.ply").write_text(head + "\n".join(rows) + "\n3 0 1 2\n3 0 2 3\n")
+    assert io.read(tmp_path / "a.ply").attributes["normal"].tolist() == [[0, 0, 1], [0, 0, 0], [0, 1, 0], [1, 0, 0]]
