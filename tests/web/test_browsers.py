@@ -282,7 +282,7 @@ def test_an_asset_is_exact_and_shows_its_picture(name: str, player: Callable[...
     )
     facet = written.attributes["facet"]
     assert np.array_equal(np.frombuffer(base64.b64decode(values[0]), "<f4").reshape(-1, 3), facet.values)
-    assert np.array_equal(np.frombuffer(base64.b64decode(values[1]), "<u4"), facet.indices)
+    assert facet.indices is not None and np.array_equal(np.frombuffer(base64.b64decode(values[1]), "<u4"), facet.indices)
     assert np.abs(np.frombuffer(base64.b64decode(values[2]), "<f4") - points[:, 0]).max() <= rows
     pixels = np.asarray(Image.open(io.BytesIO(base64.b64decode(png))).convert("RGB"), int)
     for place, colour in {(0.2, 0.8): (230, 20, 20), (0.8, 0.2): (240, 240, 240), (0.2, 0.2): (20, 30, 220)}.items():
