@@ -219,6 +219,32 @@ def test_hard_edges_are_hard_in_every_frame(player: Player, site: Site) -> None:
     assert steps["smooth", 0] < 0.4 * steps["hard", 0] and steps["smooth", 1] < 0.4 * steps["hard", 1]
 
 
+def test_materials_with_gloss(player: Player, browser: Any, site: Site) -> None:
+    """As a GPU draws them, which the browser is made to believe it has: every texture, metal, and what it reflects."""
+    player("""const { getParameter } = WebGL2RenderingContext.prototype;
+        WebGL2RenderingContext.prototype.getParameter = function (name) {
+          return name === 0x9246 ? "A GPU" : getParameter.call(this, name);
+        };""")
+    flat = Image("flat", "image/png", picture([[[128, 128, 255]]]))
+    shine = Image("shine", "image/png", picture([[[255, 60, 255]]]))
+    material = Material(
+        "brass",
+        base_color=(0.9, 0.6, 0.2, 1.0),
+        metallic=1.0,
+        roughness=1.0,
+        metallic_roughness_texture=Texture(1),
+        normal_texture=Texture(0, scale=0.5),
+        occlusion_texture=Texture(1),
+        emissive=(0.0, 0.0, 0.05),
+        emissive_texture=Texture(1),
+    )
+    shot = show(player, textured(Texture(0), images=[flat, shine], materials=[material]), site)
+    red, green, blue, alpha = shot(0.5, 0.5, 0)
+    assert alpha == 255 and red > green > blue and red > 40
+    wrong = [entry for entry in browser.get_log("browser") if "Shader" in entry["message"] or entry["level"] == "SEVERE"]
+    assert wrong == []
+
+
 def test_pictures_that_browsers_cannot_show_are_said(player: Player, site: Site) -> None:
     data = b"\xabKTX 20\xbb\r\n\x1a\n" + bytes(80)
     material = Material(base_color=(0, 1, 0, 1), base_color_texture=Texture(0), unlit=True)

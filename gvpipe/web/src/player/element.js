@@ -151,7 +151,7 @@ export class GeometryVideoElement extends HTMLElement {
       const positions = await video.frame(0);
       if (loading !== this.#loading) return video.close();
       this.#stage ??= openStage(this.shadowRoot.querySelector("canvas"));
-      await this.#stage.setMesh(video, positions, this.getAttribute("up") ?? "y");
+      await this.#stage.setMesh(video, positions, this.getAttribute("up") ?? (video.metadata.up_axis === "z" ? "z" : "y"));
       if (loading !== this.#loading) return video.close();
       this.#positions = positions;
     } catch (error) {
