@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 Source = StrPath | Sequence[StrPath]
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
-ASSET = ("attributes", "fields", "textures")
+ASSET = ("attributes", "fields", "textures", "clip", "mesh")
 KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", *ASSET)  # of `encode`
 
 
@@ -146,14 +146,15 @@ class _StageClock:
             self.progress(stage, done)
 
 
-def read(path: Source, fps: float | None = None, clip: str | None = None) -> MeshSequence:
+def read(path: Source, fps: float | None = None, clip: str | None = None, mesh: StrPath | None = None) -> MeshSequence:
     """Read a mesh sequence, or a geometry video as one.
 
     Args:
-        path: an ``.npz``, an ``.mp4``, an animated ``.glb`` or ``.gltf``, or frame files as a folder, a glob, a ``%04d``
-            pattern, a list or one file.
+        path: an ``.npz``, an ``.mp4``, a scene (animated glTF, USD, Alembic), a point cache (``.pc2``, ``.mdd``, ``.npy``), or
+            frame files as a folder, a glob, a ``%04d`` pattern, a list or one file.
         fps: frames per second; overrides the file's. Frame files have 30 by default, glTF files the rate of their keys.
         clip: name of the animation to read, of a glTF file that has several; None: the first.
+        mesh: a file with the triangles of a point cache.
 
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
@@ -163,11 +164,11 @@ def read(path: Source, fps: float | None = None, clip: str | None = None) -> Mes
         for file in path:
             check_path(file, "a file of gvpipe.read's list")
         if len(path) != 1:
-            return read_sequence(path, fps, clip)
+            return read_sequence(path, fps, clip, mesh)
         path = path[0]
     one = check_path(path, "what gvpipe.read is given", "a list of frame files or ")
     if Path(one).suffix.lower() not in VIDEO_SUFFIXES:
-        return read_sequence(one, fps, clip)
+        return read_sequence(one, fps, clip, mesh)
     if clip is not None:
         raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
     sequence = Player(one).sequence()
@@ -205,6 +206,8 @@ def encode(
     attributes: Mapping[str, float | str] | None = None,
     fields: Mapping[str, float | str] | None = None,
     textures: int | str | None = None,
+    clip: str | None = None,
+    mesh: StrPath | None = None,
     **settings: Any,
 ) -> Report:
     """Encode a sequence into a geometry video.
@@ -230,6 +233,7 @@ def encode(
         fields: the same for animated fields; ``"0.1%,nan=keep"`` keeps NaN as holes.
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
+        clip, mesh: as for `read`.
 
     Raises:
         InputError: the source, a setting or the path cannot be used, or no quality meets the target.
@@ -242,7 +246,7 @@ def encode(
         raise SettingError(f"more than one target is given; choose one of {', '.join(targets)}")
     given = _candidates(codec, settings, purpose)
     clock = _StageClock(progress)
-    sequence = _open_source(source, path, fps)
+    sequence = _open_source(source, path, fps, clip, mesh)
     target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
     asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
     coded = _code(sequence, given, target, asset, clock)
@@ -430,7 +434,9 @@ def _is_settings(value: object) -> bool:
     return isinstance(value, Codec) and not isinstance(value, type)
 
 
-def _open_source(source: MeshSequence | Source, path: StrPath, fps: float | None) -> MeshSequence:
+def _open_source(
+    source: MeshSequence | Source, path: StrPath, fps: float | None, clip: str | None, mesh: StrPath | None
+) -> MeshSequence:
     """The sequence to encode, which must not be the file to write."""
     if isinstance(source, MeshSequence):
         return source if fps is None else source.with_fps(fps)
@@ -438,7 +444,7 @@ def _open_source(source: MeshSequence | Source, path: StrPath, fps: float | None
         check_path(source, "gvpipe.encode's source", "a MeshSequence or ")
     if _is_among(path, source):
         raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
-    return read(source, fps)
+    return read(source, fps, clip, mesh)
 
 
 def _target(

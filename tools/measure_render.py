@@ -1,6 +1,6 @@
 """Frames a second that the rasterizer draws, plain and with materials if there are any.
 
-    python tools/measure_render.py FILE [SIZE]
+python tools/measure_render.py FILE [SIZE]
 """
 
 from __future__ import annotations

@@ -105,6 +105,8 @@ def cli() -> None:
     metavar="NAME=BOUND",
     help="The same for an animated field; 0.1%,nan=keep keeps NaN as holes.",
 )
+@click.option("--clip", metavar="NAME", help="The animation to read, of a glTF file that has several. [default: the first]")
+@click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp.")
 @output_options
 def encode(
@@ -123,6 +125,8 @@ def encode(
     reorder: bool,
     attributes: tuple[str, ...],
     fields: tuple[str, ...],
+    clip: str | None,
+    mesh: str | None,
     textures: str | None,
     out: Output,
 ) -> None:
@@ -157,8 +161,9 @@ def encode(
     )
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
-        beside = {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
-        report = api.encode(source, path, chosen, progress, fps, **targets, **beside, textures=textures)  # type: ignore[arg-type]  # by name
+        beside: dict[str, Any] = {"clip": clip, "mesh": mesh, "textures": textures}
+        beside |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
+        report = api.encode(source, path, chosen, progress, fps, **targets, **beside)  # type: ignore[arg-type]  # by name
     out = out.carrying(target)
     for note in report.notes:
         out.note(note)

@@ -1,7 +1,7 @@
 """Mesh sequences from files and to files.
 
-A format that holds a whole sequence in one file has a module here and an entry in `scene_formats`. A format of single frames has a
-module and an entry in `formats.FRAME_FORMATS`.
+A format that holds a whole sequence in one file has a module here and an entry in `scene_formats`. A format of single frames
+has a module and an entry in `formats.FRAME_FORMATS`.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ def read(
     """Read a mesh sequence.
 
     Args:
-        path: an ``.npz``, a scene (animated ``.glb`` or ``.gltf``, ``.usd``, ``.usda``, ``.usdc``, ``.usdz``, ``.abc``), a point
-            cache (``.pc2``, ``.mdd``, ``.npy``), or frame files as a folder, a glob (``walk/*.obj``), a pattern
+        path: an ``.npz``, a scene (animated ``.glb`` or ``.gltf``, ``.usd``, ``.usda``, ``.usdc``, ``.usdz``, ``.abc``), a
+            point cache (``.pc2``, ``.mdd``, ``.npy``), or frame files as a folder, a glob (``walk/*.obj``), a pattern
             (``walk/%04d.obj``, ``walk/####.obj``, ``walk/$F4.obj``), one file or a list of files.
         fps: frames per second; overrides the file's. Frame files, and archives without one, have 30 by default. An animated
             glTF file is sampled at it; by default at the rate of its keys.
@@ -87,6 +87,6 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
     return write_frames(sequence, path, start)
 
 
-def _refuse_clip(clip: str | None, where: str) -> None:
+def _refuse_clip(clip: str | None, name: str) -> None:
     if clip is not None:
-        raise InputError(f"{where}: clip {clip!r} is asked for; only {', '.join(HAVE_CLIPS)} files have clips")
+        raise InputError(f"{name} has no clips; clip={clip!r} is for a single {' or '.join(HAVE_CLIPS)}")

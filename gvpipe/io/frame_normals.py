@@ -46,6 +46,13 @@ class FrameNormals:
         return result
 
 
+def unknown_normals(sequence: MeshSequence) -> tuple[str, ...]:
+    """What to say of normals that are known in the first frame alone: they would be wrong in all others."""
+    given = sequence.attributes.get("normal")
+    is_unknown = given is not None and "normal" not in sequence.fields and sequence.n_frames > 1
+    return ("normals that do not follow from the moving surface",) if is_unknown and frame_normals(sequence) is None else ()
+
+
 def frame_normals(sequence: MeshSequence) -> FrameNormals | None:
     """The normals to write: a field, or an attribute of a still mesh, or one whose rule holds in the first frame.
 

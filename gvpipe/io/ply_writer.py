@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,9 +16,10 @@ import numpy as np
 from gvpipe.arrays import Array, Float32, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
+from gvpipe.asset.material import Material
 from gvpipe.asset.polygons import polygon_corners, polygon_starts
 from gvpipe.io.even_polygons import is_even
-from gvpipe.io.frame_normals import frame_normals
+from gvpipe.io.frame_normals import frame_normals, unknown_normals
 from gvpipe.io.losses import lost_notes
 from gvpipe.io.mesh import FrameEncoder
 from gvpipe.io.pictures import picture_names
@@ -69,9 +71,13 @@ def encode_ply(sequence: MeshSequence, shared: str) -> FrameEncoder:
         return header + vertices.tobytes() + (fixed or faces.encode(fields))
 
     held = {*columns} | ({"uv"} if uv is not None else set()) | ({"normal"} if has_normals else set())
-    held |= ({"polygons"} if polygons is not None else set()) | ({"materials", "parts"} if beside else set())
+    unknown = unknown_normals(sequence)
+    held |= ({"polygons"} if polygons is not None else set()) | ({"normal"} if unknown else set())
+    if beside:  # the picture is held, and what is like a plain material
+        held |= {"materials"} if replace(sequence.materials[0], name="", base_color_texture=None) == Material() else set()
+        held |= set() if any(part.name for part in sequence.parts) else {"parts"}
     wanted = [name for name in sequence.fields if name in columns or (name == "normal" and has_normals)]
-    return FrameEncoder(encode, tuple(wanted), lost_notes(sequence, "PLY", held), beside)
+    return FrameEncoder(encode, tuple(wanted), lost_notes(sequence, "PLY", held, unknown), beside)
 
 
 def _columns(sequence: MeshSequence) -> dict[str, _Column]:
