@@ -1,7 +1,8 @@
 """Writing a file as a whole or not at all.
 
 The content goes to a temporary file in the same folder, is flushed to the disk and then takes the final name in one
-step. An interrupted or failed write leaves no half file and never damages an older one.
+step. An interrupted or failed write leaves no half file and never damages an older one. What is only needed for a while goes
+to a temporary folder.
 """
 
 from __future__ import annotations
@@ -10,11 +11,14 @@ import contextlib
 import errno
 import os
 import secrets
+import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from gvpipe.errors import OutputError
 
+PREFIX = "gvpipe-"  # of the names of temporary folders
 REMEDIES = {
     errno.ENOSPC: "free some space or choose another disk",
     errno.EDQUOT: "free some space or choose another disk",
@@ -55,6 +59,28 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         with contextlib.suppress(OSError):
             temporary.unlink()
     _flush_folder(target.parent)
+
+
+@contextlib.contextmanager
+def temporary_folder() -> Iterator[str]:
+    """Give a new temporary folder, as `lasting_folder` does; it vanishes with its files when the block ends."""
+    folder = lasting_folder()
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def lasting_folder() -> str:
+    """Return the path of a new folder among the system's temporary files, which stays.
+
+    Raises:
+        OutputError: no folder can be made there.
+    """
+    try:
+        return tempfile.mkdtemp(prefix=PREFIX)
+    except OSError as exc:
+        raise output_error(tempfile.gettempdir(), exc) from exc
 
 
 def output_error(path: str | os.PathLike[str], exc: OSError) -> OutputError:

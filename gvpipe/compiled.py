@@ -5,17 +5,25 @@ where they call them, not at the top of a file.
 
 numba compiles a kernel when it is first called with arguments of some types, and caches the machine code beside the source
 (``NUMBA_CACHE_DIR`` names another folder). The cache only saves time: code that it cannot load is compiled again.
+
+Compiling all kernels of an encode takes about 20 s. So the logger of this module says once per process that it begins, at
+level INFO, which is silent unless someone listens. The command line does.
 """
 
 from __future__ import annotations
 
-import contextlib
+import functools
+import logging
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
 from numba.core.caching import FunctionCache
 from numba.core.sigutils import normalize_signature
+
+LOGGER = logging.getLogger(__name__)
+ONCE = "compiling kernels, once after installation; the first commands take up to half a minute longer"
+EVERY_TIME = "compiling kernels in every run, since no folder takes machine code; set NUMBA_CACHE_DIR to one that does"
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -35,8 +43,10 @@ class TolerantCache(FunctionCache):  # type: ignore[misc]  # numba has no types
             found = super().load_overload(sig, target_context)
         except Exception:  # unpickling may raise any
             self._forget()
-            return None
+            found = None
         fits = found is not None and tuple(found.signature.args) == tuple(normalize_signature(sig)[0])
+        if not fits:
+            _announce(ONCE)
         return found if fits else None
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -57,6 +67,13 @@ def compiled(function: Function) -> Function:
     """Compile ``function`` when it is first called; its arrays and scalars must be of types that numba knows."""
     kernel: Any = numba.njit(nogil=True)(function)
     if kernel is not function:  # NUMBA_DISABLE_JIT leaves it as it is
-        with contextlib.suppress(RuntimeError):  # no folder takes files: the code stays in memory
+        try:
             kernel._cache = TolerantCache(function)  # what `cache=True` sets, to numba's own class
+        except RuntimeError:  # no folder takes files: the code stays in memory
+            _announce(EVERY_TIME)
     return cast(Function, kernel)
+
+
+@functools.cache
+def _announce(message: str) -> None:
+    LOGGER.info(message)

@@ -8,19 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from gvpipe.arrays import Integers
-
 ROUNDED = 1e-5  # part of the diagonal: what float32 may round without a word
 DEFAULT_FPS = 30.0
 ASSUMED_FPS = f"the input has no frame rate; {DEFAULT_FPS:g} frames per second were assumed (fps, --fps)"
-
-
-def cut(counts: Integers) -> tuple[str, ...]:
-    """Of polygons, given their numbers of corners ``(N,)``; nothing if all are triangles."""
-    larger = counts[counts > 3]
-    if not len(larger):
-        return ()
-    return (f"{len(larger)} of {len(counts)} faces have more than 3 corners; they became {int((larger - 2).sum())} triangles",)
 
 
 def left_out(n_primitives: int) -> tuple[str, ...]:
@@ -51,6 +41,11 @@ def rounded(rounding: float, diagonal: float) -> tuple[str, ...]:
         return ()
     part = f"{100 * rounding / diagonal:.2g} % of the object's diagonal"
     return (f"positions reach so far from the first frame's that float32 rounds them by up to {rounding:.2g}, {part}",)
+
+
+def not_held(format_name: str, names: Sequence[str]) -> tuple[str, ...]:
+    """Of what a file format has no place for."""
+    return (f"{format_name} has no place for {', '.join(names)}; left out (.npz holds everything)",) if names else ()
 
 
 def not_carried(names: Sequence[str]) -> tuple[str, ...]:

@@ -105,7 +105,7 @@ def share(rows: Floats, faces: npt.NDArray[np.int32], kind: str) -> gvpipe.Attri
     """Return the attribute of corners in which equal rows at one vertex are one value."""
     keys = np.concatenate([faces.reshape(-1, 1), np.round(rows, 6)], axis=1)
     first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)[1:]
-    return gvpipe.Attribute(rows[first], "corner", kind, index.reshape(-1))
+    return gvpipe.Attribute(rows[first], "corner", kind, index.reshape(-1).astype(np.int32))
 
 
 def smooth_normals(vertices: Floats, faces: npt.NDArray[np.int32]) -> Floats:
@@ -122,7 +122,7 @@ def strain(cloth: Floats) -> npt.NDArray[np.float32]:
     grid = cloth.reshape(len(cloth), N_DOWN + 1, N_ACROSS + 1, 3)
     threads = 100 * (np.linalg.norm(np.diff(grid, axis=2), axis=3) / (WIDTH / N_ACROSS) - 1)
     mean = (np.pad(threads, ((0, 0), (0, 0), (1, 0)), "edge") + np.pad(threads, ((0, 0), (0, 0), (0, 1)), "edge")) / 2
-    return mean.reshape(len(cloth), -1).astype(np.float32)
+    return np.asarray(mean.reshape(len(cloth), -1), np.float32)
 
 
 def paint() -> bytes:

@@ -1,7 +1,8 @@
 """Make gvpipe's sample animations; runs with the same libraries write the same bytes.
 
 `cloth.npz` and `creature.npz` hold `vertices` (F, V, 3) float32 in metres, y up, `faces` (T, 3) int32,
-counter-clockwise from outside, and `fps`. `ball_frames/` holds one OBJ file for each frame.
+counter-clockwise from outside, and `fps`. `ball_frames/` holds one OBJ file for each frame. `flag.npz` has two parts, quads,
+uv with a texture, normals with hard edges, and a field.
 
     python make_samples.py [OUTPUT_FOLDER]
 """
@@ -17,6 +18,9 @@ from animation import Animation
 from bounce import make_bounce
 from cloth import make_cloth
 from creature import make_creature
+from flag import make_flag
+
+import gvpipe
 
 GRID = 2.0**-13  # m; a power of two leaves the low bits of each float32 zero, which then compress
 
@@ -32,6 +36,9 @@ def main() -> None:
         animation = make()
         write_npz(folder / f"{name}.npz", animation)
         report(f"{name}.npz", animation, (folder / f"{name}.npz").stat().st_size)
+    flag = make_flag()
+    gvpipe.write(flag, folder / "flag.npz")
+    print(f"flag.npz: {flag.n_frames} frames, {flag.n_vertices} vertices, {len(flag.faces)} triangles")
     bounce = make_bounce()
     write_obj_frames(folder / "ball_frames", bounce)
     n_bytes = sum(file.stat().st_size for file in (folder / "ball_frames").glob("ball_*.obj"))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
 
-from gvpipe.atomic import atomic_path
+from gvpipe.atomic import atomic_path, lasting_folder, temporary_folder
 from gvpipe.errors import OutputError
 
 
@@ -39,4 +41,24 @@ def test_atomic_path_keeps_links_and_permissions(tmp_path: Path) -> None:
     (tmp_path / "plain").touch()
     assert (tmp_path / "real" / "a.npz").stat().st_mode == (tmp_path / "plain").stat().st_mode
     with pytest.raises(OutputError, match="not an ordinary file"), atomic_path("/dev/null"):
+        pass
+
+
+def test_a_temporary_folder_vanishes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with pytest.raises(KeyboardInterrupt), temporary_folder() as folder:
+        Path(folder, "a.mp4").write_text("half")
+        assert [name.startswith("gvpipe-") for name in os.listdir(tmp_path)] == [True]
+        raise KeyboardInterrupt
+    assert not os.listdir(tmp_path)
+    assert Path(lasting_folder()).parent == tmp_path
+
+
+def test_no_place_for_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    missing = tmp_path / "missing"
+    monkeypatch.setattr(tempfile, "tempdir", str(missing))
+    with (
+        pytest.raises(OutputError, match=f"cannot write {re.escape(str(missing))}: .*; create its folder first"),
+        temporary_folder(),
+    ):
         pass

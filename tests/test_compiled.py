@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import logging
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -11,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from gvpipe import compiled as module
 from gvpipe.compiled import compiled
 
 KERNELS = """
@@ -122,3 +124,21 @@ def test_a_folder_that_takes_no_file(kernels: Any) -> None:
 
 def test_functions_without_a_file() -> None:
     assert compiled(eval("lambda value: value + 1"))(2) == 3
+
+
+def test_compiling_is_logged_once(kernels: Any, caplog: pytest.LogCaptureFixture) -> None:
+    """At level INFO, so that a library's user sees nothing unasked; loading code from the cache is not logged."""
+    for wanted in ([module.ONCE], []):
+        module._announce.cache_clear()
+        caplog.clear()
+        with caplog.at_level(logging.INFO, logger="gvpipe.compiled"):
+            loaded = kernels()
+            assert (loaded.double(2), loaded.total(loaded.Pair(1.0, 2.0))) == (4, 3)
+        assert caplog.messages == wanted
+
+
+def test_code_that_no_folder_takes_is_logged(caplog: pytest.LogCaptureFixture) -> None:
+    module._announce.cache_clear()
+    with caplog.at_level(logging.INFO, logger="gvpipe.compiled"):
+        compiled(eval("lambda value: value + 1"))
+    assert caplog.messages == [module.EVERY_TIME]

@@ -80,11 +80,11 @@ def test_which_files_are_siblings(names: list[str], one: str, choice: str | None
 
 
 @pytest.mark.parametrize("name", QUAD_FILES)
-def test_polygons_that_became_triangles(name: str, run: Run, tmp_path: Path) -> None:
+def test_polygons_are_kept(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text(QUAD_FILES[name])
     read = gvpipe.read(tmp_path / name)
-    assert read.notes == ("1 of 2 faces have more than 3 corners; they became 2 triangles",) and len(read.faces) == 3
-    assert notes_of(run, "encode", tmp_path / name, tmp_path / "o.mp4", *OPTIONS) == list(read.notes)
+    assert read.polygons is not None and sorted(read.polygons.tolist()) == [3, 4]
+    assert read.notes == () and len(read.faces) == 3
 
 
 def test_binary_quads(tmp_path: Path) -> None:
@@ -93,7 +93,8 @@ def test_binary_quads(tmp_path: Path) -> None:
     faces = np.zeros(2, [("n", "u1"), ("i", "<i4", 4)])
     faces["n"], faces["i"] = 4, [[0, 1, 4, 3], [1, 2, 5, 4]]
     (tmp_path / "q.ply").write_bytes(f"{header}end_header\n".encode() + points.astype("<f4").tobytes() + faces.tobytes())
-    assert gvpipe.read(tmp_path / "q.ply").notes == ("2 of 2 faces have more than 3 corners; they became 4 triangles",)
+    polygons = gvpipe.read(tmp_path / "q.ply").polygons
+    assert polygons is not None and polygons.tolist() == [4, 4]
 
 
 def test_a_frame_rate_that_was_assumed(run: Run, walk: Path, sequence: MeshSequence, tmp_path: Path) -> None:
@@ -118,7 +119,10 @@ def test_a_bound_larger_than_the_object(run: Run, tmp_path: Path, sequence: Mesh
 def test_attributes_that_the_file_does_not_carry(run: Run, sequence: MeshSequence, tmp_path: Path) -> None:
     attributes: dict[str, Array] = {"uv": np.zeros((72, 2), np.float32), "color": np.zeros((72, 4), np.uint8)}
     gvpipe.write(MeshSequence(sequence.positions, sequence.faces, 25.0, attributes), tmp_path / "a.npz")
-    assert notes_of(run, "encode", tmp_path / "a.npz", tmp_path / "o.mp4", *OPTIONS) == ["the file does not carry color, uv"]
+    assert notes_of(run, "encode", tmp_path / "a.npz", tmp_path / "o.mp4", *OPTIONS) == []
+    left_out = ("--attribute", "uv=none", "--attribute", "color=none")
+    noticed = notes_of(run, "encode", tmp_path / "a.npz", tmp_path / "o.mp4", *left_out, *OPTIONS)
+    assert noticed == ["the file does not carry color, uv"]
 
 
 def test_the_library_prints_nothing(walk: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

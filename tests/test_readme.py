@@ -1,18 +1,22 @@
-"""What the README shows runs as it stands."""
+"""What the README and the page of pictures show runs as it stands."""
 
 from __future__ import annotations
 
 import re
 import shlex
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
 from folders import ROOT
 
+import gvpipe
 from gvpipe.cli.commands import cli
 
 README = (ROOT / "README.md").read_text()
+ASSETS = (ROOT / "docs" / "assets.md").read_text()
+PICTURES = (ROOT / "docs" / "render.md").read_text()
 
 
 @pytest.fixture
@@ -28,6 +32,28 @@ def test_python_example(in_a_copy: Path, capsys: pytest.CaptureFixture[str]) -> 
     exec(compile(example, "README.md", "exec"), {})
     assert "102 frames, (5332, 3) triangles, (2668, 3)" in capsys.readouterr().out
     assert (in_a_copy / "creature.npz").exists()
+
+
+def test_example_of_pictures(in_a_copy: Path) -> None:
+    (example,) = re.findall(r"```python\n(.*?)```", PICTURES, re.DOTALL)
+    sequence = gvpipe.read("samples/creature.npz").part(0, 32)
+    gvpipe.write(sequence, "walk.npz")
+    gvpipe.encode(sequence, "walk.mp4", "pdct", quality=50)
+    names: dict[str, Any] = {}
+    exec(compile(example, "render.md", "exec"), names)
+    assert (in_a_copy / "walk.png").exists()
+    assert names["picture"].shape == (512, 512, 3) and 0 <= names["triangles"].max() < len(sequence.faces)
+
+
+def test_examples_of_assets(in_a_copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    examples = re.findall(r"```python\n(.*?)```", ASSETS, re.DOTALL)
+    assert len(examples) == 2
+    for example in examples:
+        exec(compile(example, "assets.md", "exec"), {})
+    assert "['flag', 'pole'] ['cloth', 'steel']\n(3732, 2) (10, 675) image/png" in capsys.readouterr().out
+    quad = gvpipe.decode("quad.mp4")
+    assert quad.polygons is not None and quad.polygons.tolist() == [4]
+    assert quad.attributes["group"].domain == "triangle"
 
 
 def test_set_up_line_ends_in_commands_that_run(in_a_copy: Path) -> None:

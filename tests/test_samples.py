@@ -21,7 +21,7 @@ def script(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
     """The names of ``make_samples.py``, whose modules are gone afterwards."""
     monkeypatch.syspath_prepend(str(SAMPLES))
     yield runpy.run_path(str(SAMPLES / "make_samples.py"))
-    for module in ("animation", "bounce", "cloth", "creature", "fox", "gait", "implicit", "polygonise"):
+    for module in ("animation", "bounce", "cloth", "creature", "flag", "fox", "gait", "implicit", "polygonise"):
         sys.modules.pop(module, None)
 
 
@@ -41,6 +41,17 @@ def test_stored_sequences_are_what_the_script_makes(name: str, script: dict[str,
     assert made.shape == stored.shape and made.fps == stored.fps
     assert np.abs(made[:] - stored[:]).max() < 0.01
     assert (made.faces == stored.faces).all(axis=1).mean() > 0.99
+
+
+def test_the_flag_is_what_the_script_makes(script: dict[str, Any]) -> None:
+    made, stored = script["make_flag"](), gvpipe.read(SAMPLES / "flag.npz")
+    errors = gvpipe.compare(made, stored)
+    assert errors.max < 1e-6
+    assert all(error["max"] is not None and error["max"] < 1e-3 for error in (errors.attributes | errors.fields).values())
+    assert (stored.parts, stored.materials, stored.metadata) == (made.parts, made.materials, made.metadata)
+    assert np.array_equal(np.asarray(stored.polygons), np.asarray(made.polygons))
+    assert stored.images[0].media_type == "image/png"
+    assert (SAMPLES / "flag.npz").stat().st_size < 500_000
 
 
 @pytest.mark.parametrize(("name", "closed", "frames"), [("cloth", False, 110), ("creature", True, 102)])

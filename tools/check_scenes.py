@@ -25,8 +25,7 @@ import numpy as np
 from gvpipe.arrays import Array, Float64
 from gvpipe.asset.part import Part
 from gvpipe.errors import InputError
-from gvpipe.io import READERS
-from gvpipe.io.options import ReadOptions
+from gvpipe.io import READERS, read
 from gvpipe.io.scene_frames import SceneFrames
 from gvpipe.sequence import MeshSequence
 
@@ -85,7 +84,7 @@ def check_file(path: Path, name: str, references: list[Path], mesh: Path | None)
     """Read one file and compare it with its references."""
     started = time.perf_counter()
     try:
-        sequence = READERS[path.suffix.lower()](path, ReadOptions(mesh=mesh))
+        sequence = read(path, mesh=mesh)
     except InputError as exc:
         return Row(name, f"refused: {str(exc).replace(str(path), path.name)}", "-")
     seconds = time.perf_counter() - started

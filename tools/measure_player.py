@@ -1,6 +1,6 @@
 """How fast the web player is: ``python tools/measure_player.py FILE.mp4 [--size 512] [--seconds 5]``.
 
-Exports the file, opens the page in headless Chromium (no GPU: WebGL on the processor) and prints what docs/player.md tells:
+Exports the file, opens the page in headless Chromium (no GPU: WebGL on the processor) and prints the numbers of docs/player.md:
 unique frames per second while playing, the longest time between two, milliseconds for a frame at random, and for loading.
 """
 
@@ -47,10 +47,10 @@ const canvas = element.shadowRoot.querySelector("canvas");
 
 def main() -> None:
     """Measure, and print one line per number."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("file", type=Path)
-    parser.add_argument("--size", type=int, default=512)
-    parser.add_argument("--seconds", type=float, default=5)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", type=Path, metavar="FILE.mp4", help="a geometry video")
+    parser.add_argument("--size", type=int, default=512, help="pixels, width and height of the picture [default: 512]")
+    parser.add_argument("--seconds", type=float, default=5, help="how long it plays [default: 5]")
     options = parser.parse_args()
     folder = Path(tempfile.mkdtemp(prefix="gvpipe-"))
     try:

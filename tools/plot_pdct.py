@@ -7,19 +7,15 @@ The paper's figures 4 and 5 (Amjoun and Strasser 2008). Needs matplotlib.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 
 import gvpipe
 from gvcodecs.pdct import Pdct
 from gvpipe.metrics.comparison import compare
 from gvpipe.sequence import MeshSequence
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
 
 CLUSTERS = (5, 10, 20, 40, 60, 80)
 KEPT = (0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0)
@@ -28,9 +24,12 @@ QUALITY = 60.0
 
 def main() -> None:
     """Draw both figures into docs/."""
-    whole = gvpipe.read(sys.argv[1])
-    n_frames = int(sys.argv[2]) if len(sys.argv) > 2 else whole.n_frames
-    sequence = MeshSequence(whole.read(0, n_frames), whole.faces, whole.fps)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", metavar="FILE.npz", help="the sequence")
+    parser.add_argument("frames", metavar="FRAMES", nargs="?", type=int, help="only so many of its frames")
+    options = parser.parse_args()
+    whole = gvpipe.read(options.file)
+    sequence = whole.part(0, min(options.frames or whole.n_frames, whole.n_frames))
     folder = Path(__file__).parents[1] / "docs"
     rows = [measure(sequence, Pdct(quality=QUALITY, clusters=k)) for k in CLUSTERS]
     print("clusters", *zip(CLUSTERS, rows, strict=True), sep="\n")
@@ -54,6 +53,11 @@ def measure(sequence: MeshSequence, settings: Pdct) -> tuple[float, float]:
 
 def draw(path: Path, label: str, curves: list[tuple[str, tuple[float, ...], list[tuple[float, float]]]]) -> None:
     """Rate on the left, error on the right."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
     figure, axes = plt.subplots(1, 2, figsize=(7, 2.6), dpi=80)
     for side, (axis, name) in enumerate(zip(axes, ("bits per vertex and frame", "da"), strict=True)):
         for title, x, rows in curves:

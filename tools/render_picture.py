@@ -5,7 +5,7 @@ python tools/render_picture.py [OUT.png]
 
 from __future__ import annotations
 
-import sys
+import argparse
 import tempfile
 from pathlib import Path
 
@@ -20,7 +20,17 @@ FRAME, SIZE, VIEW = 30, (400, 310), (62.0, 14.0)
 LEGEND = 110  # pixels, about: the picture with the colour bar is so much wider, to show the fox at the same size
 
 
-def main(target: str) -> None:
+def main() -> None:
+    """Draw the picture."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "target", metavar="OUT.png", nargs="?", default=str(ROOT / "docs" / "picture.png"), help="what to write"
+    )
+    draw(parser.parse_args().target)
+
+
+def draw(target: str) -> None:
+    """Encode the sample, draw it three times and write the pictures side by side."""
     source = gvpipe.read(ROOT / "samples" / "creature.npz")
     camera = framing(source, [FRAME], VIEW, aspect=SIZE[0] / SIZE[1])
     with tempfile.TemporaryDirectory() as folder:
@@ -36,4 +46,4 @@ def main(target: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1] if len(sys.argv) > 1 else str(ROOT / "docs" / "picture.png"))
+    main()

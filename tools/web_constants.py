@@ -6,6 +6,7 @@ A constant has the name of its module and its own: ``REACH`` of `gvpipe.connecti
 
 from __future__ import annotations
 
+import argparse
 import json
 from importlib import import_module
 from pathlib import Path
@@ -61,6 +62,12 @@ def make() -> str:
     return "\n".join(lines) + "\n"
 
 
+def main() -> None:
+    """Write the file."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+    TARGET.write_text(make(), "utf-8")
+
+
 def _literal(value: Any) -> str:
     """A value as JavaScript writes it."""
     if isinstance(value, UUID):
@@ -73,4 +80,4 @@ def _literal(value: Any) -> str:
 
 
 if __name__ == "__main__":
-    TARGET.write_text(make(), "utf-8")
+    main()

@@ -124,7 +124,8 @@ def as_attribute(name: str, given: Any, rows: dict[str, int], where: str) -> Att
 def guess_kind(name: str, values: Array) -> str:
     """The kind that a name and an array suggest: ``uv1 (N, 2)`` is a uv, one column of integers a label."""
     for kind, widths in WIDTHS.items():
-        if name.lower().startswith(kind) and values.ndim == 2 and values.shape[1] in widths:
+        is_typed = kind == "color" or values.dtype.kind == "f"
+        if name.lower().startswith(kind) and values.ndim == 2 and values.shape[1] in widths and is_typed:
             return kind
     if values.ndim == 1 or values.shape[1] == 1:
         return "label" if values.dtype.kind in "iu" else "scalar"

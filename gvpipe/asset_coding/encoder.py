@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Int32
+from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, image_size
@@ -20,20 +21,26 @@ from gvpipe.asset.metadata import NO_METADATA
 from gvpipe.asset.part import Part
 from gvpipe.asset_coding.bounds import Precision, check_names, precision
 from gvpipe.asset_coding.directory import SECTION, Directory, Listed, ListedImage, pack_directory
+from gvpipe.asset_coding.normal_fields import find_normal_rule, pack_rule
 from gvpipe.asset_coding.options import NO_OPTIONS, AssetOptions
 from gvpipe.asset_coding.pictures import limit_image
 from gvpipe.asset_coding.scan import scan_field
 from gvpipe.attributes.attribute_coding import encode_attribute
+from gvpipe.attributes.corner_sharing import entries_of
 from gvpipe.attributes.surface import Surface
-from gvpipe.attributes.triangle_order import Arrangement, encode_arrangement
+from gvpipe.attributes.triangle_order import Arrangement, SourceCorners, encode_arrangement
 from gvpipe.codec import Codec, Encoded, FrameReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.mesh import FieldMesh
+from gvpipe.fields.octahedral import angular_bound, to_octahedral
+from gvpipe.fields.values import FieldBound
 from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence
 
 ARRANGEMENT = "arrangement"
+CODED, SURFACE, OCTAHEDRAL = 1, 2, 3  # codings of fields; attributes have the first
+MOVING = ("scalar", "vector")  # kinds of fields that may follow from positions
 
 
 @dataclass(frozen=True)
@@ -102,42 +109,46 @@ class AssetCoder:
         self._sequence = sequence
         self.plan = plan_asset(sequence, options)
         self._fields: dict[tuple[str, bytes], bytes] = {}
+        self._meshes: dict[tuple[str, bytes], FieldMesh] = {}
 
     @property
     def is_empty(self) -> bool:
         """Whether there is nothing beside positions and triangles."""
         given = self._sequence
-        beside = (self.plan.attributes, self.plan.fields, given.parts, given.materials, given.images)
-        return not any(map(len, beside)) and given.polygons is None and given.metadata == NO_METADATA
+        is_bare = not (self.plan.attributes or self.plan.fields or given.parts or given.materials or given.images)
+        return is_bare and given.polygons is None and given.metadata == NO_METADATA
 
-    def add(self, encoded: Encoded, codec: Codec) -> Bitstream:
-        """Return the bitstream with the asset's sections.
+    def add(self, encoded: Encoded, codec: Codec, is_final: bool = True) -> Bitstream:
+        """Return the bitstream with the asset's sections; those that it has are replaced.
 
         Args:
-            encoded: without them.
+            encoded: of the positions.
             codec: that made it. Attributes are predicted from frame 0, if it decodes to the same bits on every machine.
+            is_final: whether fields may follow from decoded positions, which makes some smaller and takes time for each
+                bitstream.
         """
         if self.is_empty:
             return encoded.bitstream
         reader, same_bits = open_reader(encoded.bitstream), getattr(codec, "same_bits", True)
-        permutation = np.asarray(encoded.permutation)
+        permutation = np.asarray(encoded.permutation, np.int64)
         place = np.empty(len(permutation), np.int32)
         place[permutation] = np.arange(len(permutation))
-        arranged, arrangement = self._arrange(reader.faces, place)
-        surface = Surface(
-            arrangement.faces, len(permutation), reader.read(0, 1)[0] if same_bits else None, len(self._sequence.parts)
-        )
+        parts = tuple(_placed(part, self._sequence.faces, place) for part in self._sequence.parts)
+        arranged, arrangement, sources = self._arrange(reader.faces, place, parts)
+        positions = reader.read(0, 1)[0] if same_bits else None
+        surface = Surface(arrangement.faces, len(permutation), positions, len(parts))
         sections = dict(encoded.bitstream.sections)
         if arranged:
             sections[ARRANGEMENT] = arranged
-        attributes = self._add_attributes(sections, permutation, arrangement, surface)
-        fields = self._add_fields(sections, permutation, arrangement, reader)
+        origins = Origins(permutation, sources.corners, sources.triangles)
+        attributes = self._add_attributes(sections, origins, surface)
+        fields = self._add_fields(sections, origins, surface, reader if is_final else None)
         images = []
         for number, image in enumerate(self.plan.images):
             images.append(ListedImage(image.name, image.media_type, f"image.{number}"))
             sections[images[-1].section] = image.data
         directory = Directory(
-            parts=tuple(_placed(part, self._sequence.faces, place) for part in self._sequence.parts),
+            parts=parts,
             geometry=same_bits,
             attributes=attributes,
             fields=fields,
@@ -147,68 +158,110 @@ class AssetCoder:
         )
         return dataclasses.replace(encoded.bitstream, sections={**sections, SECTION: pack_directory(directory)})
 
-    def _arrange(self, decoded: Int32, place: Int32) -> tuple[bytes, Arrangement]:
+    def _arrange(self, decoded: Int32, place: Int32, parts: tuple[Part, ...]) -> tuple[bytes, Arrangement, SourceCorners]:
         sequence = self._sequence
-        labels = np.zeros(len(decoded), np.int32)
-        for number, part in enumerate(sequence.parts):
-            labels[part.triangles[0] : part.triangles[1]] = number
-        return encode_arrangement(decoded, place[sequence.faces], sequence.polygons, labels)
+        labels = np.repeat(np.arange(len(parts)), [part.triangles[1] - part.triangles[0] for part in parts]) if parts else None
+        return encode_arrangement(
+            decoded,
+            place[sequence.faces],
+            polygons=sequence.polygons,
+            parts=labels,
+            n_parts=max(len(parts), 1),
+            vertex_starts=vertex_starts(parts, sequence.n_vertices),
+        )
 
-    def _add_attributes(
-        self, sections: dict[str, bytes], permutation: Int32, arrangement: Arrangement, surface: Surface
-    ) -> tuple[Listed, ...]:
-        rows = {"vertex": permutation, "corner": arrangement.source_corners, "triangle": arrangement.source_triangles}
-        listed = []
+    def _add_attributes(self, sections: dict[str, bytes], origins: Origins, surface: Surface) -> tuple[Listed, ...]:
+        listed: list[Listed] = []
+        references: list[Int32] = []  # of corner attributes, which tell where others are likely to have seams
         for number, (name, (attribute, found)) in enumerate(self.plan.attributes.items()):
             section = f"attribute.{number}"
-            moved = attribute.select(rows[attribute.domain]) if attribute.domain in rows else attribute
+            rows = origins.of(attribute.domain)
+            moved = attribute if rows is None else attribute.select(rows)
             sections[section] = encode_attribute(
-                moved.values, moved.indices, attribute.domain, attribute.kind, found.bound, surface
+                moved.values,
+                moved.indices,
+                surface,
+                domain=attribute.domain,
+                kind=attribute.kind,
+                bound=found.bound,
+                references=references,
             )
-            listed.append(
-                Listed(
-                    name=name,
-                    kind=attribute.kind,
-                    domain=attribute.domain,
-                    components=attribute.values.shape[1],
-                    dtype=attribute.dtype.name,
-                    unit=attribute.unit,
-                    bound=found.bound,
-                    coding=1,
-                    section=section,
-                )
-            )
+            if attribute.domain == "corner" and moved.indices is not None:
+                references.append(entries_of(moved.indices, surface))
+            listed.append(_listed(name, attribute, attribute.values.shape[1], found.bound, section))
         return tuple(listed)
 
     def _add_fields(
-        self, sections: dict[str, bytes], permutation: Int32, arrangement: Arrangement, reader: FrameReader
+        self, sections: dict[str, bytes], origins: Origins, surface: Surface, reader: FrameReader | None
     ) -> tuple[Listed, ...]:
         listed = []
-        key = hashlib.sha256(arrangement.faces.tobytes()).digest()
-        meshes: dict[str, FieldMesh] = {}
-        for number, (name, (field, found, (low, high))) in enumerate(self.plan.fields.items()):
+        for number, (name, (field, found, span)) in enumerate(self.plan.fields.items()):
             section = f"field.{number}"
-            if (name, key) not in self._fields:
-                if field.domain not in meshes:
-                    meshes[field.domain] = FieldMesh(arrangement.faces, self._sequence.n_vertices, field.domain)
-                moved = field.select(permutation if field.domain == "vertex" else arrangement.source_triangles)
-                self._fields[name, key] = encode_field(moved.read, len(field), meshes[field.domain], found.bound)
-            sections[section] = self._fields[name, key]
-            listed.append(
-                Listed(
-                    name=name,
-                    kind=field.kind,
-                    domain=field.domain,
-                    components=field.n_components if len(field.shape) == 3 else 0,
-                    dtype=field.dtype.name,
-                    unit=field.unit,
-                    bound=found.bound,
-                    coding=1,
-                    section=section,
-                    range=(low, high),
-                )
-            )
+            rows = origins.of(field.domain)
+            assert rows is not None  # fields are on vertices or triangles
+            coding, sections[section] = self._code_field(name, field.select(rows), found, surface, reader)
+            components = field.n_components if len(field.shape) == 3 else 0
+            listed.append(_listed(name, field, components, found.bound, section, span, coding))
         return tuple(listed)
+
+    def _code_field(
+        self, name: str, field: Field, found: Precision, surface: Surface, reader: FrameReader | None
+    ) -> tuple[int, bytes]:
+        """The coding and the section of a field whose rows are as they are decoded."""
+        is_normal = field.kind == "normal" and found.bound > 0
+        if is_normal and reader is not None:
+            rule = find_normal_rule(field, reader, surface, found.bound)
+            if rule is not None:
+                return SURFACE, pack_rule(rule)
+        key = hashlib.sha256(surface.faces.tobytes()).digest()
+        mesh = self._meshes.setdefault((field.domain, key), FieldMesh(surface.faces, surface.n_vertices, field.domain))
+        if is_normal:
+            bound = angular_bound(found.bound)
+            read: Callable[[int, int], Array] = lambda start, stop: to_octahedral(field.read(start, stop), start, name)  # noqa: E731  # it closes over the field
+        else:
+            bound, read = FieldBound(found.bound) if found.bound else FieldBound(exact=True), field.read
+        codings = [self._fields[name, key]] if (name, key) in self._fields else []
+        if reader is not None and field.kind in MOVING and found.bound:
+            codings.append(encode_field(read, len(field), mesh, bound, name, positions=reader.read, holes=found.holes))
+        elif not codings:
+            codings.append(encode_field(read, len(field), mesh, bound, name, holes=found.holes))
+            self._fields[name, key] = codings[0]
+        data = min(codings, key=len)
+        return (OCTAHEDRAL if is_normal else CODED), data
+
+
+@dataclass(frozen=True)
+class Origins:
+    """The source's row of each row that is decoded: ``vertices (V,)``, ``corners (3T,)``, ``triangles (T,)``."""
+
+    vertices: Int64
+    corners: Int64
+    triangles: Int64
+
+    def of(self, domain: str) -> Int64 | None:
+        """Of a domain; None for parts, which keep their order."""
+        return {"vertex": self.vertices, "corner": self.corners, "triangle": self.triangles}.get(domain)
+
+
+def vertex_starts(parts: tuple[Part, ...], n_vertices: int) -> Int64 | None:
+    """``(n_parts + 1,)`` first vertex of each part, and V, where parts follow each other; else None."""
+    starts = [part.vertices[0] for part in parts]
+    stops = [part.vertices[1] for part in parts]
+    if not parts or [*starts[1:], n_vertices] != stops or starts[0]:
+        return None
+    return np.array([*starts, n_vertices])
+
+
+def _listed(
+    name: str,
+    given: Attribute | Field,
+    components: int,
+    bound: float,
+    section: str,
+    span: tuple[float, float] | None = None,
+    coding: int = CODED,
+) -> Listed:
+    return Listed(name, given.kind, given.domain, components, given.dtype.name, given.unit, bound, coding, section, span)
 
 
 def _placed(part: Part, faces: Int32, place: Int32) -> Part:

@@ -34,7 +34,7 @@ def draw(report: BenchReport, folder: str | os.PathLike[str], peers: Peers | Non
     try:
         import matplotlib
     except ImportError as exc:
-        raise InputError("plots need matplotlib; install gvpipe[plot]") from exc
+        raise InputError("plots need matplotlib, which is not installed; run: pip install 'gvpipe[plot]'") from exc
     matplotlib.use("Agg")
     by_sequence: dict[str, list[Curve]] = defaultdict(list)
     for curve in report.curves:

@@ -19,6 +19,18 @@ from typing import Any
 from gvpipe.atomic import atomic_path
 from gvpipe.errors import InputError
 
+NUMBER = int | float | None
+REPORT_TYPES = {"gvpipe": str, "machine": dict, "command": list, "curves": list}
+CURVE_TYPES = {
+    "sequence": str,
+    "vertices": int,
+    "triangles": NUMBER,
+    "frames": int,
+    "codec": str,
+    "settings": dict,
+    "peak_mb": NUMBER,
+    "points": list,
+}
 POINT_KEYS = ("quality", "bytes", "bpvf", "rmse_diag", "max_diag", "kg", "sted", "encode_s", "decode_fps")  # that tables use
 
 
@@ -65,14 +77,43 @@ class BenchReport:
     def read(cls, path: str | os.PathLike[str]) -> BenchReport:
         """Mirror of `write`; raises `InputError` for anything that it does not write."""
         try:
-            values = json.loads(Path(path).read_text("utf-8"))
-            curves = [Curve(**curve) for curve in values["curves"]]
-            for curve in curves:
-                for point in curve.points:
-                    if any(not isinstance(point[key], int | float | None) for key in POINT_KEYS):
-                        raise ValueError(f"a point of {curve.sequence} is not made of numbers")
-            return cls(str(values["gvpipe"]), dict(values["machine"]), list(values["command"]), curves)
+            return cls._parse(Path(path).read_text("utf-8"))
         except OSError as exc:
             raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check the path") from exc
-        except (ValueError, TypeError, KeyError) as exc:
-            raise InputError(f"{path} is not what `gvpipe bench --json` writes ({exc}); make it anew") from exc
+        except UnicodeDecodeError as exc:
+            raise _no_report(path, "it is no text") from exc
+        except json.JSONDecodeError as exc:
+            raise _no_report(path, f"line {exc.lineno} is no JSON") from exc
+        except _WrongValue as exc:
+            raise _no_report(path, str(exc)) from exc
+
+    @classmethod
+    def _parse(cls, text: str) -> BenchReport:
+        values = _checked(json.loads(text), REPORT_TYPES, "the file")
+        curves = []
+        for i, given in enumerate(values["curves"]):
+            curve = _checked(given, CURVE_TYPES, f"curve {i}")
+            for k, point in enumerate(curve["points"]):
+                _checked(point, dict.fromkeys(POINT_KEYS, NUMBER), f"point {k} of curve {i}")
+            curves.append(Curve(**{key: curve[key] for key in CURVE_TYPES}))
+        return cls(values["gvpipe"], values["machine"], values["command"], curves)
+
+
+class _WrongValue(ValueError):
+    """What a file lacks or holds that a report does not."""
+
+
+def _checked(values: Any, types: dict[str, Any], what: str) -> dict[str, Any]:
+    """Return an object of the file, whose values under the keys of ``types`` have those types; raises `_WrongValue`."""
+    if not isinstance(values, dict):
+        raise _WrongValue(f"{what} is no object")
+    for key, kind in types.items():
+        if key not in values:
+            raise _WrongValue(f"{what} has no {key}")
+        if not isinstance(values[key], kind):
+            raise _WrongValue(f"{what} has {key} of another type")
+    return values
+
+
+def _no_report(path: str | os.PathLike[str], why: str) -> InputError:
+    return InputError(f"{path} is not what `gvpipe bench --json` writes: {why}; give that file, or measure again")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import json
+import logging
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -20,6 +21,7 @@ import click
 if TYPE_CHECKING:
     from gvpipe.codec import Progress
 
+COMPILER = "gvpipe.compiled"  # its logger; the module itself imports numba
 VERBOSE = ("--verbose", "-v")
 
 Command = Callable[..., None]
@@ -65,13 +67,30 @@ class Output:
         """A bar per stage, where standard error is a terminal; verbose: the seconds of each stage when it ends."""
         if self.verbose:
             stages = _Stages()
-            yield stages
+            with self._listening():
+                yield stages
             stages.end()
         elif self.quiet or not sys.stderr.isatty():
             yield None
         else:
-            with _bars() as show:
+            with _bars() as show, self._listening():
                 yield show
+
+    @contextlib.contextmanager
+    def _listening(self) -> Iterator[None]:
+        """Note that kernels are being compiled, which takes long and shows no progress (`gvpipe.compiled`)."""
+        if self.quiet:
+            yield
+            return
+        logger, handler = logging.getLogger(COMPILER), _Noting()
+        level = logger.level
+        logger.setLevel(logging.INFO)
+        logger.addHandler(handler)
+        try:
+            yield
+        finally:
+            logger.removeHandler(handler)
+            logger.setLevel(level)
 
 
 def output_options(command: Command) -> Command:
@@ -95,6 +114,13 @@ def print_options(command: Command) -> Command:
 def is_verbose(arguments: list[str]) -> bool:
     """Whether a command line asks for tracebacks; looked at before, and whether or not, it is parsed."""
     return any(argument in VERBOSE for argument in arguments)
+
+
+class _Noting(logging.Handler):
+    """Prints what a logger says as notes, while bars may be on the screen."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        print(f"Note: {record.getMessage()}", file=sys.stderr)  # click would write behind the bars' back, and they erase that
 
 
 class _Stages:

@@ -10,10 +10,9 @@ import contextlib
 import os
 import shutil
 import sys
-import tempfile
 from collections.abc import Iterator
 
-from gvpipe.atomic import output_error
+from gvpipe.atomic import output_error, temporary_folder
 from gvpipe.errors import GvpipeError, InputError, OutputError
 
 PIPE = "-"
@@ -32,7 +31,7 @@ def source_path(source: str) -> Iterator[str]:
         return
     if sys.stdin.isatty():
         raise InputError(f"{STDIN} is a terminal; pipe an .npz or a geometry video into it, or give a file's name")
-    with _folder() as folder, _renamed(folder, STDIN):
+    with temporary_folder() as folder, _renamed(folder, STDIN):
         stream = sys.stdin.buffer
         head = stream.read(8)
         path = os.path.join(folder, STDIN + _suffix(head))
@@ -54,7 +53,7 @@ def target_path(target: str, suffix: str) -> Iterator[str]:
         return
     if sys.stdout.isatty():
         raise OutputError(f"{STDOUT} is a terminal, which shows no {suffix} file; pipe it on, or give a file's name")
-    with _folder() as folder, _renamed(folder, STDOUT):
+    with temporary_folder() as folder, _renamed(folder, STDOUT):
         path = os.path.join(folder, STDOUT + suffix)
         yield path
         with open(path, "rb") as file:
@@ -74,16 +73,6 @@ def _suffix(head: bytes) -> str:
     if head[4:8] == b"ftyp":
         return ".mp4"
     raise InputError(f"{STDIN} is {'no .npz and no geometry video' if head else 'empty'}; pipe one of those into it")
-
-
-@contextlib.contextmanager
-def _folder() -> Iterator[str]:
-    try:
-        folder = tempfile.TemporaryDirectory(prefix="gvpipe-")
-    except OSError as exc:
-        raise output_error(tempfile.gettempdir(), exc) from exc
-    with folder as name:
-        yield name
 
 
 @contextlib.contextmanager

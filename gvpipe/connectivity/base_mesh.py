@@ -23,7 +23,7 @@ from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor
 from gvpipe.errors import CorruptFile, InputError, corrupt_section
-from gvpipe.mesh.unique_rows import decode_table, encode_table, row_ids, smallest_first, used_vertices
+from gvpipe.mesh.unique_rows import decode_table, encode_table, left_out, row_ids, smallest_first, used_vertices
 
 HEADER = struct.Struct("<4I")
 COMPRESSION_LEVEL = 10  # Draco's best; 20 ms for 10k vertices
@@ -123,7 +123,7 @@ def _encode_draco(points: Array, faces: Array) -> bytes:
 def _encode_mesh(points: Array, faces: Array, draco: bytes) -> tuple[bytes, Array, Array]:
     """The mesh stream, its codec order, and its triangles in that order.
 
-    Whatever the Draco stream does not give back is added as loose rows.
+    Whatever the Draco stream does not give back is added as loose rows. Raises ValueError where it gives back something else.
     """
     keys, draco_faces = _decode_draco(draco)
     carried = _find_vertices(points, used_vertices(_proper(points, faces), len(points)), keys)
@@ -132,14 +132,7 @@ def _encode_mesh(points: Array, faces: Array, draco: bytes) -> tuple[bytes, Arra
     permutation = np.concatenate([carried, np.flatnonzero(is_loose)])
     codec_index = np.argsort(permutation)
 
-    canonical = np.concatenate([smallest_first(codec_index[faces]), smallest_first(draco_faces)])
-    ids, representatives = row_ids(canonical)
-    missing = np.bincount(ids[: len(faces)], minlength=len(representatives))
-    missing -= np.bincount(ids[len(faces) :], minlength=len(representatives))
-    if (missing < 0).any():
-        raise ValueError("Draco returned triangles that the mesh does not have")
-    loose_faces = canonical[np.repeat(representatives, missing)]
-
+    loose_faces = left_out(smallest_first(codec_index[faces]), smallest_first(draco_faces))
     loose_points = encode_table(points[is_loose])
     header = HEADER.pack(len(draco), int(is_loose.sum()), len(loose_faces), len(loose_points))
     mesh = header + draco + loose_points + encode_table(loose_faces)

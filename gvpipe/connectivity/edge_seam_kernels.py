@@ -2,32 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from gvpipe.arrays import Array, Int64
 from gvpipe.compiled import compiled
+from gvpipe.connectivity.seam_corners import SeamCorners
 
 LOOK = 32  # corners before, of the same point, that are looked at
 SAME, SINGLE, LATER, NEW = range(4)  # why a vertex is likely, best first
 CONTEXTS, ENCODE, DECODE = range(3)  # what `visit_corners` fills
-
-
-class SeamCorners(NamedTuple):
-    """Corners on seams, by point, then by corner; int64.
-
-    Args:
-        points: ``(3T,)`` the point of every corner of the mesh.
-        corners: ``(n,)`` corners of points with more than one vertex.
-        begins: ``(n,)`` for each of them the index of its point's first one.
-        counts: ``(P,)`` vertices of each point.
-    """
-
-    points: Int64
-    corners: Int64
-    begins: Int64
-    counts: Int64
 
 
 @compiled

@@ -10,16 +10,12 @@ Bytes against those of differences between a point's corners (`seams`): 92 and 1
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from gvpipe.arrays import Array, Bool
+from gvpipe.arrays import Array
+from gvpipe.connectivity.seam_corners import are_first, find_seam_corners
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import corrupt_section
-
-if TYPE_CHECKING:
-    from gvpipe.connectivity.edge_seam_kernels import SeamCorners
 
 
 def encode_across_edges(numbers: Array, point_faces: Array, counts: Array) -> bytes:
@@ -32,10 +28,10 @@ def encode_across_edges(numbers: Array, point_faces: Array, counts: Array) -> by
     """
     from gvpipe.connectivity.edge_seam_kernels import ENCODE, visit_corners
 
-    seams = _seam_corners(point_faces, counts)
+    seams = find_seam_corners(point_faces, counts)
     ranks, contexts = np.zeros(len(seams.corners), np.int64), np.zeros(len(seams.corners), np.int64)
     visit_corners(seams, numbers, ranks, contexts, ENCODE)
-    coded = _is_coded(seams)
+    coded = ~are_first(seams)
     return encode_integers(ranks[coded], contexts[coded])
 
 
@@ -43,27 +39,11 @@ def decode_across_edges(data: bytes, point_faces: Array, counts: Array) -> Array
     """Mirror of `encode_across_edges`: ``(3T,)``; raises `CorruptFile` where a corner uses a vertex that does not exist."""
     from gvpipe.connectivity.edge_seam_kernels import CONTEXTS, DECODE, visit_corners
 
-    seams, numbers = _seam_corners(point_faces, counts), np.zeros(point_faces.size, np.int64)
+    seams, numbers = find_seam_corners(point_faces, counts), np.zeros(point_faces.size, np.int64)
     ranks, contexts = np.zeros(len(seams.corners), np.int64), np.zeros(len(seams.corners), np.int64)
     visit_corners(seams, numbers, ranks, contexts, CONTEXTS)
-    coded = _is_coded(seams)
+    coded = ~are_first(seams)
     ranks[coded] = decode_integers(data, int(coded.sum()), contexts[coded], "mesh")
     if visit_corners(seams, numbers, ranks, contexts, DECODE) < len(seams.corners):
         raise corrupt_section("mesh", "a corner uses a copy that does not exist")
     return numbers
-
-
-def _is_coded(seams: SeamCorners) -> Bool:
-    """``(n,)`` all corners but the first of each point, which uses its first vertex."""
-    return np.asarray(seams.begins < np.arange(len(seams.corners)))
-
-
-def _seam_corners(point_faces: Array, counts: Array) -> SeamCorners:
-    from gvpipe.connectivity.edge_seam_kernels import SeamCorners
-
-    points = point_faces.ravel()
-    corners = np.flatnonzero(counts[points] > 1)
-    corners = corners[np.argsort(points[corners], kind="stable")]
-    is_first = np.diff(points[corners], prepend=-1) > 0
-    begins = np.maximum.accumulate(np.where(is_first, np.arange(len(corners)), 0))
-    return SeamCorners(*(np.ascontiguousarray(array, np.int64) for array in (points, corners, begins, counts)))

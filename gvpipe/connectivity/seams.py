@@ -18,8 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array
+from gvpipe.arrays import Array, Int64
 from gvpipe.connectivity.edge_seams import decode_across_edges, encode_across_edges
+from gvpipe.connectivity.seam_corners import SeamCorners, are_first, find_seam_corners
 from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import corrupt_section
@@ -101,10 +102,10 @@ def _encode_corners(
     numbers[by_use] = np.arange(len(points)) - starts[points[by_use]]
     if across:
         return numbers, encode_integers(counts - 1), encode_across_edges(numbers[corners.ravel()], point_faces, counts)
-    where, is_first = _seam_corners(point_faces, counts)
-    differences = np.diff(numbers[corners.ravel()[where]], prepend=0)
-    contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_SEAM_VERTICES)
-    return numbers, encode_integers(counts - 1), encode_integers(_filled(differences, contexts, is_first), contexts)
+    seams = find_seam_corners(point_faces, counts)
+    differences = np.diff(numbers[corners.ravel()[seams.corners]], prepend=0)
+    contexts = _contexts(seams)
+    return numbers, encode_integers(counts - 1), encode_integers(_filled(differences, contexts, are_first(seams)), contexts)
 
 
 def _filled(differences: Array, contexts: Array, is_first: Array) -> Array:
@@ -134,24 +135,18 @@ def _decode_corners(counts_data: bytes, data: bytes, point_faces: Array, n_point
 
 def _decode_differences(data: bytes, point_faces: Array, counts: Array) -> Array:
     """The number ``(3T,)`` of each corner's vertex among its point's."""
-    where, is_first = _seam_corners(point_faces, counts)
-    contexts = np.minimum(counts[point_faces.ravel()[where]], MAX_SEAM_VERTICES)
-    total = np.cumsum(decode_integers(data, len(where), contexts, "mesh"))
-    begin = np.maximum.accumulate(np.where(is_first, np.arange(len(where)), 0))
+    seams = find_seam_corners(point_faces, counts)
+    total = np.cumsum(decode_integers(data, len(seams.corners), _contexts(seams), "mesh"))
     numbers = np.zeros(point_faces.size, np.int64)
-    numbers[where] = total - total[begin] if len(where) else 0
-    if ((numbers < 0) | (numbers >= counts[point_faces.ravel()])).any():
+    numbers[seams.corners] = total - total[seams.begins]
+    if ((numbers < 0) | (numbers >= counts[seams.points])).any():
         raise corrupt_section("mesh", "a corner uses a copy that does not exist")
     return numbers
 
 
-def _seam_corners(point_faces: Array, counts: Array) -> tuple[Array, Array]:
-    """Corners on seams, in order of point and corner, and which of them is its point's first."""
-    flat = point_faces.ravel()
-    where = np.flatnonzero(counts[flat] > 1)
-    where = np.asarray(where[np.argsort(flat[where], kind="stable")])
-    is_first: Array = np.diff(flat[where], prepend=-1) > 0
-    return where, is_first
+def _contexts(seams: SeamCorners) -> Int64:
+    """``(n,)`` the context of each corner's difference: how many vertices its point has."""
+    return np.minimum(seams.counts[seams.points[seams.corners]], MAX_SEAM_VERTICES)
 
 
 def _as_lattice(points: Array) -> Array:

@@ -33,7 +33,7 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import CorruptFile, corrupt_section
-from gvpipe.mesh.unique_rows import decode_table, encode_table, row_ids, smallest_first, used_vertices
+from gvpipe.mesh.unique_rows import decode_table, encode_table, left_out, smallest_first, used_vertices
 
 HEADER = struct.Struct("<6I")
 
@@ -147,13 +147,7 @@ def _place_points(faces: Array, n_points: int, carried: _Carried) -> tuple[tuple
     is_left[carried_points] = False
     place = np.argsort(np.concatenate([carried_points, np.flatnonzero(is_left)]))
     merged = smallest_first(_merge(draco_faces, len(came_from), merges))
-    rows = np.concatenate([smallest_first(place[faces]), merged])
-    ids, representatives = row_ids(rows)
-    missing = np.bincount(ids[: len(faces)], minlength=len(representatives))
-    missing -= np.bincount(ids[len(faces) :], minlength=len(representatives))
-    if (missing < 0).any():
-        raise ValueError("Draco returned triangles that the mesh does not have")
-    loose = rows[np.repeat(representatives, missing)]
+    loose = left_out(smallest_first(place[faces]), merged)
     return (draco, merges, encode_table(loose), len(loose)), place, np.concatenate([merged, loose])
 
 

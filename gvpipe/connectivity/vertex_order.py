@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +30,32 @@ SHORT_LIST = 64  # neighbours that are sorted by insertion
 MAX_VERTICES = (1 << 24) - 1  # constriction's largest uniform alphabet
 
 
+class NeighbourLists(NamedTuple):
+    """The vertices that a search reaches from each vertex.
+
+    Args:
+        starts: ``(V + 1,)`` int64 bounds of each vertex' neighbours in ``neighbours``.
+        neighbours: ``(E,)`` int64, nearest first: along triangle edges, and vertices at one point.
+    """
+
+    starts: Array
+    neighbours: Array
+
+
+class CodedVisits(NamedTuple):
+    """An order of vertices and how it is coded, int64; a traversal fills one from the other.
+
+    Args:
+        ranks: ``(V,)`` in the search from the vertex before; -1: not found.
+        jumps: ``(V,)`` where the rank is -1, the index among the vertices left.
+        visits: ``(V,)`` vertices in the codec's numbers.
+    """
+
+    ranks: Array
+    jumps: Array
+    visits: Array
+
+
 def encode_order(visits: Array, points: Array, faces: Array) -> bytes:
     """Code `visits` (V,), where visits[v] is the codec's index of the user's vertex v.
 
@@ -39,11 +66,10 @@ def encode_order(visits: Array, points: Array, faces: Array) -> bytes:
     n_vertices = len(points)
     if n_vertices > MAX_VERTICES:
         raise InputError(f"{n_vertices} vertices: a vertex order holds at most {MAX_VERTICES}; use reorder=True")
-    ranks = np.full(n_vertices, -1, np.int64)
-    jumps = np.zeros(n_vertices, np.int64)
-    _compiled_traverse()(*_neighbours(points, faces), REACH, ranks, jumps, visits.astype(np.int64), False)
+    coded = CodedVisits(np.full(n_vertices, -1, np.int64), np.zeros(n_vertices, np.int64), visits.astype(np.int64))
+    _compiled_traverse()(_neighbours(points, faces), REACH, coded, False)
 
-    symbols, low, sizes = _split(ranks, jumps)
+    symbols, low, sizes = _split(coded.ranks, coded.jumps)
     table = _quantised(np.bincount(symbols, minlength=N_SYMBOLS))
     coder = constriction.stream.queue.RangeEncoder()
     if n_vertices:
@@ -82,12 +108,11 @@ def decode_order(data: bytes, points: Array, faces: Array) -> Array:
         raise corrupt_section("order", "the range coder ran out of step") from exc
     if not coder.maybe_exhausted():
         raise corrupt_section("order", "bytes left over")
-    ranks, jumps = _joined(symbols, low)
-    visits = np.zeros(n_vertices, np.int64)
-    n_done = _compiled_traverse()(*_neighbours(points, faces), REACH, ranks, jumps, visits, True)
+    coded = CodedVisits(*_joined(symbols, low), np.zeros(n_vertices, np.int64))
+    n_done = _compiled_traverse()(_neighbours(points, faces), REACH, coded, True)
     if n_done != n_vertices:
         raise corrupt_section("order", f"no vertex has the rank sent for vertex {n_done}")
-    return visits
+    return coded.visits
 
 
 def _split(ranks: Array, jumps: Array) -> tuple[Array, Array, Array]:
@@ -128,14 +153,12 @@ def _weights(table: Array) -> Float64:
     return np.where(code < 8, code, (8 + code % 8) << np.maximum(code // 8 - 1, 0)).astype(np.float64)
 
 
-def _neighbours(points: Array, faces: Array) -> tuple[Array, Array]:
-    """Lists of neighbours (starts (V + 1,), neighbours (E,)), nearest first: triangle edges, and vertices at one point."""
+def _neighbours(points: Array, faces: Array) -> NeighbourLists:
     rows = np.ascontiguousarray(points, np.int64)
     by_point = sort_rows(rows)
     same = (rows[by_point[1:]] == rows[by_point[:-1]]).all(axis=1)
     twins = np.c_[by_point[1:], by_point[:-1]][same]
-    starts, neighbours = _compiled_lists()(rows, np.ascontiguousarray(faces, np.int64), twins)
-    return starts, neighbours
+    return NeighbourLists(*_compiled_lists()(rows, np.ascontiguousarray(faces, np.int64), twins))
 
 
 def _sorted_lists(points: Array, faces: Array, twins: Array) -> tuple[Array, Array]:
@@ -189,11 +212,14 @@ def _sorted_lists(points: Array, faces: Array, twins: Array) -> tuple[Array, Arr
     return starts, neighbours[:kept].copy()
 
 
-def _traverse(starts: Array, neighbours: Array, reach: int, ranks: Array, jumps: Array, visits: Array, decoding: bool) -> int:
+def _traverse(lists: NeighbourLists, reach: int, coded: CodedVisits, decoding: bool) -> int:
     """Fill ranks and jumps from visits, or (decoding) visits from them; one body, so that the two cannot differ.
 
-    Returns the number of vertices done; fewer than V means that a rank or a jump points nowhere.
+    A search looks at ``reach`` vertices at most. Returns the number of vertices done; fewer than V means that a rank or a jump
+    points nowhere.
     """
+    starts, neighbours = lists.starts, lists.neighbours
+    ranks, jumps, visits = coded.ranks, coded.jumps, coded.visits
     n_vertices = len(starts) - 1
     visited = np.zeros(n_vertices, np.bool_)
     seen_by = np.full(n_vertices, -1, np.int64)  # the last search that saw a vertex

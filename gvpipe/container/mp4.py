@@ -33,6 +33,7 @@ TAG = "comment"
 TAG_PREFIX = "gvpipe "
 BOX = struct.Struct(">I4s")
 LARGE = struct.Struct(">Q")
+ENCODE_FIRST = "encode the sequence first: gvpipe encode INPUT OUTPUT.mp4"
 MAX_BOXES = 1 << 16
 
 
@@ -77,7 +78,7 @@ def read_file(path: str | os.PathLike[str]) -> Bitstream:
     except (NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile) as exc:
         raise type(exc)(f"{path}: {exc}") from exc
     except IsADirectoryError as exc:
-        raise InputError(f"{path} is a folder; a geometry video (.mp4) is needed") from exc
+        raise InputError(f"{path} is a folder and no geometry video; {ENCODE_FIRST}") from exc
     except FileNotFoundError as exc:
         raise InputError(f"{path}: no such file; check the path") from exc
     except OSError as exc:
@@ -107,7 +108,7 @@ def _read(file: IO[bytes], size: int) -> Bitstream:
     if payload_range is None:
         if tag:
             raise StrippedFile(f"its geometry was stripped, as remuxing or re-encoding does; {REMEDY}")
-        raise NotGeometryVideo("an MP4 file, but not one that gvpipe wrote; encode a sequence to make one")
+        raise NotGeometryVideo(f"an MP4 file, but not one that gvpipe wrote; {ENCODE_FIRST}")
     version = tag.partition(" ")[0]
     if version.isascii() and version.isdecimal() and len(version) < 10 and int(version) > VERSION:
         raise NewerVersion(f"container version {version}, this gvpipe reads up to {VERSION}; upgrade gvpipe")
@@ -129,7 +130,7 @@ def _find_payload(file: IO[bytes], size: int) -> tuple[int, tuple[int, int] | No
         file.seek(position)
         head = file.read(BOX.size)
         if position == 0 and head[4:8] != b"ftyp"[: max(0, len(head) - 4)]:
-            raise NotGeometryVideo("not an MP4 file; a geometry video (.mp4) is needed")
+            raise NotGeometryVideo(f"not an MP4 file, so no geometry video; {ENCODE_FIRST}")
         if len(head) < BOX.size:
             if found:
                 raise corrupt(f"{len(head)} stray bytes follow its last box")

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-import numpy as np
-
+from gvpipe.asset.field import Field
 from gvpipe.atomic import atomic_path, output_error
 from gvpipe.errors import InputError
 from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.pattern import match_pattern
-from gvpipe.sequence import MeshSequence
+from gvpipe.sequence import CHUNK_BYTES, MeshSequence
 
 DEFAULT_PATTERN = "%04d.obj"
 
 
-def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> None:
-    """Write one file per frame, numbered from ``start``, each as a whole or not at all.
+def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> tuple[str, ...]:
+    """Write one file per frame, numbered from ``start``, each as a whole or not at all, and what all share beside them.
+
+    Returns what the format cannot hold, a line each.
 
     Args:
         path: a pattern (``out/%04d.obj``, its folder is created), a folder (``%04d.obj`` in it), or for a sequence of
@@ -39,21 +41,40 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> None:
             f"{path}: frames cannot be written as {target.suffix or 'a file without extension'}; give a folder that "
             f"ends in '/', or a name with %04d and one of {', '.join(writable)}"
         )
-    attributes = {name: np.asarray(each) for name, each in sequence.attributes.items() if each.domain in ("vertex", "corner")}
-    encode = entry.encoder(sequence.faces, attributes, sequence.n_vertices, sequence.origin)
     pattern = match_pattern(path)
     if pattern is None and sequence.n_frames > 1:
         raise InputError(
             f"{path} would hold one frame of {sequence.n_frames}; give a pattern such as "
             f"{target.with_name(target.stem + '_%04d' + target.suffix)}"
         )
+    encoder = entry.encoder(sequence, _shared_name(pattern.before if pattern else target.stem))
     if pattern is not None:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
         except OSError as exc:
             raise output_error(target.parent, exc) from exc
-    for first, block in sequence.chunks():
+    for name, data in encoder.beside.items():
+        with atomic_path(target.with_name(name)) as temporary:
+            temporary.write_bytes(data)
+    wanted = {name: sequence.fields[name] for name in encoder.fields}
+    for first, stop in _spans(sequence, wanted):
+        block = sequence.read(first, stop)
+        fields = {name: field.read(first, stop) for name, field in wanted.items()}
         for i, positions in enumerate(block):
-            number = start + first + i
-            with atomic_path(target.with_name(pattern.name(number)) if pattern else target) as temporary:
-                temporary.write_bytes(encode(positions))
+            data = encoder.encode(positions, {name: values[i] for name, values in fields.items()})
+            with atomic_path(target.with_name(pattern.name(start + first + i)) if pattern else target) as temporary:
+                temporary.write_bytes(data)
+    return encoder.notes
+
+
+def _shared_name(before: str) -> str:
+    """A name for what all frames share: that of the frames without their number."""
+    return before.rstrip("_-. ") or "materials"
+
+
+def _spans(sequence: MeshSequence, fields: Mapping[str, Field]) -> Iterator[tuple[int, int]]:
+    """Some frames at a time, bounded by the bytes of positions and fields."""
+    n_bytes = 12 * sequence.n_vertices
+    n_bytes += sum(field.shape[1] * field.n_components * field.dtype.itemsize for field in fields.values())
+    step = max(1, CHUNK_BYTES // n_bytes)
+    return ((first, min(first + step, sequence.n_frames)) for first in range(0, sequence.n_frames, step))

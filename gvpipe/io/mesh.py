@@ -1,40 +1,86 @@
-"""One frame file as a mesh, and the few steps that several formats share to get there."""
+"""One frame file as a mesh, what a format needs to write frames, and the few steps that several formats share to get there."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.arrays import Float32, Floats, Int32, Int64, Integers, UInt8
+from gvpipe.arrays import Array, Bool, Float32, Floats, Int32, Int64, Integers, UInt8
+from gvpipe.asset.attribute import Attribute
+from gvpipe.asset.material import Image, Material
+from gvpipe.asset.metadata import NO_METADATA, Metadata
+from gvpipe.asset.part import Part
+from gvpipe.asset.polygons import polygon_starts
+from gvpipe.sequence import MeshSequence
 
-ATTRIBUTES = {"uv": (2,), "normal": (3,), "color": (3, 4)}  # name: columns that are understood
 
-Attributes = Mapping[str, NDArray[np.generic]]
+class FrameValues(NamedTuple):
+    """Numbers that each frame file has: a field where they differ between files, an attribute where they do not.
+
+    Args:
+        values: ``(R,)`` or ``(R, C)``, of the file's own type.
+        domain, kind, unit: as of `gvpipe.Attribute`. Values per corner become an attribute, the first file's.
+    """
+
+    values: Array
+    domain: str = "vertex"
+    kind: str = ""
+    unit: str = ""
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """What one frame file holds.
+    """What one frame file holds. All but positions, faces and ``animated`` is needed of the first file alone.
 
     Args:
         positions: ``(V, 3)``, float32 or float64 as the file has them, model units, in the file's own order.
         faces: ``(T, 3) int32``.
-        attributes: static arrays, as in `MeshSequence`.
-        notes: what the loader did that the user should know, a line each; of the first file alone.
+        attributes: static arrays or `Attribute`, as in `MeshSequence`.
+        notes: what the loader did that the user should know, a line each.
+        polygons, parts, materials, images, metadata: as in `MeshSequence`.
+        animated: numbers by name that may change from file to file; every file of a sequence has the same names. Each is
+            computed when it is called for.
     """
 
     positions: Floats
     faces: Int32
-    attributes: Attributes = field(default_factory=dict)
+    attributes: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    polygons: Int32 | None = None
+    parts: tuple[Part, ...] = ()
+    materials: tuple[Material, ...] = ()
+    images: tuple[Image, ...] = ()
+    metadata: Metadata = NO_METADATA
+    animated: Mapping[str, Callable[[], FrameValues]] = field(default_factory=dict)
 
 
 Loader = Callable[[Path], Mesh]  # one per sequence: it may remember its first file to read the others faster
-Encoder = Callable[[Float32], bytes]  # positions (V, 3), relative to the origin that it was made for -> a whole file
+
+
+@dataclass(frozen=True)
+class FrameEncoder:
+    """How the frames of one sequence become files.
+
+    Args:
+        encode: positions ``(V, 3) float32`` relative to the sequence's origin, and the frame's fields ``(R, C)`` by name, to
+            a whole file. The encoder adds the origin; it raises `InputError` if the format cannot hold the sums.
+        fields: names of the fields that it wants; no others are read.
+        notes: what the format cannot hold, a line each.
+        beside: files that all frames share, such as pictures, by their names in the frames' folder.
+    """
+
+    encode: Callable[[Float32, Mapping[str, Array]], bytes]
+    fields: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    beside: Mapping[str, bytes] = field(default_factory=dict)
+
+
+EncoderMaker = Callable[[MeshSequence, str], FrameEncoder]  # a sequence, and a name for files that all frames share
 
 
 def fan(counts: Int64) -> Int64:
@@ -54,8 +100,13 @@ def fan(counts: Int64) -> Int64:
         raise ValueError(f"face {small[0] + 1} has {counts[small[0]]} corners, and at least 3 are needed")
     n_triangles = counts - 2
     first = np.repeat(np.cumsum(counts) - counts, n_triangles)
-    step = np.arange(n_triangles.sum()) - np.repeat(np.cumsum(n_triangles) - n_triangles, n_triangles)
+    step = np.arange(n_triangles.sum()) - np.repeat(polygon_starts(counts), n_triangles)
     return np.stack([first, first + step + 1, first + step + 2], axis=1)
+
+
+def as_polygons(counts: Integers) -> Int32 | None:
+    """Corners of each polygon ``(N,)`` as a mesh has them: None if all are triangles."""
+    return counts.astype(np.int32) if (counts > 3).any() else None
 
 
 def as_faces(values: Integers, n_vertices: int) -> Int32:
@@ -82,27 +133,28 @@ def as_color(values: NDArray[np.generic]) -> UInt8:
     return rgba
 
 
-def per_vertex(corner_values: NDArray[np.generic], faces: Int32, n_vertices: int) -> NDArray[np.generic] | None:
-    """Corner values ``(3 T, k)`` as ``(V, k)`` if all corners of each vertex agree, else unchanged.
+def as_normals(values: Array) -> Float32:
+    """Normals ``(N, 3)``; those that are not finite, as programs write them for triangles without an area, become zeros."""
+    normals = np.asarray(values, np.float32)
+    is_finite: Bool = np.asarray(np.isfinite(normals).all(axis=1))
+    return normals if is_finite.all() else np.where(is_finite[:, None], normals, np.float32(0))
 
-    None if they differ and ``3 T = V``: `MeshSequence` could not tell corners from vertices by their number.
+
+def indexed(table: Float32, index: Int64, faces: Int32, n_vertices: int, kind: str) -> Attribute:
+    """An attribute whose corners show rows of a table: per vertex where all corners of each vertex show one row.
+
+    Args:
+        table: ``(N, C)``; rows that no corner shows are left out.
+        index: ``(3 T,)`` the row of each corner, -1 for none, which becomes zeros.
+        faces: ``(T, 3)`` vertices of the corners.
+        n_vertices: those that have no corner get zeros, too.
+        kind: as of `Attribute`.
     """
     corners = faces.reshape(-1)
-    values = np.zeros((n_vertices, corner_values.shape[1]), corner_values.dtype)
-    values[corners] = corner_values
-    if np.array_equal(values[corners], corner_values):
-        return values
-    return corner_values if len(corners) != n_vertices else None
-
-
-def concatenate(meshes: Sequence[Mesh]) -> Mesh:
-    """Join the meshes of one file in the order given; an attribute is kept if all of them have it per vertex."""
-    if len(meshes) == 1:
-        return meshes[0]
-    first = np.cumsum([0] + [len(mesh.positions) for mesh in meshes[:-1]])
-    shared = [name for name in ATTRIBUTES if all(len(mesh.attributes.get(name, ())) == len(mesh.positions) for mesh in meshes)]
-    return Mesh(
-        np.concatenate([mesh.positions for mesh in meshes]),
-        np.concatenate([mesh.faces + offset for mesh, offset in zip(meshes, first, strict=True)]).astype(np.int32),
-        {name: np.concatenate([mesh.attributes[name] for mesh in meshes]) for name in shared},
-    )
+    rows = np.full(n_vertices, -1, np.int64)
+    rows[corners] = index
+    padded = np.concatenate([table, np.zeros((1, table.shape[1]), table.dtype)])
+    if np.array_equal(rows[corners], index):
+        return Attribute(padded[rows], "vertex", kind, name=kind)
+    used, indices = np.unique(np.where(index < 0, len(table), index), return_inverse=True)
+    return Attribute(padded[used], "corner", kind, indices.reshape(-1).astype(np.int32), name=kind)

@@ -1,7 +1,7 @@
-"""NumPy archives: ``vertices (F, V, 3)``, ``faces (T, 3)``, ``fps``, and ``uv``, ``normal``, ``color`` if present.
+"""NumPy archives: ``vertices (F, V, 3)``, ``faces (T, 3)``, ``fps``, ``field_NAME (F, R[, C])``, and an asset's other data.
 
 The archive is an ordinary compressed ``.npz``; `numpy.load` reads it. Its bytes depend on the sequence alone, not on
-the time of writing.
+the time of writing. It holds everything that a sequence has; `gvpipe.io.npz_asset` lists the members.
 """
 
 from __future__ import annotations
@@ -9,27 +9,36 @@ from __future__ import annotations
 import zipfile
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.arrays import Array
+from gvpipe.asset.attribute import WIDTHS
+from gvpipe.asset.field import Field
+from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.atomic import atomic_path
 from gvpipe.errors import InputError
-from gvpipe.io.mesh import ATTRIBUTES, as_color
+from gvpipe.io.mesh import as_color
+from gvpipe.io.npz_asset import USUAL, asset_members, meta_units, read_asset
+from gvpipe.io.npz_fields import NpzField, write_field
 from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS
 from gvpipe.sequence import MeshSequence
 
+MEMBERS = ("vertices", "faces", "fps", "polygons", "asset", "meta", *USUAL)
+PREFIXES = ("attribute_", "indices_", "image_")
 
-def write_npz(sequence: MeshSequence, path: Path) -> None:
-    """Write the sequence as float32, or as float64 where it has an origin, which is added; some frames at a time.
+
+def write_npz(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
+    """Write the sequence, its positions as float32, or as float64 where it has an origin, which is added; frames by and by.
 
     Raises:
         OutputError: the file cannot be written.
     """
-    statics: dict[str, NDArray[np.generic]] = {"faces": sequence.faces, "fps": np.array(sequence.fps, np.float64)}
-    statics |= {name: np.asarray(values) for name, values in sequence.attributes.items()}
-    # `numpy.savez_compressed` wants all frames at once, so the one large member is written by hand
+    statics: dict[str, NDArray[Any]] = {"faces": sequence.faces, "fps": np.array(sequence.fps, np.float64)}
+    statics |= asset_members(sequence)
+    # `numpy.savez_compressed` wants all frames at once, so the large members are written by hand
     descr, read = ("<f8", sequence.read_absolute) if sequence.origin.any() else ("<f4", sequence.read)
     header = {"descr": descr, "fortran_order": False, "shape": (sequence.n_frames, sequence.n_vertices, 3)}
     with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -40,22 +49,56 @@ def write_npz(sequence: MeshSequence, path: Path) -> None:
         for name, values in statics.items():
             with archive.open(_member(name), "w", force_zip64=True) as file:
                 np.lib.format.write_array(file, values, allow_pickle=False)
+        for name, field in sequence.fields.items():
+            with archive.open(_member(f"field_{name}"), "w", force_zip64=True) as file:
+                write_field(file, field)
+    return ()
 
 
 def read_npz(path: Path, fps: float | None = None) -> MeshSequence:
-    """Read a sequence; ``fps`` overrides the file's, and 30 stands in where neither says.
+    """Read a sequence; ``fps`` overrides the file's, and 30 stands in where neither says. Fields load when they are read.
 
     Raises:
         InputError: not an archive, damaged, a missing array or a wrong shape.
     """
+    arrays, field_names, held = _load(path)
+    for key in ("vertices", "faces"):
+        if key not in arrays:
+            raise InputError(f"{path} has no array {key!r} (it holds {held}); 'vertices' and 'faces' are needed")
+    vertices, faces = _as_vertices(arrays["vertices"], path), arrays["faces"]
+    is_assumed = fps is None and "fps" not in arrays and len(vertices) > 1
+    asset: dict[str, Any] = {}
+    if faces.ndim == 2 and faces.shape[1] == 3 and faces.dtype.kind in "iu":  # else the sequence refuses them
+        arrays |= {} if "asset" in arrays else {name: _as_usual(name, arrays[name], path) for name in USUAL if name in arrays}
+        asset = read_asset(arrays, faces, vertices.shape[1], path)
+        meta = str(arrays["meta"]) if "meta" in arrays and arrays["meta"].dtype.kind == "U" else ""
+        rows = {"vertex": vertices.shape[1], "triangle": len(faces)}
+        asset["fields"] = _fields(field_names, asset["fields"], meta_units(meta), rows, path)
+        if meta and asset["metadata"] == NO_METADATA:
+            asset["metadata"] = Metadata(texts={"meta": meta})
+    return MeshSequence(
+        vertices,
+        faces,
+        fps if fps is not None else _as_fps(arrays["fps"], path) if "fps" in arrays else DEFAULT_FPS,
+        name=str(path),
+        notes=(ASSUMED_FPS,) if is_assumed else (),
+        **asset,
+    )
+
+
+def _load(path: Path) -> tuple[dict[str, NDArray[Any]], list[str], str]:
+    """The arrays that are understood, names of fields, which are not loaded, and all members as a text."""
     try:
         with open(path, "rb") as file:  # opened here because `numpy.load` leaves damaged files open
             if not zipfile.is_zipfile(file):
                 raise InputError(f"{path} is not an .npz archive, or is cut short; write it again with numpy.savez")
             file.seek(0)
             with np.load(file, allow_pickle=False) as archive:
-                arrays = {key: archive[key] for key in ("vertices", "faces", "fps", *ATTRIBUTES) if key in archive}
-                held = ", ".join(archive.files) or "nothing"
+                if len(set(archive.files)) < len(archive.files):
+                    raise InputError(f"{path} has two members of one name; write it again with numpy.savez")
+                arrays = {key: archive[key] for key in archive.files if key in MEMBERS or key.startswith(PREFIXES)}
+                fields = [key.removeprefix("field_") for key in archive.files if key.startswith("field_")]
+                return arrays, fields, ", ".join(archive.files) or "nothing"
     except InputError:
         raise
     # an archive that lies about a size or a type can raise nearly anything inside NumPy, zipfile and zlib
@@ -63,18 +106,27 @@ def read_npz(path: Path, fps: float | None = None) -> MeshSequence:
             SyntaxError, OverflowError, zipfile.BadZipFile, zlib.error) as exc:  # fmt: skip
         reason = " ".join(str(exc).split())[:150]
         raise InputError(f"{path} cannot be read as .npz ({reason}); write it again with numpy.savez") from exc
-    for key in ("vertices", "faces"):
-        if key not in arrays:
-            raise InputError(f"{path} has no array {key!r} (it holds {held}); 'vertices' and 'faces' are needed")
-    is_assumed = fps is None and "fps" not in arrays and len(arrays["vertices"]) > 1
-    return MeshSequence(
-        _as_vertices(arrays["vertices"], path),
-        arrays["faces"],
-        fps if fps is not None else _as_fps(arrays["fps"], path) if "fps" in arrays else DEFAULT_FPS,
-        {name: _as_attribute(name, arrays[name], path) for name in ATTRIBUTES if name in arrays},
-        str(path),
-        notes=(ASSUMED_FPS,) if is_assumed else (),
-    )
+
+
+def _fields(
+    names: list[str], described: dict[str, Any], units: dict[str, str], rows: dict[str, int], path: Path
+) -> dict[str, Field]:
+    """The fields, not loaded yet; what the description does not name is guessed from the shape."""
+    made: dict[str, Field] = {}
+    for name in names:
+        values, label = NpzField(path, f"field_{name}"), f"{path}: field {name!r}"
+        one = described.get(name)
+        if one is None:
+            domain = "triangle" if values.shape[1] == rows["triangle"] != rows["vertex"] else "vertex"
+            made[name] = Field(values, domain, unit=units.get(name, ""), name=label)
+            continue
+        unit, limits = one.get("unit", ""), one.get("range")
+        is_pair = isinstance(limits, list) and [type(limit) for limit in limits] == [float, float]
+        if not isinstance(unit, str) or not (limits is None or is_pair):
+            raise InputError(f"{label} has unit {unit!r} and range {limits!r}; a text and two numbers are needed")
+        limits = (limits[0], limits[1]) if limits else None
+        made[name] = Field(values, one.get("domain", "vertex"), one.get("kind", ""), unit, limits, label)
+    return made
 
 
 def _as_vertices(vertices: NDArray[np.generic], path: Path) -> Array:
@@ -91,8 +143,9 @@ def _as_fps(fps: NDArray[np.generic], path: Path) -> float:
     return float(fps.reshape(-1)[0])
 
 
-def _as_attribute(name: str, values: NDArray[np.generic], path: Path) -> NDArray[np.generic]:
-    widths = ATTRIBUTES[name]
+def _as_usual(name: str, values: NDArray[np.generic], path: Path) -> NDArray[np.generic]:
+    """An array of an archive without a description: colours of any type become bytes."""
+    widths = WIDTHS[name]
     if values.ndim != 2 or values.shape[1] not in widths or values.dtype.kind not in "fiu":
         needed = " or ".join(str(width) for width in widths)
         raise InputError(

@@ -13,7 +13,7 @@ from io import FileIO
 
 import numpy as np
 
-from gvpipe.arrays import Float32
+from gvpipe.arrays import Array
 
 
 class Spool:
@@ -33,22 +33,22 @@ class Spool:
             self._file = tempfile.TemporaryFile(prefix="gvpipe-", buffering=0)  # noqa: SIM115 - lives as long as self
             weakref.finalize(self, self._file.close)
 
-    def store(self, frame: int, positions: Float32) -> None:
+    def store(self, frame: int, values: Array) -> None:
         """Keep a frame, if there is room on the disk."""
         with self._lock:
-            self._stored[frame] = self._move(frame, positions, write=True)
+            self._stored[frame] = self._move(frame, values, write=True)
 
-    def fetch(self, frame: int, positions: Float32) -> bool:
-        """Fill ``positions`` with a frame and return True, or return False if it is not held."""
+    def fetch(self, frame: int, values: Array) -> bool:
+        """Fill ``values`` with a frame and return True, or return False if it is not held."""
         with self._lock:
-            return bool(self._stored[frame]) and self._move(frame, positions, write=False)
+            return bool(self._stored[frame]) and self._move(frame, values, write=False)
 
-    def _move(self, frame: int, positions: Float32, write: bool) -> bool:
+    def _move(self, frame: int, values: Array, write: bool) -> bool:
         if self._file is None:
             return False
         try:
             self._file.seek(frame * self._bytes_frame)
-            if (self._file.write if write else self._file.readinto)(positions.data) == self._bytes_frame:
+            if (self._file.write if write else self._file.readinto)(values.data) == self._bytes_frame:
                 return True
         except OSError:
             pass

@@ -8,16 +8,19 @@ refused. Reading is trimesh's; writing is one structured array.
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Float64, Int32, Int64
+from gvpipe.arrays import Array, Float32, Float64, Int32, Int64
+from gvpipe.asset.part import Part
 from gvpipe.errors import InputError
-from gvpipe.io.mesh import Attributes, Encoder, Mesh, as_faces
+from gvpipe.io.losses import lost_notes
+from gvpipe.io.mesh import FrameEncoder, Mesh, as_faces
 from gvpipe.origin import choose_origin, narrow
-from gvpipe.sequence import check_finite
+from gvpipe.sequence import MeshSequence, check_finite
 
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 HEADER_BYTES = 80
@@ -39,7 +42,7 @@ class StlLoader:
             InputError: corners that were one vertex in the first file are apart in this one.
             Exception: the file cannot be read; trimesh raises many kinds, and the caller names the file.
         """
-        exact = _load_corners(path)
+        exact, solids = _load_corners(path)
         if self._first is None:
             self._origin = choose_origin(exact[None])
         corners = narrow(exact[None], self._origin)[0]
@@ -61,18 +64,30 @@ class StlLoader:
                 f"corner {corner % 3} of triangle {corner // 3} shares a vertex with another in {self._first.name} "
                 f"but not in {path.name}; STL has no vertices of its own: export OBJ, PLY or GLB"
             )
-        return Mesh(exact[self._corner_of], self._faces)
+        return Mesh(exact[self._corner_of], self._faces, parts=_make_parts(solids, self._faces))
 
 
-def _load_corners(path: Path) -> Float64:
-    """All corners, ``(3 T, 3)``."""
+def _load_corners(path: Path) -> tuple[Float64, list[tuple[str, int]]]:
+    """All corners, ``(3 T, 3)``, and the solids' names and triangles; binary files have one solid."""
     import trimesh
 
     scene: Any = trimesh.load_scene(path, file_type="stl", process=False)
     solids = [np.asarray(solid.vertices, np.float64)[solid.faces.reshape(-1)] for solid in scene.geometry.values()]
     if not solids:
         raise ValueError("it has no triangles")
-    return np.concatenate(solids)
+    return np.concatenate(solids), [(name, len(solid) // 3) for name, solid in zip(scene.geometry, solids, strict=True)]
+
+
+def _make_parts(solids: list[tuple[str, int]], faces: Int32) -> tuple[Part, ...]:
+    """A part for each solid of a text file, if there are several."""
+    stops = np.cumsum([n_triangles for _, n_triangles in solids]).tolist()
+    ranges = [(stop - n_triangles, stop) for stop, (_, n_triangles) in zip(stops, solids, strict=True)]
+    if len(solids) < 2 or any(start == stop for start, stop in ranges):
+        return ()
+    return tuple(
+        Part(name, (int(faces[start:stop].min()), int(faces[start:stop].max()) + 1), (start, stop))
+        for (name, _), (start, stop) in zip(solids, ranges, strict=True)
+    )
 
 
 def _weld(corners: Float32) -> tuple[Int64, Int64]:
@@ -85,12 +100,13 @@ def _weld(corners: Float32) -> tuple[Int64, Int64]:
     return first[by_appearance], rank[inverse]
 
 
-def encode_stl(faces: Int32, attributes: Attributes, n_vertices: int, origin: Float64) -> Encoder:
-    """A writer of frames with these faces; STL holds nothing but triangles.
+def encode_stl(sequence: MeshSequence, shared: str) -> FrameEncoder:
+    """An encoder of frames; STL holds nothing but triangles.
 
     Raises:
         InputError: there is an origin.
     """
+    faces, origin = sequence.faces, sequence.origin
     if origin.any():
         place = ", ".join(f"{x:.17g}" for x in origin)
         raise InputError(
@@ -100,7 +116,7 @@ def encode_stl(faces: Int32, attributes: Attributes, n_vertices: int, origin: Fl
     records = np.zeros(len(faces), RECORD)
     header = b"gvpipe".ljust(HEADER_BYTES) + struct.pack("<I", len(faces))
 
-    def encode(positions: Float32) -> bytes:
+    def encode(positions: Float32, fields: Mapping[str, Array]) -> bytes:
         corners = positions[faces]  # (T, 3, 3)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -108,4 +124,4 @@ def encode_stl(faces: Int32, attributes: Attributes, n_vertices: int, origin: Fl
         records["corners"] = corners
         return header + bytes(records.tobytes())
 
-    return encode
+    return FrameEncoder(encode, notes=lost_notes(sequence, "STL", {}))

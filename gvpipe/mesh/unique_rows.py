@@ -49,6 +49,27 @@ def row_ids(rows: Array) -> tuple[Array, Array]:
     return ids, order[is_new]  # a stable sort: the first of equals has the smallest index
 
 
+def left_out(rows: Array, returned: Array) -> Array:
+    """Return ``(k, m)`` those of ``rows (n, m)`` that ``returned (r, m)`` lacks, each as often as it lacks them.
+
+    They are ordered as `sort_rows` orders rows. Columns hold integers.
+
+    Raises:
+        ValueError: a row was returned that was not given, or more often than it was given.
+
+    Examples:
+        >>> left_out(np.array([[1, 2], [3, 4], [1, 2]]), np.array([[1, 2]])).tolist()
+        [[1, 2], [3, 4]]
+    """
+    both = np.concatenate([rows, returned])
+    ids, representatives = row_ids(both)
+    lacking = np.bincount(ids[: len(rows)], minlength=len(representatives))
+    lacking -= np.bincount(ids[len(rows) :], minlength=len(representatives))
+    if (lacking < 0).any():
+        raise ValueError(f"{-int(np.minimum(lacking, 0).sum())} rows are returned that were not given")
+    return np.asarray(both[np.repeat(representatives, lacking)])
+
+
 def sort_rows(rows: Array) -> Array:
     """The order ``(n,)`` of rows by their last number, then the one before, and so on; equal rows stay in order."""
     bits = int(rows.max(initial=0)).bit_length()

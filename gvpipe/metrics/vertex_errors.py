@@ -84,38 +84,22 @@ def measure_errors(reference: MeshSequence, read: Callable[[int, int], Float32])
     return errors.result(frame_diagonal(reference))
 
 
-class Spread:
-    """Root mean square distance, model units, of vertices from their frame's centre, over blocks of frames.
-
-    Of one vertex, or vertices at one place: of all frames' from their centre, or a part of the coordinates if none moves.
-    """
-
-    def __init__(self) -> None:
-        self._squared, self._largest, self._n_positions = 0.0, 0.0, 0
-        self._centres: list[Float64] = []  # each (n, 3)
-
-    def add(self, block: Float32) -> None:
-        """Take frames ``block (n, V, 3)``."""
-        frames = block.astype(np.float64)
-        self._centres.append(frames.mean(axis=1))
-        self._squared += float(np.square(frames - self._centres[-1][:, None]).sum())
-        self._largest = max(self._largest, float(np.abs(block).max()))
-        self._n_positions += block.shape[0] * block.shape[1]
-
-    @property
-    def value(self) -> float:
-        """The spread; above 0."""
-        path = np.concatenate(self._centres)
-        moved = float(np.sqrt(np.square(path - path.mean(axis=0)).sum(axis=1).mean()))
-        return math.sqrt(self._squared / self._n_positions) or moved or self._largest * LEAST_SPREAD or 1.0
-
-
 def measure_spread(sequence: MeshSequence) -> float:
-    """The spread of a sequence, model units (`Spread`)."""
-    spread = Spread()
+    """The spread of a sequence, model units, above 0: the root mean square distance of vertices from their frame's centre.
+
+    Of one vertex, or vertices at one position: the distance of all frames' centres from their mean, or a part of the
+    coordinates if none moves.
+    """
+    squared, largest = 0.0, 0.0
+    centres: list[Float64] = []  # each (n, 3)
     for _, block in sequence.chunks():
-        spread.add(block)
-    return spread.value
+        frames = block.astype(np.float64)
+        centres.append(frames.mean(axis=1))
+        squared += float(np.square(frames - centres[-1][:, None]).sum())
+        largest = max(largest, float(np.abs(block).max()))
+    path = np.concatenate(centres)
+    moved = float(np.sqrt(np.square(path - path.mean(axis=0)).sum(axis=1).mean()))
+    return math.sqrt(squared / (sequence.n_frames * sequence.n_vertices)) or moved or largest * LEAST_SPREAD or 1.0
 
 
 def frame_diagonal(reference: MeshSequence) -> float:

@@ -97,7 +97,24 @@ def _without(own: Own, given: frozenset[str]) -> Own:
 
 def describe(codec: Codec) -> str:
     """Return a codec's id, with the settings that distinguish it from its other variants: ``mcgv transform=klt``."""
-    settings = dataclasses.asdict(cast("DataclassInstance", codec))
-    names = sorted({name for own in VARIANTS.get(codec.id, ()) for name in own})
-    plain = {field.name: field.default for field in dataclasses.fields(cast("DataclassInstance", codec))}
-    return " ".join([codec.id, *(f"{name}={settings[name]}" for name in names if settings[name] != plain[name])])
+    names = {name for own in VARIANTS.get(codec.id, ()) for name in own}
+    return name_with(codec.id, {name: value for name, value in own_settings(codec).items() if name in names})
+
+
+def own_settings(codec: Codec) -> Own:
+    """Return the settings that differ from the codec's defaults, the quality left out, by name."""
+    fields = dataclasses.fields(cast("DataclassInstance", codec))
+    values = {field.name: getattr(codec, field.name) for field in fields}
+    return {
+        field.name: values[field.name] for field in fields if values[field.name] != field.default and field.name != "quality"
+    }
+
+
+def name_with(codec_id: str, settings: Own) -> str:
+    """Return a codec's id with settings.
+
+    Examples:
+        >>> name_with("mcgv", {"transform": "klt"})
+        'mcgv transform=klt'
+    """
+    return " ".join([codec_id, *(f"{name}={value}" for name, value in sorted(settings.items()))])

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 
@@ -55,6 +56,13 @@ class Anchor:
 
     step: float
     error: float
+
+    def distance(self, target_error: float) -> float:
+        """How far a target error, model units, is from the error measured, as a logarithm."""
+        return math.log(target_error) - math.log(self.error)
+
+
+AnyAnchor = TypeVar("AnyAnchor", bound=Anchor)
 
 
 def find_step(
@@ -104,14 +112,19 @@ def step_between(anchors: Sequence[Anchor], target_error: float) -> float | None
         if low.error <= target_error < high.error:
             part = math.log(target_error / low.error) / math.log(high.error / low.error)
             return low.step * math.exp(part * math.log(high.step / low.step))
-    near = _nearest(anchors, target_error)
+    near = nearest(anchors, target_error)
     return near.step * target_error / near.error if near and 1 / NEAR <= target_error / near.error <= NEAR else None
 
 
 def first_step(anchors: Sequence[Anchor], target_error: float, ratio: float) -> float:
     """Return the step where a loop starts: in proportion to the nearest anchor; without one, ``ratio`` target errors."""
-    near = _nearest(anchors, target_error)
+    near = nearest(anchors, target_error)
     return target_error * (near.step / near.error if near else ratio)
+
+
+def nearest(anchors: Sequence[AnyAnchor], target_error: float) -> AnyAnchor | None:
+    """Return the anchor whose error is nearest to a target error, model units, as logarithms; None without anchors."""
+    return min(anchors, key=lambda anchor: abs(anchor.distance(target_error)), default=None)
 
 
 def root_mean_square(sequence: MeshSequence, reader: FrameReader) -> float:
@@ -132,7 +145,3 @@ def _change(error: float, target_error: float, slope: float) -> float:
     """What to multiply a step by, so that it leaves the target error."""
     change = (math.log(target_error) - math.log(error)) / slope
     return math.exp(min(max(change, -MOST_CHANGE), MOST_CHANGE))
-
-
-def _nearest(anchors: Sequence[Anchor], target_error: float) -> Anchor | None:
-    return min(anchors, key=lambda anchor: abs(math.log(anchor.error / target_error)), default=None)

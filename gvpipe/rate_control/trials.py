@@ -20,6 +20,7 @@ from gvpipe.container.mp4 import file_size
 from gvpipe.corrections.bound import SECTION, Bound, encode_corrections
 from gvpipe.errors import InputError
 from gvpipe.metrics.vertex_errors import Errors, measure_errors
+from gvpipe.rate_control.purposes import own_settings
 from gvpipe.registry import encode_sequence, open_reader
 from gvpipe.rendering.poster import poster_of
 from gvpipe.repeated_frames import RepeatedFramesReader
@@ -61,6 +62,7 @@ class Trial:
         """Return settings and results as JSON values (``tried`` of `gvpipe.Report`)."""
         return {
             "codec": self.codec.id,
+            "settings": own_settings(self.codec),
             "quality": self.codec.quality,
             "bytes": self.bytes,
             "bpvf": self.bpvf,
@@ -111,7 +113,8 @@ class Trials:
             bound = Bound.of(self._bound, memo("coordinate", lambda: _largest_coordinate(self._sequence)))
             bitstream, errors = _correct(bitstream, reference, reader, bound)
         if self._asset is not None:
-            bitstream = self._asset.add(dataclasses.replace(encoded, bitstream=bitstream), codec)
+            report("asset", 0.0)
+            bitstream = self._asset.add(dataclasses.replace(encoded, bitstream=bitstream), codec, is_final=False)
         size = file_size(bitstream)
         report("measure", 1.0)
         bpvf = 8 * size / (bitstream.n_vertices * bitstream.n_frames)

@@ -95,6 +95,7 @@ def reduce_trajectories(
     entry_cost: float = THRESHOLD,
     noise: float = 1.0,
     most: int = MAX_COMPONENTS,
+    n_axes: int = 3,
 ) -> Reduced:
     """Choose the step and the components of ``trajectories (V, 3F)``, and code their basis.
 
@@ -106,6 +107,7 @@ def reduce_trajectories(
         point_cost, entry_cost: of a component (`count_components`).
         noise: squared error of decoded coefficients, in that of rounding them to the step.
         most: components, whatever pays.
+        n_axes: coordinates of a frame; 3 in all formulas here stands for it.
     """
     n_points, n_coordinates = trajectories.shape
     principal = find_principal(trajectories, error)
@@ -114,7 +116,7 @@ def reduce_trajectories(
         principal, error, lambda step: min(most, count_components(principal, n_points, step, point_cost, entry_cost)), left
     )
     kept = min(n_components, most, len(principal.energies)) or kept
-    data, basis = encode_basis(principal, kept, n_points, step * basis_ratio)
+    data, basis = encode_basis(principal, kept, n_points, step * basis_ratio, n_axes)
     return Reduced(step, data, fit_coefficients(trajectories, basis), basis)
 
 
@@ -189,30 +191,31 @@ def _coarsest(is_fine: Callable[[float], bool]) -> float:
     return float(2.0 ** (low / PER_STEP_OCTAVE))
 
 
-def encode_basis(principal: Principal, n_components: int, n_points: int, step: float) -> tuple[bytes, Basis]:
+def encode_basis(principal: Principal, n_components: int, n_points: int, step: float, n_axes: int = 3) -> tuple[bytes, Basis]:
     """Code the mean and the first R principal trajectories; return the bytes and what the decoder will have."""
     levels = np.rint(PER_OCTAVE * np.log2(np.sqrt(principal.energies[:n_components]) / step)).astype(np.int64)
     levels = np.clip(levels, -MAX_SCALE, MAX_SCALE)
     scales = _scales(levels, n_points, step)
     columns = np.column_stack([principal.mean, principal.vectors[:, :n_components]]) * scales  # (3F, 1 + R)
-    data, decoded = encode_vectors(columns, _basis_step(step, columns.shape), temporal_order(len(columns) // 3))
+    order = temporal_order(len(columns) // n_axes, n_axes)
+    data, decoded = encode_vectors(columns, _basis_step(step, columns.shape), order)
     head = encode_integers(np.diff(levels, prepend=0))
     decoded /= scales
     return varint(n_components) + pack_block(head) + data, Basis(decoded[:, 0], decoded[:, 1:])
 
 
-def decode_basis(data: bytes, n_frames: int, n_points: int, step: float, name: str) -> Basis:
+def decode_basis(data: bytes, n_frames: int, n_points: int, step: float, name: str, n_axes: int = 3) -> Basis:
     """Mirror of `encode_basis`; raises `CorruptFile` if the bytes are not what it writes."""
     cursor = Cursor(data, name)
-    n_components = cursor.varint(min(MAX_COMPONENTS, 3 * n_frames), "the number of components")
+    n_components = cursor.varint(min(MAX_COMPONENTS, n_axes * n_frames), "the number of components")
     head = cursor.block()
     levels = np.cumsum(decode_integers(head, n_components, name=name))
     if (np.abs(levels) > MAX_SCALE).any():
         raise cursor.corrupt("a scale is out of range")
-    if 3 * n_frames * (n_components + 1) > MAX_VALUES:
+    if n_axes * n_frames * (n_components + 1) > MAX_VALUES:
         raise cursor.corrupt(f"{n_components} components over {n_frames} frames")
-    coarse_step = _basis_step(step, (3 * n_frames, n_components + 1))
-    decoded = decode_vectors(cursor.rest(), n_components + 1, coarse_step, temporal_order(n_frames), name)
+    coarse_step = _basis_step(step, (n_axes * n_frames, n_components + 1))
+    decoded = decode_vectors(cursor.rest(), n_components + 1, coarse_step, temporal_order(n_frames, n_axes), name)
     decoded /= _scales(levels, n_points, step)
     return Basis(decoded[:, 0], decoded[:, 1:])
 

@@ -13,9 +13,10 @@ from gvpipe.arrays import Float64, Int64
 from gvpipe.codec import Memo, Progress
 from gvpipe.connectivity.base_mesh import EncodedMesh
 from gvpipe.connectivity.topology_only import Topology, encode_mesh
-from gvpipe.metrics.vertex_errors import Spread
+from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of
 from gvpipe.sequence import MeshSequence
+from gvpipe.trajectory.welding import find_points
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class CodedConnectivity:
         coded: the mesh's sections.
         mesh: as the decoder will have it.
         members: ``(P,)`` a given vertex of each of the mesh's points.
-        spread: of the vertices, model units (`gvpipe.metrics.vertex_errors.Spread`).
+        spread: of the vertices, model units (`gvpipe.metrics.vertex_errors.measure_spread`).
     """
 
     coded: EncodedMesh
@@ -42,26 +43,12 @@ class CodedConnectivity:
 def code_connectivity(sequence: MeshSequence, reorder: bool, memo: Memo, report: Progress) -> CodedConnectivity:
     """Find a sequence's points and code its mesh; ``reorder`` lets the decoder see the codec's vertex order."""
     report("read", 0)
-    points, spread = memo("survey", lambda: survey(sequence, report))
+    spread = memo("spread", lambda: measure_spread(sequence))
+    points = memo("points", lambda: find_points(sequence))
     report("mesh", 0)
     coded, mesh = memo("mesh", lambda: encode_mesh(sequence.faces, points, reorder))
     _, first = np.unique(mesh.points, return_index=True)
     return CodedConnectivity(coded, mesh, coded.permutation[first], spread)
-
-
-def survey(sequence: MeshSequence, report: Progress) -> tuple[Int64, float]:
-    """Points ``(V,)`` of vertices, equal where trajectories are, and the vertices' spread, model units."""
-    points = np.zeros(sequence.n_vertices, np.int64)
-    spread = Spread()
-    for first, block in sequence.chunks():
-        spread.add(block)
-        vectors = np.ascontiguousarray((block + np.float32(0)).swapaxes(0, 1)).reshape(sequence.n_vertices, -1)  # no minus zero
-        _, ids = np.unique(vectors.view(np.dtype((np.void, vectors.shape[1] * 4))).ravel(), return_inverse=True)
-        _, points = np.unique(points * sequence.n_vertices + ids, return_inverse=True)
-        report("read", (first + len(block)) / sequence.n_frames)
-    _, first_vertex = np.unique(points, return_index=True)
-    points = np.argsort(np.argsort(first_vertex))[points]  # numbered as their first vertices are
-    return points.astype(np.int64), spread.value
 
 
 def read_trajectories(sequence: MeshSequence, start: int, stop: int, members: Int64) -> Float64:

@@ -5,7 +5,7 @@ a frame lies between its neighbours. A frame's x, y and z vectors are predicted 
 Why: a basis coded plainly is the largest part of a file. It is a factor of the same matrix as the coefficients, and predicts as
 well: on chicken this took 0.24 bits per vertex and frame where a DCT along time in octave bands took 0.44.
 
-Vector 3 f + a is axis a of frame f.
+Vector A f + a is axis a of frame f, of A axes: three of positions, any number of a field.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ LINEAR = {-1: 0.5, 1: 0.5}
 OFFSETS = (-1, 1, -3, 3, -2, -5, 5, -4)  # frames that may be decoded, those that predict best first
 
 
-def temporal_order(n_frames: int) -> CausalOrder:
-    """Return the order of the 3 F vectors of ``n_frames`` frames.
+def temporal_order(n_frames: int, n_axes: int = 3) -> CausalOrder:
+    """Return the order of the A F vectors of ``n_frames`` frames with A axes.
 
     Examples:
         >>> (temporal_order(5).order[::3] // 3).tolist()
@@ -44,20 +44,20 @@ def temporal_order(n_frames: int) -> CausalOrder:
             order.append(frame)
             weights_of.append({frame + o * step: prior.get(o, 0.0) for o in near})
             is_done.add(frame)
-        if 3 * (len(order) - bounds[-1]) >= MIN_BLOCK or step == 1:
+        if n_axes * (len(order) - bounds[-1]) >= MIN_BLOCK or step == 1:
             bounds.append(len(order))
-    axes = np.arange(3)
-    counts = np.repeat([len(k) for k in weights_of], 3)
+    axes = np.arange(n_axes)
+    counts = np.repeat([len(k) for k in weights_of], n_axes)
     near_frames = [np.array(list(k), np.int64) for k in weights_of]
-    neighbours = np.concatenate([(3 * k + axes[:, None]).ravel() for k in near_frames])
-    weights = np.concatenate([np.tile(np.array(list(k.values())), 3) for k in weights_of])
+    neighbours = np.concatenate([(n_axes * k + axes[:, None]).ravel() for k in near_frames])
+    weights = np.concatenate([np.tile(np.array(list(k.values())), n_axes) for k in weights_of])
     return CausalOrder(
-        order=(3 * np.array(order)[:, None] + axes).ravel().astype(np.int32),
+        order=(n_axes * np.array(order)[:, None] + axes).ravel().astype(np.int32),
         starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
         neighbours=neighbours.astype(np.int32),
         weights=weights.astype(np.float64),
         variances=np.full(len(weights), VARIANCE),
         ring_sizes=np.minimum(counts, 2).astype(np.int32),
-        blocks=(3 * np.array(bounds)).astype(np.int32),
+        blocks=(n_axes * np.array(bounds)).astype(np.int32),
         affine=False,
     )

@@ -12,15 +12,12 @@ from __future__ import annotations
 import base64
 import html
 import os
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from gvpipe.atomic import atomic_path, output_error
+from gvpipe.atomic import atomic_path, temporary_folder
 from gvpipe.codec import Progress
 from gvpipe.container.mp4 import write_file
 from gvpipe.errors import InputError, OutputError
@@ -101,7 +98,8 @@ def export_html(
     if remaining:
         raise InputError(f"the web player does not read {remaining} yet; use an older gvpipe to convert")
     x, y, z = player.bitstream.origin
-    with _scratch_file() as converted:
+    with temporary_folder() as folder:
+        converted = os.path.join(folder, "converted.mp4")
         write_file(replace(trial.bitstream, origin=(x, y, z)), converted)
         page = _write_page(player.path, converted, target, up)
     added = trial.errors
@@ -138,14 +136,3 @@ def _write_page(name: str, video: str | os.PathLike[str], target: Path, up: str)
     with atomic_path(target) as temporary:
         temporary.write_bytes(text)
     return ExportReport(len(text), len(data))
-
-
-@contextmanager
-def _scratch_file() -> Iterator[str]:
-    """The path of a file to be, gone at the end."""
-    try:
-        folder = tempfile.TemporaryDirectory(prefix="gvpipe-")
-    except OSError as exc:
-        raise output_error(tempfile.gettempdir(), exc) from exc
-    with folder as name:
-        yield os.path.join(name, "converted.mp4")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from pathlib import Path
 
 import pytest
@@ -28,3 +29,10 @@ def test_plots_need_the_report_alone(report: BenchReport, tmp_path: Path) -> Non
     (tmp_path / "peers.csv").write_text("seq,codec\n")
     with pytest.raises(InputError, match="bpvf, kg, rmse_rel"):
         read_peers(tmp_path / "peers.csv")
+
+
+def test_plots_name_the_package_that_they_need(report: BenchReport, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)  # as if it were not installed
+    with pytest.raises(InputError, match=r"pip install 'gvpipe\[plot\]'"):
+        draw(report, tmp_path / "plots")
+    assert not (tmp_path / "plots").exists()

@@ -122,7 +122,7 @@ def test_compare_json(run: Run, npz: Path, video: Path, sequence: MeshSequence) 
     same = one_object(run("compare", video, video, "--json").out)
     assert [same[key] for key in sorted(COMPARE_KEYS - {"frames", "hausdorff"})] == [0] * 7
     lines = run("compare", npz, video).out.splitlines()
-    assert [line.split()[0] for line in lines] == [key for key in values if key != "frames"]
+    assert [line.split()[0] for line in lines] == [key for key in values if key not in ("frames", "attributes", "fields")]
 
 
 def test_info(run: Run, video: Path, sequence: MeshSequence) -> None:
@@ -235,6 +235,7 @@ def test_python_m() -> None:
         ["decode", "in.mp4", "out", "--stop", "1.5"],
         ["info", "--jsn", "in.mp4"],
         ["compare", "in.mp4"],
+        ["render", "in.mp4", "out.png", "--error-max", "1"],
     ],
 )
 def test_usage(run: Run, arguments: list[str]) -> None:
@@ -590,7 +591,7 @@ def plain_mp4(path: Path) -> None:
         container.mux(stream.encode(None))
 
 
-def test_other_files(run: Run, video: Path, tmp_path: Path) -> None:
+def test_other_files(run: Run, video: Path, npz: Path, tmp_path: Path) -> None:
     """Files that are not geometry videos, or no longer: each is told apart."""
     plain_mp4(tmp_path / "plain.mp4")
     remux(video, tmp_path / "remuxed.mp4", {"movflags": "use_metadata_tags"})
@@ -599,6 +600,7 @@ def test_other_files(run: Run, video: Path, tmp_path: Path) -> None:
     samples: dict[str, tuple[bytes, type[FormatError], str]] = {
         "jpeg.mp4": (jpeg, NotGeometryVideo, "not an MP4"),
         "text.mp4": (b"hello, this is a text file", NotGeometryVideo, "not an MP4"),
+        "tube.npz": (npz.read_bytes(), NotGeometryVideo, "encode the sequence first: gvpipe encode INPUT OUTPUT.mp4"),
         "short.mp4": (b"hi, you!", NotGeometryVideo, "not an MP4"),
         "zeros.mp4": (bytes(5000), NotGeometryVideo, "not an MP4"),
         "empty.mp4": (b"", TruncatedFile, "empty"),
@@ -611,7 +613,8 @@ def test_other_files(run: Run, video: Path, tmp_path: Path) -> None:
         assert words in str(refuse(tmp_path / name, data, kind))
     for name, (_, _, words) in samples.items():
         assert_refused(run, tmp_path, ("info", tmp_path / name), (name, words))
-        assert_refused(run, tmp_path, ("encode", tmp_path / name, tmp_path / "o.mp4"), (name, words))
+        if name.endswith(".mp4"):
+            assert_refused(run, tmp_path, ("encode", tmp_path / name, tmp_path / "o.mp4"), (name, words))
     for arguments in (("info", tmp_path), ("info", tmp_path / "none.mp4"), ("decode", tmp_path / "n" / "x.mp4", "o.npz")):
         assert_refused(run, tmp_path, arguments, (str(arguments[1]),))
 

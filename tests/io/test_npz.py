@@ -9,11 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from assets import assert_same_attribute, assert_same_static, asset
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 from mesh_files import FACES, POSITIONS, fast, grid, same_bits
 
 from gvpipe import io
+from gvpipe.asset.attribute import DOMAINS, Attribute
+from gvpipe.asset.field import Field
+from gvpipe.asset.part import Part
 from gvpipe.errors import InputError
 from gvpipe.sequence import MeshSequence
 
@@ -105,3 +110,136 @@ def test_npz_flipped_bytes(tmp_path: Path) -> None:
         (tmp_path / "b.npz").write_bytes(whole[:at] + bytes([whole[at] ^ 255]) + whole[at + 1 :])
         with contextlib.suppress(InputError):  # a flip in a field that zip readers ignore does no harm
             assert same_bits(io.read(tmp_path / "b.npz").positions, grid(2, 2).positions)
+
+
+def assert_same_asset(read: MeshSequence, given: MeshSequence) -> None:
+    assert_same_static(read, given)
+    assert read.metadata == given.metadata
+    assert set(read.attributes) == set(given.attributes)
+    for name, each in given.attributes.items():
+        assert_same_attribute(read.attributes[name], each, given.faces)
+    assert set(read.fields) == set(given.fields)
+    for name, one in given.fields.items():
+        other = read.fields[name]
+        assert (other.domain, other.kind, other.unit, other.range, other.shape, other.dtype) == (
+            one.domain, one.kind, one.unit, one.range, one.shape, one.dtype
+        )  # fmt: skip
+        assert same_bits(other.read(0, len(one)), one.read(0, len(one)))
+
+
+def test_an_asset_comes_back_whole(tmp_path: Path) -> None:
+    given = asset()
+    assert io.write(given, tmp_path / "a.npz") == ()
+    read = io.read(tmp_path / "a.npz")
+    assert_same_asset(read, given)
+    assert same_bits(read.fields["flow"][1:3], given.fields["flow"][1:3])
+    io.write(read, tmp_path / "b.npz")
+    assert (tmp_path / "b.npz").read_bytes() == (tmp_path / "a.npz").read_bytes()
+    with np.load(tmp_path / "a.npz") as archive:
+        assert archive["field_stress"].shape == (3, 9) and archive["attribute_id"].tolist() == [[i] for i in range(8)]
+        assert archive["image_0"].tobytes() == given.images[0].data
+
+
+NAMES = st.sampled_from(["uv", "normal", "color", "uv1", "a b", "mass", "attribute_x", "é"])
+TYPES = st.sampled_from([np.float32, np.uint8, np.int16, np.int64, np.uint32])
+
+
+@st.composite
+def attributes(draw: st.DrawFn) -> Attribute:
+    """Rows of any type on any domain of the test asset, with indices in half of the cases."""
+    rows = {"vertex": 9, "corner": 24, "triangle": 8, "part": 2}
+    domain = draw(st.sampled_from(DOMAINS))
+    dtype, width = draw(TYPES), draw(st.integers(1, 4))
+    if not draw(st.booleans()):
+        return Attribute(draw(hnp.arrays(dtype, (rows[domain], width), elements=None, fill=None).filter(finite)), domain)
+    values = draw(hnp.arrays(dtype, (draw(st.integers(1, 5)), width)).filter(finite))
+    indices = draw(hnp.arrays(np.int32, rows[domain], elements=st.integers(0, len(values) - 1)))
+    return Attribute(values, domain, indices=indices, unit=draw(st.sampled_from(["", "m/s", "\u00b0C"])))
+
+
+def finite(values: Any) -> bool:
+    return bool(np.isfinite(values).all())
+
+
+@fast
+@given(st.dictionaries(NAMES, attributes(), max_size=3), hnp.arrays(np.float32, (3, 8)), st.booleans())
+def test_any_attributes_and_fields_come_back(tmp_path: Path, made: dict[str, Attribute], values: Any, with_parts: bool) -> None:
+    changes: Any = {"parts": asset().parts if with_parts else ()}
+    if not with_parts:
+        made = {name: each for name, each in made.items() if each.domain != "part"}
+    given = asset(attributes=made, fields={"f": Field(values, "triangle")}, **changes)
+    io.write(given, tmp_path / "a.npz")
+    read = io.read(tmp_path / "a.npz")
+    assert_same_asset(read, given)
+    io.write(read, tmp_path / "b.npz")
+    assert (tmp_path / "b.npz").read_bytes() == (tmp_path / "a.npz").read_bytes()
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_fields_load_some_frames_at_a_time(tmp_path: Path, order: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gvpipe.io.npz_fields.BLOCK_BYTES", 64)
+    speed = np.random.default_rng(3).random((7, 3, 3), np.float32)
+    units = "{'units': {'speed': 'm/s, true'}, 'dt': np.float64(0.5)}"
+    held = np.asarray(speed, order=order)
+    np.savez(tmp_path / "a.npz", vertices=np.zeros((7, 3, 3)), faces=FACES, field_speed=held, meta=units)
+    read = io.read(tmp_path / "a.npz", 30)
+    assert read.fields["speed"].unit == "m/s" and read.metadata.texts == {"meta": units}
+    assert same_bits(read.fields["speed"][5:7], speed[5:7])
+    assert same_bits(read.fields["speed"][0:6], speed[0:6])
+
+
+BAD_ASSETS = {
+    "no json": ({"asset": np.array("{")}, "'asset' is not JSON"),
+    "list": ({"asset": np.array("[]")}, "'asset' is no description"),
+    "newer": ({"asset": np.array('{"version": 2}')}, "written by a newer gvpipe"),
+    "image": ({"asset": np.array('{"version": 1, "images": [{"name": "a"}]}')}, "image 0 has no bytes"),
+    "no picture": (
+        {"asset": np.array('{"version": 1, "images": [{"name": "a", "media_type": "b"}]}'), "image_0": np.zeros(3, np.uint8)},
+        "is not a picture",
+    ),
+    "material": ({"asset": np.array('{"version": 1, "materials": [{"shine": 1}]}')}, "material has 'shine', which a Material"),
+    "factor": ({"asset": np.array('{"version": 1, "materials": [{"metallic": "1"}]}')}, "metallic is '1'; a finite number"),
+    "texture": ({"asset": np.array('{"version": 1, "materials": [{"emissive_texture": {}}]}')}, "lacks 'image'"),
+    "part": ({"asset": np.array('{"version": 1, "parts": [{"name": "a", "vertices": [0]}]}')}, "vertices is [0]; 2 values"),
+    "indices": ({"uv": np.zeros((9, 2), "f4"), "indices_uv": np.zeros(8, int)}, "'indices_uv' has shape (8,)"),
+    "indices differ": ({"uv": np.eye(9, 2, dtype="f4"), "indices_uv": np.zeros(9, int)}, "one index to corners of different"),
+    "nan": ({"attribute_a": np.full(3, np.nan)}, "attribute 'a': value 0 is [nan]"),
+    "rows": ({"attribute_a": np.zeros(4)}, "attribute 'a' has 4 rows"),
+    "two of a name": ({"uv": np.zeros((3, 2)), "attribute_uv": np.zeros(3)}, "two attributes of one name"),
+    "polygons": ({"polygons": np.array([4])}, "the polygons' fans are not 3 triangles"),
+    "field": ({"field_a": np.zeros(3)}, "'field_a' has shape (3,)"),
+    "field rows": ({"field_a": np.zeros((2, 4))}, "field 'a' has shape (2, 4)"),
+    "field text": ({"field_a": np.array([["a"]])}, "'field_a' has shape (1, 1) and type <U1"),
+}
+
+
+@pytest.mark.parametrize(("arrays", "message"), BAD_ASSETS.values(), ids=BAD_ASSETS.keys())
+def test_npz_asset_errors(tmp_path: Path, arrays: Any, message: str) -> None:
+    np.savez(tmp_path / "a.npz", **{**OK, **arrays})
+    with pytest.raises(InputError) as error:
+        io.read(tmp_path / "a.npz")
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_ten_thousand_parts(tmp_path: Path) -> None:
+    n = 10_000
+    faces = np.arange(3 * n, dtype=np.int32).reshape(-1, 3)
+    parts = tuple(Part(f"part {i}", (3 * i, 3 * i + 3), (i, i + 1)) for i in range(n))
+    given = MeshSequence(np.zeros((1, 3 * n, 3), np.float32), faces, parts=parts)
+    io.write(given, tmp_path / "a.npz")
+    assert io.read(tmp_path / "a.npz").parts == parts
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_a_damaged_field_is_refused_when_it_is_read(tmp_path: Path, order: Any) -> None:
+    heat = np.asarray(np.random.default_rng(1).random((9000, 3), np.float32), order=order)
+    np.savez(tmp_path / "a.npz", vertices=np.zeros((9000, 3, 3)), faces=FACES, field_heat=heat)
+    whole = (tmp_path / "a.npz").read_bytes()
+    at = whole.index(heat.tobytes(order)[:8]) + 90_000
+    (tmp_path / "a.npz").write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+    read = io.read(tmp_path / "a.npz")
+    with pytest.raises(InputError, match=r"a.npz: 'field_heat' cannot be read \(Bad CRC-32 .*write it again"):
+        read.fields["heat"].read(0, 2)
+    with pytest.raises(InputError, match="'field_heat' cannot be read"):
+        read.fields["heat"].read(0, 2)

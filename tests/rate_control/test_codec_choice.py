@@ -137,6 +137,9 @@ def test_codecs_that_cannot_are_passed_over(tmp_path: Path, monkeypatch: pytest.
         given = [published, codec_class("pca")(), jpeg, codec_class("pdct")()]
         report = gvpipe.encode(waving(16, 12), tmp_path / "a.mp4", given, target_bpvf=10.0)
         assert report.codec == "pca" and {trial["codec"] for trial in report.tried} == {"pca"}
+    report = gvpipe.encode(waving(16, 12), tmp_path / "a.mp4", [published, jpeg], target_kg=1.0)
+    settings = [trial["settings"] for trial in report.tried]
+    assert {"prediction": "affine"} in settings and {"prediction": "affine", "image": "jpeg"} in settings
     with pytest.raises(InputError, match="no codec meets the target: no quality of codec mcgv"):
         choose_codec([published], waving(16, 12), Target("bpvf", 10.0))
 
@@ -146,7 +149,7 @@ def test_settings_are_those_that_all_have(run: Run, tmp_path: Path) -> None:
     ended = run("encode", tmp_path / "w.npz", tmp_path / "w.mp4", "--codec", "auto", "--set", "clusters=3")
     assert ended.status == 1 and "clusters" in ended.err
     ended = run("encode", tmp_path / "w.npz", tmp_path / "w.mp4", "--codec=auto", "--reorder", "--segment=5", "--target-kg=1")
-    assert ended.status == 0 and "estimates" in ended.out and " at quality " in ended.out
+    assert ended.status == 0 and "estimates" in ended.out and " reorder=True segment=5 at quality " in ended.out
     report = gvpipe.encode(waving(10, 8), tmp_path / "v.mp4", "auto", target_kg=1.0, reorder=True, segment=5)
     assert report.settings["reorder"] is True
     assert report.settings == dataclasses.asdict(codec_class(report.codec)(**report.settings))

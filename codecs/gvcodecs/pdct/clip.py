@@ -126,23 +126,23 @@ def _encode_deltas(signals: Float64, dictionary: Dictionary, quantiser: DeltaQua
     sizes = np.diff(dictionary.bounds)
     sums = np.zeros((3, n_affine + len(scale)), np.int64)
     for signal in signals:
-        predicted = momentum.predict()
-        known = (sums + predicted) / UNIT
-        left = signal - known[:, n_affine:] * scale - _expand(known[:, :n_affine], shapes, sizes)
-        wanted = np.empty_like(known)
-        wanted[:, :n_affine] = _project(left, projections, dictionary.bounds)
-        left -= _expand(np.rint(wanted[:, :n_affine]), shapes, sizes)
-        wanted[:, n_affine:] = left / scale
+        predicted_delta = momentum.predict()
+        prediction = (sums + predicted_delta) / UNIT
+        residual = signal - prediction[:, n_affine:] * scale - _expand(prediction[:, :n_affine], shapes, sizes)
+        coefficients = np.empty_like(prediction)
+        coefficients[:, :n_affine] = _project(residual, projections, dictionary.bounds)
+        residual -= _expand(np.rint(coefficients[:, :n_affine]), shapes, sizes)
+        coefficients[:, n_affine:] = residual / scale
         if quantiser.kept > 0:
-            _drop_small(wanted[:, n_affine:], dictionary, quantiser.kept)
+            _drop_small(coefficients[:, n_affine:], dictionary, quantiser.kept)
         values, contexts = np.zeros_like(sums), np.zeros_like(sums)
         costs = coder.contexts.costs()
         for axis in range(3):
             contexts[axis] = coder.contexts.of(axis, values)
-            values[axis] = _choose(wanted[axis], contexts[axis], costs, n_affine)
+            values[axis] = _choose(coefficients[axis], contexts[axis], costs, n_affine)
             coder.add_axis(contexts[axis], values[axis])
         coder.contexts.learn(contexts, values)
-        delta = predicted + UNIT * values
+        delta = predicted_delta + UNIT * values
         momentum.learn(delta)
         sums += delta
     return coder.finish()
@@ -165,23 +165,23 @@ def _decode_deltas(cursor: Cursor, n_frames: int, dictionary: Dictionary) -> Int
     return sums
 
 
-def _drop_small(wanted: Float64, dictionary: Dictionary, kept: float) -> None:
+def _drop_small(coefficients: Float64, dictionary: Dictionary, kept: float) -> None:
     """Zero all but the largest part ``kept`` of each cluster's coefficients, axis by axis (section 4.5)."""
     for where in dictionary.slices:
         n_dropped = round((1 - kept) * (where.stop - where.start))
-        smallest = np.argsort(np.abs(wanted[:, where]), axis=1, kind="stable")[:, :n_dropped]
-        np.put_along_axis(wanted[:, where], smallest, 0.0, axis=1)
+        smallest = np.argsort(np.abs(coefficients[:, where]), axis=1, kind="stable")[:, :n_dropped]
+        np.put_along_axis(coefficients[:, where], smallest, 0.0, axis=1)
 
 
-def _choose(wanted: Float64, contexts: Int64, costs: Float64, n_affine: int) -> Int64:
-    """Round ``wanted (C,)`` to the nearest integer or the next one towards 0, whichever costs less in error and bits.
+def _choose(coefficients: Float64, contexts: Int64, costs: Float64, n_affine: int) -> Int64:
+    """Round ``coefficients (C,)`` to the nearest integer or the next one towards 0, whichever costs less in error and bits.
 
     The affine values are rounded to the nearest: what is left of them has been carried into the DCT.
     """
-    nearest = np.rint(wanted).astype(np.int64)
+    nearest = np.rint(coefficients).astype(np.int64)
     at = np.flatnonzero(nearest[n_affine:]) + n_affine
     if len(at):
-        x, high = wanted[at], nearest[at]
+        x, high = coefficients[at], nearest[at]
         low = high - np.sign(high)
         rows = contexts[at]
         gain = (x - low) ** 2 - (x - high) ** 2

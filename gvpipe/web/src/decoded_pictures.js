@@ -16,19 +16,19 @@ const LONGEST_STEP = 1000; // ms that the clock goes on at once: a hidden page i
 
 export class DecodedPictures {
   /**
-   * @param {Uint8Array} file @param {number} fps @param {import("./format/repeated_frames.js").Holds} holds
+   * @param {Uint8Array} file @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated
    * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
    * @returns {Promise<DecodedPictures>} its first group decoded
    * @throws {GeometryVideoError} kind "unsupported": this browser's WebCodecs cannot decode it
    */
-  static async open(file, fps, holds, size, samples) {
+  static async open(file, fps, repeated, size, samples) {
     const track = readTrack(file);
     const found = track.groups.reduce((sum, group) => sum + group.length, 0);
-    if (found !== holds.distinct) {
-      throw new GeometryVideoError("corrupt", `its video has ${found} pictures in place of ${holds.distinct}; ${AGAIN}`);
+    if (found !== repeated.distinct) {
+      throw new GeometryVideoError("corrupt", `its video has ${found} pictures in place of ${repeated.distinct}; ${AGAIN}`);
     }
-    const groupBytes = (samples.length * holds.distinct) / track.groups.length;
-    const pictures = new DecodedPictures(track.groups, groupBytes, fps, holds, new GroupDecoder(track, size, samples));
+    const groupBytes = (samples.length * repeated.distinct) / track.groups.length;
+    const pictures = new DecodedPictures(track.groups, groupBytes, fps, repeated, new GroupDecoder(track, size, samples));
     try {
       await pictures.seek(0);
     } catch (error) {
@@ -41,28 +41,28 @@ export class DecodedPictures {
   /**
    * The same clock for a file without pictures, whose frames all have the levels of no residual.
    *
-   * @param {number} fps @param {import("./format/repeated_frames.js").Holds} holds @param {Uint8Array} levels
+   * @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {Uint8Array} levels
    * @returns {Promise<DecodedPictures>}
    */
-  static async without(fps, holds, levels) {
-    const group = Array.from({ length: holds.distinct }, (_, picture) => ({ picture }));
+  static async without(fps, repeated, levels) {
+    const group = Array.from({ length: repeated.distinct }, (_, picture) => ({ picture }));
     const decode = async (samples, add) => samples.forEach(({ picture }) => add(picture, levels));
-    const pictures = new DecodedPictures([group], 0, fps, holds, { decode, close() {} });
+    const pictures = new DecodedPictures([group], 0, fps, repeated, { decode, close() {} });
     await pictures.seek(0);
     return pictures;
   }
 
-  constructor(groups, groupBytes, fps, holds, decoder) {
+  constructor(groups, groupBytes, fps, repeated, decoder) {
     this.fps = fps;
-    this.holds = holds;
-    this.frames = holds.frames;
+    this.repeated = repeated;
+    this.frames = repeated.frames;
     /** The frame shown. */
     this.shown = -1;
     this.decoder = decoder;
     this.groupBytes = groupBytes;
     this.samples = groups;
     /** Of each picture its group. */
-    this.groupOf = new Uint32Array(holds.distinct);
+    this.groupOf = new Uint32Array(repeated.distinct);
     groups.forEach((group, g) => group.forEach(({ picture }) => (this.groupOf[picture] = g)));
     this.kept = new Map(); // group -> Group, the one asked for last at the end
     this.turn = Promise.resolve(); // one group after the other
@@ -77,7 +77,7 @@ export class DecodedPictures {
   async seek(frame) {
     this.pause();
     if (this.shown === frame) return;
-    this.current = await this.#picture(this.holds.distinctOf(frame));
+    this.current = await this.#picture(this.repeated.distinctOf(frame));
     this.shown = frame;
   }
 
@@ -90,14 +90,14 @@ export class DecodedPictures {
     let position = Math.max(0, this.shown); // frames since the start
     let before = performance.now();
     this.shown = -1; // it is shown again, at once
-    await this.#picture(this.holds.distinctOf(Math.floor(position)));
+    await this.#picture(this.repeated.distinctOf(Math.floor(position)));
     const tick = (now) => {
       if (this.playing !== playing) return;
       const next = position + (Math.min(Math.max(0, now - before), LONGEST_STEP) * rate * this.fps) / 1000;
       before = now;
       const isOver = !loop && next >= this.frames;
       const frame = loop ? Math.floor(next) % this.frames : Math.min(Math.floor(next), this.frames - 1);
-      const picture = this.holds.distinctOf(frame);
+      const picture = this.repeated.distinctOf(frame);
       const group = this.#group(this.groupOf[picture]);
       if (group.error) {
         this.pause();

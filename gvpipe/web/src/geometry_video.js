@@ -9,7 +9,7 @@
 import { DecodedPictures } from "./decoded_pictures.js";
 import { readContainer } from "./format/boxes.js";
 import { GeometryVideoError } from "./format/errors.js";
-import { readHolds } from "./format/repeated_frames.js";
+import { readRepeatedFrames } from "./format/repeated_frames.js";
 import { readPayload } from "./format/payload.js";
 import { checkCodec } from "./mcgv/header.js";
 import { McgvReader } from "./mcgv/reader.js";
@@ -33,13 +33,13 @@ export class GeometryVideo {
     try {
       const payload = await readPayload(readContainer(file));
       checkCodec(payload.header);
-      const holds = readHolds(payload);
-      const reader = await McgvReader.open(holds.distinctPayload(payload));
+      const repeated = readRepeatedFrames(payload);
+      const reader = await McgvReader.open(repeated.distinctPayload(payload));
       const { fps } = payload.header;
       pictures = reader.samples
-        ? await openPictures(file, fps, holds, reader.pictureSize, reader.samples)
-        : await DecodedPictures.without(fps, holds, reader.zeroLevels);
-      return new GeometryVideo(payload.header, file.length, holds, reader, pictures);
+        ? await openPictures(file, fps, repeated, reader.pictureSize, reader.samples)
+        : await DecodedPictures.without(fps, repeated, reader.zeroLevels);
+      return new GeometryVideo(payload.header, file.length, repeated, reader, pictures);
     } catch (error) {
       pictures?.close();
       if (!(error instanceof RangeError)) throw error; // an array that the browser cannot give
@@ -47,12 +47,12 @@ export class GeometryVideo {
     }
   }
 
-  #holds;
+  #repeated;
   #reader;
   #pictures;
   #queue = Promise.resolve();
 
-  constructor(header, byteLength, holds, reader, pictures) {
+  constructor(header, byteLength, repeated, reader, pictures) {
     this.frameCount = header.frames;
     this.fps = header.fps;
     this.vertexCount = header.vertices;
@@ -65,7 +65,7 @@ export class GeometryVideo {
     this.basePoints = reader.basePoints;
     /** `{min, max}`: the box that the motion stays in, model units. */
     this.bounds = reader.bounds();
-    this.#holds = holds;
+    this.#repeated = repeated;
     this.#reader = reader;
     this.#pictures = pictures;
   }
@@ -125,7 +125,7 @@ export class GeometryVideo {
   }
 
   #read(k, positions) {
-    this.#reader.rebuild(this.#holds.distinctOf(k), this.#pictures.levels(), positions);
+    this.#reader.rebuild(this.#repeated.distinctOf(k), this.#pictures.levels(), positions);
     return positions;
   }
 }

@@ -8,17 +8,17 @@ import { VideoPictures } from "./video_pictures.js";
  * WebCodecs, or where a browser has none that reads the video (pages of plain http, old browsers), `<video>`.
  *
  * @param {Uint8Array} file @param {number} fps
- * @param {import("./format/repeated_frames.js").Holds} holds which picture each frame shows
+ * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated which picture each frame shows
  * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
  * @returns {Promise<DecodedPictures|VideoPictures>} with `levels()`, `seek`, `play`, `pause` and `close`
  */
-export async function openPictures(file, fps, holds, size, samples) {
+export async function openPictures(file, fps, repeated, size, samples) {
   if (typeof VideoDecoder === "function") {
     try {
-      return await DecodedPictures.open(file, fps, holds, size, samples);
+      return await DecodedPictures.open(file, fps, repeated, size, samples);
     } catch (error) {
       if (!(error instanceof GeometryVideoError) || error.kind !== "unsupported") throw error;
     }
   }
-  return VideoPictures.open(file, fps, holds, size, samples);
+  return VideoPictures.open(file, fps, repeated, size, samples);
 }

@@ -7,7 +7,7 @@
  * Chromium plays: the video's clock leads, and whoever draws late gets the picture of that moment. It loops by seeking. Firefox
  * announces other pictures than it draws while it plays (and times that go on growing where the element loops by itself), so
  * there every frame that is due is sought. So it is in every browser where frames repeat: the video has each picture once, and its
- * clock knows no holds (`format/repeated_frames.js`).
+ * clock knows of no repeated frames (`format/repeated_frames.js`).
  */
 
 import { GeometryVideoError } from "./format/errors.js";
@@ -17,12 +17,12 @@ const SHOWN_WITHIN = 1000; // ms after `seeked` in which the browser says what i
 
 export class VideoPictures {
   /**
-   * @param {Uint8Array} file @param {number} fps @param {import("./format/repeated_frames.js").Holds} holds
+   * @param {Uint8Array} file @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated
    * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
    * @returns {Promise<VideoPictures>}
    */
-  static async open(file, fps, holds, size, samples) {
-    const pictures = new VideoPictures(file, fps, holds, size, samples);
+  static async open(file, fps, repeated, size, samples) {
+    const pictures = new VideoPictures(file, fps, repeated, size, samples);
     try {
       await pictures.#load();
     } catch (error) {
@@ -32,11 +32,11 @@ export class VideoPictures {
     return pictures;
   }
 
-  constructor(file, fps, holds, [width, height], samples) {
+  constructor(file, fps, repeated, [width, height], samples) {
     this.fps = fps;
-    this.holds = holds;
-    this.frames = holds.frames;
-    this.repeats = holds.distinct < holds.frames;
+    this.repeated = repeated;
+    this.frames = repeated.frames;
+    this.hasRepeats = repeated.distinct < repeated.frames;
     /** The frame shown last, where frames repeat. */
     this.frame = 0;
     this.width = width;
@@ -67,7 +67,7 @@ export class VideoPictures {
       throw new GeometryVideoError("corrupt", `its video is ${found} pixels; ${this.width}x${this.height} are needed`);
     }
     const found = video.duration * this.fps; // in units of a thousandth of a second
-    const { distinct } = this.holds;
+    const { distinct } = this.repeated;
     if (!(Math.abs(found - distinct) <= 1 + 0.002 * this.fps)) {
       throw new GeometryVideoError("corrupt", `its video lasts ${found.toFixed(1)} pictures in place of ${distinct}`);
     }
@@ -83,7 +83,7 @@ export class VideoPictures {
   async seek(frame) {
     this.pause();
     this.frame = frame;
-    const picture = this.holds.distinctOf(frame);
+    const picture = this.repeated.distinctOf(frame);
     if (this.shown !== picture) await this.#reach(picture);
   }
 
@@ -144,7 +144,7 @@ export class VideoPictures {
     const playing = (this.playing = {});
     const playBySeeking = (first) =>
       this.#playBySeeking(playing, first, on, rate, loop).catch((error) => this.playing === playing && on.failed(error));
-    if (this.repeats) {
+    if (this.hasRepeats) {
       playBySeeking(this.frame);
       return;
     }
@@ -183,12 +183,12 @@ export class VideoPictures {
   /** The same by seeking to whatever is due: slower, and exact where it is not known which picture of a playing video is drawn. */
   async #playBySeeking(playing, first, { show, ended }, rate, loop) {
     const start = performance.now() - (1000 * first) / (this.fps * rate);
-    let before = this.repeats ? -1 : this.shown;
+    let before = this.hasRepeats ? -1 : this.shown;
     while (this.playing === playing) {
       const due = Math.floor(((performance.now() - start) * this.fps * rate) / 1000);
       const frame = loop ? due % this.frames : Math.min(due, this.frames - 1);
       if (frame !== before) {
-        const picture = this.holds.distinctOf(frame);
+        const picture = this.repeated.distinctOf(frame);
         if (picture !== this.shown) {
           await this.#reach(picture);
           if (this.playing !== playing) return;
@@ -219,7 +219,7 @@ export class VideoPictures {
   pause() {
     if (!this.playing) return;
     this.playing = null;
-    if (this.repeats) return; // it never played
+    if (this.hasRepeats) return; // it never played
     this.video.pause();
     this.shown = -1; // the browser may have gone on to the next picture since
   }

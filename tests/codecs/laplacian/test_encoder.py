@@ -7,16 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from perturbation import perturb_predictions
 from sequences import waving
 from tubes import decoded, kg, tube
 
-import gvpipe.trajectory.prediction
 from gvcodecs.laplacian import Laplacian
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import FormatError, SettingError
 from gvpipe.metrics.comparison import compare
 from gvpipe.sequence import MeshSequence
-from gvpipe.trajectory.causal_order import CausalOrder
 
 
 def moving(n_frames: int = 16, shake: float = 5e-4) -> MeshSequence:
@@ -92,13 +91,7 @@ def test_perturbed_predictions_hardly_move_vertices(prediction: str, monkeypatch
     sequence = moving(20, shake=0.02)  # noise teaches weights that mean nothing
     bitstream = Laplacian(quality=80, delta_prediction=prediction).encode(sequence).bitstream
     clean = Laplacian.reader(bitstream).read(0, 20).astype(np.float64)
-    original = gvpipe.trajectory.prediction.predict_vectors
-
-    def perturbed(causal: CausalOrder, *rest: Any) -> None:
-        noise = 1 + 1e-12 * np.random.default_rng(5).choice([-1, 1], len(causal.weights))
-        original(causal._replace(weights=causal.weights * noise), *rest)
-
-    monkeypatch.setattr("gvpipe.trajectory.coefficient_coding.predict_vectors", perturbed)
+    perturb_predictions(monkeypatch)
     moved = Laplacian.reader(bitstream).read(0, 20).astype(np.float64)
     assert np.abs(clean - moved).max() < 1e-3 * bitstream.header["steps"][0]
 

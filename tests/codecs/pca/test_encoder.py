@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
 
 import numpy as np
 import pytest
+from perturbation import perturb_predictions
 
-import gvpipe.trajectory.prediction
 from gvcodecs.pca import Pca
 from gvcodecs.pca.reader import PcaReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import FormatError, InputError, SettingError
 from gvpipe.quality_scale import error_of
 from gvpipe.sequence import MeshSequence
-from gvpipe.trajectory.causal_order import CausalOrder
 
 
 def grid(side: int) -> tuple[np.ndarray, np.ndarray]:
@@ -223,17 +221,11 @@ def test_settings_are_checked() -> None:
 
 @pytest.mark.parametrize("predictor", ["lsp", "rbf", "kalman"])
 def test_perturbed_predictions_hardly_move_vertices(predictor: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """DESIGN 6: 1e-12 in every prior weight moves no vertex by more than a thousandth of a step."""
+    """1e-12 in every prior weight moves no vertex by more than a thousandth of a step."""
     sequence = make(*TUBE, n_frames=20)
     bitstream = Pca(quality=80, predictor=predictor).encode(sequence).bitstream
     clean = Pca.reader(bitstream).read(0, 20).astype(np.float64)
-    original = gvpipe.trajectory.prediction.predict_vectors
-
-    def perturbed(causal: CausalOrder, *rest: Any) -> None:
-        noise = 1 + 1e-12 * np.random.default_rng(5).choice([-1, 1], len(causal.weights))
-        original(causal._replace(weights=causal.weights * noise), *rest)
-
-    monkeypatch.setattr("gvpipe.trajectory.coefficient_coding.predict_vectors", perturbed)
+    perturb_predictions(monkeypatch)
     moved = Pca.reader(bitstream).read(0, 20).astype(np.float64)
     assert np.abs(clean - moved).max() < 1e-3 * bitstream.header["steps"][0]
 

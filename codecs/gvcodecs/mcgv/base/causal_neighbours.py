@@ -11,10 +11,15 @@ from gvpipe.arrays import Int64
 
 
 class CausalNeighbours(NamedTuple):
-    """Each point's neighbours of lower number: ``starts (P + 1,)`` bounds in ``near``, ascending; kernels take it as it is."""
+    """Each point's adjacent points of lower number, ascending; kernels take it as it is.
+
+    Args:
+        starts: ``(P + 1,)`` bounds of each point's in ``neighbours``.
+        neighbours: points.
+    """
 
     starts: Int64
-    near: Int64
+    neighbours: Int64
 
 
 def causal_neighbours(neighbours: sparse.csr_array) -> CausalNeighbours:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,7 @@ from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.motion.skinning import Weights
 from gvcodecs.mcgv.motion.skinning_fit import Fitted
-from gvpipe.rate_control.step_search import StepTrial
+from gvpipe.rate_control.step_search import Anchor, StepTrial
 
 
 @dataclass(frozen=True)
@@ -25,22 +24,16 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Anchor:
-    """An encode that was measured: from what, its step and error, model units, and `StepTrial.slope`."""
+class CandidateAnchor(Anchor):
+    """An encode that was measured, what it was made from, and `StepTrial.slope`."""
 
     candidate: Candidate
-    step: float
-    error: float
     slope: float
 
     @classmethod
-    def of(cls, candidate: Candidate, trial: StepTrial) -> Anchor:
+    def of(cls, candidate: Candidate, trial: StepTrial) -> CandidateAnchor:
         """Of an encode of a candidate."""
-        return cls(candidate, trial.step, trial.error, trial.slope)
-
-    def distance(self, target_error: float) -> float:
-        """How far a target error is from the error measured, as a logarithm."""
-        return math.log(target_error) - math.log(self.error)
+        return cls(trial.step, trial.error, candidate, trial.slope)
 
 
 def rebase(job: Job, candidate: Candidate, step: float, target_error: float) -> Candidate:

@@ -5,7 +5,7 @@
 3. Where pictures do not pay, do without, and look for the base frame that makes the file smallest (`without_pictures`).
 4. Mend the step until the error is close enough.
 
-What was measured (`Anchor`) serves encodes of the same sequence at other qualities.
+What was measured (`CandidateAnchor`) serves encodes of the same sequence at other qualities.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ import math
 from gvcodecs.mcgv.base.base_frame import begin
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.bitstream_sizes import cost
-from gvcodecs.mcgv.encoding.candidate import Anchor, Candidate
+from gvcodecs.mcgv.encoding.candidate import Candidate, CandidateAnchor
 from gvcodecs.mcgv.encoding.initial_skinning import fit_skinning
 from gvcodecs.mcgv.encoding.step_trials import StepTrials, encode
 from gvcodecs.mcgv.encoding.without_pictures import approach, omit_pictures, refine
 from gvpipe.codec import Encoded
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of
-from gvpipe.rate_control.step_search import SLOPE, StepTrial, find_step
+from gvpipe.rate_control.step_search import SLOPE, StepTrial, find_step, nearest
 
 GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
 BAND = {"blended": (0.9, 0.99), "affine": (1.0, 1.1)}  # of the target error: the published mode is no finer than asked
@@ -37,19 +37,18 @@ LEAST = 1e-9  # part of the target error, below which an error is none
 def encode_to_target(job: Job) -> Encoded:
     """Code a sequence with the error that its quality asks for."""
     target_error = error_of(job.settings.quality) / 100 * job.memo("spread", lambda: measure_spread(job.sequence))
-    anchors = job.memo("anchors", list[Anchor])
-    if anchors:  # what was measured at another quality serves this one
-        anchor = min(anchors, key=lambda anchor: abs(anchor.distance(target_error)))
-        if not anchor.candidate.fitted or abs(anchor.distance(target_error)) < REUSED:
-            return _reuse(job, anchor, target_error)
+    anchors = job.memo("anchors", list[CandidateAnchor])
+    anchor = nearest(anchors, target_error)
+    if anchor and (not anchor.candidate.fitted or abs(anchor.distance(target_error)) < REUSED):
+        return _reuse(job, anchor, target_error)  # what was measured at another quality serves this one
     trials, trial = _aim(job, target_error)
-    anchors.append(Anchor.of(trials.candidate, trial))
+    anchors.append(CandidateAnchor.of(trials.candidate, trial))
     if not job.memo.is_shared and not trials.candidate.start.pictures:  # who searches a quality asks for no more than its error
         trial = refine(trials, trial, target_error)
     return trial.encoded
 
 
-def _reuse(job: Job, anchor: Anchor, target_error: float) -> Encoded:
+def _reuse(job: Job, anchor: CandidateAnchor, target_error: float) -> Encoded:
     """Code from what an anchor was made from."""
     step = anchor.step * _limited(anchor.distance(target_error) / anchor.slope)
     if anchor.candidate.start.pictures:

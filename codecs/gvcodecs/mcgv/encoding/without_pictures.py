@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from gvcodecs.mcgv.base.base_lattice import base_step
 from gvcodecs.mcgv.encoding.bitstream_sizes import cost, count_bytes, count_picture_bytes
-from gvcodecs.mcgv.encoding.candidate import Anchor, rebase
+from gvcodecs.mcgv.encoding.candidate import CandidateAnchor, rebase
 from gvcodecs.mcgv.encoding.step_trials import StepTrials
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.rate_control.step_search import SLOPE, StepTrial, find_step
@@ -25,7 +25,7 @@ MAX_TRANSFORMS = 0.2  # part of the bytes that transforms may take for that to b
 FINE_BAND = 0.8, 1.0  # part of that error which is close enough
 
 
-def approach(trials: StepTrials, anchor: Anchor, step: float, target_error: float) -> StepTrial:
+def approach(trials: StepTrials, anchor: CandidateAnchor, step: float, target_error: float) -> StepTrial:
     """Come close to a target error from an anchor; it follows the step less: base frame and blend have errors of their own."""
     return find_step(trials, step, target_error, NARROW, anchor.slope, MAX_ROUNDS)
 

@@ -35,7 +35,7 @@ def encode_charts(charts: Int64, neighbours: sparse.csr_array) -> bytes:
 
     causal = causal_neighbours(neighbours)
     ranks, numbers = np.empty(len(charts), np.int64), np.empty(len(charts), np.int64)
-    count = describe(causal.starts, causal.near, charts, ranks, numbers)
+    count = describe(causal.starts, causal.neighbours, charts, ranks, numbers)
     first = encode_integers(ranks, _contexts(causal))
     return pack_block(first) + varint(count) + encode_integers(numbers[:count])
 
@@ -51,7 +51,7 @@ def decode_charts(data: bytes, neighbours: sparse.csr_array) -> Int64:
     count = cursor.varint(n_points, "the number of charts told by number")
     numbers = decode_integers(cursor.rest(), count, name=SECTION)
     charts = np.empty(n_points, np.int64)
-    wrong = restore(causal.starts, causal.near, ranks, numbers, charts)
+    wrong = restore(causal.starts, causal.neighbours, ranks, numbers, charts)
     if wrong >= 0:
         raise cursor.corrupt(f"the chart of point {wrong} makes no sense")
     return charts

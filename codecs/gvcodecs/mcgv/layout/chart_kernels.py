@@ -1,6 +1,6 @@
 """Compiled loops over the charts of points: what they are predicted from, as numbers to code and back.
 
-A point's *list* holds the charts of its causal neighbours (`near`: adjacent points of lower number, the last `MAX_NEAR` of
+A point's *list* holds the charts of its causal neighbours (adjacent points of lower number, the last `MAX_NEAR` of
 them), most frequent first; of equal ones, that of the neighbour of highest number. A chart's *rank* is its index there.
 """
 
@@ -15,11 +15,11 @@ MAX_NEAR = 8  # causal neighbours that count: the last ones
 
 
 @compiled
-def list_causal(point: int, starts: Int64, near: Int64, charts: Int64, listed: Int64, counts: Int64) -> int:
+def list_causal(point: int, starts: Int64, neighbours: Int64, charts: Int64, listed: Int64, counts: Int64) -> int:
     """Fill ``listed (8,)`` and ``counts (8,)`` with a point's list; return its length."""
     n = 0
     for entry in range(starts[point + 1] - 1, max(starts[point], starts[point + 1] - MAX_NEAR) - 1, -1):
-        chart, place = charts[near[entry]], 0
+        chart, place = charts[neighbours[entry]], 0
         while place < n and listed[place] != chart:
             place += 1
         if place == n:
@@ -36,12 +36,12 @@ def list_causal(point: int, starts: Int64, near: Int64, charts: Int64, listed: I
 
 
 @compiled
-def describe(starts: Int64, near: Int64, charts: Int64, ranks: Int64, numbers: Int64) -> int:
+def describe(starts: Int64, neighbours: Int64, charts: Int64, ranks: Int64, numbers: Int64) -> int:
     """Fill ``ranks (P,)`` and ``numbers (P,)`` for ``charts (P,)``; return how many of the latter are used."""
     listed, counts = np.empty(MAX_NEAR, np.int64), np.empty(MAX_NEAR, np.int64)
     n_charts, used = 0, 0
     for point in range(len(charts)):
-        n, rank = list_causal(point, starts, near, charts, listed, counts), 0
+        n, rank = list_causal(point, starts, neighbours, charts, listed, counts), 0
         while rank < n and listed[rank] != charts[point]:
             rank += 1
         ranks[point] = rank
@@ -53,12 +53,12 @@ def describe(starts: Int64, near: Int64, charts: Int64, ranks: Int64, numbers: I
 
 
 @compiled
-def restore(starts: Int64, near: Int64, ranks: Int64, numbers: Int64, charts: Int64) -> int:
+def restore(starts: Int64, neighbours: Int64, ranks: Int64, numbers: Int64, charts: Int64) -> int:
     """Fill ``charts (P,)`` from what `describe` makes; return the first point that makes no sense (P: the end), or -1."""
     listed, counts = np.empty(MAX_NEAR, np.int64), np.empty(MAX_NEAR, np.int64)
     n_charts, used = 0, 0
     for point in range(len(charts)):
-        n, rank = list_causal(point, starts, near, charts, listed, counts), ranks[point]
+        n, rank = list_causal(point, starts, neighbours, charts, listed, counts), ranks[point]
         if rank < 0 or rank > n:
             return point
         if rank < n:

@@ -61,7 +61,7 @@ def list_clusters(point: int, causal: CausalNeighbours, weights: Weights, listed
     n = 0
     first = max(causal.starts[point], causal.starts[point + 1] - MAX_NEIGHBOURS)
     for entry in range(first, causal.starts[point + 1]):
-        neighbour = causal.near[entry]
+        neighbour = causal.neighbours[entry]
         for j in range(INFLUENCES):
             weight = parts[neighbour, j]
             if weight == 0:

@@ -7,9 +7,9 @@ import {
   BASIS_PER_OCTAVE as PER_OCTAVE,
 } from "../constants.js";
 import { Cursor } from "./cursor.js";
-import { frameRows } from "./temporal_neighbours.js";
+import { temporalOrder } from "./temporal_neighbours.js";
 import { decodeIntegers } from "./integers.js";
-import { MAX_VALUES, decodeRows } from "./coefficient_coding.js";
+import { MAX_VALUES, decodeVectors } from "./coefficient_coding.js";
 
 /**
  * @typedef {object} Basis
@@ -36,7 +36,7 @@ export function decodeBasis(data, frames, points, step, name) {
   const width = components + 1;
   if (3 * frames * width > MAX_VALUES) throw cursor.corrupt(`${components} components over ${frames} frames`);
   const coarse = step / Math.sqrt(Math.max(LEAST_OUTSIDE, 1 - width / (3 * frames)));
-  const columns = decodeRows(cursor.rest(), width, coarse, frameRows(frames), name);
+  const columns = decodeVectors(cursor.rest(), width, coarse, temporalOrder(frames), name);
   for (let i = 0; i < columns.length; i++) columns[i] /= scales[i % width];
   return { components, columns };
 }

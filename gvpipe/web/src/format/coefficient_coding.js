@@ -1,5 +1,5 @@
 /**
- * Rows of coefficients from bytes: residuals in contexts of their expected magnitude, then prediction. Mirrors
+ * Vectors of coefficients from bytes: residuals in contexts of their expected magnitude, then prediction. Mirrors
  * `gvpipe.trajectory.coefficient_coding.decode_vectors`; `docs/format.md`, section 6.
  *
  * Contexts are integers, and must be Python's: all sums here stay below 2^53.
@@ -26,7 +26,7 @@ import { BlockDecoder } from "./block_coder.js";
 import { Cursor } from "./cursor.js";
 import { powersOfTwo } from "./exact_powers.js";
 import { decodeIntegers } from "./integers.js";
-import { predictRows } from "./prediction.js";
+import { predictVectors } from "./prediction.js";
 
 export { MAX_VALUES };
 
@@ -40,14 +40,14 @@ const SMALL_LOGS = Int16Array.from({ length: 1 << 14 }, (_, value) => searchLog(
  * @param {Uint8Array} data
  * @param {number} components R
  * @param {number} step quantisation step
- * @param {import("./prediction.js").Rows} rows
+ * @param {import("./prediction.js").CausalOrder} causal
  * @param {string} name of the section, for messages
- * @returns {Float64Array} (n, R) by row, flat
+ * @returns {Float64Array} (n, R) by vector, flat
  */
-export function decodeRows(data, components, step, rows, name) {
+export function decodeVectors(data, components, step, causal, name) {
   const cursor = new Cursor(data, name);
-  const n = rows.order.length;
-  if (n * components > MAX_VALUES) throw cursor.corrupt(`${n} rows of ${components} components`);
+  const n = causal.order.length;
+  if (n * components > MAX_VALUES) throw cursor.corrupt(`${n} vectors of ${components} components`);
   const levels = decodeIntegers(cursor.take(cursor.varint(cursor.left, "a length")), components, null, name);
   const usual = new Float64Array(components); // magnitude of each component, in 1 / ONE
   for (let c = 0, level = 0; c < components; c++) {
@@ -56,39 +56,39 @@ export function decodeRows(data, components, step, rows, name) {
     usual[c] = LEVEL_BOUNDS[level];
   }
   const coder = new BlockDecoder(cursor.rest(), N_CONTEXTS, name);
-  const values = decodeResiduals(rows, usual, coder);
+  const values = decodeResiduals(causal, usual, coder);
   coder.end();
-  predictRows(rows, step, values, components);
+  predictVectors(causal, step, values, components);
   return values;
 }
 
-/** Residuals (n, R) by row, flat. */
-function decodeResiduals(rows, usual, coder) {
+/** Residuals (n, R) by vector, flat. */
+function decodeResiduals(causal, usual, coder) {
   const components = usual.length;
-  const values = new Float64Array(rows.order.length * components);
-  const blockOf = new Int32Array(rows.order.length); // by row
+  const values = new Float64Array(causal.order.length * components);
+  const blockOf = new Int32Array(causal.order.length); // by vector
   let before = usual;
-  /** Mean magnitude of a component in the rows near row i of the order; those of its own block count as 0. */
+  /** Mean magnitude of a component in the neighbours of vector i of the order; those of its own block count as 0. */
   const meanAround = (i, c) => {
-    const count = Math.min(rows.rings[i], rows.starts[i + 1] - rows.starts[i], N_NEAR);
+    const count = Math.min(causal.ringSizes[i], causal.starts[i + 1] - causal.starts[i], N_NEAR);
     let sum = 0;
-    for (let j = rows.starts[i]; j < rows.starts[i] + count; j++) {
-      const row = rows.near[j];
-      if (blockOf[row] < blockOf[rows.order[i]]) sum += ONE * Math.abs(values[row * components + c]);
+    for (let j = causal.starts[i]; j < causal.starts[i] + count; j++) {
+      const neighbour = causal.neighbours[j];
+      if (blockOf[neighbour] < blockOf[causal.order[i]]) sum += ONE * Math.abs(values[neighbour * components + c]);
     }
     return Math.floor(sum / Math.max(1, count));
   };
-  for (let b = 0; b + 1 < rows.blocks.length; b++) {
-    const [first, end] = [rows.blocks[b], rows.blocks[b + 1]];
-    for (let i = first; i < end; i++) blockOf[rows.order[i]] = b;
+  for (let b = 0; b + 1 < causal.blocks.length; b++) {
+    const [first, end] = [causal.blocks[b], causal.blocks[b + 1]];
+    for (let i = first; i < end; i++) blockOf[causal.order[i]] = b;
     const contexts = new Uint8Array(end - first);
     const found = new Float64Array(end - first);
     const sums = new Float64Array(components);
     for (let c = 0; c < components; c++) {
       const fixed = POWERS[0] * log(usual[c]) + POWERS[1] * log(before[c]) - spans(usual, 0, c, 1);
       for (let i = first; i < end; i++) {
-        const near = b ? meanAround(i, c) : usual[c];
-        const forecast = fixed + POWERS[2] * log(near + FLOOR_NEAR) + spans(values, rows.order[i] * components, c, ONE);
+        const magnitude = b ? meanAround(i, c) : usual[c];
+        const forecast = fixed + POWERS[2] * log(magnitude + FLOOR_NEAR) + spans(values, causal.order[i] * components, c, ONE);
         const octaves = Math.floor(forecast / POWER_ONE) - PER_OCTAVE * Math.log2(ONE);
         contexts[i - first] = Math.min(Math.max(Math.floor(octaves / (PER_OCTAVE / 2)), LOWEST), HIGHEST) - LOWEST;
       }
@@ -98,7 +98,7 @@ function decodeResiduals(rows, usual, coder) {
         const magnitude = Math.abs(residual);
         if (magnitude >= LARGEST) throw coder.cursor.corrupt("a residual is out of range");
         sums[c] += ONE * magnitude;
-        values[rows.order[i] * components + c] = residual;
+        values[causal.order[i] * components + c] = residual;
       }
     }
     before = sums.map((sum) => Math.floor(sum / Math.max(1, end - first)) + 1);
@@ -106,12 +106,12 @@ function decodeResiduals(rows, usual, coder) {
   return values;
 }
 
-/** What a row's components before c say: logarithms of weighted sums of their magnitudes, which are `one` times the row's. */
-function spans(row, start, c, one) {
+/** The part of a forecast from a vector's components before c: logarithms of weighted sums of their magnitudes, times `one`. */
+function spans(vector, start, c, one) {
   let short = 0;
   let long = 0;
   for (let t = Math.min(c, LONG.length) - 1; t >= 0; t--) {
-    const magnitude = Math.abs(row[start + c - 1 - t]);
+    const magnitude = Math.abs(vector[start + c - 1 - t]);
     long += magnitude * LONG[t];
     if (t < SHORT.length) short += magnitude * SHORT[t];
   }

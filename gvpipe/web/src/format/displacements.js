@@ -1,6 +1,6 @@
 /**
- * Sparse moves of vertices, in whole multiples of a step. Mirrors the decoding half of `gvpipe.corrections.displacements`; `docs/format.md`,
- * section 9.
+ * Sparse displacements of vertices, in whole multiples of a step. Mirrors the decoding half of
+ * `gvpipe.corrections.displacements`; `docs/format.md`, section 9.
  */
 
 import {
@@ -15,7 +15,7 @@ import { Recent } from "./recent.js";
 
 const LARGEST = 2 ** 128; // float32 ends there
 
-export class Moves {
+export class Displacements {
   /**
    * @param {Uint8Array} data the section @param {string} name its name
    * @param {number} frames F @param {number} vertices V
@@ -42,24 +42,24 @@ export class Moves {
     for (let g = 0; g < this.count; g++) this.recent.get(g);
   }
 
-  /** @param {number} frame @param {Float32Array} positions (V, 3) flat, moved */
+  /** @param {number} frame @param {Float32Array} positions (V, 3) flat, displaced */
   apply(frame, positions) {
     const g = Math.floor(frame / this.group);
-    const { starts, coordinates, moves } = this.recent.get(g);
+    const { starts, coordinates, displacements } = this.recent.get(g);
     const place = frame - g * this.group;
     for (let i = starts[place]; i < starts[place + 1]; i++) {
-      for (let axis = 0; axis < 3; axis++) positions[coordinates[i] + axis] += moves[3 * i + axis];
+      for (let axis = 0; axis < 3; axis++) positions[coordinates[i] + axis] += displacements[3 * i + axis];
     }
   }
 }
 
 /**
- * @returns {{starts: Uint32Array, coordinates: Uint32Array, moves: Float64Array}} sorted by frame: frame f has the moves
- *   starts[f] to starts[f + 1]; where the coordinates of a vertex begin, and (C, 3) by how much they move, model units
+ * @returns {{starts: Uint32Array, coordinates: Uint32Array, displacements: Float64Array}} sorted by frame: frame f
+ *   has the displacements starts[f] to starts[f + 1]; where the coordinates of a vertex begin, and (C, 3) its displacement, model units
  */
 function decodeGroup(data, frames, vertices, step, name) {
   const starts = new Uint32Array(frames + 1);
-  if (!data.length) return { starts, coordinates: new Uint32Array(0), moves: new Float64Array(0) };
+  if (!data.length) return { starts, coordinates: new Uint32Array(0), displacements: new Float64Array(0) };
   const cursor = new Cursor(data, name);
   const runs = cursor.varint(frames * vertices, "the number of runs");
   const take = (count, contexts) =>
@@ -74,14 +74,16 @@ function decodeGroup(data, frames, vertices, step, name) {
   for (let f = 0; f < frames; f++) starts[f + 1] += starts[f];
   const next = starts.slice();
   const coordinates = new Uint32Array(at.length);
-  const moves = new Float64Array(3 * at.length);
+  const displacements = new Float64Array(3 * at.length);
   at.forEach((position, i) => {
     const place = next[position % frames]++;
     coordinates[place] = 3 * Math.floor(position / frames);
-    [x[i], y[i], z[i]].forEach((steps, axis) => (moves[3 * place + axis] = steps * step));
+    [x[i], y[i], z[i]].forEach((steps, axis) => (displacements[3 * place + axis] = steps * step));
   });
-  if (moves.some((move) => Math.abs(move) >= LARGEST)) throw cursor.corrupt("a move is larger than float32 can hold");
-  return { starts, coordinates, moves };
+  if (displacements.some((distance) => Math.abs(distance) >= LARGEST)) {
+    throw cursor.corrupt("a displacement is larger than float32 can hold");
+  }
+  return { starts, coordinates, displacements };
 }
 
 /** Positions `vertex * frames + frame` of runs, ascending; all below `limit`. */

@@ -42,7 +42,7 @@ function walk(flat, counts, corners, copies, tell, take) {
       [begin, used] = [i, 1];
       continue;
     }
-    let [known, single, later] = [0, 0, 0];
+    let [done, single, later] = [0, 0, 0];
     const listed = []; // of [copy, reason]: best reason first, then highest number
     for (let j = Math.max(begin, i - LOOK); j < i; j++) {
       const y = corners[j];
@@ -58,7 +58,7 @@ function walk(flat, counts, corners, copies, tell, take) {
             later++;
             reason = LATER;
           } else {
-            known++;
+            done++;
             if (copies[own] !== copies[other]) continue;
           }
           if (!tell) note(listed, copies[y], reason);
@@ -66,7 +66,7 @@ function walk(flat, counts, corners, copies, tell, take) {
       }
     }
     if (tell) {
-      tell(i, 9 * Math.min(known, 2) + 3 * Math.min(single, 2) + Math.min(later, 2));
+      tell(i, 9 * Math.min(done, 2) + 3 * Math.min(single, 2) + Math.min(later, 2));
       continue;
     }
     if (used < counts[p]) note(listed, used, NEW);

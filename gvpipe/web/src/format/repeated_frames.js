@@ -8,7 +8,7 @@ import { Cursor } from "./cursor.js";
 import { decodeIntegers } from "./integers.js";
 import { Payload } from "./payload.js";
 
-export class Holds {
+export class RepeatedFrames {
   /**
    * @param {number} frames F
    * @param {Uint32Array|null} starts (D) the frame at which each distinct frame is shown first; null: no frame repeats another
@@ -40,11 +40,11 @@ export class Holds {
 
 /**
  * @param {Payload} payload
- * @returns {Holds}
+ * @returns {RepeatedFrames}
  * @throws {GeometryVideoError} the runs are not those of the header's number of frames
  */
-export function readHolds({ header: { frames }, sections }) {
-  if (!sections.has(SECTION)) return new Holds(frames);
+export function readRepeatedFrames({ header: { frames }, sections }) {
+  if (!sections.has(SECTION)) return new RepeatedFrames(frames);
   const cursor = new Cursor(sections.get(SECTION), SECTION);
   const distinct = cursor.varint(frames, "the number of distinct frames");
   const repeats = decodeIntegers(cursor.rest(), distinct, null, SECTION); // run lengths less 1
@@ -56,5 +56,5 @@ export function readHolds({ header: { frames }, sections }) {
     if (repeats[d] < 0 || end > frames) break;
   }
   if (end !== frames || repeats.some((n) => n < 0)) throw cursor.corrupt(`its runs do not add up to ${frames} frames`);
-  return new Holds(frames, starts);
+  return new RepeatedFrames(frames, starts);
 }

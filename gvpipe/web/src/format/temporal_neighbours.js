@@ -1,4 +1,7 @@
-/** Rows of a trajectory basis, one per frame and axis, in an order that interpolates. Mirrors `gvpipe.trajectory.temporal_neighbours`. */
+/**
+ * The causal order of a trajectory basis' vectors, one per frame and axis, that interpolates them in time. Mirrors
+ * `gvpipe.trajectory.temporal_neighbours`.
+ */
 
 import {
   TEMPORAL_NEIGHBOURS_CUBIC as CUBIC,
@@ -11,28 +14,28 @@ import {
 
 const BEFORE = new Map([[-1, 1]]);
 
-/** @param {number} frames @returns {import("./prediction.js").Rows} 3 F rows; row 3 f + a is axis a of frame f */
-export function frameRows(frames) {
-  const rows = { order: [], starts: [0], near: [], weights: [], variances: [], rings: [], blocks: [0] };
-  const isKnown = new Uint8Array(frames);
+/** @param {number} frames @returns {import("./prediction.js").CausalOrder} of 3 F vectors; vector 3 f + a is axis a of frame f */
+export function temporalOrder(frames) {
+  const causal = { order: [], starts: [0], neighbours: [], weights: [], variances: [], ringSizes: [], blocks: [0] };
+  const isDone = new Uint8Array(frames);
   const add = (frame, step) => {
-    const near = OFFSETS.filter((o) => isKnown[frame + o * step]).slice(0, MAX_NEIGHBOURS);
-    const prior = [CUBIC, LINEAR, BEFORE].find((p) => [...p.keys()].every((o) => near.includes(o)));
+    const offsets = OFFSETS.filter((o) => isDone[frame + o * step]).slice(0, MAX_NEIGHBOURS);
+    const prior = [CUBIC, LINEAR, BEFORE].find((p) => [...p.keys()].every((o) => offsets.includes(o)));
     for (let axis = 0; axis < 3; axis++) {
-      rows.order.push(3 * frame + axis);
-      for (const o of near) {
-        rows.near.push(3 * (frame + o * step) + axis);
-        rows.weights.push(prior?.get(o) ?? 0);
-        rows.variances.push(VARIANCE);
+      causal.order.push(3 * frame + axis);
+      for (const o of offsets) {
+        causal.neighbours.push(3 * (frame + o * step) + axis);
+        causal.weights.push(prior?.get(o) ?? 0);
+        causal.variances.push(VARIANCE);
       }
-      rows.starts.push(rows.near.length);
-      rows.rings.push(Math.min(near.length, 2));
+      causal.starts.push(causal.neighbours.length);
+      causal.ringSizes.push(Math.min(offsets.length, 2));
     }
-    isKnown[frame] = 1;
+    isDone[frame] = 1;
   };
   const endBlock = (isLast) => {
-    const last = rows.blocks[rows.blocks.length - 1];
-    if (rows.order.length - last >= MIN_BLOCK || isLast) rows.blocks.push(rows.order.length);
+    const last = causal.blocks[causal.blocks.length - 1];
+    if (causal.order.length - last >= MIN_BLOCK || isLast) causal.blocks.push(causal.order.length);
   };
   let step = 1;
   while (step < frames) step *= 2; // the first power of two that is no frame
@@ -45,5 +48,5 @@ export function frameRows(frames) {
     for (let frame = step; frame < frames; frame += 2 * step) add(frame, step);
     endBlock(step === 1);
   }
-  return rows;
+  return causal;
 }

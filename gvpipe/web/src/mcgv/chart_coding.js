@@ -6,13 +6,13 @@ import { decodeIntegers } from "../format/integers.js";
 
 /**
  * @param {Uint8Array} data section `charts`
- * @param {{starts: Int32Array, near: Int32Array}} known of the points
+ * @param {{starts: Int32Array, neighbours: Int32Array}} causal of the points
  * @returns {Int32Array} (P) charts, numbered without a gap
  */
-export function decodeCharts(data, known) {
+export function decodeCharts(data, causal) {
   const cursor = new Cursor(data, "charts");
-  const n = known.starts.length - 1;
-  const context = (p) => Math.min(known.starts[p + 1] - known.starts[p], CONTEXTS - 1);
+  const n = causal.starts.length - 1;
+  const context = (p) => Math.min(causal.starts[p + 1] - causal.starts[p], CONTEXTS - 1);
   const contexts = Uint8Array.from({ length: n }, (_, p) => context(p));
   const ranks = decodeIntegers(cursor.take(cursor.varint(cursor.left, "a length")), n, contexts, "charts");
   const count = cursor.varint(n, "the number of charts told by number");
@@ -22,7 +22,7 @@ export function decodeCharts(data, known) {
   const counts = new Int32Array(MAX_NEAR);
   let [nCharts, used] = [0, 0];
   for (let point = 0; point < n; point++) {
-    const length = listKnown(point, known, charts, listed, counts);
+    const length = listCharts(point, causal, charts, listed, counts);
     const rank = ranks[point];
     if (rank >= 0 && rank < length) {
       charts[point] = listed[rank];
@@ -37,14 +37,14 @@ export function decodeCharts(data, known) {
   return charts;
 }
 
-/** Fill `listed` and `counts` with the charts of a point's known neighbours, most frequent first; return how many. */
-function listKnown(point, { starts, near }, charts, listed, counts) {
+/** Fill `listed` and `counts` with the charts of a point's causal neighbours, most frequent first; return how many. */
+function listCharts(point, { starts, neighbours }, charts, listed, counts) {
   let n = 0;
   for (let entry = starts[point + 1] - 1; entry >= Math.max(starts[point], starts[point + 1] - MAX_NEAR); entry--) {
     let place = 0;
-    while (place < n && listed[place] !== charts[near[entry]]) place++;
+    while (place < n && listed[place] !== charts[neighbours[entry]]) place++;
     if (place === n) {
-      listed[n] = charts[near[entry]];
+      listed[n] = charts[neighbours[entry]];
       counts[n++] = 0;
     }
     counts[place]++;

@@ -4,7 +4,7 @@
  */
 
 import { AGAIN, GeometryVideoError, corrupt } from "../format/errors.js";
-import { Moves } from "../format/displacements.js";
+import { Displacements } from "../format/displacements.js";
 import { AffineMotion } from "./affine.js";
 import { BlendedMotion } from "./blended.js";
 import { decodeCharts } from "./chart_coding.js";
@@ -31,12 +31,12 @@ export class McgvReader {
     if (header.outliers !== payload.sections.has("outliers")) {
       throw new GeometryVideoError("corrupt", `its header and its section 'outliers' do not fit; ${AGAIN}`);
     }
-    const movesOf = (name, n) =>
-      payload.sections.has(name) ? [new Moves(payload.section(name), payload.header.frames, n, name)] : [];
+    const displacementsOf = (name, n) =>
+      payload.sections.has(name) ? [new Displacements(payload.section(name), payload.header.frames, n, name)] : [];
     /** What the pictures cannot hold. */
-    this.outliers = movesOf("outliers", surface.nSlots);
+    this.outliers = displacementsOf("outliers", surface.nSlots);
     /** What a bound on every vertex needs. */
-    this.corrections = movesOf("corrections", surface.slot.length);
+    this.corrections = displacementsOf("corrections", surface.slot.length);
     const plane = header.width * header.height;
     /** (S, 3) which sample of a picture carries each coordinate; null without pictures. */
     this.samples = pixels && new Uint32Array(3 * surface.nSlots);
@@ -121,6 +121,6 @@ function piecesOf({ point, points }) {
 function placePoints(payload, header, surface) {
   const { lattice, point, points } = surface;
   if (header.placement === "halves") return place(lattice, piecesOf(surface), header);
-  const charts = decodeCharts(payload.section("charts"), points.earlierNeighbours());
+  const charts = decodeCharts(payload.section("charts"), points.causalNeighbours());
   return placeCharts(lattice, point.map((p) => charts[p]), header);
 }

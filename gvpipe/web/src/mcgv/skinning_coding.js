@@ -1,7 +1,7 @@
 /** A blend's transforms over a segment. Mirrors `gvcodecs.mcgv.motion.skinning_coding`; `docs/format.md`, section 5. */
 
 import { Cursor } from "../format/cursor.js";
-import { decodeRows } from "../format/coefficient_coding.js";
+import { decodeVectors } from "../format/coefficient_coding.js";
 import { decodeBasis } from "../format/basis.js";
 
 export class Trajectories {
@@ -15,7 +15,7 @@ export class Trajectories {
     const cursor = new Cursor(data, name);
     this.basis = decodeBasis(cursor.take(cursor.varint(cursor.left, "a length")), frames, 4 * clusters, step, name);
     /** (4K, R) flat. */
-    this.coefficients = decodeRows(cursor.rest(), this.basis.components, step, loneRows(4 * clusters), name);
+    this.coefficients = decodeVectors(cursor.rest(), this.basis.components, step, independentOrder(4 * clusters), name);
     this.n = 4 * clusters;
   }
 
@@ -44,8 +44,8 @@ export class Trajectories {
   }
 }
 
-/** Rows in their own order, none predicted from another. */
-function loneRows(n) {
+/** The causal order of vectors that come by number, none predicted from another. */
+function independentOrder(n) {
   const order = Array.from({ length: n }, (_, i) => i);
-  return { order, starts: Array(n + 1).fill(0), near: [], weights: [], variances: [], rings: Array(n).fill(0), blocks: [0, n] };
+  return { order, starts: Array(n + 1).fill(0), neighbours: [], weights: [], variances: [], ringSizes: Array(n).fill(0), blocks: [0, n] };
 }

@@ -11,14 +11,14 @@ import { INFLUENCES, TOTAL, restore } from "./weight_kernels.js";
  * @property {Uint8Array} weights (P, 4) flat, in 1 / TOTAL, used ones first; each row's sum is TOTAL
  *
  * @param {Uint8Array} data section `weights`
- * @param {{starts: Int32Array, near: Int32Array}} known of the points
+ * @param {{starts: Int32Array, neighbours: Int32Array}} causal of the points
  * @param {number} nClusters K
  * @returns {Weights}
  */
-export function decodeWeights(data, known, nClusters) {
+export function decodeWeights(data, causal, nClusters) {
   const cursor = new Cursor(data, "weights");
-  const n = known.starts.length - 1;
-  const context = (p) => Math.min(known.starts[p + 1] - known.starts[p], COUNT_CONTEXTS - 1);
+  const n = causal.starts.length - 1;
+  const context = (p) => Math.min(causal.starts[p + 1] - causal.starts[p], COUNT_CONTEXTS - 1);
   const contexts = Uint8Array.from({ length: n }, (_, p) => context(p));
   const counts = decodeIntegers(cursor.take(cursor.varint(cursor.left, "a length")), n, contexts, "weights");
   if (counts.some((count) => count < 0 || count > INFLUENCES)) throw cursor.corrupt("a point follows more than four clusters");
@@ -30,7 +30,7 @@ export function decodeWeights(data, known, nClusters) {
     throw cursor.corrupt("a rank or a weight is out of range");
   }
   const weights = { clusters: new Uint16Array(INFLUENCES * n), weights: new Uint8Array(INFLUENCES * n) };
-  const wrong = restore(known, nClusters, { counts, gaps, changes }, weights);
+  const wrong = restore(causal, nClusters, { counts, gaps, changes }, weights);
   if (wrong >= 0) throw cursor.corrupt(`the weights of point ${wrong} make no sense`);
   return weights;
 }

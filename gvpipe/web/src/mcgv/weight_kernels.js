@@ -1,7 +1,7 @@
 /**
  * What points' weights are predicted from. Mirrors `gvcodecs.mcgv.motion.weight_kernels`.
  *
- * A point's list holds the clusters that its known neighbours follow, heaviest first, equal ones by number.
+ * A point's list holds the clusters that its causal neighbours follow, heaviest first, equal ones by number.
  */
 
 import {
@@ -15,20 +15,20 @@ export { INFLUENCES, TOTAL };
 /**
  * Fill `weights` from the numbers of the section, points in order.
  *
- * @param {{starts: Int32Array, near: Int32Array}} known
+ * @param {{starts: Int32Array, neighbours: Int32Array}} causal
  * @param {number} nClusters K
  * @param {{counts: Float64Array, gaps: Float64Array, changes: Float64Array}} coded
  * @param {import("./weight_coding.js").Weights} result filled
  * @returns {number} the first point that makes no sense, or -1
  */
-export function restore(known, nClusters, { counts, gaps, changes }, result) {
+export function restore(causal, nClusters, { counts, gaps, changes }, result) {
   const { clusters, weights } = result;
   const listed = new Int32Array(INFLUENCES * MAX_NEAR);
   const sums = new Int32Array(INFLUENCES * MAX_NEAR);
   const ranks = new Int32Array(INFLUENCES);
   let [nextGap, nextChange] = [0, 0];
   for (let point = 0; point < counts.length; point++) {
-    const nListed = listKnown(point, known, result, listed, sums);
+    const nListed = listClusters(point, causal, result, listed, sums);
     const n = counts[point];
     const at = INFLUENCES * point;
     if (n === 0) {
@@ -58,10 +58,10 @@ export function restore(known, nClusters, { counts, gaps, changes }, result) {
 }
 
 /** Fill `listed` and `sums` with a point's list; return its length. */
-function listKnown(point, { starts, near }, { clusters, weights }, listed, sums) {
+function listClusters(point, { starts, neighbours }, { clusters, weights }, listed, sums) {
   let n = 0;
   for (let entry = Math.max(starts[point], starts[point + 1] - MAX_NEAR); entry < starts[point + 1]; entry++) {
-    const at = INFLUENCES * near[entry];
+    const at = INFLUENCES * neighbours[entry];
     for (let j = at; j < at + INFLUENCES && weights[j]; j++) {
       let place = 0;
       while (place < n && listed[place] !== clusters[j]) place++;

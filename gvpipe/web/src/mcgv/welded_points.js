@@ -13,11 +13,11 @@ export class Points {
   }
 
   /**
-   * Adjacent points of lower number: `causal_neighbours` of `weight_coding`.
+   * Adjacent points of lower number. Mirrors `gvcodecs.mcgv.base.causal_neighbours`.
    *
-   * @returns {{starts: Int32Array, near: Int32Array}} `starts` (P + 1) bounds in `near`; each point's are ascending
+   * @returns {{starts: Int32Array, neighbours: Int32Array}} `starts` (P + 1) bounds in `neighbours`; each point's are ascending
    */
-  earlierNeighbours() {
+  causalNeighbours() {
     const { n } = this;
     const counts = new Int32Array(n + 1); // by lower point: the pairs are sorted by it first, then by the higher one
     this.#eachSide((low) => counts[low + 1]++);
@@ -38,10 +38,10 @@ export class Points {
     };
     eachEdge((_, high) => starts[high + 1]++);
     for (let p = 0; p < n; p++) starts[p + 1] += starts[p];
-    const near = new Int32Array(starts[n]);
+    const neighbours = new Int32Array(starts[n]);
     const filled = starts.slice();
-    eachEdge((low, high) => (near[filled[high]++] = low));
-    return { starts, near };
+    eachEdge((low, high) => (neighbours[filled[high]++] = low));
+    return { starts, neighbours };
   }
 
   /** (P) the connected piece of the surface that each point belongs to. */

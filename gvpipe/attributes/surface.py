@@ -1,0 +1,77 @@
+"""The mesh that attributes lie on, as the decoder has it before it decodes them.
+
+Corner ``3 t + k`` is vertex k of triangle t. The corner *opposite* to a corner is that of the neighbouring triangle across the
+edge between the two other vertices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from gvpipe.arrays import Array, Float32, Int32, Int64
+from gvpipe.mesh.unique_rows import row_ids
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Triangles and decoded positions, checked by the caller: faces index vertices, positions are finite.
+
+    Args:
+        faces: ``(T, 3) int32`` in their final order (`gvpipe.attributes.triangle_order`).
+        n_vertices: V.
+        positions: ``(V, 3) float32`` of frame 0 as decoded; None where machines may decode them differently.
+        n_parts: of the mesh.
+    """
+
+    faces: Int32
+    n_vertices: int
+    positions: Float32 | None = None
+    n_parts: int = 1
+
+    @cached_property
+    def places(self) -> Int64:
+        """``(V,)`` a number for each vertex, equal where positions are; without positions all differ."""
+        if self.positions is None:
+            return np.arange(self.n_vertices)
+        bits = (self.positions + np.float32(0)).view(np.int32)  # no negative zeros
+        return np.asarray(row_ids(bits.astype(np.int64))[0], np.int64)
+
+    def welded(self) -> Surface:
+        """The surface with vertices of one position as one, numbered by the first corner that uses each; all must be used."""
+        corners = self.places[self.faces.ravel()]
+        _, first, numbers = np.unique(corners, return_index=True, return_inverse=True)
+        by_corner = np.argsort(first)
+        faces = np.argsort(by_corner)[numbers].reshape(-1, 3).astype(np.int32)
+        positions = None if self.positions is None else self.positions[self.faces.ravel()[first[by_corner]]]
+        return Surface(faces, len(first), positions, self.n_parts)
+
+    @cached_property
+    def opposite(self) -> Int64:
+        """`opposite_corners` of the faces."""
+        return opposite_corners(self.faces)
+
+
+def opposite_corners(triangles: Array) -> Int64:
+    """``(3T,)`` the corner opposite to each corner of ``triangles (T, 3)``, -1 without one.
+
+    Corners across one edge are paired in ascending order: the first with the second, the third with the fourth. A side between
+    equal vertices is no edge.
+
+    Examples:
+        >>> opposite_corners(np.array([[0, 1, 2], [0, 2, 3]])).tolist()
+        [-1, 5, -1, -1, -1, 1]
+    """
+    ends = np.sort(triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2).astype(np.int64), axis=1)  # (3T, 2) of the far edge
+    keys = ends[:, 0] << 32 | ends[:, 1]
+    corners = np.flatnonzero(ends[:, 0] != ends[:, 1])
+    corners = corners[np.argsort(keys[corners], kind="stable")]
+    place = np.arange(len(corners))
+    is_first = np.diff(keys[corners], prepend=-1) != 0
+    in_run = place - np.maximum.accumulate(np.where(is_first, place, 0))
+    seconds = np.flatnonzero(in_run % 2 == 1)
+    opposite = np.full(triangles.size, -1, np.int64)
+    opposite[corners[seconds]], opposite[corners[seconds - 1]] = corners[seconds - 1], corners[seconds]
+    return opposite

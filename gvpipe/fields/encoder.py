@@ -1,0 +1,105 @@
+"""A field's section from its frames, segment by segment."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+
+from gvpipe.arrays import Array
+from gvpipe.errors import InputError
+from gvpipe.fields.derived import Motion, Positions, Span
+from gvpipe.fields.head import Head, longest_segment
+from gvpipe.fields.mesh import FieldMesh
+from gvpipe.fields.segment import MODES, Place
+from gvpipe.fields.segment_encoder import encode_segment
+from gvpipe.fields.values import MAX_COMPONENTS, FieldBound, check_finite, narrow
+
+Read = Callable[[int, int], Array]
+Progress = Callable[[float], None]
+
+
+def encode_field(
+    read: Read,
+    n_frames: int,
+    mesh: FieldMesh,
+    bound: FieldBound,
+    name: str = "field",
+    *,
+    positions: Positions | None = None,
+    holes: bool = False,
+    modes: tuple[str, ...] = MODES,
+    progress: Progress | None = None,
+) -> bytes:
+    """Return the section of a field.
+
+    Examples:
+        >>> mesh = FieldMesh(np.array([[0, 1, 2]], np.int32), 3)
+        >>> heat = np.linspace(20, 80, 12, dtype=np.float32).reshape(4, 3, 1)
+        >>> section = encode_field(lambda a, b: heat[a:b], 4, mesh, FieldBound(0.5))
+        >>> from gvpipe.fields.reader import FieldReader
+        >>> bool(np.abs(FieldReader(section, 4, mesh, "heat").read(0, 4) - heat).max() <= 0.5)
+        True
+
+    Args:
+        read: ``read(start, stop)`` returns frames ``(stop - start, R, C)``; asked for each segment once, in order.
+        n_frames: F, at least 1.
+        mesh: the R rows.
+        bound: on every value.
+        name: of the field, for messages.
+        positions: ``positions(start, stop)`` returns the mesh's decoded positions ``(stop - start, V, 3)``, in the order of the
+            mesh's vertices; None: the field is coded without them.
+        holes: whether NaN is kept, instead of refused.
+        modes: of `gvpipe.fields.segment.MODES`; the smallest is chosen for each segment.
+        progress: called with the share that is done.
+
+    Raises:
+        InputError: frames of a wrong shape or type, NaN or infinity.
+    """
+    if n_frames < 1:
+        raise InputError(f"field {name!r} has no frames; leave it out")
+    first = narrow(_checked(read(0, 1), (0, 1), mesh, name))
+    n_components = first.shape[2]
+    if not 0 < n_components <= MAX_COMPONENTS:
+        raise InputError(f"field {name!r} has {n_components} components; 1 to {MAX_COMPONENTS} are possible")
+    head = Head(first.dtype, n_components, longest_segment(mesh.n_rows, n_components))
+    bounds = head.bounds(n_frames)
+    motion = None if positions is None else Motion(positions, n_frames, mesh)
+    segments, least = [], (math.inf, 0)
+    for start, stop in pairwise(bounds):
+        values = narrow(_checked(read(start, stop), (start, stop), mesh, name))
+        if values.dtype != first.dtype or values.shape[2] != n_components:
+            raise InputError(
+                f"field {name!r}: frames {start} to {stop - 1} have {values.shape[2]} components of type {values.dtype}, "
+                f"the first has {n_components} of type {first.dtype}; make them alike"
+            )
+        missing = check_finite(values, start, name, holes)
+        span = None
+        if motion is not None:
+            least = min(least, _smallest_frame(values, start))
+            span = Span(motion, start, stop, tuple(sorted({0, least[1]})))
+        place = Place(mesh.causal, name, span)
+        segments.append(encode_segment(values, missing, bound, place, modes))
+        if progress is not None:
+            progress(stop / n_frames)
+    return head.pack(segments)
+
+
+def _smallest_frame(values: Array, start: int) -> tuple[float, int]:
+    """The sum of magnitudes, and the number, of the frame of ``values (n, R, C)`` in which these are smallest."""
+    sums = [float(np.nansum(np.abs(frame.astype(np.float64)))) for frame in values]
+    smallest = int(np.argmin(sums))
+    return sums[smallest], start + smallest
+
+
+def _checked(values: Array, span: tuple[int, int], mesh: FieldMesh, name: str) -> Array:
+    start, stop = span
+    values = np.asarray(values)
+    if values.ndim != 3 or values.shape[:2] != (stop - start, mesh.n_rows):
+        raise InputError(
+            f"field {name!r}: frames {start} to {stop - 1} have shape {values.shape}; "
+            f"({stop - start}, {mesh.n_rows}, components) is needed, one row per {mesh.domain}"
+        )
+    return values

@@ -1,0 +1,40 @@
+"""What the command line adds on standard error while the library works."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+from gvpipe import compiled
+from gvpipe.cli.console import COMPILER, Output
+
+LOGGER = logging.getLogger(COMPILER)
+
+
+@pytest.mark.parametrize(
+    ("out", "is_terminal", "is_noted"),
+    [
+        (Output(), False, False),
+        (Output(), True, True),
+        (Output(as_json=True), True, True),
+        (Output(verbose=True), False, True),
+        (Output(quiet=True), True, False),
+        (Output(quiet=True, verbose=True), True, False),
+    ],
+)
+def test_compiling_is_noted_where_progress_is_shown(
+    out: Output, is_terminal: bool, is_noted: bool, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On standard error, as one line; nothing listens afterwards."""
+    monkeypatch.setattr("sys.stderr.isatty", lambda: is_terminal)
+    with out.progress():
+        LOGGER.info(compiled.ONCE)
+    LOGGER.info(compiled.ONCE)
+    printed = capsys.readouterr()
+    assert printed.out == "" and " ".join(printed.err.split()).count(f"Note: {compiled.ONCE}") == is_noted
+    assert not LOGGER.handlers and LOGGER.level == logging.NOTSET
+
+
+def test_the_logger_is_that_of_the_compiler() -> None:
+    assert compiled.LOGGER is LOGGER

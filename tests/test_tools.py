@@ -1,0 +1,23 @@
+"""Every script in tools/ says what it does."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from folders import ROOT
+
+TOOLS = sorted((ROOT / "tools").glob("*.py"))
+
+
+@pytest.mark.parametrize("script", TOOLS, ids=lambda path: path.stem)
+def test_help(script: Path, tmp_path: Path) -> None:
+    """It names the script and its first sentence, and nothing is measured or written."""
+    done = subprocess.run([sys.executable, script, "--help"], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0 and done.stderr == ""
+    assert done.stdout.startswith(f"usage: {script.name}")
+    summary = script.read_text("utf-8").split('"""')[1].splitlines()[0]
+    assert summary in done.stdout
+    assert list(tmp_path.iterdir()) == []
