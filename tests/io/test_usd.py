@@ -226,7 +226,7 @@ def test_meshes_that_are_not_shown_are_left_out(tmp_path: Path) -> None:
     read = io.read(stage(tmp_path, body))
     assert [part.name for part in read.parts] == ["seen"]
     assert any("no meshes were left out: 1 Sphere" in note for note in read.notes)
-    assert any("2 meshes are invisible, guides or proxies" in note for note in read.notes)
+    assert any("2 of 3 meshes are invisible, guides or proxies" in note for note in read.notes)
 
 
 def test_layers_of_some_meshes_get_a_stand_in(tmp_path: Path) -> None:

@@ -53,11 +53,11 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
         raise InputError(f"{where} has no polygon mesh{held}; a mesh with triangles is needed")
     notes = []
     if shown and len(shown) < len(motions):
-        notes.append(f"{len(motions) - len(shown)} meshes are hidden; they were left out")
+        notes.append(f"{len(motions) - len(shown)} of {len(motions)} meshes are hidden; they were left out")
     motions = shown or motions
     cages = sum("SubD" in motion.node.kind for motion in motions)
     if cages:
-        notes.append(f"{cages} meshes are cages of subdivision surfaces; the cages were read as they are")
+        notes.append(f"{cages} of {len(motions)} meshes are cages of subdivision surfaces; the cages were read as they are")
     drawn = sorted(set(others) & {"Points", "Curve", "NuPatch"})
     if drawn:
         notes.append(f"{', '.join(drawn)} beside the meshes were left out")

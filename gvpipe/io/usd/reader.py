@@ -8,9 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from gvpipe.arrays import Int32
+from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
+from gvpipe.io.frame_columns import FIRST_NORMALS
 from gvpipe.io.options import ReadOptions
+from gvpipe.io.own_normals import entries_of, own_rule
 from gvpipe.io.scene_fields import join_fields
 from gvpipe.io.scene_frames import SceneFrames
 from gvpipe.io.scene_layers import join_layers
@@ -63,6 +67,10 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
     sampled = [sampled_of(found.meshes[number], mesh, float(times[0])) for number, mesh in zip(kept, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times)
+    moving = [motion.prim for motion in motions if _has_moving_normals(motion.prim)]
+    unruled = (
+        FIRST_NORMALS if moving and "normal" in attributes and not _is_own(attributes["normal"], joined.faces, frames) else ""
+    )
     left = list(dict.fromkeys(name for names in (*(names for _, names in read), torn) for name in names))
     left_note = (f"primvars that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()
     return MeshSequence(
@@ -72,7 +80,15 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
         attributes,
         where,
         frames.origin,
-        (*found.notes, *time_notes, *materials.notes(), *layer_notes, *left_note, *outside_note(stage, path)),
+        (
+            *found.notes,
+            *time_notes,
+            *materials.notes(),
+            *layer_notes,
+            *([unruled] if unruled else []),
+            *left_note,
+            *outside_note(stage, path),
+        ),
         fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,
@@ -99,6 +115,20 @@ def _read_mesh(mesh: Any, motion: UsdMotion, materials: Materials, time: float, 
     layers, uv_names, left = layers_of(mesh, plain, time, turn)
     materials.name_uv(bound, uv_names)
     return replace(plain, layers=layers), left
+
+
+def _has_moving_normals(prim: Any) -> bool:
+    from pxr import UsdGeom
+
+    primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals")
+    return bool(primvar.ValueMightBeTimeVarying() if primvar else UsdGeom.Mesh(prim).GetNormalsAttr().ValueMightBeTimeVarying())
+
+
+def _is_own(normals: Attribute, faces: Int32, frames: SceneFrames) -> bool:
+    """Whether normals of the first frame follow from the surface, so that those of other frames do."""
+    entries, corners = entries_of(normals, faces)
+    rows = corners if normals.domain == "corner" else faces.reshape(-1)[corners]
+    return own_rule(np.asarray(normals)[rows], frames[0:1][0], faces, entries) is not None
 
 
 def _metadata(stage: Any, path: Path, start: float) -> Metadata:
