@@ -73,6 +73,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
     )
     left = list(dict.fromkeys(name for names in (*(names for _, names in read), torn) for name in names))
     left_note = (f"primvars that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()
+    drawn, images = materials.drawn()
     return MeshSequence(
         frames,
         joined.faces,
@@ -92,8 +93,8 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
         fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,
-        materials=tuple(materials.materials),
-        images=tuple(materials.textures.images),
+        materials=drawn,
+        images=images,
         metadata=_metadata(stage, path, float(times[0])),
     )
 
