@@ -8,17 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Int32
-from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
-from gvpipe.io.frame_columns import FIRST_NORMALS
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.own_normals import entries_of, own_rule
 from gvpipe.io.scene_fields import join_fields
 from gvpipe.io.scene_frames import SceneFrames
 from gvpipe.io.scene_layers import join_layers
 from gvpipe.io.scene_mesh import SceneMesh, join
+from gvpipe.io.scene_normals import first_normals_note
 from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.meshes import find_meshes, groups_of, polygons_of
 from gvpipe.io.usd.motion import Skins, UsdMotion
@@ -67,10 +64,8 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
     sampled = [sampled_of(found.meshes[number], mesh, float(times[0])) for number, mesh in zip(kept, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times)
-    moving = [motion.prim for motion in motions if _has_moving_normals(motion.prim)]
-    unruled = (
-        FIRST_NORMALS if moving and "normal" in attributes and not _is_own(attributes["normal"], joined.faces, frames) else ""
-    )
+    moves = any(_has_moving_normals(motion.prim) for motion in motions)
+    unruled = first_normals_note(moves, attributes, joined.faces, frames[0:1][0])
     left = list(dict.fromkeys(name for names in (*(names for _, names in read), torn) for name in names))
     left_note = (f"primvars that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()
     drawn, images = materials.drawn()
@@ -81,15 +76,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
         attributes,
         where,
         frames.origin,
-        (
-            *found.notes,
-            *time_notes,
-            *materials.notes(),
-            *layer_notes,
-            *([unruled] if unruled else []),
-            *left_note,
-            *outside_note(stage, path),
-        ),
+        (*found.notes, *time_notes, *materials.notes(), *layer_notes, *unruled, *left_note, *outside_note(stage, path)),
         fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,
@@ -123,13 +110,6 @@ def _has_moving_normals(prim: Any) -> bool:
 
     primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals")
     return bool(primvar.ValueMightBeTimeVarying() if primvar else UsdGeom.Mesh(prim).GetNormalsAttr().ValueMightBeTimeVarying())
-
-
-def _is_own(normals: Attribute, faces: Int32, frames: SceneFrames) -> bool:
-    """Whether normals of the first frame follow from the surface, so that those of other frames do."""
-    entries, corners = entries_of(normals, faces)
-    rows = corners if normals.domain == "corner" else faces.reshape(-1)[corners]
-    return own_rule(np.asarray(normals)[rows], frames[0:1][0], faces, entries) is not None
 
 
 def _metadata(stage: Any, path: Path, start: float) -> Metadata:
