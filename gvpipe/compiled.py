@@ -14,6 +14,8 @@ from __future__ import annotations
 
 import functools
 import logging
+import os
+import sys
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
@@ -25,6 +27,10 @@ LOGGER = logging.getLogger(__name__)
 ONCE = "compiling kernels, once after installation; the first commands take up to half a minute longer"
 EVERY_TIME = "compiling kernels in every run, since no folder takes machine code; set NUMBA_CACHE_DIR to one that does"
 
+PACKAGES = ("gvpipe.", "gvcodecs.")
+
+Sources = frozenset[tuple[str, float]]  # modules, and when each was changed
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -35,7 +41,13 @@ class TolerantCache(FunctionCache):  # type: ignore[misc]  # numba has no types
     - A damaged file raises an error.
     - Two processes that compile at once number their files alike, so an index may name the code of other types.
     - A folder may be read-only, a disk full.
+    - numba asks for the age of the kernel's own file alone. Here the files of what it calls count, too.
     """
+
+    def __init__(self, function: Any, sources: Sources) -> None:
+        super().__init__(function)
+        stamp = (*self._cache_file._source_stamp, *sorted(sources))
+        self._source_stamp = self._cache_file._source_stamp = stamp
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compile result for argument types, None if there is none that fits."""
@@ -68,10 +80,31 @@ def compiled(function: Function) -> Function:
     kernel: Any = numba.njit(nogil=True)(function)
     if kernel is not function:  # NUMBA_DISABLE_JIT leaves it as it is
         try:
-            kernel._cache = TolerantCache(function)  # what `cache=True` sets, to numba's own class
+            kernel.sources = _sources(function)
+            kernel._cache = TolerantCache(function, kernel.sources)  # what `cache=True` sets, to numba's own class
         except RuntimeError:  # no folder takes files: the code stays in memory
             _announce(EVERY_TIME)
     return cast(Function, kernel)
+
+
+def _sources(function: Callable[..., Any]) -> Sources:
+    """The files that a kernel's machine code depends on: its own, and those of what it may call."""
+    found = {_changed(function.__module__)}
+    for value in list(function.__globals__.values()):
+        module = getattr(value, "__module__", None)
+        if isinstance(module, str) and module.startswith(PACKAGES):
+            found |= {_changed(module), *getattr(value, "sources", ())}
+    return frozenset(found)
+
+
+@functools.cache
+def _changed(module: str) -> tuple[str, float]:
+    """A module, and when its file was changed, seconds; 0 if it has none."""
+    file = getattr(sys.modules.get(module), "__file__", None)
+    try:
+        return module, os.stat(file).st_mtime if file else 0.0
+    except OSError:
+        return module, 0.0
 
 
 @functools.cache

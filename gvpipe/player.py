@@ -19,6 +19,7 @@ from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, Material
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
+from gvpipe.asset_coding.directory import Directory
 from gvpipe.asset_coding.listing import list_asset
 from gvpipe.asset_coding.reader import AssetReader
 from gvpipe.codec import GroupReader, LevelReader
@@ -97,6 +98,11 @@ class Player:
     def metadata(self) -> Metadata:
         """What the scene says of itself."""
         return self._asset.metadata
+
+    @property
+    def directory(self) -> Directory:
+        """Section ``asset`` of the file."""
+        return self._asset.directory
 
     def list_asset(self) -> dict[str, Any]:
         """What it holds beside positions, as JSON values (`gvpipe.Info`)."""

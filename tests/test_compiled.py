@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import logging
+import os
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -142,3 +143,25 @@ def test_code_that_no_folder_takes_is_logged(caplog: pytest.LogCaptureFixture) -
     with caplog.at_level(logging.INFO, logger="gvpipe.compiled"):
         compiled(eval("lambda value: value + 1"))
     assert caplog.messages == [module.EVERY_TIME]
+
+
+def test_a_callee_that_has_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Machine code holds what a kernel calls, which may come from another file."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(module, "PACKAGES", ("callee_kernels", "caller_kernels"))
+    head = "from gvpipe.compiled import compiled\n"
+    (tmp_path / "caller_kernels.py").write_text(
+        f"from callee_kernels import factor\n{head}\n@compiled\ndef scaled(x):\n    return factor() * x\n", encoding="utf-8"
+    )
+    for number, changed in ((2, 1_000_000_000), (3, 1_000_000_100)):
+        callee = tmp_path / "callee_kernels.py"
+        callee.write_text(f"{head}\n@compiled\ndef factor():\n    return {number}\n", encoding="utf-8")
+        os.utime(callee, (changed, changed))
+        for name in ("callee_kernels", "caller_kernels"):
+            sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        module._changed.cache_clear()
+        assert importlib.import_module("caller_kernels").scaled(5) == 5 * number
+    for name in ("callee_kernels", "caller_kernels"):
+        sys.modules.pop(name, None)
+    module._changed.cache_clear()

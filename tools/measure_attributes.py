@@ -2,7 +2,7 @@
 
 Draco's bytes are those of its file with the attribute less those without, at compression level 10. Both code the same mesh:
 vertices of one position are one, corners have values. Steps are Draco's of 12 bits for texture coordinates, range / (2^12 - 1),
-and of 8 bits for normals, the octahedral lattice of 2^8 - 1 points a side. Colours are exact.
+and of 8 bits for normals, the octahedral lattice of 2^8 - 1 points a side. Colours have 8 bits and are exact.
 """
 
 from __future__ import annotations
@@ -70,9 +70,16 @@ def read_gltf(path: Path) -> Iterator[Mesh]:
             faces = accessor(primitive["indices"]) if "indices" in primitive else np.arange(len(positions))
             names = {"uv": "TEXCOORD_0", "normal": "NORMAL", "color": "COLOR_0", "tangent": "TANGENT"}
             attributes = {kind: accessor(found[name]) for kind, name in names.items() if name in found}
+            if "color" in attributes:
+                attributes["color"] = as_bytes(attributes["color"])
             yield Mesh(
                 f"{path.stem} {mesh.get('name', '')} {number}", positions, faces.reshape(-1, 3).astype(np.int64), attributes
             )
+
+
+def as_bytes(colours: Array) -> Array:
+    """Colours ``(V, C)`` as Draco takes them: 8 bits."""
+    return colours if colours.dtype == np.uint8 else np.rint(255 * colours).astype(np.uint8)
 
 
 def read_obj(path: Path) -> Iterator[Mesh]:
@@ -151,8 +158,8 @@ def main() -> None:
             if len(mesh.faces) < arguments.least:
                 continue
             for kind in mesh.attributes:
-                if kind == "tangent" or (kind == "color" and mesh.attributes[kind].dtype != np.uint8):
-                    continue  # Draco has neither
+                if kind == "tangent":
+                    continue  # Draco has none
                 sharing, values, by_vertex = own_bytes(mesh, kind)
                 theirs = draco_bytes(mesh, kind)
                 total += [theirs, sharing + values]

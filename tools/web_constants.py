@@ -15,6 +15,8 @@ from uuid import UUID
 
 TARGET = Path(__file__).parents[1] / "gvpipe" / "web" / "src" / "constants.js"
 SHARED = {
+    "gvpipe.asset_coding.directory": "SECTION VERSION MOST MAX_BYTES",
+    "gvpipe.asset_coding.encoder": "ARRANGEMENT CODED",
     "gvpipe.connectivity.base_mesh": "DRACO_PREFIX MAX_PER_BYTE",
     "gvpipe.connectivity.edge_seam_kernels": "LOOK SAME SINGLE LATER NEW",
     "gvpipe.connectivity.seams": "MAX_SEAM_VERTICES",
@@ -31,6 +33,7 @@ SHARED = {
     "gvpipe.entropy.tokens": "DIRECT TABLE_TOTAL MAX_TOKENS CHUNK",
     "gvpipe.errors": "REMEDY",
     "gvpipe.media.video": "MAX_SIDE",
+    "gvpipe.rasterizer.colormaps": "MAGMA VIRIDIS",
     "gvpipe.repeated_frames": "SECTION",
     "gvpipe.trajectory.basis": "MAX_COMPONENTS MAX_SCALE PER_OCTAVE LEAST_OUTSIDE",
     "gvpipe.trajectory.coefficient_coding": "LARGEST MAX_VALUES",
@@ -38,6 +41,7 @@ SHARED = {
     "N_CONTEXTS N_NEAR",
     "gvpipe.trajectory.prediction_kernels": "DOUBT",
     "gvpipe.trajectory.temporal_neighbours": "MAX_NEIGHBOURS VARIANCE MIN_BLOCK CUBIC LINEAR OFFSETS",
+    "gvpipe.web.field_export": "CODING ORDERS MAX_VALUES",
     "gvcodecs.mcgv.base.surface": "STILL",
     "gvcodecs.mcgv.browser": "VERSION PROFILE",
     "gvcodecs.mcgv.header": "OF_PICTURES PREDICTIONS PLACEMENTS MAX_CLUSTERS MAX_SEGMENTS",

@@ -1,4 +1,4 @@
-"""Kernels of `gvpipe.attributes.triangle_order`: triangles to polygons, and the part of each triangle.
+"""Kernels of `gvpipe.attributes.triangle_order`: which triangles are a polygon.
 
 A polygon of n corners is a *fan* of n - 2 triangles ``(v0, v1, v2), (v0, v2, v3), ...`` around its *apex* v0. The first
 triangle left has some place in its fan, and one of its corners is the apex: 3 (n - 2) options. Those whose other triangles are
@@ -12,23 +12,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Int32, Int64
+from gvpipe.arrays import Int64
+from gvpipe.attributes.fan_kernels import (
+    MOST_RANKED,
+    Arranged,
+    Soup,
+    new_arrangement,
+    note_edges,
+    score_fan,
+    try_walk,
+    walk_fan,
+)
 from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
 
-MOST_RANKED = 8  # corners of a polygon whose options are ranked
 MAX_OPTIONS = 3 * (MOST_RANKED - 2)
 SIZES, RANKS, EXPLICIT = 0, 6, 27  # first contexts of a polygon's size, of its option, of what is coded without options
 N_CONTEXTS = EXPLICIT + 5
-N_PART_CONTEXTS = 3
-
-
-class Soup(NamedTuple):
-    """Triangles grouped by parts: ``triangles (T, 3) int32``, ``opposite (3T,)`` corners, ``parts (T,)``."""
-
-    triangles: Int32
-    opposite: Int64
-    parts: Int64
 
 
 class Fans(NamedTuple):
@@ -46,64 +46,11 @@ class Fans(NamedTuple):
     members: Int64
 
 
-class Arranged(NamedTuple):
-    """The result, and memory on the way. int64 but for the first.
-
-    Args:
-        is_used: ``(T,)`` triangles whose polygon is known.
-        triangles, apexes: ``(T,)`` triangles in their final order, and the corner with which each one begins.
-        sizes: ``(T,)`` corners of polygons in order.
-        edge_numbers, edge_sizes: ``(3T,)`` for each corner of a used triangle, the number in its polygon of the edge opposite
-            to it, and the size of the polygon; -1 where that edge is a diagonal.
-        learned: ``(n, n, n)`` by size of a neighbour, number of its edge and size of a polygon: the number of the polygon's
-            edge.
-        stamps: ``(T,)`` the walk that last saw a triangle; its last item counts walks.
-    """
-
-    is_used: Bool
-    triangles: Int64
-    apexes: Int64
-    sizes: Int64
-    edge_numbers: Int64
-    edge_sizes: Int64
-    learned: Int64
-    stamps: Int64
-
-
-@compiled
-def code_parts(coder: SerialCoder, opposite: Int64, ranges: Int64, parts: Int64, n_parts: int) -> None:
-    """Code ``parts (T,)``; ``ranges (T,)`` are what vertices say, or none. A decoder fills parts."""
-    last = 0
-    for t in range(len(parts)):
-        guess, context = last, 0
-        if len(ranges):
-            guess, context = ranges[t], 1
-        else:
-            for c in range(3 * t, 3 * t + 3):
-                if 0 <= opposite[c] < 3 * t:
-                    guess, context = parts[opposite[c] // 3], 2
-                    break
-        part = guess + code_value(coder, context, parts[t] - guess)
-        if not 0 <= part < n_parts:
-            refuse(coder)
-            part = 0
-        parts[t] = last = part
-
-
 @compiled
 def code_polygons(coder: SerialCoder, soup: Soup, fans: Fans) -> tuple[Int64, Int64, Int64]:
     """Code the polygons; return triangles in final order, their first corners, and the sizes of polygons."""
     n_triangles = len(soup.triangles)
-    arranged = Arranged(
-        np.zeros(n_triangles, np.bool_),
-        np.empty(n_triangles, np.int64),
-        np.empty(n_triangles, np.int64),
-        np.empty(n_triangles, np.int64),
-        np.full(3 * n_triangles, -1, np.int64),
-        np.zeros(3 * n_triangles, np.int64),
-        np.full((MOST_RANKED + 1, MOST_RANKED + 1, MOST_RANKED + 1), -1, np.int64),
-        np.zeros(n_triangles + 1, np.int64),
-    )
+    arranged = new_arrangement(n_triangles)
     n, n_polygons, size = 0, 0, 3
     for t in range(n_triangles):
         if arranged.is_used[t]:
@@ -119,7 +66,7 @@ def code_polygons(coder: SerialCoder, soup: Soup, fans: Fans) -> tuple[Int64, In
         if not _code_fan(coder, soup, fans, arranged, (t, size, n)):
             refuse(coder)
             break
-        _note_edges(soup, arranged, n, size)
+        note_edges(soup, arranged, n, size)
         arranged.sizes[n_polygons] = size
         n_polygons += 1
         n += size - 2
@@ -144,7 +91,7 @@ def _code_fan(coder: SerialCoder, soup: Soup, fans: Fans, arranged: Arranged, at
             margin = 2 if n_options == 1 or scores[0] > scores[1] else 1
         rank = _code_count(coder, RANKS + 3 * min(n_options, 6) + margin, rank)
         if rank < n_options:
-            return _walk(soup, arranged, at, (options[rank, 0], options[rank, 1]))
+            return walk_fan(soup, arranged, at, (options[rank, 0], options[rank, 1]))
     place = _code_count(coder, EXPLICIT, fans.places[t] if coder.encodes else 0)
     apex = _code_count(coder, EXPLICIT + 1, fans.apexes[t] if coder.encodes else 0)
     if place > size - 3 or apex > 2:
@@ -154,7 +101,7 @@ def _code_fan(coder: SerialCoder, soup: Soup, fans: Fans, arranged: Arranged, at
         if coder.encodes:
             is_jump = 0 if _is_true(soup, fans, arranged, at, (place, apex)) else 1
         if _code_count(coder, EXPLICIT + 2, is_jump) == 0:
-            return _walk(soup, arranged, at, (place, apex))
+            return walk_fan(soup, arranged, at, (place, apex))
     return _code_members(coder, soup, fans, arranged, at, (place, apex))
 
 
@@ -197,9 +144,9 @@ def _find_options(soup: Soup, arranged: Arranged, at: tuple[int, int, int], opti
     n_options = 0
     for place in range(at[1] - 2):
         for apex in range(3):
-            if not _try_walk(soup, arranged, at, (place, apex)):
+            if not try_walk(soup, arranged, at, (place, apex)):
                 continue
-            score = _score(soup, arranged, at)
+            score = score_fan(soup, arranged, at)
             i = n_options
             while i > 0 and scores[i - 1] < score:
                 scores[i] = scores[i - 1]
@@ -214,7 +161,7 @@ def _find_options(soup: Soup, arranged: Arranged, at: tuple[int, int, int], opti
 def _is_true(soup: Soup, fans: Fans, arranged: Arranged, at: tuple[int, int, int], option: tuple[int, int]) -> bool:
     """Whether an option gives the fan that an encoder has."""
     t, size, n = at
-    if not _try_walk(soup, arranged, at, option):
+    if not try_walk(soup, arranged, at, option):
         return False
     first = fans.starts[fans.polygons[t]]
     for i in range(size - 2):
@@ -222,94 +169,6 @@ def _is_true(soup: Soup, fans: Fans, arranged: Arranged, at: tuple[int, int, int
         if triangle != fans.members[first + i] or arranged.apexes[n + i] != fans.apexes[triangle]:
             return False
     return True
-
-
-@compiled
-def _walk(soup: Soup, arranged: Arranged, at: tuple[int, int, int], option: tuple[int, int]) -> bool:
-    """Append the fan of an option, and mark its triangles as used; False if there is none."""
-    if not _try_walk(soup, arranged, at, option):
-        return False
-    for i in range(at[2], at[2] + at[1] - 2):
-        arranged.is_used[arranged.triangles[i]] = True
-    return True
-
-
-@compiled
-def _try_walk(soup: Soup, arranged: Arranged, at: tuple[int, int, int], option: tuple[int, int]) -> bool:
-    """Put the fan of an option behind the triangles arranged; False if a triangle is missing."""
-    t, size, n = at
-    place, apex = option
-    arranged.stamps[-1] += 1
-    arranged.stamps[t] = arranged.stamps[-1]
-    arranged.triangles[n + place], arranged.apexes[n + place] = t, apex
-    for i in range(place + 1, size - 2):
-        if not _step(soup, arranged, n + i - 1, 1):
-            return False
-    is_there = True
-    for i in range(place - 1, -1, -1):
-        is_there = is_there and _step(soup, arranged, n + i + 1, -1)
-    return is_there
-
-
-@compiled
-def _step(soup: Soup, arranged: Arranged, at: int, direction: int) -> bool:
-    """Put the triangle that follows (1) or precedes (-1) the arranged one at a place beside it; False if there is none."""
-    t, apex = arranged.triangles[at], arranged.apexes[at]
-    near, far = (apex + 1) % 3, (apex + 2) % 3  # corner opposite to the edge to be crossed, corner on it
-    if direction < 0:
-        near, far = far, near
-    corner = soup.opposite[3 * t + near]
-    if corner < 0:
-        return False
-    other = corner // 3
-    if arranged.is_used[other] or arranged.stamps[other] == arranged.stamps[-1] or soup.parts[other] != soup.parts[t]:
-        return False
-    turned = (corner % 3 + (1 if direction > 0 else 2)) % 3
-    shared = (turned + (1 if direction > 0 else 2)) % 3
-    if soup.triangles[other, turned] != soup.triangles[t, apex] or soup.triangles[other, shared] != soup.triangles[t, far]:
-        return False
-    arranged.stamps[other] = arranged.stamps[-1]
-    arranged.triangles[at + direction], arranged.apexes[at + direction] = other, turned
-    return True
-
-
-@compiled
-def _edge_corner(arranged: Arranged, n: int, size: int, edge: int) -> int:
-    """The corner opposite to edge ``edge`` of the polygon arranged at n."""
-    if edge == 0:
-        return int(3 * arranged.triangles[n] + (arranged.apexes[n] + 2) % 3)
-    if edge == size - 1:
-        return int(3 * arranged.triangles[n + size - 3] + (arranged.apexes[n + size - 3] + 1) % 3)
-    return int(3 * arranged.triangles[n + edge - 1] + arranged.apexes[n + edge - 1])
-
-
-@compiled
-def _score(soup: Soup, arranged: Arranged, at: tuple[int, int, int]) -> int:
-    """How many more edges of the fan just put lie to their neighbours as was learned, than do not."""
-    _, size, n = at
-    score = 0
-    for edge in range(size):
-        other = soup.opposite[_edge_corner(arranged, n, size, edge)]
-        if other < 0 or arranged.edge_numbers[other] < 0:
-            continue
-        expected = arranged.learned[arranged.edge_sizes[other], arranged.edge_numbers[other], size]
-        if expected >= 0:
-            score += 1 if expected == edge else -1
-    return score
-
-
-@compiled
-def _note_edges(soup: Soup, arranged: Arranged, n: int, size: int) -> None:
-    """Note the edges of the polygon arranged at n, and how they lie to those of its neighbours."""
-    if size > MOST_RANKED:
-        return
-    for edge in range(size):
-        other = soup.opposite[_edge_corner(arranged, n, size, edge)]
-        if other >= 0 and arranged.edge_numbers[other] >= 0:
-            arranged.learned[arranged.edge_sizes[other], arranged.edge_numbers[other], size] = edge
-    for edge in range(size):
-        corner = _edge_corner(arranged, n, size, edge)
-        arranged.edge_numbers[corner], arranged.edge_sizes[corner] = edge, size
 
 
 @compiled

@@ -22,7 +22,8 @@ from gvpipe.errors import InputError
 from gvpipe.mesh.unique_rows import row_ids
 
 if TYPE_CHECKING:
-    from gvpipe.attributes.polygon_kernels import Fans, Soup
+    from gvpipe.attributes.fan_kernels import Soup
+    from gvpipe.attributes.polygon_kernels import Fans
 
 PARTS, POLYGONS = 1, 2  # flags
 
@@ -160,7 +161,7 @@ def _part_ranges(decoded: Int32, vertex_starts: Array | None) -> Int64:
 
 
 def _encode_parts(decoded: Int32, ranges: Int64, parts: Int64, n_parts: int) -> bytes:
-    from gvpipe.attributes.polygon_kernels import N_PART_CONTEXTS, code_parts
+    from gvpipe.attributes.part_kernels import N_PART_CONTEXTS, code_parts
     from gvpipe.entropy.serial_coder import SerialEncoder
 
     coder = SerialEncoder(N_PART_CONTEXTS, len(parts))
@@ -169,7 +170,7 @@ def _encode_parts(decoded: Int32, ranges: Int64, parts: Int64, n_parts: int) -> 
 
 
 def _decode_parts(data: bytes, decoded: Int32, ranges: Int64, n_parts: int, name: str) -> Int64:
-    from gvpipe.attributes.polygon_kernels import N_PART_CONTEXTS, code_parts
+    from gvpipe.attributes.part_kernels import N_PART_CONTEXTS, code_parts
     from gvpipe.entropy.serial_coder import SerialDecoder
 
     coder = SerialDecoder(data, N_PART_CONTEXTS, name)
@@ -180,7 +181,7 @@ def _decode_parts(data: bytes, decoded: Int32, ranges: Int64, n_parts: int, name
 
 
 def _soup(decoded: Int32, grouped: Int64, parts: Int64) -> Soup:
-    from gvpipe.attributes.polygon_kernels import Soup
+    from gvpipe.attributes.fan_kernels import Soup
 
     triangles = np.ascontiguousarray(decoded[grouped], np.int32)
     return Soup(triangles, opposite_corners(triangles), parts[grouped])

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 MAX_SHIFT = 32
 SHIFTS = (0, 1, 2, 4, 7, 10, 14, 18)  # that an encoder tries
 USUAL_SHIFT = 1
+MAX_TRIED = 1 << 15  # entries
 
 
 class Choice(NamedTuple):
@@ -55,18 +56,21 @@ def encode_codes(storage: Storage, codes: Int64, layout: EntryLayout) -> bytes:
     prepared = _prepare(layout)
     has_twins = int(prepared.entries.places.max()) + 1 < len(codes)
 
-    def encode(choice: Choice) -> SerialEncoder:
-        coder = SerialEncoder(_n_contexts(choice), len(codes) * (codes.shape[1] + 1))
-        _code(coder.coder, storage, choice, codes.copy(), prepared)
+    sample = prepared._replace(entries=_first_entries(prepared.entries))
+
+    def encode(choice: Choice, prepared: Prepared) -> SerialEncoder:
+        n = len(prepared.entries.order.order)
+        coder = SerialEncoder(_n_contexts(choice), n * (codes.shape[1] + 1))
+        _code(coder.coder, storage, choice, codes, prepared)
         return coder
 
     def cost(choice: Choice) -> float:
-        return estimate_bytes(*encode(choice).noted, _n_contexts(choice))
+        return estimate_bytes(*encode(choice, sample).noted, _n_contexts(choice))
 
     best = min((Choice(method, 0, USUAL_SHIFT) for method in _methods(storage, layout)), key=cost)
     best = min((best._replace(flags=flags) for flags in ((0, 1, 2, 3) if has_twins else (0, 2))), key=cost)
     best = min((best._replace(shift=shift) for shift in SHIFTS), key=cost)
-    return bytes(best) + encode(best).finish()
+    return bytes(best) + encode(best, prepared).finish()
 
 
 def decode_codes(cursor: Cursor, storage: Storage, layout: EntryLayout) -> Int64:
@@ -88,6 +92,12 @@ def decode_codes(cursor: Cursor, storage: Storage, layout: EntryLayout) -> Int64
 def _prepare(layout: EntryLayout) -> Prepared:
     owners = layout.owners
     return Prepared(layout, layout.entries(), owners, opposite_corners(owners.reshape(-1, 3)))
+
+
+def _first_entries(entries: Entries) -> Entries:
+    """The first entries of the order, which choices are tried with."""
+    order = entries.order
+    return entries._replace(order=order._replace(order=order.order[:MAX_TRIED], starts=order.starts[: MAX_TRIED + 1]))
 
 
 def _methods(storage: Storage, layout: EntryLayout) -> list[int]:

@@ -72,12 +72,14 @@ def look_of(asset: Asset) -> tuple[Look, tuple[str, ...]]:
         slots[m] = textures.add(m, materials[m])
     flags = [_flags(material) for material in materials]
     flags[-1] |= 0 if len(colours) else CLAY
+    twins: list[int] = []
     for m in [m for m in np.flatnonzero(used).tolist() if flags[m] & TESTED]:
         for kept, which in _without_holes(m, materials[m], textures, colours):
             of_triangles[which] = len(materials)  # the same material, but for its flags
             materials.append(materials[m])
             flags.append(flags[m] & ~(TESTED | BLENDED) | kept)
-            slots = np.concatenate([slots, slots[m : m + 1]])
+            twins.append(m)
+    slots = np.concatenate([slots, slots[twins]])
     base = np.clip([material.base_color for material in materials], 0, 1)
     return Look(
         of_triangles=of_triangles,
@@ -107,8 +109,7 @@ def see_through(look: Look) -> tuple[Int32, Int32]:
 
 def _without_holes(number: int, material: Material, textures: _Textures, colours: Float32) -> list[tuple[int, Int64]]:
     """Triangles of a cut-out or see-through material that need no test, by the flags that they keep."""
-    of_triangles = textures.of_triangles
-    chosen = np.flatnonzero(of_triangles == number)
+    chosen = textures.triangles_of(number)
     factor = min(max(material.base_color[3], 0.0), 1.0) * (float(colours[chosen, :, 3].min()) if len(colours) else 1.0)
     if material.alpha_mode == "mask":
         return [(0, chosen[textures.reach(material, chosen, material.alpha_cutoff, factor)])]
@@ -121,11 +122,14 @@ class _Textures:
     """The textures of all materials: rows of tables that grow material by material."""
 
     def __init__(self, asset: Asset, of_triangles: Int32) -> None:
-        self._asset, self.of_triangles = asset, of_triangles
+        self._asset, self._count = asset, len(of_triangles)
         self._side = largest_side(asset.images)
         self._images: dict[tuple[int, bool], int | None] = {}
         self._decoded: dict[int, Array | None] = {}
         self._uv: list[Float32] = []
+        self._corners: dict[str, Float32] = {}
+        self._order = np.argsort(of_triangles, kind="stable")
+        self._ends = np.cumsum(np.bincount(of_triangles, minlength=len(asset.materials) + 1))
         self.rows: list[tuple[int, int, int, int, int]] = []
         self.scales: list[float] = []
         self.pixels: list[Array] = []
@@ -152,6 +156,11 @@ class _Textures:
             self.rows.append((image, sets[key], u, v, int(texture.filter == "nearest")))
             self.scales.append(float(np.clip(texture.scale, -1e3, 1e3)))
         return result
+
+    def triangles_of(self, number: int) -> Int64:
+        """The triangles that had this material at first, in order."""
+        end = int(self._ends[number])
+        return np.asarray(self._order[int(self._ends[number - 1]) if number else 0 : end])
 
     def reach(self, material: Material, triangles: Int64, limit: float, factor: float) -> Bool:
         """Which triangles of a material have an alpha of ``limit`` or more all over, given the factor of their texture's."""
@@ -189,11 +198,12 @@ class _Textures:
     def _place(self, row: int, texture: Texture, material: int, name: str) -> None:
         """Fill a row of coordinates for the triangles of a material, from the upper left, transformed."""
         where = f"{self._asset.name}: material {material} ({name!r})"
-        corners = _corners(self._asset, texture.uv, where)
+        if texture.uv not in self._corners:
+            self._corners[texture.uv] = _corners(self._asset, texture.uv, where)
         if row == len(self._uv):
-            self._uv.append(np.zeros((len(self.of_triangles), 3, 2), np.float32))
-        chosen = self.of_triangles == material
-        uv = corners[chosen].astype(np.float64) * (1, -1) + (0, 1)
+            self._uv.append(np.zeros((self._count, 3, 2), np.float32))
+        chosen = self.triangles_of(material)
+        uv = self._corners[texture.uv][chosen].astype(np.float64) * (1, -1) + (0, 1)
         with np.errstate(over="ignore", invalid="ignore"):
             cos, sin = np.cos(texture.rotation), np.sin(texture.rotation)
             u, v = uv[..., 0] * texture.tiling[0], uv[..., 1] * texture.tiling[1]

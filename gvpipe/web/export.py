@@ -1,6 +1,7 @@
 """A geometry video and its player as one HTML file that needs no network.
 
-What: page = ``page.html`` with the player's bundle inline and the MP4 file as base64 text, so that it opens from a disk.
+What: page = ``page.html`` with the player's bundle inline and the MP4 file as base64 text, so that it opens from a disk. Only
+fields are coded anew (`gvpipe.web.asset_export`).
 Why: browsers load no modules and fetch no files for a page that is itself a file.
 
 A codec knows which of its files browsers play (`gvpipe.registry.browser_obstacle`). Any other file is decoded and encoded anew
@@ -19,6 +20,7 @@ from typing import Any
 
 from gvpipe.atomic import atomic_path, temporary_folder
 from gvpipe.codec import Progress
+from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import write_file
 from gvpipe.errors import InputError, OutputError
 from gvpipe.player import Player
@@ -26,6 +28,7 @@ from gvpipe.quality_scale import error_of, quality_of
 from gvpipe.rate_control.purposes import SERVES, WEB
 from gvpipe.rate_control.trials import Trial, Trials
 from gvpipe.registry import browser_obstacle, make_codec
+from gvpipe.web.asset_export import carry_asset, with_web_fields
 
 SUFFIXES = (".html", ".htm")
 AXES = ("y", "z")
@@ -92,16 +95,17 @@ def export_html(
     player = Player(source)
     obstacle = browser_obstacle(player.bitstream)
     if not obstacle:
-        return _write_page(player.path, player.path, target, up)
+        shown = with_web_fields(player)
+        if shown is player.bitstream:
+            return _write_page(player.path, player.path, target, up)
+        return _write_bitstream(player.path, shown, target, up)
     trial = _convert(player, QUALITY if quality is None else quality, progress)
     remaining = browser_obstacle(trial.bitstream)
     if remaining:
         raise InputError(f"the web player does not read {remaining} yet; use an older gvpipe to convert")
     x, y, z = player.bitstream.origin
-    with temporary_folder() as folder:
-        converted = os.path.join(folder, "converted.mp4")
-        write_file(replace(trial.bitstream, origin=(x, y, z)), converted)
-        page = _write_page(player.path, converted, target, up)
+    bitstream = carry_asset(player, trial.encoded, trial.codec)
+    page = _write_bitstream(player.path, replace(bitstream, origin=(x, y, z)), target, up)
     added = trial.errors
     return ExportReport(page.bytes, page.video_bytes, obstacle, added.rmse_diag, added.max_diag, added.kg)
 
@@ -110,7 +114,7 @@ def _convert(player: Player, quality: float, progress: Progress | None) -> Trial
     """Encode a file's frames for browsers, with no more error than the quality's where a few encodes reach that."""
     name, settings = next(iter(SERVES[WEB].items()))
     codec = make_codec(name, {**settings, "quality": quality})
-    trials, allowed = Trials(codec, player.sequence(), None, progress), error_of(quality)
+    trials, allowed = Trials(codec, player.sequence().bare(), None, progress), error_of(quality)
     tried: list[Trial] = []
     while len(tried) < MOST_ENCODES:
         trial = trials(quality)
@@ -119,6 +123,13 @@ def _convert(player: Player, quality: float, progress: Progress | None) -> Trial
             break
         quality = quality_of(error_of(quality) * INSIDE * allowed / trial.errors.kg)
     return min(tried, key=lambda trial: trial.errors.kg or 0.0)
+
+
+def _write_bitstream(name: str, bitstream: Bitstream, target: Path, up: str) -> ExportReport:
+    with temporary_folder() as folder:
+        path = os.path.join(folder, "converted.mp4")
+        write_file(bitstream, path)
+        return _write_page(name, path, target, up)
 
 
 def _write_page(name: str, video: str | os.PathLike[str], target: Path, up: str) -> ExportReport:

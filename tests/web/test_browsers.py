@@ -13,6 +13,7 @@ import browsers
 import numpy as np
 import pages
 import pytest
+from asset_files import picture, write_asset
 from folders import ROOT
 from PIL import Image
 from sequences import held, waving
@@ -249,3 +250,42 @@ def test_the_snippet_from_a_disk_says_that_it_needs_a_server(driver: Any, site: 
     assert plays or "server" in shown, shown
     driver.get(f"{site[1]}/snippet.html")
     assert pages.run(driver, text) == ["", True]
+
+
+def test_an_asset_is_exact_and_shows_its_picture(name: str, player: Callable[..., Any], site: tuple[Path, str]) -> None:
+    """Attributes and a field equal Python's in every browser; a texture without light shows its colours."""
+    y, x = np.divmod(np.arange(25), 5)
+    points = np.c_[x / 4, y / 4, 0 * x].astype(np.float32)
+    corner = np.flatnonzero((x < 4) & (y < 4))
+    faces = np.concatenate([np.c_[corner, corner + 1, corner + 6], np.c_[corner, corner + 6, corner + 5]])
+    checks = picture([[[230, 20, 20], [10, 200, 30]], [[20, 30, 220], [240, 240, 240]]])
+    sheet = gvpipe.MeshSequence(
+        np.stack([points, points * np.array([1, 1.1, 1], np.float32)]),
+        faces,
+        attributes={"uv": points[:, :2], "facet": np.random.default_rng(0).normal(size=(96, 3)).astype(np.float32)},
+        fields={"height": gvpipe.Field(np.stack([points[:, 1], points[:, 0]]))},
+        parts=(gvpipe.Part("sheet", (0, 25), (0, 32), 0),),
+        materials=(gvpipe.Material(base_color_texture=gvpipe.Texture(0), unlit=True),),
+        images=(gvpipe.Image("checks", "image/png", checks),),
+    )
+    written = write_asset(site[0] / "asset.mp4", sheet)
+    values, rows, png, projection = player(
+        f"""{pages.LOAD} {pages.TEXT} const {{ attributes, fields }} = element.video;
+        const {{ values, indices }} = attributes.get("facet");
+        const blob = await element.still();
+        const field = await fields.get("height").frame(1);
+        const png = text(new Uint8Array(await blob.arrayBuffer()));
+        element.setAttribute("field", "height");
+        await element.seek(1);
+        return [[text(values), text(indices), text(field)], fields.get("height").bound, png, element.projection];""",
+        "asset.mp4",
+    )
+    facet = written.attributes["facet"]
+    assert np.array_equal(np.frombuffer(base64.b64decode(values[0]), "<f4").reshape(-1, 3), facet.values)
+    assert facet.indices is not None and np.array_equal(np.frombuffer(base64.b64decode(values[1]), "<u4"), facet.indices)
+    assert np.abs(np.frombuffer(base64.b64decode(values[2]), "<f4") - points[:, 0]).max() <= rows
+    pixels = np.asarray(Image.open(io.BytesIO(base64.b64decode(png))).convert("RGB"), int)
+    for place, colour in {(0.2, 0.8): (230, 20, 20), (0.8, 0.2): (240, 240, 240), (0.2, 0.2): (20, 30, 220)}.items():
+        u, v, _, w = np.array([*place, 0, 1]) @ np.reshape(projection, (4, 4))
+        shown = pixels[int((0.5 - v / w / 2) * len(pixels)), int((0.5 + u / w / 2) * pixels.shape[1])]
+        assert np.abs(shown - colour).max() <= 8, (name, place, shown)

@@ -1,5 +1,15 @@
 // Made by tools/web_constants.py from gvpipe's Python modules; edit those, and run it again.
 
+// gvpipe.asset_coding.directory
+export const DIRECTORY_SECTION = "asset";
+export const DIRECTORY_VERSION = 1;
+export const DIRECTORY_MOST = 65536;
+export const DIRECTORY_MAX_BYTES = 67108864;
+
+// gvpipe.asset_coding.encoder
+export const ENCODER_ARRANGEMENT = "arrangement";
+export const ENCODER_CODED = 1;
+
 // gvpipe.connectivity.base_mesh
 export const BASE_MESH_DRACO_PREFIX = [68, 82, 65, 67, 79, 2, 2, 1, 1, 0, 0];
 export const BASE_MESH_MAX_PER_BYTE = 1024;
@@ -73,6 +83,10 @@ export const ERRORS_REMEDY = "get the file again from its source";
 // gvpipe.media.video
 export const VIDEO_MAX_SIDE = 16384;
 
+// gvpipe.rasterizer.colormaps
+export const COLORMAPS_MAGMA = "\n000004 030311 0a0822 130d33 1d1146 28115a 36106a 430f76 50127c 5d177f 691c81 762181 822681 8f2a81 9c2e7f a9327d b63779 c33b75\ncf4170 db486a e65163 ee5c5e f5695c f9785d fb8761 fd9668 fea571 feb47b fec387 fed194 fde0a2 fceeb0 fcfdbf\n";
+export const COLORMAPS_VIRIDIS = "\n440154 470d60 48186a 482374 472d7b 453681 424086 3f4989 3b528b 375a8d 33638d 2f6a8e 2c728e 297a8e 26818e 23898e 21908c 1f988b\n1f9f88 21a685 28ae80 31b57b 3ebc74 4cc26c 5dc963 6ece58 82d34c 96d83f abdc32 c0df24 d5e21a eae51a fde725\n";
+
 // gvpipe.repeated_frames
 export const REPEATED_FRAMES_SECTION = "holds";
 
@@ -111,6 +125,11 @@ export const TEMPORAL_NEIGHBOURS_MIN_BLOCK = 48;
 export const TEMPORAL_NEIGHBOURS_CUBIC = new Map([[-3, -0.0625], [-1, 0.5625], [1, 0.5625], [3, -0.0625]]);
 export const TEMPORAL_NEIGHBOURS_LINEAR = new Map([[-1, 0.5], [1, 0.5]]);
 export const TEMPORAL_NEIGHBOURS_OFFSETS = [-1, 1, -3, 3, -2, -5, 5, -4];
+
+// gvpipe.web.field_export
+export const FIELD_EXPORT_CODING = 256;
+export const FIELD_EXPORT_ORDERS = 3;
+export const FIELD_EXPORT_MAX_VALUES = 67108864;
 
 // gvcodecs.mcgv.base.surface
 export const SURFACE_STILL = "still";

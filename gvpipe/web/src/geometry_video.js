@@ -6,6 +6,7 @@
  *     video.play((positions, frame) => draw(positions));   // as the video plays
  */
 
+import { NO_ASSET, readAsset } from "./asset/asset.js";
 import { DecodedPictures } from "./decoded_pictures.js";
 import { readContainer } from "./format/boxes.js";
 import { GeometryVideoError } from "./format/errors.js";
@@ -39,7 +40,9 @@ export class GeometryVideo {
       pictures = reader.samples
         ? await openPictures(file, fps, repeated, reader.pictureSize, reader.samples)
         : await DecodedPictures.without(fps, repeated, reader.zeroLevels);
-      return new GeometryVideo(payload.header, file.length, repeated, reader, pictures);
+      const video = new GeometryVideo(payload.header, file.length, repeated, reader, pictures);
+      video.#takeAsset(await readAsset(payload, video));
+      return video;
     } catch (error) {
       pictures?.close();
       if (!(error instanceof RangeError)) throw error; // an array that the browser cannot give
@@ -65,6 +68,7 @@ export class GeometryVideo {
     this.basePoints = reader.basePoints;
     /** `{min, max}`: the box that the motion stays in, model units. */
     this.bounds = reader.bounds();
+    this.#takeAsset(NO_ASSET);
     this.#repeated = repeated;
     this.#reader = reader;
     this.#pictures = pictures;
@@ -122,6 +126,24 @@ export class GeometryVideo {
   /** Free the video; the object is of no use afterwards. */
   close() {
     this.#pictures.close();
+  }
+
+  #takeAsset(asset) {
+    this.indices = asset.indices ?? this.indices;
+    /** Named meshes: `{name, vertices: [start, stop], triangles: [start, stop], material, parent}`; [] for one without a name. */
+    this.parts = asset.parts;
+    /** `Map` by name of `{domain, kind, components, unit, values (N, C), indices (rows) or null, fullScale}`. */
+    this.attributes = asset.attributes;
+    /** `Map` by name of `WebField`s: `frame(k)` is a promise of `Float32Array` (R, C). */
+    this.fields = asset.fields;
+    this.materials = asset.materials;
+    /** `{name, mediaType, data}` */
+    this.images = asset.images;
+    /** (P) corners of each polygon, or null if all are triangles. */
+    this.polygons = asset.polygons;
+    this.metadata = asset.metadata;
+    /** What of the file is not read, a line each. */
+    this.notes = asset.notes;
   }
 
   #read(k, positions) {

@@ -74,6 +74,11 @@ export class Cursor {
     throw this.corrupt(`${what} is longer than ${MAX_VARINT_BYTES} bytes`);
   }
 
+  /** The bytes of a block: its length as a varint comes before it. */
+  block() {
+    return this.take(this.varint(this.left, "the length of a block"));
+  }
+
   end() {
     if (this.left) throw this.corrupt(`${this.left} bytes are left over`);
   }

@@ -33,16 +33,19 @@ export class RangeDecoder {
   /** Decode `count` symbols of one categorical model: `edges` are its left cumulatives, then TOTAL. */
   categorical(edges, count) {
     const symbols = new Uint8Array(count);
-    const top = edges.length - 2;
-    for (let i = 0; i < count; i++) {
-      const scale = this.#scale;
-      const near = Math.floor((this.high * WORD + this.low) / scale); // of a rounded double: at most one off
-      let first = search(edges, top, near);
-      if (near - 1 < edges[first] || near + 1 >= edges[first + 1]) first = search(edges, top, this.#quantile());
-      symbols[i] = first;
-      this.#advance(scale, edges[first], edges[first + 1] - edges[first]);
-    }
+    for (let i = 0; i < count; i++) symbols[i] = this.symbol(edges);
     return symbols;
+  }
+
+  /** Decode one symbol of such a model. */
+  symbol(edges) {
+    const top = edges.length - 2;
+    const scale = this.#scale;
+    const near = Math.floor((this.high * WORD + this.low) / scale); // of a rounded double: at most one off
+    let first = search(edges, top, near);
+    if (near - 1 < edges[first] || near + 1 >= edges[first + 1]) first = search(edges, top, this.#quantile());
+    this.#advance(scale, edges[first], edges[first + 1] - edges[first]);
+    return first;
   }
 
   /** Decode one symbol of 0..size-1 (size 2..2^24), all alike; the last takes what the division leaves. */

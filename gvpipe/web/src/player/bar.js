@@ -22,7 +22,8 @@ const MARKUP = `
   ${button("view", "Reset the view (R)", "view")}
   ${button("still", "Save this picture as PNG (P)", "still")}
   ${button("fullscreen", "Full screen (F)", "fullscreen", 'aria-pressed="false"')}
-  <p class="facts"></p>`;
+  <p class="facts"></p>
+  <p class="notes"></p>`;
 
 export class Bar {
   /**
@@ -37,6 +38,7 @@ export class Bar {
     this.count = root.querySelector(".count");
     this.speeds = root.querySelector("select");
     this.facts = root.querySelector(".facts");
+    this.notes = root.querySelector(".notes");
     root.addEventListener("click", (event) => {
       const pressed = event.target.closest("[data-act]");
       if (pressed) on.act(pressed.dataset.act);
@@ -67,6 +69,11 @@ export class Bar {
       .map((fact) => fact.replaceAll(" ", "\u00a0"))
       .join(" · ");
     this.facts.title = this.facts.textContent;
+  }
+
+  /** What of the file is not shown as it should be. @param {string[]} notes */
+  setNotes(notes) {
+    this.notes.textContent = notes.join(" · ");
   }
 
   setFrame(frame) {

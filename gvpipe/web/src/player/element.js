@@ -3,15 +3,18 @@
  *
  * Attributes: `src` (an address, or `#id` of an element in the page that holds the file as base64 text), `autoplay` (not for
  * those who prefer reduced motion), `loop`, `wireframe`, `follow` (the camera goes with the mesh), `speed` (1 is the video's
- * own), `up` ("y", or "z").
+ * own), `up` ("y", or "z"), `field` (the name of one that is shown in colours), `colormap`, `range` ("low,high" of the colours).
  * Events: `ready`, `frame` (detail: the frame's number), `ended`, `error` (detail: a `GeometryVideoError`).
  */
 
 import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
 import { Bar, nextSpeed } from "./bar.js";
 import { embedded } from "./embedded.js";
+import { COLORMAPS } from "./colormaps.js";
 import { actionOf } from "./keys.js";
+import { Legend } from "./legend.js";
 import { isFullscreen, save, toggleFullscreen } from "./outside.js";
+import { Panel } from "./panel.js";
 import { Stage } from "./stage.js";
 import style from "./style.css";
 
@@ -19,6 +22,8 @@ const LABEL = "Animated mesh; shift and arrow keys turn it, + and - zoom";
 const MARKUP = `<style>${style}</style>
   <div class="stage">
     <canvas tabindex="0" role="img" aria-label="${LABEL}"></canvas>
+    <div class="legend" hidden></div>
+    <div class="panel"></div>
     <div class="message" role="status"></div>
   </div>
   <div class="bar" role="group" aria-label="Playback"></div>`;
@@ -26,10 +31,12 @@ const TURN = Math.PI / 18; // by one press of a key
 const ZOOM = 1.15;
 
 export class GeometryVideoElement extends HTMLElement {
-  static observedAttributes = ["src", "loop", "wireframe", "follow", "speed"];
+  static observedAttributes = ["src", "loop", "wireframe", "follow", "speed", "field", "colormap", "range"];
 
   #stage = null;
   #bar;
+  #panel;
+  #legend;
   #message;
   #loading = 0; // counts loads, so that a late one does not replace its successor
   #positions = null;
@@ -37,6 +44,8 @@ export class GeometryVideoElement extends HTMLElement {
   #aim = 0; // the frame that was wanted last
   #seeking = null;
   #resume = false; // whether to play on when the slider is let go
+  #field = null; // that is shown
+  #hidden = new Set(); // names of parts
 
   /** The `GeometryVideo` that is shown, or null. */
   video = null;
@@ -53,6 +62,12 @@ export class GeometryVideoElement extends HTMLElement {
       seek: (frame, done) => this.#scrub(frame, done),
       speed: (speed) => this.setAttribute("speed", speed),
     });
+    this.#panel = new Panel(root.querySelector(".panel"), {
+      field: (name) => (name ? this.setAttribute("field", name) : this.removeAttribute("field")),
+      colormap: (name) => this.setAttribute("colormap", name),
+      hide: (names) => this.hide(names),
+    });
+    this.#legend = new Legend(root.querySelector(".legend"));
     this.#bar.setEnabled(false);
     root.addEventListener("keydown", (event) => this.#onKey(event));
     if (!document.fullscreenEnabled) this.#bar.hide("fullscreen"); // phones may show films alone so
@@ -77,6 +92,7 @@ export class GeometryVideoElement extends HTMLElement {
     if (name === "wireframe") this.#stage?.setWireframe(value !== null);
     if (name === "follow") this.#stage?.setFollowing(value !== null);
     if (name === "speed") this.#bar.setSpeed(this.speed);
+    if (["field", "colormap", "range"].includes(name) && before !== value && this.video) this.#showField();
     if ((name === "loop" || name === "speed") && !this.paused) this.play(); // with the new value
   }
 
@@ -93,6 +109,31 @@ export class GeometryVideoElement extends HTMLElement {
     return speed >= 0.0625 && speed <= 16 ? speed : 1; // what browsers play
   }
 
+  /** The colour map of fields, one of `COLORMAPS`. */
+  get colormap() {
+    const name = this.getAttribute("colormap");
+    return COLORMAPS.includes(name) ? name : COLORMAPS[0];
+  }
+
+  /** Low and high of the colours, or null: the field's own. */
+  get range() {
+    const numbers = (this.getAttribute("range") ?? "").split(",").map(Number);
+    return numbers.length === 2 && numbers[0] < numbers[1] ? numbers : null;
+  }
+
+  /** Names of the parts that are hidden. */
+  get hiddenParts() {
+    return new Set(this.#hidden);
+  }
+
+  /** Hide the parts of these names, and show all others. @param {Iterable<string>} names */
+  hide(names) {
+    this.#hidden = new Set(names);
+    if (!this.video) return;
+    this.#stage?.setHidden(this.#hidden);
+    this.#panel.setHidden(this.#hidden);
+  }
+
   /** 16 numbers, a (4, 4) matrix by columns: from model units to the picture's clip space, for those who draw over it. */
   get projection() {
     return this.video ? Array.from(this.#stage.projection) : null;
@@ -103,22 +144,33 @@ export class GeometryVideoElement extends HTMLElement {
     this.#unload();
     const loading = this.#loading;
     this.#say("Loading …");
+    let video = null;
     try {
-      const video = await GeometryVideo.load(typeof source === "string" && source[0] === "#" ? embedded(source) : source);
+      video = await GeometryVideo.load(typeof source === "string" && source[0] === "#" ? embedded(source) : source);
       if (loading !== this.#loading) return video.close();
-      this.video = video;
-      this.#positions = await video.frame(0);
-      if (loading !== this.#loading) return undefined;
+      const positions = await video.frame(0);
+      if (loading !== this.#loading) return video.close();
       this.#stage ??= openStage(this.shadowRoot.querySelector("canvas"));
-      this.#stage.setMesh(video, this.#positions, this.getAttribute("up") ?? "y");
-      this.#stage.setWireframe(this.hasAttribute("wireframe"));
-      this.#stage.setFollowing(this.hasAttribute("follow"));
+      await this.#stage.setMesh(video, positions, this.getAttribute("up") ?? (video.metadata.up_axis === "z" ? "z" : "y"));
+      if (loading !== this.#loading) return video.close();
+      this.#positions = positions;
     } catch (error) {
+      video?.close();
       if (loading === this.#loading) this.#fail(error);
       return undefined;
     }
+    this.video = video;
+    this.#stage.setWireframe(this.hasAttribute("wireframe"));
+    this.#stage.setFollowing(this.hasAttribute("follow"));
     this.#say("");
+    const { model } = this.#stage;
+    model.onError = (error) => this.#fail(error);
     this.#bar.setVideo(this.video);
+    this.#bar.setNotes([...this.video.notes, ...model.notes]);
+    this.#panel.setVideo(this.video, model.parts.names);
+    this.hide(this.#hidden);
+    await this.#showField();
+    if (loading !== this.#loading) return undefined;
     this.#bar.setEnabled(true);
     this.#show(0);
     this.dispatchEvent(new CustomEvent("ready"));
@@ -134,7 +186,7 @@ export class GeometryVideoElement extends HTMLElement {
       if (this.paused && this.currentFrame === video.frameCount - 1) await this.seek(0);
       this.#setPaused(false);
       const show = (positions, frame) => {
-        this.#stage.setPositions(positions);
+        this.#stage.setPositions(positions, frame);
         this.#show(frame);
       };
       const ended = () => {
@@ -169,15 +221,34 @@ export class GeometryVideoElement extends HTMLElement {
       const [video, frame] = [this.video, this.#wanted];
       this.#wanted = null;
       try {
-        await video.frame(frame, this.#positions);
+        await Promise.all([video.frame(frame, this.#positions), this.#field?.load(frame)]);
         if (video !== this.video) return;
-        this.#stage.setPositions(this.#positions);
+        this.#stage.setPositions(this.#positions, frame);
         this.#show(frame);
       } catch (error) {
         if (video === this.video) this.#fail(error);
         return;
       }
     }
+  }
+
+  /** Show the field of attribute `field`, if the video has it, or else the materials. */
+  async #showField() {
+    const { video } = this;
+    const field = video.fields.get(this.getAttribute("field")) ?? null;
+    this.#field = field;
+    try {
+      await field?.load(this.currentFrame);
+    } catch (error) {
+      if (video === this.video) this.#fail(error);
+      return;
+    }
+    if (video !== this.video || field !== this.#field || !this.#stage?.model) return;
+    const range = this.#stage.setField(field, this.colormap, this.range);
+    const hasMap = field !== null && field.kind !== "color";
+    this.#panel.setField(field?.name ?? "", this.colormap, hasMap);
+    if (hasMap) this.#legend.show(field, this.colormap, range);
+    else this.#legend.hide();
   }
 
   /** Steps in a row add up, however fast they come. */
@@ -266,6 +337,10 @@ export class GeometryVideoElement extends HTMLElement {
     this.#resume = false;
     this.currentFrame = 0;
     this.#stage?.clear();
+    this.#field = null;
+    this.#legend.hide();
+    this.#panel.clear();
+    this.#bar.setNotes([]);
     this.#bar.setEnabled(false);
     this.#setPaused(true);
   }

@@ -1,26 +1,19 @@
 /** The picture: a mesh drawn by three.js, and a camera that frames the whole motion and orbits it. */
 
 import {
-  BufferAttribute,
-  BufferGeometry,
   DirectionalLight,
-  DoubleSide,
-  DynamicDrawUsage,
   HemisphereLight,
   Matrix4,
-  Mesh,
-  MeshBasicMaterial,
-  MeshLambertMaterial,
+  PMREMGenerator,
   PerspectiveCamera,
-  Points,
-  PointsMaterial,
   Scene,
   Spherical,
   Vector3,
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { Normals } from "./normals.js";
+import { RoomEnvironment } from "three/examples/jsm/environments/RoomEnvironment.js";
+import { Model } from "./model.js";
 
 const FIELD_OF_VIEW = 35; // degrees, of the shorter side
 const MARGIN = 1.06; // around what is framed
@@ -28,6 +21,9 @@ const FOLLOWING_ROOM = 1.15; // around a mesh that is followed, which may stretc
 const AZIMUTH = Math.PI / 7; // of the first view: from the front, a little from the right and from above
 const ELEVATION = Math.PI / 12;
 const MAX_PIXEL_RATIO = 2;
+const MAX_ANISOTROPY = 8; // of textures seen at a flat angle
+const ROOM_PIXELS = 64; // a side of what metal reflects
+const ROOM_BLUR = 0.04; // radians
 const SOFTWARE = /SwiftShader|llvmpipe|softpipe|software|Basic Render/i; // renderers that run on the processor
 const MAX_SOFTWARE_PIXELS = 512 * 768; // drawn without a GPU: larger pictures are scaled up, and play on smoothly
 
@@ -49,58 +45,41 @@ export class Stage {
     this.controls.addEventListener("start", () => (this.isFramed = false));
     this.isFollowing = false; // whether the camera goes where the mesh goes
     this.isFramed = false; // whether the view is still the first one, which follows the picture's shape
-    this.geometry = null;
+    this.model = null;
+    this.turn = 0; // counts meshes, so that a late one does not replace its successor
     this.pending = 0;
     this.observer = new ResizeObserver(() => this.#resize());
     this.observer.observe(canvas);
   }
 
   /** Take a video's mesh; `positions (V, 3)` are its first frame. `up` is the axis, "y" or "z", that stands upright. */
-  setMesh(video, positions, up) {
+  async setMesh(video, positions, up) {
     this.clear();
     const { min, max } = video.bounds;
     this.centre = min.map((low, axis) => (low + max[axis]) / 2);
     this.scale = 1 / (Math.hypot(...max.map((high, axis) => high - min[axis])) / 2 || 1); // the scene is a unit ball
     this.halfBox = max.map((high, axis) => ((high - min[axis]) / 2) * this.scale);
-    const dynamic = () => new BufferAttribute(new Float32Array(positions.length), 3).setUsage(DynamicDrawUsage);
-    this.geometry = new BufferGeometry().setAttribute("position", dynamic()).setAttribute("normal", dynamic());
-    this.normals = new Normals(video.indices, video.basePoints, positions);
+    const { centre, scale, hasGpu } = this;
+    const anisotropy = hasGpu ? Math.min(MAX_ANISOTROPY, this.renderer.capabilities.getMaxAnisotropy()) : 1;
+    const turn = ++this.turn;
+    const model = await Model.open(video, positions, { centre, scale, hasGpu, anisotropy, environment: () => this.#environment() });
+    if (turn !== this.turn) return model.dispose(); // another mesh has come meanwhile, or the stage is closed
+    this.model = model;
+    model.onChange = () => this.requestRender();
     const all = Uint32Array.from({ length: video.vertexCount }, (_, v) => v);
     this.used = video.triangleCount ? Uint32Array.from(new Set(video.indices)) : all; // which vertices are drawn
     this.middle = new Vector3();
-    this.objects = [];
-    if (video.triangleCount) {
-      this.geometry.setIndex(new BufferAttribute(video.indices, 1));
-      const offset = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
-      this.objects.push(new Mesh(this.geometry, new MeshLambertMaterial({ color: 0xb9c4d0, side: DoubleSide, ...offset })));
-      const lines = { wireframe: true, visible: false, transparent: true, opacity: 0.35 };
-      this.wires = new Mesh(this.geometry, new MeshBasicMaterial({ color: 0x1d2a38, ...lines }));
-      this.objects.push(this.wires);
-    } else {
-      this.objects.push(new Points(this.geometry, new PointsMaterial({ color: 0x6f8296, size: 3, sizeAttenuation: false })));
-    }
-    for (const object of this.objects) {
-      object.frustumCulled = false; // its bounds change with every frame
-      this.scene.add(object);
-    }
+    this.scene.add(model.group);
     this.camera.up.set(0, up === "z" ? 0 : 1, up === "z" ? 1 : 0);
-    this.setPositions(positions);
     this.#resize();
     this.resetView();
+    return undefined;
   }
 
-  /** Show `positions (V, 3)`, model units. */
-  setPositions(positions) {
-    const { position, normal } = this.geometry.attributes;
-    const { centre, scale } = this;
-    for (let i = 0; i < positions.length; i += 3) {
-      position.array[i] = (positions[i] - centre[0]) * scale;
-      position.array[i + 1] = (positions[i + 1] - centre[1]) * scale;
-      position.array[i + 2] = (positions[i + 2] - centre[2]) * scale;
-    }
+  /** Show `positions (V, 3)`, model units, of frame k. */
+  setPositions(positions, k) {
+    this.model.setPositions(positions, k);
     if (this.isFollowing) this.#follow(this.#findMiddle());
-    this.normals.compute(position.array, normal.array);
-    position.needsUpdate = normal.needsUpdate = true;
     this.requestRender();
   }
 
@@ -113,7 +92,20 @@ export class Stage {
   }
 
   setWireframe(visible) {
-    if (this.wires) this.wires.material.visible = visible;
+    this.model?.setWireframe(visible);
+    this.requestRender();
+  }
+
+  /** Show a field in colours; null: the materials. @returns {[number, number]} low and high of the colours */
+  setField(field, colormap, range) {
+    const shown = this.model.setField(field, colormap, range);
+    this.requestRender();
+    return shown;
+  }
+
+  /** Hide the parts of these names. @param {Set<string>} names */
+  setHidden(names) {
+    this.model.setHidden(names);
     this.requestRender();
   }
 
@@ -121,7 +113,7 @@ export class Stage {
   setFollowing(isFollowing) {
     if (this.isFollowing === isFollowing) return;
     this.isFollowing = isFollowing;
-    if (this.geometry) this.resetView();
+    if (this.model) this.resetView();
   }
 
   /** Look from the front at the whole motion, or at the mesh that is followed. */
@@ -172,27 +164,39 @@ export class Stage {
   }
 
   clear() {
-    for (const object of this.objects ?? []) {
-      this.scene.remove(object);
-      object.material.dispose();
+    if (this.model) {
+      this.scene.remove(this.model.group);
+      this.model.dispose();
     }
-    this.geometry?.dispose();
-    this.objects = this.geometry = this.wires = null;
+    this.model = null;
     this.isFramed = false;
     this.requestRender();
   }
 
   close() {
+    this.turn++;
     this.clear();
     cancelAnimationFrame(this.pending);
     this.observer.disconnect();
     this.controls.dispose();
+    this.reflected?.dispose();
     this.renderer.dispose();
+  }
+
+  /** What metal reflects: a room with lamps, made once it is needed. */
+  #environment() {
+    if (!this.reflected) {
+      const [room, generator] = [new RoomEnvironment(), new PMREMGenerator(this.renderer)];
+      this.reflected = generator.fromScene(room, ROOM_BLUR, 0.1, 100, { size: ROOM_PIXELS });
+      room.dispose();
+      generator.dispose();
+    }
+    return this.reflected.texture;
   }
 
   /** The mean of the vertices drawn, in the scene. */
   #findMiddle() {
-    const { array } = this.geometry.attributes.position;
+    const array = this.model.points;
     const sum = [0, 0, 0];
     for (const v of this.used) for (let axis = 0; axis < 3; axis++) sum[axis] += array[3 * v + axis];
     return new Vector3(...sum).divideScalar(this.used.length || 1);
@@ -200,7 +204,7 @@ export class Stage {
 
   /** How far the mesh reaches from a point, along each axis, with room to move. */
   #findReach(point) {
-    const { array } = this.geometry.attributes.position;
+    const array = this.model.points;
     const reach = [0, 0, 0];
     for (const v of this.used) {
       for (let axis = 0; axis < 3; axis++) {

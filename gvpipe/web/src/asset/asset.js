@@ -1,0 +1,156 @@
+/**
+ * What an asset has beside moving positions: section `asset`, JSON that lists it, and the sections that it names. Mirrors what
+ * `gvpipe.asset` models; `docs/format.md` has the members.
+ */
+
+import {
+  DIRECTORY_MAX_BYTES as MAX_BYTES,
+  DIRECTORY_MOST as MAX_ITEMS,
+  DIRECTORY_SECTION as SECTION,
+  DIRECTORY_VERSION as VERSION,
+  ENCODER_ARRANGEMENT as ARRANGEMENT,
+  ENCODER_CODED as CODED,
+  FIELD_EXPORT_CODING as WEB_CODING,
+} from "../constants.js";
+import { decodeAttribute } from "../attributes/attribute_coding.js";
+import { Surface } from "../attributes/surface.js";
+import { decodeArrangement } from "../attributes/triangle_order.js";
+import { corrupt } from "../format/errors.js";
+import { inflate } from "../format/inflate.js";
+import { AssetEntry } from "./asset_entry.js";
+import { readImages, readMaterials } from "./materials.js";
+import { WebField, findParents } from "./web_field.js";
+
+const MAX_PARTS = 2 ** 22;
+const MAX_COMPONENTS = 64;
+const HUGE = 3.5e38; // above float32's largest number
+export const KINDS = ["uv", "normal", "tangent", "color", "scalar", "vector", "label"];
+export const DOMAINS = ["vertex", "corner", "triangle", "part"];
+const WIDTHS = { uv: [2], normal: [3], tangent: [3, 4], color: [3, 4] }; // components of a kind; others have any number
+const FULL_SCALES = { uint8: 255, uint16: 65535, uint32: 2 ** 32 - 1 };
+
+export const NO_ASSET = {
+  indices: null,
+  parts: [],
+  attributes: new Map(),
+  fields: new Map(),
+  materials: [],
+  images: [],
+  polygons: null,
+  metadata: {},
+  notes: [],
+};
+
+/**
+ * @param {import("../format/payload.js").Payload} payload
+ * @param {import("../geometry_video.js").GeometryVideo} video of its positions
+ * @returns {Promise<typeof NO_ASSET>} `indices` are the triangles in the asset's order
+ * @throws {GeometryVideoError} a member or a section is not as gvpipe writes it
+ */
+export async function readAsset(payload, video) {
+  if (!payload.sections.has(SECTION)) return NO_ASSET;
+  const list = new AssetEntry(await readJson(payload.section(SECTION)), "the list");
+  if (list.integer("version", undefined, 1, 2 ** 31) > VERSION) {
+    return { ...NO_ASSET, notes: ["what the file has beside positions is not shown: a newer gvpipe wrote it"] };
+  }
+  const images = readImages(list.list("images", MAX_ITEMS), payload);
+  const materials = readMaterials(list.list("materials", MAX_ITEMS), images.length);
+  const notes = [];
+  const { parts, indices, polygons } = readParts(list, payload, video, materials.length);
+  const positions = list.flag("geometry", false) ? await video.frame(0) : null;
+  const attributes = readAttributes(list, payload, new Surface(indices, video.vertexCount, positions, parts.length), notes);
+  const fields = readFields(list, payload, video, notes);
+  const metadata = list.given.metadata ?? {};
+  return { indices, parts, attributes, fields, materials, images, polygons, metadata, notes };
+}
+
+async function readJson(data) {
+  const text = await inflate(data, MAX_BYTES, (what) => corrupt(SECTION, what));
+  try {
+    return JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(text));
+  } catch {
+    throw corrupt(SECTION, "it is not JSON");
+  }
+}
+
+function readParts(list, payload, { indices: decoded, vertexCount }, nMaterials) {
+  const parts = list.list("parts", MAX_PARTS).map((given, number) => {
+    const entry = new AssetEntry(given, `part ${number}`);
+    const [start, stop] = entry.numbers("vertices", 2, undefined, 0, vertexCount);
+    if (!(Number.isInteger(start) && Number.isInteger(stop) && start <= stop)) throw corrupt(SECTION, `part ${number}: its vertices are none`);
+    const material = given.material == null ? null : entry.integer("material", undefined, 0, nMaterials - 1);
+    return { name: entry.text("name", ""), vertices: [start, stop], triangles: [0, 0], material, parent: entry.text("parent", "") };
+  });
+  const data = payload.sections.get(ARRANGEMENT) ?? new Uint8Array(0);
+  const arranged = decodeArrangement(data, decoded, parts.length || 1, vertexStarts(parts, vertexCount), ARRANGEMENT);
+  parts.forEach((part, number) => (part.triangles = arranged.partStarts.slice(number, number + 2)));
+  return { parts, indices: arranged.faces, polygons: arranged.polygons };
+}
+
+/** First vertex of each part, then V, if each has vertices of its own; else null. */
+function vertexStarts(parts, vertexCount) {
+  const starts = [...parts.map(({ vertices }) => vertices[0]), vertexCount];
+  const isOwn = parts.length > 0 && starts[0] === 0 && parts.every(({ vertices }, number) => vertices[1] === starts[number + 1]);
+  return isOwn ? starts : null;
+}
+
+function readAttributes(list, payload, surface, notes) {
+  const attributes = new Map();
+  const references = [];
+  let isBeyond = false;
+  for (const given of list.list("attributes", MAX_ITEMS)) {
+    const entry = new AssetEntry(given, "an attribute");
+    const name = entry.text("name");
+    const section = entry.text("section");
+    const domain = entry.word("domain", DOMAINS);
+    const kind = entry.word("kind", KINDS);
+    if (attributes.has(name)) throw corrupt(SECTION, `there are two attributes ${name}`);
+    if (isBeyond || entry.integer("coding", undefined, 0, MAX_ITEMS) !== CODED) {
+      notes.push(`attribute ${name} is not shown: a newer gvpipe wrote it`);
+      isBeyond ||= domain === "corner"; // later ones may refer to it
+      continue;
+    }
+    const { values, components, type, corners } = decodeAttribute(payload.section(section), surface, section, domain, references);
+    if (components !== given.components || type !== given.dtype) throw corrupt(section, "it does not hold what section 'asset' lists");
+    if (WIDTHS[kind] && !WIDTHS[kind].includes(components)) throw corrupt(SECTION, `attribute ${name} has ${components} components`);
+    if (corners) references.push(corners);
+    const [unit, fullScale] = [entry.text("unit", ""), FULL_SCALES[type] ?? 1];
+    attributes.set(name, { name, domain, kind, components, unit, type, values, indices: corners, fullScale });
+  }
+  return attributes;
+}
+
+function readFields(list, payload, { frameCount, vertexCount, triangleCount, indices }, notes) {
+  const fields = new Map();
+  const parents = {}; // by domain
+  for (const given of list.list("fields", MAX_ITEMS)) {
+    const entry = new AssetEntry(given, "a field");
+    const name = entry.text("name");
+    const domain = entry.word("domain", ["vertex", "triangle"]);
+    const dtype = entry.text("dtype");
+    const coding = entry.integer("coding", undefined, 0, MAX_ITEMS);
+    if (fields.has(name)) throw corrupt(SECTION, `there are two fields ${name}`);
+    if (given.kind === "normal") {
+      notes.push(`field ${name} is not used: light falls on normals computed from the surface`);
+      continue;
+    }
+    if (coding !== WEB_CODING) {
+      notes.push(`field ${name} is not shown: gvpipe export-html makes a page that shows it`);
+      continue;
+    }
+    const checked = {
+      name,
+      domain,
+      kind: entry.word("kind", KINDS),
+      components: entry.integer("components", undefined, 0, MAX_COMPONENTS),
+      unit: entry.text("unit", ""),
+      bound: entry.number("bound", 0, 0, HUGE),
+      range: given.range == null ? null : entry.numbers("range", 2, undefined, -HUGE, HUGE),
+      section: entry.text("section"),
+      fullScale: FULL_SCALES[dtype] ?? 1,
+    };
+    parents[domain] ??= domain === "vertex" ? findParents(vertexCount, indices) : findParents(triangleCount, []);
+    fields.set(name, new WebField(checked, payload.section(checked.section), frameCount, parents[domain]));
+  }
+  return fields;
+}

@@ -1,0 +1,66 @@
+/** An object of section `asset`: members read by name and checked, with a default for those that may be left out. */
+
+import { corrupt } from "../format/errors.js";
+
+export class AssetEntry {
+  /** @param {object} given JSON value @param {string} where for messages */
+  constructor(given, where) {
+    this.where = where;
+    if (typeof given !== "object" || given === null || Array.isArray(given)) throw this.#wrong("it", given);
+    this.given = given;
+  }
+
+  /** A text. Without a default the member is needed; so below. */
+  text(name, otherwise) {
+    return this.#read(name, otherwise, (value) => typeof value === "string" && value.length < 65536);
+  }
+
+  word(name, words, otherwise) {
+    return this.#read(name, otherwise, (value) => words.includes(value));
+  }
+
+  words(name, count, words, otherwise) {
+    return this.#read(name, otherwise, (value) => isList(value, count, (item) => words.includes(item)));
+  }
+
+  flag(name, otherwise) {
+    return this.#read(name, otherwise, (value) => typeof value === "boolean");
+  }
+
+  number(name, otherwise, low, high) {
+    return this.#read(name, otherwise, (value) => isNumber(value, low, high));
+  }
+
+  integer(name, otherwise, low, high) {
+    return this.#read(name, otherwise, (value) => Number.isInteger(value) && isNumber(value, low, high));
+  }
+
+  numbers(name, count, otherwise, low, high) {
+    return this.#read(name, otherwise, (value) => isList(value, count, (item) => isNumber(item, low, high)));
+  }
+
+  /** A list of at most `most` items; [] where there is none. */
+  list(name, most) {
+    return this.#read(name, [], (value) => Array.isArray(value) && value.length <= most);
+  }
+
+  #read(name, otherwise, isSound) {
+    const value = (Object.hasOwn(this.given, name) ? this.given[name] : undefined) ?? undefined; // null counts as left out
+    if (value === undefined && otherwise !== undefined) return otherwise;
+    if (!isSound(value)) throw this.#wrong(`'${name}'`, value);
+    return value;
+  }
+
+  #wrong(what, value) {
+    const shown = JSON.stringify(value)?.slice(0, 60);
+    return corrupt("asset", `${this.where}: ${what} is ${shown}`);
+  }
+}
+
+function isNumber(value, low, high) {
+  return typeof value === "number" && value >= low && value <= high;
+}
+
+function isList(value, count, isSound) {
+  return Array.isArray(value) && value.length === count && value.every(isSound);
+}

@@ -1,0 +1,100 @@
+/** Menus over the picture: the field that is shown and its colour map, and the parts that are. They are there if there is a choice. */
+
+import { COLORMAPS } from "./colormaps.js";
+
+const MANY = 12; // parts from which on they can be searched
+const MOST_LISTED = 200;
+
+const MARKUP = `
+  <label class="choice" hidden><span>Show</span> <select data-of="field" aria-label="Field"></select></label>
+  <label class="choice" hidden><span>Colours</span> <select data-of="colormap" aria-label="Colour map"></select></label>
+  <details class="choice" hidden>
+    <summary>Parts</summary>
+    <input type="search" placeholder="Name" aria-label="Name of parts" hidden>
+    <ul></ul>
+    <p></p>
+  </details>`;
+
+export class Panel {
+  /**
+   * @param {HTMLElement} root filled with the menus
+   * @param {{field: (name: string) => void, colormap: (name: string) => void, hide: (names: Set<string>) => void}} on called for what
+   *   the user asks for; field "" is the materials
+   */
+  constructor(root, on) {
+    root.innerHTML = MARKUP;
+    this.root = root;
+    this.on = on;
+    [this.fields, this.colormaps] = root.querySelectorAll("select");
+    this.parts = root.querySelector("details");
+    this.filter = root.querySelector("input");
+    this.list = root.querySelector("ul");
+    this.more = root.querySelector("p");
+    this.names = [];
+    this.hidden = new Set();
+    this.colormaps.append(...COLORMAPS.map((name) => new Option(name, name)));
+    this.fields.addEventListener("change", () => on.field(this.fields.value));
+    this.colormaps.addEventListener("change", () => on.colormap(this.colormaps.value));
+    this.filter.addEventListener("input", () => this.#listParts());
+    this.list.addEventListener("change", ({ target }) => this.#toggle(this.names[target.value], target.checked));
+  }
+
+  /** @param {import("../geometry_video.js").GeometryVideo} video @param {string[]} parts their names, each once */
+  setVideo(video, parts) {
+    const plain = video.materials.length ? "material" : "surface";
+    this.fields.replaceChildren(new Option(plain, ""), ...[...video.fields.keys()].map((name) => new Option(labelOf(video, name), name)));
+    this.fields.parentElement.hidden = !video.fields.size;
+    this.names = parts;
+    this.hidden = new Set();
+    this.parts.hidden = parts.length < 2;
+    this.parts.open = false;
+    this.filter.hidden = parts.length < MANY;
+    this.filter.value = "";
+    this.#listParts();
+    this.setField("", COLORMAPS[0], false);
+  }
+
+  clear() {
+    for (const choice of this.root.children) choice.hidden = true;
+  }
+
+  setField(name, colormap, hasMap) {
+    this.fields.value = name;
+    this.colormaps.value = colormap;
+    this.colormaps.parentElement.hidden = !hasMap;
+  }
+
+  /** @param {Set<string>} names */
+  setHidden(names) {
+    this.hidden = names;
+    this.#listParts();
+  }
+
+  #listParts() {
+    const wanted = this.filter.value.toLowerCase();
+    const found = [...this.names.keys()].filter((i) => this.names[i].toLowerCase().includes(wanted));
+    this.list.replaceChildren(...found.slice(0, MOST_LISTED).map((i) => this.#row(i)));
+    this.more.textContent = found.length > MOST_LISTED ? `and ${found.length - MOST_LISTED} more` : "";
+  }
+
+  #row(i) {
+    const [row, label, box] = ["li", "label", "input"].map((name) => document.createElement(name));
+    Object.assign(box, { type: "checkbox", value: i, checked: !this.hidden.has(this.names[i]) });
+    label.append(box, this.names[i] || "(no name)");
+    row.append(label);
+    return row;
+  }
+
+  #toggle(name, isShown) {
+    const hidden = new Set(this.hidden);
+    if (isShown) hidden.delete(name);
+    else hidden.add(name);
+    this.hidden = hidden;
+    this.on.hide(hidden);
+  }
+}
+
+function labelOf({ fields }, name) {
+  const { components, kind } = fields.get(name);
+  return components > 1 && kind !== "color" ? `${name} (length)` : name;
+}
