@@ -15,10 +15,11 @@ from gvpipe import notes
 from gvpipe.atomic import atomic_path
 from gvpipe.errors import InputError, OutputError
 from gvpipe.io.alembic.archive import EXTRA
-from gvpipe.io.alembic.param_writer import ParamWriter, filled
+from gvpipe.io.alembic.param_writer import ParamWriter, filled, is_held
 from gvpipe.io.scene_export import ExportMesh, export_layer, export_meshes, uncovered
 from gvpipe.io.scene_frames import one_line
 from gvpipe.io.scene_normals import SceneNormals
+from gvpipe.notes import not_held
 from gvpipe.sequence import MeshSequence
 
 BYTES = 16 << 20  # of a field's frames at a time
@@ -59,6 +60,8 @@ def _write_archive(sequence: MeshSequence, meshes: list[ExportMesh], normals: Sc
             for writer in writers:
                 writer.write(whole, turned)
     for name, field in normals.fields.items():
+        if not is_held(field.kind, field.n_components):
+            continue
         step = max(1, BYTES // (4 * field.shape[1] * field.n_components))
         for first in range(0, len(field), step):
             block = field.read(first, min(first + step, len(field)))
@@ -146,7 +149,7 @@ class MeshWriter:
         """Add texture coordinates and normals to the first sample, and the other attributes beside."""
         for name, attribute in self._normals.attributes.items():
             layer = export_layer(name, attribute, self._mesh)
-            if not len(layer.values):
+            if not len(layer.values) or not is_held(layer.kind, layer.values.shape[1]):
                 continue
             if name == "uv" and attribute.kind == "uv":
                 sample.setUVs(self._params.sample(layer))
@@ -173,7 +176,9 @@ class MeshWriter:
 
 
 def _notes(sequence: MeshSequence, meshes: list[ExportMesh]) -> tuple[str, ...]:
-    said = []
+    wide = [name for name, each in sequence.attributes.items() if not is_held(each.kind, each.values.shape[1])]
+    wide += [name for name, each in sequence.fields.items() if not is_held(each.kind, each.n_components)]
+    said = list(not_held("Alembic", wide))
     if sequence.materials:
         said.append("Alembic has no materials; face sets have their names, and textures were left out")
     lost = uncovered(sequence, meshes)
