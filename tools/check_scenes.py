@@ -47,6 +47,7 @@ class Row:
     held: str
     distance: str
     is_far: bool = False
+    seconds: float = 0.0
 
 
 def main() -> int:
@@ -62,7 +63,8 @@ def main() -> int:
     is_far = False
     for row in check(given.folder, given.kind, given.only):
         is_far |= row.is_far
-        print(f"| {row.file} | {row.held} | {row.distance} |" if given.markdown else f"{row.file}: {row.held}; {row.distance}")
+        plain = f"{row.file}: {row.held}; {row.distance}; {row.seconds:.2f} s"
+        print(f"| {row.file} | {row.held} | {row.distance} |" if given.markdown else plain)
     return int(is_far)
 
 
@@ -88,22 +90,20 @@ def check_file(path: Path, name: str, references: list[Path], mesh: Path | None)
     seconds = time.perf_counter() - started
     lacks = next((lack for end, lack in OTHERS.items() if name.endswith(end)), "")
     if lacks or not references:
-        return Row(name, f"{describe(sequence)}, {seconds:.2f} s", f"the reference has {lacks}" if lacks else "no reference")
+        return Row(name, describe(sequence), f"the reference has {lacks}" if lacks else "no reference", seconds=seconds)
     distances = [distance(sequence, reference, path.name in BAKED) for reference in references]
     known = [found for found in distances if found is not None]
     if not known:
-        return Row(name, f"{describe(sequence)}, {seconds:.2f} s", "the reference is of another space or order")
-    return Row(name, f"{describe(sequence)}, {seconds:.2f} s", f"{max(known):.1e}", max(known) > LIMIT)
+        return Row(name, describe(sequence), "the reference is of another space or order", seconds=seconds)
+    return Row(name, describe(sequence), f"{max(known):.1e}", max(known) > LIMIT, seconds)
 
 
 def describe(sequence: MeshSequence) -> str:
-    """``5 parts, 921 vertices, 1724 triangles, 20 frames at 24, normal, uv (corner), 2 materials``."""
-    held = [
-        f"{len(sequence.parts)} parts, {sequence.n_vertices} vertices, {len(sequence.faces)} triangles",
-        f"{sequence.n_frames} frames at {sequence.fps:g}",
-        *(f"{name} ({each.domain})" for name, each in sequence.attributes.items()),
-        *(f"field {name} ({each.domain})" for name, each in sequence.fields.items()),
-    ]
+    """``V 921, T 1724, F 20 at 24 fps; 6 parts; normal, uv (corner)``."""
+    held = [f"V {sequence.n_vertices}, T {len(sequence.faces)}, F {sequence.n_frames} at {sequence.fps:g} fps"]
+    held += [f"{len(sequence.parts)} parts"] if len(sequence.parts) > 1 else []
+    held += [f"{name} ({each.domain})" for name, each in sequence.attributes.items()]
+    held += [f"field {name} ({each.domain})" for name, each in sequence.fields.items()]
     held += [f"{len(sequence.materials)} materials"] if sequence.materials else []
     held += [f"{len(sequence.images)} images"] if sequence.images else []
     return ", ".join(held)

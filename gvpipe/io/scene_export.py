@@ -86,12 +86,18 @@ def uncovered(sequence: MeshSequence, meshes: Sequence[ExportMesh]) -> int:
 
 
 def export_layer(name: str, attribute: Attribute, mesh: ExportMesh) -> Layer:
-    """An attribute on one mesh. Corner values that are used are kept once each; of a polygon's triangles the first counts."""
+    """An attribute on one mesh. Corner values that are used are kept once each; of a polygon's triangles the first counts.
+
+    What a part has becomes that of its polygons.
+    """
     own = np.arange(len(attribute.values)) if attribute.indices is None else attribute.indices
     if attribute.domain == "vertex":
         return Layer(name, attribute.kind, "vertex", attribute.values[own[slice(*mesh.vertices)]])
     if attribute.domain == "part":
-        return Layer(name, attribute.kind, "constant", attribute.values[own[mesh.part]][None])
+        rows = np.zeros(len(mesh.counts), np.int64)
+        for number, (start, stop, _) in enumerate(mesh.groups):
+            rows[start:stop] = own[mesh.part + number]
+        return Layer(name, attribute.kind, "polygon", attribute.values[rows])
     if attribute.domain == "triangle":
         first = mesh.triangles[0] + polygon_starts(mesh.counts.astype(np.int64))
         return Layer(name, attribute.kind, "polygon", attribute.values[own[first]])

@@ -14,6 +14,7 @@ import numpy as np
 from gvpipe.arrays import Array, Float64, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.io.scene_mesh import Fans, Layer, SceneMesh
+from gvpipe.mesh.unique_rows import row_ids
 
 
 def join_layers(
@@ -88,13 +89,12 @@ def _shared(layer: Layer, rows: Int64) -> tuple[Array, Int64]:
     """Values of corners without indices of their own: equal ones become one."""
     if layer.indices is not None or layer.domain != "corner":
         return layer.values, rows
-    values = np.ascontiguousarray(layer.values)
-    keys = values.view(np.dtype((np.void, values.dtype.itemsize * values.shape[1]))).reshape(-1)
-    _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
+    bits = np.ascontiguousarray(layer.values)
+    ids, first = row_ids(bits.view(np.int32) if bits.dtype == np.float32 else bits)
     order = np.argsort(first, kind="stable")  # values in the order of the file
     rank = np.empty(len(order), np.int64)
     rank[order] = np.arange(len(order))
-    return values[first[order]], np.asarray(rank[inverse.reshape(-1)][rows])
+    return layer.values[first[order]], np.asarray(rank[ids][rows])
 
 
 def _stand_in(kind: str, width: int, dtype: np.dtype[Any], mesh: SceneMesh, fans: Fans, positions: Float64) -> Layer:

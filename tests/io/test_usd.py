@@ -5,10 +5,12 @@ from __future__ import annotations
 import sys
 import zipfile
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image as Pillow
 from scenes import FACES, assert_same, scene
 
 from gvpipe import io
@@ -226,7 +228,7 @@ def test_meshes_that_are_not_shown_are_left_out(tmp_path: Path) -> None:
     read = io.read(stage(tmp_path, body))
     assert [part.name for part in read.parts] == ["seen"]
     assert any("no meshes were left out: 1 Sphere" in note for note in read.notes)
-    assert any("2 meshes are invisible, guides or proxies" in note for note in read.notes)
+    assert any("2 of 3 meshes are invisible, guides or proxies" in note for note in read.notes)
 
 
 def test_layers_of_some_meshes_get_a_stand_in(tmp_path: Path) -> None:
@@ -279,6 +281,62 @@ def test_textures_stay_inside_of_the_folder(tmp_path: Path) -> None:
     outside = io.read(inside / "a.usda")
     assert not outside.images
     assert any("../check.png lies outside of the file's folder; it was left out" in note for note in outside.notes)
+
+
+TEXTURED = """
+def Mesh "m" (prepend apiSchemas = ["MaterialBindingAPI"]) { %s
+    texCoord2f[] primvars:map1 = [(0, 0), (1, 0), (0, 1)] ( interpolation = "vertex" )
+    rel material:binding = </look>
+}
+def Material "look" {
+    token outputs:surface.connect = </look/s.outputs:surface>
+    def Shader "s" {
+        uniform token info:id = "UsdPreviewSurface"
+        float inputs:metallic.connect = </look/metal.outputs:r>
+        float inputs:roughness.connect = </look/rough.outputs:g>
+        float inputs:opacity.connect = </look/metal.outputs:r>
+        int inputs:useSpecularWorkflow = 1
+        token outputs:surface
+    }
+    def Shader "metal" {
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @./metal.png@
+        float2 inputs:st.connect = </look/uv.outputs:result>
+        float outputs:r
+    }
+    def Shader "rough" {
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @./rough.png@
+        float4 inputs:scale = (1, 0.5, 1, 1)
+        float2 inputs:st.connect = </look/uv.outputs:result>
+        token inputs:wrapS = "mirror"
+        float outputs:g
+    }
+    def Shader "uv" {
+        uniform token info:id = "UsdPrimvarReader_float2"
+        string inputs:varname = "map1"
+        float2 outputs:result
+    }
+}
+"""
+
+
+def test_metallic_and_roughness_of_two_files_become_one(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    metal, rough = (rng.integers(0, 256, (4, 6, 3)).astype(np.uint8) for _ in range(2))
+    Pillow.fromarray(metal).save(tmp_path / "metal.png")
+    Pillow.fromarray(rough).save(tmp_path / "rough.png")
+    read = io.read(stage(tmp_path, TEXTURED % TRIANGLE))
+    (material,) = read.materials
+    both = material.metallic_roughness_texture
+    assert both is not None
+    assert len(read.images) == 1
+    pixels = np.asarray(Pillow.open(BytesIO(read.images[both.image].data)))
+    assert np.array_equal(pixels[..., 1], rough[..., 1])
+    assert np.array_equal(pixels[..., 2], metal[..., 0])
+    assert (material.metallic, material.roughness, both.uv, both.wrap) == (1, 0.5, "uv", ("mirror", "repeat"))
+    assert any("the texture of opacity is not the alpha of its colour" in note for note in read.notes)
+    assert any("has a specular colour, which was left out" in note for note in read.notes)
 
 
 CHANGING = TRIANGLE.replace(

@@ -90,6 +90,11 @@ class ParamWriter:
         return param
 
 
+def is_held(kind: str, width: int) -> bool:
+    """Whether Alembic has parameters of that many numbers."""
+    return width <= 3 or (kind == "color" and width == 4)
+
+
 def _types(kind: str, values: Array) -> tuple[str, str, Array]:
     """The library's name of a parameter, of the array that it takes, and the values as that array needs them."""
     width = values.shape[1]

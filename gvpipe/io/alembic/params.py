@@ -64,6 +64,12 @@ def layers_of(schema: Any, polygons: SceneMesh, turn: Float64) -> tuple[tuple[La
     return tuple(layers), left
 
 
+def changing_normals(schema: Any) -> bool:
+    """Whether a mesh has normals that change over time."""
+    param = schema.getNormalsParam() if hasattr(schema, "getNormalsParam") else None
+    return bool(param and param.valid() and param.getNumSamples() > 1 and not param.isConstant())
+
+
 def sampled_of(schema: Any, polygons: SceneMesh) -> dict[str, Sampled]:
     """The parameters of a mesh that change over time and can be fields: per vertex or polygon, not indexed, no uv."""
     found: dict[str, Sampled] = {}

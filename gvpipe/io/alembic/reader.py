@@ -17,12 +17,13 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
 from gvpipe.io.alembic.archive import Node, alembic_errors, find_meshes, open_archive, sample_of
 from gvpipe.io.alembic.motion import AlembicMotion
-from gvpipe.io.alembic.params import layers_of, sampled_of
+from gvpipe.io.alembic.params import changing_normals, layers_of, sampled_of
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_fields import join_fields
 from gvpipe.io.scene_frames import SceneFrames, even_times
 from gvpipe.io.scene_layers import join_layers
 from gvpipe.io.scene_mesh import SceneMesh, join
+from gvpipe.io.scene_normals import first_normals_note
 from gvpipe.notes import DEFAULT_FPS
 from gvpipe.sequence import MeshSequence
 
@@ -53,11 +54,11 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
         raise InputError(f"{where} has no polygon mesh{held}; a mesh with triangles is needed")
     notes = []
     if shown and len(shown) < len(motions):
-        notes.append(f"{len(motions) - len(shown)} meshes are hidden; they were left out")
+        notes.append(f"{len(motions) - len(shown)} of {len(motions)} meshes are hidden; they were left out")
     motions = shown or motions
     cages = sum("SubD" in motion.node.kind for motion in motions)
     if cages:
-        notes.append(f"{cages} meshes are cages of subdivision surfaces; the cages were read as they are")
+        notes.append(f"{cages} of {len(motions)} meshes are cages of subdivision surfaces; the cages were read as they are")
     drawn = sorted(set(others) & {"Points", "Curve", "NuPatch"})
     if drawn:
         notes.append(f"{', '.join(drawn)} beside the meshes were left out")
@@ -71,6 +72,8 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
     sampled = [sampled_of(motion.node.schema, mesh) for motion, mesh in zip(motions, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times)
+    moves = any(changing_normals(motion.node.schema) for motion in motions)
+    unruled = first_normals_note(moves, attributes, joined.faces, frames[0:1][0])
     left = list(dict.fromkeys(name for names in (*(names for _, names in read), torn) for name in names))
     left_note = (f"parameters that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()
     return MeshSequence(
@@ -80,7 +83,7 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
         attributes,
         where,
         frames.origin,
-        (*notes, *time_notes, *layer_notes, *left_note),
+        (*notes, *time_notes, *layer_notes, *unruled, *left_note),
         fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,

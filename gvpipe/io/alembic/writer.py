@@ -15,9 +15,11 @@ from gvpipe import notes
 from gvpipe.atomic import atomic_path
 from gvpipe.errors import InputError, OutputError
 from gvpipe.io.alembic.archive import EXTRA
-from gvpipe.io.alembic.param_writer import ParamWriter, filled
+from gvpipe.io.alembic.param_writer import ParamWriter, filled, is_held
 from gvpipe.io.scene_export import ExportMesh, export_layer, export_meshes, uncovered
 from gvpipe.io.scene_frames import one_line
+from gvpipe.io.scene_normals import SceneNormals
+from gvpipe.notes import not_held
 from gvpipe.sequence import MeshSequence
 
 BYTES = 16 << 20  # of a field's frames at a time
@@ -35,27 +37,31 @@ def write_alembic(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     except ImportError as exc:
         raise InputError(f"{path}: {EXTRA}") from exc
     meshes = export_meshes(sequence, path.stem)
+    normals = SceneNormals(sequence, "Alembic")
     try:
         with atomic_path(path) as temporary:
-            _write_archive(sequence, meshes, str(temporary))  # the library closes the file when its objects are gone
+            _write_archive(sequence, meshes, normals, str(temporary))  # the library closes the file when its objects are gone
     except RuntimeError as exc:
         raise OutputError(f"cannot write {path}: {one_line(exc)}; check the folder and the disk") from exc
-    return _notes(sequence, meshes)
+    return (*normals.notes, *_notes(sequence, meshes))
 
 
-def _write_archive(sequence: MeshSequence, meshes: list[ExportMesh], path: str) -> None:
+def _write_archive(sequence: MeshSequence, meshes: list[ExportMesh], normals: SceneNormals, path: str) -> None:
     from alembic3d import Abc, AbcCoreAbstract
 
     archive = Abc.CreateArchiveWithInfo(path, float(sequence.fps), "gvpipe", sequence.metadata.source or sequence.name)
     sampling = AbcCoreAbstract.TimeSampling(1.0 / sequence.fps, float(sequence.metadata.start_time))
     tree = Tree(archive.getTop())
-    writers = [MeshWriter(tree, mesh, sequence, sampling) for mesh in meshes]
-    for _, block in sequence.chunks():
-        for frame in block:
+    writers = [MeshWriter(tree, mesh, sequence, normals, sampling) for mesh in meshes]
+    for first, block in sequence.chunks():
+        for i, frame in enumerate(block):
+            turned = normals.of(first + i, frame)
             whole = (frame + sequence.origin).astype(np.float32) if sequence.origin.any() else frame
             for writer in writers:
-                writer.write(whole)
-    for name, field in sequence.fields.items():
+                writer.write(whole, turned)
+    for name, field in normals.fields.items():
+        if not is_held(field.kind, field.n_components):
+            continue
         step = max(1, BYTES // (4 * field.shape[1] * field.n_components))
         for first in range(0, len(field), step):
             block = field.read(first, min(first + step, len(field)))
@@ -101,8 +107,9 @@ class Tree:
 class MeshWriter:
     """Writes one mesh: all that it has with the first frame, points alone with the others."""
 
-    def __init__(self, tree: Tree, mesh: ExportMesh, sequence: MeshSequence, sampling: Any) -> None:
-        self._mesh, self._sequence = mesh, sequence
+    def __init__(self, tree: Tree, mesh: ExportMesh, sequence: MeshSequence, normals: SceneNormals, sampling: Any) -> None:
+        self._mesh, self._sequence, self._normals = mesh, sequence, normals
+        self._rows = normals.rows(mesh)
         self._object = tree.mesh(mesh.parent, mesh.name)  # it must outlive its schema
         self._schema = self._object.getSchema()
         self._schema.setTimeSampling(sampling)
@@ -112,8 +119,8 @@ class MeshWriter:
         self._params = ParamWriter(self._schema, self._order, sampling)
         self._is_first = True
 
-    def write(self, points: Any) -> None:
-        """Write the points of the next frame, given all of the sequence's ``(V, 3)``."""
+    def write(self, points: Any, normals: Any) -> None:
+        """Write the next frame, given all of the sequence's points ``(V, 3)`` and its normals ``(N, 3)`` or None."""
         import imath
         from alembic3d import AbcGeom
 
@@ -123,6 +130,8 @@ class MeshWriter:
             sample.setFaceIndices(filled(imath.IntArray, self._mesh.corners[self._order].astype(np.int32)))
             sample.setFaceCounts(filled(imath.IntArray, self._mesh.counts))
             self._describe(sample)
+        if normals is not None:
+            sample.setNormals(self._params.sample(self._normals.layer(normals, self._mesh, self._rows)))
         self._schema.set(sample)
         if self._is_first:
             self._write_face_sets()
@@ -138,9 +147,9 @@ class MeshWriter:
 
     def _describe(self, sample: Any) -> None:
         """Add texture coordinates and normals to the first sample, and the other attributes beside."""
-        for name, attribute in self._sequence.attributes.items():
+        for name, attribute in self._normals.attributes.items():
             layer = export_layer(name, attribute, self._mesh)
-            if not len(layer.values):
+            if not len(layer.values) or not is_held(layer.kind, layer.values.shape[1]):
                 continue
             if name == "uv" and attribute.kind == "uv":
                 sample.setUVs(self._params.sample(layer))
@@ -167,7 +176,9 @@ class MeshWriter:
 
 
 def _notes(sequence: MeshSequence, meshes: list[ExportMesh]) -> tuple[str, ...]:
-    said = []
+    wide = [name for name, each in sequence.attributes.items() if not is_held(each.kind, each.values.shape[1])]
+    wide += [name for name, each in sequence.fields.items() if not is_held(each.kind, each.n_components)]
+    said = list(not_held("Alembic", wide))
     if sequence.materials:
         said.append("Alembic has no materials; face sets have their names, and textures were left out")
     lost = uncovered(sequence, meshes)

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from gvpipe.asset.material import Material, Texture
+from gvpipe.asset.material import Image, Material, Texture
 from gvpipe.io.usd.names import name_of
 from gvpipe.io.usd.textures import CHANNELS, Textures
 
@@ -56,6 +56,16 @@ class Materials:
             changes = {role: replace(each, uv=named.get(each.uv, "uv")) for role, each in material.textures.items()}
             self.materials[number] = replace(material, **changes)  # type: ignore[arg-type]
 
+    def drawn(self) -> tuple[tuple[Material, ...], tuple[Image, ...]]:
+        """The materials, and the images that they show; those that were put into one are left out."""
+        used = sorted({texture.image for material in self.materials for texture in material.textures.values()})
+        place = {image: number for number, image in enumerate(used)}
+        result = []
+        for material in self.materials:
+            changes = {role: replace(each, image=place[each.image]) for role, each in material.textures.items()}
+            result.append(replace(material, **changes))  # type: ignore[arg-type]
+        return tuple(result), tuple(self.textures.images[image] for image in used)
+
     def notes(self) -> tuple[str, ...]:
         """What could not be read of materials and textures."""
         plain = tuple(dict.fromkeys(self.plain))
@@ -74,6 +84,7 @@ class Materials:
         threshold, _ = self._number(surface, "opacityThreshold", 0.0)
         metallic, metallic_texture = self._number(surface, "metallic", 0.0)
         roughness, roughness_texture = self._number(surface, "roughness", 0.5)
+        self._note_losses(name, surface, base_texture, opacity_texture)
         combined = self.textures.combine(metallic_texture, roughness_texture)
         seen = opacity < 1 or opacity_texture is not None
         return Material(
@@ -90,6 +101,15 @@ class Materials:
             "mask" if threshold > 0 else "blend" if seen else "opaque",
             threshold if threshold > 0 else 0.5,
         )
+
+    def _note_losses(self, name: str, surface: Any, base: Any, opacity: Any) -> None:
+        """Say what of a surface has no place in glTF's metallic-roughness model."""
+        if opacity and not (base and base.texture.image == opacity.texture.image and opacity.output == "a"):
+            self.textures.notes.append(
+                f"material {name}: the texture of opacity is not the alpha of its colour; it was left out"
+            )
+        if _value(surface, "useSpecularWorkflow"):
+            self.textures.notes.append(f"material {name} has a specular colour, which was left out")
 
     def _color(self, surface: Any, name: str, fallback: tuple[float, float, float]) -> tuple[tuple[float, float, float], Any]:
         """A colour, or the texture in its place and what that is multiplied with."""

@@ -47,22 +47,23 @@ def find_meshes(stage: Any) -> Found:
         (hidden if is_hidden else shown).append(UsdGeom.Mesh(prim))
     notes = []
     if hidden and shown:
-        notes.append(f"{len(hidden)} meshes are invisible, guides or proxies; they were left out, such as {_path(hidden[0])}")
+        some = f"{len(hidden)} of {len(hidden) + len(shown)} meshes"
+        notes.append(f"{some} are invisible, guides or proxies; they were left out, such as {_path(hidden[0])}")
     elif hidden:
         notes.append(f"all {len(hidden)} meshes are invisible, guides or proxies; they were read nevertheless")
     if flickering:
-        notes.append(f"the visibility of {flickering} meshes changes over time; they are shown always")
+        notes.append(f"meshes whose visibility changes over time are shown always: {flickering}")
     if others:
         held = ", ".join(f"{count} {kind}" for kind, count in sorted(others.items()))
         notes.append(f"prims that are no meshes were left out: {held}")
     if n_instancers:
         notes.append(
-            f"{n_instancers} point instancers were not expanded; their prototypes were read once each, where they stand"
+            f"point instancers were not expanded ({n_instancers}); their prototypes were read once each, where they stand"
         )
     meshes = shown or hidden
     cages = sum(mesh.GetSubdivisionSchemeAttr().Get() not in (None, "none") for mesh in meshes)
     if cages:
-        notes.append(f"{cages} meshes are cages of subdivision surfaces; the cages were read as they are")
+        notes.append(f"{cages} of {len(meshes)} meshes are cages of subdivision surfaces; the cages were read as they are")
     return Found(tuple(meshes), tuple(notes))
 
 

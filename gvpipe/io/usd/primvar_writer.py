@@ -48,6 +48,11 @@ def write_field(name: str, field: Field, meshes: list[tuple[Any, ExportMesh]], s
                 _write(drawn, _usd_name(name, field.kind), layer, layer.values, start + first + i)
 
 
+def write_layer(drawn: Any, layer: Layer, time: float) -> None:
+    """Write a layer's values at a time code; where they are indexed, the indices are those of every time."""
+    _write(drawn, _usd_name(layer.name, layer.kind), layer, layer.values, time)
+
+
 def _write_color(drawn: Any, layer: Layer) -> None:
     colors = as_unit_range(layer.values)
     _write(drawn, "displayColor", layer, colors[:, :3])

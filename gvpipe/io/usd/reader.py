@@ -15,6 +15,7 @@ from gvpipe.io.scene_fields import join_fields
 from gvpipe.io.scene_frames import SceneFrames
 from gvpipe.io.scene_layers import join_layers
 from gvpipe.io.scene_mesh import SceneMesh, join
+from gvpipe.io.scene_normals import first_normals_note
 from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.meshes import find_meshes, groups_of, polygons_of
 from gvpipe.io.usd.motion import Skins, UsdMotion
@@ -63,8 +64,11 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
     sampled = [sampled_of(found.meshes[number], mesh, float(times[0])) for number, mesh in zip(kept, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times)
+    moves = any(_has_moving_normals(motion.prim) for motion in motions)
+    unruled = first_normals_note(moves, attributes, joined.faces, frames[0:1][0])
     left = list(dict.fromkeys(name for names in (*(names for _, names in read), torn) for name in names))
     left_note = (f"primvars that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()
+    drawn, images = materials.drawn()
     return MeshSequence(
         frames,
         joined.faces,
@@ -72,12 +76,12 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
         attributes,
         where,
         frames.origin,
-        (*found.notes, *time_notes, *materials.notes(), *layer_notes, *left_note, *outside_note(stage, path)),
+        (*found.notes, *time_notes, *materials.notes(), *layer_notes, *unruled, *left_note, *outside_note(stage, path)),
         fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,
-        materials=tuple(materials.materials),
-        images=tuple(materials.textures.images),
+        materials=drawn,
+        images=images,
         metadata=_metadata(stage, path, float(times[0])),
     )
 
@@ -99,6 +103,13 @@ def _read_mesh(mesh: Any, motion: UsdMotion, materials: Materials, time: float, 
     layers, uv_names, left = layers_of(mesh, plain, time, turn)
     materials.name_uv(bound, uv_names)
     return replace(plain, layers=layers), left
+
+
+def _has_moving_normals(prim: Any) -> bool:
+    from pxr import UsdGeom
+
+    primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals")
+    return bool(primvar.ValueMightBeTimeVarying() if primvar else UsdGeom.Mesh(prim).GetNormalsAttr().ValueMightBeTimeVarying())
 
 
 def _metadata(stage: Any, path: Path, start: float) -> Metadata:

@@ -19,9 +19,10 @@ from gvpipe.atomic import atomic_path
 from gvpipe.errors import InputError, OutputError
 from gvpipe.io.scene_export import ExportMesh, export_meshes, uncovered
 from gvpipe.io.scene_frames import one_line
+from gvpipe.io.scene_normals import SceneNormals
 from gvpipe.io.usd.material_writer import MaterialWriter
 from gvpipe.io.usd.names import ADDED, identifier, name_prim
-from gvpipe.io.usd.primvar_writer import write_field, write_primvars
+from gvpipe.io.usd.primvar_writer import write_field, write_layer, write_primvars
 from gvpipe.io.usd.stage import EXTRA
 from gvpipe.sequence import MeshSequence
 
@@ -95,10 +96,13 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str) -
     if any(path.count("/") > len(mesh.parent.split("/")) + bool(mesh.parent) for path, mesh in zip(paths, meshes, strict=True)):
         top.SetCustomDataByKey(ADDED, True)
     materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, image_names(sequence))
-    said: list[str] = []
-    drawn = [_define(stage, where, mesh, sequence, materials, said) for where, mesh in zip(paths, meshes, strict=True)]
-    _write_points(sequence, list(zip(drawn, meshes, strict=True)), start)
-    for field_name, field in sequence.fields.items():
+    normals = SceneNormals(sequence, "USD")
+    said = list(normals.notes)
+    drawn = [_define(stage, where, mesh, sequence, materials) for where, mesh in zip(paths, meshes, strict=True)]
+    for each, mesh in zip(drawn, meshes, strict=True):
+        said.extend(write_primvars(each, mesh, normals.attributes))
+    _write_frames(sequence, list(zip(drawn, meshes, strict=True)), normals, start)
+    for field_name, field in normals.fields.items():
         write_field(field_name, field, list(zip(drawn, meshes, strict=True)), start)
     stage.GetRootLayer().Save()
     return (*dict.fromkeys(said), *_notes(sequence, meshes))
@@ -114,9 +118,7 @@ def _new_stage(path: Path) -> Any:
     return Usd.Stage.Open(layer)
 
 
-def _define(
-    stage: Any, where: str, mesh: ExportMesh, sequence: MeshSequence, materials: MaterialWriter, said: list[str]
-) -> Any:
+def _define(stage: Any, where: str, mesh: ExportMesh, sequence: MeshSequence, materials: MaterialWriter) -> Any:
     """One mesh without points."""
     from pxr import UsdGeom, UsdShade, Vt
 
@@ -132,7 +134,6 @@ def _define(
     drawn.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     drawn.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(mesh.counts, np.int32)))
     drawn.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.corners.astype(np.int32)))
-    said.extend(write_primvars(drawn, mesh, sequence.attributes))
     bound = [material for _, _, material in mesh.groups]
     if any(material is not None and sequence.materials[material].double_sided for material in bound):
         drawn.CreateDoubleSidedAttr(True)
@@ -147,14 +148,18 @@ def _define(
     return drawn
 
 
-def _write_points(sequence: MeshSequence, meshes: list[tuple[Any, ExportMesh]], start: float) -> None:
-    """Points and extents of every frame."""
+def _write_frames(sequence: MeshSequence, meshes: list[tuple[Any, ExportMesh]], normals: SceneNormals, start: float) -> None:
+    """Points, extents and normals of every frame."""
+    rows = [normals.rows(mesh) for _, mesh in meshes]
     held = [PointsWriter(drawn, start, sequence.n_frames > 1) for drawn, _ in meshes]
     for first, block in sequence.chunks():
         for i, frame in enumerate(block):
             whole = (frame + sequence.origin).astype(np.float32) if sequence.origin.any() else frame
-            for writer, (_, mesh) in zip(held, meshes, strict=True):
+            turned = normals.of(first + i, frame)
+            for writer, (drawn, mesh), own in zip(held, meshes, rows, strict=True):
                 writer.write(first + i, np.ascontiguousarray(whole[slice(*mesh.vertices)]))
+                if turned is not None:
+                    write_layer(drawn, normals.layer(turned, mesh, own), start + first + i)
 
 
 class PointsWriter:
