@@ -94,7 +94,8 @@ def decode_segment(data: bytes, shape: tuple[int, ...], dtype: np.dtype[np.gener
     if n_rows:
         result[:, :, constant] = cursor.array(dtype.str, int(constant.sum()))
     if n_rows and not constant.all():
-        numbers = _decode_numbers(cursor, mode, (int((~constant).sum()), frames), place)
+        with np.errstate(over="ignore", invalid="ignore"):  # of damaged bytes; what is not finite is refused below
+            numbers = _decode_numbers(cursor, mode, (int((~constant).sum()), frames), place)
         values = from_integers(_whole(numbers), dtype) if mode == EXACT else from_numbers(numbers, dtype)
         if values is None:
             raise cursor.corrupt("a value is out of its type's range")
