@@ -29,7 +29,7 @@ TOP = 1 << 24  # range below which a byte leaves
 RANGE = (1 << 32) - 1
 LOW, EXTENT, PLACE = 0, 1, 2  # of a coder's state; in a decoder LOW is the code's distance from the lower end
 RATE_BITS = 18  # a mixer's learning: error times logit, shifted by so much
-RATE = 3
+RATE = 5
 
 
 class Mixing(NamedTuple):

@@ -14,9 +14,11 @@ filter of constant weights). The first one learns fast, the second one slowly. T
 inverse square of its recent squared errors. The weights of the first five signals, and the errors, start from what the nearest
 neighbours came to.
 
-Values are in steps. The step is twice the bound, and a residual is rounded to a whole step, so that no value misses the
-bound. With ``whole`` values are integers and predictions are rounded; then only the order of plain IEEE operations on float64
-matters, which is the same everywhere, and the round trip is exact.
+Values are in steps. The step is twice the bound, and a residual is rounded to a whole step, so that no value misses the bound.
+
+Exact values come in two kinds. Of integers, predictions are rounded. Of float32, a residual counts the numbers of float32
+from the one nearest to the prediction, in the order of floats; values are in units of a power of two. Both decode alike
+wherever float64 and float32 are IEEE's and sums keep their order.
 
 Source: Vasa and Skala 2010, section 3.4 (weights learnt from earlier components; see `gvpipe.trajectory.prediction`). S.
 Haykin, "Adaptive Filter Theory", 2002, chapter 9 (recursive least squares).
@@ -24,36 +26,56 @@ Haykin, "Adaptive Filter Theory", 2002, chapter 9 (recursive least squares).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from gvpipe.arrays import Bool, Float64, Int64
 from gvpipe.trajectory.causal_order import CausalOrder
 
 
-def predict_values(target: Float64, n_frames: int, causal: CausalOrder, still: Bool, whole: bool) -> tuple[Int64, Float64]:
-    """Return the residuals ``(R, N)`` of ``target (R, N)``, N = C F columns, in steps, and what the decoder will have.
+@dataclass(frozen=True)
+class Kind:
+    """What residuals are: whole steps of real numbers by default.
 
     Args:
-        target: values in steps, component after component.
+        whole: values are integers, kept exactly.
+        unit: above 0: values are float32 over this power of two, kept exactly.
+    """
+
+    whole: bool = False
+    unit: float = 0.0
+
+
+STEPS, WHOLE = Kind(), Kind(whole=True)
+
+
+def predict_values(target: Float64, n_frames: int, causal: CausalOrder, still: Bool, kind: Kind = STEPS) -> Int64:
+    """Return the residuals ``(R, N)`` of ``target (R, N)``, N = C F columns.
+
+    Args:
+        target: values in steps, or as ``kind`` says, component after component.
         n_frames: F.
         causal: the order of the R rows.
         still: ``(R,)`` rows that keep each component's first value.
-        whole: whether values are integers, to be kept exactly.
+        kind: of the residuals.
     """
     residuals, decoded = np.zeros(target.shape, np.int64), np.zeros(target.shape)
-    _run(residuals, decoded, target, (n_frames, causal, still, whole))
-    return residuals, decoded
+    _run(residuals, decoded, target, (n_frames, causal, still, kind))
+    return residuals
 
 
-def restore_values(residuals: Int64, n_frames: int, causal: CausalOrder, still: Bool, whole: bool) -> Float64:
-    """Mirror of `predict_values`: values ``(R, N)`` in steps."""
+def restore_values(residuals: Int64, n_frames: int, causal: CausalOrder, still: Bool, kind: Kind = STEPS) -> Float64:
+    """Mirror of `predict_values`: values ``(R, N)``; NaN where a residual leads to no float32."""
     decoded = np.zeros(residuals.shape)
-    _run(residuals, decoded, np.zeros((0, 0)), (n_frames, causal, still, whole))
+    _run(residuals, decoded, np.zeros((0, 0)), (n_frames, causal, still, kind))
     return decoded
 
 
-def _run(residuals: Int64, decoded: Float64, target: Float64, shared: tuple[int, CausalOrder, Bool, bool]) -> None:
-    from gvpipe.fields.prediction_kernels import FieldCoding, predict_rows
+def _run(residuals: Int64, decoded: Float64, target: Float64, shared: tuple[int, CausalOrder, Bool, Kind]) -> None:
+    from gvpipe.fields import prediction_kernels as kernels
 
-    n_frames, causal, still, whole = shared
-    predict_rows(FieldCoding(causal, n_frames, still, whole, residuals, decoded, np.ascontiguousarray(target)))
+    n_frames, causal, still, kind = shared
+    number = kernels.FLOATS if kind.unit else kernels.WHOLE if kind.whole else kernels.STEPS
+    target = np.ascontiguousarray(target)
+    kernels.predict_rows(kernels.FieldCoding(causal, n_frames, still, number, kind.unit, residuals, decoded, target))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from gvpipe.trajectory.causal_order import CausalOrder
 N_SHARED = 5  # signals whose weights pass from row to row
 MOST_NEAR = 20  # neighbours that are signals of their own
 FIRST_NOISE = 4.0  # of rows without neighbours, steps squared
+STEPS, WHOLE, FLOATS = range(3)  # residuals are steps of real numbers, integers, or numbers of float32
+LARGEST_FLOAT = float(np.finfo(np.float32).max)
 FARTHEST = 2.0**37  # magnitude of a prediction, steps
 DOUBT = 0.01  # part of a weight's variance that a value leaves at least, so that rounding cannot grow
 N_FILTERS = 2
@@ -32,7 +34,8 @@ class FieldCoding(NamedTuple):
         causal: order and neighbours of the R rows.
         n_frames: F.
         still: ``(R,)`` rows that keep each component's first value.
-        whole: predictions are rounded.
+        kind: `STEPS`, `WHOLE` or `FLOATS`.
+        unit: of `FLOATS`: values are multiples of it; a power of two.
         residuals: ``(R, N)``, N = C F columns.
         decoded: ``(R, N)``.
         target: ``(R, N)`` what to code; ``(0, 0)``: decode.
@@ -41,7 +44,8 @@ class FieldCoding(NamedTuple):
     causal: CausalOrder
     n_frames: int
     still: Bool
-    whole: bool
+    kind: int
+    unit: float
     residuals: Int64
     decoded: Float64
     target: Float64
@@ -178,13 +182,43 @@ def _code(coding: FieldCoding, row: int, n: int, guess: float) -> float:
     """Round the target's residual to whole steps, if there is a target; decode the value; return the residual."""
     if not -FARTHEST < guess < FARTHEST:  # NaN neither
         guess = 0.0
-    if coding.whole:
+    if coding.kind == FLOATS:
+        return _code_float(coding, row, n, guess)
+    if coding.kind == WHOLE:
         guess = np.rint(guess)
     if len(coding.target):
         coding.residuals[row, n] = np.int64(np.rint(coding.target[row, n] - guess))
     change = float(coding.residuals[row, n])
     coding.decoded[row, n] = guess + change
     return change
+
+
+@compiled
+def _code_float(coding: FieldCoding, row: int, n: int, guess: float) -> float:
+    """As `_code`, with residuals in float32 numbers: how many lie between prediction and value."""
+    near = _number(min(max(guess * coding.unit, -LARGEST_FLOAT), LARGEST_FLOAT))
+    if len(coding.target):
+        coding.residuals[row, n] = _number(coding.target[row, n] * coding.unit) - near
+    coding.decoded[row, n] = _float(near + coding.residuals[row, n]) / coding.unit
+    change: float = coding.decoded[row, n] - guess
+    return change
+
+
+@compiled
+def _number(value: float) -> int:
+    """The nearest float32, as an integer in the order of floats."""
+    bits: Any = np.int64(np.float32(value).view(np.int32))
+    number: int = bits if bits >= 0 else -1 - (bits & 0x7FFFFFFF)
+    return number
+
+
+@compiled
+def _float(number: int) -> float:
+    """Mirror of `_number`; NaN for what is no float32."""
+    if not -(1 << 31) <= number < 1 << 31:
+        return np.nan
+    bits = number if number >= 0 else (-1 - number) - (1 << 31)
+    return float(np.int32(bits).view(np.float32))
 
 
 @compiled

@@ -17,7 +17,7 @@ NODES = 256  # slots of one context: one per decision of a residual
 FIRST_BIT, SECOND_BIT, SIGN = 64, 128, 48
 N_FINE, N_COARSE = 64, 16  # classes of magnitudes
 N_MIXERS = 64
-N_NEAR = 6
+N_NEAR = 8
 ROOM = 6 * MAX_LENGTH  # bytes that a residual takes at most, by far
 LOOK_AHEAD = 3  # bytes that a decoder reads before they matter
 

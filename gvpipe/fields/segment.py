@@ -5,7 +5,7 @@ What repeats is left out, and the rest is coded by one mode.
 ::
 
     segment = [block] holes, [block] holds, [8 bits] mode, C x [8 bits] 1 where the component is constant, else 0,
-              value of each constant component, then if any is not: [float64] step (not if exact), [block] still, rest to the
+              value of each constant component, then if any is not: [float64] step or unit, [block] still, rest to the
               end
     holds   = nothing if all frames differ from the frame before, else [varint] D, [integers] D lengths - 1
     still   = nothing if no row keeps its values over all frames, else residuals of R flags
@@ -13,7 +13,7 @@ What repeats is left out, and the rest is coded by one mode.
 =============  ==========================================================================================
 mode           rest
 =============  ==========================================================================================
-0 exact        residuals of integers in the order of the values (`gvpipe.fields.prediction`, whole)
+0 exact        residuals of exact values (`gvpipe.fields.prediction`): integers, unit 1, or float32 in a unit of a power of two
 1 prediction   residuals in steps (`gvpipe.fields.prediction`)
 2 trajectories `gvpipe.fields.trajectories`
 3 derived      a derivation (`gvpipe.fields.derived`), then residuals in steps of what does not follow, as in mode 1
@@ -24,6 +24,7 @@ Blocks and rest hold the D distinct frames and the components that are not const
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import dataclass
 
@@ -36,16 +37,15 @@ from gvpipe.entropy.integers import decode_integers
 from gvpipe.errors import InputError, corrupt_section
 from gvpipe.fields.derived import Derivation, Span
 from gvpipe.fields.holes import decode_holes
-from gvpipe.fields.prediction import restore_values
+from gvpipe.fields.prediction import STEPS, WHOLE, Kind, restore_values
 from gvpipe.fields.residual_coding import decode_residuals
 from gvpipe.fields.trajectories import decode_trajectories
-from gvpipe.fields.values import from_integers, from_numbers
+from gvpipe.fields.values import from_numbers
 from gvpipe.trajectory.causal_order import CausalOrder
 
 EXACT, PREDICTION, TRAJECTORIES, DERIVED = range(4)
 MODES = ("exact", "prediction", "trajectories", "derived")
 STEP = struct.Struct("<d")
-TOO_LARGE = 2.0**53
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +94,9 @@ def decode_segment(data: bytes, shape: tuple[int, ...], dtype: np.dtype[np.gener
     if n_rows:
         result[:, :, constant] = cursor.array(dtype.str, int(constant.sum()))
     if n_rows and not constant.all():
-        numbers = _decode_numbers(cursor, mode, (int((~constant).sum()), frames), place)
-        values = from_integers(_whole(numbers), dtype) if mode == EXACT else from_numbers(numbers, dtype)
+        with np.errstate(over="ignore", invalid="ignore"):  # of damaged bytes; what is not finite is refused below
+            numbers = _decode_numbers(cursor, (mode, dtype.kind != "f"), (int((~constant).sum()), frames), place)
+        values = from_numbers(numbers, dtype, mode == EXACT)
         if values is None:
             raise cursor.corrupt("a value is out of its type's range")
         result[:, :, ~constant] = values
@@ -119,30 +120,40 @@ def read_mode(data: bytes, name: str) -> str:
     return MODES[mode]
 
 
-def _decode_numbers(cursor: Cursor, mode: int, kept: tuple[int, Int64], place: Place) -> Float64:
-    """Numbers ``(D, R, K)`` of the K components that are not constant; ``kept`` is K and the distinct frame of each frame."""
+def _decode_numbers(cursor: Cursor, way: tuple[int, bool], kept: tuple[int, Int64], place: Place) -> Float64:
+    """Numbers ``(D, R, K)`` of the K components that are not constant.
+
+    Args:
+        cursor: at the step.
+        way: the mode, and whether values are integers.
+        kept: K and the distinct frame of each frame.
+        place: where the segment belongs.
+    """
+    mode, is_whole = way
     n_components, of_frames = kept
     causal, n_frames = place.causal, int(of_frames[-1]) + 1
-    step = 1.0
-    if mode != EXACT:
-        (step,) = cursor.struct(STEP)
-        if not 0 < step <= LARGEST_STEP:  # NaN neither
-            raise cursor.corrupt(f"its step is {step}")
+    (step,) = cursor.struct(STEP)
+    if not 0 < step <= LARGEST_STEP:  # NaN neither
+        raise cursor.corrupt(f"its step is {step}")
+    if mode == EXACT and (step != 1 if is_whole else math.frexp(step)[0] != 0.5):
+        raise cursor.corrupt(f"its unit is {step}")
     flags = cursor.block()
     still = np.zeros(len(causal.order), np.bool_)
     if flags:
         still = decode_residuals(flags, 1, 1, causal, cursor.name)[:, 0] != 0
     if mode == TRAJECTORIES:
         columns = decode_trajectories(cursor.rest(), (n_frames, n_components), causal, cursor.name)
-        return by_frame(columns, n_frames) * step
-    base: Float64 | float = 0.0
+        return np.asarray(by_frame(columns, n_frames) * step)
+    base = None
     if mode == DERIVED:
         if place.span is None:
             raise InputError(f"{place.name!r} follows from the mesh's positions; give its reader the positions")
         derivation = Derivation.take(cursor, n_components, place.span.motion.n_frames)
         base = derivation.values(place.span)[np.flatnonzero(np.diff(of_frames, prepend=-1))]
     residuals = decode_residuals(cursor.rest(), n_components * n_frames, n_frames, causal, cursor.name, still)
-    return base + by_frame(restore_values(residuals, n_frames, causal, still, mode == EXACT), n_frames) * step
+    kind = STEPS if mode != EXACT else WHOLE if is_whole else Kind(unit=step)
+    own: Float64 = by_frame(restore_values(residuals, n_frames, causal, still, kind), n_frames) * step
+    return own if base is None else base + own
 
 
 def by_component(values: Float64) -> Float64:
@@ -153,11 +164,6 @@ def by_component(values: Float64) -> Float64:
 def by_frame(columns: Float64, n_frames: int) -> Float64:
     """Mirror of `by_component`."""
     return np.ascontiguousarray(columns.reshape(len(columns), -1, n_frames).transpose(2, 0, 1))
-
-
-def _whole(numbers: Float64) -> Int64:
-    """Integers; what float64 does not hold exactly is out of every type's range."""
-    return np.where(np.abs(numbers) < TOO_LARGE, numbers, TOO_LARGE).astype(np.int64)
 
 
 def _decode_holds(data: bytes, n_frames: int, name: str) -> Int64:

@@ -13,11 +13,11 @@ from gvpipe.entropy.integers import encode_integers
 from gvpipe.errors import InputError
 from gvpipe.fields.derived import SIGNALS, fit_derivation
 from gvpipe.fields.holes import encode_holes, fill_holes
-from gvpipe.fields.prediction import predict_values
+from gvpipe.fields.prediction import STEPS, WHOLE, Kind, predict_values
 from gvpipe.fields.residual_coding import LARGEST, encode_residuals
 from gvpipe.fields.segment import DERIVED, EXACT, MODES, PREDICTION, STEP, TRAJECTORIES, Place, by_component, decode_segment
 from gvpipe.fields.trajectories import SHARES, WORTH, encode_trajectories
-from gvpipe.fields.values import FieldBound, choose_step, keeps_bound, to_integers
+from gvpipe.fields.values import FieldBound, choose_step, choose_unit, keeps_bound, to_integers
 from gvpipe.trajectory.causal_order import CausalOrder
 
 EXPLAINED = 0.25  # energy of changes that may be left where values follow from positions
@@ -99,13 +99,15 @@ def _choices(kept: Kept, modes: tuple[str, ...]) -> Iterator[tuple[int, bytes]]:
                 if len(data) > WORTH * min(len(other) for _, other in found):
                     break
     yield from sorted(found, key=lambda pair: len(pair[1]))
-    integers = by_component(to_integers(kept.values).astype(np.float64))  # float64 holds them exactly
-    yield from ((EXACT, still + data) for data in _predicted(integers, kept, kept.still, True))
+    unit = choose_unit(kept.values)
+    exact = by_component(kept.values.astype(np.float64)) / unit
+    kind = WHOLE if kept.values.dtype.kind != "f" else Kind(unit=unit)
+    yield from ((EXACT, STEP.pack(unit) + still + data) for data in _predicted(exact, kept, kept.still, kind))
 
 
-def _predicted(columns: Float64, kept: Kept, still: Bool, whole: bool = False) -> list[bytes]:
+def _predicted(columns: Float64, kept: Kept, still: Bool, kind: Kind = STEPS) -> list[bytes]:
     """The bytes of ``columns (R, K D)`` by prediction; none if a residual is too large."""
-    residuals, _ = predict_values(columns, kept.n_frames, kept.place.causal, still, whole)
+    residuals = predict_values(columns, kept.n_frames, kept.place.causal, still, kind)
     if np.abs(residuals).max(initial=0) >= LARGEST:
         return []
     return [encode_residuals(residuals, kept.n_frames, kept.place.causal, still)]

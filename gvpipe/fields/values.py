@@ -18,6 +18,7 @@ TYPES = tuple(map(np.dtype, ("<f4", "|i1", "|u1", "<i2", "<u2", "<i4", "<u4")))
 MARGIN = 2.0**-14  # part of the bound that is kept for other machines' rounding
 MOST_STEPS = 2.0**36  # magnitude of a value, in steps; larger ones are kept exactly
 MAX_COMPONENTS = 256
+UNIT_BITS = 24  # of the largest value, in the unit of exact float32
 
 
 @dataclass(frozen=True)
@@ -73,27 +74,27 @@ def to_integers(values: Array) -> Int64:
     return np.where(bits < 0, -1 - (bits & 0x7FFFFFFF), bits)
 
 
-def from_integers(numbers: Int64, dtype: np.dtype[np.generic]) -> Array | None:
-    """Mirror of `to_integers`; None if a number stands for no finite value of the type."""
-    if dtype.kind != "f":
-        least, most = _limits(dtype)
-        return None if ((numbers < least) | (numbers > most)).any() else numbers.astype(dtype)
-    if (np.abs(numbers + 0.5) > 1 << 31).any():
-        return None
-    bits = np.where(numbers < 0, (-1 - numbers) | 0x80000000, numbers)
-    values = bits.astype(np.uint32).view(np.float32)
-    return values if np.isfinite(values).all() else None
+def from_numbers(numbers: Float64, dtype: np.dtype[np.generic], exact: bool = False) -> Array | None:
+    """Round float64 ``numbers`` to a type; None if one is not finite there.
 
-
-def from_numbers(numbers: Float64, dtype: np.dtype[np.generic]) -> Array | None:
-    """Round float64 ``numbers`` to a type; None if one is not finite there. Integers are cut to their type's range."""
+    Integers are cut to their type's range; if ``exact``, None is returned where that changes one.
+    """
     if dtype.kind == "f":
         with np.errstate(over="ignore", invalid="ignore"):
             values = numbers.astype(np.float32)
         return values if np.isfinite(values).all() else None
-    if not np.isfinite(numbers).all():
+    least, most = _limits(dtype)
+    if not np.isfinite(numbers).all() or (exact and ((numbers < least) | (numbers > most)).any()):
         return None
-    return np.clip(np.rint(numbers), *_limits(dtype)).astype(dtype)
+    return np.clip(np.rint(numbers), least, most).astype(dtype)
+
+
+def choose_unit(values: Array) -> float:
+    """Return the unit, a power of two, in which exact ``values`` are predicted: 1 for integers."""
+    if values.dtype.kind != "f":
+        return 1.0
+    largest = float(np.abs(values).max(initial=0))
+    return 2.0 ** (math.frexp(largest)[1] - UNIT_BITS) if largest else 1.0
 
 
 def choose_step(values: Array, bound: FieldBound) -> float:
