@@ -40,6 +40,7 @@ from gvpipe.sequence import MeshSequence
 
 ARRANGEMENT = "arrangement"
 CODED, SURFACE, OCTAHEDRAL = 1, 2, 3  # codings of fields; attributes have the first
+WEB = 256  # of fields in web pages (`gvpipe.web.field_export`)
 MOVING = ("scalar", "vector")  # kinds of fields that may follow from positions
 
 

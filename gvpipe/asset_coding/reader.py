@@ -22,7 +22,7 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part, check_parts
 from gvpipe.asset.polygons import as_polygons
 from gvpipe.asset_coding.directory import SECTION, VERSION, Directory, Listed, unpack_directory
-from gvpipe.asset_coding.encoder import ARRANGEMENT, CODED, OCTAHEDRAL, SURFACE, vertex_starts
+from gvpipe.asset_coding.encoder import ARRANGEMENT, CODED, OCTAHEDRAL, SURFACE, WEB, vertex_starts
 from gvpipe.asset_coding.normal_fields import unpack_rule
 from gvpipe.attributes.attribute_coding import decode_attribute
 from gvpipe.attributes.surface import Surface
@@ -62,8 +62,8 @@ class AssetReader:
             self.directory = unpack_directory(bitstream.section(SECTION), bitstream.n_vertices)
         attributes = {each.name: each for each in self.directory.attributes if each.coding == CODED}
         fields = {each.name: each for each in self.directory.fields if _is_known(each)}
-        newer = [each.name for each in self.directory.attributes if each.name not in attributes]
-        newer += [each.name for each in self.directory.fields if each.name not in fields]
+        known = {**attributes, **fields, **{each.name: each for each in self.directory.fields if each.coding == WEB}}
+        newer = [each.name for each in (*self.directory.attributes, *self.directory.fields) if each.name not in known]
         self.skipped = ("all of it",) if self.directory.version > VERSION else tuple(newer)
         self.attributes: Mapping[str, Attribute] = _Lazy(attributes, self._attribute, self._lock, path)
         self.fields: Mapping[str, Field] = _Lazy(fields, self._field, self._lock, path)
@@ -71,9 +71,11 @@ class AssetReader:
     @property
     def notes(self) -> tuple[str, ...]:
         """What this version of gvpipe skips, a line."""
-        if not self.skipped:
-            return ()
-        return (f"a newer gvpipe wrote beside the positions what this one skips: {', '.join(self.skipped)}",)
+        of_pages = [each.name for each in self.directory.fields if each.coding == WEB]
+        notes = [f"fields of a web page, which browsers alone read, are skipped: {', '.join(of_pages)}"] if of_pages else []
+        if self.skipped:
+            notes.append(f"a newer gvpipe wrote beside the positions what this one skips: {', '.join(self.skipped)}")
+        return tuple(notes)
 
     @cached_property
     def _arrangement(self) -> Arrangement:

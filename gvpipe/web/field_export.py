@@ -26,9 +26,10 @@ import numpy as np
 
 from gvpipe.arrays import Array, Float32, Int32, Int64
 from gvpipe.asset.field import Field
+from gvpipe.asset_coding.encoder import WEB
 from gvpipe.errors import InputError
 
-CODING = 256  # of these fields in section `asset`
+CODING = WEB  # of these fields in section `asset`
 COLOURS = 1023  # halves of it are the least number of levels that a range gets, but for fields with a coarser bound
 MAX_GROUP = 32  # frames
 GROUP_VALUES = 1 << 21  # at most in a group, unless one frame has more: what the player unpacks at a time
