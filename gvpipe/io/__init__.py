@@ -11,14 +11,23 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from gvpipe.errors import InputError
+from gvpipe.io.alembic import read_alembic
 from gvpipe.io.export import write_frames
 from gvpipe.io.frames import read_frames
 from gvpipe.io.npz import read_npz, write_npz
+from gvpipe.io.options import ReadOptions
+from gvpipe.io.usd import read_usd
 from gvpipe.sequence import MeshSequence
 
 __all__ = ["READERS", "WRITERS", "read", "write"]
 
-READERS: dict[str, Callable[[Path, float | None], MeshSequence]] = {".npz": read_npz}
+USD = (".usda", ".usdc", ".usd", ".usdz")
+
+READERS: dict[str, Callable[[Path, ReadOptions], MeshSequence]] = {
+    ".npz": lambda path, options: read_npz(path, options.fps),
+    **dict.fromkeys(USD, read_usd),
+    ".abc": read_alembic,
+}
 WRITERS: dict[str, Callable[[MeshSequence, Path], tuple[str, ...]]] = {".npz": write_npz}
 
 
@@ -41,7 +50,7 @@ def read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], fps: f
     if reader is not None and not os.path.isdir(path):
         if not os.path.isfile(path):
             raise InputError(f"{path}: no such file; check the path")
-        return reader(Path(path), fps)
+        return reader(Path(path), ReadOptions(fps))
     return read_frames(path, fps)
 
 

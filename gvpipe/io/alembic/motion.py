@@ -1,0 +1,78 @@
+"""How an Alembic mesh moves: its positions and the transforms above it, at a time.
+
+Between two samples, positions and matrices are interpolated linearly; at a sample they are the sample's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from gvpipe.arrays import Array, Float64
+from gvpipe.io.alembic.archive import Node, sample_of
+
+CLOSE = 1e-6  # seconds within which a time is a sample's
+
+
+class AlembicMotion:
+    """How one mesh moves."""
+
+    def __init__(self, node: Node) -> None:
+        self.node = node
+        self.name = node.path
+        self._positions = node.schema.getPositionsProperty()
+        self.moves = self._positions.getNumSamples() > 1 or any(parent.schema.getNumSamples() > 1 for parent in node.parents)
+        self.n_vertices = len(_sample(self._positions, 0)) if self._positions.getNumSamples() else 0
+
+    def samples(self) -> Iterable[float]:
+        """Times of all samples that move it, seconds."""
+        for schema in (self._positions, *(parent.schema for parent in self.node.parents)):
+            if schema.getNumSamples() > 1:
+                sampling = schema.getTimeSampling()
+                yield from (sampling.getSampleTime(i) for i in range(schema.getNumSamples()))
+
+    def at(self, time: float) -> Array:
+        """Positions ``(n, 3)`` in world space at a time in seconds."""
+        low, high, part = _around(self._positions, time)
+        points = _sample(self._positions, low)
+        if part:
+            after = _sample(self._positions, high)
+            if len(after) == len(points):
+                points = points + part * (after - points)
+        world = self.world(time)
+        return points if (world == np.eye(4)).all() else np.asarray(points @ world[:3, :3] + world[3, :3])
+
+    def world(self, time: float) -> Float64:
+        """``(4, 4)`` from the mesh's space into the world's, applied to rows."""
+        total = np.eye(4)
+        for parent in self.node.parents:
+            low, high, part = _around(parent.schema, time)
+            first = sample_of(parent.schema, low)
+            matrix = np.array(first.getMatrix(), np.float64)
+            if part:
+                matrix += part * (np.array(sample_of(parent.schema, high).getMatrix(), np.float64) - matrix)
+            total = total @ matrix
+            if not first.getInheritsXforms():
+                break
+        return np.asarray(total)
+
+
+def _sample(positions: Any, number: int) -> Float64:
+    return np.array(sample_of(positions, number), np.float64).reshape(-1, 3)
+
+
+def _around(schema: Any, time: float) -> tuple[int, int, float]:
+    """The samples before and after a time, and how far it is between them, 0 at a sample."""
+    count = schema.getNumSamples()
+    if count < 2:
+        return 0, 0, 0.0
+    sampling = schema.getTimeSampling()
+    low, high = sampling.getFloorIndex(time, count), sampling.getCeilIndex(time, count)
+    before, after = sampling.getSampleTime(low), sampling.getSampleTime(high)
+    if abs(time - before) < CLOSE or high == low:
+        return low, low, 0.0
+    if abs(after - time) < CLOSE:
+        return high, high, 0.0
+    return low, high, min(max((time - before) / (after - before), 0.0), 1.0)

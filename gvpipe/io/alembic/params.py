@@ -1,0 +1,112 @@
+"""Geometry parameters of an Alembic mesh as layers: texture coordinates, normals, colours, and numbers of other names."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gvpipe.arrays import Array, Float64
+from gvpipe.io.scene_mesh import Layer, SceneMesh
+
+SCOPES = {
+    "kUniformScope": "polygon",
+    "kVaryingScope": "vertex",
+    "kVertexScope": "vertex",
+    "kFacevaryingScope": "corner",
+    "kConstantScope": "constant",
+    "kUnknownScope": "constant",
+}
+READERS = {  # (type, components, interpretation): name of the library's class, kind
+    ("float32_t", 2, ""): ("IV2fGeomParam", "vector"),
+    ("float32_t", 2, "vector"): ("IV2fGeomParam", "uv"),
+    ("float32_t", 3, "rgb"): ("IC3fGeomParam", "color"),
+    ("float32_t", 4, "rgba"): ("IC4fGeomParam", "color"),
+    ("float32_t", 3, "vector"): ("IV3fGeomParam", "vector"),
+    ("float32_t", 3, "point"): ("IP3fGeomParam", "vector"),
+    ("float32_t", 3, "normal"): ("IN3fGeomParam", "vector"),
+    ("float32_t", 1, ""): ("IFloatGeomParam", "scalar"),
+    ("float64_t", 1, ""): ("IDoubleGeomParam", "scalar"),
+    ("int32_t", 1, ""): ("IInt32GeomParam", "label"),
+}
+
+
+def layers_of(schema: Any, polygons: SceneMesh, turn: Float64) -> tuple[tuple[Layer, ...], list[str]]:
+    """Return a mesh's layers at its first sample, and the names of what does not fit it.
+
+    Args:
+        schema: of a polygon mesh or a subdivision cage.
+        polygons: the same mesh, without layers.
+        turn: ``(3, 3)`` how its directions turn into world space.
+    """
+    layers: list[Layer] = []
+    left: list[str] = []
+    if hasattr(schema, "getNormalsParam"):
+        normals = _layer("normal", "normal", schema.getNormalsParam(), polygons)
+        if normals is not None:
+            layers.append(_turned(normals, turn))
+    uv = _layer("uv", "uv", schema.getUVsParam(), polygons)
+    layers.extend([uv] if uv is not None else [])
+    for name, kind, param in _others(schema):
+        if kind == "color":
+            name = _numbered("color", layers)
+        elif kind == "uv":
+            name = _numbered("uv", layers)
+        layer = _layer(name, kind, param, polygons)
+        if layer is None:
+            left.append(name)
+        elif layer.domain != "constant" or kind == "color":
+            layers.append(layer)
+    return tuple(layers), left
+
+
+def _others(schema: Any) -> list[tuple[str, str, Any]]:
+    """Name, kind and parameter of what programs add to a mesh, as far as it is numbers."""
+    from alembic3d import AbcGeom
+
+    held = schema.getArbGeomParams()
+    if not (held and held.valid()):
+        return []
+    found = []
+    for number in range(held.getNumProperties()):
+        header = held.getPropertyHeader(number)
+        about = header.getMetaData()
+        key = (about.get("podName"), int(about.get("podExtent") or 1), about.get("interpretation") or "")
+        is_constant = (about.get("geoScope") or "con") == "con"
+        if key not in READERS or (is_constant and key[2] not in ("rgb", "rgba")):
+            continue  # constants are settings of programs, not numbers of the surface
+        reader, kind = READERS[key]
+        found.append((header.getName(), kind, getattr(AbcGeom, reader)(held, header.getName())))
+    return found
+
+
+def _layer(name: str, kind: str, param: Any, polygons: SceneMesh) -> Layer | None:
+    """A parameter as a layer, or None if it is absent or has not the rows that its scope needs."""
+    if not (param and param.valid() and param.getNumSamples()):
+        return None
+    value = param.getIndexedValue()
+    values = np.array(value.getVals())
+    values = values.reshape(len(values), -1)
+    if not values.size or (values.dtype.kind == "f" and not np.isfinite(values).all()):
+        return None
+    if values.dtype.kind == "f":
+        values = values.astype(np.float32)
+    indices = np.array(value.getIndices(), np.int64) if param.isIndexed() else None
+    if indices is not None and (not indices.size or indices.min() < 0 or indices.max() >= len(values)):
+        return None
+    domain = SCOPES[str(param.getScope()).rsplit(".", 1)[-1]]
+    rows = len(values) if indices is None else len(indices)
+    sizes = {"vertex": polygons.n_vertices, "corner": len(polygons.corners), "polygon": len(polygons.counts), "constant": rows}
+    return Layer(name, kind, domain, values, indices) if rows == sizes[domain] else None
+
+
+def _turned(normals: Layer, turn: Float64) -> Layer:
+    turned = normals.values @ np.linalg.pinv(turn).T
+    length = np.linalg.norm(turned, axis=1, keepdims=True)
+    unit: Array = np.asarray(turned / np.where(length > 0, length, 1), np.float32)
+    return Layer(normals.name, normals.kind, normals.domain, unit, normals.indices)
+
+
+def _numbered(stem: str, layers: list[Layer]) -> str:
+    count = sum(layer.kind == stem for layer in layers)
+    return f"{stem}{count}" if count else stem

@@ -1,0 +1,134 @@
+"""An Alembic archive as a `MeshSequence`: meshes become parts in world space, frames are read when they are asked for.
+
+Alembic's polygons are clockwise seen from outside; here they are turned round. Face sets become parts, their names materials.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gvpipe.arrays import Int64
+from gvpipe.asset.material import Material
+from gvpipe.asset.metadata import Metadata
+from gvpipe.errors import InputError
+from gvpipe.io.alembic.archive import Node, alembic_errors, find_meshes, open_archive, sample_of
+from gvpipe.io.alembic.motion import AlembicMotion
+from gvpipe.io.alembic.params import layers_of
+from gvpipe.io.options import ReadOptions
+from gvpipe.io.scene_frames import SceneFrames, even_times
+from gvpipe.io.scene_layers import join_layers
+from gvpipe.io.scene_mesh import SceneMesh, join
+from gvpipe.notes import DEFAULT_FPS
+from gvpipe.sequence import MeshSequence
+
+
+def read_alembic(path: Path, options: ReadOptions) -> MeshSequence:
+    """Read the meshes of an Alembic archive, in the file's units, with the transforms above them.
+
+    Args:
+        path: an .abc of the Ogawa kind.
+        options: `fps` samples the archive's range at that rate instead of at its samples.
+
+    Raises:
+        InputError: alembic3d is missing, the file is damaged or of the HDF5 kind, it has no mesh, a mesh's topology
+            changes, a position is not finite.
+    """
+    archive = open_archive(path)
+    with alembic_errors(path):
+        return _read_archive(archive, path, options)
+
+
+def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequence:
+    where = str(path)
+    nodes, others = find_meshes(archive)
+    motions = [motion for motion in map(AlembicMotion, nodes) if motion.n_vertices]
+    shown = [motion for motion in motions if not motion.node.is_hidden]
+    if not motions:
+        held = f"; it holds {', '.join(sorted(set(others)))}" if others else ""
+        raise InputError(f"{where} has no polygon mesh{held}; a mesh with triangles is needed")
+    notes = []
+    if shown and len(shown) < len(motions):
+        notes.append(f"{len(motions) - len(shown)} meshes are hidden; they were left out")
+    motions = shown or motions
+    cages = sum("SubD" in motion.node.kind for motion in motions)
+    if cages:
+        notes.append(f"{cages} meshes are cages of subdivision surfaces; the cages were read as they are")
+    samples = np.unique(np.fromiter((time for motion in motions for time in motion.samples()), np.float64))
+    times, fps, time_notes = even_times(samples, options.fps, DEFAULT_FPS, where)
+    frames = SceneFrames(motions, times, where, "second")
+    materials: list[str] = []
+    read = [_read_mesh(motion, materials, float(times[0]), where) for motion in motions]
+    meshes = [mesh for mesh, _ in read]
+    joined = join(meshes, where)
+    attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
+    left = list(dict.fromkeys(name for _, names in read for name in names))
+    left_note = (f"parameters that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()
+    return MeshSequence(
+        frames,
+        joined.faces,
+        fps,
+        attributes,
+        where,
+        frames.origin,
+        (*notes, *time_notes, *layer_notes, *left_note),
+        parts=joined.parts,
+        polygons=joined.polygons,
+        materials=tuple(Material(name) for name in materials),
+        metadata=_metadata(archive, path, float(times[0])),
+    )
+
+
+def _read_mesh(motion: AlembicMotion, materials: list[str], time: float, where: str) -> tuple[SceneMesh, list[str]]:
+    """One mesh with its layers, and the names of parameters that were left out; new materials are added to the list."""
+    node = motion.node
+    counts, corners = _polygons(node, where)
+    groups, names = _face_sets(node.schema, len(counts))
+    materials.extend(name for name in names if name and name not in materials)
+    bound = tuple(materials.index(name) if name else None for name in names)
+    turn = motion.world(time)[:3, :3]
+    is_mirrored = bool(np.linalg.det(turn) < 0)
+    parent, _, name = node.path.strip("/").rpartition("/")
+    plain = SceneMesh(name, parent, motion.n_vertices, counts, corners, groups, bound, not is_mirrored)
+    layers, left = layers_of(node.schema, plain, turn)
+    return replace(plain, layers=layers), left
+
+
+def _polygons(node: Node, where: str) -> tuple[Int64, Int64]:
+    """Corners per polygon and the vertex of each corner; raises `InputError` where they change."""
+    found = []
+    for held in (node.schema.getFaceCountsProperty(), node.schema.getFaceIndicesProperty()):
+        first = np.array(held.getValue(), np.int64).reshape(-1)
+        for number in range(1, held.getNumSamples()):
+            if held.isConstant():
+                break
+            if not np.array_equal(np.array(sample_of(held, number), np.int64).reshape(-1), first):
+                raise InputError(
+                    f"{where}: the topology of mesh {node.path} changes at frame {number}; export it with constant topology"
+                )
+        found.append(first)
+    return found[0], found[1]
+
+
+def _face_sets(schema: Any, n_polygons: int) -> tuple[Int64, list[str]]:
+    """The group of each polygon, and the name of each group: 0 for polygons of no set, then one per face set."""
+    groups = np.zeros(n_polygons, np.int64)
+    names = [""]
+    for name in map(str, schema.getFaceSetNames()):
+        held = schema.getFaceSet(name)  # it must outlive its schema
+        indices = np.array(held.getSchema().getValue().getFaces(), np.int64).reshape(-1)
+        indices = indices[(indices >= 0) & (indices < n_polygons)]
+        groups[indices[groups[indices] == 0]] = len(names)
+        names.append(name)
+    return groups, names
+
+
+def _metadata(archive: Any, path: Path, start: float) -> Metadata:
+    from alembic3d import Abc
+
+    about = Abc.GetArchiveInfo(archive)
+    texts = {f"alembic {key}": str(about[key]) for key in ("appName", "userDescription") if about.get(key)}
+    return Metadata("", None, start, path.name, texts)

@@ -1,0 +1,182 @@
+"""UsdPreviewSurface materials as gvpipe's, and the textures that they show.
+
+Source: Pixar, UsdPreviewSurface specification, version 2.6. Its specular workflow, clear coat, displacement and index of
+refraction have no place in glTF's metallic-roughness model and are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from gvpipe.asset.material import Material, Texture
+from gvpipe.io.usd.textures import Textures
+
+WRAPS = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp", "black": "clamp", "useMetadata": "repeat"}
+
+
+class Materials:
+    """The materials that meshes and subsets of a stage bind, each once.
+
+    A material that both single-sided and double-sided meshes bind becomes two.
+    """
+
+    def __init__(self, stage: Any, path: Path) -> None:
+        self.textures = Textures(path)
+        self.materials: list[Material] = []
+        self.plain: list[str] = []  # materials without UsdPreviewSurface
+        self._numbers: dict[tuple[str, bool], int] = {}
+        self._uv_names: dict[int, dict[str, str]] = {}
+
+    def of(self, prim: Any) -> int | None:
+        """The number of the material that a mesh or a subset binds, or None."""
+        from pxr import UsdGeom, UsdShade
+
+        bound = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+        if not bound:
+            return None
+        mesh = prim if prim.IsA(UsdGeom.Gprim) else prim.GetParent()
+        two_sided = bool(UsdGeom.Gprim(mesh).GetDoubleSidedAttr().Get()) if mesh.IsA(UsdGeom.Gprim) else False
+        key = (str(bound.GetPath()), two_sided)
+        if key not in self._numbers:
+            self._numbers[key] = len(self.materials)
+            self.materials.append(replace(self._read(bound), double_sided=two_sided))
+        return self._numbers[key]
+
+    def name_uv(self, numbers: tuple[int | None, ...], named: dict[str, str]) -> None:
+        """Give the textures of materials the attributes of a mesh whose primvars have those names; the first mesh decides."""
+        for number in numbers:
+            if number is None or number in self._uv_names:
+                continue
+            self._uv_names[number] = named
+            material = self.materials[number]
+            changes = {role: replace(each, uv=named.get(each.uv, "uv")) for role, each in material.textures.items()}
+            self.materials[number] = replace(material, **changes)  # type: ignore[arg-type]
+
+    def notes(self) -> tuple[str, ...]:
+        """What could not be read of materials and textures."""
+        plain = tuple(dict.fromkeys(self.plain))
+        said = (f"materials without a UsdPreviewSurface have their names alone: {', '.join(plain[:5])}",) if plain else ()
+        return (*said, *self.textures.notes)
+
+    def _read(self, bound: Any) -> Material:
+        name = bound.GetPrim().GetName()
+        surface = bound.ComputeSurfaceSource()[0]
+        if not surface or surface.GetIdAttr().Get() != "UsdPreviewSurface":
+            self.plain.append(name)
+            return Material(name, roughness=0.5)
+        base, base_texture = self._color(surface, "diffuseColor", (0.18, 0.18, 0.18))
+        emissive, emissive_texture = self._color(surface, "emissiveColor", (0.0, 0.0, 0.0))
+        opacity, opacity_texture = self._number(surface, "opacity", 1.0)
+        threshold, _ = self._number(surface, "opacityThreshold", 0.0)
+        metallic, metallic_texture = self._number(surface, "metallic", 0.0)
+        roughness, roughness_texture = self._number(surface, "roughness", 0.5)
+        combined = self.textures.combine(metallic_texture, roughness_texture, metallic, roughness)
+        seen = opacity < 1 or opacity_texture is not None
+        return Material(
+            name,
+            (*base, opacity),
+            base_texture.texture if base_texture else None,
+            1.0 if metallic_texture else metallic,
+            1.0 if roughness_texture else roughness,
+            combined,
+            self._texture(surface, "normal"),
+            self._texture(surface, "occlusion"),
+            emissive,
+            emissive_texture.texture if emissive_texture else None,
+            "mask" if threshold > 0 else "blend" if seen else "opaque",
+            threshold if threshold > 0 else 0.5,
+        )
+
+    def _color(self, surface: Any, name: str, fallback: tuple[float, float, float]) -> tuple[tuple[float, float, float], Any]:
+        """A colour, or the texture in its place and what that is multiplied with."""
+        source = self._source(surface, name)
+        if source is not None:
+            return source.scale[:3], source
+        value = _value(surface, name)
+        made = tuple(float(x) for x in value)[:3] if value is not None else fallback
+        return (made if len(made) == 3 and all(math.isfinite(x) for x in made) else fallback), None
+
+    def _number(self, surface: Any, name: str, fallback: float) -> tuple[float, Any]:
+        source = self._source(surface, name)
+        if source is not None:
+            return 1.0, source
+        value = _value(surface, name)
+        made = float(value) if isinstance(value, int | float) else fallback
+        return (made if math.isfinite(made) else fallback), None
+
+    def _texture(self, surface: Any, name: str) -> Texture | None:
+        source = self._source(surface, name)
+        return None if source is None else source.texture
+
+    def _source(self, surface: Any, name: str) -> Any:
+        """The texture that an input is connected to, or None."""
+        shader, output = _connected(surface, name)
+        if shader is None or shader.GetIdAttr().Get() != "UsdUVTexture":
+            return None
+        place = _place(shader)
+        wrap = tuple(WRAPS.get(str(_value(shader, axis)), "repeat") for axis in ("wrapS", "wrapT"))
+        scale = _value(shader, "scale")
+        factors = tuple(float(x) for x in scale) if scale is not None else (1.0, 1.0, 1.0, 1.0)
+        return self.textures.read(_value(shader, "file"), output, replace(place, wrap=wrap), factors)  # type: ignore[arg-type]
+
+
+def _place(shader: Any) -> Texture:
+    """Which coordinates a texture has, and how they are moved; the image comes later."""
+    uv, offset, rotation, tiling = "st", (0.0, 0.0), 0.0, (1.0, 1.0)
+    reader, _ = _connected(shader, "st")
+    if reader is not None and reader.GetIdAttr().Get() == "UsdTransform2d":
+        degrees = float(_value(reader, "rotation") or 0.0)
+        scale, shift = _value(reader, "scale"), _value(reader, "translation")
+        tiling = (float(scale[0]), float(scale[1])) if scale is not None else tiling
+        moved = (float(shift[0]), float(shift[1])) if shift is not None else (0.0, 0.0)
+        offset, rotation = _from_upper_left(moved, math.radians(degrees), tiling)
+        reader, _ = _connected(reader, "in")
+    if reader is not None and str(reader.GetIdAttr().Get()).startswith("UsdPrimvarReader"):
+        uv = str(_value(reader, "varname") or uv)
+    return Texture(0, uv, offset=offset, rotation=rotation, tiling=tiling)
+
+
+def _from_upper_left(
+    shift: tuple[float, float], angle: float, tiling: tuple[float, float]
+) -> tuple[tuple[float, float], float]:
+    """UsdTransform2d's translation and rotation, of (u, v) from the lower left, as KHR_texture_transform's.
+
+    USD: uv' = R(angle) S uv + shift, counter-clockwise. With w = (u, 1 - v), c = cos(angle), s = sin(angle) and S = (a, b):
+
+    - w'_u = c a w_u + s b w_v + (shift_u - s b)
+    - w'_v = -s a w_u + c b w_v + (1 - shift_v - c b)
+    """
+    c, s = math.cos(angle), math.sin(angle)
+    u = shift[0] - s * tiling[1]
+    v = 1.0 - shift[1] - c * tiling[1]
+    return (u, v), angle
+
+
+def _connected(shader: Any, name: str) -> tuple[Any, str]:
+    """The shader that an input is connected to, through node graphs, and the name of its output."""
+    from pxr import UsdShade
+
+    given = shader.GetInput(name)
+    if not given:
+        return None, ""
+    for attribute in UsdShade.Utils.GetValueProducingAttributes(given):
+        if UsdShade.Utils.GetType(attribute.GetName()) == UsdShade.AttributeType.Output:
+            return UsdShade.Shader(attribute.GetPrim()), UsdShade.Utils.GetBaseNameAndType(attribute.GetName())[0]
+    return None, ""
+
+
+def _value(shader: Any, name: str) -> Any:
+    """The value of an input, through the interface of its material, or None."""
+    from pxr import Usd, UsdShade
+
+    given = shader.GetInput(name)
+    if not given:
+        return None
+    for attribute in UsdShade.Utils.GetValueProducingAttributes(given):
+        if UsdShade.Utils.GetType(attribute.GetName()) == UsdShade.AttributeType.Input:
+            value = attribute.Get()
+            return attribute.Get(Usd.TimeCode.EarliestTime()) if value is None else value
+    return None

@@ -1,0 +1,148 @@
+"""Primvars of a USD mesh as layers: texture coordinates, normals, colours, and numbers of other names."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from gvpipe.arrays import Array, Float64
+from gvpipe.asset.attribute import MAX_COMPONENTS
+from gvpipe.io.scene_mesh import Layer, SceneMesh
+
+DOMAINS = {"constant": "constant", "uniform": "polygon", "varying": "vertex", "vertex": "vertex", "faceVarying": "corner"}
+UV_NAME = re.compile(r"^(st|uv|map|uvmap|uvset|texcoord)[_\d]*$", re.IGNORECASE)
+FIRST_UV = ("st", "map1", "uv", "UVMap", "st0")  # the main set's usual names, the commonest first
+OWN = ("displayColor", "displayOpacity", "normals")  # they have a meaning of their own
+
+
+def layers_of(
+    mesh: Any, polygons: SceneMesh, time: float, turn: Float64
+) -> tuple[tuple[Layer, ...], dict[str, str], list[str]]:
+    """Return a mesh's layers, the attribute of each uv primvar by its name, and what was left out.
+
+    Args:
+        mesh: the UsdGeom.Mesh.
+        polygons: the same mesh, without layers.
+        time: of the first frame; primvars that change have their values then.
+        turn: ``(3, 3)`` or ``(n, 3, 3)`` how its directions turn into world space.
+    """
+    from pxr import UsdGeom
+
+    api = UsdGeom.PrimvarsAPI(mesh.GetPrim())
+    primvars = {each.GetPrimvarName(): each for each in api.FindPrimvarsWithInheritance() if each.HasValue()}
+    layers: list[Layer] = []
+    left: list[str] = []
+    normals = _normals(mesh, primvars.get("normals"), polygons, time, turn)
+    layers.extend([normals] if normals else [])
+    uv_names = sorted((name for name, each in primvars.items() if _is_uv(name, each)), key=_uv_rank)
+    named_uv = {name: "uv" if not number else f"uv{number}" for number, name in enumerate(uv_names)}
+    n_colors = 0
+    for name, primvar in sorted(primvars.items(), key=lambda item: item[0] != "displayColor"):
+        kind = "uv" if name in named_uv else _kind(primvar)
+        if name.startswith("skel:") or (name in OWN and name != "displayColor") or kind is None:
+            continue
+        if primvar.GetInterpolation() == "constant" and name != "displayColor":
+            continue  # settings of programs, not numbers of the surface
+        layer = _layer(named_uv.get(name, name), kind, primvar, polygons, time)
+        if layer is None or layer.values.shape[1] > MAX_COMPONENTS:
+            left.append(name)
+            continue
+        if kind == "color":
+            layer = _with_opacity(layer, primvars.get("displayOpacity"), polygons, time) if name == "displayColor" else layer
+            layer = Layer("color" if not n_colors else f"color{n_colors}", kind, layer.domain, layer.values, layer.indices)
+            n_colors += 1
+        layers.append(layer)
+    return tuple(layers), named_uv, left
+
+
+def _normals(mesh: Any, primvar: Any, polygons: SceneMesh, time: float, turn: Float64) -> Layer | None:
+    """Normals in world space; a primvar of that name comes before the attribute."""
+    if primvar is not None:
+        layer = _layer("normal", "normal", primvar, polygons, time)
+    else:
+        values = mesh.GetNormalsAttr().Get(time)
+        if not values:
+            return None
+        domain = DOMAINS[mesh.GetNormalsInterpolation()]
+        layer = _fitting(Layer("normal", "normal", domain, np.array(values, np.float32)), polygons)
+    if layer is None or layer.values.shape[1] != 3:
+        return None
+    if turn.ndim == 2:
+        turned = layer.values @ np.linalg.pinv(turn).T
+        return Layer("normal", "normal", layer.domain, _unit(turned), layer.indices)
+    if layer.domain not in ("vertex", "corner"):
+        return None
+    rows = layer.values if layer.indices is None else layer.values[layer.indices]
+    vertices = np.arange(len(rows)) if layer.domain == "vertex" else polygons.corners
+    turned = np.einsum("rk,rjk->rj", rows.astype(np.float64), np.linalg.pinv(turn)[vertices])
+    return Layer("normal", "normal", layer.domain, _unit(turned))
+
+
+def _layer(name: str, kind: str, primvar: Any, polygons: SceneMesh, time: float) -> Layer | None:
+    values = np.array(primvar.Get(time))
+    if values.dtype.kind not in "fiub" or not values.size:
+        return None
+    if values.dtype.kind == "f":
+        values = values.astype(np.float32)
+        if not np.isfinite(values).all():
+            return None
+    if primvar.GetElementSize() > 1 and values.ndim == 1:
+        values = values.reshape(-1, primvar.GetElementSize()) if len(values) % primvar.GetElementSize() == 0 else values
+    values = values.reshape(1, -1) if not primvar.GetTypeName().isArray else values.reshape(len(values), -1)
+    indices = primvar.GetIndices(time) if primvar.IsIndexed() else None
+    own = None if indices is None else np.array(indices, np.int64)
+    if own is not None and (own.min(initial=0) < 0 or own.max(initial=0) >= len(values)):
+        return None
+    return _fitting(Layer(name, kind, DOMAINS[primvar.GetInterpolation()], values, own), polygons)
+
+
+def _fitting(layer: Layer, polygons: SceneMesh) -> Layer | None:
+    """The layer, if it has the rows that its domain needs; constant values may have any number, and the first counts."""
+    rows = len(layer.values) if layer.indices is None else len(layer.indices)
+    sizes = {"vertex": polygons.n_vertices, "corner": len(polygons.corners), "polygon": len(polygons.counts), "constant": 1}
+    if layer.domain == "constant" and rows:
+        return layer
+    return layer if rows == sizes[layer.domain] else None
+
+
+def _with_opacity(color: Layer, primvar: Any, polygons: SceneMesh, time: float) -> Layer:
+    """Colours with the opacities beside them as a fourth component, if those have rows of the same kind."""
+    opacity = _layer("", "scalar", primvar, polygons, time) if primvar is not None else None
+    if opacity is None or opacity.domain not in (color.domain, "constant"):
+        return color
+    rows = _expanded(color)
+    alpha = np.broadcast_to(_expanded(opacity)[:1] if opacity.domain == "constant" else _expanded(opacity), (len(rows), 1))
+    return Layer(color.name, color.kind, color.domain, np.concatenate([rows, alpha], axis=1).astype(np.float32))
+
+
+def _expanded(layer: Layer) -> Array:
+    return layer.values if layer.indices is None else layer.values[layer.indices]
+
+
+def _kind(primvar: Any) -> str | None:
+    """The kind of a primvar by its type and role, or None for what is no number of the surface."""
+    kind = str(primvar.GetTypeName())
+    plain = kind.removesuffix("[]")
+    if plain.startswith(("color3", "color4")):
+        return "color"
+    if plain in ("int", "uint", "uchar", "bool"):
+        return "label"
+    if plain in ("float", "double", "half"):
+        return "scalar"
+    return "vector" if re.fullmatch(r"(float|double|half|int|vector|normal|point|texCoord)[234][fdhi]?", plain) else None
+
+
+def _is_uv(name: str, primvar: Any) -> bool:
+    plain = str(primvar.GetTypeName()).removesuffix("[]")
+    return plain.startswith("texCoord2") or (plain in ("float2", "double2", "half2") and bool(UV_NAME.match(name)))
+
+
+def _uv_rank(name: str) -> tuple[int, str]:
+    return (FIRST_UV.index(name) if name in FIRST_UV else len(FIRST_UV), name)
+
+
+def _unit(vectors: Float64) -> Array:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(vectors / np.where(length > 0, length, 1), np.float32)

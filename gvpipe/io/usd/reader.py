@@ -1,0 +1,109 @@
+"""A USD stage as a `MeshSequence`: meshes become parts in world space, frames are evaluated when they are read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gvpipe.asset.metadata import Metadata
+from gvpipe.errors import InputError
+from gvpipe.io.options import ReadOptions
+from gvpipe.io.scene_frames import SceneFrames
+from gvpipe.io.scene_layers import join_layers
+from gvpipe.io.scene_mesh import SceneMesh, join
+from gvpipe.io.usd.materials import Materials
+from gvpipe.io.usd.meshes import find_meshes, groups_of, polygons_of
+from gvpipe.io.usd.motion import Skins, UsdMotion
+from gvpipe.io.usd.primvars import layers_of
+from gvpipe.io.usd.stage import open_stage, outside_note, stage_times, usd_errors
+from gvpipe.sequence import MeshSequence
+
+
+def read_usd(path: Path, options: ReadOptions) -> MeshSequence:
+    """Read the meshes of a USD file, in the stage's units and axes, with the world transforms of its prims.
+
+    Args:
+        path: .usda, .usdc, .usd or .usdz; files that it refers to are read too.
+        options: `fps` samples the stage's range at that rate instead of once per time code.
+
+    Raises:
+        InputError: usd-core is missing, the file is damaged or refers to a file that is missing, it has no mesh, a
+            mesh's topology changes, a position is not finite.
+    """
+    stage = open_stage(path)
+    with usd_errors(path):
+        return _read_stage(stage, path, options)
+
+
+def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
+    from pxr import UsdGeom
+
+    where = str(path)
+    found = find_meshes(stage)
+    skins, materials = Skins(stage), Materials(stage, path)
+    places = UsdGeom.XformCache()
+    start = float(stage.GetStartTimeCode())
+    motions = [UsdMotion(mesh, skins, places, start) for mesh in found.meshes]
+    kept = [number for number, motion in enumerate(motions) if motion.n_vertices]
+    if not kept:
+        raise InputError(f"{where} has no polygon mesh; a mesh with triangles is needed")
+    motions = [motions[number] for number in kept]
+    samples = (sample for motion in motions for sample in motion.samples())
+    times, fps, time_notes = stage_times(stage, samples, options, where)
+    frames = SceneFrames(motions, times, where, "time code")
+    read = [_read_mesh(found.meshes[number], motion, materials, float(times[0]), where) for number, motion in
+            zip(kept, motions, strict=True)]  # fmt: skip
+    meshes = [mesh for mesh, _ in read]
+    joined = join(meshes, where)
+    attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
+    left = list(dict.fromkeys(name for _, names in read for name in names))
+    left_note = (f"primvars that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()
+    return MeshSequence(
+        frames,
+        joined.faces,
+        fps,
+        attributes,
+        where,
+        frames.origin,
+        (*found.notes, *time_notes, *materials.notes(), *layer_notes, *left_note, *outside_note(stage, path)),
+        parts=joined.parts,
+        polygons=joined.polygons,
+        materials=tuple(materials.materials),
+        images=tuple(materials.textures.images),
+        metadata=_metadata(stage, path, float(times[0])),
+    )
+
+
+def _read_mesh(mesh: Any, motion: UsdMotion, materials: Materials, time: float, where: str) -> tuple[SceneMesh, list[str]]:
+    """One mesh with its layers, and the names of primvars that were left out."""
+    from pxr import UsdGeom
+
+    prim = mesh.GetPrim()
+    counts, corners = polygons_of(mesh, time, where)
+    groups, bound = groups_of(mesh, len(counts), materials)
+    turn = motion.linear(time)
+    whole = turn if turn.ndim == 2 else turn.mean(axis=0)
+    is_left = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
+    is_mirrored = bool(np.linalg.det(whole) < 0)  # a mirror turns the winding round
+    parent = str(prim.GetParent().GetPath()).strip("/")
+    plain = SceneMesh(prim.GetName(), parent, motion.n_vertices, counts, corners, groups, bound, is_left != is_mirrored)
+    layers, uv_names, left = layers_of(mesh, plain, time, turn)
+    materials.name_uv(bound, uv_names)
+    return replace(plain, layers=layers), left
+
+
+def _metadata(stage: Any, path: Path, start: float) -> Metadata:
+    from pxr import UsdGeom
+
+    unit = float(UsdGeom.GetStageMetersPerUnit(stage))
+    texts = {"usd comment": stage.GetRootLayer().comment} if stage.GetRootLayer().comment else {}
+    return Metadata(
+        str(UsdGeom.GetStageUpAxis(stage)).lower(),
+        unit if np.isfinite(unit) and unit > 0 else None,
+        start / float(stage.GetTimeCodesPerSecond()),
+        path.name,
+        texts,
+    )

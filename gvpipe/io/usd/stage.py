@@ -1,0 +1,142 @@
+"""Opening a USD stage: the library's diagnostics become errors and notes, and time codes become frames."""
+
+from __future__ import annotations
+
+import os
+import re
+import zipfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gvpipe.arrays import Float64
+from gvpipe.errors import InputError
+from gvpipe.io.options import ReadOptions
+from gvpipe.io.scene_frames import between_note, frame_times, one_line
+
+EXTRA = "USD files need the package usd-core; install it by: pip install 'gvpipe[usd]'"
+SIGNATURES = {  # first bytes by extension; .usd is text or binary
+    ".usda": (b"#usda", b"#sdf"),
+    ".usdc": (b"PXR-USDC",),
+    ".usd": (b"#usda", b"#sdf", b"PXR-USDC"),
+    ".usdz": (b"PK\x03\x04",),
+}
+MISSING = ("ErrorInvalidAssetPath", "ErrorInvalidSublayerPath")  # of composition: a file that is not there
+FASTEST = 120.0  # time codes a second above which codes are a unit of time rather than frames
+SLOWEST = 5.0  # and below which
+
+
+def open_stage(path: Path) -> Any:
+    """Open a stage.
+
+    Raises:
+        InputError: usd-core is missing, the file is none of USD's or damaged, or a file that it refers to is missing.
+    """
+    try:
+        from pxr import Usd
+    except ImportError as exc:
+        raise InputError(f"{path}: {EXTRA}") from exc
+    head = _head(path)
+    if not head.startswith(SIGNATURES[path.suffix.lower()]):
+        begins = f"it begins with {head[:8]!r}" if head else "it is empty"
+        raise InputError(f"{path} is not a {path.suffix.lower()} file ({begins}); export it again")
+    if path.suffix.lower() == ".usdz" and not zipfile.is_zipfile(path):
+        raise InputError(f"{path} is cut short or damaged; get it again from its source")
+    with usd_errors(path):
+        stage = Usd.Stage.Open(str(path))
+        for error in stage.GetCompositionErrors():
+            if type(error).__name__ in MISSING:
+                named = re.search(r"@(.*?)@", str(error))
+                raise InputError(
+                    f"{path} refers to {named[1] if named else 'a file'}, which cannot be read; put it in its place, or export "
+                    "again as one file"
+                )
+    return stage
+
+
+@contextmanager
+def usd_errors(path: Path) -> Iterator[None]:
+    """Turn what the library raises into `InputError`, and keep its warnings from the terminal."""
+    from pxr import Tf, UsdUtils
+
+    silencer = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        yield
+    except InputError:
+        raise
+    except (Tf.ErrorException, RuntimeError, ValueError, TypeError, OverflowError, MemoryError) as exc:
+        raise InputError(f"{path} cannot be read as USD: {_reason(exc)}; export it again") from exc
+    finally:
+        silencer.TakeUncoalescedDiagnostics()
+        del silencer
+
+
+def outside_note(stage: Any, path: Path) -> tuple[str, ...]:
+    """Of layers that lie outside of the file's folder."""
+    folder = Path(os.path.realpath(path)).parent
+    outside = [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath and not is_inside(layer.realPath, folder)]
+    return (f"it refers to {len(outside)} files outside of its folder, such as {outside[0]}",) if outside else ()
+
+
+def is_inside(path: str, folder: Path) -> bool:
+    """Whether a file, or a package of USD and a file in it, lies below a folder, links followed."""
+    outer = path.split("[", 1)[0]
+    return Path(os.path.realpath(outer)).is_relative_to(folder)
+
+
+def stage_times(
+    stage: Any, samples: Iterable[float], options: ReadOptions, where: str
+) -> tuple[Float64, float, tuple[str, ...]]:
+    """Return the time code of each frame, the frames per second, and notes.
+
+    Frames are the stage's time codes from its start to its end, or from the first to the last sample where the stage has no
+    range. Where time codes are no frames (1000 a second, say), the stage's frames per second count, else the densest samples.
+
+    Args:
+        samples: time codes of all samples of what moves.
+        options: `fps` evaluates at other times of the same range.
+    """
+    codes = float(stage.GetTimeCodesPerSecond())
+    if not (np.isfinite(codes) and codes > 0):
+        raise InputError(f"{where} has {codes} time codes a second; a number above 0 is needed")
+    given = np.unique(np.fromiter(samples, np.float64))
+    given = given[np.isfinite(given)]
+    whole = np.rint(given)
+    given = np.unique(np.where(np.abs(given - whole) < 1e-6, whole, given))  # of programs that store codes in seconds
+    start, stop = float(stage.GetStartTimeCode()), float(stage.GetEndTimeCode())
+    if not stop > start:
+        start, stop = (float(given[0]), float(given[-1])) if len(given) else (start, start)
+    if not len(given):  # nothing moves
+        stop = start
+    inside = given[(given >= start) & (given <= stop)]
+    step = codes / options.fps if options.fps else _step(stage, codes, inside)
+    fps = codes / step
+    times = frame_times(start, stop, step, where)
+    return times, fps, between_note(inside, start, step, fps, codes)
+
+
+def _step(stage: Any, codes: float, samples: Float64) -> float:
+    """Time codes from frame to frame."""
+    rate = float(stage.GetFramesPerSecond())
+    if stage.GetRootLayer().HasFramesPerSecond() and 0 < rate <= FASTEST and rate < codes:
+        return codes / rate
+    if SLOWEST <= codes <= FASTEST or len(samples) < 2:
+        return 1.0
+    return max(float(np.diff(samples).min()), codes / FASTEST)
+
+
+def _head(path: Path) -> bytes:
+    try:
+        with open(path, "rb") as file:
+            return file.read(16)
+    except OSError as exc:
+        raise InputError(f"{path} cannot be read: {exc.strerror}; check the path") from exc
+
+
+def _reason(exc: BaseException) -> str:
+    """What the library says, without where in its sources."""
+    said = re.search(r" : '(.*?)'\s*$", str(exc), re.MULTILINE)
+    return one_line(RuntimeError(said[1] if said else str(exc)))
