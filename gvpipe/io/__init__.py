@@ -16,6 +16,9 @@ from gvpipe.io.export import write_frames
 from gvpipe.io.frames import read_frames
 from gvpipe.io.npz import read_npz, write_npz
 from gvpipe.io.options import ReadOptions
+from gvpipe.io.simulation.collections import read_collection
+from gvpipe.io.simulation.exodus import read_exodus
+from gvpipe.io.simulation.vtkhdf import read_vtkhdf
 from gvpipe.io.usd import read_usd
 from gvpipe.sequence import MeshSequence
 
@@ -27,6 +30,10 @@ READERS: dict[str, Callable[[Path, ReadOptions], MeshSequence]] = {
     ".npz": lambda path, options: read_npz(path, options.fps),
     **dict.fromkeys(USD, read_usd),
     ".abc": read_alembic,
+    ".pvd": read_collection,
+    ".series": read_collection,
+    **dict.fromkeys((".vtkhdf", ".hdf"), read_vtkhdf),
+    **dict.fromkeys((".e", ".exo", ".ex2"), read_exodus),
 }
 WRITERS: dict[str, Callable[[MeshSequence, Path], tuple[str, ...]]] = {".npz": write_npz}
 

@@ -10,6 +10,9 @@ from gvpipe.io.mesh import EncoderMaker, Loader
 from gvpipe.io.obj import ObjLoader, encode_obj
 from gvpipe.io.off import OffLoader, encode_off
 from gvpipe.io.ply import encode_ply, load_ply
+from gvpipe.io.simulation.frame_loader import SurfaceLoader
+from gvpipe.io.simulation.legacy import load_legacy
+from gvpipe.io.simulation.xml_grids import load_xml_grid
 from gvpipe.io.stl import StlLoader, encode_stl
 
 
@@ -33,6 +36,11 @@ FRAME_FORMATS = {
     ".off": FrameFormat(OffLoader, encode_off),
     ".glb": FrameFormat(GltfLoader, encode_glb),
     ".gltf": FrameFormat(GltfLoader),
+    ".vtk": FrameFormat(lambda: SurfaceLoader(load_legacy)),
+    **{
+        suffix: FrameFormat(lambda: SurfaceLoader(load_xml_grid))
+        for suffix in (".vtp", ".vtu", ".vts", ".vtr", ".vti", ".pvtp", ".pvtu")
+    },
 }
 
 

@@ -1,0 +1,41 @@
+"""Simulation files of one time step each, as frame files: the surface of the first serves all that have the same cells."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from gvpipe.io.mesh import Mesh
+from gvpipe.io.simulation.cells import Cells
+from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
+from gvpipe.io.simulation.surface import Surface, extract_surface
+
+
+class SurfaceLoader:
+    """Loads the surface of one file after the other.
+
+    Args:
+        load: parses a file.
+    """
+
+    def __init__(self, load: Callable[[Path], Dataset]) -> None:
+        self._load = load
+        self._first: tuple[Cells, int, Surface] | None = None
+
+    def __call__(self, path: Path) -> Mesh:
+        """Load a file; raises `ValueError`."""
+        step = self._load(path)
+        cells, points = step.cells(), step.points()
+        if self._first is not None and self._first[1] == len(points) and self._first[0].equals(cells):
+            surface = self._first[2]
+        else:
+            surface = extract_surface(cells, points)
+        self._first = self._first or (cells, len(points), surface)
+        return Mesh(
+            points[surface.points],
+            surface.faces,
+            notes=(*step.notes, *surface.notes),
+            polygons=surface.polygons,
+            parts=block_parts(step, surface),
+            animated=surface_values(step, surface),
+        )
