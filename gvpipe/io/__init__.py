@@ -13,12 +13,15 @@ from pathlib import Path
 from gvpipe.errors import InputError
 from gvpipe.io.alembic import read_alembic
 from gvpipe.io.export import write_frames
+from gvpipe.io.fbx import read_fbx
 from gvpipe.io.frames import read_frames
 from gvpipe.io.npz import read_npz, write_npz
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.collections import read_collection
+from gvpipe.io.simulation.ensight import read_ensight
 from gvpipe.io.simulation.exodus import read_exodus
 from gvpipe.io.simulation.vtkhdf import read_vtkhdf
+from gvpipe.io.simulation.xdmf import read_xdmf
 from gvpipe.io.usd import read_usd
 from gvpipe.sequence import MeshSequence
 
@@ -30,9 +33,12 @@ READERS: dict[str, Callable[[Path, ReadOptions], MeshSequence]] = {
     ".npz": lambda path, options: read_npz(path, options.fps),
     **dict.fromkeys(USD, read_usd),
     ".abc": read_alembic,
+    ".fbx": read_fbx,
     ".pvd": read_collection,
     ".series": read_collection,
     **dict.fromkeys((".vtkhdf", ".hdf"), read_vtkhdf),
+    **dict.fromkeys((".case", ".encas"), read_ensight),
+    **dict.fromkeys((".xdmf", ".xmf"), read_xdmf),
     **dict.fromkeys((".e", ".exo", ".ex2"), read_exodus),
 }
 WRITERS: dict[str, Callable[[MeshSequence, Path], tuple[str, ...]]] = {".npz": write_npz}

@@ -1,0 +1,8 @@
+"""FBX scenes (.fbx) by ufbx: skins, blend shapes, node animation, geometry caches, several takes. Experimental, as its package is.
+
+Source: S. Raivio, ufbx (https://github.com/ufbx/ufbx), which evaluates all motion itself.
+"""
+
+from gvpipe.io.fbx.reader import read_fbx
+
+__all__ = ["read_fbx"]
