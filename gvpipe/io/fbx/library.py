@@ -1,37 +1,24 @@
-"""The library ufbx: imported when it is needed, its objects held, its errors as one line."""
+"""The library ufbx, inside the process of its own that `gvpipe.io.fbx.worker` is: its objects are held there for ever.
+
+ufbx 0.0.5 gives out its objects without a reference of their own: the second look at a node, or a garbage collection, frees what
+is still in use, and the process dies. So every object gets a reference that is never taken back, and nothing is collected.
+"""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.errors import InputError
+from gvpipe.arrays import Array, Float64
 
 _keep = ctypes.pythonapi.Py_IncRef
 _keep.argtypes, _keep.restype = [ctypes.py_object], None
 
 
-def import_ufbx(path: Path) -> Any:
-    """The library; raises `InputError` with the command that installs it."""
-    try:
-        import ufbx
-    except ImportError as exc:
-        raise InputError(f"{path} needs ufbx; install it with: pip install 'gvpipe[fbx]'") from exc
-    return ufbx
-
-
 def hold(found: Any) -> Any:
-    """Return an object of the library with a reference that is never taken back.
-
-    ufbx 0.0.5 gives out its objects without a reference of their own, so that the second look at a node frees it and the
-    process dies. What is held here are small wrappers; `free` returns the memory of a scene itself.
-    """
+    """Return an object of the library with a reference that is never taken back."""
     if found is not None:
         _keep(found)
     return found
@@ -49,11 +36,6 @@ def numbers(found: Any, dtype: Any) -> Array:
     return np.array(found, dtype) if len(found) else np.zeros(0, dtype)
 
 
-@contextmanager
-def fbx_errors(ufbx: Any, path: Path) -> Iterator[None]:
-    """Turn the library's errors into `InputError` of one line."""
-    try:
-        yield
-    except ufbx.UfbxError as exc:
-        reason = " ".join(str(exc).split())[:200] or type(exc).__name__
-        raise InputError(f"{path} cannot be read as FBX: {reason}; export it again") from exc
+def columns(node: Any) -> Float64:
+    """``(4, 3)`` the columns of the transform from a node's geometry to the world."""
+    return np.array(hold(node.geometry_to_world), np.float64)
