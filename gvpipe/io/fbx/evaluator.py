@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Array
+from gvpipe.arrays import Array, Float64
 from gvpipe.asset.material import Image, Material
 from gvpipe.errors import InputError
-from gvpipe.io.fbx.library import columns, hold, listed, numbers
+from gvpipe.io.fbx.library import columns, hold, listed, numbers, square
 from gvpipe.io.fbx.materials import read_material
 from gvpipe.io.fbx.textures import Textures
 from gvpipe.io.scene_mesh import Layer, SceneMesh
@@ -96,12 +96,9 @@ class FbxScene:
         now, posed = self._evaluate(time)
         result = []
         for index in self._shown:
-            mesh = hold(posed[index].mesh)
-            values = numbers(hold(mesh.skinned_position).values, np.float64).reshape(-1, 3)
-            if mesh.skinned_is_local:
-                matrix = columns(posed[index])
-                values = values @ matrix[:3] + matrix[3]
-            result.append(values)
+            values = numbers(hold(hold(posed[index].mesh).skinned_position).values, np.float64).reshape(-1, 3)
+            matrix = _to_world(posed[index])
+            result.append(values @ matrix[:3] + matrix[3])
         now.free()
         return result
 
@@ -139,6 +136,23 @@ def _with_mesh(nodes: list[Any]) -> tuple[list[int], int]:
     return (visible, len(found) - len(visible)) if visible else (found, 0)
 
 
+def _to_world(node: Any) -> Float64:
+    """``(4, 3)`` the transform of a node's evaluated positions to the world.
+
+    A skin puts its mesh into the world. Of a skinned mesh that several nodes show, each node moves what the skin gives, relative
+    to where the mesh was bound; Maya does so.
+    """
+    mesh = hold(node.mesh)
+    if mesh.skinned_is_local:
+        return columns(node)
+    skins = listed(mesh.skin_deformers)
+    clusters = listed(skins[0].clusters) if skins else []
+    if len(hold(mesh.instances)) < 2 or not clusters:
+        return np.eye(4, 3)
+    bound = square(clusters[0].geometry_to_bone) @ square(clusters[0].bind_to_world)
+    return np.asarray((np.linalg.pinv(bound) @ square(node.geometry_to_world))[:, :3])
+
+
 def _uv_names(nodes: list[Any]) -> dict[str, str]:
     """Names of attributes by the names of uv sets: the first of each mesh is ``uv``, the second ``uv1``."""
     names: dict[str, str] = {}
@@ -159,7 +173,7 @@ def _read_mesh(node: Any, posed: Any, materials: dict[int, int]) -> SceneMesh:
     if len(groups) != len(counts) or groups.max(initial=0) >= len(bound):
         groups, bound = np.zeros(len(counts), np.int64), bound[:1] or (None,)
     parent = hold(node.parent)
-    is_mirrored = bool(np.linalg.det(columns(posed)[:3]) < 0)
+    is_mirrored = bool(np.linalg.det(_to_world(posed)[:3]) < 0)
     return SceneMesh(
         str(node.name) or str(mesh.name),
         "" if parent is None or parent.is_root else str(parent.name),
@@ -192,8 +206,7 @@ def _normals(posed: Any, take: Array) -> list[Layer]:
     if not held.exists:
         return []
     values = numbers(held.values, np.float64).reshape(-1, 3)
-    if mesh.skinned_is_local:
-        values = values @ np.linalg.pinv(columns(posed)[:3]).T
+    values = values @ np.linalg.pinv(_to_world(posed)[:3]).T
     length = np.linalg.norm(values, axis=1, keepdims=True)
     unit = np.where(length > 0, values / np.where(length > 0, length, 1), [0.0, 0.0, 1.0])
     return [Layer("normal", "normal", "corner", unit.astype(np.float32), numbers(held.indices, np.int64)[take])]

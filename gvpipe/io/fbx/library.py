@@ -39,3 +39,10 @@ def numbers(found: Any, dtype: Any) -> Array:
 def columns(node: Any) -> Float64:
     """``(4, 3)`` the columns of the transform from a node's geometry to the world."""
     return np.array(hold(node.geometry_to_world), np.float64)
+
+
+def square(matrix: Any) -> Float64:
+    """``(4, 4)`` a transform, for rows of coordinates."""
+    result = np.eye(4)
+    result[:, :3] = np.array(hold(matrix), np.float64)
+    return result
