@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 Source = StrPath | Sequence[StrPath]
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
-ASSET = ("attributes", "fields", "textures")
+ASSET = ("attributes", "fields", "textures", "clip", "mesh")
 KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", *ASSET)  # of `encode`
 
 
@@ -146,12 +146,15 @@ class _StageClock:
             self.progress(stage, done)
 
 
-def read(path: Source, fps: float | None = None) -> MeshSequence:
+def read(path: Source, fps: float | None = None, clip: str | None = None, mesh: StrPath | None = None) -> MeshSequence:
     """Read a mesh sequence, or a geometry video as one.
 
     Args:
-        path: an ``.npz``, an ``.mp4``, or frame files as a folder, a glob, a ``%04d`` pattern, a list or one file.
-        fps: frames per second; overrides the file's. Frame files have 30 by default.
+        path: an ``.npz``, an ``.mp4``, a scene (animated glTF, USD, Alembic), a point cache (``.pc2``, ``.mdd``, ``.npy``), or
+            frame files as a folder, a glob, a ``%04d`` pattern, a list or one file.
+        fps: frames per second; overrides the file's. Frame files have 30 by default, glTF files the rate of their keys.
+        clip: name of the animation to read, of a glTF file that has several; None: the first.
+        mesh: a file with the triangles of a point cache.
 
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
@@ -161,11 +164,13 @@ def read(path: Source, fps: float | None = None) -> MeshSequence:
         for file in path:
             check_path(file, "a file of gvpipe.read's list")
         if len(path) != 1:
-            return read_sequence(path, fps)
+            return read_sequence(path, fps, clip, mesh)
         path = path[0]
     one = check_path(path, "what gvpipe.read is given", "a list of frame files or ")
     if Path(one).suffix.lower() not in VIDEO_SUFFIXES:
-        return read_sequence(one, fps)
+        return read_sequence(one, fps, clip, mesh)
+    if clip is not None:
+        raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
     sequence = Player(one).sequence()
     return sequence if fps is None else sequence.with_fps(fps)
 
@@ -201,6 +206,8 @@ def encode(
     attributes: Mapping[str, float | str] | None = None,
     fields: Mapping[str, float | str] | None = None,
     textures: int | str | None = None,
+    clip: str | None = None,
+    mesh: StrPath | None = None,
     **settings: Any,
 ) -> Report:
     """Encode a sequence into a geometry video.
@@ -226,6 +233,7 @@ def encode(
         fields: the same for animated fields; ``"0.1%,nan=keep"`` keeps NaN as holes.
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
+        clip, mesh: as for `read`.
 
     Raises:
         InputError: the source, a setting or the path cannot be used, or no quality meets the target.
@@ -238,7 +246,7 @@ def encode(
         raise SettingError(f"more than one target is given; choose one of {', '.join(targets)}")
     given = _candidates(codec, settings, purpose)
     clock = _StageClock(progress)
-    sequence = _open_source(source, path, fps)
+    sequence = _open_source(source, path, fps, clip, mesh)
     target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
     asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
     coded = _code(sequence, given, target, asset, clock)
@@ -292,16 +300,23 @@ def render(
     frame: int | None = None,
     size: int | tuple[int, int] = 512,
     view: str | tuple[float, float] = "three-quarter",
-    up: str = "y",
+    up: str | None = None,
     turntable: bool = False,
     follow: bool = False,
     error_of: MeshSequence | StrPath | None = None,
     error_max: float | None = None,
     shading: str = "smooth",
     camera: Camera | None = None,
+    field: str | None = None,
+    colormap: str | None = None,
+    field_range: tuple[float, float] | str | None = None,
+    parts: str | Sequence[str] = (),
+    plain: bool = False,
     progress: Progress | None = None,
-) -> None:
-    """Paint a sequence, or a geometry video, as ``.png``, ``.gif`` or ``.mp4``.
+) -> list[str]:
+    """Paint a sequence, or a geometry video, as ``.png``, ``.gif`` or ``.mp4``; return what should be known, a line each.
+
+    Materials, textures and vertex colours show if the sequence has them.
 
     Args:
         source: a sequence, or what `gvpipe.read` takes.
@@ -310,17 +325,23 @@ def render(
         size: pixels, one number for a square or ``(width, height)``; even for MP4.
         view: ``"three-quarter"``, ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``, ``"bottom"`` or
             ``(azimuth, elevation)`` in degrees.
-        up: the world's axis that is up: ``"x"``, ``"y"`` or ``"z"``.
+        up: the world's axis that is up: ``"x"``, ``"y"`` or ``"z"``; None: what the sequence's metadata says, else y.
         turntable: let the camera go once around.
         follow: let the camera go with the mesh, which then stays in the middle of the picture.
         error_of: a reference; colours then show each vertex' distance from it, with a legend.
         error_max: where the colours end, percent of the reference's diagonal, instead of at the largest error drawn.
         shading: ``"smooth"`` or ``"flat"``.
         camera: instead of the one that frames the whole motion from ``view``.
+        field: name of a field; colours then show its values, or its vectors' lengths, with a legend. What has no value is grey.
+        colormap: of the field: ``"viridis"`` (default), ``"magma"``, ``"coolwarm"``, ``"gray"`` or ``"errors"``.
+        field_range: the values at the ends of the colours; ``"symmetric"``: about 0. By default the range of the frames drawn.
+        parts: the name of the part to paint, or several; none: all.
+        plain: paint the shape alone, without materials and colours.
         progress: called with ``"render"`` and the part that is done.
 
     Raises:
-        InputError: a value that cannot be, a sequence without triangles, a reference that does not fit.
+        InputError: a value that cannot be, a sequence without triangles, a reference that does not fit, an unknown field or
+            part, a texture without its uv attribute.
         OutputError: the file cannot be written; no part of it is left.
     """
     from gvpipe.rendering.films import PictureOptions, check_output, write_pictures
@@ -337,13 +358,19 @@ def render(
         error_max=error_max,
         shading=shading,
         camera=camera,
+        field=field,
+        colormap=colormap,
+        limits=field_range,
+        parts=(parts,) if isinstance(parts, str) else tuple(parts),
+        plain=plain,
     )
     check_output(target, options)
     for given in (source, error_of):
         if given is not None and _is_among(path, given):
             raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
     reference = error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of)
-    write_pictures(source if isinstance(source, MeshSequence) else read(source), target, options, reference, progress)
+    sequence = source if isinstance(source, MeshSequence) else read(source)
+    return list(write_pictures(sequence, target, options, reference, progress))
 
 
 def info(path: StrPath) -> Info:
@@ -407,7 +434,9 @@ def _is_settings(value: object) -> bool:
     return isinstance(value, Codec) and not isinstance(value, type)
 
 
-def _open_source(source: MeshSequence | Source, path: StrPath, fps: float | None) -> MeshSequence:
+def _open_source(
+    source: MeshSequence | Source, path: StrPath, fps: float | None, clip: str | None, mesh: StrPath | None
+) -> MeshSequence:
     """The sequence to encode, which must not be the file to write."""
     if isinstance(source, MeshSequence):
         return source if fps is None else source.with_fps(fps)
@@ -415,7 +444,7 @@ def _open_source(source: MeshSequence | Source, path: StrPath, fps: float | None
         check_path(source, "gvpipe.encode's source", "a MeshSequence or ")
     if _is_among(path, source):
         raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
-    return read(source, fps)
+    return read(source, fps, clip, mesh)
 
 
 def _target(
@@ -453,7 +482,8 @@ def _code(
         choice = choose_codec(given, sequence, target or default_target(given), progress, asset)
     trial = choice.trial
     check = partial(choice.trials.check, trial.encoded.permutation)
-    return _Coded(trial.codec, trial.encoded, check, choice.tried, choice.reason)
+    encoded = dataclasses.replace(trial.encoded, bitstream=asset.add(trial.encoded, trial.codec))
+    return _Coded(trial.codec, encoded, check, choice.tried, choice.reason)
 
 
 def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progress) -> tuple[int, Bitstream]:

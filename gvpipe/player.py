@@ -49,7 +49,7 @@ class Player:
         self.bitstream: Bitstream = read_file(path)
         with in_file(self.path):
             self._reader = open_reader(self.bitstream)
-            self._asset = AssetReader(self.bitstream, self._reader, self.path)
+            self._asset = AssetReader(self.bitstream, self._reader, self.path, self._read)
         self._lock = threading.Lock()
         group = self._reader.group if isinstance(self._reader, GroupReader) else _alone
         self._cache = FrameCache(self._read, group, len(self), 12 * self.bitstream.n_vertices)

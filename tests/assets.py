@@ -52,7 +52,7 @@ def asset(n_frames: int = 3, **changes: Any) -> MeshSequence:
             "stress": Field(rng.random((n_frames, 9), np.float32), unit="MPa", range=(0.0, 1.0)),
             "flow": Field(rng.random((n_frames, 8, 3), np.float32), "triangle"),
         },
-        "parts": (Part("cloth", (0, 9), (0, 6), 0), Part("patch", (4, 9), (6, 8), 1, "group")),
+        "parts": (Part("cloth", (0, 8), (0, 6), 0), Part("patch", (4, 9), (6, 8), 1, "group")),
         "polygons": np.array([4, 4, 4, 3, 3], np.int32),
         "materials": (
             Material("red cloth", (0.5, 0.25, 0.125, 1.0), Texture(0), 0.25, 0.5, emissive=(0.0, 0.5, 0.0)),

@@ -1,4 +1,4 @@
-"""A small moving scene that has everything beside its positions."""
+"""A scene with a bit of everything, for the tests of scene formats."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import io
 import numpy as np
 from PIL import Image as Pillow
 
-from gvpipe.arrays import Array
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, Material, Texture
@@ -15,72 +14,83 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
 from gvpipe.sequence import MeshSequence
 
-N = 6  # quads along each side of each sheet
-N_FRAMES = 10
+FACES = np.array([[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [6, 7, 8]], np.int32)  # two quads, and a triangle of its own
+POLYGONS = np.array([4, 4, 3], np.int32)
+N_FRAMES = 6
 
 
-def png(side: int = 32) -> bytes:
-    """A picture of random pixels."""
-    file = io.BytesIO()
-    Pillow.fromarray(np.random.default_rng(2).integers(0, 255, (side, side, 3), np.uint8)).save(file, "PNG")
-    return file.getvalue()
-
-
-def scene(n_frames: int = N_FRAMES) -> MeshSequence:
-    """Two sheets: one of quads, and one of which half the quads are cut; vertices are shuffled inside each part."""
-    points, polygons = [], []
+def scene() -> MeshSequence:
+    """Two meshes, the first of two materials: 9 vertices, 5 triangles, 6 frames at 24 from 0.5 s."""
+    rest = np.array(
+        [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0], [5, 0, 0], [6, 0, 0], [5, 1, 0]], np.float32
+    )
+    positions = np.repeat(rest[None], N_FRAMES, axis=0)
+    positions[:, :6, 2] = np.sin(np.arange(N_FRAMES))[:, None] * rest[:6, 0]  # the second mesh stands still
+    positions[2] = positions[1]  # a frame that repeats the one before
     rng = np.random.default_rng(5)
-    side = N + 1
-    for number in range(2):
-        y, x = np.divmod(np.arange(side * side), side)
-        first = np.flatnonzero((x < N) & (y < N))
-        quads = np.stack([first, first + 1, first + side + 1, first + side], axis=1)
-        order = rng.permutation(side * side)
-        place = np.argsort(order)
-        points.append(np.stack([x + 10 * number, y, 0 * x], axis=1)[order] / N)
-        for quad in (place[quads] + number * side * side).tolist():
-            is_cut = number == 1 and rng.random() < 0.5
-            polygons += [quad[:3], [quad[0], *quad[2:]]] if is_cut else [quad]
-    rest = np.concatenate(points)
-    counts = np.array([len(polygon) for polygon in polygons])
-    faces = np.array([[p[0], p[k], p[k + 1]] for p in polygons for k in range(1, len(p) - 1)], np.int32)
-    n_first = 2 * N * N
-    t = np.arange(n_frames)[:, None] / 5
-    height = 0.3 * np.sin(3 * rest[:, 0] + t) * np.cos(2 * rest[:, 1] - t)
-    positions = np.stack([rest[:, 0] + 0 * t, rest[:, 1] + 0.1 * height, height], axis=2).astype(np.float32)
+    uv = rng.random((8, 2)).astype(np.float32)
+    attributes = {
+        "uv": Attribute(uv, "corner", "uv", np.array([0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7, 0, 1, 3], np.int32)),
+        "uv1": Attribute(rng.random((9, 2)), "vertex", "uv"),
+        "normal": Attribute(np.tile(np.array([[0, 0, 1]], np.float32), (9, 1)), "vertex", "normal"),
+        "color": Attribute(rng.random((9, 4)).astype(np.float32), "vertex", "color"),
+        "weight": Attribute(rng.random((9, 1)), "vertex", "scalar"),
+        "group": Attribute(np.array([[3], [3], [1], [1], [2]], np.int32), "triangle", "label"),
+    }
+    fields = {
+        "stress": Field(rng.random((N_FRAMES, 9)), kind="scalar"),
+        "velocity": Field(rng.random((N_FRAMES, 9, 3)), kind="vector"),
+    }
+    texture = Texture(0, "uv1", wrap=("clamp", "repeat"), offset=(0.25, 0.5), rotation=0.5, tiling=(2.0, 3.0))
+    materials = (
+        Material("wood", (0.5, 0.25, 0.125, 1.0), metallic=0.25, roughness=0.75),
+        Material(
+            "1 cloth", (1.0, 0.5, 1.0, 1.0), texture, 0.0, 0.5, alpha_mode="mask", alpha_cutoff=0.25, emissive=(0.0, 0.5, 0.0)
+        ),
+    )
+    parts = (
+        Part("sheet", (0, 6), (0, 2), 0, "world/2 left"),
+        Part("sheet", (0, 6), (2, 4), 1, "world/2 left"),
+        Part("piece", (6, 9), (4, 5), 1, "world"),
+    )
     return MeshSequence(
         positions,
-        faces,
-        24.0,
-        attributes=_attributes(rest, faces, rng),
-        name="scene",
-        fields={
-            "stress": Field((100 * height + 50).astype(np.float32), unit="MPa"),
-            "flow": np.gradient(positions, axis=0).astype(np.float32) if n_frames > 1 else np.zeros_like(positions),
-            "state": (np.mean(height[:, faces], axis=2) > 0).astype(np.int16),
-        },
-        parts=(
-            Part("left", (0, side * side), (0, n_first), 0),
-            Part("right", (side * side, 2 * side * side), (n_first, len(faces)), 1, "left"),
-        ),
-        polygons=counts,
-        materials=(Material("skin", base_color_texture=Texture(0)), Material("steel", (0.5, 0.5, 0.5, 1.0), metallic=1.0)),
-        images=(Image("skin.png", "image/png", png()),),
-        metadata=Metadata("y", 0.01, 0.5, "made here", {"author": "gvpipe"}),
+        FACES,
+        24,
+        attributes,
+        "scene",
+        fields=fields,
+        parts=parts,
+        polygons=POLYGONS,
+        materials=materials,
+        images=(Image("check.png", "image/png", picture()),),
+        metadata=Metadata("z", 0.01, 0.5, "scene"),
     )
 
 
-def _attributes(rest: Array, faces: Array, rng: np.random.Generator) -> dict[str, Attribute]:
-    corners = faces.reshape(-1)
-    centre = np.repeat(rest[faces].mean(axis=1), 3, axis=0)
-    uv = np.where(centre[:, :1] > 0.5, rest[corners][:, :2] + 0.25, rest[corners][:, :2])  # a seam at x = 0.5
-    keys, index = np.unique(np.concatenate([corners[:, None], uv], axis=1), axis=0, return_inverse=True)
-    normal = np.stack([0.1 * rest[:, 0], 0.2 * rest[:, 1], np.ones(len(rest))], axis=1)
-    return {
-        "uv": Attribute(keys[:, 1:], "corner", "uv", index.reshape(-1).astype(np.int32)),
-        "normal": Attribute(normal / np.linalg.norm(normal, axis=1, keepdims=True), "vertex", "normal"),
-        "color": Attribute(rng.integers(0, 255, (len(rest), 4), np.uint8), "vertex", "color"),
-        "mass": Attribute(rng.random(len(rest)), unit="kg"),
-        "group": Attribute(rng.integers(-3, 3, len(faces)), "triangle"),
-        "density": Attribute(np.array([1.5, 7.8]), "part", "scalar"),
-    }
+def picture() -> bytes:
+    """A PNG of 4 x 4 pixels."""
+    stream = io.BytesIO()
+    Pillow.fromarray(np.arange(64, dtype=np.uint8).reshape(4, 4, 4)).save(stream, "PNG")
+    return stream.getvalue()
+
+
+def assert_same(read: MeshSequence, given: MeshSequence) -> None:
+    """Positions, triangles, polygons, parts, attributes and seams are the same; fields where ``read`` has any."""
+    assert read.fps == given.fps
+    assert np.array_equal(read.read(0, len(read)), given.read(0, len(given)))
+    assert np.array_equal(read.faces, given.faces)
+    assert read.polygons is not None
+    assert given.polygons is not None
+    assert np.array_equal(read.polygons, given.polygons)
+    assert read.parts == given.parts
+    assert set(read.attributes) == set(given.attributes)
+    for name, attribute in given.attributes.items():
+        found = read.attributes[name]
+        assert (found.domain, found.kind) == (attribute.domain, attribute.kind), name
+        assert np.allclose(np.asarray(found), np.asarray(attribute), rtol=0, atol=1e-6), name
+    assert set(read.fields) == set(given.fields)
+    for name, field in given.fields.items():
+        assert (read.fields[name].kind, read.fields[name].domain) == (field.kind, field.domain)
+        assert np.array_equal(read.fields[name][1:4], field[1:4])
+    assert read.metadata.start_time == given.metadata.start_time

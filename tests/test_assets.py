@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import scene
+from asset_scene import scene
 
 import gvpipe
 from gvpipe.asset.polygons import polygon_corners

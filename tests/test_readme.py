@@ -15,6 +15,7 @@ import gvpipe
 from gvpipe.cli.commands import cli
 
 README = (ROOT / "README.md").read_text()
+ASSETS = (ROOT / "docs" / "assets.md").read_text()
 PICTURES = (ROOT / "docs" / "render.md").read_text()
 
 
@@ -42,6 +43,17 @@ def test_example_of_pictures(in_a_copy: Path) -> None:
     exec(compile(example, "render.md", "exec"), names)
     assert (in_a_copy / "walk.png").exists()
     assert names["picture"].shape == (512, 512, 3) and 0 <= names["triangles"].max() < len(sequence.faces)
+
+
+def test_examples_of_assets(in_a_copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    examples = re.findall(r"```python\n(.*?)```", ASSETS, re.DOTALL)
+    assert len(examples) == 2
+    for example in examples:
+        exec(compile(example, "assets.md", "exec"), {})
+    assert "['flag', 'pole'] ['cloth', 'steel']\n(3732, 2) (10, 675) image/png" in capsys.readouterr().out
+    quad = gvpipe.decode("quad.mp4")
+    assert quad.polygons is not None and quad.polygons.tolist() == [4]
+    assert quad.attributes["group"].domain == "triangle"
 
 
 def test_set_up_line_ends_in_commands_that_run(in_a_copy: Path) -> None:

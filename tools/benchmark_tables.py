@@ -25,7 +25,7 @@ from gvpipe.benchmark.tables import tables
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = (DOCS / "benchmarks.md", DOCS / "codecs" / "mcgv.md", DOCS / "experiments" / "benchmark-curves-version-2.md")
-CURVES, QUALITY = "curves-version-2", "quality-75"  # files of results
+CURVES, QUALITY, BOUND = "curves-version-2", "quality-75", "bound-0.1-percent"  # files of results
 MARKED = re.compile(r"(<!-- table: ([\w.-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 NAMES = {
     "mcgv:prediction=affine": "`mcgv` affine",
@@ -87,6 +87,22 @@ def rates_at(level: str) -> list[str]:
     return table(("sequence", *heads_of(found), "V-DMC base mesh"), rows)
 
 
+def rates_at_bound() -> list[str]:
+    """Rates at a bound on every vertex, and the three best of other compressors."""
+    results = load(BOUND)
+    rows, logarithms = [], []
+    for sequence, codecs in curves_of(results).items():
+        rates = {codec: points[0]["bpvf"] for codec, points in codecs.items()}
+        peers = sorted(results["peers"][sequence].items(), key=lambda item: item[1])[:3]
+        part = min(rates.values()) / peers[0][1]
+        logarithms.append(math.log(part))
+        others = ", ".join(f"{name} {rate:.2f}" for name, rate in peers)
+        rows.append((sequence, *(f"{rate:.3f}" for rate in rates.values()), others, f"{100 * part:.0f} %"))
+    mean = math.exp(sum(logarithms) / len(logarithms))
+    heads = ("sequence", *heads_of(curves_of(results)), "others, best first", "best of ours to best of others")
+    return table(heads, [*rows, ("geometric mean", *"---", f"{100 * mean:.0f} %")])
+
+
 def rate_cell(points: Points, stated: float | None, error: float) -> str:
     """A rate; the coarsest file's where that is better already, with its error; "-" where none is as good."""
     rate = stated or rate_at(points, "kg", error)
@@ -128,6 +144,7 @@ TABLES: dict[str, Callable[[], list[str]]] = {
     "rates-at-kg-1": lambda: rates_at("1"),
     "rates-at-kg-0.3": lambda: rates_at("0.3"),
     "rates-at-kg-0.1": lambda: rates_at("0.1"),
+    "rates-at-bound": rates_at_bound,
     "differences-kg": lambda: differences("kg"),
     "differences-sted": lambda: differences("sted"),
 }

@@ -4,8 +4,8 @@
     python tools/check_simulations.py ../shared/data --vtk     # also against the package vtk, where it is installed
 
 A distance is the largest of a vertex at any time of the reference, as part of the reference's diagonal. "vertices": vertex by
-vertex in the same order. "surface": of a volume mesh only the surface is read, so that each vertex's trajectory is compared with
-the nearest of the reference. Blender's references are metres, so positions are scaled by the file's unit first.
+vertex in the same order. "surface": of a volume mesh only the surface is read, so that each vertex's trajectory is compared
+with the nearest of the reference. Blender's references are metres, so positions are scaled by the file's unit first.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from gvpipe.errors import InputError
-from gvpipe.io import READERS, read_frames
-from gvpipe.io.options import ReadOptions
+from gvpipe.io import read
 from gvpipe.sequence import MeshSequence, describe
 
 Array = NDArray[Any]
@@ -97,7 +96,9 @@ def _line(asset: Asset, data: Path, with_vtk: bool) -> str:
     except InputError as exc:
         return f"{name}: refused: {str(exc).replace(str(data / 'assets'), '')}"
     for what, names in (("fields", list(sequence.fields)), ("attributes", list(sequence.attributes))):
-        parts.append(f"{len(names)} {what}" + (f" ({', '.join(names[:4])}{', ...' if len(names) > 4 else ''})" if names else ""))
+        parts.append(
+            f"{len(names)} {what}" + (f" ({', '.join(names[:4])}{', ...' if len(names) > 4 else ''})" if names else "")
+        )
     if asset.reference:
         parts.append(from_reference(sequence, asset, data / "reference" / f"{asset.reference}.npz"))
     if with_vtk:
@@ -107,8 +108,7 @@ def _line(asset: Asset, data: Path, with_vtk: bool) -> str:
 
 def read_asset(asset: Asset, path: Path) -> MeshSequence:
     """Read one asset; raises `InputError`."""
-    reader = READERS.get(path.suffix)
-    return reader(path, ReadOptions(clip=asset.clip)) if reader else read_frames(str(path))
+    return read(path, clip=asset.clip)
 
 
 def from_reference(sequence: MeshSequence, asset: Asset, path: Path) -> str:

@@ -84,10 +84,12 @@ def _typed(hint: Any, value: Any, where: str) -> Any:
         if not isinstance(value, dict):
             raise InputError(f"{where} is {_short(value)}; an object of texts is needed")
         return value
-    if hint is float and type(value) in (int, float) and math.isfinite(value):
+    if hint is float:
+        if type(value) not in (int, float) or not math.isfinite(value):
+            raise InputError(f"{where} is {_short(value)}; a finite number is needed")
         return float(value)
     if type(value) is not hint or (hint is int and abs(value) >= 1 << 31):
-        raise InputError(f"{where} is {_short(value)}; a {'finite number' if hint is float else hint.__name__} is needed")
+        raise InputError(f"{where} is {_short(value)}; a value of type {hint.__name__} is needed")
     return value
 
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Int32, Int64
+from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, image_size
@@ -20,6 +21,7 @@ from gvpipe.asset.metadata import NO_METADATA
 from gvpipe.asset.part import Part
 from gvpipe.asset_coding.bounds import Precision, check_names, precision
 from gvpipe.asset_coding.directory import SECTION, Directory, Listed, ListedImage, pack_directory
+from gvpipe.asset_coding.normal_fields import find_normal_rule, pack_rule
 from gvpipe.asset_coding.options import NO_OPTIONS, AssetOptions
 from gvpipe.asset_coding.pictures import limit_image
 from gvpipe.asset_coding.scan import scan_field
@@ -27,16 +29,18 @@ from gvpipe.attributes.attribute_coding import encode_attribute
 from gvpipe.attributes.corner_sharing import entries_of
 from gvpipe.attributes.surface import Surface
 from gvpipe.attributes.triangle_order import Arrangement, SourceCorners, encode_arrangement
-from gvpipe.codec import Codec, Encoded
+from gvpipe.codec import Codec, Encoded, FrameReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.mesh import FieldMesh
+from gvpipe.fields.octahedral import angular_bound, to_octahedral
 from gvpipe.fields.values import FieldBound
 from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence
 
 ARRANGEMENT = "arrangement"
-CODING = 1  # of attributes and fields
+CODED, SURFACE, OCTAHEDRAL = 1, 2, 3  # codings of fields; attributes have the first
+MOVING = ("scalar", "vector")  # kinds of fields that may follow from positions
 
 
 @dataclass(frozen=True)
@@ -105,6 +109,7 @@ class AssetCoder:
         self._sequence = sequence
         self.plan = plan_asset(sequence, options)
         self._fields: dict[tuple[str, bytes], bytes] = {}
+        self._meshes: dict[tuple[str, bytes], FieldMesh] = {}
 
     @property
     def is_empty(self) -> bool:
@@ -113,12 +118,14 @@ class AssetCoder:
         is_bare = not (self.plan.attributes or self.plan.fields or given.parts or given.materials or given.images)
         return is_bare and given.polygons is None and given.metadata == NO_METADATA
 
-    def add(self, encoded: Encoded, codec: Codec) -> Bitstream:
-        """Return the bitstream with the asset's sections.
+    def add(self, encoded: Encoded, codec: Codec, is_final: bool = True) -> Bitstream:
+        """Return the bitstream with the asset's sections; those that it has are replaced.
 
         Args:
-            encoded: without them.
+            encoded: of the positions.
             codec: that made it. Attributes are predicted from frame 0, if it decodes to the same bits on every machine.
+            is_final: whether fields may follow from decoded positions, which makes some smaller and takes time for each
+                bitstream.
         """
         if self.is_empty:
             return encoded.bitstream
@@ -135,7 +142,7 @@ class AssetCoder:
             sections[ARRANGEMENT] = arranged
         origins = Origins(permutation, sources.corners, sources.triangles)
         attributes = self._add_attributes(sections, origins, surface)
-        fields = self._add_fields(sections, origins, surface)
+        fields = self._add_fields(sections, origins, surface, reader if is_final else None)
         images = []
         for number, image in enumerate(self.plan.images):
             images.append(ListedImage(image.name, image.media_type, f"image.{number}"))
@@ -184,23 +191,43 @@ class AssetCoder:
             listed.append(_listed(name, attribute, attribute.values.shape[1], found.bound, section))
         return tuple(listed)
 
-    def _add_fields(self, sections: dict[str, bytes], origins: Origins, surface: Surface) -> tuple[Listed, ...]:
+    def _add_fields(
+        self, sections: dict[str, bytes], origins: Origins, surface: Surface, reader: FrameReader | None
+    ) -> tuple[Listed, ...]:
         listed = []
-        key = hashlib.sha256(surface.faces.tobytes()).digest()
-        meshes: dict[str, FieldMesh] = {}
         for number, (name, (field, found, span)) in enumerate(self.plan.fields.items()):
             section = f"field.{number}"
-            if (name, key) not in self._fields:
-                mesh = meshes.setdefault(field.domain, FieldMesh(surface.faces, surface.n_vertices, field.domain))
-                rows = origins.of(field.domain)
-                assert rows is not None  # fields are on vertices or triangles
-                self._fields[name, key] = encode_field(
-                    field.select(rows).read, len(field), mesh, _field_bound(found), name, holes=found.holes
-                )
-            sections[section] = self._fields[name, key]
+            rows = origins.of(field.domain)
+            assert rows is not None  # fields are on vertices or triangles
+            coding, sections[section] = self._code_field(name, field.select(rows), found, surface, reader)
             components = field.n_components if len(field.shape) == 3 else 0
-            listed.append(_listed(name, field, components, found.bound, section, span))
+            listed.append(_listed(name, field, components, found.bound, section, span, coding))
         return tuple(listed)
+
+    def _code_field(
+        self, name: str, field: Field, found: Precision, surface: Surface, reader: FrameReader | None
+    ) -> tuple[int, bytes]:
+        """The coding and the section of a field whose rows are as they are decoded."""
+        is_normal = field.kind == "normal" and found.bound > 0
+        if is_normal and reader is not None:
+            rule = find_normal_rule(field, reader, surface, found.bound)
+            if rule is not None:
+                return SURFACE, pack_rule(rule)
+        key = hashlib.sha256(surface.faces.tobytes()).digest()
+        mesh = self._meshes.setdefault((field.domain, key), FieldMesh(surface.faces, surface.n_vertices, field.domain))
+        if is_normal:
+            bound = angular_bound(found.bound)
+            read: Callable[[int, int], Array] = lambda start, stop: to_octahedral(field.read(start, stop), start, name)  # noqa: E731  # it closes over the field
+        else:
+            bound, read = FieldBound(found.bound) if found.bound else FieldBound(exact=True), field.read
+        codings = [self._fields[name, key]] if (name, key) in self._fields else []
+        if reader is not None and field.kind in MOVING and found.bound:
+            codings.append(encode_field(read, len(field), mesh, bound, name, positions=reader.read, holes=found.holes))
+        elif not codings:
+            codings.append(encode_field(read, len(field), mesh, bound, name, holes=found.holes))
+            self._fields[name, key] = codings[0]
+        data = min(codings, key=len)
+        return (OCTAHEDRAL if is_normal else CODED), data
 
 
 @dataclass(frozen=True)
@@ -226,13 +253,15 @@ def vertex_starts(parts: tuple[Part, ...], n_vertices: int) -> Int64 | None:
 
 
 def _listed(
-    name: str, given: Attribute | Field, components: int, bound: float, section: str, span: tuple[float, float] | None = None
+    name: str,
+    given: Attribute | Field,
+    components: int,
+    bound: float,
+    section: str,
+    span: tuple[float, float] | None = None,
+    coding: int = CODED,
 ) -> Listed:
-    return Listed(name, given.kind, given.domain, components, given.dtype.name, given.unit, bound, CODING, section, span)
-
-
-def _field_bound(found: Precision) -> FieldBound:
-    return FieldBound(found.bound) if found.bound else FieldBound(exact=True)
+    return Listed(name, given.kind, given.domain, components, given.dtype.name, given.unit, bound, coding, section, span)
 
 
 def _placed(part: Part, faces: Int32, place: Int32) -> Part:

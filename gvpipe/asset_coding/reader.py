@@ -14,7 +14,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int32
+from gvpipe.arrays import Array, Float32, Int32
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, Material
@@ -22,7 +22,8 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part, check_parts
 from gvpipe.asset.polygons import as_polygons
 from gvpipe.asset_coding.directory import SECTION, VERSION, Directory, Listed, unpack_directory
-from gvpipe.asset_coding.encoder import ARRANGEMENT, CODING, vertex_starts
+from gvpipe.asset_coding.encoder import ARRANGEMENT, CODED, OCTAHEDRAL, SURFACE, vertex_starts
+from gvpipe.asset_coding.normal_fields import unpack_rule
 from gvpipe.attributes.attribute_coding import decode_attribute
 from gvpipe.attributes.surface import Surface
 from gvpipe.attributes.triangle_order import Arrangement, decode_arrangement
@@ -30,8 +31,10 @@ from gvpipe.codec import FrameReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import InputError, corrupt_section, in_file
 from gvpipe.fields.mesh import FieldMesh
+from gvpipe.fields.octahedral import from_octahedral
 from gvpipe.fields.reader import FieldReader
 
+Read = Callable[[int, int], Float32]
 Thing = TypeVar("Thing")
 Lock = AbstractContextManager[bool]
 
@@ -43,22 +46,25 @@ class AssetReader:
         bitstream: that holds it, or nothing of it.
         reader: of its frames.
         path: of the file, for messages.
+        read: as ``reader.read``, but from any thread; None: ``reader.read``.
 
     Raises:
         CorruptFile: here or later: a section is not what `AssetCoder` writes.
     """
 
-    def __init__(self, bitstream: Bitstream, reader: FrameReader, path: str = "") -> None:
+    def __init__(self, bitstream: Bitstream, reader: FrameReader, path: str = "", read: Read | None = None) -> None:
         self._bitstream, self._reader, self._path = bitstream, reader, path
+        self._read = read or reader.read
         self._lock: Lock = threading.RLock()
         self._meshes: dict[str, FieldMesh] = {}
         self.directory = Directory()
         if SECTION in bitstream.sections:
             self.directory = unpack_directory(bitstream.section(SECTION), bitstream.n_vertices)
-        newer = [each.name for each in (*self.directory.attributes, *self.directory.fields) if each.coding != CODING]
+        attributes = {each.name: each for each in self.directory.attributes if each.coding == CODED}
+        fields = {each.name: each for each in self.directory.fields if _is_known(each)}
+        newer = [each.name for each in self.directory.attributes if each.name not in attributes]
+        newer += [each.name for each in self.directory.fields if each.name not in fields]
         self.skipped = ("all of it",) if self.directory.version > VERSION else tuple(newer)
-        attributes = {each.name: each for each in self.directory.attributes if each.coding == CODING}
-        fields = {each.name: each for each in self.directory.fields if each.coding == CODING}
         self.attributes: Mapping[str, Attribute] = _Lazy(attributes, self._attribute, self._lock, path)
         self.fields: Mapping[str, Field] = _Lazy(fields, self._field, self._lock, path)
 
@@ -123,7 +129,7 @@ class AssetReader:
 
     @cached_property
     def _surface(self) -> Surface:
-        positions = self._reader.read(0, 1)[0] if self.directory.geometry else None
+        positions = self._read(0, 1)[0] if self.directory.geometry else None
         return Surface(self.faces, self._bitstream.n_vertices, positions, len(self.directory.parts))
 
     def _attribute(self, listed: Listed) -> Attribute:
@@ -156,29 +162,59 @@ class AssetReader:
         return made
 
     def _field(self, listed: Listed) -> Field:
+        values = _FieldValues(self._frames_of(listed), self._shape_of(listed), listed, self._lock, self._path)
+        return Field(values, listed.domain, listed.kind, listed.unit, listed.range, f"field {listed.name!r}")
+
+    def _shape_of(self, listed: Listed) -> tuple[int, ...]:
+        n_rows = self._bitstream.n_vertices if listed.domain == "vertex" else len(self.faces)
+        shape = (self._bitstream.n_frames, n_rows)
+        return (*shape, listed.components) if listed.components else shape
+
+    def _frames_of(self, listed: Listed) -> Callable[[int, int], Array]:
+        """What decodes frames of a field: ``(start, stop) -> (n, R, C)``."""
+        data = self._bitstream.section(listed.section)
+        if listed.coding == SURFACE:
+            rule = unpack_rule(data, listed.section)
+            return lambda start, stop: rule.normals(self._read(start, stop), self._surface)
         if listed.domain not in self._meshes:
             self._meshes[listed.domain] = FieldMesh(self.faces, self._bitstream.n_vertices, listed.domain)
-        data, mesh = self._bitstream.section(listed.section), self._meshes[listed.domain]
-        reader = FieldReader(data, self._bitstream.n_frames, mesh, listed.section)
-        values = _FieldValues(reader, self._bitstream.n_frames, mesh.n_rows, listed, self._lock, self._path)
-        return Field(values, listed.domain, listed.kind, listed.unit, listed.range, f"field {listed.name!r}")
+        mesh = self._meshes[listed.domain]
+        reader = FieldReader(data, self._bitstream.n_frames, mesh, listed.section, self._read)
+        if listed.coding == OCTAHEDRAL:
+            return lambda start, stop: from_octahedral(_of_two(reader.read(start, stop), listed))
+        return reader.read
 
 
 class _FieldValues:
     """A field's frames, decoded when they are sliced."""
 
-    def __init__(self, reader: FieldReader, n_frames: int, n_rows: int, listed: Listed, lock: Lock, path: str) -> None:
-        self._reader, self._lock, self._listed, self._path = reader, lock, listed, path
+    def __init__(
+        self, read: Callable[[int, int], Array], shape: tuple[int, ...], listed: Listed, lock: Lock, path: str
+    ) -> None:
+        self._read, self._lock, self._listed, self._path = read, lock, listed, path
         self.dtype = np.dtype(listed.dtype)
-        self.shape: tuple[int, ...] = (n_frames, n_rows, listed.components) if listed.components else (n_frames, n_rows)
+        self.shape: tuple[int, ...] = shape
 
     def __getitem__(self, key: slice, /) -> Array:
         start, stop, _ = key.indices(self.shape[0])
         with self._lock, in_file(self._path):
-            block = self._reader.read(start, max(start, stop))
-        if block.shape[1:] != (self.shape[1], self._listed.components or 1) or block.dtype != self.dtype:
-            raise corrupt_section(self._listed.section, "it does not hold what the section 'asset' lists")
+            block = self._read(start, max(start, stop))
+            if block.shape[1:] != (self.shape[1], self._listed.components or 1) or block.dtype != self.dtype:
+                raise corrupt_section(self._listed.section, "it does not hold what the section 'asset' lists")
         return block if self._listed.components else block[:, :, 0]
+
+
+def _is_known(listed: Listed) -> bool:
+    """Whether this version reads a field's coding."""
+    if listed.coding in (SURFACE, OCTAHEDRAL):
+        return listed.kind == "normal" and listed.components == 3 and listed.domain in ("vertex", "triangle")
+    return listed.coding == CODED
+
+
+def _of_two(coordinates: Array, listed: Listed) -> Array:
+    if coordinates.shape[2] != 2:
+        raise corrupt_section(listed.section, f"it has {coordinates.shape[2]} components; octahedral coordinates are two")
+    return coordinates
 
 
 class _Lazy(Mapping[str, Thing], Generic[Thing]):

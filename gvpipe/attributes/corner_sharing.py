@@ -15,6 +15,7 @@ entry of the corner before it, a new one, or an older one of the vertex. Three t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from gvpipe.attributes.surface import Surface
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.errors import InputError
 from gvpipe.mesh.unique_rows import row_ids
+
+if TYPE_CHECKING:
+    from gvpipe.attributes.sharing_kernels import Corners
 
 WHOLE, LOOSE, SHARED, CODED, GUIDED = range(5)  # modes: one entry per vertex; one per corner; as the reference; two streams
 MAX_TRIED = 4  # references, the last ones, that an encoder tries
@@ -81,32 +85,26 @@ def decode_sharing(cursor: Cursor, surface: Surface, references: Sequence[Int32]
 
 
 def _encode_fans(entries: Int32, surface: Surface, reference: Int32 | None) -> bytes:
-    from gvpipe.attributes.sharing_kernels import code_sharing
+    from gvpipe.attributes.sharing_kernels import N_CONTEXTS, code_sharing
     from gvpipe.entropy.serial_coder import SerialEncoder
 
-    coder = SerialEncoder(_n_contexts(reference), len(entries))
+    coder = SerialEncoder(N_CONTEXTS, len(entries))
     code_sharing(coder.coder, _corners(surface, reference), surface.n_vertices, entries.astype(np.int64))
     return coder.finish()
 
 
 def _decode_fans(cursor: Cursor, surface: Surface, reference: Int32 | None) -> Int32:
-    from gvpipe.attributes.sharing_kernels import code_sharing
+    from gvpipe.attributes.sharing_kernels import N_CONTEXTS, code_sharing
     from gvpipe.entropy.serial_coder import SerialDecoder
 
-    coder = SerialDecoder(cursor.rest(), _n_contexts(reference), cursor.name)
+    coder = SerialDecoder(cursor.rest(), N_CONTEXTS, cursor.name)
     entries = np.zeros(surface.faces.size, np.int64)
     code_sharing(coder.coder, _corners(surface, reference), surface.n_vertices, entries)
     coder.end()
     return _by_first_corner(entries)
 
 
-def _n_contexts(reference: Int32 | None) -> int:
-    from gvpipe.attributes.sharing_kernels import N_CONTEXTS, N_CONTEXTS_REFERENCE
-
-    return N_CONTEXTS if reference is None else N_CONTEXTS_REFERENCE
-
-
-def _corners(surface: Surface, reference: Int32 | None) -> Array:
+def _corners(surface: Surface, reference: Int32 | None) -> Corners:
     from gvpipe.attributes.sharing_kernels import Corners
 
     guide = np.zeros(0, np.int64) if reference is None else reference.astype(np.int64)

@@ -1,4 +1,4 @@
-"""Kernels of `gvpipe.attributes.entry_order`: the order in which entries are coded, and the earlier entries that predict each.
+"""Kernels of `gvpipe.attributes.entry_layout`: the order in which entries are coded, and the earlier entries that predict each.
 
 An entry is next if it completes most triangles, so that most predictions are averages; among equals, the one found last. The
 idea of this order is that of Draco's traversal by prediction degree (Google, 2016, `max_prediction_degree_traverser`).
@@ -94,7 +94,9 @@ def order_by_edges(opposite: Int64) -> EntryOrder:
     gates = np.full((len(opposite), 4), NONE, np.int64)
     is_done = np.zeros(n_entries, np.bool_)
     completes = np.zeros(n_entries, np.int64)
-    stacks = _Stacks(np.full(LEVELS, NONE), np.empty(len(opposite), np.int64), np.empty(len(opposite), np.int64), np.zeros(1, np.int64))
+    stacks = _Stacks(
+        np.full(LEVELS, NONE), np.empty(len(opposite), np.int64), np.empty(len(opposite), np.int64), np.zeros(1, np.int64)
+    )
     n, n_gates = 0, 0
     for seed in range(n_entries):
         entry = seed

@@ -12,11 +12,21 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Float32, Float64, Int32, Int64
-from gvpipe.attributes.match_kernels import Entries, code_match, near_magnitude, new_history, remember, residual_context
+from gvpipe.attributes.entry_kernels import EntryOrder
+from gvpipe.attributes.match_kernels import (
+    N_CLASSES,
+    Entries,
+    code_match,
+    near_magnitude,
+    new_history,
+    remember,
+    residual_context,
+)
 from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
 
 LAST, MEAN, PARALLELOGRAM, CONFORMAL, AFFINE = range(5)  # methods
+LEAST_HEIGHT = 0.25  # of a triangle whose map is trusted, in heights of the triangle that is predicted by it
 MAX_CODE = 1 << 38  # magnitudes of codes and predictions stay below, those of an encoder below a quarter
 
 
@@ -27,12 +37,14 @@ class Linear(NamedTuple):
         method: one of the above; the last two need two components and positions.
         is_float: codes are the ordered bits of float32 values, and these are predicted.
         triangles: ``(T, 3)`` vertices.
+        opposite: ``(3T,)`` corners over entries.
         positions: ``(V, 3)`` of vertices; none without geometry.
     """
 
     method: int
     is_float: bool
     triangles: Int32
+    opposite: Int64
     positions: Float32
 
 
@@ -52,10 +64,11 @@ def code_linear(coder: SerialCoder, entries: Entries, linear: Linear, codes: Int
             numbers[entry] = numbers[match]
         else:
             _predict(entries, linear, i, numbers, guess, side[0])
-            previous = 0
+            previous, least = 0, _least_class(order, i)
             for c in range(n_components):
                 base = _round(guess[c], linear.is_float, bits)
-                context = residual_context(c, (near_magnitude(entries, history, i, c) + 2 * previous) >> entries.shift)
+                near = near_magnitude(entries, history, i, c) + 2 * previous
+                context = residual_context(c, near >> entries.shift, least)
                 residual = code_value(coder, context, codes[entry, c] - base)
                 if not coder.encodes:
                     code = base + residual
@@ -72,15 +85,24 @@ def code_linear(coder: SerialCoder, entries: Entries, linear: Linear, codes: Int
 
 
 @compiled
+def _least_class(order: EntryOrder, i: int) -> int:
+    """The class that residuals of entry i of the order have at least: without a triangle they are large."""
+    first = order.starts[i]
+    if first == order.starts[i + 1]:
+        return N_CLASSES - 1
+    return N_CLASSES - 2 if order.gates[first, 1] < 0 else 0
+
+
+@compiled
 def _round(guess: float, is_float: bool, bits: Float32) -> int:
     """The code nearest to a predicted value; 0 for one that is none."""
     if is_float:
         bits[0] = guess
         key = np.int64(bits.view(np.int32)[0])
-        return key if key >= 0 else -(key + (1 << 31)) - 1
+        return int(key if key >= 0 else -(key + (1 << 31)) - 1)
     if not abs(guess) < MAX_CODE:
         return 0
-    return np.int64(np.floor(guess + 0.5))
+    return int(np.floor(guess + 0.5))
 
 
 @compiled
@@ -95,7 +117,7 @@ def _value_of(code: int, bits: Float32) -> float:
     """The float32 of an ordered code, as float64; not a number counts as 0."""
     key = code if code >= 0 else -(code + 1) - (1 << 31)
     bits.view(np.int32)[0] = key
-    value = float(bits[0])
+    value = np.float64(bits[0])
     return value if abs(value) < np.inf else 0.0
 
 
@@ -144,21 +166,15 @@ def _predict_by_shape(
     n = 0
     guess[0] = guess[1] = 0.0
     for g in range(begin, end):
-        a, b, o, corner = gates[g, 0], gates[g, 1], gates[g, 2], gates[g, 3]
+        a, b, corner = gates[g, 0], gates[g, 1], gates[g, 3]
         t, k = corner // 3, corner % 3
-        along, above, squared = _coordinates(
-            linear, linear.triangles[t, k], linear.triangles[t, (k + 1) % 3], linear.triangles[t, (k + 2) % 3]
-        )
+        ends = linear.triangles[t, (k + 1) % 3], linear.triangles[t, (k + 2) % 3]
+        along, above, squared = _coordinates(linear, linear.triangles[t, k], ends)
         if not squared > 0.0:
             continue
-        du, dv = numbers[b, 0] - numbers[a, 0], numbers[b, 1] - numbers[a, 1]
-        turn = side
-        if o >= 0:
-            cross = du * (numbers[o, 1] - numbers[a, 1]) - dv * (numbers[o, 0] - numbers[a, 0])
-            if cross != 0.0:
-                turn = -1.0 if cross > 0.0 else 1.0
-        guess[0] += numbers[a, 0] + along * du - turn * above * dv
-        guess[1] += numbers[a, 1] + along * dv + turn * above * du
+        across_u, across_v = _across(gates[g], linear, numbers, ends, (above, side))
+        guess[0] += numbers[a, 0] + along * (numbers[b, 0] - numbers[a, 0]) + above * across_u
+        guess[1] += numbers[a, 1] + along * (numbers[b, 1] - numbers[a, 1]) + above * across_v
         n += 1
     if n:
         guess[0] /= n
@@ -167,12 +183,44 @@ def _predict_by_shape(
 
 
 @compiled
-def _coordinates(linear: Linear, x: int, a: int, b: int) -> tuple[float, float, float]:
-    """Of vertex x over the edge from a to b: place along it, height over it, both in units of its length, whose square is last."""
+def _across(
+    gate: Int64, linear: Linear, numbers: Float64, ends: tuple[int, int], shape: tuple[float, float]
+) -> tuple[float, float]:
+    """What changes in the plane with a step in space across the edge of a gate, towards its entry, as long as the edge.
+
+    The triangle on the other side says so, if it is done: by its map from space (AFFINE, unless it is far flatter than the
+    entry's), or by its side of the edge.
+
+    Args:
+        gate: ``(4,)``.
+        linear, numbers: as of `code_linear`.
+        ends: vertices of the edge.
+        shape: height of the entry's triangle, in edges; the side on which the last texture triangle lay.
+    """
+    a, b, o = gate[0], gate[1], gate[2]
+    above, turn = shape
+    du, dv = numbers[b, 0] - numbers[a, 0], numbers[b, 1] - numbers[a, 1]
+    if o >= 0:
+        ou, ov = numbers[o, 0] - numbers[a, 0], numbers[o, 1] - numbers[a, 1]
+        if linear.method == AFFINE:
+            third = linear.opposite[gate[3]]
+            o_along, o_above, _ = _coordinates(linear, linear.triangles[third // 3, third % 3], ends)
+            if o_above > LEAST_HEIGHT * above:
+                return (o_along * du - ou) / o_above, (o_along * dv - ov) / o_above
+        cross = du * ov - dv * ou
+        if cross != 0.0:
+            turn = -1.0 if cross > 0.0 else 1.0
+    return -turn * dv, turn * du
+
+
+@compiled
+def _coordinates(linear: Linear, x: int, ends: tuple[int, int]) -> tuple[float, float, float]:
+    """Of vertex x over an edge: place along it and height, in units of its length; then the length's square."""
+    a, b = ends
     squared = dot = height = 0.0
     for axis in range(3):
-        origin = float(linear.positions[a, axis])
-        edge, own = float(linear.positions[b, axis]) - origin, float(linear.positions[x, axis]) - origin
+        origin = np.float64(linear.positions[a, axis])
+        edge, own = np.float64(linear.positions[b, axis]) - origin, np.float64(linear.positions[x, axis]) - origin
         squared += edge * edge
         dot += edge * own
         height += own * own

@@ -1,7 +1,7 @@
 """Kernels that linear and octahedral prediction share: equal values nearby, and the context of a residual.
 
-A *candidate* is a distinct value of an earlier entry at the same place, or of an earlier neighbour. Where seams split a surface,
-or few values recur, its number replaces a residual.
+A *candidate* is a distinct value of an earlier entry at the same place, or of an earlier neighbour. Where seams split a
+surface, or few values recur, its number replaces a residual.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def remember(entries: Entries, history: History, entry: int, is_match: bool) -> 
 
 @compiled
 def near_magnitude(entries: Entries, history: History, i: int, component: int) -> int:
-    """Twice the mean magnitude of the residuals of the entries that predict entry i of the order."""
+    """Four times the mean magnitude of the residuals of the entries that predict entry i of the order."""
     total, n = 0, 0
     for g in range(entries.order.starts[i], entries.order.starts[i + 1]):
         for k in range(2):
@@ -126,17 +126,17 @@ def near_magnitude(entries: Entries, history: History, i: int, component: int) -
                 n += 1
     if n == 0 and i > 0:
         total, n = history.magnitudes[entries.order.order[i - 1], component], 1
-    return 2 * total // n if n else 0
+    return 4 * total // n if n else 0
 
 
 @compiled
-def residual_context(component: int, magnitude: int) -> int:
-    """The context of a residual of which ``magnitude`` is expected."""
+def residual_context(component: int, magnitude: int, least: int) -> int:
+    """The context of a residual of which ``magnitude`` is expected, and of which the class is ``least`` at least."""
     bits = 0
     while magnitude > 0 and bits < N_CLASSES - 1:
         magnitude >>= 1
         bits += 1
-    return bits + (N_CLASSES if component > 0 else 0)
+    return max(bits, least) + (N_CLASSES if component > 0 else 0)
 
 
 @compiled
@@ -173,7 +173,7 @@ def _add_candidate(candidates: Int64, n: int, entry: int, codes: Int64) -> int:
 
 @compiled
 def _are_equal(codes: Int64, a: int, b: int) -> bool:
+    equal = True
     for c in range(codes.shape[1]):
-        if codes[a, c] != codes[b, c]:
-            return False
-    return True
+        equal = equal and codes[a, c] == codes[b, c]
+    return equal

@@ -1,7 +1,8 @@
 """Directions as points of the octahedral lattice: integers i, j, k with ``|i| + |j| + |k| = n``, and back, within an angle.
 
 Source: Meyer, Suessmuth, Sussner, Stamminger and Greiner, "On Floating-Point Normal Vectors", Computer Graphics Forum 29(4),
-2010. There the octahedron's faces are folded into a square; here a point keeps its three coordinates, so that axes may be permuted.
+2010. There the octahedron's faces are folded into a square. Here a point keeps its three coordinates, so that axes may be
+permuted.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from gvpipe.attributes.match_kernels import Entries, code_match, near_magnitude,
 from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
 
-LAST, MEAN, SURFACE, PLACE = range(4)  # methods
+LAST, MEAN, SURFACE, PLACE, SURFACE_CORRECTED, PLACE_CORRECTED = range(6)  # methods
 
 
 class Octahedral(NamedTuple):
@@ -54,7 +54,7 @@ def code_octahedral(coder: SerialCoder, entries: Entries, octahedral: Octahedral
         _to_chart(codes[entry], axis, flip, n, chart)
         previous = 0
         for c in range(2):
-            context = residual_context(c, (near_magnitude(entries, history, i, c) + 2 * previous) >> entries.shift)
+            context = residual_context(c, (near_magnitude(entries, history, i, c) + 2 * previous) >> entries.shift, 0)
             residual = code_value(coder, context, chart[c] - guess[(axis + 1 + c) % 3])
             chart[c] = guess[(axis + 1 + c) % 3] + residual
             previous = abs(residual)
@@ -64,7 +64,7 @@ def code_octahedral(coder: SerialCoder, entries: Entries, octahedral: Octahedral
             chart[0] = chart[1] = 0
         _from_chart(chart, axis, flip, n, codes[entry])
         if codes.shape[1] == 4:
-            context = residual_context(1, (2 * history.magnitudes[order.order[i - 1], 2] if i > 0 else 0) >> entries.shift)
+            context = residual_context(1, (2 * history.magnitudes[order.order[i - 1], 2] if i > 0 else 0) >> entries.shift, 0)
             differs = code_value(coder, context, 1 if codes[entry, 3] != guess[3] else 0)
             codes[entry, 3] = guess[3] if differs == 0 else -guess[3]
             history.magnitudes[entry, 2] = min(abs(differs), 1)
@@ -97,9 +97,9 @@ def corner_normals(triangles: Int32, positions: Float32, places: Int64, n_places
 @compiled
 def _edge(positions: Float32, a: int, b: int) -> tuple[float, float, float]:
     return (
-        float(positions[b, 0]) - float(positions[a, 0]),
-        float(positions[b, 1]) - float(positions[a, 1]),
-        float(positions[b, 2]) - float(positions[a, 2]),
+        np.float64(positions[b, 0]) - np.float64(positions[a, 0]),
+        np.float64(positions[b, 1]) - np.float64(positions[a, 1]),
+        np.float64(positions[b, 2]) - np.float64(positions[a, 2]),
     )
 
 
@@ -114,6 +114,8 @@ def _predict(entries: Entries, octahedral: Octahedral, i: int, codes: Int64, gue
     if octahedral.method >= SURFACE:
         entry = order.order[i]
         x, y, z = octahedral.normals[entry, 0], octahedral.normals[entry, 1], octahedral.normals[entry, 2]
+        if octahedral.method >= SURFACE_CORRECTED:
+            x, y, z = _correct(order.gates[begin:end], octahedral.normals, codes, (x, y, z))
     elif octahedral.method == MEAN:
         for g in range(begin, end):
             for k in range(2):
@@ -123,6 +125,34 @@ def _predict(entries: Entries, octahedral: Octahedral, i: int, codes: Int64, gue
     if abs(x) + abs(y) + abs(z) == 0.0 and nearest >= 0:
         x, y, z = float(codes[nearest, 0]), float(codes[nearest, 1]), float(codes[nearest, 2])
     _to_lattice(x, y, z, octahedral.n, guess)
+
+
+@compiled
+def _correct(gates: Int64, normals: Float64, codes: Int64, normal: tuple[float, float, float]) -> tuple[float, float, float]:
+    """A unit normal, moved by half the mean by which earlier normals differ from those of the surface."""
+    x, y, z = _unit(normal[0], normal[1], normal[2])
+    dx = dy = dz = 0.0
+    n = 0
+    for g in range(len(gates)):
+        for k in range(2):
+            other = gates[g, k]
+            if other >= 0:
+                ux, uy, uz = _unit(float(codes[other, 0]), float(codes[other, 1]), float(codes[other, 2]))
+                vx, vy, vz = _unit(normals[other, 0], normals[other, 1], normals[other, 2])
+                dx, dy, dz = dx + (ux - vx), dy + (uy - vy), dz + (uz - vz)
+                n += 1
+    if n == 0:
+        return x, y, z
+    return x + 0.5 * dx / n, y + 0.5 * dy / n, z + 0.5 * dz / n
+
+
+@compiled
+def _unit(x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A direction with length 1; zero stays zero."""
+    length = np.sqrt(x * x + y * y + z * z)
+    if not 0.0 < length < np.inf:
+        return 0.0, 0.0, 0.0
+    return x / length, y / length, z / length
 
 
 @compiled

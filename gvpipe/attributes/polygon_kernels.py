@@ -1,9 +1,9 @@
 """Kernels of `gvpipe.attributes.triangle_order`: triangles to polygons, and the part of each triangle.
 
-A polygon of n corners is a *fan* of n - 2 triangles ``(v0, v1, v2), (v0, v2, v3), ...`` around its *apex* v0. The first triangle
-left has some place in its fan, and one of its corners is the apex: 3 (n - 2) options. Those whose other triangles are missing drop
-out. The rest is ranked by how the polygon lies to its neighbours, compared with the last polygons that met such neighbours: in a
-grid of quads the first option is nearly always right.
+A polygon of n corners is a *fan* of n - 2 triangles ``(v0, v1, v2), (v0, v2, v3), ...`` around its *apex* v0. The first
+triangle left has some place in its fan, and one of its corners is the apex: 3 (n - 2) options. Those whose other triangles are
+missing drop out. The rest is ranked by how the polygon lies to its neighbours, compared with the last polygons that met such
+neighbours: in a grid of quads the first option is nearly always right.
 """
 
 from __future__ import annotations
@@ -53,9 +53,10 @@ class Arranged(NamedTuple):
         is_used: ``(T,)`` triangles whose polygon is known.
         triangles, apexes: ``(T,)`` triangles in their final order, and the corner with which each one begins.
         sizes: ``(T,)`` corners of polygons in order.
-        edge_numbers, edge_sizes: ``(3T,)`` for each corner of a used triangle, the number in its polygon of the edge opposite to
-            it, and the size of the polygon; -1 where that edge is a diagonal.
-        learned: ``(n, n, n)`` by size of a neighbour, number of its edge and size of a polygon: the number of the polygon's edge.
+        edge_numbers, edge_sizes: ``(3T,)`` for each corner of a used triangle, the number in its polygon of the edge opposite
+            to it, and the size of the polygon; -1 where that edge is a diagonal.
+        learned: ``(n, n, n)`` by size of a neighbour, number of its edge and size of a polygon: the number of the polygon's
+            edge.
         stamps: ``(T,)`` the walk that last saw a triangle; its last item counts walks.
     """
 
@@ -128,7 +129,7 @@ def code_polygons(coder: SerialCoder, soup: Soup, fans: Fans) -> tuple[Int64, In
 @compiled
 def _code_fan(coder: SerialCoder, soup: Soup, fans: Fans, arranged: Arranged, at: tuple[int, int, int]) -> bool:
     """Code the fan of a polygon that has triangle t first in order, and append it; False if there is none."""
-    t, size, n = at
+    t, size, _ = at
     options, scores = np.empty((MAX_OPTIONS, 2), np.int64), np.empty(MAX_OPTIONS, np.int64)
     n_options, rank = 0, -1
     if size <= MOST_RANKED:
@@ -244,10 +245,10 @@ def _try_walk(soup: Soup, arranged: Arranged, at: tuple[int, int, int], option: 
     for i in range(place + 1, size - 2):
         if not _step(soup, arranged, n + i - 1, 1):
             return False
+    is_there = True
     for i in range(place - 1, -1, -1):
-        if not _step(soup, arranged, n + i + 1, -1):
-            return False
-    return True
+        is_there = is_there and _step(soup, arranged, n + i + 1, -1)
+    return is_there
 
 
 @compiled
@@ -276,10 +277,10 @@ def _step(soup: Soup, arranged: Arranged, at: int, direction: int) -> bool:
 def _edge_corner(arranged: Arranged, n: int, size: int, edge: int) -> int:
     """The corner opposite to edge ``edge`` of the polygon arranged at n."""
     if edge == 0:
-        return 3 * arranged.triangles[n] + (arranged.apexes[n] + 2) % 3
+        return int(3 * arranged.triangles[n] + (arranged.apexes[n] + 2) % 3)
     if edge == size - 1:
-        return 3 * arranged.triangles[n + size - 3] + (arranged.apexes[n + size - 3] + 1) % 3
-    return 3 * arranged.triangles[n + edge - 1] + arranged.apexes[n + edge - 1]
+        return int(3 * arranged.triangles[n + size - 3] + (arranged.apexes[n + size - 3] + 1) % 3)
+    return int(3 * arranged.triangles[n + edge - 1] + arranged.apexes[n + edge - 1])
 
 
 @compiled

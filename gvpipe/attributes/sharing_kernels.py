@@ -13,7 +13,7 @@ from gvpipe.mesh.corner_lists import link_corners
 
 SAME, NEW, OLDER = 0, 1, 2  # symbols; an older entry's number is added to the last
 UNLINKED, UNKNOWN, JOINED, CUT = 0, 1, 2, 3  # what is known of the edge between two corners of a fan
-N_CONTEXTS, N_CONTEXTS_REFERENCE = 12, 36  # alone, and with the partition of another attribute
+N_CONTEXTS = 12
 
 
 class Corners(NamedTuple):
@@ -48,7 +48,10 @@ def code_sharing(coder: SerialCoder, mesh: Corners, n_vertices: int, entries: In
     most = 1
     for v in range(n_vertices):
         most = max(most, lists.degree[v])
-    fan, turned = _Fan(np.empty(most, np.int64), np.empty(most, np.int64)), _Fan(np.empty(most, np.int64), np.empty(most, np.int64))
+    fan, turned = (
+        _Fan(np.empty(most, np.int64), np.empty(most, np.int64)),
+        _Fan(np.empty(most, np.int64), np.empty(most, np.int64)),
+    )
     is_visited = np.zeros(len(flat), np.bool_)
     given = entries.copy()
     coded = np.full(len(flat), -1, np.int64)  # of each given entry, its number in the order of coding
@@ -89,7 +92,7 @@ def _code_fan(
         context = edge * 3 + min(cuts, 2)
         if len(mesh.reference):
             differs = i > 0 and mesh.reference[corner] != mesh.reference[fan.corners[i - 1]]
-            context = context * 3 + (0 if i == 0 else (1 if differs else 2))
+            context = edge * 3 + (0 if i == 0 else (1 if differs else 2))
         symbol = _code_symbol(coder, context, symbol)
         if symbol == SAME:
             entries[corner] = last

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Int64
+from gvpipe.arrays import Array, Float32, Int64, UInt64
 from gvpipe.attributes import octahedral
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
@@ -108,8 +108,7 @@ def store_directions(values: Float32, degrees: float, n: int | None = None) -> t
 def restore(storage: Storage, codes: Int64, cursor: Cursor) -> Array:
     """Return the values ``(N, C)`` of ``codes``; raises `CorruptFile`, in the name of ``cursor``, for codes without a value."""
     if storage.id == FLOATS:
-        keys = np.where(codes >= 0, codes, -(codes + 1) - (1 << 31))
-        return keys.astype(np.int32).view(np.float32)
+        return float_values(codes)
     if storage.id == STEPS:
         values = _from_steps(codes, storage.step)
         if not np.isfinite(values).all():
@@ -123,10 +122,15 @@ def restore(storage: Storage, codes: Int64, cursor: Cursor) -> Array:
         if codes.min(initial=0) < 0 or codes.max(initial=-1) >= len(storage.table):
             raise cursor.corrupt("a rank is out of range")
         codes = storage.table[codes]
-    limits = np.iinfo(storage.dtype)
+    limits = np.iinfo(np.dtype(storage.dtype).name)
     if codes.size and (int(codes.min()) < limits.min or int(codes.max()) > limits.max):
         raise cursor.corrupt(f"a value does not fit {storage.dtype}")
     return codes.astype(storage.dtype)
+
+
+def float_values(codes: Int64) -> Float32:
+    """The float32 values of the codes of FLOATS."""
+    return np.where(codes >= 0, codes, -(codes + 1) - (1 << 31)).astype(np.int32).view(np.float32)
 
 
 def pack_storage(storage: Storage) -> bytes:
@@ -140,8 +144,9 @@ def pack_storage(storage: Storage) -> bytes:
     if storage.table is not None:
         head += varint(len(storage.table))
         if len(storage.table):
-            gaps = np.diff(storage.table.view(np.uint64)) - np.uint64(1)
-            low, high = (gaps & np.uint64(0xFFFFFFFF)).astype(np.int64), (gaps >> np.uint64(32)).astype(np.int64)
+            ordered = storage.table.view(np.uint64)
+            distances: UInt64 = ordered[1:] - ordered[:-1] - np.uint64(1)
+            low, high = (distances & np.uint64(0xFFFFFFFF)).astype(np.int64), (distances >> np.uint64(32)).astype(np.int64)
             head += FIRST.pack(int(storage.table[0])) + pack_block(encode_integers(low)) + pack_block(encode_integers(high))
     return head
 
@@ -167,7 +172,9 @@ def read_storage(cursor: Cursor, n_entries: int) -> Storage:
         if n == 0:
             raise cursor.corrupt("the octahedral lattice has no points")
         return Storage(number, dtype, n_components, n=n, zeros=_read_zeros(cursor, n_entries))
-    return Storage(number, dtype, n_components, table=_read_table(cursor, n_entries * n_components) if number == RANKS else None)
+    return Storage(
+        number, dtype, n_components, table=_read_table(cursor, n_entries * n_components) if number == RANKS else None
+    )
 
 
 def _steps(values: Float32, bound: float) -> list[float]:
@@ -206,4 +213,3 @@ def _read_table(cursor: Cursor, most: int) -> Int64:
     if total > 2.0**64 or (table[1:] <= table[:-1]).any():
         raise cursor.corrupt("distinct values are out of range")
     return table
-

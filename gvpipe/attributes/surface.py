@@ -39,6 +39,15 @@ class Surface:
         bits = (self.positions + np.float32(0)).view(np.int32)  # no negative zeros
         return np.asarray(row_ids(bits.astype(np.int64))[0], np.int64)
 
+    def welded(self) -> Surface:
+        """The surface with vertices of one position as one, numbered by the first corner that uses each; all must be used."""
+        corners = self.places[self.faces.ravel()]
+        _, first, numbers = np.unique(corners, return_index=True, return_inverse=True)
+        by_corner = np.argsort(first)
+        faces = np.argsort(by_corner)[numbers].reshape(-1, 3).astype(np.int32)
+        positions = None if self.positions is None else self.positions[self.faces.ravel()[first[by_corner]]]
+        return Surface(faces, len(first), positions, self.n_parts)
+
     @cached_property
     def opposite(self) -> Int64:
         """`opposite_corners` of the faces."""

@@ -48,7 +48,7 @@ class Arrangement:
 
 @dataclass(frozen=True)
 class SourceCorners:
-    """Where triangles came from: ``triangles (T,)`` of the source, and ``corners (3T,)``, for each final corner the source's."""
+    """Where final triangles come from: ``triangles (T,)`` of the source, and ``corners (3T,)``, of each corner the source's."""
 
     triangles: Int64
     corners: Int64
@@ -191,7 +191,9 @@ def _find_fans(owner: Int64, turn: Int64, source: Int32, polygons: Int64, parts:
     from gvpipe.attributes.polygon_kernels import Fans
 
     if (polygons < 3).any() or int((polygons - 2).sum()) != len(source):
-        raise InputError(f"polygons of {int((polygons - 2).sum())} triangles for {len(source)}; each has three corners at least")
+        raise InputError(
+            f"polygons of {int((polygons - 2).sum())} triangles for {len(source)}; each has three corners at least"
+        )
     starts = np.concatenate([[0], np.cumsum(polygons - 2)])
     polygon = np.repeat(np.arange(len(polygons)), polygons - 2)
     place = np.arange(len(source)) - starts[polygon]

@@ -105,6 +105,8 @@ def cli() -> None:
     metavar="NAME=BOUND",
     help="The same for an animated field; 0.1%,nan=keep keeps NaN as holes.",
 )
+@click.option("--clip", metavar="NAME", help="The animation to read, of a glTF file that has several. [default: the first]")
+@click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp.")
 @output_options
 def encode(
@@ -123,6 +125,8 @@ def encode(
     reorder: bool,
     attributes: tuple[str, ...],
     fields: tuple[str, ...],
+    clip: str | None,
+    mesh: str | None,
     textures: str | None,
     out: Output,
 ) -> None:
@@ -157,8 +161,9 @@ def encode(
     )
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
-        beside = {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
-        report = api.encode(source, path, chosen, progress, fps, **targets, **beside, textures=textures)  # type: ignore[arg-type]  # by name
+        beside: dict[str, Any] = {"clip": clip, "mesh": mesh, "textures": textures}
+        beside |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
+        report = api.encode(source, path, chosen, progress, fps, **targets, **beside)  # type: ignore[arg-type]  # by name
     out = out.carrying(target)
     for note in report.notes:
         out.note(note)
@@ -322,25 +327,34 @@ def play(source: str, up: str, out: Output) -> None:
 @click.option(
     "--view", default="three-quarter", show_default=True, help="front, back, left, right, top, bottom or AZIMUTH,ELEVATION."
 )
-@click.option("--up", type=click.Choice(["x", "y", "z"]), default="y", show_default=True, help="The axis that is up.")
+@click.option("--up", type=click.Choice(["x", "y", "z"]), help="The axis that is up. [default: the input's own, else y]")
 @click.option("--turntable", is_flag=True, help="Let the camera go once around.")
 @click.option("--follow", is_flag=True, help="Let the camera go with the mesh.")
 @click.option("--error-of", "error_of", metavar="REFERENCE", help="Colour each vertex by its distance from REFERENCE's.")
 @click.option("--error-max", type=float, metavar="PERCENT", help="Where the colours end. [default: the largest error drawn]")
 @click.option("--shading", type=click.Choice(["smooth", "flat"]), default="smooth", show_default=True)
+@click.option("--field", metavar="NAME", help="Colour by a field's values; vectors by their length.")
+@click.option("--colormap", metavar="NAME", help="viridis, magma, coolwarm, gray or errors. [default: viridis]")
+@click.option("--range", "limits", metavar="A,B", help="Ends of the colours, or symmetric. [default: the range drawn]")
+@click.option("--part", "parts", multiple=True, metavar="NAME", help="Paint this part only; repeat for more.")
+@click.option("--plain", "--no-textures", "plain", is_flag=True, help="Leave out materials, textures and colours.")
 @output_options
-def render(source: str, target: str, size: str, out: Output, **options: Any) -> None:
+def render(source: str, target: str, size: str, limits: str | None, out: Output, **options: Any) -> None:
     """Paint a geometry video or a sequence as a picture or a film; needs no display and no GPU."""
     from gvpipe import api
+    from gvpipe.rendering.field_map import parse_range
     from gvpipe.rendering.films import parse_size
 
     if options["error_max"] is not None and not options["error_of"]:
         raise click.UsageError("--error-max ends the colours of errors; give --error-of too", click.get_current_context())
     pixels = parse_size(size)
+    field_range = None if limits is None else parse_range(limits)
     with source_path(source) as path, out.progress() as progress:
-        api.render(path, target, size=pixels, progress=progress, **options)
+        notes = api.render(path, target, size=pixels, field_range=field_range, progress=progress, **options)
+    for note in notes:
+        out.note(note)
     n_bytes = os.path.getsize(target)
-    out.json({"output": target, "width": pixels[0], "height": pixels[1], "bytes": n_bytes})
+    out.json({"output": target, "width": pixels[0], "height": pixels[1], "bytes": n_bytes, "notes": notes})
     out.text(f"{shown(source, STDIN)} -> {target} ({pixels[0]}x{pixels[1]}, {_size(n_bytes)})")
 
 

@@ -57,7 +57,7 @@ class BlockEncoder:
 
         head, models = [varint(self._n_contexts)], []
         for counts in self._counts:
-            described, table = describe_table(counts)
+            described, table = _describe(counts)
             head.append(described)
             models.append(model(table) if len(table) > 1 else None)  # None: nothing to code
         coder = constriction.stream.queue.RangeEncoder()
@@ -117,12 +117,10 @@ class BlockDecoder:
 
     def check(self, status: int) -> None:
         """Raise `CorruptFile` if a kernel's status is an error."""
-        from gvpipe.entropy.block_kernels import NO_TABLE, OUT_OF_RANGE
+        from gvpipe.entropy.block_kernels import NO_TABLE
 
         if status == NO_TABLE:
             raise self._cursor.corrupt("a context is used that has no table")
-        if status == OUT_OF_RANGE:
-            raise self._cursor.corrupt("a value is out of range")
         if status:
             raise self._cursor.corrupt("its range-coded data do not decode")
 
@@ -147,7 +145,7 @@ class BlockDecoder:
             raise self._cursor.corrupt("range-coded data are left over")
 
 
-def describe_table(counts: Int64) -> tuple[bytes, Int64]:
+def _describe(counts: Int64) -> tuple[bytes, Int64]:
     """Choose a context's table for tokens of these counts; return its bytes and its frequencies."""
     if not counts.any():
         return varint(0), np.zeros(0, np.int64)

@@ -26,16 +26,15 @@ def squash_table() -> Int64:
         [1, 32768, 65535]
     """
     context = Context(prec=30)
-    knots = range(-LIMIT - 1, LIMIT + 2, SPACING)
-    exact = []
-    for knot in knots:
-        power = context.exp(context.divide(Decimal(-knot), Decimal(256)))
-        exact.append(int(context.divide(Decimal(1 << 24), 1 + power)))
-    offset = np.arange(2 * LIMIT + 1) + 1
-    below, part = offset // SPACING, offset % SPACING
-    values = np.array(exact, np.int64)
-    fine = values[below] * (SPACING - part) + values[np.minimum(below + 1, len(values) - 1)] * part
-    return np.asarray(np.clip((fine // SPACING + 128) >> 8, 1, 65535), np.int64)
+    knots = []  # 2**24 times the probability, rounded down, of logits -LIMIT - 1 to 0
+    for logit in range(-LIMIT - 1, 1, SPACING):
+        power = context.exp(context.divide(Decimal(-logit), Decimal(256)))
+        knots.append(int(context.divide(Decimal(1 << 24), 1 + power)))
+    exact = np.array([*knots, 0], np.int64)
+    place, part = np.divmod(np.arange(LIMIT + 1) + 1, SPACING)  # of logits -LIMIT to 0
+    below = (exact[place] * (SPACING - part) + exact[place + 1] * part) // SPACING
+    lower = np.maximum(1, (below + 128) >> 8)
+    return np.concatenate([lower, 65536 - lower[-2::-1]])
 
 
 @functools.cache

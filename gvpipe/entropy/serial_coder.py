@@ -1,6 +1,9 @@
 """Range coding of integers one by one: the context of each may depend on all values before it.
 
-What: a stream as `gvpipe.entropy.block_coder` writes it, in which every value is a block of its own.
+What: values become tokens as in `gvpipe.entropy.tokens`; the low bits that a token leaves out follow it::
+
+    stream = tables, 32-bit range-coded words to the end
+
 Why: one compiled function can then describe a format for both directions. It calls `code_value` for every value; when encoding,
 the value is noted with its context, when decoding, it is read. So encoder and decoder cannot differ.
 """
@@ -12,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from gvpipe.arrays import Int64
-from gvpipe.container.cursor import varint
-from gvpipe.entropy.block_coder import BlockDecoder, describe_table
+from gvpipe.container.cursor import Cursor
+from gvpipe.entropy.serial_tables import bits_of, read_tables, write_tables
 from gvpipe.entropy.tokens import CHUNK, MAX_TOKENS, model, tokenise
 
 
@@ -58,16 +61,34 @@ class SerialDecoder:
     """
 
     def __init__(self, data: bytes, n_contexts: int, name: str) -> None:
+        from gvpipe.entropy import range_decoder
+        from gvpipe.entropy.block_kernels import BlockStream
         from gvpipe.entropy.serial_kernels import SerialCoder
 
-        self._decoder = BlockDecoder(data, n_contexts, name)
+        self._cursor = Cursor(data, name)
+        tables = read_tables(self._cursor, n_contexts)
+        sizes = np.array([len(table) for table in tables], np.int64)
+        edges = np.zeros((n_contexts, int(sizes.max(initial=0)) + 1), np.uint64)
+        for own, table in zip(edges, tables, strict=True):
+            own[: len(table) + 1] = range_decoder.edges_of(table)
+        if self._cursor.left % 4:
+            raise self._cursor.corrupt("its words are not whole")
+        words = self._cursor.array("<u4", self._cursor.left // 4).astype(np.uint32)
+        stream = BlockStream(range_decoder.start(words), words, edges, sizes)
         none = np.zeros(0, np.int64)
-        self.coder = SerialCoder(self._decoder.stream, none, none.copy(), np.zeros(2, np.int64), False)
+        self.coder = SerialCoder(stream, none, none.copy(), np.zeros(2, np.int64), False)
 
     def end(self) -> None:
         """Raise `CorruptFile` if a kernel met an error, or left words unread."""
-        self._decoder.check(int(self.coder.progress[1]))
-        self._decoder.end()
+        from gvpipe.entropy import range_decoder
+        from gvpipe.entropy.block_kernels import NO_TABLE, OUT_OF_RANGE
+
+        status = int(self.coder.progress[1])
+        if status:
+            wrong = {NO_TABLE: "a context is used that has no table", OUT_OF_RANGE: "a value is out of range"}
+            raise self._cursor.corrupt(wrong.get(status, "its range-coded data do not decode"))
+        if not range_decoder.may_be_exhausted(self.coder.stream.state, self.coder.stream.words):
+            raise self._cursor.corrupt("range-coded data are left over")
 
 
 def encode_serial(values: Int64, contexts: Int64, n_contexts: int) -> bytes:
@@ -75,14 +96,14 @@ def encode_serial(values: Int64, contexts: Int64, n_contexts: int) -> bytes:
 
     Examples:
         >>> len(encode_serial(np.array([0, 0, 0]), np.array([0, 0, 1]), 2))
-        7
+        6
     """
     import constriction
 
     tokens, low, n_low = tokenise(values)
     counts = _count_tokens(tokens, contexts, n_contexts)
-    described = [describe_table(own) for own in counts]
-    models: list[Any] = [model(table) if len(table) > 1 else None for _, table in described]
+    head, tables = write_tables(counts)
+    models: list[Any] = [model(table) if len(table) > 1 else None for table in tables]
     coder = constriction.stream.queue.RangeEncoder()
     uniform = {width: constriction.stream.model.Uniform(1 << width) for width in range(1, CHUNK + 1)}
     ends = np.flatnonzero((np.diff(contexts, append=-1) != 0) | (n_low > 0)) + 1  # runs that the library takes at once
@@ -95,21 +116,16 @@ def encode_serial(values: Int64, contexts: Int64, n_contexts: int) -> bytes:
             width = min(left, CHUNK)
             coder.encode(bits & ((1 << width) - 1), uniform[width])
             bits, left = bits >> width, left - width
-    return b"".join([varint(n_contexts), *(head for head, _ in described), coder.get_compressed().astype("<u4").tobytes()])
+    return head + bytes(coder.get_compressed().astype("<u4").tobytes())
 
 
 def estimate_bytes(values: Int64, contexts: Int64, n_contexts: int) -> float:
     """About the length of `encode_serial`'s stream, faster."""
     tokens, _, n_low = tokenise(values)
-    total = 8.0 * 2 + float(n_low.sum())
-    for counts in _count_tokens(tokens, contexts, n_contexts):
-        head, table = describe_table(counts)
-        used = counts[: len(table)]
-        used, table = used[used > 0], table[used > 0] if len(table) else table
-        total += 8 * len(head)
-        if len(table):
-            total -= float((used * np.log2(table / int(table.sum()))).sum())
-    return total / 8
+    counts = _count_tokens(tokens, contexts, n_contexts)
+    head, tables = write_tables(counts)
+    bits = 16 + float(n_low.sum()) + sum(bits_of(own[: len(table)], table) for own, table in zip(counts, tables, strict=True))
+    return len(head) + bits / 8
 
 
 def _count_tokens(tokens: Int64, contexts: Int64, n_contexts: int) -> Int64:

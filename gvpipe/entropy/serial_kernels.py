@@ -32,9 +32,7 @@ class SerialCoder(NamedTuple):
 
 def empty_stream() -> BlockStream:
     """The stream of an encoder, which reads nothing."""
-    return BlockStream(
-        np.zeros(3, np.uint64), np.zeros(0, np.uint32), np.zeros((0, 1), np.uint64), np.zeros(0, np.int64)
-    )
+    return BlockStream(np.zeros(3, np.uint64), np.zeros(0, np.uint32), np.zeros((0, 1), np.uint64), np.zeros(0, np.int64))
 
 
 @compiled
@@ -68,7 +66,7 @@ def code_value(coder: SerialCoder, context: int, value: int) -> int:
                 progress[1] = NO_DATA
                 return 0
             u |= np.int64(bits) << shift
-    return -((u + 1) >> 1) if u & 1 else u >> 1
+    return int(-((u + 1) >> 1) if u & 1 else u >> 1)
 
 
 @compiled

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -9,9 +10,10 @@ import numpy as np
 
 from gvpipe.arrays import Array
 from gvpipe.errors import InputError
+from gvpipe.fields.derived import Motion, Positions, Span
 from gvpipe.fields.head import Head, longest_segment
 from gvpipe.fields.mesh import FieldMesh
-from gvpipe.fields.segment import MODES
+from gvpipe.fields.segment import MODES, Place
 from gvpipe.fields.segment_encoder import encode_segment
 from gvpipe.fields.values import MAX_COMPONENTS, FieldBound, check_finite, narrow
 
@@ -26,6 +28,7 @@ def encode_field(
     bound: FieldBound,
     name: str = "field",
     *,
+    positions: Positions | None = None,
     holes: bool = False,
     modes: tuple[str, ...] = MODES,
     progress: Progress | None = None,
@@ -46,6 +49,8 @@ def encode_field(
         mesh: the R rows.
         bound: on every value.
         name: of the field, for messages.
+        positions: ``positions(start, stop)`` returns the mesh's decoded positions ``(stop - start, V, 3)``, in the order of the
+            mesh's vertices; None: the field is coded without them.
         holes: whether NaN is kept, instead of refused.
         modes: of `gvpipe.fields.segment.MODES`; the smallest is chosen for each segment.
         progress: called with the share that is done.
@@ -61,7 +66,8 @@ def encode_field(
         raise InputError(f"field {name!r} has {n_components} components; 1 to {MAX_COMPONENTS} are possible")
     head = Head(first.dtype, n_components, longest_segment(mesh.n_rows, n_components))
     bounds = head.bounds(n_frames)
-    segments = []
+    motion = None if positions is None else Motion(positions, n_frames, mesh)
+    segments, least = [], (math.inf, 0)
     for start, stop in pairwise(bounds):
         values = narrow(_checked(read(start, stop), (start, stop), mesh, name))
         if values.dtype != first.dtype or values.shape[2] != n_components:
@@ -70,10 +76,22 @@ def encode_field(
                 f"the first has {n_components} of type {first.dtype}; make them alike"
             )
         missing = check_finite(values, start, name, holes)
-        segments.append(encode_segment(values, missing, bound, mesh.causal, modes))
+        span = None
+        if motion is not None:
+            least = min(least, _smallest_frame(values, start))
+            span = Span(motion, start, stop, tuple(sorted({0, least[1]})))
+        place = Place(mesh.causal, name, span)
+        segments.append(encode_segment(values, missing, bound, place, modes))
         if progress is not None:
             progress(stop / n_frames)
     return head.pack(segments)
+
+
+def _smallest_frame(values: Array, start: int) -> tuple[float, int]:
+    """The sum of magnitudes, and the number, of the frame of ``values (n, R, C)`` in which these are smallest."""
+    sums = [float(np.nansum(np.abs(frame.astype(np.float64)))) for frame in values]
+    smallest = int(np.argmin(sums))
+    return sums[smallest], start + smallest
 
 
 def _checked(values: Array, span: tuple[int, int], mesh: FieldMesh, name: str) -> Array:

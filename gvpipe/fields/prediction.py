@@ -9,9 +9,10 @@ frame, in the one before and in the one after. With S the neighbours' average un
 - the value less S of the component before;
 - the neighbours one by one.
 
-The weights follow the row's own residuals, by the recursion of recursive least squares with a prior (a Kalman filter of
-constant weights). The weights of the first five signals start from what the nearest neighbours' came to; the variance of the
-residuals does, too.
+Two filters learn the weights from the row's own values, by the recursion of recursive least squares with a prior (a Kalman
+filter of constant weights). The first one learns fast, the second one slowly. Their guesses are averaged, each weighed by the
+inverse square of its recent squared errors. The weights of the first five signals, and the errors, start from what the nearest
+neighbours came to.
 
 Values are in steps. The step is twice the bound, and a residual is rounded to a whole step, so that no value misses the
 bound. With ``whole`` values are integers and predictions are rounded; then only the order of plain IEEE operations on float64

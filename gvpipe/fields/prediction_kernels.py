@@ -12,13 +12,17 @@ from gvpipe.trajectory.causal_order import CausalOrder
 
 N_SHARED = 5  # signals whose weights pass from row to row
 MOST_NEAR = 20  # neighbours that are signals of their own
-SHARED_VARIANCE = 0.15  # prior variance of a shared weight
-NEAR_VARIANCE = 1.0  # prior variance of a neighbour's weight, in that of the causal order
-NOISE, FLOOR = 0.5, 0.05  # variance of a prediction that the weights do not explain: share of the residuals', and steps squared
-MEMORY = 0.15  # share of a residual's square in the running variance
 FIRST_NOISE = 4.0  # of rows without neighbours, steps squared
 FARTHEST = 2.0**37  # magnitude of a prediction, steps
 DOUBT = 0.01  # part of a weight's variance that a value leaves at least, so that rounding cannot grow
+N_FILTERS = 2
+SHARED_VARIANCE = (0.15, 0.05)  # of each filter: prior variance of a shared weight
+NEAR_VARIANCE = (1.5, 0.3)  # prior variance of a neighbour's weight, in that of the causal order
+NOISE = (0.25, 1.0)  # variance of a value that the weights do not explain: share of the residuals' variance,
+FLOOR = (0.05, 0.3)  # and steps squared
+MEMORY = (0.2, 0.05)  # share of a residual's square in their variance
+TRUST = 0.35  # share of an error's square in the running mean that weighs the filters
+TRUST_FLOOR = 0.02  # added to that mean, steps squared
 
 
 class FieldCoding(NamedTuple):
@@ -44,12 +48,25 @@ class FieldCoding(NamedTuple):
 
 
 class Filter(NamedTuple):
-    """The state of a row's weights: ``(n,)`` weights, signals, direction, ``(n, n)`` covariance."""
+    """The state of a row's filters; n signals.
 
-    weights: Float64
+    Args:
+        signals: ``(n,)``.
+        weights: ``(N_FILTERS, n)``.
+        direction: ``(n,)`` memory.
+        covariance: ``(N_FILTERS, n, n)``.
+        guesses: ``(N_FILTERS,)``.
+        noises: ``(N_FILTERS,)`` running mean of squared residuals, steps squared.
+        errors: ``(N_FILTERS,)`` running mean of squared errors, by which filters are weighed, steps squared.
+    """
+
     signals: Float64
+    weights: Float64
     direction: Float64
     covariance: Float64
+    guesses: Float64
+    noises: Float64
+    errors: Float64
 
 
 @compiled
@@ -57,8 +74,16 @@ def predict_rows(coding: FieldCoding) -> None:
     """Code all rows (there is a target), filling residuals and decoded values, or fill decoded values from residuals."""
     causal, n_columns = coding.causal, coding.decoded.shape[1]
     most = N_SHARED + MOST_NEAR
-    state = Filter(np.zeros(most), np.zeros(most), np.zeros(most), np.zeros((most, most)))
-    learnt = np.zeros((len(causal.order), N_SHARED + 1))  # weights that rows came to, and their residuals' variance
+    state = Filter(
+        np.zeros(most),
+        np.zeros((N_FILTERS, most)),
+        np.zeros(most),
+        np.zeros((N_FILTERS, most, most)),
+        np.zeros(N_FILTERS),
+        np.zeros(N_FILTERS),
+        np.zeros(N_FILTERS),
+    )
+    learnt = np.zeros((len(causal.order), N_FILTERS, N_SHARED + 2))  # what rows' filters came to
     base = np.zeros(n_columns)
     for i in range(len(causal.order)):
         row, first = causal.order[i], causal.starts[i]
@@ -68,54 +93,53 @@ def predict_rows(coding: FieldCoding) -> None:
         for j in range(first, first + n_near):
             for n in range(n_columns):
                 base[n] += causal.weights[j] * coding.decoded[causal.neighbours[j], n]
-        noise = _start(state, i, n_near, causal, learnt)
+        _start(state, i, n_near, causal, learnt)
         for n in range(n_columns):
             if coding.still[row] and n % coding.n_frames:
                 coding.decoded[row, n] = coding.decoded[row, n - 1]
                 continue
             _gather(state, coding, i, n, n_near, base)
-            guess = 0.0
-            for a in range(N_SHARED + n_near):
-                guess += state.weights[a] * state.signals[a]
+            guess = _guess(state, N_SHARED + n_near)
             change = _code(coding, row, n, base[n] + guess)
-            _learn(state, N_SHARED + n_near, change, noise * NOISE + FLOOR)
-            noise += MEMORY * (change * change - noise)
-        for s in range(N_SHARED):
-            learnt[row, s] = state.weights[s]
-        learnt[row, N_SHARED] = noise
+            _learn(state, N_SHARED + n_near, coding.decoded[row, n] - base[n], change)
+        for f in range(N_FILTERS):
+            for s in range(N_SHARED):
+                learnt[row, f, s] = state.weights[f, s]
+            learnt[row, f, N_SHARED] = state.noises[f]
+            learnt[row, f, N_SHARED + 1] = state.errors[f]
 
 
 @compiled
-def _start(state: Filter, i: int, n_near: int, causal: CausalOrder, learnt: Float64) -> float:
-    """Set the weights' prior for rank i; return the residuals' variance to expect, steps squared."""
+def _start(state: Filter, i: int, n_near: int, causal: CausalOrder, learnt: Float64) -> None:
+    """Set the filters' priors for rank i: shared weights and variances from its nearest neighbours'."""
     first, n = causal.starts[i], N_SHARED + n_near
-    weights, covariance = state.weights, state.covariance
     ring = abs(causal.ring_sizes[i])
     ring = min(ring if ring else n_near, n_near)
-    noise = FIRST_NOISE
-    for a in range(n):
-        weights[a] = 0.0
-        for b in range(n):
-            covariance[a, b] = 0.0
-    if ring:
-        noise = 0.0
-        for j in range(first, first + ring):
-            for s in range(N_SHARED):
-                weights[s] += learnt[causal.neighbours[j], s] / ring
-            noise += learnt[causal.neighbours[j], N_SHARED] / ring
-    else:
-        weights[0] = 1.0
-    for s in range(N_SHARED):
-        covariance[s, s] = SHARED_VARIANCE
     total = 0.0
     for j in range(n_near):
         total += causal.variances[first + j]
-    for j in range(n_near):
-        own = NEAR_VARIANCE * causal.variances[first + j]
-        for b in range(n_near):  # the neighbours' weights keep their sum
-            covariance[N_SHARED + j, N_SHARED + b] = -own * causal.variances[first + b] / total
-        covariance[N_SHARED + j, N_SHARED + j] += own
-    return noise
+    for f in range(N_FILTERS):
+        weights, covariance = state.weights[f], state.covariance[f]
+        for a in range(n):
+            weights[a] = 0.0
+            for b in range(n):
+                covariance[a, b] = 0.0
+        state.noises[f] = state.errors[f] = 0.0 if ring else FIRST_NOISE
+        for j in range(first, first + ring):
+            known = learnt[causal.neighbours[j], f]
+            for s in range(N_SHARED):
+                weights[s] += known[s] / ring
+            state.noises[f] += known[N_SHARED] / ring
+            state.errors[f] += known[N_SHARED + 1] / ring
+        if not ring:
+            weights[0] = 1.0
+        for s in range(N_SHARED):
+            covariance[s, s] = SHARED_VARIANCE[f]
+        for j in range(n_near):
+            own = NEAR_VARIANCE[f] * causal.variances[first + j]
+            for b in range(n_near):  # the neighbours' weights keep their sum
+                covariance[N_SHARED + j, N_SHARED + b] = -own * causal.variances[first + b] / total
+            covariance[N_SHARED + j, N_SHARED + j] += own
 
 
 @compiled
@@ -134,6 +158,22 @@ def _gather(state: Filter, coding: FieldCoding, i: int, n: int, n_near: int, bas
 
 
 @compiled
+def _guess(state: Filter, n: int) -> float:
+    """The filters' guesses, and their mean weighed by what errors they made."""
+    total = trust = 0.0
+    for f in range(N_FILTERS):
+        guess = 0.0
+        for a in range(n):
+            guess += state.weights[f, a] * state.signals[a]
+        state.guesses[f] = guess
+        own = 1.0 / (state.errors[f] + TRUST_FLOOR)
+        own *= own
+        total += own * guess
+        trust += own
+    return total / trust
+
+
+@compiled
 def _code(coding: FieldCoding, row: int, n: int, guess: float) -> float:
     """Round the target's residual to whole steps, if there is a target; decode the value; return the residual."""
     if not -FARTHEST < guess < FARTHEST:  # NaN neither
@@ -148,18 +188,26 @@ def _code(coding: FieldCoding, row: int, n: int, guess: float) -> float:
 
 
 @compiled
-def _learn(state: Filter, n: int, change: float, noise: float) -> None:
-    """Update n weights by a residual, given the variance that they do not explain."""
-    covariance, signals, direction = state.covariance, state.signals, state.direction
-    variance = noise
-    for a in range(n):
-        total = 0.0
-        for b in range(n):
-            total += covariance[a, b] * signals[b]
-        direction[a] = total
-        variance += (1 + DOUBT) * total * signals[a]
-    for a in range(n):
-        gain = direction[a] / variance
-        state.weights[a] += gain * change
-        for b in range(n):
-            covariance[a, b] -= gain * direction[b]
+def _learn(state: Filter, n: int, value: float, change: float) -> None:
+    """Update the filters by a value, less its base, and by the residual that it took."""
+    signals, direction = state.signals, state.direction
+    for f in range(N_FILTERS):
+        weights, covariance = state.weights[f], state.covariance[f]
+        error = value - state.guesses[f]
+        variance = state.noises[f] * NOISE[f] + FLOOR[f]
+        for a in range(n):
+            direction[a] = 0.0
+        for b in range(n):  # each sum over b in order; side by side for all a
+            own, signal = covariance[b], signals[b]
+            for a in range(n):
+                direction[a] += own[a] * signal
+        for a in range(n):
+            variance += (1 + DOUBT) * direction[a] * signals[a]
+        for a in range(n):
+            gain = direction[a] / variance
+            weights[a] += gain * error
+            own = covariance[a]
+            for b in range(n):
+                own[b] -= gain * direction[b]
+        state.noises[f] += MEMORY[f] * (change * change - state.noises[f])
+        state.errors[f] += TRUST * (error * error - state.errors[f])

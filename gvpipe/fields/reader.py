@@ -8,9 +8,10 @@ import numpy as np
 
 from gvpipe.arrays import Array
 from gvpipe.errors import InputError
+from gvpipe.fields.derived import Motion, Positions, Span
 from gvpipe.fields.head import read_head
 from gvpipe.fields.mesh import FieldMesh
-from gvpipe.fields.segment import decode_segment
+from gvpipe.fields.segment import Place, decode_segment, read_mode
 
 
 class FieldReader:
@@ -21,15 +22,17 @@ class FieldReader:
         n_frames: F.
         mesh: the field's rows, as when it was encoded.
         name: of the section, for messages.
+        positions: as for the encoder: needed if it had them.
 
     Raises:
         CorruptFile: here or later: the section is not what `gvpipe.fields.encoder.encode_field` writes.
     """
 
-    def __init__(self, data: bytes, n_frames: int, mesh: FieldMesh, name: str) -> None:
+    def __init__(self, data: bytes, n_frames: int, mesh: FieldMesh, name: str, positions: Positions | None = None) -> None:
         self._head, self._segments = read_head(data, n_frames, mesh.n_rows, name)
         self._bounds = self._head.bounds(n_frames)
         self._mesh, self._name, self._n_frames = mesh, name, n_frames
+        self._motion = None if positions is None else Motion(positions, n_frames, mesh)
         self._last: tuple[int, Array] | None = None
 
     @property
@@ -47,12 +50,17 @@ class FieldReader:
         """F, R, C."""
         return self._n_frames, self._mesh.n_rows, self._head.components
 
+    @property
+    def modes(self) -> list[str]:
+        """How each segment is coded: names of `gvpipe.fields.segment.MODES`. Raises `CorruptFile`."""
+        return [read_mode(segment, self._name) for segment in self._segments]
+
     def read(self, start: int, stop: int) -> Array:
         """Return frames ``start`` to ``stop``: ``(stop - start, R, C)``, in the field's unit; NaN where there are holes.
 
         Raises:
             CorruptFile: a segment does not decode.
-            InputError: there are no such frames.
+            InputError: there are no such frames, or they follow from positions and the reader has none.
         """
         if not 0 <= start <= stop <= self._n_frames:
             raise InputError(f"field {self._name!r}: frames {start} to {stop}: there are 0 to {self._n_frames}")
@@ -66,6 +74,8 @@ class FieldReader:
     def _decode(self, s: int) -> Array:
         last = self._last  # once: other threads may read too
         if last is None or last[0] != s:
+            span = None if self._motion is None else Span(self._motion, self._bounds[s], self._bounds[s + 1])
+            place = Place(self._mesh.causal, self._name, span)
             shape = (self._bounds[s + 1] - self._bounds[s], *self.shape[1:])
-            last = self._last = s, decode_segment(self._segments[s], shape, self.dtype, self._mesh.causal, self._name)
+            last = self._last = s, decode_segment(self._segments[s], shape, self.dtype, place)
         return last[1]

@@ -16,6 +16,7 @@ mode           rest
 0 exact        residuals of integers in the order of the values (`gvpipe.fields.prediction`, whole)
 1 prediction   residuals in steps (`gvpipe.fields.prediction`)
 2 trajectories `gvpipe.fields.trajectories`
+3 derived      a derivation (`gvpipe.fields.derived`), then residuals in steps of what does not follow, as in mode 1
 =============  ==========================================================================================
 
 Blocks and rest hold the D distinct frames and the components that are not constant.
@@ -24,6 +25,7 @@ Blocks and rest hold the D distinct frames and the components that are not const
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,7 +33,8 @@ from gvpipe.arrays import Array, Float64, Int64
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.segments import LARGEST_STEP
 from gvpipe.entropy.integers import decode_integers
-from gvpipe.errors import corrupt_section
+from gvpipe.errors import InputError, corrupt_section
+from gvpipe.fields.derived import Derivation, Span
 from gvpipe.fields.holes import decode_holes
 from gvpipe.fields.prediction import restore_values
 from gvpipe.fields.residual_coding import decode_residuals
@@ -39,24 +42,49 @@ from gvpipe.fields.trajectories import decode_trajectories
 from gvpipe.fields.values import from_integers, from_numbers
 from gvpipe.trajectory.causal_order import CausalOrder
 
-EXACT, PREDICTION, TRAJECTORIES = range(3)
-MODES = ("exact", "prediction", "trajectories")
+EXACT, PREDICTION, TRAJECTORIES, DERIVED = range(4)
+MODES = ("exact", "prediction", "trajectories", "derived")
 STEP = struct.Struct("<d")
+TOO_LARGE = 2.0**53
 
 
-def decode_segment(data: bytes, shape: tuple[int, ...], dtype: np.dtype[np.generic], causal: CausalOrder, name: str) -> Array:
-    """Mirror of `gvpipe.fields.segment_encoder.encode_segment`: ``shape`` (n, R, C) of a type of
-    `gvpipe.fields.values.TYPES`; holes are NaN.
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a segment belongs.
+
+    Args:
+        causal: the order of the R rows.
+        name: of the section, for messages.
+        span: the motion of the segment's frames; None where positions are not known.
+    """
+
+    causal: CausalOrder
+    name: str
+    span: Span | None = None
+
+
+def decode_segment(data: bytes, shape: tuple[int, ...], dtype: np.dtype[np.generic], place: Place) -> Array:
+    """Mirror of `gvpipe.fields.segment_encoder.encode_segment`.
+
+    Args:
+        data: the bytes.
+        shape: n, R, C.
+        dtype: of the values, one of `gvpipe.fields.values.TYPES`.
+        place: where the segment belongs.
+
+    Returns:
+        ``(n, R, C)`` values; holes are NaN.
 
     Raises:
         CorruptFile: the bytes are not what the encoder writes.
+        InputError: values follow from positions, and these are not known.
     """
     n_frames, n_rows, n_components = shape
-    cursor = Cursor(data, name)
-    holes = decode_holes(cursor.block(), (n_frames, n_rows, n_components), causal, name)
+    cursor = Cursor(data, place.name)
+    holes = decode_holes(cursor.block(), (n_frames, n_rows, n_components), place.causal, place.name)
     if holes is not None and dtype.kind != "f":
         raise cursor.corrupt("integers have holes")
-    frames = _decode_holds(cursor.block(), n_frames, name)
+    frames = _decode_holds(cursor.block(), n_frames, place.name)
     mode = cursor.take(1)[0]
     flags = cursor.array("u1", n_components)
     if mode >= len(MODES) or (flags > 1).any():
@@ -66,8 +94,11 @@ def decode_segment(data: bytes, shape: tuple[int, ...], dtype: np.dtype[np.gener
     if n_rows:
         result[:, :, constant] = cursor.array(dtype.str, int(constant.sum()))
     if n_rows and not constant.all():
-        kept = (len(result), n_rows, int((~constant).sum()))
-        result[:, :, ~constant] = _decode_kept(cursor, mode, kept, dtype, causal)
+        numbers = _decode_numbers(cursor, mode, (int((~constant).sum()), frames), place)
+        values = from_integers(_whole(numbers), dtype) if mode == EXACT else from_numbers(numbers, dtype)
+        if values is None:
+            raise cursor.corrupt("a value is out of its type's range")
+        result[:, :, ~constant] = values
     cursor.end()
     if not np.isfinite(result).all():
         raise cursor.corrupt("a value is not finite")
@@ -77,38 +108,56 @@ def decode_segment(data: bytes, shape: tuple[int, ...], dtype: np.dtype[np.gener
     return result
 
 
-def _decode_kept(
-    cursor: Cursor, mode: int, shape: tuple[int, int, int], dtype: np.dtype[np.generic], causal: CausalOrder
-) -> Array:
-    """The components that are not constant, ``shape`` (D, R, C)."""
-    n_frames, n_rows, n_components = shape
+def read_mode(data: bytes, name: str) -> str:
+    """Which of `MODES` a segment is coded in; constant ones are ``exact``. Raises `CorruptFile`."""
+    cursor = Cursor(data, name)
+    cursor.block()
+    cursor.block()
+    mode = cursor.take(1)[0]
+    if mode >= len(MODES):
+        raise cursor.corrupt(f"its mode is {mode}")
+    return MODES[mode]
+
+
+def _decode_numbers(cursor: Cursor, mode: int, kept: tuple[int, Int64], place: Place) -> Float64:
+    """Numbers ``(D, R, K)`` of the K components that are not constant; ``kept`` is K and the distinct frame of each frame."""
+    n_components, of_frames = kept
+    causal, n_frames = place.causal, int(of_frames[-1]) + 1
     step = 1.0
     if mode != EXACT:
         (step,) = cursor.struct(STEP)
         if not 0 < step <= LARGEST_STEP:  # NaN neither
             raise cursor.corrupt(f"its step is {step}")
     flags = cursor.block()
-    still = np.zeros(n_rows, np.bool_)
+    still = np.zeros(len(causal.order), np.bool_)
     if flags:
         still = decode_residuals(flags, 1, 1, causal, cursor.name)[:, 0] != 0
     if mode == TRAJECTORIES:
         columns = decode_trajectories(cursor.rest(), (n_frames, n_components), causal, cursor.name)
-    else:
-        residuals = decode_residuals(cursor.rest(), n_components * n_frames, n_frames, causal, cursor.name, still)
-        columns = restore_values(residuals, n_frames, causal, still, mode == EXACT)
-    frames = np.ascontiguousarray(columns.reshape(n_rows, n_components, n_frames).transpose(2, 0, 1))
-    values = _to_values(frames, step, mode, dtype)
-    if values is None:
-        raise cursor.corrupt("a value is out of its type's range")
-    return values
+        return by_frame(columns, n_frames) * step
+    base: Float64 | float = 0.0
+    if mode == DERIVED:
+        if place.span is None:
+            raise InputError(f"{place.name!r} follows from the mesh's positions; give its reader the positions")
+        derivation = Derivation.take(cursor, n_components, place.span.motion.n_frames)
+        base = derivation.values(place.span)[np.flatnonzero(np.diff(of_frames, prepend=-1))]
+    residuals = decode_residuals(cursor.rest(), n_components * n_frames, n_frames, causal, cursor.name, still)
+    return base + by_frame(restore_values(residuals, n_frames, causal, still, mode == EXACT), n_frames) * step
 
 
-def _to_values(frames: Float64, step: float, mode: int, dtype: np.dtype[np.generic]) -> Array | None:
-    if mode != EXACT:
-        return from_numbers(frames * step, dtype)
-    if not (np.abs(frames) < 2.0**62).all():
-        return None
-    return from_integers(frames.astype(np.int64), dtype)
+def by_component(values: Float64) -> Float64:
+    """Columns of each row, component after component: ``(D, R, C) -> (R, C D)``."""
+    return np.ascontiguousarray(values.transpose(1, 2, 0).reshape(values.shape[1], -1))
+
+
+def by_frame(columns: Float64, n_frames: int) -> Float64:
+    """Mirror of `by_component`."""
+    return np.ascontiguousarray(columns.reshape(len(columns), -1, n_frames).transpose(2, 0, 1))
+
+
+def _whole(numbers: Float64) -> Int64:
+    """Integers; what float64 does not hold exactly is out of every type's range."""
+    return np.where(np.abs(numbers) < TOO_LARGE, numbers, TOO_LARGE).astype(np.int64)
 
 
 def _decode_holds(data: bytes, n_frames: int, name: str) -> Int64:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,42 +11,50 @@ from gvpipe.arrays import Array, Bool, Float64, Int64
 from gvpipe.container.cursor import pack_block, varint
 from gvpipe.entropy.integers import encode_integers
 from gvpipe.errors import InputError
+from gvpipe.fields.derived import SIGNALS, fit_derivation
 from gvpipe.fields.holes import encode_holes, fill_holes
 from gvpipe.fields.prediction import predict_values
 from gvpipe.fields.residual_coding import LARGEST, encode_residuals
-from gvpipe.fields.segment import EXACT, MODES, PREDICTION, STEP, TRAJECTORIES, decode_segment
+from gvpipe.fields.segment import DERIVED, EXACT, MODES, PREDICTION, STEP, TRAJECTORIES, Place, by_component, decode_segment
 from gvpipe.fields.trajectories import SHARES, WORTH, encode_trajectories
 from gvpipe.fields.values import FieldBound, choose_step, keeps_bound, to_integers
 from gvpipe.trajectory.causal_order import CausalOrder
 
+EXPLAINED = 0.25  # energy of changes that may be left where values follow from positions
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class Kept:
     """What of a segment is coded by a mode: its distinct frames, and the components that are not constant.
 
     Args:
-        columns: ``(R, C D)`` values, component after component: steps, or integers for `EXACT`.
-        n_frames: D.
+        values: ``(D, R, K)`` of a type of `gvpipe.fields.values.TYPES`, without holes.
+        distinct: ``(n,)`` the segment's frames that these are.
         still: ``(R,)`` rows that keep their values.
-        causal: the order of the R rows.
+        bound: on every value.
+        place: where the segment belongs.
     """
 
-    columns: Float64
-    n_frames: int
+    values: Array
+    distinct: Bool
     still: Bool
-    causal: CausalOrder
+    bound: FieldBound
+    place: Place
+
+    @property
+    def n_frames(self) -> int:
+        """D."""
+        return len(self.values)
 
 
-def encode_segment(
-    values: Array, holes: Bool | None, bound: FieldBound, causal: CausalOrder, modes: tuple[str, ...] = MODES
-) -> bytes:
+def encode_segment(values: Array, holes: Bool | None, bound: FieldBound, place: Place, modes: tuple[str, ...] = MODES) -> bytes:
     """Return the bytes of ``values (n, R, C)``, verified by decoding them.
 
     Args:
         values: of a type of `gvpipe.fields.values.TYPES`; NaN where ``holes`` are.
         holes: as ``values``, or None.
         bound: on every value.
-        causal: the order of the R rows.
+        place: where the segment belongs.
         modes: which to try; what none of them holds within the bound is coded as ``exact``.
 
     Raises:
@@ -55,67 +64,76 @@ def encode_segment(
     numbers = to_integers(filled)
     distinct = _find_distinct(numbers)
     constant = (numbers == numbers[:1, :1]).all(axis=(0, 1))
-    before = pack_block(encode_holes(holes, causal)) + pack_block(_encode_holds(distinct))
+    before = pack_block(encode_holes(holes, place.causal)) + pack_block(_encode_holds(distinct))
     after: bytes = constant.astype(np.uint8).tobytes() + filled[:1, :1, constant].tobytes()
-    kept, kept_numbers = filled[distinct][:, :, ~constant], numbers[distinct][:, :, ~constant]
-    still = (kept_numbers == kept_numbers[:1]).all(axis=(0, 2))
-    described = pack_block(encode_residuals(still[:, None].astype(np.int64), 1, causal) if still.any() else b"")
-    step = choose_step(kept, bound) if kept.size else 0.0
-    choices = []
-    if step:
-        lossy = Kept(_columns(kept.astype(np.float64)) / step, len(kept), still, causal)
-        choices = [(mode, STEP.pack(step) + described + data) for mode, data in _smallest_first(lossy, modes)]
-    for mode, data in choices:
+    changing = numbers[distinct][:, :, ~constant]
+    still = (changing == changing[:1]).all(axis=(0, 2))
+    kept = Kept(filled[distinct][:, :, ~constant], distinct, still, bound, place)
+    for mode, data in _choices(kept, modes) if changing.size else [(EXACT, b"")]:
         section = before + bytes([mode]) + after + data
-        if _verify(section, values, filled, holes, bound, causal):
+        decoded = decode_segment(section, values.shape, values.dtype, place)
+        there = slice(None) if holes is None else ~holes
+        holds = holes is None or np.array_equal(np.isnan(decoded), holes)
+        if holds and keeps_bound(filled[there], decoded[there], FieldBound(exact=True) if mode == EXACT else bound):
             return section
-    rest = b""
-    if kept.size:
-        integers = Kept(_columns(kept_numbers.astype(np.float64)), len(kept), still, causal)
-        rest = described + (_encode_prediction(integers, True) or b"")
-    section = before + bytes([EXACT]) + after + rest
-    if not _verify(section, values, filled, holes, FieldBound(exact=True), causal):
-        raise InputError("a field does not decode to what was encoded; check this machine's floating-point arithmetic")
-    return section
+    raise InputError("a field does not decode to what was encoded; check this machine's floating-point arithmetic")
 
 
-def _verify(section: bytes, values: Array, filled: Array, holes: Bool | None, bound: FieldBound, causal: CausalOrder) -> bool:
-    """Whether a segment decodes within the bound, with its holes."""
-    decoded = decode_segment(section, values.shape, values.dtype, causal, "field")
-    if holes is None:
-        return keeps_bound(filled, decoded, bound)
-    same = np.array_equal(np.isnan(decoded), holes)
-    return same and keeps_bound(filled[~holes], decoded[~holes], bound)
-
-
-def _smallest_first(kept: Kept, modes: tuple[str, ...]) -> list[tuple[int, bytes]]:
-    """Modes and bytes, the smallest first; modes whose residuals are too large are left out."""
+def _choices(kept: Kept, modes: tuple[str, ...]) -> Iterator[tuple[int, bytes]]:
+    """Modes and bytes, the smallest first; the exact one is the last, and is made only if it is asked for."""
+    still = _encode_still(kept.still, kept.place.causal)
     found: list[tuple[int, bytes]] = []
-    if "prediction" in modes:
-        data = _encode_prediction(kept, False)
-        if data is not None:
-            found.append((PREDICTION, data))
-    if "trajectories" in modes and kept.n_frames > 1:
-        for share in SHARES:
-            data = encode_trajectories(kept.columns, kept.n_frames, kept.causal, share)
-            if data is None:
-                break
-            found.append((TRAJECTORIES, data))
-            if len(data) > WORTH * min(len(other) for _, other in found):
-                break
-    return sorted(found, key=lambda pair: len(pair[1]))
+    step = choose_step(kept.values, kept.bound)
+    if step:
+        columns = by_component(kept.values.astype(np.float64)) / step
+        if "prediction" in modes:
+            found += [(PREDICTION, STEP.pack(step) + still + data) for data in _predicted(columns, kept, kept.still)]
+        if "derived" in modes:
+            found += [(DERIVED, data) for data in _derived(kept)]
+        if "trajectories" in modes and kept.n_frames > 1:
+            for share in SHARES:
+                data = encode_trajectories(columns, kept.n_frames, kept.place.causal, share)
+                if data is None:
+                    break
+                found.append((TRAJECTORIES, STEP.pack(step) + pack_block(b"") + data))
+                if len(data) > WORTH * min(len(other) for _, other in found):
+                    break
+    yield from sorted(found, key=lambda pair: len(pair[1]))
+    integers = by_component(to_integers(kept.values).astype(np.float64))  # float64 holds them exactly
+    yield from ((EXACT, still + data) for data in _predicted(integers, kept, kept.still, True))
 
 
-def _encode_prediction(kept: Kept, whole: bool) -> bytes | None:
-    residuals, _ = predict_values(kept.columns, kept.n_frames, kept.causal, kept.still, whole)
+def _predicted(columns: Float64, kept: Kept, still: Bool, whole: bool = False) -> list[bytes]:
+    """The bytes of ``columns (R, K D)`` by prediction; none if a residual is too large."""
+    residuals, _ = predict_values(columns, kept.n_frames, kept.place.causal, still, whole)
     if np.abs(residuals).max(initial=0) >= LARGEST:
-        return None
-    return encode_residuals(residuals, kept.n_frames, kept.causal, kept.still)
+        return []
+    return [encode_residuals(residuals, kept.n_frames, kept.place.causal, still)]
 
 
-def _columns(values: Float64) -> Float64:
-    """``(D, R, C) -> (R, C D)``, component after component."""
-    return np.ascontiguousarray(values.transpose(1, 2, 0).reshape(values.shape[1], -1))
+def _derived(kept: Kept) -> list[bytes]:
+    """The bytes of values that follow from positions, for each kind that explains most of them."""
+    span = kept.place.span
+    if span is None or kept.n_frames < 2:
+        return []
+    found = []
+    energy = float(np.square(np.diff(kept.values.astype(np.float64), axis=0)).sum())
+    all_frames = kept.values[np.cumsum(kept.distinct) - 1]
+    for kind in range(len(SIGNALS)):
+        fits = [fit_derivation(all_frames, span, kind, reference) for reference in span.references]
+        lefts = [kept.values - fit.values(span)[kept.distinct] for fit in fits]
+        best = min(range(len(fits)), key=lambda k: float(np.square(lefts[k]).sum()))
+        step = choose_step(kept.values, kept.bound) - 2 * fits[best].rounding(span)
+        unexplained = float(np.square(np.diff(lefts[best], axis=0)).sum())
+        if step > kept.bound.largest and unexplained < EXPLAINED * energy:
+            still = np.zeros(len(kept.still), np.bool_)
+            head = STEP.pack(step) + pack_block(b"") + fits[best].pack()
+            found += [head + data for data in _predicted(by_component(lefts[best]) / step, kept, still)]
+    return found
+
+
+def _encode_still(still: Bool, causal: CausalOrder) -> bytes:
+    return pack_block(encode_residuals(still[:, None].astype(np.int64), 1, causal) if still.any() else b"")
 
 
 def _find_distinct(numbers: Int64) -> Bool:

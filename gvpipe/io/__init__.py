@@ -1,77 +1,76 @@
 """Mesh sequences from files and to files.
 
-A format that holds a whole sequence in one file has a module here and an entry in `READERS` and `WRITERS`. A format of single
-frames has a module and an entry in `formats.FRAME_FORMATS`.
+A format that holds a whole sequence in one file has a module here and an entry in `scene_formats`. A format of single frames
+has a module and an entry in `formats.FRAME_FORMATS`.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from gvpipe.errors import InputError
-from gvpipe.io.alembic import read_alembic
 from gvpipe.io.export import write_frames
-from gvpipe.io.fbx import read_fbx
+from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames import read_frames
-from gvpipe.io.npz import read_npz, write_npz
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.simulation.collections import read_collection
-from gvpipe.io.simulation.ensight import read_ensight
-from gvpipe.io.simulation.exodus import read_exodus
-from gvpipe.io.simulation.vtkhdf import read_vtkhdf
-from gvpipe.io.simulation.xdmf import read_xdmf
-from gvpipe.io.usd import read_usd
+from gvpipe.io.pattern import match_pattern
+from gvpipe.io.scene_formats import HAVE_CLIPS, WRITERS, scene_readers
 from gvpipe.sequence import MeshSequence
 
 __all__ = ["READERS", "WRITERS", "read", "write"]
 
-USD = (".usda", ".usdc", ".usd", ".usdz")
 
-READERS: dict[str, Callable[[Path, ReadOptions], MeshSequence]] = {
-    ".npz": lambda path, options: read_npz(path, options.fps),
-    **dict.fromkeys(USD, read_usd),
-    ".abc": read_alembic,
-    ".fbx": read_fbx,
-    ".pvd": read_collection,
-    ".series": read_collection,
-    **dict.fromkeys((".vtkhdf", ".hdf"), read_vtkhdf),
-    **dict.fromkeys((".case", ".encas"), read_ensight),
-    **dict.fromkeys((".xdmf", ".xmf"), read_xdmf),
-    **dict.fromkeys((".e", ".exo", ".ex2"), read_exodus),
-}
-WRITERS: dict[str, Callable[[MeshSequence, Path], tuple[str, ...]]] = {".npz": write_npz}
-
-
-def read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], fps: float | None = None) -> MeshSequence:
+def read(
+    path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    fps: float | None = None,
+    clip: str | None = None,
+    mesh: str | os.PathLike[str] | None = None,
+) -> MeshSequence:
     """Read a mesh sequence.
 
     Args:
-        path: an ``.npz``, or frame files as a folder, a glob (``walk/*.obj``), a pattern (``walk/%04d.obj``,
-            ``walk/####.obj``, ``walk/$F4.obj``), one file or a list of files.
-        fps: frames per second; overrides the file's. Frame files, and archives without one, have 30 by default.
+        path: an ``.npz``, a scene (animated ``.glb`` or ``.gltf``, ``.usd``, ``.usda``, ``.usdc``, ``.usdz``, ``.abc``), a
+            point cache (``.pc2``, ``.mdd``, ``.npy``), or frame files as a folder, a glob (``walk/*.obj``), a pattern
+            (``walk/%04d.obj``, ``walk/####.obj``, ``walk/$F4.obj``), one file or a list of files.
+        fps: frames per second; overrides the file's. Frame files, and archives without one, have 30 by default. An animated
+            glTF file is sampled at it; by default at the rate of its keys.
+        clip: name of the animation to read, of a file that has several; None: the first.
+        mesh: a file with the triangles of a point cache.
 
     Raises:
         InputError: the path or what it holds cannot be used. Frame files after the first are read, and may raise it,
             when their positions are.
     """
     if not isinstance(path, str | os.PathLike):
+        _refuse_clip(clip, "a list of files")
         return read_frames([os.fspath(file) for file in path], fps)
     path = os.fspath(path)
-    reader = READERS.get(Path(path).suffix.lower())
-    if reader is not None and not os.path.isdir(path):
+    suffix = Path(path).suffix.lower()
+    if suffix not in HAVE_CLIPS or not os.path.isfile(path):
+        _refuse_clip(clip, path)
+    reader = READERS.get(suffix)
+    # a pattern of frames may end in .glb, too
+    if reader is not None and (os.path.isfile(path) or (suffix not in FRAME_FORMATS and not os.path.isdir(path))):
         if not os.path.isfile(path):
             raise InputError(f"{path}: no such file; check the path")
-        return reader(Path(path), ReadOptions(fps))
+        sequence = reader(Path(path), ReadOptions(fps, clip, mesh))
+        if sequence is not None:
+            return sequence
     return read_frames(path, fps)
+
+
+READERS = scene_readers(read)
 
 
 def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) -> tuple[str, ...]:
     """Write a mesh sequence; returns what the format cannot hold, a line each.
 
     Args:
-        path: an ``.npz``, a pattern of frame files (``out/%04d.obj``) or a folder (existing, or ending in ``/``).
+        path: an ``.npz``, a scene (animated ``.glb``, ``.usda``, ``.usdc``, ``.usd``, ``.usdz``, ``.abc``), a point cache
+            (``.pc2``, ``.mdd``, ``.npy``), a pattern of frame files (``out/%04d.obj``) or a folder (existing, or ending in
+            ``/``).
         start: number of the first frame file.
 
     Raises:
@@ -79,7 +78,15 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
         OutputError: a file cannot be written; nothing half-written is left.
     """
     path = os.fspath(path)
-    writer = WRITERS.get(Path(path).suffix.lower())
-    if writer is not None and not path.endswith(("/", os.sep)):
-        return writer(sequence, Path(path))
+    suffix = Path(path).suffix.lower()
+    writer = WRITERS.get(suffix)
+    # .glb may be a frame, too: of a pattern, or of a sequence of one
+    is_frame = suffix in FRAME_FORMATS and (sequence.n_frames == 1 or match_pattern(path) is not None or os.path.isdir(path))
+    if writer is not None and not path.endswith(("/", os.sep)) and not is_frame:
+        return writer(sequence, Path(path)) or ()
     return write_frames(sequence, path, start)
+
+
+def _refuse_clip(clip: str | None, name: str) -> None:
+    if clip is not None:
+        raise InputError(f"{name} has no clips; clip={clip!r} is for a single {' or '.join(HAVE_CLIPS)}")

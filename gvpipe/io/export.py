@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from gvpipe.asset.field import Field
 from gvpipe.atomic import atomic_path, output_error
 from gvpipe.errors import InputError
 from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.pattern import match_pattern
-from gvpipe.sequence import MeshSequence
+from gvpipe.sequence import CHUNK_BYTES, MeshSequence
 
 DEFAULT_PATTERN = "%04d.obj"
 
@@ -54,9 +56,10 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> tuple[str
     for name, data in encoder.beside.items():
         with atomic_path(target.with_name(name)) as temporary:
             temporary.write_bytes(data)
-    for first, stop in sequence.spans():
+    wanted = {name: sequence.fields[name] for name in encoder.fields}
+    for first, stop in _spans(sequence, wanted):
         block = sequence.read(first, stop)
-        fields = {name: sequence.fields[name].read(first, stop) for name in encoder.fields}
+        fields = {name: field.read(first, stop) for name, field in wanted.items()}
         for i, positions in enumerate(block):
             data = encoder.encode(positions, {name: values[i] for name, values in fields.items()})
             with atomic_path(target.with_name(pattern.name(start + first + i)) if pattern else target) as temporary:
@@ -67,3 +70,11 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> tuple[str
 def _shared_name(before: str) -> str:
     """A name for what all frames share: that of the frames without their number."""
     return before.rstrip("_-. ") or "materials"
+
+
+def _spans(sequence: MeshSequence, fields: Mapping[str, Field]) -> Iterator[tuple[int, int]]:
+    """Some frames at a time, bounded by the bytes of positions and fields."""
+    n_bytes = 12 * sequence.n_vertices
+    n_bytes += sum(field.shape[1] * field.n_components * field.dtype.itemsize for field in fields.values())
+    step = max(1, CHUNK_BYTES // n_bytes)
+    return ((first, min(first + step, sequence.n_frames)) for first in range(0, sequence.n_frames, step))

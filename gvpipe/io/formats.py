@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 from gvpipe.io.gltf import GltfLoader, encode_glb
 from gvpipe.io.mesh import EncoderMaker, Loader
-from gvpipe.io.obj import ObjLoader, encode_obj
-from gvpipe.io.off import OffLoader, encode_off
-from gvpipe.io.ply import encode_ply, load_ply
-from gvpipe.io.simulation.frame_loader import SurfaceLoader
-from gvpipe.io.simulation.legacy import load_legacy
-from gvpipe.io.simulation.xml_grids import load_xml_grid
+from gvpipe.io.obj import ObjLoader
+from gvpipe.io.obj_writer import encode_obj
+from gvpipe.io.off import OffLoader
+from gvpipe.io.off_writer import encode_off
+from gvpipe.io.ply import PlyLoader
+from gvpipe.io.ply_writer import encode_ply
+from gvpipe.io.simulation.frame_loader import STEP_LOADERS
 from gvpipe.io.stl import StlLoader, encode_stl
 
 
@@ -31,16 +32,12 @@ class FrameFormat:
 
 FRAME_FORMATS = {
     ".obj": FrameFormat(ObjLoader, encode_obj),
-    ".ply": FrameFormat(lambda: load_ply, encode_ply),
+    ".ply": FrameFormat(PlyLoader, encode_ply),
     ".stl": FrameFormat(StlLoader, encode_stl),
     ".off": FrameFormat(OffLoader, encode_off),
     ".glb": FrameFormat(GltfLoader, encode_glb),
     ".gltf": FrameFormat(GltfLoader),
-    ".vtk": FrameFormat(lambda: SurfaceLoader(load_legacy)),
-    **{
-        suffix: FrameFormat(lambda: SurfaceLoader(load_xml_grid))
-        for suffix in (".vtp", ".vtu", ".vts", ".vtr", ".vti", ".pvtp", ".pvtu")
-    },
+    **{suffix: FrameFormat(loader) for suffix, loader in STEP_LOADERS.items()},
 }
 
 

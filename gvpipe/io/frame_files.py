@@ -7,6 +7,7 @@ reads come from there.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -36,13 +37,15 @@ class FrameFiles:
     def __init__(self, paths: Sequence[Path]) -> None:
         self.paths = list(paths)
         self._loader: Loader = FRAME_FORMATS[self.paths[0].suffix.lower()].loader()
-        self.first: Mesh = load_mesh(self._loader, self.paths[0], 0)
+        self.first = load_mesh(self._loader, self.paths[0], 0)
         self.origin: Float64 = choose_origin(self.first.positions[None])
         self.rounding = 0.0  # what float32 moved a coordinate by at most, model units, in the frames loaded so far
         positions = self._narrow(self.first)
         self._spool = Spool(len(self.paths), positions.nbytes)
         self._spool.store(0, positions)
-        self._columns: dict[str, Spool] = {}  # by name, the numbers beside positions that are read with them
+        self._columns: dict[
+            str, tuple[Array, Spool]
+        ] = {}  # numbers beside positions: the first file's, and where they are kept
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -61,7 +64,7 @@ class FrameFiles:
     def load(self, frame: int) -> Mesh:
         """Load one file, and keep its positions and its columns for later reads; raises `InputError`."""
         path, first_path = self.paths[frame], self.paths[0]
-        mesh = self.first if frame == 0 else load_mesh(self._loader, path, frame)
+        mesh = load_mesh(self._loader, path, frame)
         for noun, here, there in (
             ("vertices", len(mesh.positions), len(self.first.positions)),
             ("triangles", len(mesh.faces), len(self.first.faces)),
@@ -81,39 +84,40 @@ class FrameFiles:
                     f"all frames need the same triangles in the same order{_remedy(frame)}"
                 )
         self._spool.store(frame, self._narrow(mesh))
-        for name in self._columns:
-            self._store(name, frame, self.values(mesh, name, frame))
+        for name, (first, spool) in self._columns.items():
+            spool.store(frame, self.values(mesh, name, frame, first))
         return mesh
 
-    def values(self, mesh: Mesh, name: str, frame: int) -> Array:
-        """Numbers beside a frame's positions, of the first file's type, which holds them; raises `InputError`."""
-        given = self.first.animated[name]().values
+    def values(self, mesh: Mesh, name: str, frame: int, first: Array) -> Array:
+        """Numbers beside a frame's positions, of the shape and type of the first file's; raises `InputError`."""
         made = mesh.animated.get(name)
-        values = given[:0] if made is None else np.asarray(made().values)
-        if values.shape != given.shape:
+        values = first[:0] if made is None else np.asarray(made().values)
+        if values.shape != first.shape:
             raise InputError(
-                f"{self.paths[frame].name} has {name!r} {values.shape if made else 'not'}, {self.paths[0].name} has it "
-                f"{given.shape}; all frames need the same properties"
+                f"{self.paths[frame].name} has {f'{name!r} {values.shape}' if values.size else f'no {name!r}'}, "
+                f"{self.paths[0].name} has it {first.shape}; all frames need the same properties"
             )
-        return np.ascontiguousarray(values, given.dtype)
+        return np.ascontiguousarray(values, first.dtype)
 
-    def keep(self, name: str) -> None:
-        """Keep a column of the frames that load from now on."""
-        values = self.values(self.first, name, 0)
-        self._columns[name] = Spool(len(self.paths), values.nbytes)
-        self._store(name, 0, values)
+    def keep(self, name: str, first: Array, n_frames: int) -> None:
+        """Keep a column of the frames that load from now on; it is ``first`` in the first ``n_frames``."""
+        values = np.ascontiguousarray(first)
+        self._columns[name] = values, Spool(len(self.paths), values.nbytes)
+        for frame in range(n_frames):
+            self._columns[name][1].store(frame, values)
+
+    def forget_animated(self) -> None:
+        """Give back the memory of the first file's numbers, when it is known which are kept."""
+        self.first = replace(self.first, animated={})
 
     def column(self, name: str, frames: range) -> Array:
         """A column of some frames: ``(n, R)`` or ``(n, R, C)``; raises `InputError`."""
-        first = self.values(self.first, name, 0)
+        first, spool = self._columns[name]
         block = np.empty((len(frames), *first.shape), first.dtype)
         for i, frame in enumerate(frames):
-            if not self._columns[name].fetch(frame, block[i]):
-                block[i] = self.values(self.load(frame), name, frame)
+            if not spool.fetch(frame, block[i]):
+                block[i] = self.values(self.load(frame), name, frame, first)
         return block
-
-    def _store(self, name: str, frame: int, values: Array) -> None:
-        self._columns[name].store(frame, values)
 
     def _narrow(self, mesh: Mesh) -> Float32:
         positions = narrow(mesh.positions[None], self.origin)
@@ -135,8 +139,10 @@ def load_mesh(loader: Loader, path: Path, frame: int) -> Mesh:
     """
     try:
         mesh = loader(path)
-    except InputError:
-        raise
+    except InputError as exc:
+        if path.name in str(exc):
+            raise
+        raise InputError(f"{path}: {exc}") from exc
     except Exception as exc:  # damaged files raise nearly anything inside NumPy, json and trimesh
         reason = getattr(exc, "strerror", None) or " ".join(str(exc).split())[:200] or type(exc).__name__
         raise InputError(f"{path} cannot be read as {path.suffix[1:].upper()}: {reason}; export this frame again") from exc

@@ -31,13 +31,14 @@ def read_frames(path: str | Sequence[str], fps: float | None = None) -> MeshSequ
     frames = FrameFiles(files)
     first = frames.first
     columns = split_columns(frames)
+    frames.forget_animated()
     if fps is None and len(files) > 1:
         noticed = (*noticed, ASSUMED_FPS)
     return MeshSequence(
         frames,
         first.faces,
         DEFAULT_FPS if fps is None else fps,
-        {**first.attributes, **columns.attributes},
+        {**{name: each for name, each in first.attributes.items() if name not in columns.fields}, **columns.attributes},
         name,
         frames.origin,
         (*noticed, *first.notes, *columns.notes),

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.arrays import Array, Float32, Floats, Int32, Int64, Integers, UInt8
+from gvpipe.arrays import Array, Bool, Float32, Floats, Int32, Int64, Integers, UInt8
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.material import Image, Material
 from gvpipe.asset.metadata import NO_METADATA, Metadata
@@ -133,6 +133,13 @@ def as_color(values: NDArray[np.generic]) -> UInt8:
     return rgba
 
 
+def as_normals(values: Array) -> Float32:
+    """Normals ``(N, 3)``; those that are not finite, as programs write them for triangles without an area, become zeros."""
+    normals = np.asarray(values, np.float32)
+    is_finite: Bool = np.asarray(np.isfinite(normals).all(axis=1))
+    return normals if is_finite.all() else np.where(is_finite[:, None], normals, np.float32(0))
+
+
 def indexed(table: Float32, index: Int64, faces: Int32, n_vertices: int, kind: str) -> Attribute:
     """An attribute whose corners show rows of a table: per vertex where all corners of each vertex show one row.
 
@@ -148,6 +155,6 @@ def indexed(table: Float32, index: Int64, faces: Int32, n_vertices: int, kind: s
     rows[corners] = index
     padded = np.concatenate([table, np.zeros((1, table.shape[1]), table.dtype)])
     if np.array_equal(rows[corners], index):
-        return Attribute(padded[rows], "vertex", kind)
+        return Attribute(padded[rows], "vertex", kind, name=kind)
     used, indices = np.unique(np.where(index < 0, len(table), index), return_inverse=True)
-    return Attribute(padded[used], "corner", kind, indices.reshape(-1).astype(np.int32))
+    return Attribute(padded[used], "corner", kind, indices.reshape(-1).astype(np.int32), name=kind)

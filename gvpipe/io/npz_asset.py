@@ -44,7 +44,7 @@ def asset_members(sequence: MeshSequence) -> dict[str, Array]:
         rows = np.asarray(each)
         members[_member(name, each)] = rows
         if each.domain == "corner" and each.indices is not None and not is_shared_by_vertex(each.indices, rows, sequence.faces):
-            members[f"indices_{name}"] = each.indices
+            members[f"indices_{name}"] = np.unique(each.indices, return_inverse=True)[1].reshape(-1).astype(np.int32)
     if sequence.polygons is not None:
         members["polygons"] = sequence.polygons
     members |= {f"image_{i}": np.frombuffer(image.data, np.uint8) for i, image in enumerate(sequence.images)}
@@ -64,8 +64,8 @@ def read_asset(members: Mapping[str, Array], faces: Int32, n_vertices: int, path
     parts = tuple(from_plain(Part, one, f"{path}: part") for one in _list(described, "parts", path))
     rows = {"vertex": n_vertices, "corner": 3 * len(faces), "triangle": len(faces), "part": len(parts)}
     details = {key: _objects(described, key, path) for key in ("attributes", "fields")}
-    names = [name for name in USUAL if name in members]
-    names += [member.removeprefix("attribute_") for member in members if member.startswith("attribute_")]
+    kept = [member for member in members if member in USUAL or member.startswith("attribute_")]
+    names = [member.removeprefix("attribute_") for member in kept]
     if len(set(names)) < len(names):
         raise InputError(f"{path}: two attributes of one name ({', '.join(sorted(names))}); keep one of each")
     return {

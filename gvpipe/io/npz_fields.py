@@ -89,15 +89,24 @@ class NpzField:
         with zipfile.ZipFile(self._path) as archive, archive.open(f"{self._member}.npy") as file:
             _read_header(file)
             made = tempfile.TemporaryFile(prefix="gvpipe-")  # noqa: SIM115 - lives as long as self
-            if not self._is_fortran:
-                for data in iter(lambda: file.read(BLOCK_BYTES), b""):
-                    made.write(data)
-                return made
-            for at, rows in self._rows(file):
-                for frame, values in enumerate(np.ascontiguousarray(rows.T)):
-                    made.seek(frame * self._bytes_frame + at * self.dtype.itemsize)
-                    made.write(values.data)
+            try:
+                (self._turn if self._is_fortran else self._copy)(file, made)
+            except BaseException:
+                made.close()
+                raise
         return made
+
+    def _copy(self, file: IO[bytes], made: IO[bytes]) -> None:
+        for data in iter(lambda: file.read(BLOCK_BYTES), b""):
+            made.write(data)
+        if made.tell() != self._bytes_frame * self.shape[0]:
+            raise ValueError("it ends early")
+
+    def _turn(self, file: IO[bytes], made: IO[bytes]) -> None:
+        for at, rows in self._rows(file):
+            for frame, values in enumerate(np.ascontiguousarray(rows.T)):
+                made.seek(frame * self._bytes_frame + at * self.dtype.itemsize)
+                made.write(values.data)
 
     def _rows(self, file: IO[bytes]) -> Iterator[tuple[int, Array]]:
         """Rows ``(n, F)``, the values of all frames each, and the number of the first."""

@@ -1,21 +1,23 @@
-"""OFF frames (Object File Format, Geomview), the text form: ``OFF``, ``COFF``, ``NOFF``, ``STOFF`` and mixtures.
+"""OFF frames (Object File Format, Geomview), read, the text form: ``OFF`` with ``ST``, ``C`` and ``N`` before it in that order.
 
-Parsed here rather than by trimesh 5.2, whose reader accepts a file that ends early, moves polygons behind the
-triangles and drops colours. Vertex colours are kept; other per-vertex values are skipped.
+Parsed here rather than by trimesh 5.2, whose reader accepts a file that ends early, moves polygons behind the triangles and
+drops colours. A vertex has x y z, then a normal (N), a colour (C) and texture coordinates (ST). A face may end in a colour.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Float64, Int32, Int64, UInt8
-from gvpipe.io.mesh import FrameEncoder, Mesh, as_color, as_faces, as_polygons, fan
-from gvpipe.io.text import clean_lines, count_tokens, format_positions, format_rows, line_spans, parse_floats, parse_integers
-from gvpipe.sequence import MeshSequence
+from gvpipe.arrays import Array, Float64, Int32, Int64
+from gvpipe.asset.attribute import Attribute
+from gvpipe.io.mesh import FrameValues, Mesh, as_color, as_faces, as_normals, as_polygons, fan
+from gvpipe.io.text import clean_lines, count_tokens, line_spans, parse_floats, parse_integers
 
 HEADER = re.compile(rb"\s*(ST)?(C)?(N)?OFF\b")
 
@@ -51,13 +53,23 @@ class OffLoader:
             raise ValueError("a vertex has fewer than 3 coordinates")
         positions = values[first[:, None] + np.arange(3)]
         face_lines = body[ends[n_vertices] : ends[n_vertices + n_faces]]
+        flags = bool(header[1]), bool(header[2]), bool(header[3])
+        columns = _vertex_columns(values, counts, flags) if any(flags) else {}
+        animated: dict[str, Callable[[], FrameValues]] = {
+            name: partial(_given, columns, name) for name in ("normal", "color") if name in columns
+        }
         if self._faces is not None and face_lines == self._face_lines and self._faces.max() < n_vertices:
-            return Mesh(positions, self._faces)
-        faces, n_corners = _parse_faces(face_lines, n_vertices)
-        if self._faces is None:
-            self._faces, self._face_lines = faces, face_lines
-        colors = _colors(values, counts, first) if header[2] and not header[1] else {}
-        return Mesh(positions, faces, colors, polygons=as_polygons(n_corners))
+            return Mesh(positions, self._faces, animated=animated)
+        faces, n_corners, colors = _parse_faces(face_lines, n_vertices)
+        if self._faces is not None:
+            return Mesh(positions, faces, animated=animated)
+        self._faces, self._face_lines = faces, face_lines
+        attributes: dict[str, Any] = {}
+        if "uv" in columns:
+            attributes["uv"] = Attribute(columns["uv"], "vertex", "uv", name="uv")
+        if colors is not None:
+            attributes["face_color" if "color" in columns else "color"] = Attribute(colors, "triangle", "color")
+        return Mesh(positions, faces, attributes, polygons=as_polygons(n_corners), animated=animated)
 
 
 def _parse_rows(text: bytes) -> tuple[Float64, Int64, Int64]:
@@ -69,8 +81,8 @@ def _parse_rows(text: bytes) -> tuple[Float64, Int64, Int64]:
     return values, counts, np.cumsum(counts) - counts
 
 
-def _parse_faces(text: bytes, n_vertices: int) -> tuple[Int32, Int64]:
-    """Polygons as triangles ``(T, 3)``, and their numbers of corners; colours behind the corners are skipped."""
+def _parse_faces(text: bytes, n_vertices: int) -> tuple[Int32, Int64, Array | None]:
+    """Polygons as triangles ``(T, 3)``, their numbers of corners, and the triangles' colours if all faces have some."""
     values, counts, first = _parse_rows(text)
     n_corners = values[first].astype(np.int64)
     if (n_corners >= counts).any():
@@ -78,30 +90,30 @@ def _parse_faces(text: bytes, n_vertices: int) -> tuple[Int32, Int64]:
     triangles = fan(n_corners)
     # corner c of polygon p stands at first[p] + 1 + c, behind the number of corners
     at = np.repeat(first + 1 - (np.cumsum(n_corners) - n_corners), n_corners) + np.arange(n_corners.sum())
-    return as_faces(values[at].astype(np.int64)[triangles], n_vertices), n_corners
+    faces = as_faces(values[at].astype(np.int64)[triangles], n_vertices)
+    more = counts - n_corners - 1
+    if more[0] not in (3, 4) or (more != more[0]).any():  # one number is an index into a palette that the file lacks
+        return faces, n_corners, None
+    colors = values[(first + 1 + n_corners)[:, None] + np.arange(more[0])]
+    return faces, n_corners, np.repeat(as_color(colors), n_corners - 2, axis=0)
 
 
-def _colors(values: Float64, counts: Int64, first: Int64) -> dict[str, UInt8]:
-    """The last four columns, or three where rows are too short for four."""
-    if (counts != counts[0]).any() or counts[0] < 6:
+def _vertex_columns(values: Float64, counts: Int64, flags: tuple[bool, bool, bool]) -> dict[str, Array]:
+    """Normals, colours and texture coordinates of the vertices, as far as the header's flags and the rows' length agree."""
+    has_uv, has_color, has_normal = flags
+    n = int(counts[0])
+    width = n - 3 - 3 * has_normal - 2 * has_uv
+    if (counts != n).any() or width < 0 or (has_color and width not in (3, 4)):
         return {}
-    width = 4 if counts[0] in (7, 10) else 3  # x y z [nx ny nz] r g b a
-    return {"color": as_color(values[(first + counts[0] - width)[:, None] + np.arange(width)])}
+    rows = values.reshape(len(counts), n)
+    columns: dict[str, Array] = {"normal": as_normals(rows[:, 3:6])} if has_normal else {}
+    start = 3 + 3 * has_normal
+    if has_color:
+        columns["color"] = as_color(rows[:, start : start + width])
+    if has_uv:
+        columns["uv"] = rows[:, n - 2 :].astype(np.float32)
+    return columns
 
 
-def encode_off(sequence: MeshSequence, shared: str) -> FrameEncoder:
-    """An encoder of frames, with polygons, and with colours if there is one per vertex."""
-    faces, origin, n_vertices = sequence.faces, sequence.origin, sequence.n_vertices
-    given = sequence.attributes.get("color")
-    color = None if given is None or given.domain != "vertex" else as_color(np.asarray(given))
-    tail = format_rows("3 %d %d %d\n", faces)
-
-    def encode(positions: Float32, fields: Mapping[str, Array]) -> bytes:
-        if color is None:
-            head = f"OFF\n{n_vertices} {len(faces)} 0\n" + format_positions("{0} {0} {0}\n", positions, origin)
-        else:
-            rows = format_positions("{0} {0} {0} %d %d %d %d\n", positions, origin, color)
-            head = f"COFF\n{n_vertices} {len(faces)} 0\n" + rows
-        return (head + tail).encode("ascii")
-
-    return FrameEncoder(encode)
+def _given(columns: dict[str, Array], name: str) -> FrameValues:
+    return FrameValues(columns[name], "vertex", name)

@@ -1,73 +1,179 @@
-"""PLY frames: text or binary, read from the file's own columns (`gvpipe.io.ply_elements`), written as binary little-endian.
+"""PLY frames, read: text or binary, from the file's own columns (`gvpipe.io.ply_elements`). Vertex order is the file's.
 
-Vertex order is the file's. Attributes are per corner where the file has them per corner.
+| property | becomes |
+| --- | --- |
+| ``x y z`` of a vertex | positions |
+| ``nx ny nz``; ``red green blue [alpha]`` of a vertex | ``normal``; ``color``: fields where they change from frame to frame |
+| ``s t``, ``u v`` or ``texture_u texture_v`` of a vertex, ``texcoord`` of a face | ``uv`` of the first frame |
+| ``red green blue [alpha]`` of a face | ``color`` per triangle |
+| any other number of a vertex or a face | an attribute, or a field, of its name; ``a_0 a_1 a_2`` are one vector ``a`` |
+| ``comment TextureFile picture.png`` | a material that shows the picture |
+
+A face's number is that of all triangles that the face is cut into.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Int32
-from gvpipe.io.mesh import FrameEncoder, Mesh, as_color, as_faces, as_polygons, fan, indexed
-from gvpipe.io.ply_elements import Columns, Lists, read_elements
-from gvpipe.sequence import MeshSequence
+from gvpipe.arrays import Array, Int32, Int64
+from gvpipe.asset.attribute import MAX_COMPONENTS, Attribute
+from gvpipe.asset.material import Material, Texture
+from gvpipe.asset.part import Part
+from gvpipe.io.mesh import FrameValues, Mesh, as_color, as_faces, as_normals, as_polygons, fan, indexed
+from gvpipe.io.pictures import Pictures
+from gvpipe.io.ply_elements import Columns, Lists, read_comments, read_elements
+from gvpipe.io.sharing import shared_by_vertex
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 NORMAL_NAMES = ("nx", "ny", "nz")
 INDEX_NAMES = ("vertex_indices", "vertex_index")
 COLOR_NAMES = ("red", "green", "blue", "alpha")
+TEXTURE_FILE = "TextureFile"
+COMPONENT = re.compile(r"(.+)_(\d+)")
+
+Animated = dict[str, Callable[[], FrameValues]]
 
 
-def load_ply(path: Path) -> Mesh:
-    """Load one file.
+class PlyLoader:
+    """Loads the frames of one sequence; after the first, without what is static."""
 
-    Raises:
-        OSError, ValueError: the file cannot be read; the caller names it.
-    """
-    elements = read_elements(path.read_bytes())
-    for name in ("vertex", "face"):
-        if not elements.get(name):
-            raise ValueError(f"it has no element {name!r}")
-    vertex, face = elements["vertex"], elements["face"]
-    positions = _stack(vertex, tuple("xyz"))
-    if positions is None:
-        raise ValueError("its vertices lack x, y or z")
-    polygons = _polygons(face)
-    faces = as_faces(polygons.values[fan(polygons.lengths)], len(positions))
-    return Mesh(positions, faces, _attributes(vertex, face, faces, len(positions)), polygons=as_polygons(polygons.lengths))
+    def __init__(self) -> None:
+        self._is_first = True
+
+    def __call__(self, path: Path) -> Mesh:
+        """Load one file.
+
+        Raises:
+            OSError, ValueError: the file cannot be read; the caller names it.
+        """
+        data = path.read_bytes()
+        elements = read_elements(data)
+        for name in ("vertex", "face"):
+            if not elements.get(name):
+                raise ValueError(f"it has no element {name!r}")
+        vertex, face = elements["vertex"], elements["face"]
+        positions = _stack(vertex, tuple("xyz"))
+        if positions is None:
+            raise ValueError("its vertices lack x, y or z")
+        list_name, polygons = _polygons(face)
+        triangles = fan(polygons.lengths)
+        faces = as_faces(polygons.values[triangles], len(positions))
+        animated = _animated(vertex, face, polygons.lengths)
+        if not self._is_first:
+            return Mesh(positions, faces, animated=animated)
+        self._is_first = False
+        pictures = Pictures(path.parent)
+        material = _material(read_comments(data), pictures)
+        lists = [name for name, one in (*vertex.items(), *face.items()) if isinstance(one, Lists)]
+        lost = [name for name in lists if name not in (list_name, "texcoord")]
+        return Mesh(
+            positions,
+            faces,
+            _uv(vertex, face, polygons.lengths, faces, len(positions)),
+            (*((f"lists {', '.join(lost)} were left out",) if lost else ()), *pictures.notes),
+            as_polygons(polygons.lengths),
+            (Part("", (0, len(positions)), (0, len(faces)), 0),) if material else (),
+            material,
+            tuple(pictures.images),
+            animated=animated,
+        )
 
 
-def _polygons(face: Columns) -> Lists:
+def _polygons(face: Columns) -> tuple[str, Lists]:
     """The vertex indices of each face: the list with a usual name, or the only list that there is."""
     lists = {name: column for name, column in face.items() if isinstance(column, Lists)}
-    usual = [lists[name] for name in INDEX_NAMES if name in lists]
+    usual = [name for name in INDEX_NAMES if name in lists]
     if not usual and len(lists) != 1:
         raise ValueError(f"its faces have no list {' or '.join(INDEX_NAMES)}")
-    return usual[0] if usual else next(iter(lists.values()))
+    name = usual[0] if usual else next(iter(lists))
+    return name, lists[name]
 
 
-def _attributes(vertex: Columns, face: Columns, faces: Int32, n_vertices: int) -> dict[str, Any]:
-    attributes: dict[str, Any] = {}
-    for pair in UV_NAMES:
-        uv = _stack(vertex, pair)
-        if uv is not None:
-            attributes["uv"] = uv.astype(np.float32)
-    corners = face.get("texcoord")  # a list (u, v, u, v, u, v) per triangle
-    if isinstance(corners, Lists) and (corners.lengths == 6).all() and len(corners.values) == faces.size * 2:
-        table = corners.values.reshape(-1, 2).astype(np.float32)
-        attributes["uv"] = indexed(table, np.arange(len(table)), faces, n_vertices, "uv")
-    normal = _stack(vertex, NORMAL_NAMES)
-    if normal is not None:
-        attributes["normal"] = normal.astype(np.float32)
-    for names in (COLOR_NAMES, COLOR_NAMES[:3]):
-        color = _stack(vertex, names)
-        if color is not None and "color" not in attributes:
-            attributes["color"] = as_color(color)
-    return attributes
+def _uv(vertex: Columns, face: Columns, counts: Int64, faces: Int32, n_vertices: int) -> dict[str, Any]:
+    """Texture coordinates of the vertices, or a list (u, v, u, v ...) of each face."""
+    corners = face.get("texcoord")
+    if isinstance(corners, Lists) and np.array_equal(corners.lengths, 2 * counts):
+        rows = corners.values.reshape(-1, 2).astype(np.float32)[fan(counts).reshape(-1)]
+        values, indices = shared_by_vertex(rows, faces)
+        return {"uv": indexed(values, indices.astype(np.int64), faces, n_vertices, "uv")}
+    found = [uv for uv in (_stack(vertex, pair) for pair in UV_NAMES) if uv is not None]
+    return {"uv": Attribute(found[0], "vertex", "uv", name="uv")} if found else {}
+
+
+def _animated(vertex: Columns, face: Columns, counts: Int64) -> Animated:
+    """Everything else: normals, colours, and numbers of other names, of vertices and faces."""
+    animated: Animated = {}
+    for columns, domain, reserved in ((vertex, "vertex", ("x", "y", "z")), (face, "triangle", ())):
+        numbers = {name: one for name, one in columns.items() if isinstance(one, np.ndarray) and name not in reserved}
+        repeats = counts - 2 if domain == "triangle" and (counts > 3).any() else None
+        for pair in UV_NAMES if domain == "vertex" else ():
+            if all(name in numbers for name in pair):
+                numbers = {name: one for name, one in numbers.items() if name not in pair}
+        groups: dict[str, Sequence[str]] = {}
+        if domain == "vertex" and all(name in numbers for name in NORMAL_NAMES):
+            groups["normal"] = NORMAL_NAMES
+        for width in (4, 3):
+            if all(name in numbers for name in COLOR_NAMES[:width]):
+                groups.setdefault("color", COLOR_NAMES[:width])
+        groups |= _vectors([name for name in numbers if not any(name in names for names in groups.values())])
+        for name, names in groups.items():
+            key = f"face_{name}" if name in animated else name
+            animated[key] = partial(_values, [numbers[one] for one in names], name, domain, repeats)
+    return animated
+
+
+def _vectors(names: list[str]) -> dict[str, Sequence[str]]:
+    """Names of single numbers by themselves, and ``a_0``, ``a_1``, ... as one vector."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        found = COMPONENT.fullmatch(name)
+        head = found[1] if found else ""
+        members = groups.get(head, [])
+        if found and found[2] == str(len(members)) and head not in names and len(members) < MAX_COMPONENTS:
+            groups.setdefault(head, []).append(name)
+        else:
+            groups[name] = [name]
+    lone = {head: members for head, members in groups.items() if len(members) == 1}
+    return {(members[0] if head in lone else head): members for head, members in groups.items()}
+
+
+def _values(columns: list[Array], name: str, domain: str, repeats: Int64 | None) -> FrameValues:
+    """The numbers of one attribute or field."""
+    kind = name if name in ("normal", "color") and len(columns) >= 3 else ""
+    values = columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
+    if kind == "color":
+        values = _color(values)
+    if kind == "normal":
+        values = as_normals(values)
+    return FrameValues(values if repeats is None else np.repeat(values, repeats, axis=0), domain, kind)
+
+
+def _color(values: Array) -> Array:
+    """Colours in their own type, with alpha; floats above 1 are meant as 0..255."""
+    if values.dtype.kind not in "fu" or values.dtype.itemsize > 4 or values.dtype == np.uint32:
+        return as_color(values)
+    if values.dtype == np.uint8 or (values.dtype.kind == "f" and (values > 1).any()):
+        return as_color(values)
+    full = np.iinfo(values.dtype).max if values.dtype.kind == "u" else 1
+    rgba = np.full((len(values), 4), full, np.float32 if values.dtype.kind == "f" else np.uint16)
+    rgba[:, : values.shape[1]] = values
+    return rgba
+
+
+def _material(comments: list[str], pictures: Pictures) -> tuple[Material, ...]:
+    """A material that shows the picture of a ``TextureFile`` comment."""
+    named = [comment.removeprefix(TEXTURE_FILE).strip() for comment in comments if comment.startswith(TEXTURE_FILE)]
+    if len(named) > 1:
+        pictures.notes.append(f"{len(named)} texture files are named, and the faces of each are not known; left out")
+    number = pictures.find(named[0], TEXTURE_FILE) if len(named) == 1 else None
+    return () if number is None else (Material(base_color_texture=Texture(number)),)
 
 
 def _stack(columns: Columns, names: Sequence[str]) -> Array | None:
@@ -75,54 +181,3 @@ def _stack(columns: Columns, names: Sequence[str]) -> Array | None:
     found = [columns.get(name) for name in names]
     numbers = [column for column in found if isinstance(column, np.ndarray)]
     return np.stack(numbers, axis=1) if len(numbers) == len(names) else None
-
-
-def encode_ply(sequence: MeshSequence, shared: str) -> FrameEncoder:
-    """An encoder of frames with texture coordinates and vertex colours (normals: see `encode_obj`).
-
-    Coordinates are ``double`` where they count from an origin.
-    """
-    faces, origin, n_vertices = sequence.faces, sequence.origin, sequence.n_vertices
-    attributes = {name: np.asarray(each) for name, each in sequence.attributes.items()}
-    uv, color = attributes.get("uv"), attributes.get("color")
-    vertex_fields: list[tuple[str, str]] = [(name, "<f8" if origin.any() else "<f4") for name in "xyz"]
-    face_fields: list[tuple[Any, ...]] = [("n", "u1"), ("vertex_indices", "<i4", 3)]
-    if uv is not None and len(uv) == n_vertices:
-        vertex_fields += [("s", "<f4"), ("t", "<f4")]
-    elif uv is not None:
-        face_fields += [("n_texcoord", "u1"), ("texcoord", "<f4", 6)]
-    if color is not None and len(color) == n_vertices:  # PLY has no usual place for corner colours
-        vertex_fields += [(name, "u1") for name in COLOR_NAMES]
-
-    vertices = np.zeros(n_vertices, vertex_fields)
-    for names, values in ((("s", "t"), uv), (COLOR_NAMES, color)):
-        if values is not None and len(values) == n_vertices:
-            for i, name in enumerate(names):
-                vertices[name] = values[:, i]
-    polygons = np.zeros(len(faces), face_fields)
-    polygons["n"], polygons["vertex_indices"] = 3, faces
-    lists = ["property list uchar int vertex_indices"]
-    if "texcoord" in (polygons.dtype.names or ()) and uv is not None:
-        polygons["n_texcoord"], polygons["texcoord"] = 6, uv.reshape(-1, 6)
-        lists.append("property list uchar float texcoord")
-
-    kinds = {"<f4": "float", "<f8": "double", "u1": "uchar"}
-    properties = [f"property {kinds[kind]} {name}" for name, kind in vertex_fields]
-    header = "\n".join(
-        [
-            "ply",
-            "format binary_little_endian 1.0",
-            f"element vertex {n_vertices}",
-            *properties,
-            f"element face {len(faces)}",
-            *lists,
-            "end_header\n",
-        ]
-    ).encode("ascii")
-
-    def encode(positions: Float32, fields: Mapping[str, Array]) -> bytes:
-        for i, name in enumerate("xyz"):
-            vertices[name] = positions[:, i] + origin[i] if origin.any() else positions[:, i]
-        return header + vertices.tobytes() + polygons.tobytes()
-
-    return FrameEncoder(encode)

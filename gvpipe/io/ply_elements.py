@@ -4,8 +4,9 @@ PLY (G. Turk, The PLY Polygon File Format, 1994) begins with a header in text. I
 many there are of each, and their properties. A property is a number, or a list of numbers with its length before it. The
 elements follow in the header's order, one per line of text or packed without gaps.
 
-Binary lists of one property must be equally long, so that a whole element is one structured array. Other packages were passed
-over: trimesh 5.2 keeps columns in a private place and accepts text that ends early; plyfile's licence (GPL) is not gvpipe's.
+Binary lists of one property are equally long in most files, so that a whole element is one structured array; others go through
+a kernel. Other packages were passed over: trimesh 5.2 keeps columns in a private place and accepts text that ends early;
+plyfile's licence (GPL) is not gvpipe's.
 """
 
 from __future__ import annotations
@@ -58,6 +59,13 @@ class _Element:
     properties: dict[str, _Property]
 
 
+def read_comments(data: bytes) -> list[str]:
+    """The comments of a PLY file's header."""
+    head = data[: max(0, data.find(b"end_header"))]
+    lines = head.decode("utf-8", "replace").splitlines()
+    return [line.strip().removeprefix("comment").strip() for line in lines if line.startswith("comment")]
+
+
 def read_elements(data: bytes) -> dict[str, Columns]:
     """Return the columns of a PLY file by element and property; an element of which there are none has no columns.
 
@@ -91,6 +99,8 @@ def _read_header(data: bytes) -> tuple[str, dict[str, _Element], int]:
                 pass
             case ["element", name, count] if name not in elements:
                 elements[name] = _Element(int(count), {})
+            case ["property", *_, key] if name and key in elements[name].properties:
+                raise ValueError(f"its header has two properties {key!r} of element {name!r}")
             case ["property", "list", length, kind, key] if name and length in TYPES and kind in TYPES:
                 elements[name].properties[key] = _Property(order + TYPES[kind], order + TYPES[length])
             case ["property", kind, key] if name and kind in TYPES:
@@ -109,7 +119,7 @@ def _read_text(elements: dict[str, _Element], body: bytes) -> dict[str, Columns]
     first = 0
     for name, element in elements.items():
         if first + element.count > n_lines:
-            raise ValueError(f"it announces {element.count} of element {name!r} but ends before the last")
+            raise _ends_early(name, element)
         if element.count:
             last = first + element.count
             columns[name] = _text_columns(name, element, lines[starts[first] : ends[last - 1]])
@@ -162,13 +172,19 @@ def _read_binary(elements: dict[str, _Element], body: bytes) -> dict[str, Column
         if element.count and element.properties:
             record = _record(name, element, body, at)
             n_there = min(element.count, (len(body) - at) // record.itemsize)
-            columns[name] = _binary_columns(name, element, np.frombuffer(body, record, n_there, at))
-            if n_there < element.count:
-                raise ValueError(f"it announces {element.count} of element {name!r} but ends before the last")
-            at += n_there * record.itemsize
+            records = np.frombuffer(body, record, n_there, at)
+            if n_there == element.count and _are_alike(element, records):
+                columns[name] = _alike_columns(element, records)
+                at += n_there * record.itemsize
+            else:
+                columns[name], at = _ragged_columns(name, element, body, at)
     if at != len(body):
         raise ValueError(f"it holds {len(body) - at} bytes more than its header announces")
     return columns
+
+
+def _ends_early(name: str, element: _Element) -> ValueError:
+    return ValueError(f"it announces {element.count} of element {name!r} but ends before the last")
 
 
 def _record(name: str, element: _Element, body: bytes, at: int) -> np.dtype[Any]:
@@ -180,7 +196,7 @@ def _record(name: str, element: _Element, body: bytes, at: int) -> np.dtype[Any]
         if kinds.length_kind:
             length_kind = np.dtype(kinds.length_kind)
             if at + size + length_kind.itemsize > len(body):
-                raise ValueError(f"it announces {element.count} of element {name!r} but ends before the last")
+                raise _ends_early(name, element)
             length = int(np.frombuffer(body, length_kind, 1, at + size)[0])
             if not 0 <= length <= len(body):
                 raise ValueError(f"a list of element {name!r} has length {length}")
@@ -191,18 +207,46 @@ def _record(name: str, element: _Element, body: bytes, at: int) -> np.dtype[Any]
     return np.dtype(fields)
 
 
-def _binary_columns(name: str, element: _Element, records: Array) -> Columns:
+def _are_alike(element: _Element, records: Array) -> bool:
+    """Whether all lists of a property are as long as the first one."""
+    lists = [f"n{i}" for i, kinds in enumerate(element.properties.values()) if kinds.length_kind]
+    return all(bool((records[name] == records[name][:1]).all()) for name in lists)
+
+
+def _alike_columns(element: _Element, records: Array) -> Columns:
     columns: Columns = {}
     for i, (key, kinds) in enumerate(element.properties.items()):
-        if not kinds.length_kind:
-            columns[key] = records[f"v{i}"]
-            continue
-        lengths = records[f"n{i}"].astype(np.int64)
-        other = np.flatnonzero(lengths != lengths[:1])
-        if len(other):
-            raise ValueError(
-                f"list {key!r} of element {name!r} has lengths {lengths[0]} and {lengths[other[0]]}; in a binary file all must "
-                "be equal, so make all faces triangles or write text"
-            )
-        columns[key] = Lists(records[f"v{i}"].reshape(-1), lengths)
+        values = records[f"v{i}"]
+        columns[key] = Lists(values.reshape(-1), records[f"n{i}"].astype(np.int64)) if kinds.length_kind else values
     return columns
+
+
+def _ragged_columns(name: str, element: _Element, body: bytes, at: int) -> tuple[Columns, int]:
+    """The columns of elements whose lists differ in length, and where they end."""
+    from gvpipe.io.ply_kernels import Layout, find_records
+
+    kinds = list(element.properties.values())
+    lists = [np.dtype(one.length_kind or "u1") for one in kinds]
+    layout = Layout(
+        np.array([np.dtype(one.kind).itemsize for one in kinds]),
+        np.array([kind.itemsize if one.length_kind else 0 for one, kind in zip(kinds, lists, strict=True)]),
+        np.array([int(kind.kind == "i") for kind in lists]),
+        kinds[0].kind.startswith(">"),
+    )
+    smallest = int(np.where(layout.length_sizes > 0, layout.length_sizes, layout.sizes).sum())
+    if element.count > (len(body) - at) // smallest:
+        raise _ends_early(name, element)
+    starts, lengths = np.empty((2, element.count, len(kinds)), np.int64)
+    data = np.frombuffer(body, np.uint8)
+    end = find_records(data, at, layout, starts, lengths)
+    if end == -2:
+        raise ValueError(f"a list of element {name!r} has a negative length")
+    if end < 0:
+        raise _ends_early(name, element)
+    columns: Columns = {}
+    for p, (key, one) in enumerate(element.properties.items()):
+        n_bytes = lengths[:, p] * layout.sizes[p]
+        before = np.cumsum(n_bytes) - n_bytes
+        values = data[np.repeat(starts[:, p] - before, n_bytes) + np.arange(n_bytes.sum())].view(one.kind)
+        columns[key] = Lists(values, lengths[:, p].copy()) if one.length_kind else values
+    return columns, end

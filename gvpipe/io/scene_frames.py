@@ -6,6 +6,7 @@ alone.
 
 from __future__ import annotations
 
+import re
 import threading
 from collections.abc import Sequence
 from typing import Protocol
@@ -74,18 +75,24 @@ class SceneFrames:
             self.rounding = max(self.rounding, rounding(exact, block[i : i + 1], self.origin))
         return block
 
+    def at(self, time: float) -> Float64:
+        """Positions ``(V, 3)`` at any time of the file's own, with the origin; raises `InputError`."""
+        return self._evaluate_at(time, f"({self._unit} {time:g})")
+
     def _evaluate(self, frame: int) -> Float64:
-        result = np.empty(self.shape[1:], np.float64)
         time = float(self.times[frame])
+        return self._evaluate_at(time, f"frame {frame} ({self._unit} {time:g})")
+
+    def _evaluate_at(self, time: float, moment: str) -> Float64:
+        result = np.empty(self.shape[1:], np.float64)
         with self._lock:
             for number, motion in enumerate(self._motions):
                 span = slice(self._starts[number], self._starts[number + 1])
                 still = self._still[number]
-                result[span] = self._checked(motion, frame, time) if still is None else still
+                result[span] = self._checked(motion, time, moment) if still is None else still
         return result
 
-    def _checked(self, motion: Motion, frame: int, time: float) -> Array:
-        moment = f"frame {frame} ({self._unit} {time:g})"
+    def _checked(self, motion: Motion, time: float, moment: str) -> Array:
         try:
             positions = motion.at(time)
         except InputError:
@@ -101,8 +108,16 @@ class SceneFrames:
 
 
 def one_line(exc: BaseException) -> str:
-    """The text of a library's error as one short line."""
-    return " ".join(str(exc).split())[:200] or type(exc).__name__
+    """The text of a library's error as one short line, without where in the library's sources it arose."""
+    try:
+        text = str(exc)
+    except UnicodeError:  # it quotes a damaged file
+        return "its text is damaged"
+    usd = re.search(r" in file \S+ : '(.*?)'?\s*(?:$|Error in)", text, re.DOTALL)
+    text = re.sub(r"parse error matching .*? at '", "parse error at '", usd[1], flags=re.DOTALL) if usd else text
+    alembic = text.rsplit("EXCEPTION:", 1)
+    text = alembic[-1] if len(alembic) > 1 else text
+    return " ".join(text.split())[:200] or type(exc).__name__
 
 
 def even_times(samples: Float64, fps: float | None, default: float, where: str) -> tuple[Float64, float, tuple[str, ...]]:

@@ -7,6 +7,7 @@ normals, 0 for anything else. Corners share a value exactly where they share it 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ def join_layers(
             left.append(name)
         else:
             attributes[name] = made
-    note = (f"the meshes disagree on the number of components of {', '.join(left)}; they were left out",) if left else ()
+    note = (f"the meshes disagree on the type of {', '.join(left)}; they were left out",) if left else ()
     return attributes, note
 
 
@@ -54,7 +55,7 @@ def _join_layer(
     start = vertex = 0
     for mesh, made, layer in zip(meshes, fans, found, strict=True):
         span = first_frame[vertex : vertex + mesh.n_vertices]
-        used = layer or _stand_in(kind, max(widths), mesh, made, span)
+        used = layer or _stand_in(kind, max(widths), present[0].values.dtype, mesh, made, span)
         rows = _rows(used, domain, mesh, made)
         pool, rows = _shared(used, rows) if domain == "corner" else (used.values, rows)
         values.append(_widen(pool, max(widths)))
@@ -63,6 +64,8 @@ def _join_layer(
         vertex += mesh.n_vertices
     pool, rows = np.concatenate(values), np.concatenate(indices)
     plain = len(rows) == len(pool) and bool((rows == np.arange(len(rows))).all())
+    if kind == "label" and pool.dtype.kind not in "iu":
+        return None
     result = "triangle" if domain == "polygon" else domain
     return Attribute(pool, result, kind, None if plain else rows.astype(np.int32), name=present[0].name)
 
@@ -94,12 +97,12 @@ def _shared(layer: Layer, rows: Int64) -> tuple[Array, Int64]:
     return values[first[order]], np.asarray(rank[inverse.reshape(-1)][rows])
 
 
-def _stand_in(kind: str, width: int, mesh: SceneMesh, fans: Fans, positions: Float64) -> Layer:
+def _stand_in(kind: str, width: int, dtype: np.dtype[Any], mesh: SceneMesh, fans: Fans, positions: Float64) -> Layer:
     if kind == "normal":
         faces = mesh.corners[fans.corner_source].reshape(-1, 3)
         return Layer("normal", kind, "vertex", vertex_normals(positions, faces))
-    value = 1.0 if kind == "color" else 0.0
-    return Layer("", kind, "constant", np.full((1, width), value, np.float32), np.zeros(1, np.int64))
+    value = np.ones((1, width), np.float32) if kind == "color" else np.zeros((1, width), dtype)
+    return Layer("", kind, "constant", value, np.zeros(1, np.int64))
 
 
 def vertex_normals(positions: Float64, faces: Int64) -> Array:

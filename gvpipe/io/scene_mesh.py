@@ -7,7 +7,7 @@ group follow each other, because a part is a range of triangles. Vertices keep t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +103,7 @@ def join(meshes: Sequence[SceneMesh], where: str) -> Joined:
     parts: list[Part] = []
     fans: list[Fans] = []
     vertex = triangle = 0
-    for mesh in meshes:
+    for mesh in map(by_first_polygon, meshes):
         check_topology(mesh, where)
         made = cut_polygons(mesh)
         fans.append(made)
@@ -118,6 +118,16 @@ def join(meshes: Sequence[SceneMesh], where: str) -> Joined:
         raise InputError(f"{where} has no polygon mesh; a mesh with triangles is needed")
     joined = np.concatenate(faces).reshape(-1, 3).astype(np.int32)
     return Joined(joined, np.concatenate([each.counts for each in fans]).astype(np.int32), tuple(parts), tuple(fans))
+
+
+def by_first_polygon(mesh: SceneMesh) -> SceneMesh:
+    """The mesh with its groups in the order of their first polygons, so that polygons move as little as they must."""
+    first = np.full(len(mesh.materials), len(mesh.groups))
+    np.minimum.at(first, mesh.groups, np.arange(len(mesh.groups)))
+    order = np.argsort(first, kind="stable")
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    return replace(mesh, groups=rank[mesh.groups], materials=tuple(mesh.materials[number] for number in order))
 
 
 def cut_polygons(mesh: SceneMesh) -> Fans:

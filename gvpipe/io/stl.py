@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from gvpipe.arrays import Array, Float32, Float64, Int32, Int64
+from gvpipe.asset.part import Part
 from gvpipe.errors import InputError
 from gvpipe.io.losses import lost_notes
 from gvpipe.io.mesh import FrameEncoder, Mesh, as_faces
@@ -41,7 +42,7 @@ class StlLoader:
             InputError: corners that were one vertex in the first file are apart in this one.
             Exception: the file cannot be read; trimesh raises many kinds, and the caller names the file.
         """
-        exact = _load_corners(path)
+        exact, solids = _load_corners(path)
         if self._first is None:
             self._origin = choose_origin(exact[None])
         corners = narrow(exact[None], self._origin)[0]
@@ -63,18 +64,30 @@ class StlLoader:
                 f"corner {corner % 3} of triangle {corner // 3} shares a vertex with another in {self._first.name} "
                 f"but not in {path.name}; STL has no vertices of its own: export OBJ, PLY or GLB"
             )
-        return Mesh(exact[self._corner_of], self._faces)
+        return Mesh(exact[self._corner_of], self._faces, parts=_make_parts(solids, self._faces))
 
 
-def _load_corners(path: Path) -> Float64:
-    """All corners, ``(3 T, 3)``."""
+def _load_corners(path: Path) -> tuple[Float64, list[tuple[str, int]]]:
+    """All corners, ``(3 T, 3)``, and the solids' names and triangles; binary files have one solid."""
     import trimesh
 
     scene: Any = trimesh.load_scene(path, file_type="stl", process=False)
     solids = [np.asarray(solid.vertices, np.float64)[solid.faces.reshape(-1)] for solid in scene.geometry.values()]
     if not solids:
         raise ValueError("it has no triangles")
-    return np.concatenate(solids)
+    return np.concatenate(solids), [(name, len(solid) // 3) for name, solid in zip(scene.geometry, solids, strict=True)]
+
+
+def _make_parts(solids: list[tuple[str, int]], faces: Int32) -> tuple[Part, ...]:
+    """A part for each solid of a text file, if there are several."""
+    stops = np.cumsum([n_triangles for _, n_triangles in solids]).tolist()
+    ranges = [(stop - n_triangles, stop) for stop, (_, n_triangles) in zip(stops, solids, strict=True)]
+    if len(solids) < 2 or any(start == stop for start, stop in ranges):
+        return ()
+    return tuple(
+        Part(name, (int(faces[start:stop].min()), int(faces[start:stop].max()) + 1), (start, stop))
+        for (name, _), (start, stop) in zip(solids, ranges, strict=True)
+    )
 
 
 def _weld(corners: Float32) -> tuple[Int64, Int64]:

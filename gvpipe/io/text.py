@@ -8,6 +8,7 @@ from an origin it uses seventeen, which give every float64 back.
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,19 +16,29 @@ from numpy.typing import NDArray
 from gvpipe.arrays import Bool, Float32, Float64, Int64, UInt8
 
 
-def clean_lines(data: bytes) -> bytes:
-    r"""Text with ``\n`` line ends, without comments (``#``), indentation, continuation lines or byte order mark."""
+def clean_lines(data: bytes, named: Collection[bytes] = ()) -> bytes:
+    r"""Text with ``\n`` line ends, without comments (``#``), indentation, continuation lines or byte order mark.
+
+    Lines that start with a keyword of ``named`` keep their ``#``: names hold it.
+    """
     data = data.removeprefix(b"\xef\xbb\xbf")
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if b"\\\n" in data:
         data = data.replace(b"\\\n", b" ")
     if b"#" in data:
-        data = re.sub(rb"#[^\n]*", b"", data)
+        data = re.sub(rb"#[^\n]*", lambda found: _uncommented(found, named), data)
     data = b"\n" + data + b"\n"
     if b"\n " in data or b"\n\t" in data:
         data = re.sub(rb"\n[ \t]+", b"\n", data)
     return data[1:]
+
+
+def _uncommented(found: re.Match[bytes], named: Collection[bytes]) -> bytes:
+    """What stays of a comment: all of it behind one of the keywords, else nothing."""
+    start = found.string.rfind(b"\n", 0, found.start()) + 1
+    words = found.string[start : min(start + 80, found.start())].split(None, 1)
+    return found[0] if words and words[0] in named else b""
 
 
 def line_spans(text: UInt8) -> tuple[Int64, Int64]:

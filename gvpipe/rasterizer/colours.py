@@ -15,6 +15,7 @@ LEVELS = 4096  # of linear light that are told apart: the darkest sRGB steps are
 BACKGROUND = (0.95, 0.95, 0.95)  # sRGB, 0..1, as all here
 FRONT = (0.62, 0.72, 0.83)
 BACK = (0.86, 0.71, 0.58)
+HOLE = (0.62, 0.62, 0.62)  # where a field has no value
 ERRORS = np.array(
     [[0.90, 0.90, 0.88], [0.985, 0.83, 0.42], [0.965, 0.53, 0.19], [0.83, 0.20, 0.20], [0.47, 0.05, 0.31], [0.20, 0.02, 0.26]]
 )

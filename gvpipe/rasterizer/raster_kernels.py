@@ -11,11 +11,10 @@ import numpy as np
 
 from gvpipe.arrays import Array
 from gvpipe.compiled import compiled
-from gvpipe.rasterizer.scene import Projection, View, ZBuffer
+from gvpipe.rasterizer.fragment_kernels import HALF, SNAP, SNAP_BITS, base_colours, empty_fragments, weigh
+from gvpipe.rasterizer.scene import BASE, CULLED, TESTED, Fragments, Look, Projection, Scene, View, ZBuffer
+from gvpipe.rasterizer.texture_kernels import sample_role
 
-SNAP_BITS = 8
-SNAP = 1 << SNAP_BITS
-HALF = SNAP // 2
 FARTHEST = float(1 << 20)  # samples: keeps products of two differences of snapped corners within 60 bits
 NEAREST = 1e-3  # of the distance: what is nearer to the eye counts as behind it
 
@@ -43,14 +42,23 @@ def project(positions: Array, view: View, projection: Projection) -> None:
 
 
 @compiled
-def rasterise(faces: Array, projection: Projection, z_buffer: ZBuffer, top: int, bottom: int) -> None:
-    """Fill rows ``top`` to ``bottom`` of the z-buffer with triangles ``faces (T, 3) int32``."""
-    snapped, nearness = projection.snapped, projection.nearness
-    depths, triangles = z_buffer.depths, z_buffer.triangles
-    width = depths.shape[1]
-    depths[top:bottom] = 0.0
-    triangles[top:bottom] = -1
-    for t in range(len(faces)):
+def rasterise(chosen: Array, scene: Scene, look: Look, z_buffer: ZBuffer, layer: int, rows: tuple[int, int]) -> int:
+    """Fill rows of one layer of the z-buffer with some triangles; return how many samples were set.
+
+    The last layer keeps what is nearest. Any other keeps what is nearest of all that lies before the last layer and, from the
+    second on, behind the layer before it; so it is filled after both.
+
+    Args:
+        chosen: ``(n,) int32``, the triangles.
+        rows: the first, and the one after the last.
+    """
+    faces, snapped, nearness = scene.faces, scene.projection.snapped, scene.projection.nearness
+    depths, triangles, of_triangles, flags = z_buffer.depths, z_buffer.triangles, look.of_triangles, look.flags
+    (top, bottom), (n_layers, _, width), has_materials = rows, depths.shape, len(of_triangles) > 0
+    _clear(z_buffer, layer, rows)
+    span, n_set = empty_fragments(width if has_materials else 0), 0
+    for number in range(len(chosen)):
+        t = chosen[number]
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         ya, yb, yc = snapped[a, 1], snapped[b, 1], snapped[c, 1]
         # the rows and columns whose middles lie in the triangle's box
@@ -62,8 +70,9 @@ def rasterise(faces: Array, projection: Projection, z_buffer: ZBuffer, top: int,
         xa, xb, xc = snapped[a, 0], snapped[b, 0], snapped[c, 0]
         left = max(0, (min(xa, xb, xc) - HALF + SNAP - 1) >> SNAP_BITS)
         right = min(width - 1, (max(xa, xb, xc) - HALF) >> SNAP_BITS)
-        area = (xb - xa) * (yc - ya) - (xc - xa) * (yb - ya)
-        if left > right or area == 0:
+        area = (xb - xa) * (yc - ya) - (xc - xa) * (yb - ya)  # below 0 where the front is seen, since y grows downwards
+        flag = flags[of_triangles[t]] if has_materials else 0
+        if left > right or area == 0 or (area > 0 and flag & CULLED):
             continue
         if area < 0:
             xb, yb, qb, xc, yc, qc, area = xc, yc, qc, xb, yb, qb, -area
@@ -72,26 +81,60 @@ def rasterise(faces: Array, projection: Projection, z_buffer: ZBuffer, top: int,
         low, high = min(qa, qb, qc), max(qa, qb, qc)
         for y in range(row, last + 1):
             py = (y << SNAP_BITS) + HALF
-            first, end = left, right
-            # an edge from (x0, y0) to (x1, y1) has the inside where (x1-x0)(py-y0) - (px-x0)(y1-y0) >= 0: one bound on px
-            for e in range(3):
-                if e == 0:
-                    x0, y0, x1, y1 = xa, ya, xb, yb
-                elif e == 1:
-                    x0, y0, x1, y1 = xb, yb, xc, yc
-                else:
-                    x0, y0, x1, y1 = xc, yc, xa, ya
-                dy = y1 - y0
-                value = (x1 - x0) * (py - y0) + (x0 - HALF) * dy  # >= (x SNAP) dy
-                if dy > 0:
-                    end = min(end, value // (dy * SNAP))
-                elif dy < 0:
-                    first = max(first, -(value // (-dy * SNAP)))
-                elif value < 0:
-                    end = -1
+            first, end = _clip((xa, ya), (xb, yb), py, left, right)
+            first, end = _clip((xb, yb), (xc, yc), py, first, end)
+            first, end = _clip((xc, yc), (xa, ya), py, first, end)
+            if flag & TESTED and first <= end:
+                find_alpha(scene, look, t, (first, end, y), span)
             for x in range(first, end + 1):
                 q = qa + across * ((x << SNAP_BITS) + HALF - xa) + down * (py - ya)
                 q = np.float32(min(max(q, low), high))  # a sliver's slopes are steep: no sample may leave its corners' range
-                if q > depths[y, x]:
-                    depths[y, x] = q
-                    triangles[y, x] = t
+                if q > depths[layer, y, x]:
+                    if layer > 0 and layer < n_layers - 1 and q >= depths[layer - 1, y, x]:
+                        continue
+                    if flag & TESTED and span.colours[x - first, 3] < look.cutoffs[of_triangles[t]]:
+                        continue
+                    depths[layer, y, x], triangles[layer, y, x] = q, t
+                    n_set += 1
+    return n_set
+
+
+@compiled
+def _clear(z_buffer: ZBuffer, layer: int, rows: tuple[int, int]) -> None:
+    """Empty a layer; what is see-through is then only seen before what is opaque."""
+    depths, triangles, last, (top, bottom) = z_buffer.depths, z_buffer.triangles, len(z_buffer.depths) - 1, rows
+    triangles[layer, top:bottom] = -1
+    if layer == last:
+        depths[layer, top:bottom] = 0.0
+    else:
+        depths[layer, top:bottom] = depths[last, top:bottom]
+
+
+@compiled
+def _clip(start: tuple[int, int], stop: tuple[int, int], py: int, first: int, end: int) -> tuple[int, int]:
+    """The part of columns ``first`` to ``end`` of a row that lies inside an edge.
+
+    An edge from (x0, y0) to (x1, y1) has the inside where (x1-x0)(py-y0) - (px-x0)(y1-y0) >= 0: one bound on px.
+    """
+    dy = stop[1] - start[1]
+    value = (stop[0] - start[0]) * (py - start[1]) + (start[0] - HALF) * dy  # >= (x SNAP) dy
+    if dy > 0:
+        return first, min(end, value // (dy * SNAP))
+    if dy < 0:
+        return max(first, -(value // (-dy * SNAP))), end
+    return first, (end if value >= 0 else -1)
+
+
+@compiled
+def find_alpha(scene: Scene, look: Look, t: int, span: tuple[int, int, int], fragments: Fragments) -> None:
+    """Fill the colours of triangle ``t`` at the samples of a row: first, last, row."""
+    first, end, y = span
+    for x in range(first, end + 1):
+        k = x - first
+        fragments.triangles[k], fragments.widths[k] = t, SNAP
+        fragments.places[k, 0], fragments.places[k, 1] = x * SNAP + HALF, y * SNAP + HALF
+    n = end + 1 - first
+    weigh(scene, fragments, n, True)
+    if look.roles[BASE]:
+        sample_role(look, BASE, fragments, n)
+    base_colours(look, fragments, n)

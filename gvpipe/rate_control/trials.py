@@ -114,7 +114,7 @@ class Trials:
             bitstream, errors = _correct(bitstream, reference, reader, bound)
         if self._asset is not None:
             report("asset", 0.0)
-            bitstream = self._asset.add(dataclasses.replace(encoded, bitstream=bitstream), codec)
+            bitstream = self._asset.add(dataclasses.replace(encoded, bitstream=bitstream), codec, is_final=False)
         size = file_size(bitstream)
         report("measure", 1.0)
         bpvf = 8 * size / (bitstream.n_vertices * bitstream.n_frames)

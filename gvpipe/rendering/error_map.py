@@ -11,15 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from gvpipe.arrays import Float64, UInt8
-from gvpipe.errors import InputError
 from gvpipe.metrics.comparison import aligned
 from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.rasterizer.camera import sampled, used_vertices
-from gvpipe.rasterizer.colours import BACKGROUND, error_colours
+from gvpipe.rasterizer.colormaps import colormap
+from gvpipe.rendering.legend import paint_legend
 from gvpipe.sequence import MeshSequence
-
-SMALLEST = (160, 120)  # pixels, of a picture with a legend
-INK = (60, 60, 60)
 
 
 class ErrorMap:
@@ -61,26 +58,5 @@ class ErrorMap:
         Raises:
             InputError: the picture is too small for it.
         """
-        from PIL import Image, ImageDraw, ImageFont
-
-        width, height = size
-        if width < SMALLEST[0] or height < SMALLEST[1]:
-            raise InputError(f"a picture of {width}x{height}; with a legend, {SMALLEST[0]}x{SMALLEST[1]} pixels are the least")
-        text = max(9, min(height // 28, width // 38))  # pixels
-        font = ImageFont.load_default(text)
-        bar = 8 * text  # pixels, its length
-        top = height - 2 * text - bar
-        labels = {part: f"{self.largest * part:.3g}" for part in (1.0, 0.5, 0.0)}
-        titles = ["vertex error,", self._unit_name]
-        columns = (
-            round(max(max(map(font.getlength, titles)), 1.6 * text + max(map(font.getlength, labels.values())))) + 2 * text
-        )
-        image = Image.new("RGB", (columns, height), tuple(round(255 * channel) for channel in BACKGROUND))
-        draw = ImageDraw.Draw(image)
-        for line, title in enumerate(titles):
-            draw.text((text, top + (1.3 * line - 3.4) * text), title, fill=INK, font=font)
-        for row, colour in enumerate(np.rint(255 * error_colours(np.linspace(1, 0, bar))).astype(int).tolist()):
-            draw.line([(text, top + row), (2 * text - 1, top + row)], fill=tuple(colour))
-        for part, label in labels.items():
-            draw.text((2.6 * text, top + (1 - part) * (bar - 1)), label, fill=INK, font=font, anchor="lm")
-        return np.asarray(image)
+        ticks = {part: f"{self.largest * part:.3g}" for part in (1.0, 0.5, 0.0)}
+        return paint_legend(size, ["vertex error,", self._unit_name], ticks, colormap("errors"))

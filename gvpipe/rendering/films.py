@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -21,11 +22,26 @@ from gvpipe.errors import InputError
 from gvpipe.rasterizer.camera import Camera, framing, middle_of, used_vertices
 from gvpipe.rasterizer.renderer import Renderer, check_size
 from gvpipe.rendering.error_map import ErrorMap
+from gvpipe.rendering.field_map import FieldMap, Range
+from gvpipe.rendering.part_choice import only_parts
 from gvpipe.rendering.picture_files import STILL, WRITERS
 from gvpipe.sequence import MeshSequence
 
 STILL_SAMPLES, FILM_SAMPLES = 3, 2  # per pixel and axis
 TURN_SECONDS = 4.0  # a turntable's shortest turn
+DEFAULT_COLORMAP = "viridis"
+
+
+class ColourMap(Protocol):
+    """Values that colours show: errors, or a field."""
+
+    def values(self, frame: int) -> Float64:
+        """``(V,)``, or ``(T, 1)`` of triangles, in 0..1."""
+        ...
+
+    def legend(self, size: tuple[int, int]) -> UInt8:
+        """``(H, w, 3) uint8``, a strip at the left of a picture of ``size``."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -36,7 +52,7 @@ class Film:
         frames: the frame of each picture.
         camera: of the first picture.
         turntable: whether the camera goes once around.
-        errors: whose values the colours show.
+        shown: whose values the colours show, in place of materials.
         legend: ``(H, w, 3) uint8``, a strip at the left.
         follow: whether the camera goes with the mesh.
     """
@@ -46,7 +62,7 @@ class Film:
     camera: Camera
     renderer: Renderer
     turntable: bool = False
-    errors: ErrorMap | None = None
+    shown: ColourMap | None = None
     legend: UInt8 | None = None
     follow: bool = False
 
@@ -81,7 +97,7 @@ class Film:
 
     def __getitem__(self, k: int) -> UInt8:
         frame = self.frames[k]
-        values = self.errors.values(frame) if self.errors else None
+        values = self.shown.values(frame) if self.shown else None
         picture = self.renderer.draw(self.sequence.read(frame, frame + 1)[0], self.camera_of(k), values)
         return picture if self.legend is None else np.concatenate([self.legend, picture], axis=1)
 
@@ -96,24 +112,37 @@ class PictureOptions:
         view: a name of `gvpipe.rasterizer.camera.VIEWS`, or azimuth and elevation, degrees.
         error_max: percent of the reference's diagonal, above 0, or None.
         camera: in place of the one that frames the whole motion from ``view``.
+        up: the world's axis that is up; None: the sequence's own, else y.
+        field: the name of a field whose values colours show, or None.
+        colormap: of the field, or None for `DEFAULT_COLORMAP`.
+        limits: of the field's colours; see `gvpipe.rendering.field_map.FieldMap`.
+        parts: names of the parts to paint; none: all.
+        plain: leave out materials and colours.
 
     Raises:
-        InputError: an ``error_max`` that is not above 0.
+        InputError: an ``error_max`` that is not above 0; a field beside errors; a colour map or a range without a field.
     """
 
     frame: int | None = None
     size: tuple[int, int] = (512, 512)
     view: str | tuple[float, float] = "three-quarter"
-    up: str = "y"
+    up: str | None = None
     turntable: bool = False
     follow: bool = False
     error_max: float | None = None
     shading: str = "smooth"
     camera: Camera | None = None
+    field: str | None = None
+    colormap: str | None = None
+    limits: Range = None
+    parts: tuple[str, ...] = ()
+    plain: bool = False
 
     def __post_init__(self) -> None:
         if self.error_max is not None and not (math.isfinite(self.error_max) and self.error_max > 0):
             raise InputError(f"the colours' end is {self.error_max} percent of the diagonal; a number above 0 is needed")
+        if self.field is None and (self.colormap is not None or self.limits is not None):
+            raise InputError("a colour map or a range is given without a field; name one (field, --field)")
 
 
 def write_pictures(
@@ -122,11 +151,11 @@ def write_pictures(
     options: PictureOptions,
     reference: MeshSequence | None = None,
     progress: Progress | None = None,
-) -> None:
-    """Paint a sequence as ``.png``, ``.gif`` or ``.mp4``; with a reference, in the colours of the errors.
+) -> tuple[str, ...]:
+    """Paint a sequence as ``.png``, ``.gif`` or ``.mp4``; with a reference, in the colours of the errors. Return notes.
 
     Raises:
-        InputError: a value that cannot be, a sequence without triangles, a reference that does not fit.
+        InputError: a value that cannot be, no triangles, a reference that does not fit, an unknown field or part.
         OutputError: the file cannot be written; no part of it is left.
     """
     suffix = check_output(path, options)
@@ -135,6 +164,7 @@ def write_pictures(
     film = _plan(sequence, suffix, options, reference)
     with atomic_path(path) as temporary:
         WRITERS[suffix](film, temporary, progress)
+    return film.renderer.notes
 
 
 def check_output(path: Path, options: PictureOptions) -> str:
@@ -165,19 +195,29 @@ def parse_size(text: str) -> tuple[int, int]:
 
 def _plan(sequence: MeshSequence, suffix: str, options: PictureOptions, reference: MeshSequence | None) -> Film:
     """Which frames, from where, with which colours."""
-    width, height = options.size
+    (across, height), colors = options.size, "errors"
     frames = _frames(sequence, options.frame, suffix, options.turntable)
-    errors, legend, across = None, None, width
+    shown: ColourMap | None = None
     if reference is not None:
+        if options.field is not None:
+            raise InputError(f"both the field {options.field!r} and errors are asked for; colours can show one of them")
         errors = ErrorMap(reference, sequence, frames, options.error_max)
-        sequence, legend = errors.sequence, errors.legend(options.size)
-        across -= legend.shape[1]
+        shown, sequence = errors, errors.sequence
+    if options.parts:
+        sequence = only_parts(sequence, options.parts)
+    if options.field is not None:
+        colors = options.colormap or DEFAULT_COLORMAP
+        shown = FieldMap(sequence, options.field, frames, colors, options.limits)
+    legend = shown.legend(options.size) if shown else None
+    across -= 0 if legend is None else legend.shape[1]
+    up = options.up or sequence.metadata.up_axis or "y"
     camera = options.camera or framing(
-        sequence, None, options.view, options.up, across / height, options.turntable, follow=options.follow
+        sequence, None, options.view, up, across / height, options.turntable, follow=options.follow
     )
     samples = STILL_SAMPLES if suffix == STILL else FILM_SAMPLES
-    renderer = Renderer(sequence.faces, sequence.read(0, 1)[0], (across, height), options.shading, samples)
-    return Film(sequence, frames, camera, renderer, options.turntable, errors, legend, options.follow)
+    plain = options.plain or shown is not None
+    renderer = Renderer.of(sequence, (across, height), options.shading, samples, plain=plain, colors=colors)
+    return Film(sequence, frames, camera, renderer, options.turntable, shown, legend, options.follow)
 
 
 def _frames(sequence: MeshSequence, frame: int | None, suffix: str, turntable: bool) -> list[int]:

@@ -61,7 +61,7 @@ def test_vertex_attributes(tmp_path: Path, suffix: str, kept: set[str]) -> None:
     io.write(sequence, tmp_path / f"%d.{suffix}")
     read = io.read(tmp_path)
     assert same_bits(read.read(0, 4), sequence.read(0, 4))
-    assert set(read.attributes) == kept - ({"uv"} if suffix == "off" else set())
+    assert set(read.attributes) == kept
     used = np.unique(sequence.faces)
     for name, values in read.attributes.items():
         np.testing.assert_allclose(np.asarray(values)[used], attributes[name][used], atol=1e-7)
@@ -163,3 +163,14 @@ def test_trimesh_loads_only_when_needed() -> None:
 
     code = "import sys, gvpipe.io; sys.exit('trimesh' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("suffix", ["obj", "ply", "off"])
+def test_normals_that_later_frames_would_not_have(tmp_path: Path, suffix: str) -> None:
+    normals = np.random.default_rng(3).normal(size=(37, 3)).astype(np.float32)
+    notes = io.write(grid(attributes={"normal": normals}), tmp_path / "moving" / f"%d.{suffix}")
+    assert len(notes) == 1 and "no place for normals that do not follow from the moving surface" in notes[0]
+    assert io.read(tmp_path / "moving").attributes == {}
+    assert io.write(grid(1, attributes={"normal": normals}), tmp_path / f"still.{suffix}") == ()
+    used = np.unique(grid().faces)
+    assert same_bits(np.asarray(io.read(tmp_path / f"still.{suffix}").attributes["normal"])[used], normals[used])

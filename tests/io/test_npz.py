@@ -229,3 +229,17 @@ def test_ten_thousand_parts(tmp_path: Path) -> None:
     given = MeshSequence(np.zeros((1, 3 * n, 3), np.float32), faces, parts=parts)
     io.write(given, tmp_path / "a.npz")
     assert io.read(tmp_path / "a.npz").parts == parts
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_a_damaged_field_is_refused_when_it_is_read(tmp_path: Path, order: Any) -> None:
+    heat = np.asarray(np.random.default_rng(1).random((9000, 3), np.float32), order=order)
+    np.savez(tmp_path / "a.npz", vertices=np.zeros((9000, 3, 3)), faces=FACES, field_heat=heat)
+    whole = (tmp_path / "a.npz").read_bytes()
+    at = whole.index(heat.tobytes(order)[:8]) + 90_000
+    (tmp_path / "a.npz").write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+    read = io.read(tmp_path / "a.npz")
+    with pytest.raises(InputError, match=r"a.npz: 'field_heat' cannot be read \(Bad CRC-32 .*write it again"):
+        read.fields["heat"].read(0, 2)
+    with pytest.raises(InputError, match="'field_heat' cannot be read"):
+        read.fields["heat"].read(0, 2)

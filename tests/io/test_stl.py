@@ -10,6 +10,7 @@ import pytest
 from mesh_files import grid, same_bits
 
 from gvpipe import io
+from gvpipe.asset.part import Part
 from gvpipe.errors import InputError
 
 
@@ -44,3 +45,13 @@ def test_stl_text_and_other_count(tmp_path: Path) -> None:
     assert read.read(1, 2)[0].tolist() == [[0, 0, 0], [1, 0, 0], [0, 2, 0]]
     with pytest.raises(InputError, match=r"3.stl has 1 triangles, 1.stl has 2"):
         read.read(2, 3)
+
+
+def test_solids_are_parts(tmp_path: Path) -> None:
+    triangle = "facet normal 0 0 1\nouter loop\nvertex 0 0 {0}\nvertex 1 0 {0}\nvertex 0 1 {0}\nendloop\nendfacet\n"
+    text = "solid lid\n" + triangle.format(0) + "endsolid lid\nsolid big box\n"
+    (tmp_path / "a.stl").write_text(text + triangle.format(1) + triangle.format(0) + "endsolid big box\n")
+    read = io.read(tmp_path / "a.stl")
+    assert read.parts == (Part("lid", (0, 3), (0, 1)), Part("big box", (0, 6), (1, 3)))
+    notes = io.write(read, tmp_path / "b.stl")
+    assert notes == ("STL has no place for parts; left out (.npz holds everything)",)

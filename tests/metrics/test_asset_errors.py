@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from scenes import scene
+from asset_scene import scene
 
 import gvpipe
 from gvpipe.asset.attribute import Attribute

@@ -10,11 +10,15 @@ from typing import Any
 import av
 import numpy as np
 import pytest
+from looks import UV, sheets
 from PIL import Image
 from sequences import awkward, waving
 from shapes import EMPTY
 
 import gvpipe
+from gvpipe.asset.material import Image as AssetImage
+from gvpipe.asset.material import Material, Texture
+from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError, OutputError
 from gvpipe.rasterizer.camera import Camera, framing
 from gvpipe.rasterizer.renderer import Renderer
@@ -163,6 +167,27 @@ def test_command_says_what_is_wrong_and_writes_nothing(
     assert ended.status == 1 and ended.out == "" and ended.err.count("\n") == 1 and words in ended.err, ended
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
     assert run("render", video, "a.png", "--shading", "cubist").status == 2
+
+
+def test_materials_show_by_default_and_images_left_out_are_named(tmp_path: Path) -> None:
+    material = Material(double_sided=True, unlit=True, base_color=(0.0, 1.0, 0.0, 1.0), base_color_texture=Texture(0))
+    lost = AssetImage("sky", "image/ktx2", b"\xabKTX 20\xbb\r\n\x1a\n" + bytes(80))
+    sequence = sheets([0.0], [material], attributes={"uv": UV}, images=(lost,), metadata=Metadata(up_axis="z"))
+    notes = gvpipe.render(sequence, tmp_path / "a.png", size=64, view="front")
+    assert notes == ["image 'sky' (image/ktx2) cannot be decoded; its materials are drawn without it"]
+    with Image.open(tmp_path / "a.png") as image:
+        picture = np.asarray(image)
+    assert (picture[32, 32] == EMPTY).all()  # the axis that is up is z, so from the front the sheet is a line
+    assert gvpipe.render(sequence, tmp_path / "b.png", size=64, view="front", up="y", plain=True) == []
+    with Image.open(tmp_path / "b.png") as image:
+        plain = np.asarray(image)
+    gvpipe.render(sequence, tmp_path / "c.gif", size=64, view="front", up="y")
+    with Image.open(tmp_path / "c.gif") as image:
+        shown = np.asarray(image.convert("RGB"))
+    assert shown[32, 32].tolist() == [0, 255, 0] and plain[32, 32].tolist() != shown[32, 32].tolist()
+    bare = MeshSequence(sequence.positions, sequence.faces)
+    gvpipe.render(bare, tmp_path / "d.png", size=64, view="front")
+    assert (tmp_path / "d.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 def test_disk_errors_leave_nothing(sequence: MeshSequence, tmp_path: Path) -> None:

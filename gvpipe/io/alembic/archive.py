@@ -79,8 +79,7 @@ def alembic_errors(path: Path) -> Iterator[None]:
     except InputError:
         raise
     except (RuntimeError, ValueError, TypeError, IndexError, OverflowError, MemoryError, UnicodeError) as exc:
-        reason = one_line(exc).rsplit("EXCEPTION: ", 1)[-1]
-        raise InputError(f"{path} cannot be read as Alembic: {reason}; export it again") from exc
+        raise InputError(f"{path} cannot be read as Alembic: {one_line(exc)}; export it again") from exc
 
 
 def sample_of(held: Any, number: int) -> Any:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gvpipe.arrays import Array, Float64
+from gvpipe.io.scene_fields import Sampled
 from gvpipe.io.scene_mesh import Layer, SceneMesh
 
 SCOPES = {
@@ -47,7 +48,10 @@ def layers_of(schema: Any, polygons: SceneMesh, turn: Float64) -> tuple[tuple[La
             layers.append(_turned(normals, turn))
     uv = _layer("uv", "uv", schema.getUVsParam(), polygons)
     layers.extend([uv] if uv is not None else [])
+    changing = sampled_of(schema, polygons)
     for name, kind, param in _others(schema):
+        if name in changing:
+            continue
         if kind == "color":
             name = _numbered("color", layers)
         elif kind == "uv":
@@ -58,6 +62,34 @@ def layers_of(schema: Any, polygons: SceneMesh, turn: Float64) -> tuple[tuple[La
         elif layer.domain != "constant" or kind == "color":
             layers.append(layer)
     return tuple(layers), left
+
+
+def sampled_of(schema: Any, polygons: SceneMesh) -> dict[str, Sampled]:
+    """The parameters of a mesh that change over time and can be fields: per vertex or polygon, not indexed, no uv."""
+    found: dict[str, Sampled] = {}
+    n_colors = 0
+    for name, kind, param in _others(schema):
+        label = name if kind != "color" else f"color{n_colors}" if n_colors else "color"
+        n_colors += kind == "color"
+        if kind == "uv" or param.isIndexed() or param.getNumSamples() < 2 or param.isConstant():
+            continue
+        layer = _layer(name, kind, param, polygons)
+        if layer is not None and layer.domain in ("vertex", "polygon"):
+            found[label] = Sampled(Values(schema, param, layer.values.shape[1]), kind, layer.domain)
+    return found
+
+
+class Values:
+    """The values of a parameter at the sample nearest to a time."""
+
+    def __init__(self, schema: Any, param: Any, width: int) -> None:
+        self._kept, self._param, self._width = schema, param, width
+
+    def __call__(self, time: float) -> Array:
+        from alembic3d import Abc
+
+        values = np.array(self._param.getExpandedValue(Abc.ISampleSelector(float(time))).getVals())
+        return values if self._width == 1 else values.reshape(len(values), -1)
 
 
 def _others(schema: Any) -> list[tuple[str, str, Any]]:

@@ -17,8 +17,9 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
 from gvpipe.io.alembic.archive import Node, alembic_errors, find_meshes, open_archive, sample_of
 from gvpipe.io.alembic.motion import AlembicMotion
-from gvpipe.io.alembic.params import layers_of
+from gvpipe.io.alembic.params import layers_of, sampled_of
 from gvpipe.io.options import ReadOptions
+from gvpipe.io.scene_fields import join_fields
 from gvpipe.io.scene_frames import SceneFrames, even_times
 from gvpipe.io.scene_layers import join_layers
 from gvpipe.io.scene_mesh import SceneMesh, join
@@ -57,6 +58,9 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
     cages = sum("SubD" in motion.node.kind for motion in motions)
     if cages:
         notes.append(f"{cages} meshes are cages of subdivision surfaces; the cages were read as they are")
+    drawn = sorted(set(others) & {"Points", "Curve", "NuPatch"})
+    if drawn:
+        notes.append(f"{', '.join(drawn)} beside the meshes were left out")
     samples = np.unique(np.fromiter((time for motion in motions for time in motion.samples()), np.float64))
     times, fps, time_notes = even_times(samples, options.fps, DEFAULT_FPS, where)
     frames = SceneFrames(motions, times, where, "second")
@@ -65,7 +69,9 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
     meshes = [mesh for mesh, _ in read]
     joined = join(meshes, where)
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
-    left = list(dict.fromkeys(name for _, names in read for name in names))
+    sampled = [sampled_of(motion.node.schema, mesh) for motion, mesh in zip(motions, meshes, strict=True)]
+    fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times)
+    left = list(dict.fromkeys(name for names in (*(names for _, names in read), torn) for name in names))
     left_note = (f"parameters that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()
     return MeshSequence(
         frames,
@@ -75,6 +81,7 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
         where,
         frames.origin,
         (*notes, *time_notes, *layer_notes, *left_note),
+        fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,
         materials=tuple(Material(name) for name in materials),
@@ -114,16 +121,21 @@ def _polygons(node: Node, where: str) -> tuple[Int64, Int64]:
 
 
 def _face_sets(schema: Any, n_polygons: int) -> tuple[Int64, list[str]]:
-    """The group of each polygon, and the name of each group: 0 for polygons of no set, then one per face set."""
-    groups = np.zeros(n_polygons, np.int64)
-    names = [""]
+    """The group of each polygon, and the name of each group: 0 for polygons of no set, then one per face set.
+
+    The library lists face sets by name; here they are in the order of their first polygons.
+    """
+    sets: list[tuple[Int64, str]] = []
     for name in map(str, schema.getFaceSetNames()):
         held = schema.getFaceSet(name)  # it must outlive its schema
         indices = np.array(held.getSchema().getValue().getFaces(), np.int64).reshape(-1)
         indices = indices[(indices >= 0) & (indices < n_polygons)]
-        groups[indices[groups[indices] == 0]] = len(names)
-        names.append(name)
-    return groups, names
+        sets.append((indices, name))
+    groups = np.zeros(n_polygons, np.int64)
+    ordered = sorted(sets, key=lambda each: int(each[0].min(initial=n_polygons)))
+    for number, (indices, _) in enumerate(ordered, start=1):
+        groups[indices[groups[indices] == 0]] = number
+    return groups, ["", *(name for _, name in ordered)]
 
 
 def _metadata(archive: Any, path: Path, start: float) -> Metadata:

@@ -139,8 +139,8 @@ def _with_mesh(nodes: list[Any]) -> tuple[list[int], int]:
 def _to_world(node: Any) -> Float64:
     """``(4, 3)`` the transform of a node's evaluated positions to the world.
 
-    A skin puts its mesh into the world. Of a skinned mesh that several nodes show, each node moves what the skin gives, relative
-    to where the mesh was bound; Maya does so.
+    A skin puts its mesh into the world. Where several nodes show a skinned mesh, each node moves what the skin gives,
+    relative to where the mesh was bound; Maya does so.
     """
     mesh = hold(node.mesh)
     if mesh.skinned_is_local:

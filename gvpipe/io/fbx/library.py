@@ -1,7 +1,7 @@
 """The library ufbx, inside the process of its own that `gvpipe.io.fbx.worker` is: its objects are held there for ever.
 
-ufbx 0.0.5 gives out its objects without a reference of their own: the second look at a node, or a garbage collection, frees what
-is still in use, and the process dies. So every object gets a reference that is never taken back, and nothing is collected.
+ufbx 0.0.5 gives out its objects without a reference of their own: the second look at a node, or a garbage collection, frees
+what is still in use, and the process dies. So every object gets a reference that is never taken back, and nothing is collected.
 """
 
 from __future__ import annotations

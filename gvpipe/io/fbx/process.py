@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import os
 import pickle
@@ -45,11 +46,9 @@ class FbxProcess:
         """What a method of `gvpipe.io.fbx.evaluator.FbxScene` returns; raises `InputError`."""
         with self._lock:
             if self._process.stdin is not None and self._process.poll() is None:
-                try:
+                with contextlib.suppress(OSError):  # it has died, which the answer says
                     pickle.dump((name, arguments), self._process.stdin, protocol=5)
                     self._process.stdin.flush()
-                except OSError:
-                    pass  # it has died, which the answer says
             return self._receive()
 
     def _receive(self) -> Any:
@@ -68,8 +67,6 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     process.kill()
     for pipe in (process.stdin, process.stdout):
         if pipe is not None:
-            try:
+            with contextlib.suppress(OSError):
                 pipe.close()
-            except OSError:
-                pass
     process.wait()

@@ -73,7 +73,9 @@ def read_fbx(path: Path, options: ReadOptions) -> MeshSequence:
     times = _times(take, fps, where)
     start, stop = options.span(len(times), where)
     times, poses = times[start:stop], _Poses(process)
-    motions = [FbxMotion(poses, number, mesh.name, mesh.n_vertices, take is not None) for number, mesh in enumerate(held.meshes)]
+    motions = [
+        FbxMotion(poses, number, mesh.name, mesh.n_vertices, take is not None) for number, mesh in enumerate(held.meshes)
+    ]
     frames = SceneFrames(motions, times, where, "second")
     joined = join(held.meshes, where)
     attributes, layer_notes = join_layers(held.meshes, joined.fans, frames.first)

@@ -43,7 +43,8 @@ def _open(path: Path) -> Any:
 
 def _answer(answers: Any, call: Any) -> Any:
     """Send what a call returns, or why it failed; returns what it returned. A scene itself is not sent."""
-    result = None
+    result: Any = None
+    answer: tuple[str, Any]
     try:
         result = call()
         answer = ("done", result if isinstance(result, list | tuple) else None)

@@ -1,7 +1,7 @@
 """EnSight Gold (.case): parts with coordinates and elements, and variables per node and per element, at time steps.
 
-Parts follow each other in the order of the geometry file; a part becomes a part. Displacements are a variable like any other: the
-format does not say that they move the nodes. Where a variable lacks a part, 0 stands.
+Parts follow each other in the order of the geometry file; a part becomes a part. Displacements are a variable like any other:
+the format does not say that they move the nodes. Where a variable lacks a part, 0 stands.
 
 Source: ANSYS, EnSight User Manual, "EnSight Gold geometry file format" and "variable file format".
 """
@@ -27,8 +27,8 @@ from gvpipe.io.simulation.steps import read_steps
 from gvpipe.sequence import MeshSequence
 
 # elements: VTK's type and the number of nodes
-ELEMENTS = {"point": (1, 1), "bar2": (3, 2), "bar3": (21, 3), "tria3": (5, 3), "tria6": (22, 6), "quad4": (9, 4), "quad8": (23, 8),
-            "tetra4": (10, 4), "tetra10": (24, 10), "pyramid5": (14, 5), "pyramid13": (27, 13), "penta6": (13, 6),
+ELEMENTS = {"point": (1, 1), "bar2": (3, 2), "bar3": (21, 3), "tria3": (5, 3), "tria6": (22, 6), "quad4": (9, 4), 
+            "quad8": (23, 8), "tetra4": (10, 4), "tetra10": (24, 10), "pyramid5": (14, 5), "pyramid13": (27, 13), "penta6": (13, 6),
             "penta15": (26, 15), "hexa8": (12, 8), "hexa20": (25, 20)}  # fmt: skip
 POLYGON = 7
 
@@ -90,7 +90,8 @@ class EnsightSteps:
     def open(self, step: int) -> Dataset:
         """A step; its variables are read when they are called for."""
         geometry = self._geometry(step)
-        point_data, cell_data = {}, {}
+        point_data: dict[str, DataArray] = {}
+        cell_data: dict[str, DataArray] = {}
         for variable in self._case.variables:
             array = DataArray(partial(self._variable, variable, step, geometry))
             (point_data if variable.per_node else cell_data)[variable.name] = array

@@ -119,7 +119,9 @@ def _case_line(section: str, text: str, case: Case) -> None:
         if "gold" not in rest.lower():
             raise ValueError(f"it is of type {rest.strip()[:40]!r}; 'ensight gold' is read")
     elif section == "GEOMETRY" and key.strip().lower() == "model":
-        words = [word for word in rest.split() if word.lower() not in ("change_coords_only", "cstep", "changing_geometry_per_part")]
+        words = [
+            word for word in rest.split() if word.lower() not in ("change_coords_only", "cstep", "changing_geometry_per_part")
+        ]
         case.model, _ = _series(words, has_name=False)
     elif section == "VARIABLE":
         found = VARIABLE.fullmatch(text)
@@ -160,5 +162,7 @@ def _time_set(number: int, found: dict[str, list[str]]) -> TimeSet:
         raise ValueError(f"time set {number} has {count} steps and {len(times)} times")
     if "filename numbers" in found:
         return TimeSet(times, [int(word) for word in found["filename numbers"]])
-    start, step = (int((found.get(f"filename {key}") or [default])[0]) for key, default in (("start number", "0"), ("increment", "1")))
+    start, step = (
+        int((found.get(f"filename {key}") or [default])[0]) for key, default in (("start number", "0"), ("increment", "1"))
+    )
     return TimeSet(times, [start + step * i for i in range(count)])

@@ -1,7 +1,8 @@
 """Exodus II files (.e, .exo, .ex2): a finite-element mesh in blocks, and variables of its nodes and elements at time steps.
 
 Positions are the coordinates plus the displacement, which by the format's convention is the node variable whose name starts
-with "dis". Blocks become parts. Variables that end in x, y, z become vectors. Where an element variable lacks a block, 0 stands.
+with "dis". Blocks become parts. Variables that end in x, y, z become vectors. Where an element variable lacks a
+block, 0 stands.
 
 Source: L. A. Schoof, V. R. Yarberry, EXODUS II: A Finite Element Data Model, Sandia SAND92-2137, 1994, appendix A; node orders
 as in G. Sjaardema, Exodus element types; displacement as vtkExodusIIReader of VTK 9.7.

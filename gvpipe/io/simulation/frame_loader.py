@@ -8,7 +8,11 @@ from pathlib import Path
 from gvpipe.io.mesh import Mesh
 from gvpipe.io.simulation.cells import Cells
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
+from gvpipe.io.simulation.legacy import load_legacy
 from gvpipe.io.simulation.surface import Surface, extract_surface
+from gvpipe.io.simulation.xml_grids import load_xml_grid
+
+XML_SUFFIXES = (".vtp", ".vtu", ".vts", ".vtr", ".vti", ".pvtp", ".pvtu")
 
 
 class SurfaceLoader:
@@ -39,3 +43,10 @@ class SurfaceLoader:
             parts=block_parts(step, surface),
             animated=surface_values(step, surface),
         )
+
+
+STEP_LOADERS: dict[str, Callable[[], SurfaceLoader]] = {
+    ".vtk": lambda: SurfaceLoader(load_legacy),
+    **dict.fromkeys(XML_SUFFIXES, lambda: SurfaceLoader(load_xml_grid)),
+}
+"""What loads the files of one time step each, by extension."""

@@ -1,7 +1,7 @@
 """Legacy VTK files (.vtk) of versions 1.0 to 5.1, as text or in binary (big endian).
 
-A file is a header of four lines, a data set, and numbers per point and per cell. Source: Kitware, The VTK User's Guide, "VTK file
-formats: simple legacy formats", and vtkDataReader of VTK 9.7.
+A file is a header of four lines, a data set, and numbers per point and per cell. Source: Kitware, The VTK User's Guide, "VTK
+file formats: simple legacy formats", and vtkDataReader of VTK 9.7.
 """
 
 from __future__ import annotations

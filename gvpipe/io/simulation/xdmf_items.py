@@ -80,7 +80,9 @@ class Items:
             raise ValueError("a HyperSlab has starts, strides and counts that cannot be")
         if (start + (count - 1) * stride >= whole.shape).any():
             raise ValueError(f"a HyperSlab reaches outside its array of {whole.shape}")
-        part = tuple(slice(a, a + n * step, step) for a, step, n in zip(start.tolist(), stride.tolist(), count.tolist(), strict=True))
+        part = tuple(
+            slice(a, a + n * step, step) for a, step, n in zip(start.tolist(), stride.tolist(), count.tolist(), strict=True)
+        )
         return whole[part]
 
 

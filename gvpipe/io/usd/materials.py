@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.asset.material import Material, Texture
-from gvpipe.io.usd.textures import Textures
+from gvpipe.io.usd.names import name_of
+from gvpipe.io.usd.textures import CHANNELS, Textures
 
 WRAPS = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp", "black": "clamp", "useMetadata": "repeat"}
 
@@ -62,7 +63,7 @@ class Materials:
         return (*said, *self.textures.notes)
 
     def _read(self, bound: Any) -> Material:
-        name = bound.GetPrim().GetName()
+        name = name_of(bound.GetPrim())
         surface = bound.ComputeSurfaceSource()[0]
         if not surface or surface.GetIdAttr().Get() != "UsdPreviewSurface":
             self.plain.append(name)
@@ -73,14 +74,14 @@ class Materials:
         threshold, _ = self._number(surface, "opacityThreshold", 0.0)
         metallic, metallic_texture = self._number(surface, "metallic", 0.0)
         roughness, roughness_texture = self._number(surface, "roughness", 0.5)
-        combined = self.textures.combine(metallic_texture, roughness_texture, metallic, roughness)
+        combined = self.textures.combine(metallic_texture, roughness_texture)
         seen = opacity < 1 or opacity_texture is not None
         return Material(
             name,
             (*base, opacity),
             base_texture.texture if base_texture else None,
-            1.0 if metallic_texture else metallic,
-            1.0 if roughness_texture else roughness,
+            metallic,
+            roughness,
             combined,
             self._texture(surface, "normal"),
             self._texture(surface, "occlusion"),
@@ -102,14 +103,17 @@ class Materials:
     def _number(self, surface: Any, name: str, fallback: float) -> tuple[float, Any]:
         source = self._source(surface, name)
         if source is not None:
-            return 1.0, source
+            return source.scale[CHANNELS.get(source.output, 0)], source
         value = _value(surface, name)
         made = float(value) if isinstance(value, int | float) else fallback
         return (made if math.isfinite(made) else fallback), None
 
     def _texture(self, surface: Any, name: str) -> Texture | None:
         source = self._source(surface, name)
-        return None if source is None else source.texture
+        if source is None:
+            return None
+        is_scaled = name == "normal" and source.scale[0] != 1  # 2 and a bias of -1 turn 0..1 into -1..1
+        return replace(source.texture, scale=source.scale[0] / 2) if is_scaled else source.texture  # type: ignore[no-any-return]
 
     def _source(self, surface: Any, name: str) -> Any:
         """The texture that an input is connected to, or None."""

@@ -31,10 +31,13 @@ def find_meshes(stage: Any) -> Found:
 
     shown: list[Any] = []
     hidden: list[Any] = []
+    others: dict[str, int] = {}
     n_instancers = flickering = 0
     for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
         n_instancers += prim.IsA(UsdGeom.PointInstancer)
         if not prim.IsA(UsdGeom.Mesh):
+            if prim.IsA(UsdGeom.Gprim):
+                others[prim.GetTypeName()] = others.get(prim.GetTypeName(), 0) + 1
             continue
         changes = _visibility_changes(prim)
         flickering += changes
@@ -49,6 +52,9 @@ def find_meshes(stage: Any) -> Found:
         notes.append(f"all {len(hidden)} meshes are invisible, guides or proxies; they were read nevertheless")
     if flickering:
         notes.append(f"the visibility of {flickering} meshes changes over time; they are shown always")
+    if others:
+        held = ", ".join(f"{count} {kind}" for kind, count in sorted(others.items()))
+        notes.append(f"prims that are no meshes were left out: {held}")
     if n_instancers:
         notes.append(
             f"{n_instancers} point instancers were not expanded; their prototypes were read once each, where they stand"

@@ -9,6 +9,7 @@ import numpy as np
 
 from gvpipe.arrays import Array, Float64
 from gvpipe.asset.attribute import MAX_COMPONENTS
+from gvpipe.io.scene_fields import Sampled
 from gvpipe.io.scene_mesh import Layer, SceneMesh
 
 DOMAINS = {"constant": "constant", "uniform": "polygon", "varying": "vertex", "vertex": "vertex", "faceVarying": "corner"}
@@ -38,6 +39,7 @@ def layers_of(
     layers.extend([normals] if normals else [])
     uv_names = sorted((name for name, each in primvars.items() if _is_uv(name, each)), key=_uv_rank)
     named_uv = {name: "uv" if not number else f"uv{number}" for number, name in enumerate(uv_names)}
+    sampled = sampled_of(mesh, polygons, time)
     n_colors = 0
     for name, primvar in sorted(primvars.items(), key=lambda item: item[0] != "displayColor"):
         kind = "uv" if name in named_uv else _kind(primvar)
@@ -45,6 +47,8 @@ def layers_of(
             continue
         if primvar.GetInterpolation() == "constant" and name != "displayColor":
             continue  # settings of programs, not numbers of the surface
+        if name in sampled or (name == "displayColor" and "color" in sampled):
+            continue
         layer = _layer(named_uv.get(name, name), kind, primvar, polygons, time)
         if layer is None or layer.values.shape[1] > MAX_COMPONENTS:
             left.append(name)
@@ -55,6 +59,39 @@ def layers_of(
             n_colors += 1
         layers.append(layer)
     return tuple(layers), named_uv, left
+
+
+def sampled_of(mesh: Any, polygons: SceneMesh, time: float) -> dict[str, Sampled]:
+    """The primvars of a mesh that change and can be fields: per vertex or polygon, neither uv nor normals, not indexed."""
+    from pxr import UsdGeom
+
+    found = {}
+    for primvar in UsdGeom.PrimvarsAPI(mesh.GetPrim()).GetPrimvarsWithValues():
+        name, kind, domain = primvar.GetPrimvarName(), _kind(primvar), DOMAINS[primvar.GetInterpolation()]
+        if (
+            kind is None
+            or domain not in ("vertex", "polygon")
+            or name in OWN[1:]
+            or name.startswith("skel:")
+            or _is_uv(name, primvar)
+        ):
+            continue
+        if primvar.ValueMightBeTimeVarying() and not primvar.IsIndexed() and primvar.GetElementSize() == 1:
+            layer = _layer(name, kind, primvar, polygons, time)
+            if layer is not None:
+                found["color" if name == "displayColor" else name] = Sampled(Values(primvar), kind, domain)
+    return found
+
+
+class Values:
+    """The values of a primvar at a time code."""
+
+    def __init__(self, primvar: Any) -> None:
+        self._primvar = primvar
+        self._stage = primvar.GetAttr().GetStage()  # primvars do not keep their stage alive
+
+    def __call__(self, time: float) -> Array:
+        return np.array(self._primvar.Get(time))
 
 
 def _normals(mesh: Any, primvar: Any, polygons: SceneMesh, time: float, turn: Float64) -> Layer | None:

@@ -11,13 +11,15 @@ import numpy as np
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
 from gvpipe.io.options import ReadOptions
+from gvpipe.io.scene_fields import join_fields
 from gvpipe.io.scene_frames import SceneFrames
 from gvpipe.io.scene_layers import join_layers
 from gvpipe.io.scene_mesh import SceneMesh, join
 from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.meshes import find_meshes, groups_of, polygons_of
 from gvpipe.io.usd.motion import Skins, UsdMotion
-from gvpipe.io.usd.primvars import layers_of
+from gvpipe.io.usd.names import name_of, parent_path
+from gvpipe.io.usd.primvars import layers_of, sampled_of
 from gvpipe.io.usd.stage import open_stage, outside_note, stage_times, usd_errors
 from gvpipe.sequence import MeshSequence
 
@@ -59,7 +61,9 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
     meshes = [mesh for mesh, _ in read]
     joined = join(meshes, where)
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
-    left = list(dict.fromkeys(name for _, names in read for name in names))
+    sampled = [sampled_of(found.meshes[number], mesh, float(times[0])) for number, mesh in zip(kept, meshes, strict=True)]
+    fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times)
+    left = list(dict.fromkeys(name for names in (*(names for _, names in read), torn) for name in names))
     left_note = (f"primvars that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()
     return MeshSequence(
         frames,
@@ -69,6 +73,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
         where,
         frames.origin,
         (*found.notes, *time_notes, *materials.notes(), *layer_notes, *left_note, *outside_note(stage, path)),
+        fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,
         materials=tuple(materials.materials),
@@ -88,8 +93,9 @@ def _read_mesh(mesh: Any, motion: UsdMotion, materials: Materials, time: float, 
     whole = turn if turn.ndim == 2 else turn.mean(axis=0)
     is_left = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
     is_mirrored = bool(np.linalg.det(whole) < 0)  # a mirror turns the winding round
-    parent = str(prim.GetParent().GetPath()).strip("/")
-    plain = SceneMesh(prim.GetName(), parent, motion.n_vertices, counts, corners, groups, bound, is_left != is_mirrored)
+    plain = SceneMesh(
+        name_of(prim), parent_path(prim), motion.n_vertices, counts, corners, groups, bound, is_left != is_mirrored
+    )
     layers, uv_names, left = layers_of(mesh, plain, time, turn)
     materials.name_uv(bound, uv_names)
     return replace(plain, layers=layers), left

@@ -36,7 +36,7 @@ def open_stage(path: Path) -> Any:
         InputError: usd-core is missing, the file is none of USD's or damaged, or a file that it refers to is missing.
     """
     try:
-        from pxr import Usd
+        from pxr import Sdf, Usd
     except ImportError as exc:
         raise InputError(f"{path}: {EXTRA}") from exc
     head = _head(path)
@@ -46,7 +46,10 @@ def open_stage(path: Path) -> Any:
     if path.suffix.lower() == ".usdz" and not zipfile.is_zipfile(path):
         raise InputError(f"{path} is cut short or damaged; get it again from its source")
     with usd_errors(path):
+        is_known = Sdf.Layer.Find(str(path)) is not None  # of a sequence that is in use
         stage = Usd.Stage.Open(str(path))
+        if is_known:
+            stage.Reload()  # what has changed on the disk since
         for error in stage.GetCompositionErrors():
             if type(error).__name__ in MISSING:
                 named = re.search(r"@(.*?)@", str(error))
@@ -68,7 +71,7 @@ def usd_errors(path: Path) -> Iterator[None]:
     except InputError:
         raise
     except (Tf.ErrorException, RuntimeError, ValueError, TypeError, OverflowError, MemoryError) as exc:
-        raise InputError(f"{path} cannot be read as USD: {_reason(exc)}; export it again") from exc
+        raise InputError(f"{path} cannot be read as USD: {one_line(exc)}; export it again") from exc
     finally:
         silencer.TakeUncoalescedDiagnostics()
         del silencer
@@ -134,9 +137,3 @@ def _head(path: Path) -> bytes:
             return file.read(16)
     except OSError as exc:
         raise InputError(f"{path} cannot be read: {exc.strerror}; check the path") from exc
-
-
-def _reason(exc: BaseException) -> str:
-    """What the library says, without where in its sources."""
-    said = re.search(r" : '(.*?)'\s*$", str(exc), re.MULTILINE)
-    return one_line(RuntimeError(said[1] if said else str(exc)))

@@ -54,12 +54,10 @@ class Textures:
         number = self._numbers[asset.path]
         return None if number is None else Source(replace(texture, image=number), output, scale)
 
-    def combine(self, metallic: Source | None, roughness: Source | None, metal: float, rough: float) -> Texture | None:
+    def combine(self, metallic: Source | None, roughness: Source | None) -> Texture | None:
         """One texture with roughness in green and metallic in blue, as glTF needs it; where they lie so, it is theirs.
 
-        Args:
-            metallic, roughness: textures, or None.
-            metal, rough: what stands where there is no texture.
+        In place of the one that is missing it has 1, so that the factor counts.
         """
         if metallic is None and roughness is None:
             return None
@@ -68,7 +66,7 @@ class Textures:
             whole = metallic and roughness
             if whole or _has_neutral(self.images[images.pop()], "b" if metallic is None else "g"):
                 return (metallic or roughness).texture  # type: ignore[union-attr]
-        made = _merge(self._of(metallic), self._of(roughness), metal, rough)
+        made = _merge(self._of(metallic), self._of(roughness))
         if made is None:
             self.notes.append("a texture of metallic or roughness cannot be decoded; it was left out")
             return None
@@ -111,7 +109,7 @@ class Textures:
         return bytes(opened.GetBuffer()), ""
 
 
-def _merge(metallic: tuple[Image, str] | None, roughness: tuple[Image, str] | None, metal: float, rough: float) -> Image | None:
+def _merge(metallic: tuple[Image, str] | None, roughness: tuple[Image, str] | None) -> Image | None:
     """A picture of both, of the larger one's size."""
     from PIL import Image as Pillow
 
@@ -126,8 +124,7 @@ def _merge(metallic: tuple[Image, str] | None, roughness: tuple[Image, str] | No
         planes[channel] = picture.getchannel(CHANNELS.get(given[1], 0))
         names.append(Path(given[0].name).stem)
     size = max((plane.size for plane in planes.values()), key=lambda each: each[0] * each[1])
-    fill = {0: 255, 1: round(255 * min(max(rough, 0), 1)), 2: round(255 * min(max(metal, 0), 1))}
-    bands = [planes[k].resize(size) if k in planes else Pillow.new("L", size, fill[k]) for k in range(3)]
+    bands = [planes[k].resize(size) if k in planes else Pillow.new("L", size, 255) for k in range(3)]
     stream = io.BytesIO()
     Pillow.merge("RGB", bands).save(stream, "PNG")
     return Image("_".join(dict.fromkeys(names)) + "_metallic_roughness.png", "image/png", stream.getvalue())

@@ -17,15 +17,15 @@ from gvpipe.errors import InputError
 from gvpipe.io.frame_columns import split_columns
 from gvpipe.io.frame_files import FrameFiles
 from gvpipe.io.options import ReadOptions
+from gvpipe.io.simulation.frame_loader import STEP_LOADERS
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.times import time_steps
 from gvpipe.sequence import MeshSequence
 
-STEP_SUFFIXES = (".vtp", ".vtu", ".vts", ".vtr", ".vti", ".vtk", ".pvtp", ".pvtu")
 LARGEST_LIST = 64 << 20  # bytes of a list: a million files
 
 
-def read_collection(path: Path, options: ReadOptions) -> MeshSequence:
+def read_step_list(path: Path, options: ReadOptions) -> MeshSequence:
     """Read the files that a .pvd or a .series lists, one frame each.
 
     Args:
@@ -58,9 +58,9 @@ def read_listed(files: list[Path], times: Float64, path: Path, options: ReadOpti
         options: ``fps``.
     """
     suffixes = {file.suffix.lower() for file in files}
-    if len(suffixes) > 1 or not suffixes <= set(STEP_SUFFIXES):
+    if len(suffixes) > 1 or not suffixes <= set(STEP_LOADERS):
         raise InputError(
-            f"{path} lists {', '.join(sorted(suffixes))} files; files of one of {', '.join(STEP_SUFFIXES)} are needed"
+            f"{path} lists {', '.join(sorted(suffixes))} files; files of one of {', '.join(STEP_LOADERS)} are needed"
         )
     frames = FrameFiles(files)
     first, columns = frames.first, split_columns(frames)

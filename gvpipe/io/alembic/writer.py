@@ -1,0 +1,181 @@
+"""A sequence as an Alembic archive of the Ogawa kind: polygon meshes in world space, a sample per frame.
+
+Alembic's polygons are clockwise seen from outside, so they are turned round; each keeps its first corner. Materials become face
+sets of their names.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gvpipe import notes
+from gvpipe.atomic import atomic_path
+from gvpipe.errors import InputError, OutputError
+from gvpipe.io.alembic.archive import EXTRA
+from gvpipe.io.alembic.param_writer import ParamWriter, filled
+from gvpipe.io.scene_export import ExportMesh, export_layer, export_meshes, uncovered
+from gvpipe.io.scene_frames import one_line
+from gvpipe.sequence import MeshSequence
+
+BYTES = 16 << 20  # of a field's frames at a time
+
+
+def write_alembic(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
+    """Write a sequence as .abc; returns what the format cannot hold.
+
+    Raises:
+        InputError: alembic3d is missing, or a position is not finite.
+        OutputError: the file cannot be written.
+    """
+    try:
+        import alembic3d  # noqa: F401
+    except ImportError as exc:
+        raise InputError(f"{path}: {EXTRA}") from exc
+    meshes = export_meshes(sequence, path.stem)
+    try:
+        with atomic_path(path) as temporary:
+            _write_archive(sequence, meshes, str(temporary))  # the library closes the file when its objects are gone
+    except RuntimeError as exc:
+        raise OutputError(f"cannot write {path}: {one_line(exc)}; check the folder and the disk") from exc
+    return _notes(sequence, meshes)
+
+
+def _write_archive(sequence: MeshSequence, meshes: list[ExportMesh], path: str) -> None:
+    from alembic3d import Abc, AbcCoreAbstract
+
+    archive = Abc.CreateArchiveWithInfo(path, float(sequence.fps), "gvpipe", sequence.metadata.source or sequence.name)
+    sampling = AbcCoreAbstract.TimeSampling(1.0 / sequence.fps, float(sequence.metadata.start_time))
+    tree = Tree(archive.getTop())
+    writers = [MeshWriter(tree, mesh, sequence, sampling) for mesh in meshes]
+    for _, block in sequence.chunks():
+        for frame in block:
+            whole = (frame + sequence.origin).astype(np.float32) if sequence.origin.any() else frame
+            for writer in writers:
+                writer.write(whole)
+    for name, field in sequence.fields.items():
+        step = max(1, BYTES // (4 * field.shape[1] * field.n_components))
+        for first in range(0, len(field), step):
+            block = field.read(first, min(first + step, len(field)))
+            for writer in writers:
+                writer.write_field(name, field.kind, field.domain, block)
+
+
+class Tree:
+    """The nodes above the meshes: transforms that move nothing, one for each path."""
+
+    def __init__(self, top: Any) -> None:
+        self._made: dict[tuple[str, ...], Any] = {(): top}
+        self._taken: dict[tuple[str, ...], set[str]] = {}
+
+    def parent(self, path: str) -> Any:
+        """The transform of a path, made with those above it."""
+        from alembic3d import AbcGeom
+
+        names = tuple(name.replace("/", "_") for name in path.split("/") if name)
+        for depth in range(1, len(names) + 1):
+            chain = names[:depth]
+            if chain not in self._made:
+                self._made[chain] = AbcGeom.OXform(self._made[chain[:-1]], self._free(chain[:-1], chain[-1]))
+        return self._made[names]
+
+    def mesh(self, path: str, name: str) -> Any:
+        """A new mesh below a path; below the top it gets a transform of its own name, as programs expect."""
+        from alembic3d import AbcGeom
+
+        above = tuple(part.replace("/", "_") for part in (path or name).split("/") if part)
+        return AbcGeom.OPolyMesh(self.parent("/".join(above)), self._free(above, name.replace("/", "_")))
+
+    def _free(self, chain: tuple[str, ...], name: str) -> str:
+        """A name that no other node of that parent has."""
+        taken = self._taken.setdefault(chain, set())
+        free, number = name or "mesh", 1
+        while free in taken:
+            free, number = f"{name}_{number}", number + 1
+        taken.add(free)
+        return free
+
+
+class MeshWriter:
+    """Writes one mesh: all that it has with the first frame, points alone with the others."""
+
+    def __init__(self, tree: Tree, mesh: ExportMesh, sequence: MeshSequence, sampling: Any) -> None:
+        self._mesh, self._sequence = mesh, sequence
+        self._object = tree.mesh(mesh.parent, mesh.name)  # it must outlive its schema
+        self._schema = self._object.getSchema()
+        self._schema.setTimeSampling(sampling)
+        starts = np.cumsum(mesh.counts) - mesh.counts
+        rank = np.arange(len(mesh.corners)) - np.repeat(starts, mesh.counts)
+        self._order = np.repeat(starts, mesh.counts) + np.where(rank > 0, np.repeat(mesh.counts, mesh.counts) - rank, 0)
+        self._params = ParamWriter(self._schema, self._order, sampling)
+        self._is_first = True
+
+    def write(self, points: Any) -> None:
+        """Write the points of the next frame, given all of the sequence's ``(V, 3)``."""
+        import imath
+        from alembic3d import AbcGeom
+
+        sample = AbcGeom.OPolyMeshSchemaSample()
+        sample.setPositions(filled(imath.V3fArray, points[slice(*self._mesh.vertices)]))
+        if self._is_first:
+            sample.setFaceIndices(filled(imath.IntArray, self._mesh.corners[self._order].astype(np.int32)))
+            sample.setFaceCounts(filled(imath.IntArray, self._mesh.counts))
+            self._describe(sample)
+        self._schema.set(sample)
+        if self._is_first:
+            self._write_face_sets()
+            self._is_first = False
+
+    def write_field(self, name: str, kind: str, domain: str, block: Any) -> None:
+        """Write some frames ``(n, R, C)`` of a field."""
+        mesh = self._mesh
+        counts = mesh.counts.astype(np.int64) - 2
+        polygons = mesh.triangles[0] + np.cumsum(counts) - counts
+        rows = slice(*mesh.vertices) if domain == "vertex" else polygons
+        self._params.write_samples(name, kind, "vertex" if domain == "vertex" else "polygon", block[:, rows])
+
+    def _describe(self, sample: Any) -> None:
+        """Add texture coordinates and normals to the first sample, and the other attributes beside."""
+        for name, attribute in self._sequence.attributes.items():
+            layer = export_layer(name, attribute, self._mesh)
+            if not len(layer.values):
+                continue
+            if name == "uv" and attribute.kind == "uv":
+                sample.setUVs(self._params.sample(layer))
+            elif name == "normal" and attribute.kind == "normal":
+                sample.setNormals(self._params.sample(layer))
+            else:
+                self._params.write(layer)
+
+    def _write_face_sets(self) -> None:
+        import imath
+        from alembic3d import AbcGeom
+
+        taken: set[str] = set()
+        for first, stop, material in self._mesh.groups:
+            name = self._sequence.materials[material].name if material is not None else ""
+            if not name:
+                continue
+            plain = free = name.replace("/", "_")
+            while free in taken:
+                free = f"{plain}_{len(taken)}"
+            taken.add(free)
+            faces = self._schema.createFaceSet(free)
+            faces.getSchema().set(AbcGeom.OFaceSetSchemaSample(filled(imath.IntArray, np.arange(first, stop, dtype=np.int32))))
+
+
+def _notes(sequence: MeshSequence, meshes: list[ExportMesh]) -> tuple[str, ...]:
+    said = []
+    if sequence.materials:
+        said.append("Alembic has no materials; face sets have their names, and textures were left out")
+    lost = uncovered(sequence, meshes)
+    if lost:
+        said.append(f"{lost} vertices belong to no part; Alembic holds meshes alone, so they were left out")
+    if sequence.origin.any():
+        said.append(f"Alembic holds float32 points; the origin {notes.show_origin(sequence.origin)} was added to them")
+    about = sequence.metadata
+    if about.up_axis or about.metres_per_unit:
+        said.append("Alembic has no up axis and no unit; positions are as they were")
+    return tuple(said)

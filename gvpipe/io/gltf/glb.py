@@ -1,0 +1,137 @@
+"""The pieces of a GLB file that is written: buffer views and accessors of its one buffer, and the JSON around them.
+
+Bytes go to a stream as they come, so that a long animation needs no memory; the JSON, which stands before them in the file, is
+written last.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import tempfile
+from typing import IO, Any
+
+import numpy as np
+
+from gvpipe.arrays import Array
+from gvpipe.io.gltf.document import BINARY_CHUNK, CHUNK, HEADER, JSON_CHUNK, MAGIC
+from gvpipe.io.gltf.json_fields import Json
+
+COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
+TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+VERTICES, INDICES = 34962, 34963  # targets of buffer views
+IN_MEMORY = 64 << 20  # bytes of the buffer, beyond which it goes to a temporary file
+LONGEST = 2**32 - 1  # bytes of a GLB file
+
+
+class Glb:
+    """A file in the making. ``tree`` is its JSON, to which the caller adds meshes, nodes and what else there is."""
+
+    def __init__(self) -> None:
+        self.tree: Json = {"asset": {"version": "2.0", "generator": "gvpipe"}, "accessors": [], "bufferViews": []}
+        self._stream: IO[bytes] = tempfile.SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115 - closed by `close`
+        self._size = 0
+
+    def append(self, kind: str, item: Json) -> int:
+        """Add an object to one of the tree's lists, and return its number."""
+        items: list[Json] = self.tree.setdefault(kind, [])
+        items.append(item)
+        return len(items) - 1
+
+    def use(self, extension: str, is_required: bool = False) -> None:
+        """Say that the file uses an extension."""
+        for key in ("extensionsUsed", "extensionsRequired")[: 1 + is_required]:
+            if extension not in self.tree.setdefault(key, []):
+                self.tree[key].append(extension)
+
+    def view(self, data: bytes, target: int | None = None, stride: int | None = None) -> int:
+        """Add bytes, aligned to 4, and return the number of their buffer view."""
+        item: Json = {"buffer": 0, "byteOffset": self._size, "byteLength": len(data)}
+        item |= {"byteStride": stride} if stride else {}
+        item |= {"target": target} if target else {}
+        self._stream.write(data)
+        self._stream.write(bytes(-len(data) % 4))
+        self._size += len(data) + -len(data) % 4
+        return self.append("bufferViews", item)
+
+    def array(self, values: Array, target: int | None = None, bounds: bool = False, normalized: bool = False) -> int:
+        """Add an array ``(n, C)``, C up to 4, and return the number of its accessor.
+
+        Args:
+            values: of a type in `COMPONENTS`.
+            target: `VERTICES` (rows are padded to 4 bytes) or `INDICES`.
+            bounds: whether to say its smallest and largest values.
+            normalized: whether its integers stand for fractions.
+        """
+        rows = np.ascontiguousarray(values)
+        width = rows.shape[1] * rows.itemsize
+        stride = None
+        if target == VERTICES and width % 4:
+            stride = width + -width % 4
+            padded = np.zeros((len(rows), stride), np.uint8)
+            padded[:, :width] = rows.view(np.uint8).reshape(len(rows), width)
+            rows = padded
+        view = self.view(rows.tobytes(), target, stride)
+        item = self._accessor(values, bounds) | {"bufferView": view}
+        return self.append("accessors", item | ({"normalized": True} if normalized else {}))
+
+    def sparse(self, values: Array, rows: Array, shape: tuple[int, int], bounds: bool = False) -> int:
+        """Add an array of zeros but for some rows ``(n, C)``, and return the number of its accessor.
+
+        Args:
+            values: ``(n, C)`` of the rows.
+            rows: ``(n,)``, rising.
+            shape: of the whole array.
+            bounds: whether to say its smallest and largest values.
+        """
+        index_type = np.uint16 if shape[0] <= 65536 else np.uint32
+        filled = np.concatenate([values, np.zeros((1, shape[1]), values.dtype)]) if len(values) < shape[0] else values
+        item = self._accessor(filled, bounds) | {"count": shape[0]}
+        if len(rows):
+            item["sparse"] = {
+                "count": len(rows),
+                "indices": {
+                    "bufferView": self.view(rows.astype(index_type).tobytes()),
+                    "componentType": _component(index_type),
+                },
+                "values": {"bufferView": self.view(np.ascontiguousarray(values).tobytes())},
+            }
+        return self.append("accessors", item)
+
+    def write(self, file: IO[bytes]) -> None:
+        """Write the whole file; raises `ValueError` if it were longer than a GLB can be."""
+        text = self._json()
+        total = HEADER.size + 2 * CHUNK.size + len(text) + self._size
+        if total > LONGEST:
+            raise ValueError(f"it would have {total} bytes, and a GLB file holds {LONGEST}; write frames, one file each")
+        file.write(HEADER.pack(MAGIC, 2, total))
+        file.write(CHUNK.pack(len(text), JSON_CHUNK) + text + CHUNK.pack(self._size, BINARY_CHUNK))
+        self._stream.seek(0)
+        shutil.copyfileobj(self._stream, file, 1 << 20)
+        self._stream.seek(self._size)
+
+    def data(self) -> bytes:
+        """The whole file."""
+        file = io.BytesIO()
+        self.write(file)
+        return file.getvalue()
+
+    def close(self) -> None:
+        """Give the temporary file back."""
+        self._stream.close()
+
+    def _json(self) -> bytes:
+        tree = {key: value for key, value in self.tree.items() if value} | {"buffers": [{"byteLength": self._size}]}
+        text = json.dumps(tree, separators=(",", ":"), ensure_ascii=False).encode()
+        return text + b" " * (-len(text) % 4)
+
+    def _accessor(self, values: Array, bounds: bool) -> Json:
+        item: Json = {"componentType": _component(values.dtype), "count": len(values), "type": TYPES[values.shape[1]]}
+        if bounds:
+            item |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+        return item
+
+
+def _component(dtype: Any) -> int:
+    return COMPONENTS[np.dtype(dtype).str[1:]]

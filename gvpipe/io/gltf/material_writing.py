@@ -1,0 +1,122 @@
+"""Materials and images into a GLB file; `materials` reads them.
+
+Images keep their bytes, unless neither glTF nor an extension has their kind: those become PNG.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from typing import Any
+
+from gvpipe.asset.material import Image, Material, Texture
+from gvpipe.io.gltf.glb import Glb
+from gvpipe.io.gltf.json_fields import Json
+from gvpipe.io.gltf.materials import NEAREST, WRAPS
+
+CORE = ("image/png", "image/jpeg")
+EXTENSIONS = {"image/webp": "EXT_texture_webp", "image/ktx2": "KHR_texture_basisu"}
+LINEAR, NEAREST_MIPMAP, LINEAR_MIPMAP = 9729, 9984, 9987
+WRAP_NUMBERS = {name: number for number, name in WRAPS.items()}
+
+
+def write_materials(glb: Glb, materials: tuple[Material, ...], images: tuple[Image, ...], uv_sets: Mapping[str, int]) -> None:
+    """Add materials and the images that they show.
+
+    Args:
+        glb: the file.
+        materials, images: of the sequence.
+        uv_sets: number of each attribute of texture coordinates; textures without one are left out.
+    """
+    types = [_write_image(glb, image) for image in images]
+    for material in materials:
+        glb.append("materials", _material(glb, material, types, uv_sets))
+
+
+def _write_image(glb: Glb, image: Image) -> str:
+    """Add an image and return its media type."""
+    data, kind = image.data, image.media_type
+    if kind not in CORE and kind not in EXTENSIONS:
+        data, kind = _as_png(image), "image/png"
+    glb.append("images", {"name": image.name, "mimeType": kind, "bufferView": glb.view(data)})
+    return kind
+
+
+def _as_png(image: Image) -> bytes:
+    from PIL import Image as Pillow
+
+    with Pillow.open(io.BytesIO(image.data)) as opened:
+        file = io.BytesIO()
+        opened.save(file, "PNG")
+        return file.getvalue()
+
+
+def _material(glb: Glb, material: Material, types: list[str], uv_sets: Mapping[str, int]) -> Json:
+    def info(texture: Texture | None, scale: str = "") -> Json:
+        if texture is None or texture.uv not in uv_sets:
+            return {}
+        return _texture_info(glb, texture, types[texture.image], uv_sets[texture.uv]) | (
+            {scale: texture.scale} if scale and texture.scale != 1 else {}
+        )
+
+    strength = max(1.0, *material.emissive)
+    item: Json = {
+        "name": material.name,
+        "pbrMetallicRoughness": {
+            "baseColorFactor": list(material.base_color),
+            "baseColorTexture": info(material.base_color_texture),
+            "metallicFactor": material.metallic,
+            "roughnessFactor": material.roughness,
+            "metallicRoughnessTexture": info(material.metallic_roughness_texture),
+        },
+        "normalTexture": info(material.normal_texture, "scale"),
+        "occlusionTexture": info(material.occlusion_texture, "strength"),
+        "emissiveTexture": info(material.emissive_texture),
+        "emissiveFactor": [value / strength for value in material.emissive] if any(material.emissive) else None,
+        "alphaMode": material.alpha_mode.upper() if material.alpha_mode != "opaque" else None,
+        "alphaCutoff": material.alpha_cutoff if material.alpha_mode == "mask" else None,
+        "doubleSided": material.double_sided or None,
+        "extensions": {},
+    }
+    surface = item["pbrMetallicRoughness"]
+    item["pbrMetallicRoughness"] = {key: value for key, value in surface.items() if value != {}}
+    if material.unlit:
+        glb.use("KHR_materials_unlit")
+        item["extensions"]["KHR_materials_unlit"] = {}
+    if strength > 1:
+        glb.use("KHR_materials_emissive_strength")
+        item["extensions"]["KHR_materials_emissive_strength"] = {"emissiveStrength": strength}
+    return {key: value for key, value in item.items() if value not in (None, {}, "")}
+
+
+def _texture_info(glb: Glb, texture: Texture, kind: str, uv_set: int) -> Json:
+    is_nearest = texture.filter == "nearest"
+    sampler = {
+        "magFilter": NEAREST if is_nearest else LINEAR,
+        "minFilter": NEAREST_MIPMAP if is_nearest else LINEAR_MIPMAP,
+        "wrapS": WRAP_NUMBERS[texture.wrap[0]],
+        "wrapT": WRAP_NUMBERS[texture.wrap[1]],
+    }
+    extension = EXTENSIONS.get(kind)
+    item: Json = {"sampler": _once(glb, "samplers", sampler)}
+    if extension:
+        glb.use(extension, is_required=True)
+        item["extensions"] = {extension: {"source": texture.image}}
+    else:
+        item["source"] = texture.image
+    info: Json = {"index": _once(glb, "textures", item)}
+    info |= {"texCoord": uv_set} if uv_set else {}
+    place: Json = {}
+    place |= {"offset": list(texture.offset)} if texture.offset != (0, 0) else {}
+    place |= {"rotation": texture.rotation} if texture.rotation else {}
+    place |= {"scale": list(texture.tiling)} if texture.tiling != (1, 1) else {}
+    if place:
+        glb.use("KHR_texture_transform")
+        info["extensions"] = {"KHR_texture_transform": place}
+    return info
+
+
+def _once(glb: Glb, kind: str, item: Json) -> int:
+    """The number of an object, added unless an equal one is there."""
+    items: list[Any] = glb.tree.get(kind, [])
+    return items.index(item) if item in items else glb.append(kind, item)

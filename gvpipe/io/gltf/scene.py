@@ -1,0 +1,179 @@
+"""A file's scene as one mesh: blocks of vertices in the order of its nodes, parts, attributes and materials.
+
+The order of vertices: the scene's nodes, each before its children, children in the file's order. A node's mesh gives its blocks
+in the order of its primitives, one block per primitive; primitives that share all accessors share a block. A mesh that several
+nodes show has vertices for each of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gvpipe import notes
+from gvpipe.arrays import Float64, Int32
+from gvpipe.asset.material import Image, Material
+from gvpipe.asset.metadata import NO_METADATA, Metadata
+from gvpipe.asset.part import Part
+from gvpipe.io.gltf.accessors import Accessors
+from gvpipe.io.gltf.clips import NO_CLIP, Clip, find_clip, read_clip
+from gvpipe.io.gltf.document import Document
+from gvpipe.io.gltf.geometry import GltfMesh, read_mesh, read_weights
+from gvpipe.io.gltf.json_fields import child, index, text
+from gvpipe.io.gltf.materials import Looks, read_materials
+from gvpipe.io.gltf.nodes import Nodes, read_nodes, scene_order
+from gvpipe.io.gltf.poses import Placed, Poses
+from gvpipe.io.gltf.skins import Skin, read_skin
+from gvpipe.io.gltf.vectors import handedness
+
+INSTANCING = "EXT_mesh_gpu_instancing"
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A scene of V vertices and T triangles.
+
+    Args:
+        poses: positions at any time of the clip.
+        clip: what moves it.
+        faces: ``(T, 3)``.
+        placed: its blocks of vertices.
+        linear: what turns each block's vectors at the clip's start.
+        parts, materials, images, metadata, notes: as in `MeshSequence`.
+    """
+
+    poses: Poses
+    clip: Clip
+    faces: Int32
+    placed: tuple[Placed, ...]
+    linear: tuple[Float64, ...]
+    parts: tuple[Part, ...]
+    materials: tuple[Material, ...]
+    images: tuple[Image, ...]
+    metadata: Metadata
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A mesh where a node shows it, and the vertices of its blocks."""
+
+    node: int
+    mesh: GltfMesh
+    placed: tuple[Placed, ...]
+
+
+def read_scene(document: Document, clip: str | None = None, is_still: bool = False, moving_alone: bool = False) -> Scene:
+    """Read the scene that a file shows.
+
+    Args:
+        document: the file.
+        clip: name of its animation; None: the first.
+        is_still: leave out animations.
+        moving_alone: leave out what is the same in all frames of a series: texture coordinates, tangents, materials, images.
+
+    Raises:
+        ValueError: it holds no triangle, or anything in it cannot be.
+    """
+    accessors = Accessors(document)
+    nodes = read_nodes(document)
+    shown = _shown_meshes(accessors, nodes, moving_alone)
+    placed = [one for each in shown for one in each.placed]
+    moves = NO_CLIP
+    if not is_still:
+        counts = {one.node: len(one.block.morphs) for one in placed}
+        moves = read_clip(accessors, find_clip(document, clip), counts)
+    poses = Poses(nodes, moves, placed)
+    linear = poses.linear(moves.start)
+    faces, parts = _triangles(nodes, shown, linear)
+    if not len(faces):
+        raise ValueError("its meshes have no triangles")
+    looks = Looks((), (), ()) if moving_alone else read_materials(document)
+    return Scene(
+        poses,
+        moves,
+        faces,
+        tuple(placed),
+        tuple(linear),
+        parts,
+        looks.materials,
+        looks.images,
+        NO_METADATA if moving_alone else _metadata(document, moves.name, moves.start),
+        () if moving_alone else (*_notes(document, shown), *looks.notes),
+    )
+
+
+def _shown_meshes(accessors: Accessors, nodes: Nodes, moving_alone: bool) -> list[Shown]:
+    document = accessors.document
+    items = document.items("nodes")
+    n_meshes, n_skins = len(document.items("meshes")), len(document.items("skins"))
+    meshes: dict[int, GltfMesh] = {}
+    skins: dict[int, Skin] = {}
+    shown: list[Shown] = []
+    n_vertices = 0
+    for node in scene_order(document, nodes):
+        where = f"node {node}"
+        number = index(items[node], "mesh", where, n_meshes)
+        if number is None:
+            continue
+        if number not in meshes:
+            meshes[number] = read_mesh(accessors, number, moving_alone)
+        skin_number = index(items[node], "skin", where, n_skins)
+        if skin_number is not None and skin_number not in skins:
+            skins[skin_number] = read_skin(accessors, skin_number)
+        mesh = meshes[number]
+        weights = read_weights(items[node], len(mesh.weights), where) if "weights" in items[node] else mesh.weights
+        placed = []
+        for block in mesh.blocks:
+            skin = None if skin_number is None or block.joints is None else skins[skin_number]
+            document.budget.spend(48 * len(block.positions), where)
+            placed.append(Placed(node, block, skin, weights[: len(block.morphs)], n_vertices))
+            n_vertices += len(block.positions)
+        shown.append(Shown(node, mesh, tuple(placed)))
+    if not n_vertices:
+        raise ValueError("it has no triangle mesh in its scene")
+    return shown
+
+
+def _triangles(nodes: Nodes, shown: list[Shown], linear: list[Float64]) -> tuple[Int32, tuple[Part, ...]]:
+    """All triangles ``(T, 3)``, and the parts; glTF 2.0, 3.7.4: a mirroring transform turns the winding."""
+    faces: list[Int32] = []
+    parts: list[Part] = []
+    n_faces, n_placed = 0, 0
+    for each in shown:
+        parent = nodes.parents[each.node]
+        for primitive in each.mesh.primitives:
+            one = each.placed[primitive.block]
+            turns = linear[n_placed + primitive.block]
+            is_mirrored = float(np.mean(handedness(turns))) < 0
+            triangles = primitive.triangles[:, ::-1] if is_mirrored else primitive.triangles
+            faces.append(triangles + np.int32(one.start))
+            parts.append(
+                Part(
+                    nodes.names[each.node] or each.mesh.name,
+                    (one.start, one.start + len(one.block.positions)),
+                    (n_faces, n_faces + len(triangles)),
+                    primitive.material,
+                    nodes.names[parent] if parent >= 0 else "",
+                )
+            )
+            n_faces += len(triangles)
+        n_placed += len(each.placed)
+    is_plain = len(parts) == 1 and not parts[0].name and parts[0].material is None
+    joined = np.concatenate(faces) if faces else np.zeros((0, 3), np.int32)
+    return np.ascontiguousarray(joined, np.int32), () if is_plain else tuple(parts)
+
+
+def _metadata(document: Document, clip: str, start: float) -> Metadata:
+    asset = child(document.tree, "asset", "the file")
+    texts = {"copyright": text(asset, "copyright"), "clip": clip}
+    return Metadata("y", 1.0, start, text(asset, "generator"), {key: value for key, value in texts.items() if value})
+
+
+def _notes(document: Document, shown: list[Shown]) -> tuple[str, ...]:
+    instanced = [node for node in document.items("nodes") if INSTANCING in child(node, "extensions", "a node")]
+    lines = notes.left_out(sum(each.mesh.n_others for each in shown))
+    if instanced:
+        lines += (f"{len(instanced)} of its nodes repeat their mesh by {INSTANCING}; it was read once each",)
+    return lines

@@ -1,0 +1,145 @@
+"""A sequence's scene in a GLB file: nodes, meshes, attributes and materials. Positions are added frame by frame.
+
+glTF counts in metres, with Y up. Scenes of other units or axes are turned and scaled by their nodes, so that positions stay as
+they are, to the bit. An origin becomes the nodes' translation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gvpipe.arrays import Array, Float32
+from gvpipe.io.gltf.attribute_writing import GltfAttribute, as_gltf, name_attributes
+from gvpipe.io.gltf.glb import INDICES, VERTICES, Glb
+from gvpipe.io.gltf.json_fields import Json
+from gvpipe.io.gltf.material_writing import write_materials
+from gvpipe.io.gltf.nodes import compose
+from gvpipe.io.gltf.split import Shape, Split, split_vertices
+from gvpipe.io.losses import lost_notes
+from gvpipe.sequence import MeshSequence
+
+HALF = float(np.sqrt(0.5))
+TURNS = {"z": (-HALF, 0.0, 0.0, HALF), "x": (0.0, 0.0, HALF, HALF)}  # quaternions that take an up axis to Y
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What all frames share.
+
+    Args:
+        sequence: that is written.
+        split: its vertices.
+        attributes: as the file holds them.
+        uv_sets: number of each attribute of texture coordinates.
+        place: transform of the scene's nodes.
+        notes: what is not held or was changed, a line each.
+    """
+
+    sequence: MeshSequence
+    split: Split
+    attributes: tuple[GltfAttribute, ...]
+    uv_sets: Mapping[str, int]
+    place: Json
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """A mesh in the file: numbers of its node and mesh, and the shape that it shows."""
+
+    node: int
+    mesh: int
+    shape: Shape
+
+
+def prepare(sequence: MeshSequence, fields: tuple[str, ...] = ()) -> Prepared:
+    """Split vertices and convert attributes; ``fields`` are names of fields that are written, too."""
+    split = split_vertices(sequence)
+    names = {name: held for name, held in name_attributes(sequence.attributes).items() if name in split.attributes}
+    made = {name: as_gltf(names[name], sequence.attributes[name].kind, split.attributes[name]) for name in names}
+    attributes = {name: one for name, one in made.items() if one is not None}
+    place, turned = _place(sequence)
+    held = ("parts", "materials", "metadata", "polygons", *attributes, *fields)
+    cut = (f"glTF has triangles alone; {len(sequence.polygons)} polygons became fans",) if sequence.polygons is not None else ()
+    n_free = len(split.sources) - len(np.unique(np.concatenate([np.arange(each.start, each.stop) for each in split.shapes])))
+    free = (f"{n_free} vertices are of no part; left out",) if n_free else ()
+    return Prepared(
+        sequence,
+        split,
+        tuple(attributes.values()),
+        {name: int(one.name.rpartition("_")[2]) for name, one in attributes.items() if one.name.startswith("TEXCOORD_")},
+        place,
+        (*turned, *cut, *free, *lost_notes(sequence, "glTF", held)),
+    )
+
+
+def write_scene(glb: Glb, prepared: Prepared, positions: Float32, more: tuple[GltfAttribute, ...] = ()) -> list[Written]:
+    """Add the whole scene.
+
+    Args:
+        glb: the file.
+        prepared: what all frames share.
+        positions: ``(W, 3)`` of the split vertices.
+        more: attributes of this frame alone.
+    """
+    sequence = prepared.sequence
+    write_materials(glb, sequence.materials, sequence.images, prepared.uv_sets)
+    written: list[Written] = []
+    roots: list[int] = []
+    last_parent = ""
+    for shape in prepared.split.shapes:
+        mesh = _write_mesh(glb, shape, positions, (*prepared.attributes, *more))
+        node = glb.append("nodes", {"mesh": mesh} | ({"name": shape.name} if shape.name else {}))
+        written.append(Written(node, mesh, shape))
+        if not shape.parent:
+            roots.append(node)
+        elif shape.parent == last_parent:
+            glb.tree["nodes"][roots[-1]]["children"].append(node)
+        else:
+            roots.append(glb.append("nodes", {"name": shape.parent, "children": [node]}))
+        last_parent = shape.parent
+    for node in roots:
+        glb.tree["nodes"][node] |= prepared.place
+    glb.append("scenes", {"nodes": roots})
+    glb.tree["scene"] = 0
+    rights = sequence.metadata.texts.get("copyright")
+    glb.tree["asset"] |= {"copyright": rights} if rights else {}
+    return written
+
+
+def _write_mesh(glb: Glb, shape: Shape, positions: Float32, attributes: tuple[GltfAttribute, ...]) -> int:
+    span = slice(shape.start, shape.stop)
+    accessors = {"POSITION": glb.array(positions[span], VERTICES, bounds=True)}
+    for one in attributes:
+        accessors[one.name] = glb.array(one.values[span], VERTICES, normalized=one.normalized)
+    primitives = []
+    for faces, material in shape.primitives:
+        small = shape.stop - shape.start < 65536  # the largest number of a type is no vertex
+        corners = faces.reshape(-1, 1).astype(np.uint16 if small else np.uint32)
+        item: Json = {"attributes": accessors, "indices": glb.array(corners, INDICES)}
+        primitives.append(item | ({} if material is None else {"material": material}))
+    return glb.append("meshes", {"primitives": primitives} | ({"name": shape.name} if shape.name else {}))
+
+
+def _place(sequence: MeshSequence) -> tuple[Json, tuple[str, ...]]:
+    """The transform of the scene's nodes to metres and Y up, and a note if it changes anything."""
+    metadata, origin = sequence.metadata, sequence.origin
+    turn = TURNS.get(metadata.up_axis)
+    scale = metadata.metres_per_unit or 1.0
+    matrix = compose(np.zeros(3), np.array(turn or (0, 0, 0, 1.0)), np.full(3, scale))
+    place: Json = {}
+    place |= {"translation": (matrix[:3, :3] @ origin).tolist()} if origin.any() else {}
+    place |= {"rotation": list(turn)} if turn else {}
+    place |= {"scale": [scale] * 3} if scale != 1 else {}
+    steps = [f"turned from {metadata.up_axis.upper()} up" if turn else "", f"scaled by {scale:g}" if scale != 1 else ""]
+    done = " and ".join(step for step in steps if step)
+    return place, (f"glTF is in metres with Y up; the scene's nodes are {done}",) if done else ()
+
+
+def frame_attributes(prepared: Prepared, fields: Mapping[str, Array]) -> tuple[GltfAttribute, ...]:
+    """A frame's fields ``(V, C)`` as attributes of its file."""
+    made = (as_gltf(f"_{name}", "scalar", values[prepared.split.sources]) for name, values in fields.items())
+    return tuple(one for one in made if one is not None)

@@ -1,0 +1,161 @@
+"""Sequences as GLB: a file for each frame, or one animated file.
+
+In an animated file each distinct frame after the first is a morph target: what it adds to the first frame's positions. Vertices
+that do not move are left out (sparse accessors). A target has weight 1 in its frames and 0 in others. Weights are linear
+between frames, so positions are interpolated.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from gvpipe.arrays import Array, Float32
+from gvpipe.atomic import atomic_path
+from gvpipe.errors import InputError
+from gvpipe.io.gltf.clips import FPS
+from gvpipe.io.gltf.glb import VERTICES, Glb
+from gvpipe.io.gltf.json_fields import Json
+from gvpipe.io.gltf.scene_writing import Prepared, Written, frame_attributes, prepare, write_scene
+from gvpipe.io.mesh import FrameEncoder
+from gvpipe.sequence import MeshSequence
+
+MANY_TARGETS = 2048  # layers of a texture in most browsers, which hold a target each
+SMALL_INTEGERS = ("float32", "int8", "uint8", "int16", "uint16")
+
+
+def encode_glb(sequence: MeshSequence, shared: str) -> FrameEncoder:
+    """An encoder of frames, each a GLB with all attributes, parts, materials and images."""
+    fields = tuple(
+        name
+        for name, one in sequence.fields.items()
+        if one.domain == "vertex"
+        and one.n_components <= 4
+        and one.dtype.name in SMALL_INTEGERS
+        and name not in sequence.attributes
+    )
+    prepared = prepare(sequence, fields)
+
+    def encode(positions: Float32, values: Mapping[str, Array]) -> bytes:
+        glb = Glb()
+        write_scene(glb, prepared, positions[prepared.split.sources], frame_attributes(prepared, values))
+        data = glb.data()
+        glb.close()
+        return data
+
+    return FrameEncoder(encode, fields, prepared.notes)
+
+
+def write_animated(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
+    """Write a sequence as one animated GLB; return what it cannot hold, a line each.
+
+    Raises:
+        InputError: it would be longer than a GLB can be.
+        OutputError: the file cannot be written.
+    """
+    prepared = prepare(sequence)
+    glb = Glb()
+    try:
+        n_targets = _write_animation(glb, prepared)
+        with atomic_path(path) as temporary, open(temporary, "wb") as file:
+            try:
+                glb.write(file)
+            except ValueError as exc:
+                raise InputError(f"{path}: {exc}") from exc
+    finally:
+        glb.close()
+    return (*prepared.notes, *_animation_notes(sequence, n_targets))
+
+
+@dataclass(eq=False)
+class _Targets:
+    """Morph targets of a mesh: their accessors, and the one of each frame, -1 for none.
+
+    Args:
+        written: the mesh.
+    """
+
+    written: Written
+    accessors: list[int] = field(default_factory=list)
+    frames: list[int] = field(default_factory=list)
+    known: dict[bytes, int] = field(default_factory=dict)
+
+    def add(self, glb: Glb, deltas: Float32) -> None:
+        """Add a frame, which differs from the first by ``deltas (n, 3)``; equal frames share a target."""
+        moved = np.flatnonzero(deltas.any(axis=1))
+        if not len(moved):
+            self.frames.append(-1)
+            return
+        digest = hashlib.sha256(deltas.tobytes()).digest()
+        if digest not in self.known:
+            self.known[digest] = len(self.accessors)
+            index_size = 2 if len(deltas) <= 65536 else 4
+            if len(moved) * (index_size + 12) < 12 * len(deltas):
+                accessor = glb.sparse(deltas[moved], moved, (len(deltas), 3), bounds=True)
+            else:
+                accessor = glb.array(deltas, VERTICES, bounds=True)
+            self.accessors.append(accessor)
+        self.frames.append(self.known[digest])
+
+
+def _write_animation(glb: Glb, prepared: Prepared) -> int:
+    """Add the scene and its animation; returns the largest number of morph targets of a mesh."""
+    sequence, sources = prepared.sequence, prepared.split.sources
+    base = sequence.read(0, 1)[0][sources]
+    targets = [_Targets(one) for one in write_scene(glb, prepared, base)]
+    for _, block in sequence.chunks():
+        for frame in block:
+            deltas = frame[sources] - base
+            for one in targets:
+                one.add(glb, deltas[one.written.shape.start : one.written.shape.stop])
+    moving = [one for one in targets if one.accessors]
+    _write_channels(glb, sequence, moving)
+    for one in moving:
+        mesh = glb.tree["meshes"][one.written.mesh]
+        mesh["weights"] = [0] * len(one.accessors)
+        for primitive in mesh["primitives"]:
+            primitive["targets"] = [{"POSITION": accessor} for accessor in one.accessors]
+    return max((len(one.accessors) for one in moving), default=0)
+
+
+def _write_channels(glb: Glb, sequence: MeshSequence, moving: list[_Targets]) -> None:
+    """Add the animation of the weights; a scene without movement has one of its first node, which says how long it is."""
+    times = (np.arange(sequence.n_frames) / sequence.fps).astype(np.float32)[:, None]
+    if moving:
+        time = glb.array(times, bounds=True)
+        samplers = [{"input": time, "output": _write_weights(glb, one), "interpolation": "LINEAR"} for one in moving]
+        targets: list[Json] = [{"node": one.written.node, "path": "weights"} for one in moving]
+    else:
+        root = glb.tree["scenes"][0]["nodes"][0]
+        place = np.array([glb.tree["nodes"][root].get("translation", [0, 0, 0])] * 2, np.float32)
+        samplers = [{"input": glb.array(times[[0, -1]], bounds=True), "output": glb.array(place), "interpolation": "STEP"}]
+        targets = [{"node": root, "path": "translation"}]
+    animation = {
+        "name": sequence.metadata.texts.get("clip") or "animation",
+        "samplers": samplers,
+        "channels": [{"sampler": i, "target": target} for i, target in enumerate(targets)],
+        "extras": {FPS: sequence.fps},
+    }
+    glb.append("animations", animation)
+
+
+def _write_weights(glb: Glb, targets: _Targets) -> int:
+    """The weights of all targets in all frames, one after the other: ``(F M, 1)``, zeros but for one a frame."""
+    frames = np.array(targets.frames)
+    shown = np.flatnonzero(frames >= 0)
+    n_targets = len(targets.accessors)
+    places = shown * n_targets + frames[shown]
+    return glb.sparse(np.ones((len(places), 1), np.float32), places, (len(frames) * n_targets, 1))
+
+
+def _animation_notes(sequence: MeshSequence, n_targets: int) -> tuple[str, ...]:
+    lines: tuple[str, ...] = ()
+    if n_targets > MANY_TARGETS:
+        lines += (f"it has {n_targets} morph targets; many viewers show at most {MANY_TARGETS}",)
+    if "normal" in sequence.attributes and n_targets:
+        lines += ("its normals are those of the first frame",)
+    return lines

@@ -1,0 +1,158 @@
+"""Material files of OBJ, read into metallic-roughness materials.
+
+| statement | becomes |
+| --- | --- |
+| ``Kd``, ``d`` or ``Tr`` | base color; blending where it is not opaque |
+| ``map_Kd`` | base color texture; ``map_d`` with the same picture: blending |
+| ``Ke``, ``map_Ke`` | emissive color and texture |
+| ``Pm``, ``Pr``, else ``Ns`` | metallic, roughness: 1 - sqrt(Ns / 1000), as Blender has it |
+| ``map_Pr -imfchan g``, ``map_Pm -imfchan b`` of one picture | metallic-roughness texture |
+| ``norm``, else ``map_Bump`` or ``bump`` | normal texture; ``-bm`` is its scale |
+| ``-o``, ``-s``, ``-clamp on`` of a map | offset, tiling, wrap |
+
+``Ka``, ``Ks``, ``Ni``, ``Tf`` and ``illum`` have no counterpart. Maps without one are named in a note.
+
+Sources: Wavefront, "Advanced Visualizer" manual, appendix B1 (MTL); the PBR extension after Clara.io's documentation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from gvpipe.asset.material import Material, Texture
+from gvpipe.io.pictures import Pictures
+
+NUMBERS = {"-o": 3, "-s": 3, "-t": 3, "-mm": 2}  # options with up to so many numbers; others have one word
+WORDS = ("-blendu", "-blendv", "-boost", "-cc", "-clamp", "-imfchan", "-texres", "-bm", "-type", "-colorspace")
+ALIASES = {"bump": "map_bump", "map_tr": "map_d", "map_ns": "map_Ns"}
+KNOWN_MAPS = ("map_kd", "map_d", "map_ke", "map_pr", "map_pm", "map_bump", "norm")
+
+
+@dataclass(frozen=True)
+class _Map:
+    """A map statement: its picture, and its options by name."""
+
+    picture: str
+    options: dict[str, list[str]]
+
+    @property
+    def file(self) -> str:
+        """The picture's path in one spelling."""
+        return self.picture.replace("\\", "/").lower()
+
+    def numbers(self, option: str, default: float) -> list[float]:
+        """Three numbers of ``-o`` or ``-s``."""
+        given = [_number(word, default) for word in self.options.get(option, [])]
+        return given + [default] * (3 - len(given))
+
+    def word(self, option: str, default: str) -> str:
+        """The word of an option."""
+        return next(iter(self.options.get(option, [])), default)
+
+
+def read_mtl(text: str, pictures: Pictures, names: Collection[str]) -> list[Material]:
+    """The materials of these names in the file's order; their pictures, and notes, are added to ``pictures``."""
+    blocks: list[tuple[str, dict[str, str]]] = []
+    for line in text.replace("\\\n", " ").splitlines():
+        words = line.strip().split(None, 1)
+        if not words or words[0].startswith("#"):
+            continue
+        key, rest = words[0].lower(), words[1].strip() if len(words) > 1 else ""
+        if key == "newmtl":
+            blocks.append((rest, {}))
+        elif blocks:
+            blocks[-1][1][ALIASES.get(key, key)] = rest
+    return [_material(name, statements, pictures) for name, statements in blocks if name in names]
+
+
+def _material(name: str, statements: dict[str, str], pictures: Pictures) -> Material:
+    maps = {key: _map(rest) for key, rest in statements.items() if key.startswith("map_") or key == "norm"}
+    base, opacity = maps.get("map_kd"), maps.get("map_d")
+    alpha = _number(statements.get("d", "").split("-halo")[-1], 1 - _number(statements.get("tr", ""), 0))
+    color = _color(statements.get("kd", ""), 1.0)
+    if base and not any(color):
+        color = (1.0, 1.0, 1.0)  # some programs write black beside a picture, and mean the picture
+    is_cut_out = base is not None and opacity is not None and base.file == opacity.file
+    emissive = _color(statements.get("ke", ""), 0.0)
+    if "map_ke" in maps and not any(emissive):
+        emissive = (1.0, 1.0, 1.0)
+    shine = min(max(_number(statements.get("ns", ""), 0), 0), 1000)
+    normal = maps.get("norm") or maps.get("map_bump")
+    packed = _packed(maps.get("map_pr"), maps.get("map_pm"))
+    used = {"map_kd", "map_ke", "norm", "map_bump"}
+    used |= ({"map_d"} if is_cut_out else set()) | ({"map_pr", "map_pm"} if packed else set())
+    lost = sorted(key for key, one in maps.items() if key not in used and one.picture)
+    if lost:
+        pictures.notes.append(f"material {name!r}: {', '.join(lost)} has no counterpart in glTF's materials and was left out")
+    return Material(
+        name,
+        (*color, min(max(alpha, 0.0), 1.0)),
+        _texture(base, name, pictures),
+        _number(statements.get("pm", ""), 0),
+        _number(statements.get("pr", ""), 1 - math.sqrt(shine / 1000)),
+        _texture(packed, name, pictures),
+        _texture(normal, name, pictures, _number(normal.word("-bm", "1"), 1) if normal else 1.0),
+        emissive=emissive,
+        emissive_texture=_texture(maps.get("map_ke"), name, pictures),
+        alpha_mode="blend" if alpha < 1 or is_cut_out else "opaque",
+    )
+
+
+def _map(rest: str) -> _Map:
+    """Options, then a file name that may have blanks."""
+    options: dict[str, list[str]] = {}
+    while rest.startswith("-"):
+        option, _, rest = rest.partition(" ")
+        key, most = option.lower(), NUMBERS.get(option.lower(), 1)
+        if key not in NUMBERS and key not in WORDS:
+            return _Map(f"{option} {rest}".strip(), options)  # a file name that starts with a hyphen
+        options[key] = []
+        rest = rest.lstrip()
+        while len(options[key]) < most:
+            word, _, after = rest.partition(" ")
+            if not word or (key in NUMBERS and not _is_number(word)):
+                break
+            options[key].append(word)
+            rest = after.lstrip()
+    return _Map(rest.strip().strip('"'), options)
+
+
+def _packed(roughness: _Map | None, metallic: _Map | None) -> _Map | None:
+    """The map of both, if they are two channels of one picture as glTF has them."""
+    if roughness is None or metallic is None or roughness.file != metallic.file:
+        return None
+    channels = roughness.word("-imfchan", "").lower(), metallic.word("-imfchan", "").lower()
+    return roughness if channels == ("g", "b") else None
+
+
+def _texture(one: _Map | None, material: str, pictures: Pictures, scale: float = 1.0) -> Texture | None:
+    number = pictures.find(one.picture, material) if one and one.picture else None
+    if one is None or number is None:
+        return None
+    wrap = "clamp" if one.word("-clamp", "off").lower() == "on" else "repeat"
+    (u, v, _), (su, sv, _) = one.numbers("-o", 0.0), one.numbers("-s", 1.0)
+    # v' = v + sv * coordinate from below; from above that is (1 - v - sv) + sv * coordinate
+    return Texture(number, "uv", scale, (wrap, wrap), offset=(u, round(1 - v - sv, 12) + 0.0), tiling=(su, sv))
+
+
+def _color(rest: str, default: float) -> tuple[float, float, float]:
+    """Three numbers; one stands for all. Spectral curves and XYZ are not read."""
+    numbers = [_number(word, default) for word in rest.split()[:3] if _is_number(word)]
+    if not numbers:
+        return (default, default, default)
+    red = numbers[0]
+    return (red, numbers[1], numbers[2]) if len(numbers) == 3 else (red, red, red)
+
+
+def _number(word: str, default: float) -> float:
+    """A finite number, or the default."""
+    return float(word) if _is_number(word) else float(default)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        return math.isfinite(float(word))
+    except ValueError:
+        return False

@@ -1,0 +1,34 @@
+"""Which corners share a normal, and whether normals follow from a frame's positions (`gvpipe.attributes.surface_normals`)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gvpipe.arrays import Array, Int32, Int64
+from gvpipe.asset.attribute import Attribute
+from gvpipe.attributes.surface_normals import find_rule
+from gvpipe.mesh.unique_rows import row_ids
+
+TOLERANCE = 1.0  # degrees: normals this near to a rule's are the surface's own
+
+
+def own_rule(normals: Array, positions: Array, faces: Int32, entries: Int64) -> str | None:
+    """The rule that gives all normals ``(N, 3)`` within `TOLERANCE`, or None.
+
+    Args:
+        normals: of any length.
+        positions: ``(V, 3)``.
+        faces: ``(T, 3)``.
+        entries: ``(3 T,)`` the normal of each corner, 0..N-1.
+    """
+    return find_rule(normals, entries, positions.astype(np.float32), faces, TOLERANCE)
+
+
+def entries_of(normals: Attribute, faces: Int32) -> tuple[Int64, Int64]:
+    """The normal of each corner ``(3 T,)``, one for each vertex and index, and a corner that has each ``(N,)``."""
+    corners = faces.reshape(-1).astype(np.int64)
+    if normals.domain == "corner":
+        own = np.arange(len(corners)) if normals.indices is None else normals.indices
+        corners, _ = row_ids(np.stack([corners, own.astype(np.int64)], axis=1))
+    _, first, entries = np.unique(corners, return_index=True, return_inverse=True)
+    return entries.reshape(-1), first

@@ -1,0 +1,105 @@
+"""Attributes and fields as primvars of a USD mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gvpipe.arrays import Array
+from gvpipe.asset.attribute import Attribute
+from gvpipe.asset.field import Field
+from gvpipe.io.scene_export import ExportMesh, as_unit_range, export_layer
+from gvpipe.io.scene_mesh import Layer
+
+INTERPOLATIONS = {"constant": "constant", "polygon": "uniform", "vertex": "vertex", "corner": "faceVarying"}
+BYTES = 16 << 20  # of a field's frames at a time
+
+
+def write_primvars(drawn: Any, mesh: ExportMesh, attributes: Mapping[str, Attribute]) -> list[str]:
+    """Write a mesh's attributes; returns notes."""
+    said: list[str] = []
+    for name, attribute in attributes.items():
+        layer = export_layer(name, attribute, mesh)
+        if not len(layer.values):
+            continue
+        if attribute.kind == "color" and name == "color":
+            _write_color(drawn, layer)
+        else:
+            _write(drawn, _usd_name(name, attribute.kind), layer, layer.values)
+        if attribute.domain == "triangle" and mesh.counts.max(initial=3) > 3:
+            said.append(f"{name} is per triangle; USD has it per polygon, so that of the first triangle was written")
+        if attribute.unit:
+            said.append(f"USD has no units of primvars; that of {name} ({attribute.unit}) was left out")
+    return said
+
+
+def write_field(name: str, field: Field, meshes: list[tuple[Any, ExportMesh]], start: float) -> None:
+    """Write a field as a primvar with a sample per frame, a bounded number of frames at a time."""
+    domain = {"vertex": "vertex", "triangle": "polygon"}[field.domain]
+    step = max(1, BYTES // (4 * field.shape[1] * field.n_components))
+    for first in range(0, len(field), step):
+        block = field.read(first, min(first + step, len(field)))
+        for drawn, mesh in meshes:
+            rows = slice(*mesh.vertices) if domain == "vertex" else mesh.triangles[0] + _first_triangles(mesh)
+            for i, frame in enumerate(block):
+                layer = Layer(name, field.kind, domain, frame[rows])
+                _write(drawn, _usd_name(name, field.kind), layer, layer.values, start + first + i)
+
+
+def _write_color(drawn: Any, layer: Layer) -> None:
+    colors = as_unit_range(layer.values)
+    _write(drawn, "displayColor", layer, colors[:, :3])
+    if colors.shape[1] == 4:
+        _write(drawn, "displayOpacity", Layer("", "scalar", layer.domain, colors[:, 3:], layer.indices), colors[:, 3:])
+
+
+def _write(drawn: Any, name: str, layer: Layer, values: Array, time: float | None = None) -> None:
+    from pxr import Sdf, Usd, UsdGeom, Vt
+
+    if layer.kind == "color":
+        values = as_unit_range(values)
+    type_name, made, size = _typed(layer.kind, values)
+    if name == "displayOpacity":
+        type_name = "float[]"
+    api = UsdGeom.PrimvarsAPI(drawn.GetPrim())
+    primvar = api.CreatePrimvar(name, getattr(Sdf.ValueTypeNames, _python_name(type_name)), INTERPOLATIONS[layer.domain], size)
+    primvar.Set(made, Usd.TimeCode.Default() if time is None else Usd.TimeCode(time))
+    if layer.indices is not None:
+        primvar.SetIndices(Vt.IntArray.FromNumpy(layer.indices.astype(np.int32)))
+
+
+def _typed(kind: str, values: Array) -> tuple[str, Any, int]:
+    """USD's type of some values, the values as its array, and how many of them are an element."""
+    from pxr import Vt
+
+    width = values.shape[1]
+    if values.dtype.kind in "iu" and width == 1 and kind != "color":
+        return "int[]", Vt.IntArray.FromNumpy(np.ascontiguousarray(values[:, 0], np.int32)), 1
+    floats = np.ascontiguousarray(values, np.float32)
+    if width == 1 or width > 4:
+        return "float[]", Vt.FloatArray.FromNumpy(floats.reshape(-1)), width
+    array = {2: Vt.Vec2fArray, 3: Vt.Vec3fArray, 4: Vt.Vec4fArray}[width].FromNumpy(floats)
+    named = {("uv", 2): "texCoord2f[]", ("normal", 3): "normal3f[]", ("color", 3): "color3f[]", ("color", 4): "color4f[]"}
+    return named.get((kind, width), {2: "float2[]", 3: "float3[]", 4: "float4[]"}[width]), array, 1
+
+
+def _python_name(type_name: str) -> str:
+    """``texCoord2f[]`` as the library's Python names it: ``TexCoord2fArray``."""
+    plain = type_name.removesuffix("[]")
+    return f"{plain[0].upper()}{plain[1:]}Array"
+
+
+def _usd_name(name: str, kind: str) -> str:
+    """The usual name of a primvar: ``st``, ``normals``; others keep theirs."""
+    from pxr import Tf
+
+    if kind == "uv" and name.startswith("uv"):
+        return f"st{name[2:]}"
+    return "normals" if name == "normal" and kind == "normal" else str(Tf.MakeValidIdentifier(name))
+
+
+def _first_triangles(mesh: ExportMesh) -> Array:
+    counts = mesh.counts.astype(np.int64) - 2
+    return np.asarray(np.cumsum(counts) - counts)

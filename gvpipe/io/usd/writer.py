@@ -1,0 +1,247 @@
+"""A sequence as a USD stage: meshes with time-sampled points, primvars, subsets, materials and textures.
+
+Positions are in world space. Nodes above the meshes are written as transforms that move nothing, so that names come back.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gvpipe import notes
+from gvpipe.arrays import Float32
+from gvpipe.atomic import atomic_path
+from gvpipe.errors import InputError, OutputError
+from gvpipe.io.scene_export import ExportMesh, export_meshes, uncovered
+from gvpipe.io.scene_frames import one_line
+from gvpipe.io.usd.material_writer import MaterialWriter
+from gvpipe.io.usd.names import ADDED, identifier, name_prim
+from gvpipe.io.usd.primvar_writer import write_field, write_primvars
+from gvpipe.io.usd.stage import EXTRA
+from gvpipe.sequence import MeshSequence
+
+ROOT = "root"  # of meshes that have no common node
+
+
+def write_usd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
+    """Write a sequence as .usda, .usdc, .usd (binary) or .usdz; returns what the format cannot hold.
+
+    Textures go into the folder ``NAME_textures`` beside the file, or into the .usdz.
+
+    Raises:
+        InputError: usd-core is missing, or a position is not finite.
+        OutputError: the file cannot be written.
+    """
+    try:
+        from pxr import Tf
+    except ImportError as exc:
+        raise InputError(f"{path}: {EXTRA}") from exc
+    try:
+        if path.suffix.lower() == ".usdz":
+            return _write_package(sequence, path)
+        with atomic_path(path) as temporary:
+            folder = path.with_name(f"{path.stem}_textures")
+            said = _write_stage(sequence, temporary, path.stem, folder.name)
+        _write_images(sequence, folder)
+    except (Tf.ErrorException, RuntimeError) as exc:
+        raise OutputError(f"cannot write {path}: {one_line(exc)}; check the folder and the disk") from exc
+    return said
+
+
+def _write_package(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
+    """A .usdz: a binary stage first, then its textures, neither compressed."""
+    from pxr import Sdf, Usd
+
+    zip_writer: Any = getattr(Sdf, "ZipFileWriter", None) or Usd.ZipFileWriter  # it moved
+    with tempfile.TemporaryDirectory(prefix="gvpipe-") as held:
+        folder = Path(held)
+        stage = folder / "scene.usdc"
+        said = _write_stage(sequence, stage, path.stem, "textures")
+        _write_images(sequence, folder / "textures")
+        with atomic_path(path) as temporary:
+            package = folder / "package.usdz"
+            writer = zip_writer.CreateNew(str(package))
+            writer.AddFile(str(stage), f"{identifier(path.stem)}.usdc")
+            for name in image_names(sequence):
+                writer.AddFile(str(folder / "textures" / name), f"textures/{name}")
+            writer.Save()
+            del writer
+            shutil.copyfile(package, temporary)
+    return said
+
+
+def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str) -> tuple[str, ...]:
+    from pxr import UsdGeom
+
+    stage: Any = _new_stage(path)
+    about = sequence.metadata
+    start = float(np.rint(about.start_time * sequence.fps * 1e6) / 1e6)
+    stage.SetTimeCodesPerSecond(sequence.fps)
+    stage.SetFramesPerSecond(sequence.fps)
+    stage.SetStartTimeCode(start)
+    stage.SetEndTimeCode(start + sequence.n_frames - 1)
+    UsdGeom.SetStageUpAxis(stage, about.up_axis.upper() if about.up_axis in ("y", "z") else "Y")
+    UsdGeom.SetStageMetersPerUnit(stage, about.metres_per_unit or 1.0)
+    meshes = export_meshes(sequence, name)
+    paths = _paths(meshes)
+    root = paths[0].split("/")[1]
+    top = UsdGeom.Xform.Define(stage, f"/{root}").GetPrim()
+    stage.SetDefaultPrim(top)
+    if any(path.count("/") > len(mesh.parent.split("/")) + bool(mesh.parent) for path, mesh in zip(paths, meshes, strict=True)):
+        top.SetCustomDataByKey(ADDED, True)
+    materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, image_names(sequence))
+    said: list[str] = []
+    drawn = [_define(stage, where, mesh, sequence, materials, said) for where, mesh in zip(paths, meshes, strict=True)]
+    _write_points(sequence, list(zip(drawn, meshes, strict=True)), start)
+    for field_name, field in sequence.fields.items():
+        write_field(field_name, field, list(zip(drawn, meshes, strict=True)), start)
+    stage.GetRootLayer().Save()
+    return (*dict.fromkeys(said), *_notes(sequence, meshes))
+
+
+def _new_stage(path: Path) -> Any:
+    """A stage in memory, saved under a name that exists already."""
+    from pxr import Sdf, Usd
+
+    path.unlink(missing_ok=True)  # the library makes the file
+    kind = {".usda": "usda"}.get(path.suffix.lower(), "usdc")
+    layer = Sdf.Layer.CreateNew(str(path), args={"format": kind} if path.suffix.lower() == ".usd" else {})
+    return Usd.Stage.Open(layer)
+
+
+def _define(
+    stage: Any, where: str, mesh: ExportMesh, sequence: MeshSequence, materials: MaterialWriter, said: list[str]
+) -> Any:
+    """One mesh without points."""
+    from pxr import UsdGeom, UsdShade, Vt
+
+    parent = ""
+    names = where.split("/")[1:-1]
+    given = [name for name in mesh.parent.split("/") if name]
+    for name, shown in zip(names, [*names[: len(names) - len(given)], *given], strict=True):
+        parent += f"/{name}"
+        if parent == f"/{names[0]}" or not stage.GetPrimAtPath(parent):
+            name_prim(UsdGeom.Xform.Define(stage, parent).GetPrim(), shown)
+    drawn = UsdGeom.Mesh.Define(stage, where)
+    name_prim(drawn.GetPrim(), mesh.name)
+    drawn.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    drawn.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(mesh.counts, np.int32)))
+    drawn.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.corners.astype(np.int32)))
+    said.extend(write_primvars(drawn, mesh, sequence.attributes))
+    bound = [material for _, _, material in mesh.groups]
+    if any(material is not None and sequence.materials[material].double_sided for material in bound):
+        drawn.CreateDoubleSidedAttr(True)
+    if len(mesh.groups) == 1:
+        materials.bind(drawn.GetPrim(), bound[0])
+        return drawn
+    api = UsdShade.MaterialBindingAPI.Apply(drawn.GetPrim())
+    for number, (first, stop, material) in enumerate(mesh.groups):
+        faces = Vt.IntArray.FromNumpy(np.arange(first, stop, dtype=np.int32))
+        materials.bind(api.CreateMaterialBindSubset(f"part{number}", faces).GetPrim(), material)
+    api.SetMaterialBindSubsetsFamilyType(UsdGeom.Tokens.partition)
+    return drawn
+
+
+def _write_points(sequence: MeshSequence, meshes: list[tuple[Any, ExportMesh]], start: float) -> None:
+    """Points and extents of every frame."""
+    held = [PointsWriter(drawn, start, sequence.n_frames > 1) for drawn, _ in meshes]
+    for first, block in sequence.chunks():
+        for i, frame in enumerate(block):
+            whole = (frame + sequence.origin).astype(np.float32) if sequence.origin.any() else frame
+            for writer, (_, mesh) in zip(held, meshes, strict=True):
+                writer.write(first + i, np.ascontiguousarray(whole[slice(*mesh.vertices)]))
+
+
+class PointsWriter:
+    """Writes the points of one mesh, a sample per frame.
+
+    USD interpolates between samples. So of frames that repeat each other the first and the last are written, and of a mesh that
+    stands still the first.
+    """
+
+    def __init__(self, drawn: Any, start: float, is_sampled: bool) -> None:
+        self._points, self._extent = drawn.CreatePointsAttr(), drawn.CreateExtentAttr()
+        self._start, self._is_sampled = start, is_sampled
+        self._last: Float32 | None = None
+        self._last_frame = self._written = -1
+
+    def write(self, frame: int, points: Float32) -> None:
+        """Take the points ``(n, 3)`` of the next frame."""
+        if self._last is None or not np.array_equal(points, self._last):
+            if self._last is not None and self._written < self._last_frame:
+                self._store(self._last_frame, self._last)
+            self._store(frame, points)
+            self._last = points
+        self._last_frame = frame
+
+    def _store(self, frame: int, points: Float32) -> None:
+        from pxr import Usd, Vt
+
+        time = Usd.TimeCode(self._start + frame) if self._is_sampled else Usd.TimeCode.Default()
+        bounds = np.stack([points.min(axis=0), points.max(axis=0)]) if len(points) else np.zeros((2, 3), np.float32)
+        self._points.Set(Vt.Vec3fArray.FromNumpy(points), time)
+        self._extent.Set(Vt.Vec3fArray.FromNumpy(bounds), time)
+        self._written = frame
+
+
+def _paths(meshes: list[ExportMesh]) -> list[str]:
+    """A path for each mesh, all below one root; names that USD does not allow are changed, equal paths numbered."""
+    chains = [[*filter(None, mesh.parent.split("/")), mesh.name] for mesh in meshes]
+    shared = len({chain[0] for chain in chains}) == 1 and all(len(chain) > 1 for chain in chains)
+    result: list[str] = []
+    taken: set[str] = set()
+    for chain in chains:
+        path = "/" + "/".join(identifier(name) for name in (chain if shared else [ROOT, *chain]))
+        free, number = path, 1
+        while free in taken:
+            free, number = f"{path}_{number}", number + 1
+        taken.add(free)
+        result.append(free)
+    return result
+
+
+def image_names(sequence: MeshSequence) -> list[str]:
+    """A file name for each image, none twice and none with a folder."""
+    endings = {"image/png": ".png", "image/jpeg": ".jpg", "image/webp": ".webp", "image/x-exr": ".exr"}
+    result: list[str] = []
+    for number, image in enumerate(sequence.images):
+        plain = Path(os.path.basename(image.name.replace("\\", "/")) or f"image{number}")
+        ending = endings.get(image.media_type, plain.suffix)
+        stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in plain.stem) or f"image{number}"
+        name, count = f"{stem}{ending}", 1
+        while name in result:
+            name, count = f"{stem}_{count}{ending}", count + 1
+        result.append(name)
+    return result
+
+
+def _write_images(sequence: MeshSequence, folder: Path) -> None:
+    if not sequence.images:
+        return
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as exc:
+        raise OutputError(f"cannot write {folder}: {exc.strerror}; choose another folder") from exc
+    for name, image in zip(image_names(sequence), sequence.images, strict=True):
+        with atomic_path(folder / name) as temporary:
+            temporary.write_bytes(image.data)
+
+
+def _notes(sequence: MeshSequence, meshes: list[ExportMesh]) -> tuple[str, ...]:
+    said = [] if sequence.metadata.metres_per_unit else ["the length of a unit is unknown; the stage says 1 metre"]
+    lost = uncovered(sequence, meshes)
+    if lost:
+        said.append(f"{lost} vertices belong to no part; USD holds meshes alone, so they were left out")
+    if sequence.origin.any():
+        said.append(f"USD holds float32 points; the origin {notes.show_origin(sequence.origin)} was added to them")
+    if sequence.metadata.up_axis == "x":
+        said.append("USD has no X-up stages; the stage says Y up, and positions are as they were")
+    unlit = [material.name for material in sequence.materials if material.unlit]
+    if unlit:
+        said.append(f"UsdPreviewSurface has no unlit materials; {', '.join(unlit[:5])} are lit in the file")
+    return tuple(said)

@@ -1,0 +1,54 @@
+"""Some parts of a sequence as a sequence: the same vertices, fewer triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gvpipe.arguments import did_you_mean
+from gvpipe.arrays import Int64
+from gvpipe.errors import InputError
+from gvpipe.sequence import MeshSequence
+
+LISTED = 12  # names in a message
+
+
+def only_parts(sequence: MeshSequence, names: Sequence[str]) -> MeshSequence:
+    """Return the sequence with the triangles of parts of some names, in their order.
+
+    All vertices stay, so that fields and attributes of vertices fit. Polygons are left out: triangles are drawn.
+
+    Raises:
+        InputError: no part has one of the names.
+    """
+    known = list(dict.fromkeys(part.name for part in sequence.parts))
+    for name in names:
+        if name not in known:
+            listed = ", ".join(known[:LISTED]) + (f" and {len(known) - LISTED} more" if len(known) > LISTED else "")
+            there = f"there are: {listed}" if known else "it has no named parts"
+            raise InputError(f"{sequence.name}: part {name!r} asked for; {there}{did_you_mean(name, known)}")
+    numbers = [number for number, part in enumerate(sequence.parts) if part.name in names]
+    ranges = [np.arange(*sequence.parts[number].triangles) for number in numbers]
+    triangles = np.concatenate(ranges)
+    ends = np.cumsum([len(each) for each in ranges]).tolist()
+    parts = tuple(
+        replace(sequence.parts[number], triangles=(end - len(each), end))
+        for number, each, end in zip(numbers, ranges, ends, strict=True)
+    )
+    rows = {"triangle": triangles, "corner": (3 * triangles[:, None] + np.arange(3)).ravel(), "part": np.array(numbers)}
+    return replace(
+        sequence,
+        faces=sequence.faces[triangles],
+        parts=parts,
+        polygons=None,
+        attributes=_chosen(sequence.attributes, rows),
+        fields=_chosen(sequence.fields, rows),
+    )
+
+
+def _chosen(named: Mapping[str, Any], rows: dict[str, Int64]) -> dict[str, Any]:
+    """Attributes or fields with the rows that are left."""
+    return {name: each.select(rows[each.domain]) if each.domain in rows else each for name, each in named.items()}
