@@ -12,12 +12,14 @@ from gvpipe.io.gltf import read_animated, write_animated
 from gvpipe.io.npz import read_npz, write_npz
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.point_cache import read_mdd, read_npy, read_pc2, write_mdd, write_npy, write_pc2
+from gvpipe.io.pvd_writer import write_pvd
 from gvpipe.io.simulation.ensight import read_ensight
 from gvpipe.io.simulation.exodus import read_exodus
 from gvpipe.io.simulation.vtkhdf import read_vtkhdf
 from gvpipe.io.simulation.xdmf import read_xdmf
 from gvpipe.io.step_lists import read_step_list
 from gvpipe.io.usd import read_usd, write_usd
+from gvpipe.io.vtkhdf_writer import write_vtkhdf
 from gvpipe.sequence import MeshSequence
 
 MeshReader = Callable[[str | os.PathLike[str]], MeshSequence]
@@ -43,6 +45,8 @@ WRITERS: dict[str, SceneWriter] = {
     ".pc2": write_pc2,
     ".mdd": write_mdd,
     ".npy": write_npy,
+    ".pvd": write_pvd,
+    ".vtkhdf": write_vtkhdf,
 }
 
 

@@ -27,9 +27,9 @@ from gvpipe.io.simulation.steps import read_steps
 from gvpipe.sequence import MeshSequence
 
 # elements: VTK's type and the number of nodes
-ELEMENTS = {"point": (1, 1), "bar2": (3, 2), "bar3": (21, 3), "tria3": (5, 3), "tria6": (22, 6), "quad4": (9, 4), 
-            "quad8": (23, 8), "tetra4": (10, 4), "tetra10": (24, 10), "pyramid5": (14, 5), "pyramid13": (27, 13), "penta6": (13, 6),
-            "penta15": (26, 15), "hexa8": (12, 8), "hexa20": (25, 20)}  # fmt: skip
+ELEMENTS = {"point": (1, 1), "bar2": (3, 2), "bar3": (21, 3), "tria3": (5, 3), "tria6": (22, 6), "quad4": (9, 4),
+            "quad8": (23, 8), "tetra4": (10, 4), "tetra10": (24, 10), "pyramid5": (14, 5), "pyramid13": (27, 13),
+            "penta6": (13, 6), "penta15": (26, 15), "hexa8": (12, 8), "hexa20": (25, 20)}  # fmt: skip
 POLYGON = 7
 
 

@@ -29,7 +29,7 @@ NAMED = re.compile(r"""//Grid\[@Name=["']([^"']*)["']\]/\*\[self::Topology or se
 # VTK's type by name, and by the number that mixed topologies have
 NAMES = {"TRIANGLE": 5, "QUADRILATERAL": 9, "TETRAHEDRON": 10, "PYRAMID": 14, "WEDGE": 13, "HEXAHEDRON": 12, "TRIANGLE_6": 22,
          "TRI_6": 22, "QUADRILATERAL_8": 23, "QUAD_8": 23, "QUADRILATERAL_9": 28, "QUAD_9": 28, "TETRAHEDRON_10": 24,
-         "TET_10": 24, "PYRAMID_13": 27, "WEDGE_15": 26, "WEDGE_18": 32, "HEXAHEDRON_20": 25, "HEX_20": 25, 
+         "TET_10": 24, "PYRAMID_13": 27, "WEDGE_15": 26, "WEDGE_18": 32, "HEXAHEDRON_20": 25, "HEX_20": 25,
          "HEXAHEDRON_24": 33, "HEX_24": 33, "HEXAHEDRON_27": 29, "HEX_27": 29,
          "EDGE_3": 21, "POLYVERTEX": 2, "POLYLINE": 4, "POLYGON": 7}  # fmt: skip
 NUMBERS = {1: 2, 2: 4, 3: 7, 4: 5, 5: 9, 6: 10, 7: 14, 8: 13, 9: 12, 34: 21, 35: 28, 36: 22, 37: 23, 38: 24, 39: 27, 40: 26,
