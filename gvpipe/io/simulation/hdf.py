@@ -41,7 +41,7 @@ def open_hdf(path: Path) -> HdfFile:
         if file.read(8) != SIGNATURE:
             raise InputError(f"{path} is not an HDF5 file; export it again")
     try:
-        return HdfFile(h5py, h5py.File(path, "r"), size)
+        return HdfFile(h5py, h5py.File(path, "r", locking=False), size)
     except OSError as exc:
         raise InputError(f"{path} cannot be read as HDF5, or is cut short ({' '.join(str(exc).split())[:120]})") from exc
 
