@@ -62,10 +62,14 @@ def surface_values(step: Dataset, surface: Surface) -> dict[str, Callable[[], Fr
     values: dict[str, Callable[[], FrameValues]] = {}
     for domain, data, rows in (("vertex", step.point_data, surface.points), ("triangle", step.cell_data, surface.cells)):
         for name, one in data.items():
+            one = one._replace(kind="normal") if name.lower() in NORMAL_NAMES and not one.kind else one
             given = USUAL_NAMES.get(one.kind, "") if domain == "vertex" else ""
             label = given if given and given not in step.point_data else name
             label = label if label not in values else f"cell_{label}"
-            values[label] = _reader(name, one, domain, rows)
+            # what has another name than `normal` is a vector: a mesh has one normal
+            values[label] = _reader(
+                name, one if label == "normal" or one.kind != "normal" else one._replace(kind="vector"), domain, rows
+            )
     return values
 
 
@@ -99,11 +103,9 @@ def plain_numbers(values: Array) -> Array:
 
 
 def guess(name: str, values: Array) -> str:
-    """The kind that a name and an array suggest; a normal or a texture coordinate only by its exact name."""
+    """The kind that a name and an array suggest; texture coordinates only by their exact name."""
     plain = name.lower()
     width = values.shape[1] if values.ndim == 2 else 1
-    if values.dtype.kind == "f" and width == 3 and plain in NORMAL_NAMES:
-        return "normal"
     if values.dtype.kind == "f" and width == 2 and plain in UV_NAMES:
         return "uv"
     if values.dtype == np.uint8 and width in WIDTHS["color"]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
-from gvpipe.io.mesh import Mesh
+from gvpipe.errors import InputError
+from gvpipe.io.mesh import FrameValues, Mesh
 from gvpipe.io.simulation.cells import Cells
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
 from gvpipe.io.simulation.legacy import load_legacy
@@ -41,8 +43,19 @@ class SurfaceLoader:
             notes=(*step.notes, *surface.notes),
             polygons=surface.polygons,
             parts=block_parts(step, surface),
-            animated=surface_values(step, surface),
+            animated={name: partial(_guarded, path, name, read) for name, read in surface_values(step, surface).items()},
         )
+
+
+def _guarded(path: Path, name: str, read: Callable[[], FrameValues]) -> FrameValues:
+    """Numbers of a file; raises `InputError` with its name for whatever goes wrong."""
+    try:
+        return read()
+    except InputError:
+        raise
+    except Exception as exc:  # damaged files raise nearly anything inside NumPy
+        reason = " ".join(str(exc).split())[:200] or type(exc).__name__
+        raise InputError(f"{path}: {name!r} cannot be read: {reason}; export this frame again") from exc
 
 
 STEP_LOADERS: dict[str, Callable[[], SurfaceLoader]] = {

@@ -277,3 +277,11 @@ def test_sizes_that_no_file_can_have(tmp_path: Path) -> None:
     (tmp_path / "a.vtu").write_text(text)
     with pytest.raises(InputError, match="cannot hold"):
         gvpipe.io.read(tmp_path / "a.vtu")
+
+
+def test_damaged_numbers(tmp_path: Path) -> None:
+    """Numbers are decoded after the mesh; what is wrong with them is one line with the file's name, too."""
+    text = vtu(POINTS, np.arange(8), "base64")
+    (tmp_path / "a.vtu").write_text(text.replace(inline(np.arange(8, dtype="<f4"), "base64"), "IAAAAA=="))
+    with pytest.raises(InputError, match=r"a\.vtu: 'stress' cannot be read.*cut short"):
+        gvpipe.io.read(tmp_path / "a.vtu")
