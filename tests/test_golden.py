@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asset_scene import scene
 from folders import GOLDEN
 from sequences import held, partly_still, patched, rigid, waving
 
@@ -35,6 +36,7 @@ CURRENT: dict[str, tuple[str, dict[str, Any]]] = {
     "mcgv-4-still": ("mcgv", {"gop": 5, "segment": 7, "placement": "tiles"}),
     "mcgv-4-rigid": ("mcgv", {"segment": 20}),
     "pca-2-still": ("pca", {"segment": 7}),
+    "pdct-2-asset": ("pdct", {}),
     "pdct-2-seams": ("pdct", {"clusters": 3, "segment": 7, "kept": 0.3}),
     "pdct-2-still": ("pdct", {"clusters": 3, "segment": 7}),
 }
@@ -53,6 +55,8 @@ def test_golden_file_decodes_to_the_same_positions(name: str, request: pytest.Fi
             sequence = patched()
         elif name.endswith("-rigid"):
             sequence = held(rigid(), [4, *[1] * 59])
+        elif name.endswith("-asset"):
+            sequence = scene()
         gvpipe.encode(sequence, video, codec, **settings)
         gvpipe.write(gvpipe.decode(video), expected)
     decoded, wanted = gvpipe.decode(video), gvpipe.read(expected)
@@ -60,3 +64,11 @@ def test_golden_file_decodes_to_the_same_positions(name: str, request: pytest.Fi
     assert decoded.fps == wanted.fps
     # matrix products may round differently on another machine; nothing else may differ
     assert np.allclose(np.asarray(decoded.positions), np.asarray(wanted.positions), rtol=0, atol=1e-6)
+    for beside in ("parts", "materials", "images", "metadata"):
+        assert getattr(decoded, beside) == getattr(wanted, beside)
+    assert np.array_equal(np.asarray(decoded.polygons), np.asarray(wanted.polygons))
+    assert (list(decoded.attributes), list(decoded.fields)) == (list(wanted.attributes), list(wanted.fields))
+    for name, attribute in decoded.attributes.items():
+        assert np.array_equal(np.asarray(attribute), np.asarray(wanted.attributes[name])), name
+    for name, field in decoded.fields.items():
+        assert np.allclose(field[:], wanted.fields[name][:], rtol=0, atol=1e-5), name
