@@ -278,7 +278,7 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0)
         FormatError: not a geometry video, or a damaged one.
     """
     player = Player(path)
-    start, stop = frame_range(player, start, stop)
+    start, stop = frame_range(player.path, len(player), start, stop)
     # positions before faces: the video decodes on other threads while the mesh does on this one
     positions = np.asarray(player.level(lod).positions[start:stop]) if lod else player[start:stop]
     if lod:
@@ -402,11 +402,11 @@ def info(path: StrPath) -> Info:
     )
 
 
-def frame_range(player: Player, start: int, stop: int | None) -> tuple[int, int]:
-    """Return the range with its end filled in; raises `InputError` unless it holds frames of the video, and only those."""
-    stop = len(player) if stop is None else stop
-    if not 0 <= start < stop <= len(player):
-        raise InputError(f"{player.path}: frames {start} to {stop} asked for; 0 <= start < stop <= {len(player)} is needed")
+def frame_range(name: str, n_frames: int, start: int, stop: int | None) -> tuple[int, int]:
+    """Return the range with its end filled in; raises `InputError` unless it holds some of the frames, and only those."""
+    stop = n_frames if stop is None else stop
+    if not 0 <= start < stop <= n_frames:
+        raise InputError(f"{name}: frames {start} to {stop} asked for; 0 <= start < stop <= {n_frames} is needed")
     return start, stop
 
 

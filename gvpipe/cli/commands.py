@@ -19,16 +19,14 @@ import click
 
 from gvpipe import __version__
 from gvpipe.cli.console import Output, is_verbose, output_options, print_options
-from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, shown, source_path, target_path
+from gvpipe.cli.conversion import convert
+from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, shown, source_path, target_path
 from gvpipe.errors import GvpipeError
 
 if TYPE_CHECKING:
-    from gvpipe.codec import Progress
-    from gvpipe.sequence import MeshSequence
     from gvpipe.web import ExportReport
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
-VIDEO_SUFFIXES = (".mp4", ".m4v")
 COLLECTED = 100_000  # objects made between garbage collections: a command makes cycles by imports, hardly by its work
 
 
@@ -190,28 +188,41 @@ def encode(
 @click.argument("target", metavar="OUTPUT")
 @click.option("--start", type=int, default=0, show_default=True, help="First frame.")
 @click.option("--stop", type=int, help="Frame after the last. [default: the end]")
+@click.option("--fps", type=float, help="Frames per second of the output, instead of the file's.")
+@click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail: 0 the mesh, higher is coarser.")
 @click.option("--local", is_flag=True, help="Leave out the origin of a mesh far from the world's: float32 positions near 0.")
 @output_options
-def decode(source: str, target: str, start: int, stop: int | None, lod: int, local: bool, out: Output) -> None:
+def decode(
+    source: str,
+    target: str,
+    start: int,
+    stop: int | None,
+    fps: float | None,
+    parts: tuple[str, ...],
+    lod: int,
+    local: bool,
+    out: Output,
+) -> None:
     """Decode a geometry video.
 
-    OUTPUT is an .npz, or a pattern of frame files such as out/%04d.obj (also .ply, .stl, .off, .glb), or - for an .npz on
-    standard output. FILE - is a geometry video on standard input.
+    OUTPUT is an .npz, a scene (.glb, .usdc, .usda, .usdz, .abc), a point cache (.pc2, .mdd, .npy), a pattern of frame files
+    such as out/%04d.obj (also .ply, .stl, .off, .glb), or - for an .npz on standard output. FILE - is a geometry video on
+    standard input.
     """
     from gvpipe import api, notes
+    from gvpipe.cli.choices import chosen
 
     out = out.carrying(target)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         player = api.open(given)
-        start, stop = api.frame_range(player, start, stop)
-        level = player.level(lod)
-        sequence = replace(level.part(start, stop), positions=_Part(level, start, stop, progress))
+        start, stop = api.frame_range(player.path, len(player), start, stop)
+        sequence = chosen(player.level(lod).part(start, stop), parts, fps, "decode", progress)
         noticed = api.write(sequence.local() if local else sequence, path, start)
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
     for note in noticed:
         out.note(note)
-    values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": player.fps}
+    values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces), "lod": lod}
     out.json({**values, "origin": [0.0, 0.0, 0.0] if local else player.origin.tolist(), "notes": noticed})
     shape = f"{stop - start} frames, {sequence.n_vertices} vertices"
@@ -269,6 +280,9 @@ def compare(reference: str, distorted: str, out: Output) -> None:
             largest, mean = error["max"], error["mean"]
             measured = "one side lacks it" if largest is None else f"largest error {largest:.4g}, mean {mean:.4g}"
             out.text(f"{kind} {name}: {measured}")
+
+
+cli.add_command(convert)
 
 
 @cli.command("export-html")
@@ -450,20 +464,6 @@ def codecs(out: Output) -> None:
         out.text(f"{name}: {codec.summary}; {defaults}")
         for own in variants[name]:
             out.text(f"  --codec auto tries too: {' '.join(f'{key}={value}' for key, value in own.items())}")
-
-
-class _Part:
-    """Some frames of a sequence, which tell how far they have been read."""
-
-    def __init__(self, sequence: MeshSequence, start: int, stop: int, progress: Progress | None) -> None:
-        self._sequence, self._start, self._progress = sequence, start, progress
-        self.shape = (stop - start, sequence.n_vertices, 3)
-
-    def __getitem__(self, key: slice, /) -> Any:
-        first, last, _ = key.indices(self.shape[0])
-        if self._progress:
-            self._progress("decode", last / self.shape[0])
-        return self._sequence.read(self._start + first, self._start + last)
 
 
 def _parse_numbers(option: str, text: str) -> list[float]:

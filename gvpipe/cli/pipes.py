@@ -16,6 +16,7 @@ from gvpipe.atomic import output_error, temporary_folder
 from gvpipe.errors import GvpipeError, InputError, OutputError
 
 PIPE = "-"
+VIDEO_SUFFIXES = (".mp4", ".m4v")
 STDIN, STDOUT = "standard input", "standard output"
 
 
