@@ -20,7 +20,7 @@ import click
 from gvpipe import __version__
 from gvpipe.cli.console import Output, is_verbose, output_options, print_options
 from gvpipe.cli.conversion import convert
-from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, shown, source_path, target_path
+from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.errors import GvpipeError
 
 if TYPE_CHECKING:
@@ -230,21 +230,26 @@ def decode(
 
 
 @cli.command()
-@click.argument("source", metavar="FILE.mp4")
+@click.argument("source", metavar="FILE")
+@click.option("--clip", metavar="NAME", help="The animation to look at, of a glTF file that has several. [default: the first]")
+@click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @output_options
-def info(source: str, out: Output) -> None:
-    """Tell what a geometry video (- for standard input) holds and where its bytes go."""
-    from gvpipe import api, notes
-    from gvpipe.cli.asset_lines import asset_lines
+def info(source: str, clip: str | None, mesh: str | None, out: Output) -> None:
+    """Tell what a geometry video (- for standard input) holds and where its bytes go, or what is read of any other input."""
+    from gvpipe import api
+    from gvpipe.cli.asset_lines import asset_lines, shape_lines
 
     with source_path(source) as path, out.progress():
+        if not is_video(path):
+            _source_info(source, path, clip, mesh, out)
+            return
+        if clip is not None or mesh is not None:
+            raise click.UsageError("--clip and --mesh are for sources; a geometry video has neither")
         found = api.info(path)
     out.json(found.to_json())
-    low, high = found.bounding_box["min"], found.bounding_box["max"]
-    place = f", relative to {notes.show_origin(found.origin)}" if any(found.origin) else ""
     out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}")
-    out.text(f"{found.vertices} vertices, {found.triangles} triangles, {found.frames} frames at {found.fps:g} fps")
-    out.text("frame 0 lies in " + " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True)) + place)
+    for line in shape_lines(found):
+        out.text(line)
     if len(found.levels) > 1:
         out.text("levels of detail, vertices: " + ", ".join(f"{lod}: {count}" for lod, count in enumerate(found.levels)))
     for line in asset_lines(found):
@@ -253,6 +258,22 @@ def info(source: str, out: Output) -> None:
         out.note(note)
     out.text(f"{_size(found.bytes)}, {found.bpvf:.3f} bits per vertex and frame:")
     _print_sections(out, found.sections, found.vertices * found.frames)
+
+
+def _source_info(source: str, path: str, clip: str | None, mesh: str | None, out: Output) -> None:
+    """Print what is read of an input that is no geometry video."""
+    from gvpipe.cli.asset_lines import asset_lines, shape_lines
+    from gvpipe.source_info import source_info
+
+    found = source_info(path, clip, mesh)
+    out.json(found.to_json())
+    out.text(shown(source, STDIN) + ("" if found.bytes is None else f": {_size(found.bytes)}"))
+    for line in [*shape_lines(found), *asset_lines(found)]:
+        out.text(line)
+    if found.clips:
+        out.text(f"clips: {', '.join(found.clips)}")
+    for note in found.notes:
+        out.note(note)
 
 
 @cli.command()

@@ -67,6 +67,17 @@ def shown(name: str, pipe: str) -> str:
     return pipe if name == PIPE else name
 
 
+def is_video(path: str) -> bool:
+    """Whether a path is that of an MP4 file, by its name or its first bytes; it need not be there."""
+    if path.lower().endswith(VIDEO_SUFFIXES) or not os.path.isfile(path):
+        return path.lower().endswith(VIDEO_SUFFIXES)
+    try:
+        with open(path, "rb") as file:
+            return file.read(8)[4:8] == b"ftyp"
+    except OSError:
+        return False  # whoever reads it says why it cannot be read
+
+
 def _suffix(head: bytes) -> str:
     """By the first bytes: an archive, a video."""
     if head.startswith(b"PK"):
