@@ -1,4 +1,4 @@
-"""Frames of a sequence seen otherwise, loaded when they are read: in another order, some of them, as float32, shifted."""
+"""Frames of a sequence seen otherwise, loaded when they are read: in another order, some, as float32, shifted, watched."""
 
 from __future__ import annotations
 
@@ -34,6 +34,19 @@ class Span:
     def __getitem__(self, key: slice, /) -> Floats:
         start, stop, _ = key.indices(self.shape[0])
         return self._read(self._start + start, self._start + stop)
+
+
+class Watched:
+    """The same frames; ``told`` is called with the number of the frame after the last that is asked for, before it is read."""
+
+    def __init__(self, read: Read, n_frames: int, n_vertices: int, told: Callable[[int], None]) -> None:
+        self._read, self._told = read, told
+        self.shape: tuple[int, ...] = (n_frames, n_vertices, 3)
+
+    def __getitem__(self, key: slice, /) -> Floats:
+        start, stop, _ = key.indices(self.shape[0])
+        self._told(stop)
+        return self._read(start, stop)
 
 
 class Narrowed:

@@ -10,7 +10,7 @@ it is kept beside, so that errors are measured against what was given and not ag
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -26,7 +26,7 @@ from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part, check_parts
 from gvpipe.asset.polygons import as_polygons
 from gvpipe.errors import InputError
-from gvpipe.frame_views import Narrowed, Permuted, Shifted, Span
+from gvpipe.frame_views import Narrowed, Permuted, Shifted, Span, Watched
 from gvpipe.notes import ASSUMED_FPS, show_origin
 from gvpipe.origin import as_origin, choose_origin, narrow, rounding
 
@@ -267,6 +267,12 @@ class MeshSequence:
         """Return the sequence at another frame rate."""
         kept = tuple(note for note in self.notes if note != ASSUMED_FPS)
         return self._derived(self.positions, self._exact, fps=fps, notes=kept)
+
+    def watched(self, told: Callable[[int], None]) -> MeshSequence:
+        """Return the same sequence, which calls ``told`` with the frame after the last of those that are read, for progress."""
+        size = self.n_frames, self.n_vertices
+        exact = None if self._exact is None else Watched(self.read_absolute, *size, told)
+        return self._derived(Watched(self.read, *size, told), exact)
 
     def _derived(self, positions: Frames, exact: Frames | None, **changes: Any) -> MeshSequence:
         result = replace(self, positions=positions, **changes)

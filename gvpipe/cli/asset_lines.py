@@ -1,4 +1,4 @@
-"""What `gvpipe info` prints of an asset: a line for each kind of thing."""
+"""What `gvpipe info` prints of a mesh and its asset: a line for each kind of thing."""
 
 from __future__ import annotations
 
@@ -7,11 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gvpipe.api import Info
+    from gvpipe.source_info import SourceInfo
 
 MOST = 12  # names in a line
 
 
-def asset_lines(info: Info) -> Iterator[str]:
+def shape_lines(info: Info | SourceInfo) -> Iterator[str]:
+    """Yield the numbers of vertices, triangles and frames, and where frame 0 lies."""
+    from gvpipe.notes import show_origin
+
+    low, high = info.bounding_box["min"], info.bounding_box["max"]
+    place = f", relative to {show_origin(info.origin)}" if any(info.origin) else ""
+    yield f"{info.vertices} vertices, {info.triangles} triangles, {info.frames} frames at {info.fps:g} fps"
+    yield "frame 0 lies in " + " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True)) + place
+
+
+def asset_lines(info: Info | SourceInfo) -> Iterator[str]:
     """Yield the lines; none for a file of positions and triangles alone."""
     if info.parts:
         yield f"parts: {_names([part['name'] for part in info.parts])}"
@@ -34,9 +45,12 @@ def _described(each: dict[str, Any]) -> str:
     unit = f" {each['unit']}" if each["unit"] else ""
     span = f", {each['range'][0]:g}..{each['range'][1]:g}{unit}" if each.get("range") else ""
     measure = " degrees" if each["kind"] in ("normal", "tangent") else unit
-    bound = f"within {each['bound']:.4g}{measure}" if each["bound"] else "exact"
     shape = f"{each['components']} x {each['type']} per {each['domain']}"
-    return f"{each['name']}: {each['kind']}, {shape}{span}, {bound}, {each['bytes']} bytes"
+    text = f"{each['name']}: {each['kind']}, {shape}{span}"
+    if "bound" not in each:  # of a source
+        return text
+    bound = f"within {each['bound']:.4g}{measure}" if each["bound"] else "exact"
+    return f"{text}, {bound}, {each['bytes']} bytes"
 
 
 def _names(names: list[str]) -> str:

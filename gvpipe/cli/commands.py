@@ -19,16 +19,14 @@ import click
 
 from gvpipe import __version__
 from gvpipe.cli.console import Output, is_verbose, output_options, print_options
-from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, shown, source_path, target_path
+from gvpipe.cli.conversion import convert
+from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.errors import GvpipeError
 
 if TYPE_CHECKING:
-    from gvpipe.codec import Progress
-    from gvpipe.sequence import MeshSequence
     from gvpipe.web import ExportReport
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
-VIDEO_SUFFIXES = (".mp4", ".m4v")
 COLLECTED = 100_000  # objects made between garbage collections: a command makes cycles by imports, hardly by its work
 
 
@@ -192,28 +190,41 @@ def encode(
 @click.argument("target", metavar="OUTPUT")
 @click.option("--start", type=int, default=0, show_default=True, help="First frame.")
 @click.option("--stop", type=int, help="Frame after the last. [default: the end]")
+@click.option("--fps", type=float, help="Frames per second of the output, instead of the file's.")
+@click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail: 0 the mesh, higher is coarser.")
 @click.option("--local", is_flag=True, help="Leave out the origin of a mesh far from the world's: float32 positions near 0.")
 @output_options
-def decode(source: str, target: str, start: int, stop: int | None, lod: int, local: bool, out: Output) -> None:
+def decode(
+    source: str,
+    target: str,
+    start: int,
+    stop: int | None,
+    fps: float | None,
+    parts: tuple[str, ...],
+    lod: int,
+    local: bool,
+    out: Output,
+) -> None:
     """Decode a geometry video.
 
-    OUTPUT is an .npz, or a pattern of frame files such as out/%04d.obj (also .ply, .stl, .off, .glb), or - for an .npz on
-    standard output. FILE - is a geometry video on standard input.
+    OUTPUT is an .npz, a scene (.glb, .usdc, .usda, .usdz, .abc), a point cache (.pc2, .mdd, .npy), a pattern of frame files
+    such as out/%04d.obj (also .ply, .stl, .off, .glb), or - for an .npz on standard output. FILE - is a geometry video on
+    standard input.
     """
     from gvpipe import api, notes
+    from gvpipe.cli.choices import chosen
 
     out = out.carrying(target)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         player = api.open(given)
-        start, stop = api.frame_range(player, start, stop)
-        level = player.level(lod)
-        sequence = replace(level.part(start, stop), positions=_Part(level, start, stop, progress))
+        start, stop = api.frame_range(player.path, len(player), start, stop)
+        sequence = chosen(player.level(lod).part(start, stop), parts, fps, "decode", progress)
         noticed = api.write(sequence.local() if local else sequence, path, start)
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
     for note in noticed:
         out.note(note)
-    values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": player.fps}
+    values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces), "lod": lod}
     out.json({**values, "origin": [0.0, 0.0, 0.0] if local else player.origin.tolist(), "notes": noticed})
     shape = f"{stop - start} frames, {sequence.n_vertices} vertices"
@@ -221,21 +232,26 @@ def decode(source: str, target: str, start: int, stop: int | None, lod: int, loc
 
 
 @cli.command()
-@click.argument("source", metavar="FILE.mp4")
+@click.argument("source", metavar="FILE")
+@click.option("--clip", metavar="NAME", help="The animation to look at, of a glTF file that has several. [default: the first]")
+@click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @output_options
-def info(source: str, out: Output) -> None:
-    """Tell what a geometry video (- for standard input) holds and where its bytes go."""
-    from gvpipe import api, notes
-    from gvpipe.cli.asset_lines import asset_lines
+def info(source: str, clip: str | None, mesh: str | None, out: Output) -> None:
+    """Tell what a geometry video (- for standard input) holds and where its bytes go, or what is read of any other input."""
+    from gvpipe import api
+    from gvpipe.cli.asset_lines import asset_lines, shape_lines
 
     with source_path(source) as path, out.progress():
+        if not is_video(path):
+            _source_info(source, path, clip, mesh, out)
+            return
+        if clip is not None or mesh is not None:
+            raise click.UsageError("--clip and --mesh are for sources; a geometry video has neither")
         found = api.info(path)
     out.json(found.to_json())
-    low, high = found.bounding_box["min"], found.bounding_box["max"]
-    place = f", relative to {notes.show_origin(found.origin)}" if any(found.origin) else ""
     out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}")
-    out.text(f"{found.vertices} vertices, {found.triangles} triangles, {found.frames} frames at {found.fps:g} fps")
-    out.text("frame 0 lies in " + " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True)) + place)
+    for line in shape_lines(found):
+        out.text(line)
     if len(found.levels) > 1:
         out.text("levels of detail, vertices: " + ", ".join(f"{lod}: {count}" for lod, count in enumerate(found.levels)))
     for line in asset_lines(found):
@@ -244,6 +260,22 @@ def info(source: str, out: Output) -> None:
         out.note(note)
     out.text(f"{_size(found.bytes)}, {found.bpvf:.3f} bits per vertex and frame:")
     _print_sections(out, found.sections, found.vertices * found.frames)
+
+
+def _source_info(source: str, path: str, clip: str | None, mesh: str | None, out: Output) -> None:
+    """Print what is read of an input that is no geometry video."""
+    from gvpipe.cli.asset_lines import asset_lines, shape_lines
+    from gvpipe.source_info import source_info
+
+    found = source_info(path, clip, mesh)
+    out.json(found.to_json())
+    out.text(shown(source, STDIN) + ("" if found.bytes is None else f": {_size(found.bytes)}"))
+    for line in [*shape_lines(found), *asset_lines(found)]:
+        out.text(line)
+    if found.clips:
+        out.text(f"clips: {', '.join(found.clips)}")
+    for note in found.notes:
+        out.note(note)
 
 
 @cli.command()
@@ -271,6 +303,9 @@ def compare(reference: str, distorted: str, out: Output) -> None:
             largest, mean = error["max"], error["mean"]
             measured = "one side lacks it" if largest is None else f"largest error {largest:.4g}, mean {mean:.4g}"
             out.text(f"{kind} {name}: {measured}")
+
+
+cli.add_command(convert)
 
 
 @cli.command("export-html")
@@ -452,20 +487,6 @@ def codecs(out: Output) -> None:
         out.text(f"{name}: {codec.summary}; {defaults}")
         for own in variants[name]:
             out.text(f"  --codec auto tries too: {' '.join(f'{key}={value}' for key, value in own.items())}")
-
-
-class _Part:
-    """Some frames of a sequence, which tell how far they have been read."""
-
-    def __init__(self, sequence: MeshSequence, start: int, stop: int, progress: Progress | None) -> None:
-        self._sequence, self._start, self._progress = sequence, start, progress
-        self.shape = (stop - start, sequence.n_vertices, 3)
-
-    def __getitem__(self, key: slice, /) -> Any:
-        first, last, _ = key.indices(self.shape[0])
-        if self._progress:
-            self._progress("decode", last / self.shape[0])
-        return self._sequence.read(self._start + first, self._start + last)
 
 
 def _parse_numbers(option: str, text: str) -> list[float]:

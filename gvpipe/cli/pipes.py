@@ -16,6 +16,7 @@ from gvpipe.atomic import output_error, temporary_folder
 from gvpipe.errors import GvpipeError, InputError, OutputError
 
 PIPE = "-"
+VIDEO_SUFFIXES = (".mp4", ".m4v")
 STDIN, STDOUT = "standard input", "standard output"
 
 
@@ -64,6 +65,17 @@ def target_path(target: str, suffix: str) -> Iterator[str]:
 def shown(name: str, pipe: str) -> str:
     """A file's name as results print it."""
     return pipe if name == PIPE else name
+
+
+def is_video(path: str) -> bool:
+    """Whether a path is that of an MP4 file, by its name or its first bytes; it need not be there."""
+    if path.lower().endswith(VIDEO_SUFFIXES) or not os.path.isfile(path):
+        return path.lower().endswith(VIDEO_SUFFIXES)
+    try:
+        with open(path, "rb") as file:
+            return file.read(8)[4:8] == b"ftyp"
+    except OSError:
+        return False  # whoever reads it says why it cannot be read
 
 
 def _suffix(head: bytes) -> str:

@@ -1,4 +1,8 @@
-"""Normals of each frame of a sequence, for formats that write them."""
+"""Normals of each frame of a sequence, for formats that write them.
+
+Static normals would be wrong in all frames but the first. So each frame has its own: a field's, those that follow from its
+surface by a rule, or those of the first frame turned with the surface (`turned_normals`).
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ import numpy as np
 from gvpipe.arrays import Array, Float32, Int32, Int64
 from gvpipe.attributes.surface_normals import surface_normals
 from gvpipe.io.own_normals import entries_of, own_rule
+from gvpipe.io.turned_normals import TurnedNormals
 from gvpipe.sequence import MeshSequence
 
 
@@ -21,8 +26,9 @@ class FrameNormals:
         indices: ``(3 T,)`` the normal of each corner; None: vertex i has normal i.
         first: ``(N, 3)`` of the first frame.
         positions: ``(V, 3)`` of the first frame; frames of equal positions have its normals.
-        rule: by which those of other frames follow; ``""``: they are a field of the sequence.
+        rule: by which those of other frames follow; ``""``: they are a field of the sequence, or turned.
         entries, faces: for the rule.
+        turned: gives those of other frames, where no rule does.
     """
 
     indices: Int32 | None
@@ -31,6 +37,7 @@ class FrameNormals:
     rule: str
     entries: Int64
     faces: Int32
+    turned: TurnedNormals | None = None
 
     def of(self, positions: Float32, fields: Mapping[str, Array]) -> Float32:
         """Normals ``(N, 3)`` of a frame."""
@@ -38,6 +45,8 @@ class FrameNormals:
             return np.asarray(fields["normal"], np.float32)
         if np.array_equal(positions, self.positions):
             return self.first
+        if self.turned is not None:
+            return self.turned.of(positions)
         own: Float32 = surface_normals(positions[None], self.faces, self.entries, self.rule)[0]
         if self.indices is not None:
             return own
@@ -46,17 +55,10 @@ class FrameNormals:
         return result
 
 
-def unknown_normals(sequence: MeshSequence) -> tuple[str, ...]:
-    """What to say of normals that are known in the first frame alone: they would be wrong in all others."""
-    given = sequence.attributes.get("normal")
-    is_unknown = given is not None and "normal" not in sequence.fields and sequence.n_frames > 1
-    return ("normals that do not follow from the moving surface",) if is_unknown and frame_normals(sequence) is None else ()
-
-
 def frame_normals(sequence: MeshSequence) -> FrameNormals | None:
-    """The normals to write: a field, or an attribute of a still mesh, or one whose rule holds in the first frame.
+    """The normals to write: a field, or an attribute; None if there are none.
 
-    None if there are none, or if those of later frames are not known.
+    Those of later frames follow by the rule that holds in the first frame. Without such a rule they are turned.
     """
     none = np.zeros(0, np.int64)
     field, given = sequence.fields.get("normal"), sequence.attributes.get("normal")
@@ -69,8 +71,15 @@ def frame_normals(sequence: MeshSequence) -> FrameNormals | None:
     entries, corners = entries_of(given, sequence.faces)
     rows = corners if given.domain == "corner" else sequence.faces.reshape(-1)[corners]
     rule = own_rule(np.asarray(given)[rows], positions, sequence.faces, entries)
-    if rule is None and sequence.n_frames > 1:
-        return None
-    if given.domain == "vertex":
-        return FrameNormals(None, np.asarray(given), positions, rule or "", entries, sequence.faces)
-    return FrameNormals(entries.astype(np.int32), np.asarray(given)[corners], positions, rule or "", entries, sequence.faces)
+    turned = TurnedNormals(given, positions, sequence.faces) if rule is None and sequence.n_frames > 1 else None
+    indices = None if given.domain == "vertex" else entries.astype(np.int32)
+    first = np.asarray(given, np.float32)
+    first = first if indices is None else first[corners]
+    return FrameNormals(indices, first, positions, rule or "", entries, sequence.faces, turned)
+
+
+def turned_note(normals: FrameNormals | None, format_name: str) -> tuple[str, ...]:
+    """What to say of normals that are turned: a line, or none."""
+    if normals is None or normals.turned is None:
+        return ()
+    return (f"normals follow from no rule; in {format_name} those of later frames are turned with the surface",)

@@ -11,7 +11,7 @@ from gvpipe.arrays import Array, Float32, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.part import Part
 from gvpipe.asset.polygons import polygon_corners
-from gvpipe.io.frame_normals import frame_normals, unknown_normals
+from gvpipe.io.frame_normals import frame_normals, turned_note
 from gvpipe.io.losses import lost_notes
 from gvpipe.io.mesh import FrameEncoder
 from gvpipe.io.mtl_writer import write_mtl
@@ -25,8 +25,7 @@ from gvpipe.sequence import MeshSequence
 def encode_obj(sequence: MeshSequence, shared: str) -> FrameEncoder:
     """An encoder of frames, with one ``.mtl`` and its pictures beside them.
 
-    Normals go in where each frame's are known: as a field, or by the rule that gives those of the first frame. Those of the
-    first frame alone would be wrong in all others.
+    Each frame has normals of its own (`gvpipe.io.frame_normals`).
     """
     uv = sequence.attributes.get("uv")
     uv = uv if uv is not None and uv.kind == "uv" and uv.domain in ("vertex", "corner") else None
@@ -54,10 +53,8 @@ def encode_obj(sequence: MeshSequence, shared: str) -> FrameEncoder:
     held = {"polygons", "parts", "materials", *wanted} | ({"uv"} if uv is not None else set())
     held |= ({"normal"} if normals is not None else set()) | ({"color"} if color is not None else set())
     opaque = color is None or color.shape[1] == 3 or bool((_parts_of_one(color[:, 3:]) == 1).all())
-    unknown = unknown_normals(sequence)
-    held |= {"normal"} if unknown else set()
-    notes = lost_notes(sequence, "OBJ", held, (*unknown, *(() if opaque else ("alpha of colours",))))
-    return FrameEncoder(encode, tuple(wanted), (*notes, *not_held("MTL", lost)), beside)
+    notes = lost_notes(sequence, "OBJ", held, () if opaque else ("alpha of colours",))
+    return FrameEncoder(encode, tuple(wanted), (*turned_note(normals, "OBJ"), *notes, *not_held("MTL", lost)), beside)
 
 
 def _indexed(each: Attribute, faces: Int32) -> tuple[Array, Int32]:

@@ -10,7 +10,7 @@ from gvpipe.arrays import Array, Float32
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.polygons import polygon_corners, polygon_starts
 from gvpipe.io.even_polygons import is_even
-from gvpipe.io.frame_normals import frame_normals, unknown_normals
+from gvpipe.io.frame_normals import frame_normals, turned_note
 from gvpipe.io.losses import lost_notes
 from gvpipe.io.mesh import FrameEncoder, as_color
 from gvpipe.io.text import format_positions
@@ -45,8 +45,7 @@ def encode_off(sequence: MeshSequence, shared: str) -> FrameEncoder:
     held = {"polygons"} | ({"uv"} if uv is not None else set()) | ({"normal"} if normals is not None else set())
     held |= {"color"} if has_color or face_colors is not None else set()
     wanted = [name for name, is_wanted in (("color", is_moving), ("normal", normals is not None)) if is_wanted]
-    unknown = unknown_normals(sequence)
-    notes = lost_notes(sequence, "OFF", held | ({"normal"} if unknown else set()), unknown)
+    notes = (*turned_note(normals, "OFF"), *lost_notes(sequence, "OFF", held))
     return FrameEncoder(encode, tuple(name for name in wanted if name in sequence.fields), notes)
 
 

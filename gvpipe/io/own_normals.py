@@ -7,6 +7,7 @@ import numpy as np
 from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.attributes.surface_normals import find_rule
+from gvpipe.io.sharing import shared_by_vertex
 from gvpipe.mesh.unique_rows import row_ids
 
 TOLERANCE = 1.0  # degrees: normals this near to a rule's are the surface's own
@@ -28,7 +29,7 @@ def entries_of(normals: Attribute, faces: Int32) -> tuple[Int64, Int64]:
     """The normal of each corner ``(3 T,)``, one for each vertex and index, and a corner that has each ``(N,)``."""
     corners = faces.reshape(-1).astype(np.int64)
     if normals.domain == "corner":
-        own = np.arange(len(corners)) if normals.indices is None else normals.indices
+        own = shared_by_vertex(normals.values, faces)[1] if normals.indices is None else normals.indices
         corners, _ = row_ids(np.stack([corners, own.astype(np.int64)], axis=1))
     _, first, entries = np.unique(corners, return_index=True, return_inverse=True)
     return entries.reshape(-1), first

@@ -19,7 +19,7 @@ from gvpipe.asset.field import Field
 from gvpipe.asset.material import Material
 from gvpipe.asset.polygons import polygon_corners, polygon_starts
 from gvpipe.io.even_polygons import is_even
-from gvpipe.io.frame_normals import frame_normals, unknown_normals
+from gvpipe.io.frame_normals import frame_normals, turned_note
 from gvpipe.io.losses import lost_notes
 from gvpipe.io.mesh import FrameEncoder
 from gvpipe.io.pictures import picture_names
@@ -46,7 +46,8 @@ def encode_ply(sequence: MeshSequence, shared: str) -> FrameEncoder:
     polygons = sequence.polygons if sequence.polygons is not None and _are_even(columns, sequence.polygons) else None
     vertex = [(name, "<f8" if sequence.origin.any() else "<f4") for name in "xyz"]
     normals = frame_normals(sequence)
-    has_normals = normals is not None and normals.indices is None
+    normals = normals if normals is not None and normals.indices is None else None
+    has_normals = normals is not None
     vertex += [(name, "<f4") for name in NORMAL_NAMES] if has_normals else []
     vertex += [(name, one.kind) for one in columns.values() if one.domain == "vertex" for name in one.properties]
     uv = sequence.attributes.get("uv")
@@ -64,20 +65,20 @@ def encode_ply(sequence: MeshSequence, shared: str) -> FrameEncoder:
     def encode(positions: Float32, fields: Mapping[str, Array]) -> bytes:
         for i, name in enumerate("xyz"):
             vertices[name] = positions[:, i] + sequence.origin[i] if sequence.origin.any() else positions[:, i]
-        if has_normals and normals is not None:
+        if normals is not None:
             for name, values in zip(NORMAL_NAMES, normals.of(positions, fields).T, strict=True):
                 vertices[name] = values
         _fill(vertices, columns, "vertex", fields, None)
         return header + vertices.tobytes() + (fixed or faces.encode(fields))
 
     held = {*columns} | ({"uv"} if uv is not None else set()) | ({"normal"} if has_normals else set())
-    unknown = unknown_normals(sequence)
-    held |= ({"polygons"} if polygons is not None else set()) | ({"normal"} if unknown else set())
+    held |= {"polygons"} if polygons is not None else set()
     if beside:  # the picture is held, and what is like a plain material
         held |= {"materials"} if replace(sequence.materials[0], name="", base_color_texture=None) == Material() else set()
         held |= set() if any(part.name for part in sequence.parts) else {"parts"}
     wanted = [name for name in sequence.fields if name in columns or (name == "normal" and has_normals)]
-    return FrameEncoder(encode, tuple(wanted), lost_notes(sequence, "PLY", held, unknown), beside)
+    notes = (*turned_note(normals, "PLY"), *lost_notes(sequence, "PLY", held))
+    return FrameEncoder(encode, tuple(wanted), notes, beside)
 
 
 def _columns(sequence: MeshSequence) -> dict[str, _Column]:

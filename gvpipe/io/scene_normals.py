@@ -1,8 +1,4 @@
-"""Normals of a moving scene, for formats that have a sample of them per frame.
-
-Static normals would be wrong in all frames but the first. So each frame has its own: a field's, the surface's, or those of the
-first frame turned with the surface (`turned_normals`).
-"""
+"""Normals of a moving scene (`frame_normals`), cut into its meshes, for formats that have a sample of them per frame."""
 
 from __future__ import annotations
 
@@ -13,11 +9,10 @@ import numpy as np
 from gvpipe.arrays import Array, Float32, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.io.frame_columns import FIRST_NORMALS
-from gvpipe.io.frame_normals import FrameNormals, frame_normals
+from gvpipe.io.frame_normals import FrameNormals, frame_normals, turned_note
 from gvpipe.io.own_normals import entries_of, own_rule
 from gvpipe.io.scene_export import ExportMesh
 from gvpipe.io.scene_mesh import Layer
-from gvpipe.io.turned_normals import TurnedNormals
 from gvpipe.sequence import MeshSequence
 
 
@@ -28,17 +23,13 @@ class SceneNormals:
         self._sequence = sequence
         moves = sequence.n_frames > 1
         self._frames: FrameNormals | None = frame_normals(sequence) if moves else None
-        self._turned = _turned(sequence) if moves and self._frames is None else None
         held = {"normal"} if moves else set()
         self.attributes: dict[str, Attribute] = {name: each for name, each in sequence.attributes.items() if name not in held}
         self.fields = {name: each for name, each in sequence.fields.items() if name not in held or self._frames is None}
-        note = f"normals follow from no rule; in {format_name} those of later frames are turned with the surface"
-        self.notes: tuple[str, ...] = (note,) if self._turned else ()
+        self.notes = turned_note(self._frames, format_name)
 
     def of(self, frame: int, positions: Float32) -> Float32 | None:
         """Normals ``(N, 3)`` of a frame, given its positions ``(V, 3)`` relative to the origin; None if there are none."""
-        if self._turned is not None:
-            return self._turned.of(positions)
         if self._frames is None:
             return None
         field = self._sequence.fields.get("normal")
@@ -52,10 +43,9 @@ class SceneNormals:
 
     def rows(self, mesh: ExportMesh) -> tuple[Array, Int64] | None:
         """The normals that a mesh uses, and the place of each corner's among them; None for normals of vertices."""
-        frames = self._frames or self._turned
-        if frames is None or frames.indices is None:
+        if self._frames is None or self._frames.indices is None:
             return None
-        used, places = np.unique(frames.indices[mesh.source], return_inverse=True)
+        used, places = np.unique(self._frames.indices[mesh.source], return_inverse=True)
         return used, places.reshape(-1).astype(np.int64)
 
 
@@ -67,10 +57,3 @@ def first_normals_note(moves: bool, attributes: Mapping[str, Attribute], faces: 
     entries, corners = entries_of(normals, faces)
     rows = corners if normals.domain == "corner" else faces.reshape(-1)[corners]
     return () if own_rule(np.asarray(normals)[rows], positions, faces, entries) else (FIRST_NORMALS,)
-
-
-def _turned(sequence: MeshSequence) -> TurnedNormals | None:
-    given = sequence.attributes.get("normal")
-    if given is None or given.kind != "normal" or given.domain not in ("vertex", "corner"):
-        return None
-    return TurnedNormals(given, sequence.read(0, 1)[0], sequence.faces)

@@ -1,7 +1,8 @@
 """How far attributes and fields of one sequence are from those of another.
 
 Attributes of vertices and of corners are compared corner by corner, so that it does not matter how a format stores them.
-Numbers are compared component by component, normals and tangents by the angle between them, in degrees.
+Numbers are compared component by component, normals and tangents by the angle between them, in degrees. Colours of different
+types are compared on the scale 0..1, colours of one type on its own scale.
 """
 
 from __future__ import annotations
@@ -84,10 +85,17 @@ def _rows(attribute: Attribute, sequence: MeshSequence, corners: Int64) -> Array
 
 def _difference(kind: str, a: Array, b: Array) -> Float64:
     """Errors of all numbers, or of all angles in degrees."""
+    if kind == "color" and a.dtype != b.dtype:
+        a, b = _as_parts_of_one(a), _as_parts_of_one(b)
     a, b = a.astype(np.float64), b.astype(np.float64)
     if kind in ANGLES:
         return angles(a[..., :3], b[..., :3])
     return np.asarray(np.where(np.isnan(a) & np.isnan(b), 0.0, np.abs(a - b)))
+
+
+def _as_parts_of_one(colors: Array) -> Array:
+    """Colours on the scale 0..1: integers are parts of the largest of their type."""
+    return colors / np.float64(np.iinfo(colors.dtype).max) if colors.dtype.kind in "iu" else colors
 
 
 def angles(a: Any, b: Any) -> Float64:

@@ -19,11 +19,11 @@ from gvpipe.arrays import Float64, Int32, UInt8
 from gvpipe.atomic import atomic_path
 from gvpipe.codec import Progress
 from gvpipe.errors import InputError
+from gvpipe.part_choice import only_parts
 from gvpipe.rasterizer.camera import Camera, framing, middle_of, used_vertices
 from gvpipe.rasterizer.renderer import Renderer, check_size
 from gvpipe.rendering.error_map import ErrorMap
 from gvpipe.rendering.field_map import FieldMap, Range
-from gvpipe.rendering.part_choice import only_parts
 from gvpipe.rendering.picture_files import STILL, WRITERS
 from gvpipe.sequence import MeshSequence
 

@@ -17,6 +17,7 @@ from mesh_files import FACES, FRAME_SUFFIXES, POSITIONS, fast, grid, same_bits
 
 from gvpipe import io
 from gvpipe.errors import InputError, OutputError
+from gvpipe.io.turned_normals import TurnedNormals
 from gvpipe.sequence import MeshSequence
 
 # frame files, both ways
@@ -165,12 +166,19 @@ def test_trimesh_loads_only_when_needed() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-@pytest.mark.parametrize("suffix", ["obj", "ply", "off"])
-def test_normals_that_later_frames_would_not_have(tmp_path: Path, suffix: str) -> None:
+@pytest.mark.parametrize("suffix", ["obj", "ply", "off", "glb"])
+def test_normals_of_an_artist_turn_with_the_surface(tmp_path: Path, suffix: str) -> None:
     normals = np.random.default_rng(3).normal(size=(37, 3)).astype(np.float32)
-    notes = io.write(grid(attributes={"normal": normals}), tmp_path / "moving" / f"%d.{suffix}")
-    assert len(notes) == 1 and "no place for normals that do not follow from the moving surface" in notes[0]
-    assert io.read(tmp_path / "moving").attributes == {}
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    given = grid(attributes={"normal": normals})
+    notes = io.write(given, tmp_path / "moving" / f"%d.{suffix}")
+    name = suffix.upper() if suffix != "glb" else "glTF"
+    assert notes == (f"normals follow from no rule; in {name} those of later frames are turned with the surface",)
+    read = io.read(tmp_path / "moving").fields["normal"]
+    used = np.unique(given.faces)
+    turned = TurnedNormals(given.attributes["normal"], given[0], given.faces)
+    assert same_bits(read[0:1][0, used], normals[used])
+    for frame in range(given.n_frames):
+        np.testing.assert_allclose(read[frame : frame + 1][0, used], turned.of(given[frame])[used], atol=2e-6)
     assert io.write(grid(1, attributes={"normal": normals}), tmp_path / f"still.{suffix}") == ()
-    used = np.unique(grid().faces)
     assert same_bits(np.asarray(io.read(tmp_path / f"still.{suffix}").attributes["normal"])[used], normals[used])

@@ -65,3 +65,18 @@ def test_corners_are_matched() -> None:
     corners = match_corners(faces, others)
     assert np.array_equal(faces.reshape(-1)[corners], others.reshape(-1))
     assert np.array_equal(np.sort(corners), np.arange(150))
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16"])
+def test_colours_of_different_types_are_compared_from_0_to_1(dtype: str) -> None:
+    source = scene()
+    largest = np.iinfo(dtype).max
+    exact = np.random.default_rng(3).integers(0, largest, (source.n_vertices, 3), endpoint=True).astype(dtype)
+    floats = (exact / np.float64(largest)).astype(np.float32)
+    floats[4, 1] += np.float32(0.25)
+    one, other = (
+        gvpipe.MeshSequence(source.positions, source.faces, attributes={"color": Attribute(values, "vertex", "color")})
+        for values in (exact, floats)
+    )
+    assert gvpipe.compare(one, other).attributes["color"]["max"] == pytest.approx(0.25, abs=1e-6)
+    assert gvpipe.compare(one, one).attributes["color"]["max"] == 0

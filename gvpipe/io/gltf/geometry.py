@@ -28,11 +28,13 @@ class Morph:
     Args:
         vertices: ``(n,)`` those that it moves, None: all.
         positions: ``(n, 3)``.
-        normals: ``(V, 3)`` or None.
+        turned: ``(m,)`` vertices whose normals it turns, None: all.
+        normals: ``(m, 3)`` or None.
     """
 
     vertices: Int64 | None
     positions: Float32
+    turned: Int64 | None
     normals: Float32 | None
 
 
@@ -235,10 +237,16 @@ def _read_morph(accessors: Accessors, target: Json, n_vertices: int, where: str)
             raise ValueError(f"{where} has {len(values)} values of {name}; {n_vertices} are needed")
         return values
 
-    normals, positions = deltas("NORMAL"), deltas("POSITION")
+    turned, normals = _without_zeros(deltas("NORMAL"))
+    moved, positions = _without_zeros(deltas("POSITION"))
     if positions is None:
-        return Morph(np.zeros(0, np.int64), np.zeros((0, 3), np.float32), normals)
-    moved = np.flatnonzero(positions.any(axis=1))
-    if 2 * len(moved) < n_vertices:
-        return Morph(moved, positions[moved], normals)
-    return Morph(None, positions, normals)
+        return Morph(np.zeros(0, np.int64), np.zeros((0, 3), np.float32), turned, normals)
+    return Morph(moved, positions, turned, normals)
+
+
+def _without_zeros(deltas: Float32 | None) -> tuple[Int64 | None, Float32 | None]:
+    """Rows that are not 0 and their numbers, where those are fewer than half; else None and all rows."""
+    if deltas is None:
+        return None, None
+    rows = np.flatnonzero(deltas.any(axis=1))
+    return (rows, deltas[rows]) if 2 * len(rows) < len(deltas) else (None, deltas)

@@ -143,6 +143,11 @@ def read_animated(path: Path, options: ReadOptions = NO_OPTIONS) -> MeshSequence
         raise InputError(f"{path} cannot be read as {path.suffix[1:].upper()}: {reason}; export it again") from exc
 
 
+def read_clip_names(path: Path) -> list[str]:
+    """Names of the file's animations that move anything; raises `ValueError`."""
+    return clip_names(load_document(path))
+
+
 def read_poses(path: Path, clip: str | None = None) -> Poses:
     """The scene of a file, to be posed at any times: of its first clip, or at rest for ``clip=""``; raises `ValueError`."""
     document = load_document(path)

@@ -45,7 +45,8 @@ def _morphed_normals(one: Placed) -> Array:
     normals = one.block.attributes["normal"]
     for morph, weight in zip(one.block.morphs, one.weights, strict=False):
         if weight and morph.normals is not None:
-            normals = normals + np.float32(weight) * morph.normals
+            normals = normals.astype(np.float32)  # a copy
+            normals[slice(None) if morph.turned is None else morph.turned] += np.float32(weight) * morph.normals
     return normals
 
 

@@ -17,6 +17,7 @@ from gvpipe.io.gltf.glb import INDICES, VERTICES, Glb
 from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.material_writing import write_materials
 from gvpipe.io.gltf.nodes import compose
+from gvpipe.io.gltf.normal_writing import NORMAL, SplitNormals, split_normals
 from gvpipe.io.gltf.split import Shape, Split, split_vertices
 from gvpipe.io.losses import lost_notes
 from gvpipe.sequence import MeshSequence
@@ -32,7 +33,8 @@ class Prepared:
     Args:
         sequence: that is written.
         split: its vertices.
-        attributes: as the file holds them.
+        attributes: as the file holds them, without normals that change from frame to frame.
+        normals: of each frame; None if there are none, or if they are among the attributes.
         uv_sets: number of each attribute of texture coordinates.
         place: transform of the scene's nodes.
         notes: what is not held or was changed, a line each.
@@ -41,6 +43,7 @@ class Prepared:
     sequence: MeshSequence
     split: Split
     attributes: tuple[GltfAttribute, ...]
+    normals: SplitNormals | None
     uv_sets: Mapping[str, int]
     place: Json
     notes: tuple[str, ...]
@@ -62,17 +65,19 @@ def prepare(sequence: MeshSequence, fields: tuple[str, ...] = ()) -> Prepared:
     made = {name: as_gltf(names[name], sequence.attributes[name].kind, split.attributes[name]) for name in names}
     attributes = {name: one for name, one in made.items() if one is not None}
     place, turned = _place(sequence)
-    held = ("parts", "materials", "metadata", "polygons", *attributes, *fields)
+    normals = split_normals(sequence, split)
+    held = ("parts", "materials", "metadata", "polygons", *attributes, *fields, *(("normal",) if normals else ()))
     cut = (f"glTF has triangles alone; {len(sequence.polygons)} polygons became fans",) if sequence.polygons is not None else ()
     n_free = len(split.sources) - len(np.unique(np.concatenate([np.arange(each.start, each.stop) for each in split.shapes])))
     free = (f"{n_free} vertices are of no part; left out",) if n_free else ()
     return Prepared(
         sequence,
         split,
-        tuple(attributes.values()),
+        tuple(one for one in attributes.values() if normals is None or one.name != NORMAL),
+        normals,
         {name: int(one.name.rpartition("_")[2]) for name, one in attributes.items() if one.name.startswith("TEXCOORD_")},
         place,
-        (*turned, *cut, *free, *lost_notes(sequence, "glTF", held)),
+        (*turned, *cut, *free, *(normals.notes if normals else ()), *lost_notes(sequence, "glTF", held)),
     )
 
 
@@ -140,6 +145,7 @@ def _place(sequence: MeshSequence) -> tuple[Json, tuple[str, ...]]:
 
 
 def frame_attributes(prepared: Prepared, fields: Mapping[str, Array]) -> tuple[GltfAttribute, ...]:
-    """A frame's fields ``(V, C)`` as attributes of its file."""
-    made = (as_gltf(f"_{name}", "scalar", values[prepared.split.sources]) for name, values in fields.items())
+    """A frame's fields ``(V, C)`` as attributes of its file; normals are not among them."""
+    named = {name: values for name, values in fields.items() if name != "normal" or prepared.normals is None}
+    made = (as_gltf(f"_{name}", "scalar", values[prepared.split.sources]) for name, values in named.items())
     return tuple(one for one in made if one is not None)

@@ -39,11 +39,13 @@ class Split:
 
     Args:
         sources: ``(W,)`` the sequence's vertex of each, rising.
+        corners: ``(W,)`` a triangle corner that each is at, -1 for none; None where no corner attribute splits vertices.
         attributes: arrays ``(W, C)`` by name, of those per vertex and per corner.
         shapes: the meshes.
     """
 
     sources: Int64
+    corners: Int64 | None
     attributes: dict[str, Array]
     shapes: tuple[Shape, ...]
 
@@ -75,7 +77,7 @@ def split_vertices(sequence: MeshSequence) -> Split:
             values = np.asarray(one)[np.maximum(first, 0)]
             values[first < 0] = 0
             arrays[name] = values
-    return Split(sources, arrays, _shapes(sequence, sources, index.reshape(-1, 3)))
+    return Split(sources, first, arrays, _shapes(sequence, sources, index.reshape(-1, 3)))
 
 
 def _value_rows(one: Attribute) -> Int64:

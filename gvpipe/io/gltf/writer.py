@@ -1,8 +1,8 @@
 """Sequences as GLB: a file for each frame, or one animated file.
 
-In an animated file each distinct frame after the first is a morph target: what it adds to the first frame's positions. Vertices
-that do not move are left out (sparse accessors). A target has weight 1 in its frames and 0 in others. Weights are linear
-between frames, so positions are interpolated.
+In an animated file each distinct frame after the first is a morph target: what it adds to the first frame's positions and
+normals. Vertices that do not move are left out (sparse accessors). A target has weight 1 in its frames and 0 in others. Weights
+are linear between frames, so positions are interpolated.
 """
 
 from __future__ import annotations
@@ -17,14 +17,17 @@ import numpy as np
 from gvpipe.arrays import Array, Float32
 from gvpipe.atomic import atomic_path
 from gvpipe.errors import InputError
+from gvpipe.io.gltf.attribute_writing import GltfAttribute
 from gvpipe.io.gltf.clips import FPS
 from gvpipe.io.gltf.glb import VERTICES, Glb
 from gvpipe.io.gltf.json_fields import Json
+from gvpipe.io.gltf.normal_writing import NORMAL
 from gvpipe.io.gltf.scene_writing import Prepared, Written, frame_attributes, prepare, write_scene
 from gvpipe.io.mesh import FrameEncoder
 from gvpipe.sequence import MeshSequence
 
 MANY_TARGETS = 2048  # layers of a texture in most browsers, which hold a target each
+ROUNDING = 1e-6  # of a normal: triangles that do not turn may turn it by as much
 SMALL_INTEGERS = ("float32", "int8", "uint8", "int16", "uint16")
 
 
@@ -42,7 +45,8 @@ def encode_glb(sequence: MeshSequence, shared: str) -> FrameEncoder:
 
     def encode(positions: Float32, values: Mapping[str, Array]) -> bytes:
         glb = Glb()
-        write_scene(glb, prepared, positions[prepared.split.sources], frame_attributes(prepared, values))
+        own = () if prepared.normals is None else (prepared.normals.of(positions, values),)
+        write_scene(glb, prepared, positions[prepared.split.sources], (*own, *frame_attributes(prepared, values)))
         data = glb.data()
         glb.close()
         return data
@@ -68,58 +72,77 @@ def write_animated(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
                 raise InputError(f"{path}: {exc}") from exc
     finally:
         glb.close()
-    return (*prepared.notes, *_animation_notes(sequence, n_targets))
+    return (*prepared.notes, *_animation_notes(n_targets))
 
 
 @dataclass(eq=False)
 class _Targets:
-    """Morph targets of a mesh: their accessors, and the one of each frame, -1 for none.
+    """Morph targets of a mesh: their accessors by attribute, and the one of each frame, -1 for none.
 
     Args:
         written: the mesh.
     """
 
     written: Written
-    accessors: list[int] = field(default_factory=list)
+    accessors: list[dict[str, int]] = field(default_factory=list)
     frames: list[int] = field(default_factory=list)
     known: dict[bytes, int] = field(default_factory=dict)
 
-    def add(self, glb: Glb, deltas: Float32) -> None:
-        """Add a frame, which differs from the first by ``deltas (n, 3)``; equal frames share a target."""
-        moved = np.flatnonzero(deltas.any(axis=1))
-        if not len(moved):
+    def add(self, glb: Glb, deltas: Mapping[str, Float32]) -> None:
+        """Add a frame, which differs from the first by ``deltas (W, 3)`` of each attribute; equal frames share a target."""
+        own = {name: values[self.written.shape.start : self.written.shape.stop] for name, values in deltas.items()}
+        if not any(values.any() for values in own.values()):
             self.frames.append(-1)
             return
-        digest = hashlib.sha256(deltas.tobytes()).digest()
+        digest = hashlib.sha256(b"".join(values.tobytes() for values in own.values())).digest()
         if digest not in self.known:
             self.known[digest] = len(self.accessors)
-            index_size = 2 if len(deltas) <= 65536 else 4
-            if len(moved) * (index_size + 12) < 12 * len(deltas):
-                accessor = glb.sparse(deltas[moved], moved, (len(deltas), 3), bounds=True)
-            else:
-                accessor = glb.array(deltas, VERTICES, bounds=True)
-            self.accessors.append(accessor)
+            self.accessors.append({name: _write_deltas(glb, values, name == "POSITION") for name, values in own.items()})
         self.frames.append(self.known[digest])
+
+
+def _write_deltas(glb: Glb, deltas: Float32, bounds: bool) -> int:
+    """Add what a target adds ``(n, 3)``, without its zeros if that is smaller, and return the number of its accessor."""
+    moved = np.flatnonzero(deltas.any(axis=1))
+    index_size = 2 if len(deltas) <= 65536 else 4
+    if len(moved) * (index_size + 12) < 12 * len(deltas):
+        return glb.sparse(deltas[moved], moved, (len(deltas), 3), bounds=bounds)
+    return glb.array(deltas, VERTICES, bounds=bounds)
 
 
 def _write_animation(glb: Glb, prepared: Prepared) -> int:
     """Add the scene and its animation; returns the largest number of morph targets of a mesh."""
     sequence, sources = prepared.sequence, prepared.split.sources
-    base = sequence.read(0, 1)[0][sources]
-    targets = [_Targets(one) for one in write_scene(glb, prepared, base)]
-    for _, block in sequence.chunks():
-        for frame in block:
-            deltas = frame[sources] - base
+    first = sequence.read(0, 1)[0]
+    base, normals = first[sources], _normals(prepared, 0, first)
+    targets = [_Targets(one) for one in write_scene(glb, prepared, base, () if normals is None else (normals,))]
+    for start, block in sequence.chunks():
+        for i, frame in enumerate(block):
+            deltas = {"POSITION": frame[sources] - base}
+            own = _normals(prepared, start + i, frame)
+            if normals is not None and own is not None:
+                turns = own.values - normals.values
+                turns[np.abs(turns).max(axis=1) < ROUNDING] = 0
+                deltas[NORMAL] = turns
             for one in targets:
-                one.add(glb, deltas[one.written.shape.start : one.written.shape.stop])
+                one.add(glb, deltas)
     moving = [one for one in targets if one.accessors]
     _write_channels(glb, sequence, moving)
     for one in moving:
         mesh = glb.tree["meshes"][one.written.mesh]
         mesh["weights"] = [0] * len(one.accessors)
         for primitive in mesh["primitives"]:
-            primitive["targets"] = [{"POSITION": accessor} for accessor in one.accessors]
+            primitive["targets"] = one.accessors
     return max((len(one.accessors) for one in moving), default=0)
+
+
+def _normals(prepared: Prepared, number: int, positions: Float32) -> GltfAttribute | None:
+    """The normals of a frame ``(V, 3)``; None if the sequence has none."""
+    if prepared.normals is None:
+        return None
+    fields = prepared.sequence.fields
+    own = {"normal": fields["normal"].read(number, number + 1)[0]} if prepared.normals.is_field else {}
+    return prepared.normals.of(positions, own)
 
 
 def _write_channels(glb: Glb, sequence: MeshSequence, moving: list[_Targets]) -> None:
@@ -152,10 +175,7 @@ def _write_weights(glb: Glb, targets: _Targets) -> int:
     return glb.sparse(np.ones((len(places), 1), np.float32), places, (len(frames) * n_targets, 1))
 
 
-def _animation_notes(sequence: MeshSequence, n_targets: int) -> tuple[str, ...]:
-    lines: tuple[str, ...] = ()
-    if n_targets > MANY_TARGETS:
-        lines += (f"it has {n_targets} morph targets; many viewers show at most {MANY_TARGETS}",)
-    if "normal" in sequence.attributes and n_targets:
-        lines += ("its normals are those of the first frame",)
-    return lines
+def _animation_notes(n_targets: int) -> tuple[str, ...]:
+    if n_targets <= MANY_TARGETS:
+        return ()
+    return (f"it has {n_targets} morph targets; many viewers show at most {MANY_TARGETS}",)

@@ -199,3 +199,74 @@ def test_other_pictures_become_png(tmp_path: Path) -> None:
     gvpipe.write(scene, tmp_path / "a.glb")
     (read,) = gvpipe.read(tmp_path / "a.glb").images
     assert read.media_type == "image/png" and read.name == "old" and read.data.startswith(b"\x89PNG")
+
+
+def corner_normals(sequence: MeshSequence) -> Attribute:
+    """A normal of length 1 for each corner, equal for no two."""
+    rows = np.random.default_rng(5).normal(size=(3 * len(sequence.faces), 3))
+    return Attribute((rows / np.linalg.norm(rows, axis=1, keepdims=True)).astype(np.float32), "corner", "normal")
+
+
+def morphed(path: Path, name: str, target: int) -> Any:
+    """An attribute of the first primitive, with one morph target of weight 1."""
+    tree, binary = take_apart(path.read_bytes())
+    primitive = tree["meshes"][0]["primitives"][0]
+    total = 0
+    for number in (primitive["attributes"][name], primitive["targets"][target][name]):
+        total = total + dense(tree, binary, tree["accessors"][number])
+    return total
+
+
+def dense(tree: Any, binary: bytes, accessor: Any) -> Any:
+    """The floats of an accessor of vectors."""
+    values = np.zeros((accessor["count"], 3), np.float32)
+
+    def view(number: int, kind: str, count: int) -> Any:
+        return np.frombuffer(binary, kind, count, tree["bufferViews"][number].get("byteOffset", 0))
+
+    if "bufferView" in accessor:
+        values = view(accessor["bufferView"], "<f4", values.size).reshape(-1, 3).copy()
+    if "sparse" in accessor:
+        sparse = accessor["sparse"]
+        rows = view(sparse["indices"]["bufferView"], "<u2", sparse["count"])
+        values[rows] = view(sparse["values"]["bufferView"], "<f4", 3 * sparse["count"]).reshape(-1, 3)
+    return values
+
+
+def test_normals_of_corners_turn_in_an_animation(tmp_path: Path) -> None:
+    base = grid(1)
+    angle = 0.7
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    moved = (base[0] @ turn.T).astype(np.float32)
+    scene = MeshSequence(np.stack([base[0], moved]), base.faces, attributes={"normal": corner_normals(base)})
+    notes = gvpipe.write(scene, tmp_path / "a.glb")
+    assert notes == ["normals follow from no rule; in glTF those of later frames are turned with the surface"]
+    first = np.asarray(gvpipe.read(tmp_path / "a.glb").attributes["normal"])
+    faces = gvpipe.read(tmp_path / "a.glb").faces.reshape(-1)
+    assert same_bits(first[faces], np.asarray(scene.attributes["normal"]))
+    np.testing.assert_allclose(morphed(tmp_path / "a.glb", "POSITION", 0)[faces], moved[base.faces.reshape(-1)], atol=1e-6)
+    expected = np.asarray(scene.attributes["normal"]) @ turn.T
+    np.testing.assert_allclose(morphed(tmp_path / "a.glb", "NORMAL", 0)[faces], expected, atol=3e-6)
+
+
+def test_normals_that_stay_are_left_out_of_targets(tmp_path: Path) -> None:
+    base = grid(1)
+    bent = base[0].copy()
+    bent[base.faces[0, 0], 2] += 0.5
+    scene = MeshSequence(np.stack([base[0], bent]), base.faces, attributes={"normal": corner_normals(base)})
+    gvpipe.write(scene, tmp_path / "a.glb")
+    tree, _ = take_apart((tmp_path / "a.glb").read_bytes())
+    target = tree["accessors"][tree["meshes"][0]["primitives"][0]["targets"][0]["NORMAL"]]
+    touched = (base.faces == base.faces[0, 0]).any(axis=1).sum()
+    assert 0 < target["sparse"]["count"] <= 3 * touched
+
+
+def test_a_field_of_normals_moves_in_an_animation(tmp_path: Path) -> None:
+    base = grid(2)
+    values = np.zeros((2, base.n_vertices, 3), np.float32)
+    values[0, :, 2], values[1, :, 0] = 1, 1
+    scene = MeshSequence(base.read(0, 2), base.faces, fields={"normal": Field(values, kind="normal")})
+    assert gvpipe.write(scene, tmp_path / "a.glb") == []
+    assert same_bits(morphed(tmp_path / "a.glb", "NORMAL", 0), values[1])
+    gvpipe.write(scene, tmp_path / "s" / "%d.glb")
+    assert same_bits(gvpipe.read(tmp_path / "s").fields["normal"][0:2], values)

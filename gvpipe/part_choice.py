@@ -1,4 +1,4 @@
-"""Some parts of a sequence as a sequence: the same vertices, fewer triangles."""
+"""Some parts of a sequence as a sequence: to draw, with all vertices, or to write, with theirs alone."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from gvpipe.arguments import did_you_mean
-from gvpipe.arrays import Int64
+from gvpipe.arrays import Int32, Int64
+from gvpipe.asset.polygons import polygon_starts
 from gvpipe.errors import InputError
 from gvpipe.sequence import MeshSequence
 
@@ -47,6 +48,47 @@ def only_parts(sequence: MeshSequence, names: Sequence[str]) -> MeshSequence:
         attributes=_chosen(sequence.attributes, rows),
         fields=_chosen(sequence.fields, rows),
     )
+
+
+def parts_alone(sequence: MeshSequence, names: Sequence[str]) -> MeshSequence:
+    """Return the parts of some names with their polygons and their vertices, and no others.
+
+    Vertices and polygons keep their order. Frames still load when they are read. Materials and images stay, since parts
+    refer to them by number.
+
+    Raises:
+        InputError: no part has one of the names.
+    """
+    chosen = only_parts(sequence, names)
+    is_kept = np.zeros(sequence.n_vertices, bool)
+    for part in chosen.parts:
+        is_kept[slice(*part.vertices)] = True
+    if not len(chosen.faces) or not is_kept.any():
+        raise InputError(f"{sequence.name}: part {', '.join(map(repr, names))} has no triangles; choose another one")
+    kept = np.flatnonzero(is_kept)
+    before = np.concatenate([[0], np.cumsum(is_kept)])  # vertices that are kept before each
+    parts = tuple(
+        replace(part, vertices=(int(before[part.vertices[0]]), int(before[part.vertices[1]]))) for part in chosen.parts
+    )
+    rows = {"vertex": kept}
+    return replace(
+        sequence.reordered(kept, before[chosen.faces].astype(np.int32)),
+        parts=parts,
+        polygons=_polygons(sequence, names),
+        attributes=_chosen(chosen.attributes, rows),
+        fields=_chosen(chosen.fields, rows),
+        materials=sequence.materials,
+        images=sequence.images,
+    )
+
+
+def _polygons(sequence: MeshSequence, names: Sequence[str]) -> Int32 | None:
+    """Corners of each polygon of the parts."""
+    if sequence.polygons is None:
+        return None
+    starts = np.append(polygon_starts(sequence.polygons.astype(np.int64)), len(sequence.faces))
+    spans = [np.searchsorted(starts, part.triangles) for part in sequence.parts if part.name in names]
+    return np.concatenate([sequence.polygons[first:stop] for first, stop in spans])
 
 
 def _chosen(named: Mapping[str, Any], rows: dict[str, Int64]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.material import Material
 from gvpipe.errors import InputError
-from gvpipe.rendering.part_choice import only_parts
+from gvpipe.part_choice import only_parts, parts_alone
 from gvpipe.sequence import MeshSequence
 
 COLOURS = ((1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0))
@@ -77,3 +77,19 @@ def test_an_unknown_part_is_named_with_those_there_are(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="sheet 11 and 8 more"):
         only_parts(many, ["leg"])
     assert not list(tmp_path.iterdir())
+
+
+def test_parts_alone_have_their_vertices_and_polygons() -> None:
+    given = replace(three(), polygons=np.full(3, 4, np.int32))
+    sequence = parts_alone(given, ["sheet 2", "sheet 0"])
+    assert [(part.name, part.vertices, part.triangles) for part in sequence.parts] == [
+        ("sheet 0", (0, 4), (0, 2)),
+        ("sheet 2", (4, 8), (2, 4)),
+    ]
+    kept = [*range(4), *range(8, 12)]
+    assert np.array_equal(sequence[0], given[0][kept])
+    assert np.array_equal(sequence[0][sequence.faces], given[0][given.faces[[0, 1, 4, 5]]])
+    assert sequence.polygons is not None and sequence.polygons.tolist() == [4, 4]
+    assert np.asarray(sequence.attributes["vertex"]).ravel().tolist() == kept
+    assert sequence.fields["load"][0].tolist() == [0, 1, 4, 5] and sequence.fields["heat"].shape == (1, 8)
+    assert sequence.materials == given.materials

@@ -1,0 +1,104 @@
+"""What gvpipe reads of a file that is no geometry video: the sequence that `gvpipe.read` returns, listed."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from dataclasses import dataclass
+from typing import Any
+
+from gvpipe.arguments import StrPath
+from gvpipe.asset.listing import Things, list_things
+from gvpipe.io import read
+from gvpipe.io.clips import list_clips
+from gvpipe.sequence import MeshSequence
+
+
+@dataclass(frozen=True)
+class SourceInfo:
+    """What a source of a sequence holds; keys that `gvpipe.Info` has too mean the same.
+
+    Args:
+        bytes: of the file; None for a folder or several files.
+        attributes, fields: as in `gvpipe.Info`, without bound and bytes.
+        clips: names of the animations of a glTF file.
+    """
+
+    vertices: int
+    triangles: int
+    frames: int
+    fps: float
+    bounding_box: dict[str, list[float]]
+    bytes: int | None
+    origin: list[float]
+    parts: list[dict[str, Any]]
+    attributes: list[dict[str, Any]]
+    fields: list[dict[str, Any]]
+    polygons: dict[str, int]
+    materials: list[str]
+    images: list[dict[str, Any]]
+    metadata: dict[str, Any]
+    clips: list[str]
+    notes: list[str]
+
+    def to_json(self) -> dict[str, Any]:
+        """The information as JSON values."""
+        return dataclasses.asdict(self)
+
+
+def source_info(path: StrPath, clip: str | None = None, mesh: StrPath | None = None) -> SourceInfo:
+    """Return what gvpipe reads of a source; only frame 0 is evaluated.
+
+    Args:
+        path, clip, mesh: as of `gvpipe.read`.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    name = os.fspath(path)
+    sequence = read(name, None, clip, mesh)
+    first = sequence[0]
+    things = Things(sequence.parts, sequence.polygons, sequence.materials, sequence.images, sequence.metadata)
+    return SourceInfo(
+        vertices=sequence.n_vertices,
+        triangles=len(sequence.faces),
+        frames=sequence.n_frames,
+        fps=sequence.fps,
+        bounding_box={"min": first.min(axis=0).tolist(), "max": first.max(axis=0).tolist()},
+        bytes=os.path.getsize(name) if os.path.isfile(name) else None,
+        origin=sequence.origin.tolist(),
+        attributes=_attributes(sequence),
+        fields=_fields(sequence),
+        clips=list_clips(name),
+        notes=list(sequence.notes),
+        **list_things(things),
+    )
+
+
+def _attributes(sequence: MeshSequence) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": name,
+            "kind": each.kind,
+            "domain": each.domain,
+            "components": each.shape[1],
+            "type": each.dtype.name,
+            "unit": each.unit,
+        }
+        for name, each in sequence.attributes.items()
+    ]
+
+
+def _fields(sequence: MeshSequence) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": name,
+            "kind": each.kind,
+            "domain": each.domain,
+            "components": each.n_components,
+            "type": each.dtype.name,
+            "unit": each.unit,
+            "range": None if each.range is None else list(each.range),
+        }
+        for name, each in sequence.fields.items()
+    ]

@@ -1,0 +1,102 @@
+"""``gvpipe info`` of inputs that are no geometry videos."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from asset_scene import scene
+
+import gvpipe
+from gvpipe.io.gltf.glb import Glb
+from gvpipe.sequence import MeshSequence
+
+Run = Callable[..., Any]
+
+
+def test_an_archive_with_everything(run: Run, tmp_path: Path) -> None:
+    given = scene()
+    gvpipe.write(given, tmp_path / "a.npz")
+    ended = run("info", tmp_path / "a.npz", "--json")
+    values = json.loads(ended.out)
+    assert ended.status == 0 and values["clips"] == []
+    shape = (values["frames"], values["vertices"], values["triangles"], values["fps"])
+    assert shape == (given.n_frames, given.n_vertices, len(given.faces), given.fps)
+    assert values["bytes"] == (tmp_path / "a.npz").stat().st_size
+    assert {each["name"]: each["kind"] for each in values["attributes"]} == {
+        name: each.kind for name, each in given.attributes.items()
+    }
+    assert [each["name"] for each in values["fields"]] == list(given.fields)
+    assert [part["name"] for part in values["parts"]] == [part.name for part in given.parts]
+    assert values["bounding_box"]["min"] == given[0].min(axis=0).tolist()
+    gvpipe.encode(given, tmp_path / "a.mp4", "pca")
+    of_video = json.loads(run("info", tmp_path / "a.mp4", "--json").out)
+    assert set(values) - set(of_video) == {"clips"}
+    assert all(values[key] == of_video[key] for key in ("frames", "vertices", "materials", "images", "metadata"))
+    text = run("info", tmp_path / "a.npz").out
+    assert f"{given.n_vertices} vertices" in text and "attribute uv: uv, 2 x float32" in text and "bytes" in text
+
+
+@pytest.mark.parametrize("source", ["walk", "walk/*.ply", "walk/%02d.ply"])
+def test_frame_files(run: Run, sequence: MeshSequence, tmp_path: Path, source: str) -> None:
+    gvpipe.write(sequence, tmp_path / "walk" / "%02d.ply")
+    ended = run("info", tmp_path / source, "--json")
+    values = json.loads(ended.out)
+    assert (values["frames"], values["vertices"], values["bytes"]) == (11, 72, None)
+    assert ended.err.startswith("Note: ") and values["notes"] == [ended.err[len("Note: ") :].strip()]
+
+
+def two_clips(path: Path) -> None:
+    """One triangle, whose node has two animations of different lengths."""
+    glb = Glb()
+    positions = glb.array(np.eye(3, dtype=np.float32), bounds=True)
+    glb.append("meshes", {"primitives": [{"attributes": {"POSITION": positions}}]})
+    glb.append("nodes", {"mesh": 0})
+    glb.append("scenes", {"nodes": [0]})
+    for name, seconds in (("Walk", 1), ("Run", 2)):
+        times = glb.array(np.array([[0], [seconds]], np.float32), bounds=True)
+        places = glb.array(np.array([[0, 0, 0], [0, 1, 0]], np.float32))
+        sampler = {"input": times, "output": places}
+        glb.append(
+            "animations",
+            {"name": name, "samplers": [sampler], "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]},
+        )
+    path.write_bytes(glb.data())
+    glb.close()
+
+
+def test_clips_of_a_gltf_file(run: Run, tmp_path: Path) -> None:
+    two_clips(tmp_path / "a.glb")
+    values = json.loads(run("info", tmp_path / "a.glb", "--json").out)
+    assert values["clips"] == ["Walk", "Run"] and values["frames"] == 31
+    values = json.loads(run("info", tmp_path / "a.glb", "--clip", "Run", "--json").out)
+    assert values["frames"] == 61
+    assert "clips: Walk, Run\n" in run("info", tmp_path / "a.glb").out
+    ended = run("info", tmp_path / "a.glb", "--clip", "Rum")
+    assert ended.status == 1 and "its clips: Walk, Run" in ended.err and ended.err.count("\n") == 1
+
+
+def test_a_point_cache_needs_its_mesh(run: Run, sequence: MeshSequence, tmp_path: Path) -> None:
+    gvpipe.write(sequence, tmp_path / "a.pc2")
+    gvpipe.write(sequence.part(0, 1), tmp_path / "base.obj")
+    assert run("info", tmp_path / "a.pc2").status == 1
+    values = json.loads(run("info", tmp_path / "a.pc2", "--mesh", tmp_path / "base.obj", "--json").out)
+    assert (values["frames"], values["triangles"]) == (11, 128)
+
+
+@pytest.mark.parametrize(
+    ("name", "data"), [("a.npz", b"hello"), ("a.glb", b"glTF\2\0\0\0"), ("a.txt", b"text"), ("a.obj", b"")]
+)
+def test_what_cannot_be_read(run: Run, tmp_path: Path, name: str, data: bytes) -> None:
+    (tmp_path / name).write_bytes(data)
+    for path in (tmp_path / name, tmp_path / "none" / name):
+        ended = run("info", path)
+        assert ended.status == 1 and ended.out == "" and str(path) in ended.err and ended.err.count("\n") == 1
+
+
+def test_a_video_has_no_clips(run: Run, video: Path) -> None:
+    assert run("info", video, "--clip", "Run").status == 2
