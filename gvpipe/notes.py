@@ -53,6 +53,13 @@ def not_carried(names: Sequence[str]) -> tuple[str, ...]:
     return (f"the file does not carry {', '.join(names)}",) if names else ()
 
 
+def coarser_level(lod: int, has_asset: bool) -> tuple[str, ...]:
+    """Of a level of detail of a video that has more than positions."""
+    if not (lod and has_asset):
+        return ()
+    return (f"level {lod} has positions and triangles alone; attributes, fields and parts are of level 0",)
+
+
 def origin_left_out(origin: Sequence[float]) -> str:
     """Of positions that were written without their origin."""
     return f"positions are relative to {show_origin(origin)}, which was left out"

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from gvpipe.arguments import check_number, show
 from gvpipe.arrays import Array, Float32, Float64, Floats, Frames, Int32, Integers
-from gvpipe.asset.attribute import as_attribute
+from gvpipe.asset.attribute import as_attribute, check_text
 from gvpipe.asset.field import as_field
 from gvpipe.asset.material import Image, Material, check_materials
 from gvpipe.asset.metadata import NO_METADATA, Metadata
@@ -124,8 +124,15 @@ class MeshSequence:
         for what, example in (("attributes", "{'uv': uv}"), ("fields", "{'stress': stress}")):
             if not isinstance(getattr(self, what), Mapping):
                 raise TypeError(f"{what} are {show(getattr(self, what))}; arrays by name are needed, such as {example}")
-        materials, images = tuple(self.materials), tuple(self.images)
-        check_materials(materials, len(images), self.name)
+            for name in getattr(self, what):
+                check_text(name, f"a name of {what}")
+        if not isinstance(self.metadata, Metadata):
+            raise TypeError(f"metadata is {show(self.metadata)}; a gvpipe.Metadata is needed")
+        for image in self.images:
+            if not isinstance(image, Image):
+                raise TypeError(f"an image is {show(image)}; a gvpipe.Image is needed")
+        images = tuple(self.images)
+        materials = check_materials(tuple(self.materials), len(images), self.name)
         parts = check_parts(self.parts, self.faces, self.n_vertices, len(materials), self.name)
         checked = {
             "materials": materials,

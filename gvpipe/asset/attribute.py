@@ -20,6 +20,7 @@ DOMAINS = ("vertex", "corner", "triangle", "part")
 KINDS = ("uv", "normal", "tangent", "color", "scalar", "vector", "label")
 WIDTHS = {"uv": (2,), "normal": (3,), "tangent": (3, 4), "color": (3, 4)}  # components of a kind; others have any number
 MAX_COMPONENTS = 64
+MOST_ROUNDED = 1e-4  # part of the range by which float32 may round float64
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +30,8 @@ class Attribute:
     `numpy.asarray` gives one row per element of the domain, ``(rows, C)``.
 
     Args:
-        values: ``(N, C)``, or ``(N,)`` for one component. float32, or integers of any size; float64 is rounded to float32.
+        values: ``(N, C)``, or ``(N,)`` for one component. float32, or integers of any size; float64 is rounded to float32, and
+            refused where that moves a value by more than 1e-4 of the range.
         domain: what has a row each: ``"vertex"``, ``"corner"`` (three per triangle), ``"triangle"`` or ``"part"``.
         kind: ``"uv"``, ``"normal"``, ``"tangent"``, ``"color"`` (float 0..1, or integers of full range), ``"scalar"``,
             ``"vector"`` or ``"label"`` (integers); ``""``: what name, type and number of components suggest.
@@ -60,6 +62,7 @@ class Attribute:
             raise InputError(f"{self.name} has shape {values.shape}; (values, 1 to {MAX_COMPONENTS} components) is needed")
         object.__setattr__(self, "values", values)
         check_word("domain", self.domain, DOMAINS, self.name)
+        check_text(self.unit, f"unit of {self.name}")
         if self.kind:
             check_kind(self.kind, values, self.name)
         if self.indices is not None:
@@ -139,14 +142,29 @@ def as_values(given: Any, name: str) -> Array:
         return values.astype(np.uint8)
     if values.dtype.kind not in "fiu":
         raise InputError(f"{name} has type {values.dtype}; numbers are needed")
-    with np.errstate(over="ignore"):
-        return values.astype(np.float32, copy=False) if values.dtype.kind == "f" else values
+    if values.dtype.kind != "f" or values.dtype == np.float32:
+        return values
+    with np.errstate(over="ignore", invalid="ignore"):
+        narrowed = values.astype(np.float32)
+        lost = float(np.nanmax(np.abs(values - narrowed), initial=0.0)) if values.size else 0.0
+        spread = float(np.fmax.reduce(values, axis=None) - np.fmin.reduce(values, axis=None)) if values.size else 0.0
+    if np.isfinite(lost) and lost > MOST_ROUNDED * spread > 0:
+        raise InputError(
+            f"{name}: float32 would round its values by up to {lost:.2g} of a range of {spread:.2g}; subtract an offset first"
+        )
+    return narrowed
 
 
 def check_word(what: str, word: object, words: tuple[str, ...], name: str) -> None:
     """Raise `InputError` unless ``word`` is one of ``words``."""
     if word not in words:
         raise InputError(f"{name}: {what} {word!r}; one of {', '.join(words)} is needed{did_you_mean(word, words)}")
+
+
+def check_text(value: object, role: str) -> None:
+    """Raise TypeError unless ``value`` is a text."""
+    if not isinstance(value, str):
+        raise TypeError(f"{role} is {show(value)}; a text is needed")
 
 
 def check_kind(kind: str, values: Array, name: str) -> None:

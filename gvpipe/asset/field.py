@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from gvpipe.arrays import Array
-from gvpipe.asset.attribute import KINDS, MAX_COMPONENTS, as_values, check_kind, check_word
+from gvpipe.asset.attribute import KINDS, MAX_COMPONENTS, as_values, check_kind, check_text, check_word
 from gvpipe.errors import InputError
 
 DOMAINS = ("vertex", "triangle")
@@ -34,7 +34,8 @@ class Field:
 
     Args:
         values: ``(F, R)`` or ``(F, R, C)``, R vertices or triangles: an array, or anything of that shape that slices by
-            frame. float32 or integers of at most 32 bits; float64 is rounded to float32.
+            frame. float32 or integers of at most 32 bits; float64 is rounded to float32, and an array of it is refused where
+            that moves a value by more than 1e-4 of the range.
         domain: ``"vertex"`` or ``"triangle"``.
         kind: as of `gvpipe.Attribute`; ``""``: scalar, or vector for several components.
         unit: such as ``"MPa"``.
@@ -70,6 +71,7 @@ class Field:
         object.__setattr__(self, "values", as_values(given, self.name) if isinstance(given, np.ndarray) else given)
         object.__setattr__(self, "kind", self.kind or ("vector" if len(shape) == 3 and shape[2] > 1 else "scalar"))
         check_word("domain", self.domain, DOMAINS, self.name)
+        check_text(self.unit, f"unit of {self.name}")
         check_word("kind", self.kind, KINDS, self.name)
         check_kind(self.kind, np.zeros((1, self.n_components), self.dtype), self.name)
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
+from gvpipe.arguments import show
 from gvpipe.asset.attribute import check_word
+from gvpipe.asset.plain import from_plain, to_plain
 from gvpipe.errors import InputError
 
 ALPHA_MODES = ("opaque", "mask", "blend")
@@ -116,22 +118,29 @@ class Material:
         return {name: value for name, value in named if isinstance(value, Texture)}
 
 
-def check_materials(materials: tuple[Material, ...], n_images: int, where: str) -> None:
-    """Raise `InputError` for an image index out of range, a word or a number that cannot be."""
-    for number, material in enumerate(materials):
-        name = f"{where}: material {number} ({material.name!r})"
-        check_word("alpha mode", material.alpha_mode, ALPHA_MODES, name)
-        factors = (*material.base_color, *material.emissive, material.metallic, material.roughness, material.alpha_cutoff)
-        if len(factors) != 10 or not _are_numbers(factors):
-            raise InputError(f"{name} has too few factors, or one that is not a number up to {MAX_FACTOR:g}")
-        for role, texture in material.textures.items():
-            if not 0 <= texture.image < n_images:
-                raise InputError(f"{name}: {role} shows image {texture.image}; there are {n_images} images")
-            if not _are_numbers((texture.scale, texture.rotation, *texture.offset, *texture.tiling)):
-                raise InputError(f"{name}: {role} is moved by something that is not a number up to {MAX_FACTOR:g}")
-            check_word("filter", texture.filter, FILTERS, name)
-            for wrap in texture.wrap:
-                check_word("wrap", wrap, WRAPS, name)
+def check_materials(materials: tuple[Material, ...], n_images: int, where: str) -> tuple[Material, ...]:
+    """Return the materials; raise `InputError` for an image index out of range, a type, a word or a number that cannot be."""
+    return tuple(_check_material(material, n_images, f"{where}: material {k}") for k, material in enumerate(materials))
+
+
+def _check_material(given: Material, n_images: int, name: str) -> Material:
+    if not isinstance(given, Material):
+        raise TypeError(f"{name} is {show(given)}; a gvpipe.Material is needed")
+    material: Material = from_plain(Material, to_plain(given), name)  # every field of its type
+    name = f"{name} ({material.name!r})"
+    check_word("alpha mode", material.alpha_mode, ALPHA_MODES, name)
+    factors = (*material.base_color, *material.emissive, material.metallic, material.roughness, material.alpha_cutoff)
+    if len(factors) != 10 or not _are_numbers(factors):
+        raise InputError(f"{name} has too few factors, or one that is not a number up to {MAX_FACTOR:g}")
+    for role, texture in material.textures.items():
+        if not 0 <= texture.image < n_images:
+            raise InputError(f"{name}: {role} shows image {texture.image}; there are {n_images} images")
+        if not _are_numbers((texture.scale, texture.rotation, *texture.offset, *texture.tiling)):
+            raise InputError(f"{name}: {role} is moved by something that is not a number up to {MAX_FACTOR:g}")
+        check_word("filter", texture.filter, FILTERS, name)
+        for wrap in texture.wrap:
+            check_word("wrap", wrap, WRAPS, name)
+    return material
 
 
 def _are_numbers(values: tuple[float, ...]) -> bool:

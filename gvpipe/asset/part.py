@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gvpipe.arrays import Int32
+from gvpipe.asset.attribute import check_text
 from gvpipe.errors import InputError
 
 
@@ -40,6 +41,8 @@ def check_parts(parts: Iterable[Any], faces: Int32, n_vertices: int, n_materials
     for number, part in enumerate(result):
         if not isinstance(part, Part):
             raise TypeError(f"part {number} is a {type(part).__name__}; a gvpipe.Part is needed")
+        for role in ("name", "parent"):
+            check_text(getattr(part, role), f"{role} of part {number}")
         name = f"{where}: part {number} ({part.name!r})"
         first, stop = part.triangles
         if first != end or not first <= stop <= len(faces):

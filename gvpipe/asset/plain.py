@@ -12,6 +12,8 @@ import typing
 from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Any
 
+import numpy as np
+
 from gvpipe.errors import InputError
 
 
@@ -66,6 +68,8 @@ def _plain(held: Any) -> Any:
         return to_plain(held)
     if isinstance(held, tuple):
         return [_plain(each) for each in held]
+    if isinstance(held, np.generic):
+        return held.item()
     return dict(held) if isinstance(held, typing.Mapping) else held
 
 

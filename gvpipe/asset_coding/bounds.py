@@ -96,6 +96,6 @@ def _parse(text: str, spread: float, what: str) -> float:
         bound = math.nan
     if not math.isfinite(bound) or bound < 0 or (bound == 0 and not text.endswith("%")):
         raise SettingError(
-            f"{what}: the bound {text!r} is none; a number above 0, a part of the range such as 0.1%, exact or none is needed"
+            f"{what}: {text!r} cannot be a bound; a number above 0, a part of the range (0.1%), 'exact' or 'none' is needed"
         )
     return bound

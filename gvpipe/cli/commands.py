@@ -222,6 +222,7 @@ def decode(
         sequence = chosen(player.level(lod).part(start, stop), parts, fps, "decode", progress)
         noticed = api.write(sequence.local() if local else sequence, path, start)
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
+    noticed += notes.coarser_level(lod, bool(player.attributes or player.fields or player.parts))
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
@@ -281,8 +282,10 @@ def _source_info(source: str, path: str, clip: str | None, mesh: str | None, out
 @cli.command()
 @click.argument("reference", metavar="REFERENCE")
 @click.argument("distorted", metavar="DISTORTED")
+@click.option("--clip", metavar="NAME", help="The animation of REFERENCE, of a file that has several. [default: the first]")
+@click.option("--fps", type=float, help="Frames per second at which REFERENCE is sampled.")
 @output_options
-def compare(reference: str, distorted: str, out: Output) -> None:
+def compare(reference: str, distorted: str, clip: str | None, fps: float | None, out: Output) -> None:
     """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos, one may be - for standard input."""
     from gvpipe import api
     from gvpipe.metrics import comparison
@@ -291,7 +294,7 @@ def compare(reference: str, distorted: str, out: Output) -> None:
         raise click.UsageError("both are -, and there is one standard input", click.get_current_context())
     with source_path(reference) as one, source_path(distorted) as other, out.progress() as progress:
         result = comparison.compare(
-            api.read(one), api.read(other), lambda done, of: progress("compare", done / of) if progress else None
+            api.read(one, fps, clip), api.read(other), lambda done, of: progress("compare", done / of) if progress else None
         )
     values = result.to_json()
     out.json(values)
@@ -311,10 +314,10 @@ cli.add_command(convert)
 @cli.command("export-html")
 @click.argument("source", metavar="FILE.mp4")
 @click.argument("target", metavar="OUT.html")
-@click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="The axis that stands upright.")
+@click.option("--up", type=click.Choice(["y", "z"]), help="The axis that stands upright. [default: the file's own, else y]")
 @click.option("--quality", type=float, help="0-100, of a conversion: the error that it may add. [default: 90]")
 @output_options
-def export_html(source: str, target: str, up: str, quality: float | None, out: Output) -> None:
+def export_html(source: str, target: str, up: str | None, quality: float | None, out: Output) -> None:
     """Write a web page of one file that plays a geometry video, without a network.
 
     Browsers read codec mcgv in its web profile; other files are converted, which adds an error that is told: KG 0.044 or less
@@ -332,9 +335,9 @@ def export_html(source: str, target: str, up: str, quality: float | None, out: O
 
 @cli.command()
 @click.argument("source", metavar="FILE.mp4")
-@click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True, help="The axis that stands upright.")
+@click.option("--up", type=click.Choice(["y", "z"]), help="The axis that stands upright. [default: the file's own, else y]")
 @output_options
-def play(source: str, up: str, out: Output) -> None:
+def play(source: str, up: str | None, out: Output) -> None:
     """Play a geometry video in your browser.
 
     Where no browser can be opened, the page's path is printed. The page is one file and needs no network.

@@ -7,12 +7,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gvpipe.arguments import did_you_mean
 from gvpipe.arrays import Array, Bool, Float32, Float64, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.material import WRAPS, Image, Material, Texture
 from gvpipe.asset.part import Part
-from gvpipe.errors import InputError
 from gvpipe.rasterizer.alpha_ranges import reach_alpha
 from gvpipe.rasterizer.colours import to_linear
 from gvpipe.rasterizer.scene import BLENDED, CLAY, CULLED, NO_LOOK, ROLES, TESTED, UNLIT, Look
@@ -141,7 +139,7 @@ class _Textures:
         sets: dict[tuple[Any, ...], int] = {}  # coordinates that this material's textures share
         result = []
         for role in ROLES:
-            texture = material.textures.get(role)
+            texture = self._placed(material, role)
             image = None if texture is None else self._image(texture.image, role in SRGB_ROLES)
             if texture is None or image is None:
                 result.append(-1)
@@ -149,13 +147,26 @@ class _Textures:
             key = (texture.uv, texture.offset, texture.rotation, texture.tiling)
             if key not in sets:
                 sets[key] = len(sets)
-                self._place(sets[key], texture, number, material.name)
+                self._place(sets[key], texture, number)
             u, v = (WRAPS.index(wrap) for wrap in texture.wrap)
             result.append(len(self.rows))
             # kernels number repeat 0, mirror 1, clamp 2, as WRAPS does
             self.rows.append((image, sets[key], u, v, int(texture.filter == "nearest")))
             self.scales.append(float(np.clip(texture.scale, -1e3, 1e3)))
         return result
+
+    def _placed(self, material: Material, role: str) -> Texture | None:
+        """The texture of a role; None for one whose coordinates are missing."""
+        texture = material.textures.get(role)
+        if texture is None:
+            return None
+        held = self._asset.attributes.get(texture.uv)
+        if held is not None and held.domain in ("vertex", "corner") and held.shape[1] >= 2:
+            return texture
+        note = f"attribute {texture.uv!r} has no texture coordinates of vertices or corners; its textures are not drawn"
+        if note not in self.notes:
+            self.notes.append(note)
+        return None
 
     def triangles_of(self, number: int) -> Int64:
         """The triangles that had this material at first, in order."""
@@ -195,11 +206,10 @@ class _Textures:
             return None
         return decoded
 
-    def _place(self, row: int, texture: Texture, material: int, name: str) -> None:
+    def _place(self, row: int, texture: Texture, material: int) -> None:
         """Fill a row of coordinates for the triangles of a material, from the upper left, transformed."""
-        where = f"{self._asset.name}: material {material} ({name!r})"
         if texture.uv not in self._corners:
-            self._corners[texture.uv] = _corners(self._asset, texture.uv, where)
+            self._corners[texture.uv] = _corners(self._asset, texture.uv)
         if row == len(self._uv):
             self._uv.append(np.zeros((self._count, 3, 2), np.float32))
         chosen = self.triangles_of(material)
@@ -219,22 +229,12 @@ def _flags(material: Material) -> int:
     return flags | (TESTED if material.alpha_mode != "opaque" else 0)
 
 
-def _corners(asset: Asset, name: str, where: str) -> Float32:
-    """``(T, 3, C)`` values of an attribute at corners."""
-    if name not in asset.attributes:
-        known = ", ".join(asset.attributes) or "none"
-        raise InputError(
-            f"{where} has a texture on attribute {name!r}, which is missing; there are: {known}"
-            f"{did_you_mean(name, asset.attributes)}"
-        )
+def _corners(asset: Asset, name: str) -> Float32:
+    """``(T, 3, C)`` values of an attribute of vertices or corners, at corners."""
     attribute: Attribute = asset.attributes[name]
     if attribute.domain == "vertex":
         return np.asarray(np.asarray(attribute)[asset.faces], np.float32)
-    if attribute.domain == "corner":
-        return np.asarray(attribute, np.float32).reshape(len(asset.faces), 3, -1)
-    raise InputError(
-        f"{where} has a texture on attribute {name!r} of a {attribute.domain}; one of vertices or corners is needed"
-    )
+    return np.asarray(attribute, np.float32).reshape(len(asset.faces), 3, -1)
 
 
 def _corner_colours(asset: Asset) -> Float32:

@@ -66,7 +66,7 @@ class ExportReport:
 def export_html(
     source: str | os.PathLike[str],
     target: str | os.PathLike[str],
-    up: str = "y",
+    up: str | None = None,
     quality: float | None = None,
     progress: Progress | None = None,
 ) -> ExportReport:
@@ -75,7 +75,7 @@ def export_html(
     Args:
         source: the geometry video, of any codec.
         target: the ``.html`` to write; an older file is replaced once the new one is complete.
-        up: the axis that stands upright in the first view, ``y`` or ``z``.
+        up: the axis that stands upright in the first view, ``y`` or ``z``; None: the file's own, else ``y``.
         quality: 0..100, of the conversion where there is one: the error that it may add (`gvpipe.quality_scale`); `QUALITY` if
             None.
         progress: called with a stage's name and the part of it that is done.
@@ -88,11 +88,13 @@ def export_html(
     target = Path(target)
     if target.suffix.lower() not in SUFFIXES:
         raise InputError(f"{target}: the output is a web page; end its name in .html")
-    if up not in AXES:
+    if up is not None and up not in AXES:
         raise InputError(f"up is {up!r}; one of {', '.join(AXES)} is needed")
     if not os.path.isdir(target.parent):
         raise OutputError(f"cannot write {target}: no folder {target.parent}; create it first")
     player = Player(source)
+    if up is None:
+        up = player.metadata.up_axis if player.metadata.up_axis in AXES else "y"
     obstacle = browser_obstacle(player.bitstream)
     if not obstacle:
         shown = with_web_fields(player)

@@ -77,3 +77,13 @@ def test_a_given_kind_stays() -> None:
     given = Attribute(np.zeros((4, 2)), kind="vector")
     assert as_attribute("uv", given, ROWS, "mesh") is given
     assert as_attribute("uv", Attribute(np.zeros((4, 2))), ROWS, "mesh").kind == "uv"
+
+
+def test_float64_that_float32_would_flatten_is_refused() -> None:
+    far = 1e9 + np.random.default_rng(1).random(100)
+    with pytest.raises(InputError, match="float32 would round its values by up to .*; subtract an offset first"):
+        Attribute(far)
+    assert np.asarray(Attribute(far - 1e9)).max() <= 1
+    assert np.asarray(Attribute(np.full(4, 0.1))).dtype == np.float32
+    with pytest.raises(TypeError, match="unit of attribute is 3"):
+        Attribute(np.zeros(4), unit=3)  # type: ignore[arg-type]

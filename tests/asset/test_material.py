@@ -41,9 +41,11 @@ def test_materials_are_checked() -> None:
         (Material(alpha_mode="glass"), "alpha mode 'glass'"),
         (Material(base_color_texture=Texture(0, wrap=("repeat", "tile"))), "wrap 'tile'"),
         (Material(normal_texture=Texture(0, filter="cubic")), "filter 'cubic'"),
-        (Material(base_color_texture=Texture(0, offset=(0.0, float("inf")))), "moved by something"),
+        (Material(base_color_texture=Texture(0, offset=(0.0, 1e30))), "moved by something"),
         (Material(emissive=(1e30, 0, 0)), "not a number up to"),
-        (Material(roughness=float("nan")), "not a number up to"),
+        (Material(roughness=float("nan")), "a finite number is needed"),
+        (Material(base_color_texture=5), "base_color_texture is 5"),  # type: ignore[arg-type]
+        (Material(5), "name is 5"),  # type: ignore[arg-type]
     ):
         with pytest.raises(InputError, match=message):
             check_materials((material,), 1, "mesh")

@@ -16,7 +16,6 @@ import gvpipe
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.material import Image, Material, Texture
 from gvpipe.asset.part import Part
-from gvpipe.errors import InputError
 from gvpipe.rasterizer.camera import Camera
 from gvpipe.rasterizer.colours import BACKGROUND, to_linear, to_srgb
 from gvpipe.rasterizer.renderer import Renderer
@@ -164,13 +163,18 @@ def test_a_large_image_is_halved_and_one_that_cannot_be_decoded_is_named() -> No
     assert "'torn'" in Renderer.of(cut, (64, 64)).notes[0]
 
 
-def test_a_texture_without_its_coordinates_is_refused() -> None:
+def test_a_texture_without_its_coordinates_is_not_drawn() -> None:
     sequence = textured(checkers(4))
-    with pytest.raises(InputError, match="material 0.*a texture on attribute 'uv', which is missing.*mean 'uv2'"):
-        Renderer.of(replace(sequence, attributes={"uv2": UV}))
     flat = Attribute(np.zeros((2, 2), np.float32), "triangle", "uv")
-    with pytest.raises(InputError, match="of a triangle; one of vertices or corners"):
-        Renderer.of(replace(sequence, attributes={"uv": flat}))
+    for attributes in ({"uv2": UV}, {"uv": flat}):
+        renderer = Renderer.of(replace(sequence, attributes=attributes))
+        assert renderer.notes == (
+            "attribute 'uv' has no texture coordinates of vertices or corners; its textures are not drawn",
+        )
+        plain = Renderer.of(
+            replace(sequence, attributes=attributes, materials=(replace(sequence.materials[0], base_color_texture=None),))
+        )
+        assert np.array_equal(renderer.draw(sequence[0], FRONT_VIEW), plain.draw(sequence[0], FRONT_VIEW))
     assert Renderer.of(replace(sequence, attributes={}), plain=True).notes == ()
 
 

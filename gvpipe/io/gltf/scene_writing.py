@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Array, Float32
+from gvpipe.errors import InputError
 from gvpipe.io.gltf.attribute_writing import GltfAttribute, as_gltf, name_attributes
 from gvpipe.io.gltf.glb import INDICES, VERTICES, Glb
 from gvpipe.io.gltf.json_fields import Json
@@ -60,6 +61,8 @@ class Written:
 
 def prepare(sequence: MeshSequence, fields: tuple[str, ...] = ()) -> Prepared:
     """Split vertices and convert attributes; ``fields`` are names of fields that are written, too."""
+    if not len(sequence.faces):
+        raise InputError(f"{sequence.name} has no triangles; glTF needs one, so write .npz or .ply")
     split = split_vertices(sequence)
     names = {name: held for name, held in name_attributes(sequence.attributes).items() if name in split.attributes}
     made = {name: as_gltf(names[name], sequence.attributes[name].kind, split.attributes[name]) for name in names}
