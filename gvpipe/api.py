@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 Source = StrPath | Sequence[StrPath]
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
-ASSET = ("attributes", "fields", "textures", "clip", "mesh")
+ASSET = ("attributes", "fields", "textures", "clip", "mesh", "frames")
 KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", *ASSET)  # of `encode`
 
 
@@ -146,7 +146,13 @@ class _StageClock:
             self.progress(stage, done)
 
 
-def read(path: Source, fps: float | None = None, clip: str | None = None, mesh: StrPath | None = None) -> MeshSequence:
+def read(
+    path: Source,
+    fps: float | None = None,
+    clip: str | None = None,
+    mesh: StrPath | None = None,
+    frames: tuple[int, int | None] | None = None,
+) -> MeshSequence:
     """Read a mesh sequence, or a geometry video as one.
 
     Args:
@@ -155,6 +161,7 @@ def read(path: Source, fps: float | None = None, clip: str | None = None, mesh: 
         fps: frames per second; overrides the file's. Frame files have 30 by default, glTF files the rate of their keys.
         clip: name of the animation to read, of a glTF file that has several; None: the first.
         mesh: a file with the triangles of a point cache.
+        frames: first frame that is read, and the one after the last (None: all that follow).
 
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
@@ -164,14 +171,16 @@ def read(path: Source, fps: float | None = None, clip: str | None = None, mesh: 
         for file in path:
             check_path(file, "a file of gvpipe.read's list")
         if len(path) != 1:
-            return read_sequence(path, fps, clip, mesh)
+            return read_sequence(path, fps, clip, mesh, frames)
         path = path[0]
     one = check_path(path, "what gvpipe.read is given", "a list of frame files or ")
     if Path(one).suffix.lower() not in VIDEO_SUFFIXES:
-        return read_sequence(one, fps, clip, mesh)
+        return read_sequence(one, fps, clip, mesh, frames)
     if clip is not None:
         raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
     sequence = Player(one).sequence()
+    if frames is not None:
+        sequence = sequence.part(*frame_range(sequence, *frames))
     return sequence if fps is None else sequence.with_fps(fps)
 
 
@@ -208,6 +217,7 @@ def encode(
     textures: int | str | None = None,
     clip: str | None = None,
     mesh: StrPath | None = None,
+    frames: tuple[int, int | None] | None = None,
     **settings: Any,
 ) -> Report:
     """Encode a sequence into a geometry video.
@@ -233,7 +243,7 @@ def encode(
         fields: the same for animated fields; ``"0.1%,nan=keep"`` keeps NaN as holes.
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
-        clip, mesh: as for `read`.
+        clip, mesh, frames: as for `read`.
 
     Raises:
         InputError: the source, a setting or the path cannot be used, or no quality meets the target.
@@ -246,7 +256,7 @@ def encode(
         raise SettingError(f"more than one target is given; choose one of {', '.join(targets)}")
     given = _candidates(codec, settings, purpose)
     clock = _StageClock(progress)
-    sequence = _open_source(source, path, fps, clip, mesh)
+    sequence = _open_source(source, path, fps, clip, mesh, frames)
     target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
     asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
     coded = _code(sequence, given, target, asset, clock)
@@ -278,7 +288,7 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0)
         FormatError: not a geometry video, or a damaged one.
     """
     player = Player(path)
-    start, stop = frame_range(player.path, len(player), start, stop)
+    start, stop = frame_range(player, start, stop)
     # positions before faces: the video decodes on other threads while the mesh does on this one
     positions = np.asarray(player.level(lod).positions[start:stop]) if lod else player[start:stop]
     if lod:
@@ -402,11 +412,12 @@ def info(path: StrPath) -> Info:
     )
 
 
-def frame_range(name: str, n_frames: int, start: int, stop: int | None) -> tuple[int, int]:
-    """Return the range with its end filled in; raises `InputError` unless it holds some of the frames, and only those."""
-    stop = n_frames if stop is None else stop
-    if not 0 <= start < stop <= n_frames:
-        raise InputError(f"{name}: frames {start} to {stop} asked for; 0 <= start < stop <= {n_frames} is needed")
+def frame_range(video: Player | MeshSequence, start: int, stop: int | None) -> tuple[int, int]:
+    """Return the range with its end filled in; raises `InputError` unless it holds frames of the video, and only those."""
+    stop = len(video) if stop is None else stop
+    if not 0 <= start < stop <= len(video):
+        name = video.path if isinstance(video, Player) else video.name
+        raise InputError(f"{name}: frames {start} to {stop} asked for; 0 <= start < stop <= {len(video)} is needed")
     return start, stop
 
 
@@ -435,16 +446,22 @@ def _is_settings(value: object) -> bool:
 
 
 def _open_source(
-    source: MeshSequence | Source, path: StrPath, fps: float | None, clip: str | None, mesh: StrPath | None
+    source: MeshSequence | Source,
+    path: StrPath,
+    fps: float | None,
+    clip: str | None,
+    mesh: StrPath | None,
+    frames: tuple[int, int | None] | None,
 ) -> MeshSequence:
     """The sequence to encode, which must not be the file to write."""
     if isinstance(source, MeshSequence):
+        source = source if frames is None else source.part(*frame_range(source, *frames))
         return source if fps is None else source.with_fps(fps)
     if not isinstance(source, list | tuple):
         check_path(source, "gvpipe.encode's source", "a MeshSequence or ")
     if _is_among(path, source):
         raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
-    return read(source, fps, clip, mesh)
+    return read(source, fps, clip, mesh, frames)
 
 
 def _target(

@@ -125,7 +125,7 @@ class MeshSequence:
             if not isinstance(getattr(self, what), Mapping):
                 raise TypeError(f"{what} are {show(getattr(self, what))}; arrays by name are needed, such as {example}")
         materials, images = tuple(self.materials), tuple(self.images)
-        check_materials(materials, images, self.name)
+        check_materials(materials, len(images), self.name)
         parts = check_parts(self.parts, self.faces, self.n_vertices, len(materials), self.name)
         checked = {
             "materials": materials,

@@ -1,4 +1,6 @@
-"""What is read of each asset, and how far it is from its reference: ``python tools/check_assets.py FOLDER [--only NAME]``.
+"""What is read of each asset, and how far it is from its reference.
+
+    python tools/check_assets.py FOLDER [--only NAME]
 
 FOLDER has ``assets/KIND/NAME/`` with the files of one asset each, and ``reference/NAME.npz`` with positions by other programs.
 Each kind has a function in `KINDS` that reads an asset at the reference's times. The distance is the largest of any vertex, as
@@ -99,7 +101,7 @@ def check(path: Path, reference: Path, compare: Compare) -> bool:
 
 def main() -> None:
     """Check all assets of a folder."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="with assets/ and reference/")
     parser.add_argument("--only", default="", help="assets whose name contains this")
     given = parser.parse_args()

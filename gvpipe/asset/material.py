@@ -16,6 +16,7 @@ ALPHA_MODES = ("opaque", "mask", "blend")
 WRAPS = ("repeat", "mirror", "clamp")
 FILTERS = ("linear", "nearest")
 MAX_SIDE = 16384  # pixels of an image
+MAX_FACTOR = 1e9  # magnitude of a material's numbers
 SIGNATURES = (  # first bytes of pictures
     b"\x89PNG\r\n\x1a\n",
     b"\xff\xd8\xff",  # JPEG
@@ -115,20 +116,26 @@ class Material:
         return {name: value for name, value in named if isinstance(value, Texture)}
 
 
-def check_materials(materials: tuple[Material, ...], images: tuple[Image, ...], where: str) -> None:
+def check_materials(materials: tuple[Material, ...], n_images: int, where: str) -> None:
     """Raise `InputError` for an image index out of range, a word or a number that cannot be."""
     for number, material in enumerate(materials):
         name = f"{where}: material {number} ({material.name!r})"
         check_word("alpha mode", material.alpha_mode, ALPHA_MODES, name)
         factors = (*material.base_color, *material.emissive, material.metallic, material.roughness, material.alpha_cutoff)
-        if not (len(factors) == 10 and all(math.isfinite(factor) for factor in factors)):
-            raise InputError(f"{name} has a factor that is not a finite number, or too few of them")
+        if len(factors) != 10 or not _are_numbers(factors):
+            raise InputError(f"{name} has too few factors, or one that is not a number up to {MAX_FACTOR:g}")
         for role, texture in material.textures.items():
-            if not 0 <= texture.image < len(images):
-                raise InputError(f"{name}: {role} shows image {texture.image}; there are {len(images)} images")
+            if not 0 <= texture.image < n_images:
+                raise InputError(f"{name}: {role} shows image {texture.image}; there are {n_images} images")
+            if not _are_numbers((texture.scale, texture.rotation, *texture.offset, *texture.tiling)):
+                raise InputError(f"{name}: {role} is moved by something that is not a number up to {MAX_FACTOR:g}")
             check_word("filter", texture.filter, FILTERS, name)
             for wrap in texture.wrap:
                 check_word("wrap", wrap, WRAPS, name)
+
+
+def _are_numbers(values: tuple[float, ...]) -> bool:
+    return all(math.isfinite(value) and abs(value) <= MAX_FACTOR for value in values)
 
 
 def check_image(image: Image) -> None:

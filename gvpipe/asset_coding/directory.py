@@ -5,22 +5,24 @@ It is deflated JSON (`gvpipe.container.json_object`). Numbers that need more roo
     asset = {"version": 1, "parts": [...], "geometry": bool, "attributes": [...], "fields": [...],
              "materials": [...], "images": [...], "metadata": {...}}
 
-Fields of a material that have their default value are left out.
+Fields of materials and metadata that have their default value are left out (`gvpipe.asset.plain`).
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 from gvpipe.asset.attribute import DOMAINS, KINDS, MAX_COMPONENTS
 from gvpipe.asset.field import DOMAINS as FIELD_DOMAINS
-from gvpipe.asset.material import ALPHA_MODES, FILTERS, WRAPS, Material, Texture
-from gvpipe.asset.metadata import NO_METADATA, UP_AXES, Metadata
+from gvpipe.asset.material import Material, check_materials
+from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part
+from gvpipe.asset.plain import from_plain, to_plain
 from gvpipe.container.json_object import JsonObject, pack_json, unpack_json
+from gvpipe.errors import InputError
 
 SECTION = "asset"
 VERSION = 1
@@ -28,7 +30,6 @@ MOST = 1 << 16  # parts, materials, images, attributes or fields
 MAX_BYTES = 1 << 26  # of the JSON, inflated
 HUGE = 3.5e38  # above float32's largest number
 DTYPES = ("float32", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64")
-TEXTURES = tuple(each.name for each in dataclasses.fields(Material) if each.name.endswith("_texture"))
 
 
 @dataclass(frozen=True)
@@ -91,9 +92,9 @@ def pack_directory(directory: Directory) -> bytes:
             "geometry": directory.geometry,
             "attributes": [dataclasses.asdict(each) for each in directory.attributes],
             "fields": [dataclasses.asdict(each) for each in directory.fields],
-            "materials": [_changed(material) for material in directory.materials],
+            "materials": [to_plain(material) for material in directory.materials],
             "images": [dataclasses.asdict(image) for image in directory.images],
-            "metadata": {key: _plain(value) for key, value in _changed(directory.metadata).items()},
+            "metadata": to_plain(directory.metadata),
         }
     )
 
@@ -108,7 +109,11 @@ def unpack_directory(data: bytes, n_vertices: int) -> Directory:
         ListedImage(image.text("name"), image.text("media_type"), image.text("section"))
         for image in values.objects("images", MOST)
     )
-    materials = tuple(_read_material(each, len(images)) for each in values.objects("materials", MOST))
+    materials = tuple(_from_plain(Material, each) for each in values.objects("materials", MOST))
+    try:
+        check_materials(materials, len(images), "the file")
+    except InputError as exc:
+        raise values.corrupt(str(exc)) from exc
     return Directory(
         parts=tuple(_read_part(part, n_vertices, len(materials)) for part in values.objects("parts", 1 << 22)),
         geometry=values.flag("geometry"),
@@ -116,7 +121,7 @@ def unpack_directory(data: bytes, n_vertices: int) -> Directory:
         fields=_unique(values, (_read_listed(each, FIELD_DOMAINS) for each in values.objects("fields", MOST))),
         materials=materials,
         images=images,
-        metadata=_read_metadata(values.object("metadata")),
+        metadata=_from_plain(Metadata, values.object("metadata")),
     )
 
 
@@ -156,65 +161,8 @@ def _unique(values: JsonObject, listed: Iterable[Listed]) -> tuple[Listed, ...]:
     return result
 
 
-def _read_material(values: JsonObject, n_images: int) -> Material:
-    textures = {role: _read_texture(values.object(role), n_images) for role in TEXTURES if role in values}
-    plain = Material()
-    red, green, blue, alpha = values.numbers("base_color", 4, -HUGE, HUGE, plain.base_color)
-    emissive = values.numbers("emissive", 3, -HUGE, HUGE, plain.emissive)
-    return Material(
-        name=values.text("name", ""),
-        base_color=(red, green, blue, alpha),
-        metallic=values.number("metallic", -HUGE, HUGE, plain.metallic),
-        roughness=values.number("roughness", -HUGE, HUGE, plain.roughness),
-        emissive=(emissive[0], emissive[1], emissive[2]),
-        alpha_mode=values.choice("alpha_mode", ALPHA_MODES, plain.alpha_mode),
-        alpha_cutoff=values.number("alpha_cutoff", -HUGE, HUGE, plain.alpha_cutoff),
-        double_sided=values.flag("double_sided"),
-        unlit=values.flag("unlit"),
-        **textures,
-    )
-
-
-def _read_texture(values: JsonObject, n_images: int) -> Texture:
-    u, v = values.choices("wrap", 2, WRAPS, ("repeat", "repeat"))
-    offset = values.numbers("offset", 2, -HUGE, HUGE, (0.0, 0.0))
-    tiling = values.numbers("tiling", 2, -HUGE, HUGE, (1.0, 1.0))
-    return Texture(
-        image=values.integer("image", 0, n_images - 1),
-        uv=values.text("uv", "uv"),
-        scale=values.number("scale", -HUGE, HUGE, 1.0),
-        wrap=(u, v),
-        filter=values.choice("filter", FILTERS, "linear"),
-        offset=(offset[0], offset[1]),
-        rotation=values.number("rotation", -HUGE, HUGE, 0.0),
-        tiling=(tiling[0], tiling[1]),
-    )
-
-
-def _read_metadata(values: JsonObject) -> Metadata:
-    return Metadata(
-        up_axis=values.choice("up_axis", UP_AXES, ""),
-        metres_per_unit=values.number("metres_per_unit", 1e-300, 1e300) if "metres_per_unit" in values else None,
-        start_time=values.number("start_time", -1e300, 1e300, 0.0),
-        source=values.text("source", ""),
-        texts=values.texts("texts", MOST),
-    )
-
-
-def _changed(thing: Any) -> dict[str, Any]:
-    """The fields of a dataclass that differ from their defaults, as JSON values."""
-    result: dict[str, Any] = {}
-    for each in dataclasses.fields(thing):
-        value = getattr(thing, each.name)
-        default = each.default_factory() if each.default_factory is not dataclasses.MISSING else each.default
-        if value != default:
-            result[each.name] = _plain(value)
-    return result
-
-
-def _plain(value: Any) -> Any:
-    if dataclasses.is_dataclass(value):
-        return _changed(value)
-    if isinstance(value, Mapping):
-        return {key: _plain(each) for key, each in value.items()}
-    return [_plain(each) for each in value] if isinstance(value, tuple) else value
+def _from_plain(kind: type[Any], values: JsonObject) -> Any:
+    try:
+        return from_plain(kind, values.plain, kind.__name__.lower())
+    except InputError as exc:
+        raise values.corrupt(str(exc)) from exc

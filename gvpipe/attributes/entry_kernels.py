@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Bool, Int32, Int64
+from gvpipe.attributes.corner_kernels import next_corner, previous_corner
 from gvpipe.compiled import compiled
 from gvpipe.mesh.corner_lists import link_corners
 
@@ -61,7 +62,7 @@ def order_by_corners(triangles: Int32, opposite: Int64, n_entries: int) -> Entry
             first = n_gates
             c = lists.head[entry]
             while c >= 0:  # triangles that this entry completes
-                a, b = flat[_next(c)], flat[_previous(c)]
+                a, b = flat[next_corner(c)], flat[previous_corner(c)]
                 if is_done[a] and is_done[b]:
                     o = flat[opposite[c]] if opposite[c] >= 0 else NONE
                     _fill(gates, n_gates, a, b, (o if o >= 0 and is_done[o] else NONE, c))
@@ -69,7 +70,7 @@ def order_by_corners(triangles: Int32, opposite: Int64, n_entries: int) -> Entry
                 c = lists.after[c]
             c = lists.head[entry] if n_gates == first else NONE
             while c >= 0:  # else whatever shares a triangle
-                a, b = flat[_next(c)], flat[_previous(c)]
+                a, b = flat[next_corner(c)], flat[previous_corner(c)]
                 if is_done[a] or is_done[b]:
                     _fill(gates, n_gates, a if is_done[a] else b, NONE, (NONE, c))
                     n_gates += 1
@@ -80,7 +81,7 @@ def order_by_corners(triangles: Int32, opposite: Int64, n_entries: int) -> Entry
             starts[n] = n_gates
             c = lists.head[entry]
             while c >= 0:
-                _push_neighbours(flat[_next(c)], flat[_previous(c)], is_done, completes, stacks)
+                _push_neighbours(flat[next_corner(c)], flat[previous_corner(c)], is_done, completes, stacks)
                 c = lists.after[c]
             entry = _pop(is_done, stacks)
     return EntryOrder(order, starts, gates[:n_gates].copy())
@@ -156,13 +157,3 @@ def _pop(is_done: Bool, stacks: _Stacks) -> int:
             if not is_done[stacks.items[place]]:
                 return int(stacks.items[place])
     return NONE
-
-
-@compiled
-def _next(corner: int) -> int:
-    return corner + 1 if corner % 3 < 2 else corner - 2
-
-
-@compiled
-def _previous(corner: int) -> int:
-    return corner - 1 if corner % 3 > 0 else corner + 2

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Int32, Int64
+from gvpipe.attributes.corner_kernels import next_corner, previous_corner
 from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
 from gvpipe.mesh.corner_lists import link_corners
@@ -127,8 +128,8 @@ def _find_fan(v: int, seed: int, mesh: Corners, entries: Int64, fan: _Fan, turne
     known cut if there is one, else at the seed.
     """
     flat = mesh.triangles.ravel()
-    start, leave = seed, _next(seed)  # leave: the corner opposite to the edge by which the chain goes on
-    at, back = seed, _previous(seed)
+    start, leave = seed, next_corner(seed)  # leave: the corner opposite to the edge by which the chain goes on
+    at, back = seed, previous_corner(seed)
     while True:
         other = mesh.opposite[back]
         if other < 0:
@@ -168,20 +169,10 @@ def _find_fan(v: int, seed: int, mesh: Corners, entries: Int64, fan: _Fan, turne
 @compiled
 def _corner_at(flat: Int32, corner: int, v: int) -> int:
     """The other corner of this one's triangle that lies at vertex v."""
-    return _next(corner) if flat[_next(corner)] == v else _previous(corner)
+    return next_corner(corner) if flat[next_corner(corner)] == v else previous_corner(corner)
 
 
 @compiled
 def _third(a: int, b: int) -> int:
     """The corner of the triangle of corners a and b that is neither."""
     return 9 * (a // 3) + 3 - a - b
-
-
-@compiled
-def _next(corner: int) -> int:
-    return corner + 1 if corner % 3 < 2 else corner - 2
-
-
-@compiled
-def _previous(corner: int) -> int:
-    return corner - 1 if corner % 3 > 0 else corner + 2

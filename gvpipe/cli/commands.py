@@ -105,6 +105,7 @@ def cli() -> None:
 )
 @click.option("--clip", metavar="NAME", help="The animation to read, of a glTF file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
+@click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
 @click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp.")
 @output_options
 def encode(
@@ -125,6 +126,7 @@ def encode(
     fields: tuple[str, ...],
     clip: str | None,
     mesh: str | None,
+    frames: str | None,
     textures: str | None,
     out: Output,
 ) -> None:
@@ -159,7 +161,7 @@ def encode(
     )
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
-        beside: dict[str, Any] = {"clip": clip, "mesh": mesh, "textures": textures}
+        beside: dict[str, Any] = {"clip": clip, "mesh": mesh, "frames": _parse_frames(frames), "textures": textures}
         beside |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
         report = api.encode(source, path, chosen, progress, fps, **targets, **beside)  # type: ignore[arg-type]  # by name
     out = out.carrying(target)
@@ -216,7 +218,7 @@ def decode(
     out = out.carrying(target)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         player = api.open(given)
-        start, stop = api.frame_range(player.path, len(player), start, stop)
+        start, stop = api.frame_range(player, start, stop)
         sequence = chosen(player.level(lod).part(start, stop), parts, fps, "decode", progress)
         noticed = api.write(sequence.local() if local else sequence, path, start)
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
@@ -502,6 +504,18 @@ def _parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:
             raise click.UsageError(f"--set {pair}: KEY=VALUE is needed, such as --set clusters=30")
         settings[key.strip()] = value.strip()
     return settings
+
+
+def _parse_frames(text: str | None) -> tuple[int, int | None] | None:
+    if text is None:
+        return None
+    first, colon, last = text.partition(":")
+    try:
+        if not colon:
+            raise ValueError
+        return int(first or 0), int(last) if last else None
+    except ValueError as exc:
+        raise click.UsageError(f"--frames {text}: A:B is needed, such as --frames 10:50") from exc
 
 
 def _parse_bounds(option: str, texts: tuple[str, ...]) -> dict[str, str]:

@@ -35,6 +35,11 @@ class JsonObject:
             raise self.corrupt("an object is missing")
         self._values = values
 
+    @property
+    def plain(self) -> dict[str, Any]:
+        """Its values as they are, unchecked."""
+        return dict(self._values)
+
     def __contains__(self, key: str) -> bool:
         return self._values.get(key) is not None
 

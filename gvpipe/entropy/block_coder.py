@@ -21,6 +21,7 @@ from gvpipe.arrays import Int64, Integers
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy import parametric_tables
 from gvpipe.entropy.grouping import group_by_context
+from gvpipe.entropy.open_stream import open_stream
 from gvpipe.entropy.tokens import CHUNK, MAX_BITS, MAX_TOKENS, TABLE_TOTAL, model, tokenise
 
 PARAMETRIC = 1  # kind of a table that two numbers describe
@@ -91,21 +92,11 @@ class BlockDecoder:
     """
 
     def __init__(self, data: bytes, n_contexts: int, name: str) -> None:
-        from gvpipe.entropy import range_decoder
-        from gvpipe.entropy.block_kernels import BlockStream
-
         self._cursor = Cursor(data, name)
         if self._cursor.varint(n_contexts, "the context count") != n_contexts:
             raise self._cursor.corrupt("its context count does not fit its content")
         tables = [self._table() for _ in range(n_contexts)]
-        sizes = np.array([len(table) for table in tables], np.int64)
-        edges = np.zeros((n_contexts, int(sizes.max(initial=0)) + 1), np.uint64)
-        for own, table in zip(edges, tables, strict=True):
-            own[: len(table) + 1] = range_decoder.edges_of(table)
-        if self._cursor.left % 4:
-            raise self._cursor.corrupt("its words are not whole")
-        words = self._cursor.array("<u4", self._cursor.left // 4).astype(np.uint32)
-        self.stream = BlockStream(range_decoder.start(words), words, edges, sizes)
+        self.stream = open_stream(self._cursor, tables)
 
     def take(self, contexts: Integers) -> Int64:
         """Return the next block's values, ``(n,)``, for its ``contexts (n,)``; raises `CorruptFile` if they do not decode."""

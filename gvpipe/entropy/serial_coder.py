@@ -16,6 +16,7 @@ import numpy as np
 
 from gvpipe.arrays import Int64
 from gvpipe.container.cursor import Cursor
+from gvpipe.entropy.open_stream import open_stream
 from gvpipe.entropy.serial_tables import bits_of, read_tables, write_tables
 from gvpipe.entropy.tokens import CHUNK, MAX_TOKENS, model, tokenise
 
@@ -61,20 +62,11 @@ class SerialDecoder:
     """
 
     def __init__(self, data: bytes, n_contexts: int, name: str) -> None:
-        from gvpipe.entropy import range_decoder
-        from gvpipe.entropy.block_kernels import BlockStream
         from gvpipe.entropy.serial_kernels import SerialCoder
 
         self._cursor = Cursor(data, name)
         tables = read_tables(self._cursor, n_contexts)
-        sizes = np.array([len(table) for table in tables], np.int64)
-        edges = np.zeros((n_contexts, int(sizes.max(initial=0)) + 1), np.uint64)
-        for own, table in zip(edges, tables, strict=True):
-            own[: len(table) + 1] = range_decoder.edges_of(table)
-        if self._cursor.left % 4:
-            raise self._cursor.corrupt("its words are not whole")
-        words = self._cursor.array("<u4", self._cursor.left // 4).astype(np.uint32)
-        stream = BlockStream(range_decoder.start(words), words, edges, sizes)
+        stream = open_stream(self._cursor, tables)
         none = np.zeros(0, np.int64)
         self.coder = SerialCoder(stream, none, none.copy(), np.zeros(2, np.int64), False)
 

@@ -16,7 +16,7 @@ from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames import read_frames
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.pattern import match_pattern
-from gvpipe.io.scene_formats import HAVE_CLIPS, WRITERS, scene_readers
+from gvpipe.io.scene_formats import HAVE_CLIPS, SIMULATIONS, WRITERS, scene_readers
 from gvpipe.sequence import MeshSequence
 
 __all__ = ["READERS", "WRITERS", "read", "write"]
@@ -27,17 +27,20 @@ def read(
     fps: float | None = None,
     clip: str | None = None,
     mesh: str | os.PathLike[str] | None = None,
+    frames: tuple[int, int | None] | None = None,
 ) -> MeshSequence:
     """Read a mesh sequence.
 
     Args:
-        path: an ``.npz``, a scene (animated ``.glb`` or ``.gltf``, ``.usd``, ``.usda``, ``.usdc``, ``.usdz``, ``.abc``), a
-            point cache (``.pc2``, ``.mdd``, ``.npy``), or frame files as a folder, a glob (``walk/*.obj``), a pattern
-            (``walk/%04d.obj``, ``walk/####.obj``, ``walk/$F4.obj``), one file or a list of files.
+        path: an ``.npz``, a scene (animated ``.glb`` or ``.gltf``, ``.usd``, ``.usda``, ``.usdc``, ``.usdz``, ``.abc``,
+            ``.fbx``), a simulation (``.pvd``, ``.vtkhdf``, ``.xdmf``, ``.exo``, ``.case``), a point cache (``.pc2``, ``.mdd``,
+            ``.npy``), or frame files as a folder, a glob (``walk/*.obj``), a pattern (``walk/%04d.obj``, ``walk/####.obj``,
+            ``walk/$F4.obj``), one file or a list of files.
         fps: frames per second; overrides the file's. Frame files, and archives without one, have 30 by default. An animated
             glTF file is sampled at it; by default at the rate of its keys.
         clip: name of the animation to read, of a file that has several; None: the first.
         mesh: a file with the triangles of a point cache.
+        frames: first frame that is read, and the one after the last (None: all that follow).
 
     Raises:
         InputError: the path or what it holds cannot be used. Frame files after the first are read, and may raise it,
@@ -45,7 +48,7 @@ def read(
     """
     if not isinstance(path, str | os.PathLike):
         _refuse_clip(clip, "a list of files")
-        return read_frames([os.fspath(file) for file in path], fps)
+        return _span(read_frames([os.fspath(file) for file in path], fps), frames)
     path = os.fspath(path)
     suffix = Path(path).suffix.lower()
     if suffix not in HAVE_CLIPS or not os.path.isfile(path):
@@ -55,10 +58,10 @@ def read(
     if reader is not None and (os.path.isfile(path) or (suffix not in FRAME_FORMATS and not os.path.isdir(path))):
         if not os.path.isfile(path):
             raise InputError(f"{path}: no such file; check the path")
-        sequence = reader(Path(path), ReadOptions(fps, clip, mesh))
+        sequence = reader(Path(path), ReadOptions(fps, clip, mesh, frames))
         if sequence is not None:
-            return sequence
-    return read_frames(path, fps)
+            return sequence if suffix in SIMULATIONS else _span(sequence, frames)
+    return _span(read_frames(path, fps), frames)
 
 
 READERS = scene_readers(read)
@@ -85,6 +88,11 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
     if writer is not None and not path.endswith(("/", os.sep)) and not is_frame:
         return writer(sequence, Path(path)) or ()
     return write_frames(sequence, path, start)
+
+
+def _span(sequence: MeshSequence, frames: tuple[int, int | None] | None) -> MeshSequence:
+    """Some frames of a sequence; simulations take theirs before their topology is compared."""
+    return sequence if frames is None else sequence.part(*ReadOptions(frames=frames).span(len(sequence), sequence.name))
 
 
 def _refuse_clip(clip: str | None, name: str) -> None:

@@ -13,6 +13,8 @@ from gvpipe.io.off import OffLoader
 from gvpipe.io.off_writer import encode_off
 from gvpipe.io.ply import PlyLoader
 from gvpipe.io.ply_writer import encode_ply
+from gvpipe.io.simulation.frame_loader import STEP_LOADERS
+from gvpipe.io.simulation.vtp_writer import encode_vtp
 from gvpipe.io.stl import StlLoader, encode_stl
 
 
@@ -36,6 +38,7 @@ FRAME_FORMATS = {
     ".off": FrameFormat(OffLoader, encode_off),
     ".glb": FrameFormat(GltfLoader, encode_glb),
     ".gltf": FrameFormat(GltfLoader),
+    **{suffix: FrameFormat(loader, encode_vtp if suffix == ".vtp" else None) for suffix, loader in STEP_LOADERS.items()},
 }
 
 

@@ -72,7 +72,7 @@ class FrameFiles:
             if here != there:
                 raise InputError(
                     f"{path.name} has {here} {noun}, {first_path.name} has {there}; "
-                    "all frames need the same vertices and triangles in the same order"
+                    f"all frames need the same vertices and triangles in the same order{_remedy(frame)}"
                 )
         if mesh.faces is not self.first.faces:
             differing = np.flatnonzero((mesh.faces != self.first.faces).any(axis=1))
@@ -81,7 +81,7 @@ class FrameFiles:
                 raise InputError(
                     f"triangle {at} is {mesh.faces[at].tolist()} in {path.name}, "
                     f"but {self.first.faces[at].tolist()} in {first_path.name}; "
-                    "all frames need the same triangles in the same order"
+                    f"all frames need the same triangles in the same order{_remedy(frame)}"
                 )
         self._spool.store(frame, self._narrow(mesh))
         for name, (first, spool) in self._columns.items():
@@ -124,6 +124,11 @@ class FrameFiles:
         self.rounding = max(self.rounding, rounding(mesh.positions[None], positions, self.origin))
         result: Float32 = positions[0]
         return result
+
+
+def _remedy(frame: int) -> str:
+    """What reads the frames before one whose topology is another."""
+    return f" (it is frame {frame}; --frames 0:{frame} reads those before it)"
 
 
 def load_mesh(loader: Loader, path: Path, frame: int) -> Mesh:

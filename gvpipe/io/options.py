@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 
+from gvpipe.errors import InputError
+
 
 @dataclass(frozen=True)
 class ReadOptions:
@@ -14,11 +16,28 @@ class ReadOptions:
         fps: frames per second, instead of the file's.
         clip: name of the animation, of files that hold several; None: the first.
         mesh: a file with the mesh, for formats that hold positions alone (point caches).
+        frames: first frame that is read, and the one after the last (None: all that follow). Simulations whose topology
+            changes are read from frame to frame where it does not.
     """
 
     fps: float | None = None
     clip: str | None = None
     mesh: str | os.PathLike[str] | None = None
+    frames: tuple[int, int | None] | None = None
+
+    def span(self, n_frames: int, where: str) -> tuple[int, int]:
+        """First frame of a file of ``n_frames``, and the one after the last; ``where`` is the file, for messages.
+
+        Raises:
+            InputError: there is no such frame.
+        """
+        if n_frames < 1:
+            raise InputError(f"{where} has no time steps; at least one is needed")
+        start, stop = self.frames or (0, None)
+        stop = n_frames if stop is None else min(stop, n_frames)
+        if not 0 <= start < stop:
+            raise InputError(f"{where}: frames {start}:{stop} are none of its {n_frames}; give a first and a later last frame")
+        return start, stop
 
 
 NO_OPTIONS = ReadOptions()

@@ -35,14 +35,15 @@ def test_a_picture_that_is_too_large_is_refused() -> None:
 
 
 def test_materials_are_checked() -> None:
-    images = (Image("a", "image/png", picture()),)
-    check_materials((Material(base_color_texture=Texture(0)),), images, "mesh")
+    check_materials((Material(base_color_texture=Texture(0)),), 1, "mesh")
     for material, message in (
         (Material(base_color_texture=Texture(1)), "shows image 1; there are 1 images"),
         (Material(alpha_mode="glass"), "alpha mode 'glass'"),
         (Material(base_color_texture=Texture(0, wrap=("repeat", "tile"))), "wrap 'tile'"),
         (Material(normal_texture=Texture(0, filter="cubic")), "filter 'cubic'"),
-        (Material(roughness=float("nan")), "not a finite number"),
+        (Material(base_color_texture=Texture(0, offset=(0.0, float("inf")))), "moved by something"),
+        (Material(emissive=(1e30, 0, 0)), "not a number up to"),
+        (Material(roughness=float("nan")), "not a number up to"),
     ):
         with pytest.raises(InputError, match=message):
-            check_materials((material,), images, "mesh")
+            check_materials((material,), 1, "mesh")

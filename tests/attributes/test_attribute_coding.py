@@ -83,7 +83,9 @@ def some_values(n: int, seed: int = 0) -> list[tuple[str, Values, float]]:
 
 
 @each_surface
-@pytest.mark.parametrize("domain", DOMAINS)
+@pytest.mark.parametrize(
+    "domain", [pytest.param(each, marks=pytest.mark.slow) if each == "vertex" else each for each in DOMAINS]
+)
 def test_every_kind_comes_back(surface: Surface, domain: str) -> None:
     n = surface.faces.size if domain == "corner" else count_values(domain, surface)
     for kind, values, bound in some_values(n):
@@ -167,6 +169,7 @@ def test_truncated_attributes_are_corrupt() -> None:
             decode_attribute(data + b"\0", surface, "x", domain="corner")
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(st.data())
 def test_damaged_attributes_are_corrupt_or_values(data: st.DataObject) -> None:

@@ -19,6 +19,7 @@ ASSETS = DATA / "assets" / "gltf"
 FILES = ["CesiumMan_Binary/CesiumMan.glb", "Fox/Fox.glb", "gdx_pbrTest_8influences/pbrTest.gltf"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_attributes_come_back_within_bounds_and_take_fewer_bytes_than_draco(name: str) -> None:
     if not (ASSETS / name).exists():

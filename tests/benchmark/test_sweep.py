@@ -87,6 +87,7 @@ def test_one_codec_with_several_settings(sheet: Path) -> None:
             sweep.run([str(sheet)], [codec])
 
 
+@pytest.mark.slow
 def test_every_codec_by_default(sheet: Path) -> None:
     assert set(codec_ids()) >= {"mcgv", "pca", "pdct"}
     named = sweep.default_codecs()

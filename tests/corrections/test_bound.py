@@ -77,7 +77,9 @@ def largest_error(sequence: MeshSequence, path: Path) -> float:
     return gvpipe.compare(sequence, gvpipe.decode(path)).max
 
 
-@each_codec
+@pytest.mark.parametrize(
+    "codec", [pytest.param(each, marks=pytest.mark.slow) if each == "mcgv" else each for each in codec_ids()]
+)
 @pytest.mark.parametrize("name", AWKWARD)
 def test_every_vertex_keeps_the_bound(codec: str, name: str, tmp_path: Path) -> None:
     """Every second input in the codec's order of vertices."""
@@ -88,6 +90,7 @@ def test_every_vertex_keeps_the_bound(codec: str, name: str, tmp_path: Path) -> 
     assert report.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("codec", "percent"), BOUNDS)
 def test_bounds_from_coarse_to_float32(codec: str, percent: float, tmp_path: Path) -> None:
     """Down to where float32 itself has hardly finer steps; and the smaller bound costs more bytes."""

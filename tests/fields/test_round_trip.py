@@ -187,6 +187,7 @@ def test_a_bound_below_float32_is_kept_exactly() -> None:
     assert np.array_equal(back, values)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not FIELDS, reason="no ../shared/data/fields")
 @pytest.mark.parametrize("path", FIELDS, ids=lambda path: path.stem)
 def test_real_fields(path: object) -> None:

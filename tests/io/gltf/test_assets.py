@@ -20,6 +20,7 @@ def asset_file(name: str) -> Path:
     return next(path for path in (ASSETS / name).iterdir() if path.suffix in (".gltf", ".glb"))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not NAMES, reason="no shared data")
 @pytest.mark.parametrize("name", NAMES)
 def test_positions_agree_with_other_programs(name: str) -> None:

@@ -15,7 +15,7 @@ from gvpipe.mesh.lattice import Lattice
 
 
 @pytest.mark.parametrize("name", awkward_surfaces())
-@pytest.mark.parametrize("block", [8, 16])
+@pytest.mark.parametrize("block", [pytest.param(8, marks=pytest.mark.slow), 16])
 def test_placement_follows_its_description(name: str, block: int) -> None:
     """The same pixels as a recursion in Python's integers; one pixel each, also in the tightest plane and with groups."""
     points = np.asarray(awkward_surfaces()[name][0])

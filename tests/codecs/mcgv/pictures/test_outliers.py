@@ -145,6 +145,7 @@ def test_headers_and_sections_that_do_not_fit(stream: Bitstream) -> None:
         open_reader(dataclasses.replace(images, header=header, sections={**images.sections, SECTION: section}))
 
 
+@pytest.mark.slow
 def test_hostile_sections(stream: Bitstream) -> None:
     """Cut, lengthened or changed: `CorruptFile`, or frames that are numbers."""
     data = stream.section(SECTION)

@@ -1,0 +1,45 @@
+"""A sequence as ParaView's .pvd, which lists a .vtp file per frame with its time, in a folder of its own beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from gvpipe.arrays import Float64
+from gvpipe.atomic import atomic_path
+from gvpipe.io.export import write_frames
+from gvpipe.sequence import MeshSequence
+
+
+def write_pvd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
+    """Write ``walk.pvd`` and ``walk/walk_0000.vtp``...; the list is written last.
+
+    Returns what the format cannot hold, a line each.
+
+    Raises:
+        OutputError: a file or the folder cannot be written.
+    """
+    digits = max(4, len(str(sequence.n_frames - 1)))
+    name = path.stem.replace("%", "_").replace("#", "_").replace("$", "_")  # no second pattern in the name
+    folder = path.with_name(name)
+    notes = write_frames(sequence, str(folder / f"{name}_%0{digits}d.vtp"))
+    listed = "".join(
+        f'<DataSet timestep="{time:.17g}" part="0" file={quoteattr(f"{name}/{name}_{frame:0{digits}d}.vtp")}/>\n'
+        for frame, time in enumerate(frame_times(sequence))
+    )
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian"><Collection>\n'
+    with atomic_path(path) as temporary:
+        temporary.write_text(f"{head}{listed}</Collection></VTKFile>\n", "utf-8")
+    return notes
+
+
+def frame_times(sequence: MeshSequence) -> Float64:
+    """``(F,)`` seconds of the frames: those that the metadata's text has where the steps were uneven, else by the rate."""
+    even = sequence.metadata.start_time + np.arange(sequence.n_frames) / sequence.fps
+    try:
+        kept = np.array(sequence.metadata.texts.get("times", "").split(), np.float64)
+    except ValueError:
+        return np.asarray(even)
+    return kept if len(kept) == sequence.n_frames and np.isfinite(kept).all() else np.asarray(even)

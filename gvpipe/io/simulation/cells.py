@@ -1,0 +1,192 @@
+"""Cells of a grid, by VTK's numbers of cell types, and the faces that each type has.
+
+Source: Kitware, VTK 9.7, vtkCellType.h and the node orders of its cell classes. Other formats are put into VTK's order by
+their readers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gvpipe.arrays import Array, Int64, UInt8
+
+# cells by the number of their dimensions; types in neither list are refused
+POINTS_AND_LINES = frozenset((0, 1, 2, 3, 4, 21, 35, 68, 75))
+STRIP, POLYGON, PIXEL, VOXEL, POLYHEDRON = 6, 7, 8, 11, 42
+ANY_LENGTH = frozenset((2, 4, 6, 7, 36, 42, *range(68, 82)))  # the number of nodes is the cell's own
+
+# nodes of flat cells, in the order of their outline; those inside are left out
+OUTLINES = {
+    5: (0, 1, 2),
+    8: (0, 1, 3, 2),
+    9: (0, 1, 2, 3),
+    22: (0, 3, 1, 4, 2, 5),
+    23: (0, 4, 1, 5, 2, 6, 3, 7),
+    28: (0, 4, 1, 5, 2, 6, 3, 7),
+    30: (0, 4, 1, 2, 5, 3),
+    34: (0, 3, 1, 4, 2, 5),
+    69: (0, 1, 2),
+    70: (0, 1, 2, 3),
+    76: (0, 1, 2),
+    77: (0, 1, 2, 3),
+}
+
+TETRAHEDRON = ((0, 1, 3), (1, 2, 3), (2, 0, 3), (0, 2, 1))
+HEXAHEDRON = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
+WEDGE = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
+PYRAMID = ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
+PENTAGONAL_PRISM = ((0, 4, 3, 2, 1), (5, 6, 7, 8, 9), (0, 1, 6, 5), (1, 2, 7, 6), (2, 3, 8, 7), (3, 4, 9, 8), (4, 0, 5, 9))
+HEXAGONAL_PRISM = (
+    (0, 5, 4, 3, 2, 1), (6, 7, 8, 9, 10, 11), (0, 1, 7, 6), (1, 2, 8, 7), (2, 3, 9, 8), (3, 4, 10, 9), (4, 5, 11, 10),
+    (5, 0, 6, 11),
+)  # fmt: skip
+VOXEL_FACES = ((0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6))
+
+# the node in the middle of each edge of quadratic cells
+TETRAHEDRON_EDGES = {(0, 1): 4, (1, 2): 5, (0, 2): 6, (0, 3): 7, (1, 3): 8, (2, 3): 9}
+HEXAHEDRON_EDGES = {(0, 1): 8, (1, 2): 9, (2, 3): 10, (0, 3): 11, (4, 5): 12, (5, 6): 13, (6, 7): 14, (4, 7): 15,
+                    (0, 4): 16, (1, 5): 17, (2, 6): 18, (3, 7): 19}  # fmt: skip
+WEDGE_EDGES = {(0, 1): 6, (1, 2): 7, (0, 2): 8, (3, 4): 9, (4, 5): 10, (3, 5): 11, (0, 3): 12, (1, 4): 13, (2, 5): 14}
+LINEAR_WEDGE_EDGES = {edge: node for edge, node in WEDGE_EDGES.items() if node < 12}
+PYRAMID_EDGES = {(0, 1): 5, (1, 2): 6, (2, 3): 7, (0, 3): 8, (0, 4): 9, (1, 4): 10, (2, 4): 11, (3, 4): 12}
+
+Corners = tuple[tuple[int, ...], ...]
+
+
+def _quadratic(faces: Corners, edges: dict[tuple[int, int], int]) -> Corners:
+    """Faces with the nodes of their edges between their corners."""
+    result = []
+    for face in faces:
+        nodes: list[int] = []
+        for a, b in zip(face, face[1:] + face[:1], strict=True):
+            middle = edges.get((min(a, b), max(a, b)))
+            nodes += [a] if middle is None else [a, middle]
+        result.append(tuple(nodes))
+    return tuple(result)
+
+
+VOLUMES: dict[int, Corners] = {
+    10: TETRAHEDRON,
+    11: VOXEL_FACES,
+    12: HEXAHEDRON,
+    13: WEDGE,
+    14: PYRAMID,
+    15: PENTAGONAL_PRISM,
+    16: HEXAGONAL_PRISM,
+    24: _quadratic(TETRAHEDRON, TETRAHEDRON_EDGES),
+    25: _quadratic(HEXAHEDRON, HEXAHEDRON_EDGES),
+    26: _quadratic(WEDGE, WEDGE_EDGES),
+    27: _quadratic(PYRAMID, PYRAMID_EDGES),
+    29: _quadratic(HEXAHEDRON, HEXAHEDRON_EDGES),
+    31: _quadratic(WEDGE, LINEAR_WEDGE_EDGES),
+    32: _quadratic(WEDGE, WEDGE_EDGES),
+    33: _quadratic(HEXAHEDRON, HEXAHEDRON_EDGES),
+    37: _quadratic(PYRAMID, PYRAMID_EDGES),
+    71: TETRAHEDRON,
+    72: HEXAHEDRON,
+    73: WEDGE,
+    74: PYRAMID,
+    78: TETRAHEDRON,
+    79: HEXAHEDRON,
+    80: WEDGE,
+    81: PYRAMID,
+}
+SIZES = {
+    1: 1, 3: 2, 5: 3, 8: 4, 9: 4, 10: 4, 11: 8, 12: 8, 13: 6, 14: 5, 15: 10, 16: 12, 21: 3, 22: 6, 23: 8, 24: 10, 25: 20,
+    26: 15, 27: 13, 28: 9, 29: 27, 30: 6, 31: 12, 32: 18, 33: 24, 34: 7, 35: 4, 37: 19,
+}  # fmt: skip
+HIGHER_ORDER = frozenset(range(69, 82)) - {75}  # only their corners are read
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Cells of a grid.
+
+    Args:
+        types: ``(M,) uint8`` VTK's number of each cell's type.
+        offsets: ``(M + 1,) int64`` where each cell's nodes start, and the end.
+        nodes: ``(K,) int64`` points of the cells, one cell after the other.
+
+    Raises:
+        ValueError: offsets that do not rise or end elsewhere, a cell with another number of nodes than its type.
+    """
+
+    types: UInt8
+    offsets: Int64
+    nodes: Int64
+
+    def __post_init__(self) -> None:
+        if len(self.offsets) != len(self.types) + 1 or self.offsets[0] != 0 or self.offsets[-1] != len(self.nodes):
+            raise ValueError(
+                f"its {len(self.types)} cells have {len(self.offsets)} offsets up to {int(self.offsets[-1])}, "
+                f"but {len(self.nodes)} nodes"
+            )
+        sizes = self.sizes
+        if sizes.min(initial=0) < 0:
+            raise ValueError(f"the nodes of cell {int(np.argmin(sizes))} end before they start")
+        needed = SIZE_OF_TYPE[self.types]
+        bad = np.flatnonzero((needed > 0) & (sizes != needed))
+        if len(bad):
+            at = bad[0]
+            raise ValueError(f"cell {at} of type {self.types[at]} has {sizes[at]} nodes; {needed[at]} are needed")
+
+    @property
+    def sizes(self) -> Int64:
+        """``(M,)`` number of nodes of each cell."""
+        return np.asarray(np.diff(self.offsets))
+
+    def equals(self, other: Cells) -> bool:
+        """Whether both are the same cells in the same order."""
+        return self is other or (
+            np.array_equal(self.types, other.types)
+            and np.array_equal(self.offsets, other.offsets)
+            and np.array_equal(self.nodes, other.nodes)
+        )
+
+
+SIZE_OF_TYPE = np.zeros(256, np.int64)  # 0 where a cell has any number of nodes
+for _type, _size in SIZES.items():
+    SIZE_OF_TYPE[_type] = _size
+
+
+def equal_cells(kind: int, nodes: Array) -> Cells:
+    """Cells of one type: ``nodes (M, n)`` are their points."""
+    count, size = nodes.shape
+    return Cells(np.full(count, kind, np.uint8), size * np.arange(count + 1), np.ascontiguousarray(nodes, np.int64).reshape(-1))
+
+
+def join_cells(pieces: list[Cells], starts: list[int]) -> Cells:
+    """Cells of several pieces as one; ``starts`` are the first points of each."""
+    if len(pieces) == 1 and starts[0] == 0:
+        return pieces[0]
+    ends = np.cumsum([0, *(len(piece.nodes) for piece in pieces)])
+    offsets = [piece.offsets[:-1] + end for piece, end in zip(pieces, ends[:-1], strict=True)]
+    return Cells(
+        np.concatenate([piece.types for piece in pieces]),
+        np.concatenate([*offsets, ends[-1:]]).astype(np.int64),
+        np.concatenate([piece.nodes + start for piece, start in zip(pieces, starts, strict=True)]),
+    )
+
+
+def structured_cells(dimensions: tuple[int, int, int]) -> Cells:
+    """The cells between points in rows, columns and layers: hexahedra, or quads if there is one layer of them.
+
+    Args:
+        dimensions: points along x, y and z; x runs fastest.
+    """
+    axes = [axis for axis in range(3) if dimensions[axis] > 1]
+    strides = (1, dimensions[0], dimensions[0] * dimensions[1])
+    if len(axes) < 2:
+        return Cells(np.zeros(0, np.uint8), np.zeros(1, np.int64), np.zeros(0, np.int64))
+    first = np.zeros((1, 1, 1), np.int64)
+    for axis in axes:
+        shape = [1, 1, 1]
+        shape[2 - axis] = -1
+        first = first + (np.arange(dimensions[axis] - 1) * strides[axis]).reshape(shape)
+    a, b = strides[axes[0]], strides[axes[1]]
+    square = np.array([0, a, a + b, b])
+    if len(axes) == 2:
+        return equal_cells(9, first.reshape(-1, 1) + square)
+    return equal_cells(12, first.reshape(-1, 1) + np.concatenate([square, square + strides[2]]))

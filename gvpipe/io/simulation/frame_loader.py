@@ -1,0 +1,65 @@
+"""Simulation files of one time step each, as frame files: the surface of the first serves all that have the same cells."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from gvpipe.errors import InputError
+from gvpipe.io.mesh import FrameValues, Mesh
+from gvpipe.io.simulation.cells import Cells
+from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
+from gvpipe.io.simulation.legacy import load_legacy
+from gvpipe.io.simulation.surface import Surface, extract_surface
+from gvpipe.io.simulation.xml_grids import load_xml_grid
+
+XML_SUFFIXES = (".vtp", ".vtu", ".vts", ".vtr", ".vti", ".pvtp", ".pvtu")
+
+
+class SurfaceLoader:
+    """Loads the surface of one file after the other.
+
+    Args:
+        load: parses a file.
+    """
+
+    def __init__(self, load: Callable[[Path], Dataset]) -> None:
+        self._load = load
+        self._first: tuple[Cells, int, Surface] | None = None
+
+    def __call__(self, path: Path) -> Mesh:
+        """Load a file; raises `ValueError`."""
+        step = self._load(path)
+        cells, points = step.cells(), step.points()
+        if self._first is not None and self._first[1] == len(points) and self._first[0].equals(cells):
+            surface = self._first[2]
+        else:
+            surface = extract_surface(cells, points)
+        self._first = self._first or (cells, len(points), surface)
+        return Mesh(
+            points[surface.points],
+            surface.faces,
+            notes=(*step.notes, *surface.notes),
+            polygons=surface.polygons,
+            parts=block_parts(step, surface),
+            animated={name: partial(_guarded, path, name, read) for name, read in surface_values(step, surface).items()},
+        )
+
+
+def _guarded(path: Path, name: str, read: Callable[[], FrameValues]) -> FrameValues:
+    """Numbers of a file; raises `InputError` with its name for whatever goes wrong."""
+    try:
+        return read()
+    except InputError:
+        raise
+    except Exception as exc:  # damaged files raise nearly anything inside NumPy
+        reason = " ".join(str(exc).split())[:200] or type(exc).__name__
+        raise InputError(f"{path}: {name!r} cannot be read: {reason}; export this frame again") from exc
+
+
+STEP_LOADERS: dict[str, Callable[[], SurfaceLoader]] = {
+    ".vtk": lambda: SurfaceLoader(load_legacy),
+    **dict.fromkeys(XML_SUFFIXES, lambda: SurfaceLoader(load_xml_grid)),
+}
+"""What loads the files of one time step each, by extension."""

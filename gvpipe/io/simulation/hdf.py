@@ -1,0 +1,103 @@
+"""HDF5 files by h5py: opened, checked and read in parts.
+
+A file takes numbers from itself alone: links to other files, virtual datasets and external storage are refused. Sizes are
+checked before anything is read, because HDF5 stores a dataset of any declared size in no bytes at all.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gvpipe.arrays import Array
+from gvpipe.errors import InputError
+from gvpipe.io.simulation.limits import check_bytes
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+
+def import_h5py(what: str) -> Any:
+    """The library; raises `InputError` with the command that installs it."""
+    try:
+        import h5py
+    except ImportError as exc:
+        raise InputError(f"{what} needs h5py; install it with: pip install 'gvpipe[vtk]'") from exc
+    return h5py
+
+
+def open_hdf(path: Path) -> HdfFile:
+    """Open a file for reading.
+
+    Raises:
+        InputError: h5py is missing, or the file is no HDF5, empty or cut short.
+    """
+    h5py = import_h5py(str(path))
+    size = path.stat().st_size
+    if not size:
+        raise InputError(f"{path} is empty; export it again")
+    with open(path, "rb") as file:
+        if file.read(8) != SIGNATURE:
+            raise InputError(f"{path} is not an HDF5 file; export it again")
+    try:
+        return HdfFile(h5py, h5py.File(path, "r", locking=False), size)
+    except OSError as exc:
+        raise InputError(f"{path} cannot be read as HDF5, or is cut short ({' '.join(str(exc).split())[:120]})") from exc
+
+
+class HdfFile:
+    """An open file."""
+
+    def __init__(self, h5py: Any, file: Any, size: int) -> None:
+        self._h5py, self.file, self.size = h5py, file, size
+
+    def find(self, path: str) -> Any:
+        """The group or dataset at a path such as ``VTKHDF/Points``, or None.
+
+        Raises:
+            ValueError: a link on the way leads to another file.
+        """
+        at = self.file
+        for name in path.strip("/").split("/"):
+            link = at.get(name, getlink=True) if isinstance(at, self._h5py.Group) else None
+            if link is None:
+                return None
+            if isinstance(link, self._h5py.ExternalLink):
+                raise ValueError(f"{path!r} is a link to another file, which is not followed")
+            at = at.get(name)
+        return at
+
+    def dataset(self, path: str) -> Any:
+        """The dataset at a path; raises `ValueError` if there is none that holds its own numbers."""
+        found = self.find(path)
+        if not isinstance(found, self._h5py.Dataset):
+            raise ValueError(f"it has no dataset {path!r}")
+        if found.is_virtual or found.external:
+            raise ValueError(f"{path!r} takes its numbers from other files, which is not followed")
+        if found.dtype.kind not in "iufb":
+            raise ValueError(f"{path!r} is of type {found.dtype}, not of numbers")
+        return found
+
+    def read(self, path: str, start: int = 0, stop: int | None = None) -> Array:
+        """Rows ``start`` to ``stop`` of a dataset; raises `ValueError`."""
+        found = self.dataset(path)
+        if not found.shape:
+            raise ValueError(f"{path!r} is one number; an array is needed")
+        n_rows = found.shape[0]
+        stop = n_rows if stop is None else stop
+        if not 0 <= start <= stop <= n_rows:
+            raise ValueError(f"{path!r} has {n_rows} rows; rows {start} to {stop} are needed")
+        check_bytes((stop - start, *found.shape[1:]), found.dtype.itemsize, self.size, repr(path))
+        return np.asarray(found[start:stop])
+
+    def names(self, path: str) -> list[str]:
+        """Names of the datasets in a group, in the file's order; none if there is no such group."""
+        group = self.find(path)
+        return list(group) if isinstance(group, self._h5py.Group) else []
+
+    def attribute(self, path: str, name: str) -> str:
+        """An attribute of a group as text, ``""`` if there is none."""
+        group = self.find(path)
+        held = None if group is None else group.attrs.get(name)
+        return held.decode("utf-8", "replace") if isinstance(held, bytes) else "" if held is None else str(held)

@@ -1,0 +1,110 @@
+"""netCDF files: the classic kinds by SciPy, netCDF-4, which is HDF5, by h5py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from gvpipe.arrays import Array
+from gvpipe.errors import InputError
+from gvpipe.io.simulation.hdf import SIGNATURE, HdfFile, open_hdf
+from gvpipe.io.simulation.limits import check_bytes
+
+
+class NetCdf(Protocol):
+    """Named arrays of a file, read in parts."""
+
+    def has(self, name: str) -> bool: ...
+
+    def shape(self, name: str) -> tuple[int, ...]: ...
+
+    def read(self, name: str, row: int | None = None) -> Array:
+        """An array, or one row of it; raises `ValueError` or `KeyError`."""
+        ...
+
+    def text(self, name: str, attribute: str) -> str:
+        """An attribute of an array, ``""`` if it has none."""
+        ...
+
+
+def open_netcdf(path: Path) -> NetCdf:
+    """Open a file of either kind.
+
+    Raises:
+        InputError: it is no such file, is empty or cut short; or h5py is missing for netCDF-4.
+    """
+    size = path.stat().st_size
+    with open(path, "rb") as file:
+        head = file.read(8)
+    if not head:
+        raise InputError(f"{path} is empty; export it again")
+    if head == SIGNATURE:
+        return Hdf4(open_hdf(path))
+    if head[:3] != b"CDF":
+        raise InputError(f"{path} is not a netCDF file; export it again")
+    if head[3] not in (1, 2):
+        raise InputError(f"{path} is netCDF of kind {head[3]}, which is not read; convert it with: nccopy -k netCDF-4")
+    return Classic(path, size)
+
+
+class Classic:
+    """A file of the classic kind; arrays are mapped, and copied in parts."""
+
+    def __init__(self, path: Path, size: int) -> None:
+        from scipy.io import netcdf_file
+
+        self._size = size
+        try:
+            self._file: Any = netcdf_file(path, "r", mmap=True)
+        except Exception as exc:  # damaged headers raise nearly anything inside SciPy
+            reason = " ".join(str(exc).split())[:120] or type(exc).__name__
+            raise InputError(f"{path} cannot be read as netCDF, or is cut short ({reason}); export it again") from exc
+
+    def has(self, name: str) -> bool:
+        return name in self._file.variables
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        return tuple(int(size) for size in self._file.variables[name].shape)
+
+    def read(self, name: str, row: int | None = None) -> Array:
+        variable = self._file.variables[name]
+        check_bytes(self.shape(name)[row is not None :], variable.data.dtype.itemsize, self._size, repr(name))
+        # a copy: mapped arrays must not outlive the file
+        values = np.array(variable.data if row is None else variable.data[row])
+        return values.astype(values.dtype.newbyteorder("="))
+
+    def text(self, name: str, attribute: str) -> str:
+        held = getattr(self._file.variables[name], attribute, b"")
+        return held.decode("latin-1") if isinstance(held, bytes) else str(held)
+
+
+class Hdf4:
+    """A netCDF-4 file."""
+
+    def __init__(self, file: HdfFile) -> None:
+        self._file = file
+
+    def has(self, name: str) -> bool:
+        return self._file.find(name) is not None
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        found = self._file.find(name)
+        return tuple(int(size) for size in getattr(found, "shape", ()))
+
+    def read(self, name: str, row: int | None = None) -> Array:
+        found = self._file.find(name)
+        if found is not None and getattr(found, "dtype", np.dtype("f4")).kind == "S":  # texts, letter by letter
+            check_bytes(found.shape, 1, self._file.size, repr(name))
+            return np.asarray(found[()])
+        return self._file.read(name) if row is None else self._file.read(name, row, row + 1)[0]
+
+    def text(self, name: str, attribute: str) -> str:
+        return self._file.attribute(name, attribute)
+
+
+def texts(values: Array) -> list[str]:
+    """Rows of letters ``(n, length)`` as texts."""
+    rows = np.atleast_2d(values).astype("S1")
+    return [b"".join(row.tolist()).split(b"\0")[0].decode("latin-1").strip() for row in rows]

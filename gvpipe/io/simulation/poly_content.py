@@ -1,0 +1,93 @@
+"""What VTK's poly data hold of a sequence: polygons, and numbers per point and per cell.
+
+A cell is a polygon. Numbers per triangle are those of a polygon's first triangle; where an attribute, or a field in the first
+frame, differs inside of polygons by more than 1 % of its range, triangles are written. Numbers per corner have no place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gvpipe.arrays import Array, Int64
+from gvpipe.asset.attribute import Attribute
+from gvpipe.asset.field import Field
+from gvpipe.asset.polygons import polygon_corners, polygon_starts
+from gvpipe.io.losses import lost_notes
+from gvpipe.sequence import MeshSequence
+
+SAME = 0.01  # part of the range by which values inside of a polygon may differ
+ROLES = {"normal": "Normals", "uv": "TCoords"}
+
+
+@dataclass(frozen=True, eq=False)
+class PolyContent:
+    """What is written.
+
+    Args:
+        offsets: ``(P + 1,)`` where each polygon's points start.
+        nodes: points of the polygons, one after the other.
+        first: ``(P,)`` the triangle whose numbers a polygon has.
+        attributes, fields: by name, those per vertex and per triangle.
+        notes: what is left out, a line each.
+    """
+
+    offsets: Int64
+    nodes: Int64
+    first: Int64
+    attributes: dict[str, Attribute]
+    fields: dict[str, Field]
+    notes: tuple[str, ...]
+
+    def still(self, domain: str) -> dict[str, Array]:
+        """Attributes of a domain: ``(rows, C)`` by name."""
+        rows = slice(None) if domain == "vertex" else self.first
+        return {name: np.asarray(one)[rows] for name, one in self.attributes.items() if one.domain == domain}
+
+    def moving(self, domain: str) -> dict[str, Field]:
+        """Fields of a domain."""
+        return {name: one for name, one in self.fields.items() if one.domain == domain}
+
+    def rows(self, one: Field, values: Array) -> Array:
+        """Frames of a field ``(n, R, C)`` as rows of points or of polygons."""
+        return values if one.domain == "vertex" else values[:, self.first]
+
+    def role(self, domain: str, kind: str) -> str:
+        """The name of what has a role in VTK, such as its normals; ``""`` if nothing has."""
+        named = [(name, one.domain, one.kind) for group in (self.attributes, self.fields) for name, one in group.items()]
+        return next((name for name, where, of in named if where == domain and of == kind), "")
+
+
+def poly_content(sequence: MeshSequence, format_name: str) -> PolyContent:
+    """Return what is written of a sequence; ``format_name`` is for notes."""
+    fields = {name: one for name, one in sequence.fields.items() if one.domain in ("vertex", "triangle")}
+    attributes = {name: one for name, one in sequence.attributes.items() if one.domain in ("vertex", "triangle")}
+    attributes = {name: one for name, one in attributes.items() if name not in fields}
+    polygons = sequence.polygons
+    if polygons is not None:
+        per_triangle = [np.asarray(one) for one in attributes.values() if one.domain == "triangle"]
+        per_triangle += [one.read(0, 1)[0] for one in fields.values() if one.domain == "triangle"]
+        if not all(_is_same_inside(values, polygons.astype(np.int64)) for values in per_triangle):
+            polygons = None
+    counts = np.full(len(sequence.faces), 3, np.int64) if polygons is None else polygons.astype(np.int64)
+    flat = sequence.faces.reshape(-1)
+    nodes = flat if polygons is None else flat[polygon_corners(polygons)]
+    held = {*fields, *attributes, *(["polygons"] if polygons is not None else [])}
+    return PolyContent(
+        np.concatenate([np.zeros(1, np.int64), np.cumsum(counts)]),
+        nodes.astype(np.int64),
+        polygon_starts(counts),
+        attributes,
+        fields,
+        lost_notes(sequence, format_name, held),
+    )
+
+
+def _is_same_inside(values: Array, counts: Int64) -> bool:
+    """Whether values ``(T, C)`` are the same in all triangles of each polygon, up to `SAME`."""
+    wide = values.astype(np.float64)
+    wide = np.where(np.isfinite(wide), wide, 0)
+    starts = np.repeat(polygon_starts(counts), counts - 2)
+    apart = np.abs(wide - wide[starts]).max(initial=0)
+    return bool(apart <= SAME * np.ptp(wide)) if wide.size else True

@@ -1,0 +1,217 @@
+"""A file that holds all time steps of a simulation, as a sequence whose frames are read when they are asked for.
+
+1. The surface of the first frame read is found once. Every other step must have the same cells.
+2. Numbers that are the same in all steps become attributes, the others fields; a few steps are compared before all are.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from gvpipe.arrays import Array, Float32, Float64, Floats
+from gvpipe.asset.attribute import MAX_COMPONENTS, Attribute
+from gvpipe.asset.field import Field
+from gvpipe.asset.metadata import Metadata
+from gvpipe.errors import InputError
+from gvpipe.io.mesh import FrameValues
+from gvpipe.io.options import ReadOptions
+from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
+from gvpipe.io.simulation.surface import Surface, extract_surface
+from gvpipe.io.simulation.times import time_steps
+from gvpipe.origin import choose_origin, narrow, rounding
+from gvpipe.sequence import MeshSequence, check_finite
+
+SAMPLES = 3  # steps that are compared with the first before all are
+Result = TypeVar("Result")
+
+
+class Steps(Protocol):
+    """The time steps of a file."""
+
+    @property
+    def n_steps(self) -> int: ...
+
+    @property
+    def times(self) -> Float64 | None:
+        """``(F,)`` seconds; None if the file has none."""
+        ...
+
+    def open(self, step: int) -> Dataset:
+        """A step; its numbers are read when they are called for."""
+        ...
+
+
+class StepFrames:
+    """Positions of the surface, ``(F, V, 3) float32`` model units, relative to ``origin``, which is the first frame's.
+
+    Args:
+        steps: of the file.
+        first, stop: steps that are frames.
+        path: the file, for messages.
+
+    Raises:
+        InputError: here for the first frame, when sliced for any other: it cannot be read, has other cells than the
+            first, or a coordinate that is not finite.
+    """
+
+    def __init__(self, steps: Steps, first: int, stop: int, path: Path) -> None:
+        self._steps, self.start, self._path = steps, first, path
+        self._n_frames = stop - first
+        self._lock = threading.Lock()  # HDF5 and netCDF files are read by one thread at a time
+        self.first = self.guarded(0, lambda: steps.open(first))
+        self._cells = self.guarded(0, self.first.cells)
+        self._n_points = -1
+        points = self.guarded(0, self.first.points)
+        self._n_points = len(points)
+        self.surface: Surface = self.guarded(0, lambda: extract_surface(self._cells, points))
+        exact = points[self.surface.points][None]
+        check_finite(narrow(exact, np.zeros(3)), str(path), 0)
+        self.origin: Float64 = choose_origin(exact)
+        self.rounding = 0.0  # what float32 moved a coordinate by at most, model units, in the frames loaded so far
+        self.values = surface_values(self.first, self.surface)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """``(F, V, 3)``."""
+        return (self._n_frames, len(self.surface.points), 3)
+
+    def __getitem__(self, key: slice) -> Float32:
+        """Frames ``key``: ``(n, V, 3) float32``."""
+        frames = range(*key.indices(self._n_frames))
+        block = np.empty((len(frames), *self.shape[1:]), np.float32)
+        for i, frame in enumerate(frames):
+            exact = self._positions(frame)[None]
+            block[i] = narrow(exact, self.origin)[0]
+            self.rounding = max(self.rounding, rounding(exact, block[i : i + 1], self.origin))
+        return block
+
+    def _positions(self, frame: int) -> Floats:
+        step = self.open(frame)
+        points = self.guarded(frame, step.points)
+        if len(points) != self._n_points:
+            raise self._changed(frame, f"{len(points)} points, {self._n_points} at first")
+        result: Floats = points[self.surface.points]
+        return result
+
+    def open(self, frame: int) -> Dataset:
+        """The step of a frame; raises `InputError` if its cells are not those of the first."""
+        step = self.guarded(frame, lambda: self._steps.open(self.start + frame))
+        cells = self.guarded(frame, step.cells)
+        if not cells.equals(self._cells):
+            raise self._changed(frame, f"{len(cells.types)} cells, {len(self._cells.types)} at first, or other corners")
+        return step
+
+    def column(self, name: str, frame: int) -> FrameValues:
+        """The numbers of one name at a frame; raises `InputError`."""
+        step = self.first if frame == 0 else self.open(frame)
+        read = surface_values(step, self.surface).get(name)
+        if read is None:
+            raise InputError(f"{self._path}: frame {frame} has no {name!r}, which frame 0 has; remove it from all or none")
+        return self.guarded(frame, read)
+
+    def guarded(self, frame: int, read: Callable[[], Result]) -> Result:
+        """What ``read`` returns; raises `InputError` naming file and frame for whatever goes wrong inside."""
+        try:
+            with self._lock:
+                return read()
+        except InputError:
+            raise
+        except Exception as exc:  # damaged files raise nearly anything inside NumPy, h5py and SciPy
+            reason = " ".join(str(exc).split())[:200] or type(exc).__name__
+            raise InputError(f"{self._path}: frame {frame} cannot be read: {reason}; export it again") from exc
+
+    def _changed(self, frame: int, what: str) -> InputError:
+        start, at = self.start, self.start + frame
+        return InputError(
+            f"{self._path}: the topology changes at frame {at} ({what}); read the frames before it or from it on alone "
+            f"(frames, --frames {start}:{at} or --frames {at}:)"
+        )
+
+
+class StepColumn:
+    """Numbers of one name in all frames, ``(F, R)`` or ``(F, R, C)``, read as they are sliced."""
+
+    def __init__(self, frames: StepFrames, name: str, first: Array) -> None:
+        self._frames, self._name = frames, name
+        self.shape: tuple[int, ...] = (frames.shape[0], *first.shape)
+        self.dtype: Any = first.dtype
+
+    def __getitem__(self, key: slice, /) -> Array:
+        frames = range(*key.indices(self.shape[0]))
+        block = np.empty((len(frames), *self.shape[1:]), self.dtype)
+        for i, frame in enumerate(frames):
+            values = self._frames.column(self._name, frame).values
+            if values.shape != self.shape[1:]:
+                raise InputError(f"{self._name!r} is {values.shape} in frame {frame} and {self.shape[1:]} in the first")
+            block[i] = values
+        return block
+
+
+def read_steps(steps: Steps, path: Path, options: ReadOptions, notes: tuple[str, ...] = (), up: str = "") -> MeshSequence:
+    """Return the surface of a simulation as a sequence.
+
+    Args:
+        steps: of the file.
+        path: of the file.
+        options: ``fps``, and ``frames``, those of the file that are read.
+        notes: of the reader.
+        up: axis, where the format says so.
+
+    Raises:
+        InputError: no step, or the first frame cannot be read.
+    """
+    first, stop = options.span(steps.n_steps, str(path))
+    frames = StepFrames(steps, first, stop, path)
+    attributes, fields, left = _split(frames, str(path))
+    times = steps.times
+    timing = time_steps(None if times is None else times[first:stop], stop - first, options.fps)
+    left_note = (
+        (f"numbers that are not of 1 to {MAX_COMPONENTS} components were left out: {', '.join(left[:5])}",) if left else ()
+    )
+    return MeshSequence(
+        frames,
+        frames.surface.faces,
+        timing.fps,
+        attributes,
+        str(path),
+        frames.origin,
+        (*notes, *frames.first.notes, *frames.surface.notes, *timing.notes, *left_note),
+        fields,
+        block_parts(frames.first, frames.surface),
+        frames.surface.polygons,
+        metadata=Metadata(up, None, timing.start, path.name, timing.texts),
+    )
+
+
+def _split(frames: StepFrames, where: str) -> tuple[dict[str, Attribute], dict[str, Field], list[str]]:
+    """Attributes, fields, and the names of what is neither."""
+    attributes, fields, left = {}, {}, []
+    for name, read in frames.values.items():
+        first = frames.guarded(0, read)
+        if (
+            first.values.ndim > 2
+            or first.values.dtype.kind not in "iuf"
+            or (first.values.shape[1:] or (1,))[0] > MAX_COMPONENTS
+        ):
+            left.append(name)
+        elif _is_still(frames, name, first.values):
+            attributes[name] = Attribute(first.values, first.domain, first.kind, unit=first.unit, name=f"{where}: {name}")
+        else:
+            column = StepColumn(frames, name, first.values)
+            fields[name] = Field(column, first.domain, first.kind, first.unit, name=f"{where}: field {name!r}")
+    return attributes, fields, left
+
+
+def _is_still(frames: StepFrames, name: str, first: Array) -> bool:
+    """Whether numbers are finite and the same in all frames."""
+    if first.dtype.kind == "f" and not np.isfinite(first).all():
+        return False  # an attribute has no holes, a field may
+    n_frames = frames.shape[0]
+    samples = np.unique(np.linspace(1, n_frames - 1, SAMPLES).astype(int)).tolist() if n_frames > 1 else []
+    rest = (frame for frame in range(1, n_frames) if frame not in samples)
+    return all(np.array_equal(frames.column(name, frame).values, first) for frame in (*samples, *rest))

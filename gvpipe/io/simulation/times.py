@@ -1,0 +1,69 @@
+"""The times of a simulation's steps: the rate that they are played at, and what of them is kept."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gvpipe.arrays import Float64
+from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS
+
+EVEN = 1e-3  # part of the mean step: steps that differ by less are even, as rounded decimals are
+SLOWEST, FASTEST = 1e-6, 100_000.0  # frames per second that a sequence can have
+
+
+@dataclass(frozen=True)
+class Timing:
+    """When the frames are.
+
+    Args:
+        fps: frames per second.
+        start: time of the first frame, seconds.
+        texts: the times of uneven steps, for `gvpipe.Metadata.texts`.
+        notes: a line each.
+    """
+
+    fps: float
+    start: float
+    texts: dict[str, str]
+    notes: tuple[str, ...]
+
+
+def time_steps(times: Float64 | None, n_frames: int, fps: float | None) -> Timing:
+    """Return when the frames are, one per step; the rate follows from the mean step.
+
+    Args:
+        times: ``(F,)`` of the steps, seconds; None: the file has none.
+        n_frames: F.
+        fps: frames per second instead of the file's.
+    """
+    if times is None or not np.isfinite(times).all():
+        return Timing(fps or DEFAULT_FPS, 0.0, {}, () if fps or n_frames < 2 else (ASSUMED_FPS,))
+    start = float(times[0])
+    if n_frames < 2:
+        return Timing(fps or DEFAULT_FPS, start, {}, ())
+    steps = np.diff(times)
+    mean = float(times[-1] - start) / (n_frames - 1)
+    texts = {"times": " ".join(f"{time:.9g}" for time in times)}
+    if not (steps > 0).all() or not SLOWEST <= 1 / mean <= FASTEST:
+        why = "do not rise" if not (steps > 0).all() else f"are {mean:.3g} s apart"
+        rate = fps or DEFAULT_FPS
+        return Timing(
+            rate, start, texts, (f"the steps' times {why}; frames are {rate:g} a second, the times are kept as text",)
+        )
+    is_even = bool((np.abs(steps - mean) <= EVEN * mean).all())
+    rate = fps or _whole(1 / mean)
+    if is_even and (fps is None or math.isclose(fps, 1 / mean, rel_tol=EVEN)):
+        return Timing(rate, start, {}, ())
+    said = () if is_even else (
+        f"time steps are uneven, {steps.min():.3g} to {steps.max():.3g} s; frames are {rate:.6g} a second, "
+        "the times are kept as text",
+    )  # fmt: skip
+    return Timing(rate, start, texts, said)
+
+
+def _whole(rate: float) -> float:
+    """A rate without the rounding of the times that it was computed from."""
+    return float(round(rate)) if round(rate) > 0 and abs(rate - round(rate)) < EVEN * rate else float(f"{rate:.9g}")

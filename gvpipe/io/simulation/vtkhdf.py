@@ -1,0 +1,175 @@
+"""VTKHDF files (.vtkhdf, .hdf) of one poly data or one unstructured grid, with any number of time steps.
+
+Numbers of all steps stand one after the other; `Steps` says where each step starts. A step has parts, whose sizes stand in
+`NumberOf...`. Source: Kitware, VTK file formats, "VTKHDF file format", versions 1.0 to 2.6.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from gvpipe.arrays import Array, Float64, Floats, Int64
+from gvpipe.errors import InputError
+from gvpipe.io.options import ReadOptions
+from gvpipe.io.simulation.cells import Cells, join_cells
+from gvpipe.io.simulation.dataset import DataArray, Dataset
+from gvpipe.io.simulation.hdf import HdfFile, open_hdf
+from gvpipe.io.simulation.steps import read_steps
+from gvpipe.io.simulation.xml_grids import POLY_CELLS, ROLES, as_points
+from gvpipe.sequence import MeshSequence
+
+ROOT = "VTKHDF"
+POLY_GROUPS = {"Vertices": POLY_CELLS["Verts"], "Lines": POLY_CELLS["Lines"], "Polygons": POLY_CELLS["Polys"],
+               "Strips": POLY_CELLS["Strips"]}  # fmt: skip
+MAX_STEPS = 10_000_000
+
+
+def read_vtkhdf(path: Path, options: ReadOptions) -> MeshSequence:
+    """Read the surface of a VTKHDF file.
+
+    Args:
+        path: .vtkhdf or .hdf.
+        options: ``fps`` and ``frames``.
+
+    Raises:
+        InputError: h5py is missing, it is no such file, it is damaged, or its data set is of another kind.
+    """
+    file = open_hdf(path)
+    try:
+        steps = VtkHdfSteps(file)
+    except InputError:
+        raise
+    except Exception as exc:  # damaged files raise nearly anything inside h5py
+        raise InputError(f"{path} cannot be read as VTKHDF: {' '.join(str(exc).split())[:200]}; export it again") from exc
+    return read_steps(steps, path, options)
+
+
+class VtkHdfSteps:
+    """The time steps of a file; raises `ValueError` for what it is not."""
+
+    def __init__(self, file: HdfFile) -> None:
+        self._file = file
+        if file.find(ROOT) is None:
+            raise ValueError("it has no group VTKHDF, so it is another kind of HDF5 file")
+        self.kind = file.attribute(ROOT, "Type")
+        if self.kind not in ("UnstructuredGrid", "PolyData"):
+            raise ValueError(f"it is a {self.kind[:40] or 'nothing'}; PolyData and UnstructuredGrid are read")
+        self._is_temporal = file.find(f"{ROOT}/Steps") is not None
+        self.times: Float64 | None = None
+        if self._is_temporal:
+            self.times = file.read(f"{ROOT}/Steps/Values").astype(np.float64).reshape(-1)
+        self.n_steps = 1 if self.times is None else len(self.times)
+        if self.n_steps > MAX_STEPS:
+            raise ValueError(f"it has {self.n_steps} time steps; at most {MAX_STEPS} are read")
+        self._points_of_part = self._sizes("NumberOfPoints")
+        self._known: tuple[tuple[int, ...], Cells] | None = None
+
+    def open(self, step: int) -> Dataset:
+        """A step; its numbers are read when they are called for."""
+        first, stop = self._parts(step)
+        sizes = self._points_of_part[first:stop]
+        n_points = int(sizes.sum())
+        start = self._offset("PointOffsets", step, int(self._points_of_part[:first].sum()))
+        cells = self._cells(step, first, stop)
+        return Dataset(
+            partial(self._points, start, n_points),
+            lambda: cells,
+            self._data("PointData", step, start, n_points),
+            self._data("CellData", step, self._first_cell(step, first), len(cells.types)),
+        )
+
+    def _sizes(self, name: str) -> Int64:
+        sizes = self._file.read(f"{ROOT}/{name}").astype(np.int64).reshape(-1)
+        if sizes.min(initial=0) < 0:
+            raise ValueError(f"{name!r} holds {int(sizes.min())}")
+        return sizes
+
+    def _parts(self, step: int) -> tuple[int, int]:
+        n_parts = len(self._points_of_part)
+        if not self._is_temporal:
+            return 0, n_parts
+        first = self._offset("PartOffsets", step, 0)
+        counts = f"{ROOT}/Steps/NumberOfParts"
+        count = 1 if self._file.find(counts) is None else int(self._file.read(counts, step, step + 1)[0])
+        if not 0 <= first <= first + count <= n_parts:
+            raise ValueError(f"step {step} has parts {first} to {first + count} of {n_parts}")
+        return first, first + count
+
+    def _offset(self, name: str, step: int, default: int, column: int = 0) -> int:
+        """Where a step's rows start."""
+        path = f"{ROOT}/Steps/{name}"
+        if not self._is_temporal or self._file.find(path) is None:
+            return default
+        row = self._file.read(path, step, step + 1).reshape(-1)
+        if column >= len(row):
+            raise ValueError(f"{name!r} has {len(row)} columns; column {column} is needed")
+        return int(row[column])
+
+    def _points(self, start: int, count: int) -> Floats:
+        points = self._file.read(f"{ROOT}/Points", start, start + count)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise ValueError(f"its points have shape {points.shape}; three coordinates each are needed")
+        return as_points(points)
+
+    def _first_cell(self, step: int, first: int) -> int:
+        if self.kind == "UnstructuredGrid":
+            return self._offset("CellOffsets", step, int(self._sizes("NumberOfCells")[:first].sum()))
+        return sum(self._offset("CellOffsets", step, 0, column) for column in range(len(POLY_GROUPS)))
+
+    def _cells(self, step: int, first: int, stop: int) -> Cells:
+        """The cells of a step; the same object for steps whose cells are the same rows of the file."""
+        n_groups = 1 if self.kind == "UnstructuredGrid" else len(POLY_GROUPS)
+        names = ("CellOffsets", "ConnectivityIdOffsets")
+        where = tuple(self._offset(name, step, 0, column) for name in names for column in range(n_groups))
+        key = (first, stop, *where)
+        if self._known is None or self._known[0] != key:
+            point_starts = np.cumsum([0, *self._points_of_part[first:stop]])[:-1].tolist()
+            if self.kind == "UnstructuredGrid":
+                pieces = self._pieces("", step, (first, stop), 0, None)
+                cells = join_cells(pieces, point_starts)
+            else:
+                groups = [(name, kind) for name, kind in POLY_GROUPS.items() if self._file.find(f"{ROOT}/{name}") is not None]
+                found = [
+                    self._pieces(f"{name}/", step, (first, stop), list(POLY_GROUPS).index(name), kind) for name, kind in groups
+                ]
+                pieces = [piece for group in found for piece in group]
+                cells = join_cells(pieces, point_starts * len(groups))
+            self._known = (key, cells)
+        return self._known[1]
+
+    def _pieces(self, group: str, step: int, parts: tuple[int, int], column: int, kind: int | None) -> list[Cells]:
+        """The cells of each part; ``kind`` is their type, None: the file says it of each."""
+        cells_of_part, nodes_of_part = (self._sizes(f"{group}{name}") for name in ("NumberOfCells", "NumberOfConnectivityIds"))
+        first, stop = parts
+        if stop > min(len(cells_of_part), len(nodes_of_part)):
+            raise ValueError(f"it has sizes of {len(cells_of_part)} parts, {stop} are needed")
+        cell = self._offset("CellOffsets", step, int(cells_of_part[:first].sum()), column)
+        node = self._offset("ConnectivityIdOffsets", step, int(nodes_of_part[:first].sum()), column)
+        pieces = []
+        for number in range(first, stop):
+            n_cells, n_nodes = int(cells_of_part[number]), int(nodes_of_part[number])
+            start = cell + number  # each part has one offset more than cells
+            offsets = self._file.read(f"{ROOT}/{group}Offsets", start, start + n_cells + 1).astype(np.int64).reshape(-1)
+            nodes = self._file.read(f"{ROOT}/{group}Connectivity", node, node + n_nodes).astype(np.int64).reshape(-1)
+            types = (
+                self._file.read(f"{ROOT}/Types", cell, cell + n_cells).astype(np.uint8).reshape(-1)
+                if kind is None
+                else np.full(n_cells, kind, np.uint8)
+            )
+            pieces.append(Cells(types, offsets, nodes))
+            cell, node = cell + n_cells, node + n_nodes
+        return pieces
+
+    def _data(self, group: str, step: int, start: int, count: int) -> dict[str, DataArray]:
+        roles = {self._file.attribute(f"{ROOT}/{group}", role): kind for role, kind in ROLES.items()}
+        made = {}
+        for name in self._file.names(f"{ROOT}/{group}"):
+            at = self._offset(f"{group}Offsets/{name}", step, start)
+            made[name] = DataArray(partial(self._rows, f"{ROOT}/{group}/{name}", at, count), roles.get(name, ""))
+        return made
+
+    def _rows(self, path: str, start: int, count: int) -> Array:
+        return self._file.read(path, start, start + count)

@@ -1,0 +1,242 @@
+"""XDMF files (.xdmf, .xmf), as dolfinx, FEniCS and meshio write them: an XML file that names grids, and HDF5 beside it.
+
+A temporal collection has a grid per step. Collections of equal length are the functions of one simulation: all their attributes
+are read. FEniCS's finite-element functions are read at the corners of their cells. Source: XDMF, "XDMF model and format";
+for functions, vtkXdmfReader of VTK 9.7.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from gvpipe.arrays import Array, Float64, Floats
+from gvpipe.errors import InputError
+from gvpipe.io.options import ReadOptions
+from gvpipe.io.simulation.cells import SIZES, Cells, equal_cells
+from gvpipe.io.simulation.dataset import DataArray, Dataset
+from gvpipe.io.simulation.steps import read_steps
+from gvpipe.io.simulation.xdmf_items import Items
+from gvpipe.sequence import MeshSequence
+
+LARGEST_XML = 256 << 20  # bytes
+INCLUDE = "{http://www.w3.org/2001/XInclude}include"
+NAMED = re.compile(r"""//Grid\[@Name=["']([^"']*)["']\]/\*\[self::Topology or self::Geometry\]""")
+# VTK's type by name, and by the number that mixed topologies have
+NAMES = {"TRIANGLE": 5, "QUADRILATERAL": 9, "TETRAHEDRON": 10, "PYRAMID": 14, "WEDGE": 13, "HEXAHEDRON": 12, "TRIANGLE_6": 22,
+         "TRI_6": 22, "QUADRILATERAL_8": 23, "QUAD_8": 23, "QUADRILATERAL_9": 28, "QUAD_9": 28, "TETRAHEDRON_10": 24,
+         "TET_10": 24, "PYRAMID_13": 27, "WEDGE_15": 26, "WEDGE_18": 32, "HEXAHEDRON_20": 25, "HEX_20": 25,
+         "HEXAHEDRON_24": 33, "HEX_24": 33, "HEXAHEDRON_27": 29, "HEX_27": 29,
+         "EDGE_3": 21, "POLYVERTEX": 2, "POLYLINE": 4, "POLYGON": 7}  # fmt: skip
+NUMBERS = {1: 2, 2: 4, 3: 7, 4: 5, 5: 9, 6: 10, 7: 14, 8: 13, 9: 12, 34: 21, 35: 28, 36: 22, 37: 23, 38: 24, 39: 27, 40: 26,
+           41: 32, 48: 25, 49: 33, 50: 29}  # fmt: skip
+CORNERS = {5: 3, 9: 4, 10: 4, 14: 5, 13: 6, 12: 8}
+COMPONENTS = {"SCALAR": 1, "VECTOR": 3, "TENSOR": 9, "TENSOR6": 6}
+
+
+def read_xdmf(path: Path, options: ReadOptions) -> MeshSequence:
+    """Read the surface of an XDMF file.
+
+    Args:
+        path: .xdmf or .xmf.
+        options: ``fps`` and ``frames``.
+
+    Raises:
+        InputError: h5py is missing for HDF5, it is no such file, it is damaged, or a file that it names is missing.
+    """
+    try:
+        steps = XdmfSteps(path)
+    except InputError:
+        raise
+    except Exception as exc:  # damaged files raise nearly anything inside the XML parser
+        raise InputError(f"{path} cannot be read as XDMF: {' '.join(str(exc).split())[:200]}; export it again") from exc
+    return read_steps(steps, path, options)
+
+
+class XdmfSteps:
+    """The time steps of a file; raises `ValueError` for what it is not."""
+
+    def __init__(self, path: Path) -> None:
+        root = _parse(path)
+        self._items = Items(path)
+        self._grids = {grid.get("Name", ""): grid for grid in root.iter("Grid") if grid.find("Topology") is not None}
+        temporal = [grid for grid in root.iter("Grid") if grid.get("CollectionType") == "Temporal"]
+        if temporal:
+            columns = [collection.findall("Grid") for collection in temporal]
+            self._steps = [list(grids) for grids in zip(*[c for c in columns if len(c) == len(columns[0])], strict=True)]
+            self.times: Float64 | None = self._times(temporal[0], [grids[0] for grids in self._steps])
+        else:
+            found = [grid for grid in root.findall("Domain/Grid") if grid.get("GridType", "Uniform") == "Uniform"]
+            self._steps = [[found[0]]] if found else []
+            self.times = None
+        if not self._steps:
+            raise ValueError("it has no grid; a mesh is needed")
+        self.n_steps = len(self._steps)
+        self._known: tuple[str, Cells] | None = None
+
+    def open(self, step: int) -> Dataset:
+        """A step; its numbers are read when they are called for."""
+        grids = self._steps[step]
+        for grid in grids:
+            if grid.get("GridType", "Uniform") != "Uniform":
+                raise ValueError(f"its grid {grid.get('Name', '')[:40]!r} is a {grid.get('GridType')}, which is not read")
+        topology, geometry = self._part(grids[0], "Topology"), self._part(grids[0], "Geometry")
+        cells = self._cells(topology)
+        point_data: dict[str, DataArray] = {}
+        cell_data: dict[str, DataArray] = {}
+        left = []
+        for attribute in (each for grid in grids for each in grid.findall("Attribute")):
+            name, center = attribute.get("Name") or "unnamed", (attribute.get("Center") or "Node").lower()
+            if attribute.get("ItemType") == "FiniteElementFunction":
+                n_dofs = int(attribute.get("ElementDegree") or 1)
+                is_flat = n_dofs == 0
+                reader = partial(self._function, attribute, cells, is_flat)
+                (cell_data if is_flat else point_data)[name] = DataArray(reader)
+            elif center in ("node", "cell"):
+                (point_data if center == "node" else cell_data)[name] = DataArray(partial(self._numbers, attribute))
+            else:
+                left.append(name)
+        notes = (f"numbers of neither nodes nor cells were left out: {', '.join(left[:5])}",) if left else ()
+        return Dataset(partial(self._points, geometry), lambda: cells, point_data, cell_data, notes=notes)
+
+    def _part(self, grid: ElementTree.Element, tag: str) -> ElementTree.Element:
+        """A grid's topology or geometry, its own or that of the grid it includes."""
+        own = grid.find(tag)
+        if own is not None and own.find("DataItem") is not None:
+            return own
+        for include in grid.findall(INCLUDE):
+            named = NAMED.search(include.get("xpointer", ""))
+            other = self._grids.get(named.group(1)) if named and not include.get("href") else None
+            if other is not None and other.find(tag) is not None:
+                return other.find(tag)  # type: ignore[return-value]  # it was found
+        raise ValueError(f"grid {grid.get('Name', '')[:40]!r} has no {tag}")
+
+    def _cells(self, topology: ElementTree.Element) -> Cells:
+        """The same object for steps that name the same numbers."""
+        key = ElementTree.tostring(topology, "unicode")
+        if self._known is None or self._known[0] != key:
+            self._known = (key, self._read_cells(topology))
+        return self._known[1]
+
+    def _read_cells(self, topology: ElementTree.Element) -> Cells:
+        kind = (topology.get("TopologyType") or topology.get("Type") or "").upper()
+        nodes = self._items.read(_item(topology)).astype(np.int64)
+        if kind == "MIXED":
+            return _mixed(nodes.reshape(-1))
+        if kind not in NAMES:
+            raise ValueError(f"its topology is {kind[:30] or 'nothing'}, which is not read")
+        vtk = NAMES[kind]
+        size = SIZES.get(vtk, 0) or int(topology.get("NodesPerElement") or (1 if vtk == 2 else 0))
+        if size < 1 or nodes.size % size:
+            raise ValueError(f"its {nodes.size} nodes are not cells of {size or 'a given number of'} nodes")
+        return equal_cells(vtk, nodes.reshape(-1, size))
+
+    def _points(self, geometry: ElementTree.Element) -> Floats:
+        kind = (geometry.get("GeometryType") or geometry.get("Type") or "XYZ").upper()
+        if kind == "X_Y_Z":
+            return np.stack([self._items.read(item).reshape(-1) for item in geometry.findall("DataItem")], axis=1).astype(
+                np.float64
+            )
+        if kind not in ("XYZ", "XY"):
+            raise ValueError(f"its geometry is {kind[:30]}, which is not read; XYZ or XY is needed")
+        points = self._items.read(_item(geometry)).reshape(-1, len(kind))
+        points = points if points.dtype.kind == "f" else points.astype(np.float64)
+        flat = np.zeros((len(points), 3 - len(kind)), points.dtype)
+        return np.concatenate([points, flat], axis=1).astype(points.dtype.newbyteorder("="), copy=False)
+
+    def _numbers(self, attribute: ElementTree.Element) -> Array:
+        return self._items.read(_item(attribute))
+
+    def _function(self, attribute: ElementTree.Element, cells: Cells, is_flat: bool) -> Array:
+        """A function's values at the corners of its cells, or in its cells: ``(N, C)``."""
+        dofs, vector, starts, listed = (self._items.read(item).reshape(-1) for item in _items(attribute, 4))
+        width = COMPONENTS.get((attribute.get("AttributeType") or "Scalar").upper(), 1)
+        per_cell = np.diff(starts.astype(np.int64))
+        listed = listed.astype(np.int64)
+        if len(per_cell) != len(listed) or len(np.unique(per_cell)) != 1 or per_cell[0] * len(listed) != len(dofs):
+            raise ValueError("a function has cells of different numbers of values, which are not read")
+        if len(listed) and not 0 <= listed.min() <= listed.max() < len(cells.types):
+            raise ValueError(f"a function has cells up to {int(listed.max())}; there are {len(cells.types)}")
+        if len(dofs) and not 0 <= dofs.min() <= dofs.max() < len(vector):
+            raise ValueError(f"a function has values up to {int(dofs.max())}; there are {len(vector)}")
+        values = vector[dofs.astype(np.int64)].reshape(len(listed), width, -1)  # (cells, components, values of a cell)
+        if is_flat:
+            result = np.zeros((len(cells.types), width))
+            result[listed] = values[:, :, 0]
+            return result
+        n_corners = CORNERS.get(int(cells.types[0]), 0)
+        if not n_corners or values.shape[2] < n_corners:
+            raise ValueError(f"a function has {values.shape[2]} values a cell; one per corner is needed")
+        nodes = cells.nodes[cells.offsets[listed, None] + np.arange(n_corners)]
+        result = np.zeros((int(cells.nodes.max()) + 1, width))
+        result[nodes.reshape(-1)] = values[:, :, :n_corners].transpose(0, 2, 1).reshape(-1, width)
+        return result
+
+    def _times(self, collection: ElementTree.Element, grids: list[ElementTree.Element]) -> Float64 | None:
+        own = collection.find("Time")
+        if own is not None and own.find("DataItem") is not None:
+            values = self._items.read(_item(own)).astype(np.float64).reshape(-1)
+            if own.get("TimeType", "").lower() == "hyperslab" and len(values) == 3:
+                values = values[0] + values[1] * np.arange(len(grids))
+            return values if len(values) == len(grids) else None
+        found = [grid.find("Time") for grid in grids]
+        if any(time is None or time.get("Value") is None for time in found):
+            return None
+        return np.array([float(time.get("Value", "0")) for time in found if time is not None])
+
+
+def _parse(path: Path) -> ElementTree.Element:
+    if path.stat().st_size > LARGEST_XML:
+        raise ValueError(f"it has {path.stat().st_size} bytes of XML; put its numbers into HDF5")
+    data = path.read_bytes()
+    if not data.strip():
+        raise ValueError("the file is empty")
+    if b"<!ENTITY" in data:
+        raise ValueError("it declares XML entities, which are not read")
+    try:
+        root = ElementTree.fromstring(data)
+    except ElementTree.ParseError as exc:
+        raise ValueError(f"it is not XML, or is cut short ({exc})") from exc
+    if root.tag != "Xdmf":
+        raise ValueError(f"its XML is {root.tag[:40]!r}, not Xdmf")
+    return root
+
+
+def _item(element: ElementTree.Element) -> ElementTree.Element:
+    return _items(element, 1)[0]
+
+
+def _items(element: ElementTree.Element, count: int) -> list[ElementTree.Element]:
+    found = element.findall("DataItem")
+    if len(found) < count:
+        raise ValueError(f"{element.tag} {element.get('Name', '')[:40]!r} has {len(found)} DataItems; {count} are needed")
+    return found[:count]
+
+
+def _mixed(flat: Array) -> Cells:
+    """Cells of several types: each is its number, for some the count of its nodes, and its nodes."""
+    types: list[int] = []
+    starts: list[int] = []
+    sizes: list[int] = []
+    at = 0
+    numbers = flat.tolist()
+    while at < len(numbers):  # every cell says where the next one starts
+        kind = NUMBERS.get(numbers[at])
+        if kind is None:
+            raise ValueError(f"its topology has a cell of type {numbers[at]}, which is not read")
+        has_count = not SIZES.get(kind)
+        size = SIZES.get(kind) or (numbers[at + 1] if at + 1 < len(numbers) else -1)
+        start = at + 1 + has_count
+        if size < 1 or start + size > len(numbers):
+            raise ValueError("its mixed topology is cut short")
+        types.append(kind)
+        starts.append(start)
+        sizes.append(size)
+        at = start + size
+    ends = np.cumsum([0, *sizes])
+    within = np.arange(ends[-1]) - np.repeat(ends[:-1], sizes)
+    return Cells(np.array(types, np.uint8), ends.astype(np.int64), flat[np.repeat(np.array(starts, np.int64), sizes) + within])
