@@ -180,7 +180,7 @@ def read(
         raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
     sequence = Player(one).sequence()
     if frames is not None:
-        sequence = sequence.part(*frame_range(sequence.name, len(sequence), *frames))
+        sequence = sequence.part(*frame_range(sequence, *frames))
     return sequence if fps is None else sequence.with_fps(fps)
 
 
@@ -288,7 +288,7 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0)
         FormatError: not a geometry video, or a damaged one.
     """
     player = Player(path)
-    start, stop = frame_range(player.path, len(player), start, stop)
+    start, stop = frame_range(player, start, stop)
     # positions before faces: the video decodes on other threads while the mesh does on this one
     positions = np.asarray(player.level(lod).positions[start:stop]) if lod else player[start:stop]
     if lod:
@@ -412,11 +412,12 @@ def info(path: StrPath) -> Info:
     )
 
 
-def frame_range(name: str, n_frames: int, start: int, stop: int | None) -> tuple[int, int]:
-    """Return the range with its end filled in; raises `InputError` unless it holds some of the frames, and only those."""
-    stop = n_frames if stop is None else stop
-    if not 0 <= start < stop <= n_frames:
-        raise InputError(f"{name}: frames {start} to {stop} asked for; 0 <= start < stop <= {n_frames} is needed")
+def frame_range(video: Player | MeshSequence, start: int, stop: int | None) -> tuple[int, int]:
+    """Return the range with its end filled in; raises `InputError` unless it holds frames of the video, and only those."""
+    stop = len(video) if stop is None else stop
+    if not 0 <= start < stop <= len(video):
+        name = video.path if isinstance(video, Player) else video.name
+        raise InputError(f"{name}: frames {start} to {stop} asked for; 0 <= start < stop <= {len(video)} is needed")
     return start, stop
 
 
@@ -454,7 +455,7 @@ def _open_source(
 ) -> MeshSequence:
     """The sequence to encode, which must not be the file to write."""
     if isinstance(source, MeshSequence):
-        source = source if frames is None else source.part(*frame_range(source.name, len(source), *frames))
+        source = source if frames is None else source.part(*frame_range(source, *frames))
         return source if fps is None else source.with_fps(fps)
     if not isinstance(source, list | tuple):
         check_path(source, "gvpipe.encode's source", "a MeshSequence or ")

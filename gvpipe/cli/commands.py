@@ -218,7 +218,7 @@ def decode(
     out = out.carrying(target)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         player = api.open(given)
-        start, stop = api.frame_range(player.path, len(player), start, stop)
+        start, stop = api.frame_range(player, start, stop)
         sequence = chosen(player.level(lod).part(start, stop), parts, fps, "decode", progress)
         noticed = api.write(sequence.local() if local else sequence, path, start)
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []

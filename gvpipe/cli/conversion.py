@@ -45,7 +45,7 @@ def convert(
     _check_target(source, target)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         whole = api.read(given, fps, clip, mesh)
-        start, stop = api.frame_range(whole.name, len(whole), start, stop)
+        start, stop = api.frame_range(whole, start, stop)
         sequence = chosen(whole.part(start, stop), parts, None, "convert", progress)
         noticed = [*whole.notes, *api.write(sequence, path, start)]
     for note in noticed:
