@@ -199,7 +199,7 @@ def test_camera_follows_and_stills_are_pictures(player: Callable[..., Any], driv
         for (const byte of new Uint8Array(await still.arrayBuffer())) binary += String.fromCharCode(byte);
         const saved = new Promise((resolve) => (HTMLAnchorElement.prototype.click = function () {{ resolve(this.download) }}));
         element.shadowRoot.querySelector("[data-act=still]").click();
-        const speeds = element.shadowRoot.querySelector("select").options.length;
+        const speeds = element.shadowRoot.querySelector("select[aria-label=Speed]").options.length;
         const fullscreen = element.shadowRoot.querySelector("[data-act=fullscreen]");
         const offered = fullscreen.hidden !== document.fullscreenEnabled;
         return {{ fixed, followed, still: btoa(binary), saved: await saved, speeds, offered }};""",
