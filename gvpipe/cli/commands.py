@@ -132,9 +132,10 @@ def encode(
 ) -> None:
     """Encode a mesh sequence as a geometry video.
 
-    INPUT is an .npz (vertices (F,V,3), faces (T,3), fps), a folder of frame files (OBJ, PLY, STL, OFF, GLB), a glob
-    ('walk/*.obj', or without the quotes), a pattern (walk/%04d.obj, walk/####.obj, 'walk/$F4.obj'), a geometry video, or - for
-    an .npz or a geometry video on standard input. OUTPUT - is standard output.
+    INPUT is an .npz (vertices (F,V,3), faces (T,3), fps), a scene (animated .glb or .gltf, .usd, .abc, .fbx), a simulation
+    (.pvd, .vtkhdf, .xdmf, .exo, .case), a point cache (.pc2, .mdd, .npy; with --mesh), a folder of frame files (OBJ, PLY, STL,
+    OFF, GLB, VTP, VTU), a glob ('walk/*.obj', or without the quotes), a pattern (walk/%04d.obj, walk/####.obj,
+    'walk/$F4.obj'), a geometry video, or - for an .npz or a geometry video on standard input. OUTPUT - is standard output.
     """
     from gvpipe import api
     from gvpipe.rate_control.purposes import candidates, name_with
@@ -208,8 +209,8 @@ def decode(
 ) -> None:
     """Decode a geometry video.
 
-    OUTPUT is an .npz, a scene (.glb, .usdc, .usda, .usdz, .abc), a point cache (.pc2, .mdd, .npy), a pattern of frame files
-    such as out/%04d.obj (also .ply, .stl, .off, .glb), or - for an .npz on standard output. FILE - is a geometry video on
+    OUTPUT is an .npz, a scene (.glb, .usdc, .usda, .usdz, .abc), a point cache (.pc2, .mdd, .npy), .pvd, .vtkhdf, or a
+    pattern of frame files such as out/%04d.obj (also .ply, .stl, .off, .glb), or - for an .npz on standard output. FILE - is a geometry video on
     standard input.
     """
     from gvpipe import api, notes
