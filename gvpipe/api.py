@@ -15,14 +15,11 @@ import numpy as np
 
 from gvpipe import notes
 from gvpipe.arguments import StrPath, check_path, show
-from gvpipe.asset_coding.encoder import AssetCoder
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.codec import Codec, Encoded, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import bytes_by_part, write_file
 from gvpipe.errors import InputError, OutputError, SettingError
-from gvpipe.io import read as read_sequence
-from gvpipe.io import write as write_sequence
 from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
@@ -37,6 +34,7 @@ from gvpipe.sequence import MeshSequence
 VIDEO_SUFFIXES = (".mp4", ".m4v")
 
 if TYPE_CHECKING:
+    from gvpipe.asset_coding.encoder import AssetCoder
     from gvpipe.rasterizer.camera import Camera
 
 Source = StrPath | Sequence[StrPath]
@@ -167,6 +165,8 @@ def read(
         InputError, FormatError: the path or what it holds cannot be used.
         TypeError: it is no path.
     """
+    from gvpipe.io import read as read_sequence  # readers of all formats
+
     if isinstance(path, list | tuple):
         for file in path:
             check_path(file, "a file of gvpipe.read's list")
@@ -197,6 +197,8 @@ def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> list[str]:
     if not isinstance(sequence, MeshSequence):
         raise TypeError(f"gvpipe.write's sequence is {show(sequence)}; a MeshSequence is needed")
     check_path(path, "gvpipe.write's path")
+    from gvpipe.io import write as write_sequence
+
     return list(write_sequence(sequence, path, start))
 
 
@@ -250,6 +252,8 @@ def encode(
         OutputError: the file cannot be written; no part of it is left.
         TypeError: an argument of a type that is none of these.
     """
+    from gvpipe.asset_coding.encoder import AssetCoder
+
     _check_output(path)
     targets = {"target_rmse": target_rmse, "target_kg": target_kg, "target_bpvf": target_bpvf, "max_error": max_error}
     if sum(value is not None for value in targets.values()) > 1:

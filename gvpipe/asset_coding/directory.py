@@ -15,6 +15,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from gvpipe.arrays import Int64
 from gvpipe.asset.attribute import DOMAINS, KINDS, MAX_COMPONENTS
 from gvpipe.asset.field import DOMAINS as FIELD_DOMAINS
 from gvpipe.asset.material import Material, check_materials
@@ -24,7 +27,9 @@ from gvpipe.asset.plain import from_plain, to_plain
 from gvpipe.container.json_object import JsonObject, pack_json, unpack_json
 from gvpipe.errors import InputError
 
-SECTION = "asset"
+SECTION, ARRANGEMENT = "asset", "arrangement"
+CODED, SURFACE, OCTAHEDRAL = 1, 2, 3  # codings of fields; attributes have the first
+WEB = 256  # of fields in web pages (`gvpipe.web.field_export`)
 VERSION = 1
 MOST = 1 << 16  # parts, materials, images, attributes or fields
 MAX_BYTES = 1 << 26  # of the JSON, inflated
@@ -123,6 +128,15 @@ def unpack_directory(data: bytes, n_vertices: int) -> Directory:
         images=images,
         metadata=_from_plain(Metadata, values.object("metadata")),
     )
+
+
+def vertex_starts(parts: tuple[Part, ...], n_vertices: int) -> Int64 | None:
+    """``(n_parts + 1,)`` first vertex of each part, and V, where parts follow each other; else None."""
+    starts = [part.vertices[0] for part in parts]
+    stops = [part.vertices[1] for part in parts]
+    if not parts or [*starts[1:], n_vertices] != stops or starts[0]:
+        return None
+    return np.array([*starts, n_vertices])
 
 
 def _part_values(part: Part) -> dict[str, Any]:

@@ -20,7 +20,18 @@ from gvpipe.asset.material import Image, image_size
 from gvpipe.asset.metadata import NO_METADATA
 from gvpipe.asset.part import Part
 from gvpipe.asset_coding.bounds import Precision, check_names, precision
-from gvpipe.asset_coding.directory import SECTION, Directory, Listed, ListedImage, pack_directory
+from gvpipe.asset_coding.directory import (
+    ARRANGEMENT,
+    CODED,
+    OCTAHEDRAL,
+    SECTION,
+    SURFACE,
+    Directory,
+    Listed,
+    ListedImage,
+    pack_directory,
+    vertex_starts,
+)
 from gvpipe.asset_coding.normal_fields import find_normal_rule, pack_rule
 from gvpipe.asset_coding.options import NO_OPTIONS, AssetOptions
 from gvpipe.asset_coding.pictures import limit_image
@@ -38,9 +49,6 @@ from gvpipe.fields.values import FieldBound
 from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence
 
-ARRANGEMENT = "arrangement"
-CODED, SURFACE, OCTAHEDRAL = 1, 2, 3  # codings of fields; attributes have the first
-WEB = 256  # of fields in web pages (`gvpipe.web.field_export`)
 MOVING = ("scalar", "vector")  # kinds of fields that may follow from positions
 
 
@@ -262,15 +270,6 @@ class Origins:
     def of(self, domain: str) -> Int64 | None:
         """Of a domain; None for parts, which keep their order."""
         return {"vertex": self.vertices, "corner": self.corners, "triangle": self.triangles}.get(domain)
-
-
-def vertex_starts(parts: tuple[Part, ...], n_vertices: int) -> Int64 | None:
-    """``(n_parts + 1,)`` first vertex of each part, and V, where parts follow each other; else None."""
-    starts = [part.vertices[0] for part in parts]
-    stops = [part.vertices[1] for part in parts]
-    if not parts or [*starts[1:], n_vertices] != stops or starts[0]:
-        return None
-    return np.array([*starts, n_vertices])
 
 
 def _listed(

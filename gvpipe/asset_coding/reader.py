@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from functools import cached_property
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
@@ -21,18 +21,27 @@ from gvpipe.asset.material import Image, Material
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part, check_parts
 from gvpipe.asset.polygons import as_polygons
-from gvpipe.asset_coding.directory import SECTION, VERSION, Directory, Listed, unpack_directory
-from gvpipe.asset_coding.encoder import ARRANGEMENT, CODED, OCTAHEDRAL, SURFACE, WEB, vertex_starts
-from gvpipe.asset_coding.normal_fields import unpack_rule
-from gvpipe.attributes.attribute_coding import decode_attribute
-from gvpipe.attributes.surface import Surface
-from gvpipe.attributes.triangle_order import Arrangement, decode_arrangement
+from gvpipe.asset_coding.directory import (
+    ARRANGEMENT,
+    CODED,
+    OCTAHEDRAL,
+    SECTION,
+    SURFACE,
+    VERSION,
+    WEB,
+    Directory,
+    Listed,
+    unpack_directory,
+    vertex_starts,
+)
 from gvpipe.codec import FrameReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import InputError, corrupt_section, in_file
-from gvpipe.fields.mesh import FieldMesh
-from gvpipe.fields.octahedral import from_octahedral
-from gvpipe.fields.reader import FieldReader
+
+if TYPE_CHECKING:  # decoders load when a file has something for them: most have not
+    from gvpipe.attributes.surface import Surface
+    from gvpipe.attributes.triangle_order import Arrangement
+    from gvpipe.fields.mesh import FieldMesh
 
 Read = Callable[[int, int], Float32]
 Thing = TypeVar("Thing")
@@ -79,6 +88,8 @@ class AssetReader:
 
     @cached_property
     def _arrangement(self) -> Arrangement:
+        from gvpipe.attributes.triangle_order import decode_arrangement
+
         parts = self.directory.parts
         data = b"" if self.directory.version > VERSION else self._bitstream.sections.get(ARRANGEMENT, b"")
         starts = vertex_starts(parts, self._bitstream.n_vertices)
@@ -87,11 +98,15 @@ class AssetReader:
     @property
     def faces(self) -> Int32:
         """``(T, 3) int32`` triangles, those of a part and of a polygon after each other."""
+        if SECTION not in self._bitstream.sections:
+            return self._reader.faces
         return self._arrangement.faces
 
     @cached_property
     def polygons(self) -> Int32 | None:
         """``(P,)`` corners of each polygon, None if all are triangles."""
+        if SECTION not in self._bitstream.sections:
+            return None
         counts = self._arrangement.polygons
         try:
             return None if counts is None else as_polygons(counts, self.faces, self.parts, "the file")
@@ -102,6 +117,8 @@ class AssetReader:
     def parts(self) -> tuple[Part, ...]:
         """The named meshes of the scene."""
         parts = self.directory.parts
+        if not parts:
+            return ()
         starts = self._arrangement.part_starts.tolist()
         placed = [dataclasses.replace(each, triangles=(starts[i], starts[i + 1])) for i, each in enumerate(parts)]
         try:
@@ -131,10 +148,14 @@ class AssetReader:
 
     @cached_property
     def _surface(self) -> Surface:
+        from gvpipe.attributes.surface import Surface
+
         positions = self._read(0, 1)[0] if self.directory.geometry else None
         return Surface(self.faces, self._bitstream.n_vertices, positions, len(self.directory.parts))
 
     def _attribute(self, listed: Listed) -> Attribute:
+        from gvpipe.attributes.attribute_coding import decode_attribute
+
         data = self._bitstream.section(listed.section)
         references = []
         if listed.domain == "corner":
@@ -174,6 +195,11 @@ class AssetReader:
 
     def _frames_of(self, listed: Listed) -> Callable[[int, int], Array]:
         """What decodes frames of a field: ``(start, stop) -> (n, R, C)``."""
+        from gvpipe.asset_coding.normal_fields import unpack_rule
+        from gvpipe.fields.mesh import FieldMesh
+        from gvpipe.fields.octahedral import from_octahedral
+        from gvpipe.fields.reader import FieldReader
+
         data = self._bitstream.section(listed.section)
         if listed.coding == SURFACE:
             rule = unpack_rule(data, listed.section)

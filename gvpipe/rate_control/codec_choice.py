@@ -16,7 +16,6 @@ import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
-from gvpipe.asset_coding.encoder import AssetCoder
 from gvpipe.codec import Codec, Progress
 from gvpipe.errors import InputError
 from gvpipe.quality_scale import error_of
@@ -28,6 +27,8 @@ from gvpipe.sequence import MeshSequence
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
+
+    from gvpipe.asset_coding.encoder import AssetCoder
 
 SAMPLE = 100  # frames of an estimate
 ELASTICITY = 0.45  # bytes per frame are about proportional to the error to minus this power

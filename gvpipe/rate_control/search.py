@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from gvpipe.asset_coding.encoder import AssetCoder
 from gvpipe.codec import Codec, Progress
 from gvpipe.metrics.vertex_errors import frame_diagonal, measure_spread
 from gvpipe.quality_scale import quality_of
@@ -14,6 +14,9 @@ from gvpipe.rate_control.smallest_search import LEAST_GAIN, find_smallest
 from gvpipe.rate_control.targets import NAMES, Target
 from gvpipe.rate_control.trials import Trial, Trials
 from gvpipe.sequence import MeshSequence
+
+if TYPE_CHECKING:
+    from gvpipe.asset_coding.encoder import AssetCoder
 
 ROUGH_TOLERANCE, ROUGH_GAIN = 0.3, 0.03
 

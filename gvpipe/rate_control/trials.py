@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from gvpipe.arrays import Integers
-from gvpipe.asset_coding.encoder import AssetCoder
 from gvpipe.codec import Codec, Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import file_size
@@ -28,6 +27,8 @@ from gvpipe.sequence import MeshSequence
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
+
+    from gvpipe.asset_coding.encoder import AssetCoder
 
 
 @dataclass(frozen=True)

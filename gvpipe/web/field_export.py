@@ -26,7 +26,7 @@ import numpy as np
 
 from gvpipe.arrays import Array, Float32, Int32, Int64
 from gvpipe.asset.field import Field
-from gvpipe.asset_coding.encoder import WEB
+from gvpipe.asset_coding.directory import WEB
 from gvpipe.errors import InputError
 
 CODING = WEB  # of these fields in section `asset`
