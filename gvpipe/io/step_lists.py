@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.frame_loader import STEP_LOADERS
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.times import time_steps
+from gvpipe.io.simulation.xml_root import parse_xml
 from gvpipe.sequence import MeshSequence
 
 LARGEST_LIST = 64 << 20  # bytes of a list: a million files
@@ -96,13 +96,8 @@ def _read_list(path: Path) -> list[tuple[float, str]]:
 
 
 def _from_xml(data: bytes) -> list[tuple[float, str]]:
-    if b"<!ENTITY" in data:
-        raise ValueError("it declares XML entities, which ParaView's files never do")
-    try:
-        root = ElementTree.fromstring(data)
-    except ElementTree.ParseError as exc:
-        raise ValueError(f"it is not XML, or is cut short ({exc})") from exc
-    if root.tag != "VTKFile" or root.get("type") != "Collection":
+    root = parse_xml(data, "VTKFile")
+    if root.get("type") != "Collection":
         raise ValueError("it is not a collection of VTK files")
     found = root.findall("Collection/DataSet")
     groups = {(each.get("group", ""), each.get("part", "0"), each.get("name", "")) for each in found}

@@ -21,6 +21,7 @@ from gvpipe.io.simulation.cells import SIZES, Cells, equal_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 from gvpipe.io.simulation.steps import read_steps
 from gvpipe.io.simulation.xdmf_items import Items
+from gvpipe.io.simulation.xml_root import parse_xml
 from gvpipe.sequence import MeshSequence
 
 LARGEST_XML = 256 << 20  # bytes
@@ -192,18 +193,7 @@ class XdmfSteps:
 def _parse(path: Path) -> ElementTree.Element:
     if path.stat().st_size > LARGEST_XML:
         raise ValueError(f"it has {path.stat().st_size} bytes of XML; put its numbers into HDF5")
-    data = path.read_bytes()
-    if not data.strip():
-        raise ValueError("the file is empty")
-    if b"<!ENTITY" in data:
-        raise ValueError("it declares XML entities, which are not read")
-    try:
-        root = ElementTree.fromstring(data)
-    except ElementTree.ParseError as exc:
-        raise ValueError(f"it is not XML, or is cut short ({exc})") from exc
-    if root.tag != "Xdmf":
-        raise ValueError(f"its XML is {root.tag[:40]!r}, not Xdmf")
-    return root
+    return parse_xml(path.read_bytes(), "Xdmf")
 
 
 def _item(element: ElementTree.Element) -> ElementTree.Element:

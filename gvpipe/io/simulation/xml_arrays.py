@@ -19,6 +19,7 @@ import numpy as np
 
 from gvpipe.arrays import Array
 from gvpipe.io.simulation.limits import check_bytes
+from gvpipe.io.simulation.xml_root import parse_xml
 
 TYPES = {
     "Int8": "i1", "UInt8": "u1", "Int16": "i2", "UInt16": "u2", "Int32": "i4", "UInt32": "u4", "Int64": "i8", "UInt64": "u8",
@@ -60,14 +61,7 @@ def parse_vtk_xml(data: bytes) -> VtkXml:
     if not data.strip():
         raise ValueError("the file is empty")
     xml, appended, is_raw = _split_appended(data)
-    if b"<!ENTITY" in xml:
-        raise ValueError("it declares XML entities, which VTK's files never do")
-    try:
-        root = ElementTree.fromstring(xml)
-    except ElementTree.ParseError as exc:
-        raise ValueError(f"it is not XML, or is cut short ({exc})") from exc
-    if root.tag != "VTKFile":
-        raise ValueError(f"its XML is {root.tag[:40]!r}, not VTKFile")
+    root = parse_xml(xml, "VTKFile")
     compressor = root.get("compressor", "")
     if compressor not in COMPRESSORS:
         raise ValueError(f"it is compressed by {compressor}, which is not read; save it with ZLib or without compression")
