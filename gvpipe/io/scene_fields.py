@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,3 +86,9 @@ def join_fields(
             kind = "" if kind != "label" else kind
         fields[name] = Field(frames, "triangle" if domain == "polygon" else "vertex", kind, name=name)
     return fields, left
+
+
+def misfit_note(what: str, names: Iterable[Iterable[str]]) -> tuple[str, ...]:
+    """Of attributes and fields that were left out, whose names are given mesh by mesh; ``what`` the format calls them."""
+    left = list(dict.fromkeys(name for own in names for name in own))
+    return (f"{what} that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()

@@ -19,7 +19,7 @@ from gvpipe.io.alembic.archive import Node, alembic_errors, find_meshes, open_ar
 from gvpipe.io.alembic.motion import AlembicMotion
 from gvpipe.io.alembic.params import changing_normals, layers_of, sampled_of
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_fields import join_fields
+from gvpipe.io.scene_fields import join_fields, misfit_note
 from gvpipe.io.scene_frames import SceneFrames, even_times
 from gvpipe.io.scene_layers import join_layers
 from gvpipe.io.scene_mesh import SceneMesh, join
@@ -74,8 +74,7 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times)
     moves = any(changing_normals(motion.node.schema) for motion in motions)
     unruled = first_normals_note(moves, attributes, joined.faces, frames[0:1][0])
-    left = list(dict.fromkeys(name for names in (*(names for _, names in read), torn) for name in names))
-    left_note = (f"parameters that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()
+    misfits = misfit_note("parameters", [*(names for _, names in read), torn])
     return MeshSequence(
         frames,
         joined.faces,
@@ -83,7 +82,7 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
         attributes,
         where,
         frames.origin,
-        (*notes, *time_notes, *layer_notes, *unruled, *left_note),
+        (*notes, *time_notes, *layer_notes, *unruled, *misfits),
         fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,

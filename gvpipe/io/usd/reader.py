@@ -11,7 +11,7 @@ import numpy as np
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_fields import join_fields
+from gvpipe.io.scene_fields import join_fields, misfit_note
 from gvpipe.io.scene_frames import SceneFrames
 from gvpipe.io.scene_layers import join_layers
 from gvpipe.io.scene_mesh import SceneMesh, join
@@ -66,8 +66,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times)
     moves = any(_has_moving_normals(motion.prim) for motion in motions)
     unruled = first_normals_note(moves, attributes, joined.faces, frames[0:1][0])
-    left = list(dict.fromkeys(name for names in (*(names for _, names in read), torn) for name in names))
-    left_note = (f"primvars that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()
+    misfits = misfit_note("primvars", [*(names for _, names in read), torn])
     drawn, images = materials.drawn()
     return MeshSequence(
         frames,
@@ -76,7 +75,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
         attributes,
         where,
         frames.origin,
-        (*found.notes, *time_notes, *materials.notes(), *layer_notes, *unruled, *left_note, *outside_note(stage, path)),
+        (*found.notes, *time_notes, *materials.notes(), *layer_notes, *unruled, *misfits, *outside_note(stage, path)),
         fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,
