@@ -10,6 +10,12 @@ export const DIRECTORY_MAX_BYTES = 67108864;
 export const ENCODER_ARRANGEMENT = "arrangement";
 export const ENCODER_CODED = 1;
 
+// gvpipe.connectivity.adaptive_mesh
+export const ADAPTIVE_MESH_MAX_POINTS = 8192;
+
+// gvpipe.connectivity.adaptive_order
+export const ADAPTIVE_ORDER_MAX_VERTICES = 65536;
+
 // gvpipe.connectivity.base_mesh
 export const BASE_MESH_DRACO_PREFIX = [68, 82, 65, 67, 79, 2, 2, 1, 1, 0, 0];
 export const BASE_MESH_MAX_PER_BYTE = 1024;
@@ -21,6 +27,23 @@ export const EDGE_SEAM_KERNELS_SINGLE = 1;
 export const EDGE_SEAM_KERNELS_LATER = 2;
 export const EDGE_SEAM_KERNELS_NEW = 3;
 
+// gvpipe.connectivity.order_kernels
+export const ORDER_KERNELS_N_CONTEXTS = 7;
+export const ORDER_KERNELS_N_GROUPS = 3;
+export const ORDER_KERNELS_LOOKED_AT = 3;
+export const ORDER_KERNELS_MATCHED = 6;
+export const ORDER_KERNELS_MATCH_BITS = 16;
+export const ORDER_KERNELS_MAX_RUN = 15;
+export const ORDER_KERNELS_LONG_RUN = 8;
+
+// gvpipe.connectivity.position_kernels
+export const POSITION_KERNELS_N_CONTEXTS = 8;
+export const POSITION_KERNELS_N_GROUPS = 9;
+export const POSITION_KERNELS_MATCHED = 2;
+export const POSITION_KERNELS_MATCH_BITS = 16;
+export const POSITION_KERNELS_MAX_RUN = 15;
+export const POSITION_KERNELS_LONG_RUN = 4;
+
 // gvpipe.connectivity.seams
 export const SEAMS_MAX_SEAM_VERTICES = 7;
 
@@ -30,6 +53,10 @@ export const VERTEX_ORDER_EXACT_RANKS = 8;
 export const VERTEX_ORDER_ESCAPE = 18;
 export const VERTEX_ORDER_N_SYMBOLS = 19;
 export const VERTEX_ORDER_MAX_VERTICES = 16777215;
+
+// gvpipe.connectivity.welded_mesh
+export const WELDED_MESH_ADAPTIVE_MESH = 1;
+export const WELDED_MESH_ADAPTIVE_ORDER = 2;
 
 // gvpipe.container.bitstream
 export const BITSTREAM_MAGIC = [103, 118, 112, 105, 112, 101, 13, 10];
@@ -55,8 +82,28 @@ export const DISPLACEMENTS_NEAR = 3;
 // gvpipe.entropy.block_coder
 export const BLOCK_CODER_PARAMETRIC = 1;
 
+// gvpipe.entropy.decision_kernels
+export const DECISION_KERNELS_ONE_BITS = 22;
+export const DECISION_KERNELS_AHEAD = 3;
+export const DECISION_KERNELS_RATE = 5;
+export const DECISION_KERNELS_RATE_BITS = 18;
+
 // gvpipe.entropy.integers
 export const INTEGERS_MAX_CONTEXTS = 65536;
+
+// gvpipe.entropy.logistic_tables
+export const LOGISTIC_TABLES_LIMIT = 2815;
+export const LOGISTIC_TABLES_SPACING = 16;
+export const LOGISTIC_TABLES_KNOTS = [280, 298, 317, 337, 359, 382, 407, 433, 461, 491, 523, 557, 593, 631, 672, 715, 761, 810, 863, 918, 977, 1041, 1108, 1179, 1255, 1336, 1422, 1514, 1612, 1716, 1826, 1944, 2070, 2203, 2345, 2497, 2658, 2829, 3011, 3206, 3412, 3633, 3867, 4116, 4382, 4664, 4965, 5285, 5626, 5988, 6375, 6786, 7223, 7689, 8184, 8712, 9274, 9871, 10508, 11185, 11906, 12673, 13490, 14359, 15284, 16269, 17317, 18433, 19621, 20885, 22230, 23661, 25185, 26807, 28533, 30370, 32325, 34405, 36619, 38976, 41483, 44152, 46991, 50013, 53228, 56650, 60290, 64164, 68285, 72670, 77335, 82299, 87579, 93196, 99171, 105527, 112287, 119477, 127125, 135257, 143906, 153102, 162881, 173277, 184330, 196079, 208568, 221842, 235948, 250938, 266864, 283785, 301758, 320848, 341120, 362645, 385496, 409751, 435492, 462804, 491777, 522506, 555090, 589632, 626241, 665029, 706114, 749620, 795674, 844407, 895959, 950469, 1008086, 1068960, 1133245, 1201101, 1272689, 1348174, 1427725, 1511509, 1599698, 1692462, 1789971, 1892392, 1999893, 2112633, 2230769, 2354451, 2483819, 2619005, 2760128, 2907293, 3060592, 3220097, 3385864, 3557924, 3736288, 3920942, 4111844, 4308925, 4512088, 4721202, 4936108, 5156611, 5382488, 5613479, 5849294, 6089612, 6334081, 6582319, 6833920, 7088451, 7345459, 7604471, 7865001, 8126549, 8388608];
+
+// gvpipe.entropy.number_kernels
+export const NUMBER_KERNELS_MAX_LENGTH = 40;
+export const NUMBER_KERNELS_MODELLED = 3;
+export const NUMBER_KERNELS_SLOT_BITS = 16;
+export const NUMBER_KERNELS_SIGN = 63;
+export const NUMBER_KERNELS_NODES = 64;
+export const NUMBER_KERNELS_FACTOR = 2654435761;
+export const NUMBER_KERNELS_MIXERS = 4;
 
 // gvpipe.entropy.parametric_tables
 export const PARAMETRIC_TABLES_N_TOKENS = 40;
@@ -135,7 +182,7 @@ export const FIELD_EXPORT_MAX_VALUES = 67108864;
 export const SURFACE_STILL = "still";
 
 // gvcodecs.mcgv.browser
-export const BROWSER_VERSION = 4;
+export const BROWSER_VERSION = 5;
 export const BROWSER_PROFILE = "h264-8";
 
 // gvcodecs.mcgv.header
