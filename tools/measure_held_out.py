@@ -1,7 +1,7 @@
 """Default files against ``prediction=affine``, on sequences made here and on files: python tools/measure_held_out.py FILES.
 
-Prints a table of bytes and errors (Karni and Gotsman) at quality 75. Made here: two robots of rigid parts, a cloth, and the cloth as a
-triangle soup. Files are anything that gvpipe reads; those with several triangles at a vertex are measured as soups, too (``--soups``).
+Prints a table of bytes and errors (Karni and Gotsman) at quality 75. Made here: two robots of rigid parts, a cloth,
+and a cloth as a triangle soup. Files are anything that gvpipe reads; ``--soups`` measures them as triangle soups, too.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def make_cloth(side: int) -> gvpipe.MeshSequence:
             0.15 * np.sin(7 * x - 5 * t) + 0.06 * np.sin(11 * z + 4 * t + 3 * x) + 0.03 * np.sin(23 * x + 9 * z - 8 * t)
         )
         frames.append(np.column_stack([x - 0.3 * swing * y, y, z + 0.05 * swing * np.sin(5 * z - 3 * t)]))
-    return gvpipe.MeshSequence(np.float32(frames), np.int32(grid(side, side)), FPS)
+    return gvpipe.MeshSequence(np.array(frames, np.float32), grid(side, side).astype(np.int32), FPS)
 
 
 def make_robot(n_parts: int, part: tuple[Floats, Ints]) -> gvpipe.MeshSequence:
@@ -99,7 +99,7 @@ def make_robot(n_parts: int, part: tuple[Floats, Ints]) -> gvpipe.MeshSequence:
             joint = joint + size * 1.1 * turn[:, 1]
         frames.append(np.concatenate(parts))
     every = np.concatenate([faces + k * len(points) for k in range(n_parts)])
-    return gvpipe.MeshSequence(np.float32(frames), np.int32(every), FPS)
+    return gvpipe.MeshSequence(np.array(frames, np.float32), every.astype(np.int32), FPS)
 
 
 def box(side: int) -> tuple[Floats, Ints]:
@@ -118,10 +118,8 @@ def box(side: int) -> tuple[Floats, Ints]:
 def cylinder(n_around: int, n_along: int) -> tuple[Floats, Ints]:
     """A round part without caps: rings around y, from 0 to 1."""
     angle = 2 * np.pi * np.arange(n_around + 1) / n_around
-    rings = [
-        np.column_stack([0.2 * np.cos(angle), np.full(n_around + 1, y), 0.2 * np.sin(angle)])
-        for y in np.linspace(0, 1, n_along)
-    ]
+    ring = np.column_stack([0.2 * np.cos(angle), 0 * angle, 0.2 * np.sin(angle)])
+    rings = [ring + np.array([0, y, 0]) for y in np.linspace(0, 1, n_along)]
     return np.concatenate(rings), grid(n_along, n_around + 1)
 
 

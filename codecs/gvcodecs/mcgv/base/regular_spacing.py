@@ -14,6 +14,7 @@ MAX_VALUES = 512  # distinct coordinates along an axis of what is regular
 RECURRING = 3  # points a coordinate at least, on average
 LEAST_COUNT = 16  # times that a distance must come; also a quarter of the distinct coordinates
 ALIKE = 2.0**-16  # of the extent: coordinates that differ by less are one
+REACH = 1.5  # units that a distance may be off
 LEAST_PARTS = 4  # steps in a spacing: fewer would change the step by much
 
 
@@ -31,17 +32,19 @@ def align_step(first: Float32, step: float) -> float:
             continue
         apart = (units[:, None] - units)[np.tri(len(units), k=-1, dtype=bool)]
         apart = apart[apart * unit >= LEAST_PARTS * step]
-        counts = np.bincount(apart)
-        if len(counts) and counts.max() > max(most, len(units) // 4):
-            at = int(counts.argmax())
+        if not len(apart):
+            continue
+        counts = np.convolve(np.bincount(apart), (1, 1))[1:]  # of a distance and the next: rounding scatters one over both
+        if counts.max() > max(most, len(units) // 4):
+            at = int(counts.argmax())  # the least of the most frequent
             most = int(counts[at])
-            spacing = _exact(values, at * unit, unit)
+            spacing = _exact(values, (at + 0.5) * unit, unit)
     return float(spacing / round(spacing / step)) if spacing else step
 
 
 def _exact(values: Float64, about: float, unit: float) -> float:
-    """The mean distance, of those that are within ``unit`` of ``about``, between values."""
+    """The mean distance, of those that are within `REACH` units of ``about``, between values."""
     ascending = np.unique(values)
-    partner = ascending[np.minimum(np.searchsorted(ascending, ascending + about - unit), len(ascending) - 1)]
+    partner = ascending[np.minimum(np.searchsorted(ascending, ascending + about - REACH * unit), len(ascending) - 1)]
     apart = partner - ascending
-    return float(apart[np.abs(apart - about) <= unit].mean())
+    return float(apart[np.abs(apart - about) <= REACH * unit].mean())
