@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from gvpipe.arrays import Float64, Integers, UInt8
 from gvpipe.errors import CorruptFile, corrupt
+from gvpipe.forks import renew_after_fork
 from gvpipe.media.jpeg import decode_jpeg, encode_jpeg
 
 if TYPE_CHECKING:
@@ -212,6 +213,11 @@ class VideoReader:
             raise corrupt("the video does not start with a key frame")
         self._groups = list(zip(starts, [*starts[1:], len(self._packets)], strict=True))
         self._cached: tuple[int, list[Plane]] = (-1, [])
+        self._pool = ThreadPoolExecutor(AHEAD)
+        renew_after_fork(self)
+
+    def after_fork(self) -> None:
+        """Have threads in a forked child, too."""
         self._pool = ThreadPoolExecutor(AHEAD)
 
     @property

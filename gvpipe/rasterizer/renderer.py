@@ -21,6 +21,7 @@ import numpy as np
 
 from gvpipe.arrays import Float32, Floats, Int32, UInt8
 from gvpipe.errors import InputError
+from gvpipe.forks import renew_after_fork
 from gvpipe.rasterizer.camera import Camera
 from gvpipe.rasterizer.colormaps import colormap
 from gvpipe.rasterizer.colours import BACK, BACKGROUND, FRONT, HOLE, srgb_codes, to_linear
@@ -88,6 +89,11 @@ class Renderer:
             hole=to_linear(HOLE),
             codes=srgb_codes(),
         )
+        self._pool = ThreadPoolExecutor(THREADS)
+        renew_after_fork(self)
+
+    def after_fork(self) -> None:
+        """Have threads in a forked child, too."""
         self._pool = ThreadPoolExecutor(THREADS)
 
     @classmethod
