@@ -55,6 +55,7 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
             [CAUSAL, SCALAR, FLAGS, SCALAR, "float64", NUMBERS, ROWS, ROWS],
         ),
     ],
+    "gvpipe.fields.trajectory_kernels.add_components": [ROWS, ROWS, ROWS],
     "gvpipe.trajectory.prediction_kernels.predict_kalman": [
         ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS]),
     ],

@@ -62,10 +62,20 @@ export class Kernels {
     return new TYPES[type](this.#exports.memory.buffer, pointer, shape.reduce((a, b) => a * b, 1));
   }
 
+  /** The 32-bit halves of an array of int64, the lower ones first: of what lies below 2^53, faster than `view`. */
+  words({ shape, pointer }) {
+    return new Int32Array(this.#exports.memory.buffer, pointer, shape.reduce((a, b) => a * b, 2));
+  }
+
+  /** Give the memory of an array that `array` made back. */
+  free({ type, shape, pointer }) {
+    this.#release(pointer, shape.reduce((a, b) => a * b, TYPES[type].BYTES_PER_ELEMENT));
+  }
+
   /**
    * @param {string} name of a kernel @param {...(KernelArray|number|boolean)} given its arguments, NamedTuples unpacked
    * @returns {(KernelArray|number)[]} its result, unpacked
-   * @throws {Error} it raised an error
+   * @throws {WebAssembly.RuntimeError} it raised an error
    */
   call(name, ...given) {
     const signature = SIGNATURES[name];
@@ -73,7 +83,7 @@ export class Kernels {
     const unpacked = given.flatMap((value, i) => (value.shape ? unpackArray(value, signature.given[i]) : [unpackScalar(value, signature.given[i])]));
     const result = this.#allocate(8 * ALIGNMENT);
     const status = this.#exports[name](result, result + 7 * ALIGNMENT, ...unpacked);
-    if (!DONE.includes(status)) throw new Error(`kernel ${name} fails with status ${status}`);
+    if (!DONE.includes(status)) throw new WebAssembly.RuntimeError(`kernel ${name} fails with status ${status}`);
     return this.#results(signature.returned, result);
   }
 
@@ -102,9 +112,8 @@ export class Kernels {
         return block;
       },
       NRT_MemInfo_call_dtor: (block) => {
-        const size = blockSize(Number(new DataView(this.#exports.memory.buffer).getBigInt64(block + 24, true)) + HEADER);
-        if (!this.#free.has(size)) this.#free.set(size, []);
-        this.#free.get(size).push(block);
+        const bytes = Number(new DataView(this.#exports.memory.buffer).getBigInt64(block + 24, true));
+        this.#release(block, bytes + HEADER);
       },
       __multi3: (result, a, _, b) => {
         const product = BigInt.asIntN(64, a) * BigInt.asIntN(64, b); // sizes of arrays: 64 bits each, sign-extended
@@ -126,6 +135,12 @@ export class Kernels {
     if (missing > 0) memory.grow(Math.ceil(missing / PAGE));
     this.#end += size;
     return pointer;
+  }
+
+  #release(pointer, bytes) {
+    const size = blockSize(bytes);
+    if (!this.#free.has(size)) this.#free.set(size, []);
+    this.#free.get(size).push(pointer);
   }
 }
 
