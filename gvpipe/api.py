@@ -11,8 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from gvpipe import notes
 from gvpipe.arguments import StrPath, check_path, show
 from gvpipe.asset_coding.options import AssetOptions
@@ -293,11 +291,11 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0)
     """
     player = Player(path)
     start, stop = frame_range(player, start, stop)
-    # positions before faces: the video decodes on other threads while the mesh does on this one
-    positions = np.asarray(player.level(lod).positions[start:stop]) if lod else player[start:stop]
     if lod:
-        return MeshSequence(positions, player.level(lod).faces, player.fps, name=player.path, origin=player.origin)
-    whole = player.sequence()
+        whole = player.level(lod)
+        positions = whole.read(start, stop)
+    else:  # positions before faces: the video decodes on other threads while the mesh does on this one
+        positions, whole = player[start:stop], player.sequence()
     fields = {name: each.part(start, stop) for name, each in whole.fields.items()}
     return dataclasses.replace(whole, positions=positions, fields=fields)
 

@@ -138,6 +138,7 @@ def encode(
     'walk/$F4.obj'), a geometry video, or - for an .npz or a geometry video on standard input. OUTPUT - is standard output.
     """
     from gvpipe import api
+    from gvpipe.cli.choices import parse_frames
     from gvpipe.rate_control.purposes import candidates, name_with
     from gvpipe.registry import codec_class
 
@@ -162,7 +163,7 @@ def encode(
     )
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
-        beside: dict[str, Any] = {"clip": clip, "mesh": mesh, "frames": _parse_frames(frames), "textures": textures}
+        beside: dict[str, Any] = {"clip": clip, "mesh": mesh, "frames": parse_frames(frames), "textures": textures}
         beside |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
         report = api.encode(source, path, chosen, progress, fps, **targets, **beside)  # type: ignore[arg-type]  # by name
     out = out.carrying(target)
@@ -189,8 +190,9 @@ def encode(
 @cli.command()
 @click.argument("source", metavar="FILE.mp4")
 @click.argument("target", metavar="OUTPUT")
-@click.option("--start", type=int, default=0, show_default=True, help="First frame.")
+@click.option("--start", type=int, help="First frame. [default: 0]")
 @click.option("--stop", type=int, help="Frame after the last. [default: the end]")
+@click.option("--frames", metavar="A:B", help="The same as --start A --stop B; either may be left out.")
 @click.option("--fps", type=float, help="Frames per second of the output, instead of the file's.")
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail: 0 the mesh, higher is coarser.")
@@ -199,8 +201,9 @@ def encode(
 def decode(
     source: str,
     target: str,
-    start: int,
+    start: int | None,
     stop: int | None,
+    frames: str | None,
     fps: float | None,
     parts: tuple[str, ...],
     lod: int,
@@ -214,16 +217,18 @@ def decode(
     is a geometry video on standard input.
     """
     from gvpipe import api, notes
-    from gvpipe.cli.choices import chosen
+    from gvpipe.cli.choices import chosen, chosen_frames
 
     out = out.carrying(target)
+    first, last = chosen_frames(start, stop, frames)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         player = api.open(given)
-        start, stop = api.frame_range(player, start, stop)
-        sequence = chosen(player.level(lod).part(start, stop), parts, fps, "decode", progress)
+        start, stop = api.frame_range(player, first, last)
+        level = player.level(lod)
+        sequence = chosen(level.part(start, stop), parts, fps, "decode", progress)
         noticed = api.write(sequence.local() if local else sequence, path, start)
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
-    noticed += notes.coarser_level(lod, bool(player.attributes or player.fields or player.parts))
+    noticed += level.notes if lod else ()
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
@@ -508,18 +513,6 @@ def _parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:
             raise click.UsageError(f"--set {pair}: KEY=VALUE is needed, such as --set clusters=30")
         settings[key.strip()] = value.strip()
     return settings
-
-
-def _parse_frames(text: str | None) -> tuple[int, int | None] | None:
-    if text is None:
-        return None
-    first, colon, last = text.partition(":")
-    try:
-        if not colon:
-            raise ValueError
-        return int(first or 0), int(last) if last else None
-    except ValueError as exc:
-        raise click.UsageError(f"--frames {text}: A:B is needed, such as --frames 10:50") from exc
 
 
 def _parse_bounds(option: str, texts: tuple[str, ...]) -> dict[str, str]:

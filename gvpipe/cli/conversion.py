@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from gvpipe.cli.console import Output, output_options
-from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, shown, source_path, target_path
+from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.errors import InputError
+
+if TYPE_CHECKING:
+    from gvpipe.sequence import MeshSequence
 
 
 @click.command()
@@ -18,9 +24,11 @@ from gvpipe.errors import InputError
 @click.option("--fps", type=float, help="Frames per second, instead of the input's; animated glTF is sampled at it.")
 @click.option("--clip", metavar="NAME", help="The animation to read, of a glTF file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
-@click.option("--start", type=int, default=0, show_default=True, help="First frame.")
+@click.option("--start", type=int, help="First frame. [default: 0]")
 @click.option("--stop", type=int, help="Frame after the last. [default: the end]")
+@click.option("--frames", metavar="A:B", help="Only frames A to B - 1; the others are not read. Either may be left out.")
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
+@click.option("--lod", type=int, default=0, show_default=True, help="Level of detail of a geometry video; higher is coarser.")
 @output_options
 def convert(
     source: str,
@@ -28,9 +36,11 @@ def convert(
     fps: float | None,
     clip: str | None,
     mesh: str | None,
-    start: int,
+    start: int | None,
     stop: int | None,
+    frames: str | None,
     parts: tuple[str, ...],
+    lod: int,
     out: Output,
 ) -> None:
     """Write a mesh sequence in another format.
@@ -39,15 +49,22 @@ def convert(
     what a format cannot hold, which is said.
     """
     from gvpipe import api
-    from gvpipe.cli.choices import chosen
+    from gvpipe.cli.choices import chosen, chosen_frames
 
     out = out.carrying(target)
+    first, last = chosen_frames(start, stop, frames)
     _check_target(source, target)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
-        whole = api.read(given, fps, clip, mesh)
-        start, stop = api.frame_range(whole, start, stop)
-        sequence = chosen(whole.part(start, stop), parts, None, "convert", progress)
-        noticed = [*whole.notes, *api.write(sequence, path, start)]
+        read = _level_reader(given, lod) if lod else partial(api.read, given, clip=clip, mesh=mesh)
+        if frames is not None:
+            some = read(fps=fps, frames=(first, last))
+            start, stop = first, first + len(some)
+        else:
+            whole = read(fps=fps)
+            start, stop = api.frame_range(whole, first, last)
+            some = whole.part(start, stop)
+        sequence = chosen(some, parts, None, "convert", progress)
+        noticed = [*some.notes, *api.write(sequence, path, start)]
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
@@ -55,6 +72,21 @@ def convert(
     out.json({**values, "origin": sequence.origin.tolist(), "notes": noticed})
     shape = f"{stop - start} frames, {sequence.n_vertices} vertices"
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")
+
+
+def _level_reader(source: str, lod: int) -> Callable[..., MeshSequence]:
+    """What reads frames of a level of detail of a geometry video, at a frame rate."""
+    from gvpipe import api
+
+    if not is_video(source):
+        raise InputError(f"{source} has no levels of detail; encode it with --codec pca, whose files have them")
+    level = api.open(source).level(lod)
+
+    def read(fps: float | None, frames: tuple[int, int | None] | None = None) -> MeshSequence:
+        own = level if fps is None else level.with_fps(fps)
+        return own if frames is None else own.part(*api.frame_range(own, *frames))
+
+    return read
 
 
 def _check_target(source: str, target: str) -> None:
