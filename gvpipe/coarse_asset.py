@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Int32, Int64
-from gvpipe.asset.material import Material
+from gvpipe.asset.material import with_uv
 from gvpipe.asset.part import Part
 from gvpipe.notes import coarser_level
 from gvpipe.sequence import MeshSequence
@@ -47,8 +47,9 @@ def add_asset(level: MeshSequence, whole: MeshSequence, points: Int32, kept: Int
     attributes, fields = _selected(whole.attributes, rows), _selected(whole.fields, rows)
     lost = [*(name for name in (*whole.attributes, *whole.fields) if name not in rows), *lost]
     lost += ["polygons"] if whole.polygons is not None else []
-    materials, n_dropped = _with_uv(whole.materials if parts else (), attributes)
-    lost += ["textures"] if n_dropped else []
+    given = whole.materials if parts else ()
+    materials = with_uv(given, attributes)
+    lost += ["textures"] if materials != given else []
     return replace(
         level.reordered(order, faces),
         attributes=attributes,
@@ -114,11 +115,3 @@ def _selected(named: Mapping[str, Any], rows: Mapping[str, Int64 | None]) -> dic
     """Attributes or fields with the rows that are left; None: all."""
     chosen = ((name, each, rows[name]) for name, each in named.items() if name in rows)
     return {name: each if own is None else each.select(own) for name, each, own in chosen}
-
-
-def _with_uv(materials: tuple[Material, ...], attributes: Mapping[str, Any]) -> tuple[tuple[Material, ...], int]:
-    """Materials without the textures whose coordinates are gone, and how many those are."""
-    gone = [[role for role, texture in each.textures.items() if texture.uv not in attributes] for each in materials]
-    none: list[dict[str, Any]] = [dict.fromkeys(roles) for roles in gone]
-    left = tuple(replace(each, **changes) for each, changes in zip(materials, none, strict=True))
-    return left, sum(map(len, gone))

@@ -212,9 +212,9 @@ def decode(
 ) -> None:
     """Decode a geometry video.
 
-    OUTPUT is an .npz, a scene (.glb, .usdc, .usda, .usdz, .abc), a point cache (.pc2, .mdd, .npy), .pvd, .vtkhdf, or a
-    pattern of frame files such as out/%04d.obj (also .ply, .stl, .off, .glb, .vtp), or - for an .npz on standard output. FILE -
-    is a geometry video on standard input.
+    OUTPUT is an .npz, a scene (.glb, .usdc, .usda, .usdz, .abc), a point cache (.pc2, .mdd, .npy), .pvd, .vtkhdf, a
+    folder of vertex animation textures (.openvat), or a pattern of frame files such as out/%04d.obj (also .ply, .stl, .off,
+    .glb, .vtp), or - for an .npz on standard output. FILE - is a geometry video on standard input.
     """
     from gvpipe import api, notes
     from gvpipe.cli.choices import chosen, chosen_frames

@@ -16,7 +16,7 @@ from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames import read_frames
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.pattern import match_pattern
-from gvpipe.io.scene_formats import HAVE_CLIPS, SIMULATIONS, WRITERS, scene_readers
+from gvpipe.io.scene_formats import HAVE_CLIPS, OPENVAT, SIMULATIONS, WRITERS, scene_readers
 from gvpipe.sequence import MeshSequence
 
 __all__ = ["READERS", "WRITERS", "read", "write"]
@@ -53,6 +53,8 @@ def read(
     suffix = Path(path).suffix.lower()
     if suffix not in HAVE_CLIPS or not os.path.isfile(path):
         _refuse_clip(clip, path)
+    if suffix == OPENVAT:
+        raise InputError(f"{path}: vertex animation textures are written, not read; give what they were made of")
     reader = READERS.get(suffix)
     # a pattern of frames may end in .glb, too
     if reader is not None and (os.path.isfile(path) or (suffix not in FRAME_FORMATS and not os.path.isdir(path))):
@@ -72,8 +74,8 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
 
     Args:
         path: an ``.npz``, a scene (animated ``.glb``, ``.usda``, ``.usdc``, ``.usd``, ``.usdz``, ``.abc``), a point cache
-            (``.pc2``, ``.mdd``, ``.npy``), a pattern of frame files (``out/%04d.obj``) or a folder (existing, or ending in
-            ``/``).
+            (``.pc2``, ``.mdd``, ``.npy``), a folder of vertex animation textures (``.openvat``), a pattern of frame files
+            (``out/%04d.obj``) or a folder (existing, or ending in ``/``).
         start: number of the first frame file.
 
     Raises:
@@ -85,7 +87,8 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
     writer = WRITERS.get(suffix)
     # .glb may be a frame, too: of a pattern, or of a sequence of one
     is_frame = suffix in FRAME_FORMATS and (sequence.n_frames == 1 or match_pattern(path) is not None or os.path.isdir(path))
-    if writer is not None and not path.endswith(("/", os.sep)) and not is_frame:
+    is_folder = path.endswith(("/", os.sep)) and suffix != OPENVAT
+    if writer is not None and not is_folder and not is_frame:
         return writer(sequence, Path(path)) or ()
     return write_frames(sequence, path, start)
 

@@ -10,6 +10,8 @@ from gvpipe.io.alembic import read_alembic, write_alembic
 from gvpipe.io.fbx import read_fbx
 from gvpipe.io.gltf import read_animated, write_animated
 from gvpipe.io.npz import read_npz, write_npz
+from gvpipe.io.openvat import SUFFIX as OPENVAT
+from gvpipe.io.openvat import write_openvat
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.point_cache import read_mdd, read_npy, read_pc2, write_mdd, write_npy, write_pc2
 from gvpipe.io.pvd_writer import write_pvd
@@ -47,6 +49,7 @@ WRITERS: dict[str, SceneWriter] = {
     ".npy": write_npy,
     ".pvd": write_pvd,
     ".vtkhdf": write_vtkhdf,
+    OPENVAT: write_openvat,
 }
 
 

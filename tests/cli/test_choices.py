@@ -79,6 +79,16 @@ def test_choices(run: Run, video: Path, tmp_path: Path, output: str, command: st
         assert [path.name for path in sorted(target.parent.glob(f"*{target.suffix}"))] == names
 
 
+def test_textures(run: Run, video: Path, tmp_path: Path) -> None:
+    target = f"{tmp_path / 'out.openvat'}/"
+    ended = run("decode", video, target, "--frames", "2:5", "--fps", 12, "--part", "right", "--lod", 1)
+    assert ended.status == 0 and "12 frames per second" in ended.err and "level of detail 1 leaves out uv" in ended.err
+    info = json.loads((tmp_path / "out.openvat" / "out-remap_info.json").read_text())
+    assert info["os-remap"]["Frames"] == 3
+    level = gvpipe.open(video).level(1)
+    assert len(gvpipe.read(tmp_path / "out.openvat" / "out.glb").faces) == np.ptp(level.parts[1].triangles)
+
+
 def _faces(level: MeshSequence) -> Any:
     """Triangles of the second part."""
     part = level.parts[1]
