@@ -8,8 +8,8 @@ A folder ``walk.openvat`` holds four files:
 - ``walk-remap_info.json``: the range of the differences, and the number of frames.
 
 Vertex i of frame f has the pixel in column ``i % width`` and row ``(i // width) * frames + f``, counted from the top. A shader
-adds f / height to the second uv set. Textures have Blender's axes, Z up. The position is mesh + B(Min + (Max - Min) pixel / 65535),
-with B(x, y, z) = (x, z, -y).
+adds f / height to the second uv set. Textures have Blender's axes, Z up. A position is mesh + B(Min + (Max - Min) pixel / 65535), with
+B(x, y, z) = (x, z, -y).
 
 Source: OpenVAT 1.1, sharpen3d/openvat on GitHub. A departure: Min and Max are exact, where OpenVAT rounds them to tenths.
 """
@@ -39,7 +39,6 @@ from gvpipe.io.gltf.writer import encode_glb
 from gvpipe.io.losses import lost_notes
 from gvpipe.sequence import MeshSequence
 
-SUFFIX = ".openvat"
 LARGEST = 8192  # pixels of a side: what graphics cards and engines take everywhere
 FULL = 65535
 BLENDER = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # from Y up to Z up

@@ -10,7 +10,6 @@ from gvpipe.io.alembic import read_alembic, write_alembic
 from gvpipe.io.fbx import read_fbx
 from gvpipe.io.gltf import read_animated, write_animated
 from gvpipe.io.npz import read_npz, write_npz
-from gvpipe.io.openvat import SUFFIX as OPENVAT
 from gvpipe.io.openvat import write_openvat
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.point_cache import read_mdd, read_npy, read_pc2, write_mdd, write_npy, write_pc2
@@ -37,6 +36,7 @@ SIMULATIONS: dict[str, SceneReader] = {
     **dict.fromkeys((".e", ".exo", ".ex2"), read_exodus),
     **dict.fromkeys((".case", ".encas"), read_ensight),
 }
+OPENVAT = ".openvat"
 HAVE_CLIPS = (*GLTF, ".fbx")
 
 WRITERS: dict[str, SceneWriter] = {

@@ -60,7 +60,7 @@ def shown(folder: Path, frame: int) -> tuple[Any, Any, Any]:
 
 def _sampled(path: Path, address: Any, frame: int) -> Any:
     """The texture's colours 0..1 at texture coordinates that count from the top, moved by a frame."""
-    texture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[:, :, ::-1]
+    texture = np.asarray(cv2.imread(str(path), cv2.IMREAD_UNCHANGED))[:, :, ::-1]
     assert texture.dtype == np.uint16
     height, width, _ = texture.shape
     column = (address[:, 0] * width).astype(int)
