@@ -33,6 +33,7 @@ VIDEO_SUFFIXES = (".mp4", ".m4v")
 
 if TYPE_CHECKING:
     from gvpipe.asset_coding.encoder import AssetCoder
+    from gvpipe.io.runs import Run
     from gvpipe.rasterizer.camera import Camera
 
 Source = StrPath | Sequence[StrPath]
@@ -180,6 +181,25 @@ def read(
     if frames is not None:
         sequence = sequence.part(*frame_range(sequence, *frames))
     return sequence if fps is None else sequence.with_fps(fps)
+
+
+def read_runs(
+    path: Source,
+    fps: float | None = None,
+    clip: str | None = None,
+    mesh: StrPath | None = None,
+    frames: tuple[int, int | None] | None = None,
+) -> list[Run]:
+    """Read an input whose vertices or triangles may change, as one sequence for each run of frames where they do not.
+
+    The arguments are those of `read`. A run has ``start``, ``stop`` and ``sequence``.
+
+    Raises:
+        InputError, FormatError: the path or what it holds cannot be used.
+    """
+    from gvpipe.io.runs import find_runs
+
+    return find_runs(lambda span: read(path, fps, clip, mesh, span), frames)
 
 
 def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> list[str]:

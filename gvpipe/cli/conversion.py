@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1; the others are not read. Either may be left out.")
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail of a geometry video; higher is coarser.")
+@click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.glb, ...")
 @output_options
 def convert(
     source: str,
@@ -41,6 +43,7 @@ def convert(
     frames: str | None,
     parts: tuple[str, ...],
     lod: int,
+    split: bool,
     out: Output,
 ) -> None:
     """Write a mesh sequence in another format.
@@ -49,11 +52,17 @@ def convert(
     what a format cannot hold, which is said.
     """
     from gvpipe import api
-    from gvpipe.cli.choices import chosen, chosen_frames
+    from gvpipe.cli.choices import chosen, chosen_frames, parse_frames
 
     out = out.carrying(target)
     first, last = chosen_frames(start, stop, frames)
     _check_target(source, target)
+    if split:
+        if lod or start is not None or stop is not None or target == PIPE:
+            raise click.UsageError("--split goes with --frames, and not with --start, --stop, --lod or an OUTPUT of -")
+        options = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames)}
+        _convert_split(source, target, options, parts, out)
+        return
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         read = _level_reader(given, lod) if lod else partial(api.read, given, clip=clip, mesh=mesh)
         if frames is not None:
@@ -72,6 +81,39 @@ def convert(
     out.json({**values, "origin": sequence.origin.tolist(), "notes": noticed})
     shape = f"{stop - start} frames, {sequence.n_vertices} vertices"
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")
+
+
+def _convert_split(source: str, target: str, options: dict[str, Any], parts: tuple[str, ...], out: Output) -> None:
+    """Convert each run of frames of one topology."""
+    from gvpipe import api
+    from gvpipe.cli.choices import chosen
+    from gvpipe.cli.splitting import write_runs
+
+    with source_path(source) as given, out.progress() as progress:
+        runs = api.read_runs(given, **options)
+        ready = [replace(run, sequence=chosen(run.sequence, parts, None, "convert", progress)) for run in runs]
+        written = write_runs(ready, target, lambda run, path: api.write(run.sequence, path, run.start))
+    every = (note for run, (_, said) in zip(runs, written, strict=True) for note in (*run.sequence.notes, *said))
+    noticed = list(dict.fromkeys(every))
+    for note in noticed:
+        out.note(note)
+    files = [
+        {
+            "output": name,
+            "start": run.start,
+            "stop": run.stop,
+            "frames": run.stop - run.start,
+            "fps": run.sequence.fps,
+            "vertices": run.sequence.n_vertices,
+            "triangles": len(run.sequence.faces),
+            "origin": run.sequence.origin.tolist(),
+        }
+        for (name, _), run in zip(written, ready, strict=True)
+    ]
+    out.json({"files": files, "notes": noticed})
+    for each in files:
+        shape = f"{each['frames']} frames, {each['vertices']} vertices"
+        out.text(f"{shown(source, STDIN)}, frames {each['start']}:{each['stop']} -> {each['output']} ({shape})")
 
 
 def _level_reader(source: str, lod: int) -> Callable[..., MeshSequence]:

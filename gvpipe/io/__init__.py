@@ -16,7 +16,7 @@ from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames import read_frames
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.pattern import match_pattern
-from gvpipe.io.scene_formats import HAVE_CLIPS, OPENVAT, SIMULATIONS, WRITERS, scene_readers
+from gvpipe.io.scene_formats import HAVE_CLIPS, OPENVAT, SCENES, SIMULATIONS, WRITERS, scene_readers
 from gvpipe.sequence import MeshSequence
 
 __all__ = ["READERS", "WRITERS", "read", "write"]
@@ -48,7 +48,7 @@ def read(
     """
     if not isinstance(path, str | os.PathLike):
         _refuse_clip(clip, "a list of files")
-        return _span(read_frames([os.fspath(file) for file in path], fps), frames)
+        return read_frames([os.fspath(file) for file in path], fps, frames)
     path = os.fspath(path)
     suffix = Path(path).suffix.lower()
     if suffix not in HAVE_CLIPS or not os.path.isfile(path):
@@ -62,8 +62,8 @@ def read(
             raise InputError(f"{path}: no such file; check the path")
         sequence = reader(Path(path), ReadOptions(fps, clip, mesh, frames))
         if sequence is not None:
-            return sequence if suffix in SIMULATIONS else _span(sequence, frames)
-    return _span(read_frames(path, fps), frames)
+            return sequence if suffix in (*SIMULATIONS, *SCENES) else _span(sequence, frames)
+    return read_frames(path, fps, frames)
 
 
 READERS = scene_readers(read)
@@ -94,7 +94,7 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
 
 
 def _span(sequence: MeshSequence, frames: tuple[int, int | None] | None) -> MeshSequence:
-    """Some frames of a sequence; simulations take theirs before their topology is compared."""
+    """Some frames of a sequence; formats whose topology may change take theirs before it is compared."""
     return sequence if frames is None else sequence.part(*ReadOptions(frames=frames).span(len(sequence), sequence.name))
 
 

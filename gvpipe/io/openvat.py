@@ -8,8 +8,8 @@ A folder ``walk.openvat`` holds four files:
 - ``walk-remap_info.json``: the range of the differences, and the number of frames.
 
 Vertex i of frame f has the pixel in column ``i % width`` and row ``(i // width) * frames + f``, counted from the top. A shader
-adds f / height to the second uv set. Textures have Blender's axes, Z up. A position is mesh + B(Min + (Max - Min) pixel / 65535), with
-B(x, y, z) = (x, z, -y).
+adds f / height to the second uv set. Textures have Blender's axes, Z up. A position is
+mesh + B(Min + (Max - Min) pixel / 65535), with B(x, y, z) = (x, z, -y).
 
 Source: OpenVAT 1.1, sharpen3d/openvat on GitHub. A departure: Min and Max are exact, where OpenVAT rounds them to tenths.
 """

@@ -28,6 +28,7 @@ SceneReader = Callable[[Path, ReadOptions], MeshSequence | None]  # None for a f
 SceneWriter = Callable[[MeshSequence, Path], tuple[str, ...] | None]  # what the format cannot hold, a line each
 
 USD = (".usda", ".usdc", ".usd", ".usdz")
+SCENES = (*USD, ".abc")  # whose topology may change
 GLTF = (".glb", ".gltf")
 SIMULATIONS: dict[str, SceneReader] = {
     **dict.fromkeys((".pvd", ".series"), read_step_list),
