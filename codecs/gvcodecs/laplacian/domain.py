@@ -9,7 +9,7 @@ from scipy import sparse
 
 from gvcodecs.laplacian.anchors import Anchors, choose_anchors
 from gvcodecs.laplacian.delta_rows import border_order, delta_causal_order, delta_order
-from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian, thin_hubs
+from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian, scale_rows, thin_hubs
 from gvcodecs.laplacian.header import CoefficientCoding
 from gvcodecs.laplacian.laplace_operators import laplacian
 from gvcodecs.laplacian.mesh_scale import fineness
@@ -83,8 +83,8 @@ def build_domain(surface: Surface, average: Float64 | None, coding: CoefficientC
     has_deltas = (np.bincount(component_of[~is_anchor], minlength=int(component_of.max()) + 1) > 0)[component_of]
     has_deltas &= ~is_still
     scale = np.ones(n_points) if average is None else fineness(average, surface.edges, coding.edge_power)
-    operator = sparse.diags_array(scale * has_deltas) @ thin_hubs(laplacian(points, surface.faces, coding.operator))
-    operator = sparse.csr_array(operator)
+    operator = scale_rows(thin_hubs(laplacian(points, surface.faces, coding.operator)), scale * has_deltas)
+    system = ExtendedLaplacian(operator, anchors.points, 1 / coding.anchor_ratio, anchors.is_free)
     order, blocks, limits = delta_order(coding.delta_prediction, surface.hierarchy, traversal, has_deltas)
-    causal = delta_causal_order(coding.delta_prediction, order, blocks, limits, surface.neighbours, operator @ points)
-    return Domain(anchors, order, causal, ExtendedLaplacian(operator, anchors.points, 1 / coding.anchor_ratio, anchors.is_free))
+    causal = delta_causal_order(coding.delta_prediction, order, blocks, limits, surface.neighbours, system.deltas(points))
+    return Domain(anchors, order, causal, system)
