@@ -112,16 +112,18 @@ def factorise(matrix: Lower, bounds: Int64, found: Int32) -> tuple[Factors, int]
 @compiled
 def solve_in_place(factors: Factors, right: Float64) -> None:
     """Turn right-hand sides ``(n, m)`` into solutions."""
-    n, m = right.shape
+    n = len(right)
     for j in range(n):
+        own = right[j]
         for k in range(factors.starts[j], factors.starts[j + 1]):
-            value, i = factors.values[k], factors.rows[k]
-            for c in range(m):
-                right[i, c] -= value * right[j, c]
+            value, other = factors.values[k], right[factors.rows[k]]
+            for c in range(len(own)):
+                other[c] -= value * own[c]
     for j in range(n - 1, -1, -1):
-        for c in range(m):
-            right[j, c] /= factors.pivots[j]
+        own = right[j]
+        for c in range(len(own)):
+            own[c] /= factors.pivots[j]
         for k in range(factors.starts[j], factors.starts[j + 1]):
-            value, i = factors.values[k], factors.rows[k]
-            for c in range(m):
-                right[j, c] -= value * right[i, c]
+            value, other = factors.values[k], right[factors.rows[k]]
+            for c in range(len(own)):
+                own[c] -= value * other[c]

@@ -16,12 +16,13 @@ import numpy as np
 
 from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.errors import FormatError
+from gvpipe.trajectory.sparse_rows import as_rows
 
 if TYPE_CHECKING:
     from scipy import sparse
 
     from gvcodecs.laplacian.factor_kernels import Factors
-    from gvcodecs.laplacian.operator_kernels import Rows
+    from gvpipe.trajectory.product_kernels import Rows
 
 COLUMNS = 32  # solved at once: more do not fit the cache
 FREE_PRODUCTS = 1 << 27  # that any system may take
@@ -82,9 +83,8 @@ class NormalEquations:
         transposed = transpose(self._rows)
         self._order, columns, self.fill = _eliminate(self._rows, transposed, most_products(len(held)))
         if self.fill.products > most_products(len(held)):
-            raise TooMuchFill(
-                f"its triangles couple {len(held)} points so that their equations take over {most_products(len(held))} products"
-            )
+            limit = f"{len(held)} points may take {most_products(len(held))} products"
+            raise TooMuchFill(f"its triangles couple points at random: factoring takes too long, {limit}; encode it as pca")
         matrix = normal_matrix(self._rows, transposed, held, self._order, len(columns) // 2)
         pattern = factor_pattern(matrix.starts, matrix.rows, self.fill.entries)
         factors, at = factorise(matrix, *pattern)
@@ -94,7 +94,7 @@ class NormalEquations:
 
     def multiply(self, vectors: Float64) -> Float64:
         """The operator times ``vectors (P, R)``."""
-        from gvcodecs.laplacian.operator_kernels import multiply
+        from gvpipe.trajectory.product_kernels import multiply
 
         return multiply(self._rows, np.ascontiguousarray(vectors))
 
@@ -114,14 +114,6 @@ class NormalEquations:
             solve_in_place(self._factors, part)
             solved[self._order, first : first + COLUMNS] = part
         return solved
-
-
-def as_rows(operator: sparse.csr_array) -> Rows:
-    """An operator as kernels take it."""
-    from gvcodecs.laplacian.operator_kernels import Rows
-
-    ordered = operator.sorted_indices()
-    return Rows(ordered.indptr.astype(np.int64), ordered.indices.astype(np.int32), ordered.data.astype(np.float64))
 
 
 def _eliminate(rows: Rows, transposed: Rows, limit: int) -> tuple[Int32, Int32, Fill]:

@@ -1,7 +1,6 @@
-"""Kernels: products with a sparse operator, and the normal equations that it makes.
+"""Kernels: the transpose of a sparse operator, and the normal equations that it makes.
 
-An operator is kept by rows: ``starts (P + 1,)``, ``columns`` ascending in each row, ``values``. Every sum runs in one order, term
-by term, so that the results have the same bits on every machine.
+Every sum runs in one order, term by term, so that the results have the same bits on every machine.
 """
 
 from __future__ import annotations
@@ -12,22 +11,9 @@ import numpy as np
 
 from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.compiled import compiled
+from gvpipe.trajectory.product_kernels import Rows
 
 NONE = -1
-
-
-class Rows(NamedTuple):
-    """A sparse square matrix by rows.
-
-    Args:
-        starts: ``(P + 1,)`` bounds of rows.
-        columns: of the entries, ascending in each row.
-        values: theirs.
-    """
-
-    starts: Int64
-    columns: Int32
-    values: Float64
 
 
 class Lower(NamedTuple):
@@ -47,26 +33,14 @@ class Lower(NamedTuple):
 
 
 @compiled
-def multiply(operator: Rows, vectors: Float64) -> Float64:
-    """The product ``(P, R)`` of an operator with ``vectors (P, R)``."""
-    result = np.zeros(vectors.shape)
-    for i in range(len(vectors)):
-        for k in range(operator.starts[i], operator.starts[i + 1]):
-            value, j = operator.values[k], operator.columns[k]
-            for c in range(vectors.shape[1]):
-                result[i, c] += value * vectors[j, c]
-    return result
-
-
-@compiled
 def multiply_transposed(operator: Rows, points: Int32, vectors: Float64) -> Float64:
     """The product ``(P, R)`` of the transpose with vectors that are zero but at ``points (D,)``: there ``vectors (D, R)``."""
     result = np.zeros((len(operator.starts) - 1, vectors.shape[1]))
     for i in range(len(points)):
         for k in range(operator.starts[points[i]], operator.starts[points[i] + 1]):
-            value, j = operator.values[k], operator.columns[k]
-            for c in range(vectors.shape[1]):
-                result[j, c] += value * vectors[i, c]
+            value, sums, vector = operator.values[k], result[operator.columns[k]], vectors[i]
+            for c in range(len(sums)):
+                sums[c] += value * vector[c]
     return result
 
 

@@ -24,7 +24,9 @@ def add_up(values: Float64) -> float:
 
 def power(values: Float64, exponent: float) -> Float64:
     """``values (n,) ** exponent``, for positive values and an exponent >= 0, by square roots: `pow` differs between machines."""
-    result, root = values ** int(exponent) if exponent >= 1 else np.ones(len(values)), values
+    result, root = np.ones(len(values)), values
+    for _ in range(int(exponent)):
+        result = result * values
     fraction = exponent - int(exponent)
     while fraction:
         fraction, root = 2 * fraction, np.sqrt(root)
