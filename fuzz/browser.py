@@ -1,0 +1,7 @@
+from __future__ import annotations
+
+from fuzz.parts import Seed, Target
+
+
+def browser_targets(seeds: tuple[Seed, ...]) -> list[Target]:
+    return []

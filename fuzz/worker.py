@@ -1,0 +1,149 @@
+"""A process that runs cases one after the other, and says what became of them. It may be killed by a case at any time."""
+
+from __future__ import annotations
+
+import gc
+import os
+import shutil
+import sys
+import traceback
+import warnings
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from multiprocessing.sharedctypes import SynchronizedArray
+from pathlib import Path
+from typing import Any
+
+from fuzz import limits
+from fuzz.limits import BAD, CRASHED, LARGE, SLOW, Verdict, judge
+from fuzz.parts import Parts, Target
+
+LONGEST_SECONDS = 20  # of processor time of one case; the system then ends the process
+MOST_MEMORY = 4 << 30  # bytes that a worker may take beside those it starts with
+WORN = 1 << 30  # bytes at which a worker is replaced
+CASE, STARTED, REFUSED, ACCEPTED, FOUND = range(5)  # numbers that the session reads while a worker is busy
+
+
+@dataclass(frozen=True)
+class Job:
+    """Cases ``first`` to ``stop`` of a target."""
+
+    target: str
+    first: int
+    stop: int
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A case that went wrong; its files are in ``folder``."""
+
+    target: str
+    number: int
+    seed: str
+    verdict: Verdict
+    folder: str
+
+
+def run_worker(connection: Connection, shared: SynchronizedArray[Any], options: Any) -> None:
+    """Take jobs until there is none; send each `Finding`, and ``None`` after each job."""
+    from fuzz.session import load_targets
+
+    warnings.simplefilter("ignore")
+    os.environ["GVPIPE_LOG"] = ""
+    _silence()
+    targets = {target.name: target for target in load_targets(options)}
+    _limit_memory()
+    warm: set[str] = set()
+    while (job := connection.recv()) is not None:
+        target = targets[job.target]
+        if target.name not in warm:
+            warm.add(target.name)
+            for number in range(len(target.seeds)):
+                _warm(target, number, options.folder, shared)
+        for number in range(job.first, job.stop):
+            _progress(shared, number)
+            seed, parts = target.case(options.seed, number)
+            verdict = run_case(target, parts, Path(options.folder))
+            shared[REFUSED] += verdict.kind == limits.REFUSED
+            shared[ACCEPTED] += verdict.kind == limits.ACCEPTED
+            if verdict.kind in BAD:
+                shared[FOUND] += 1
+                connection.send(Finding(target.name, number, seed.name, verdict, options.folder))
+                connection.recv()  # the session has copied the files
+        shared[CASE] = -1
+        connection.send(None)
+        if _is_worn():
+            return
+
+
+def memory_folder() -> str | None:
+    """A folder whose files are in memory, where the system has one."""
+    return "/dev/shm" if os.path.isdir("/dev/shm") else None
+
+
+def run_case(target: Target, parts: Parts, folder: Path) -> Verdict:
+    """Write a case's files, parse the first, and say what became of it; what costs too much is tried again."""
+    try:
+        files = target.join(parts)
+        path = write_files(files, folder)
+    except Exception:
+        return Verdict(CRASHED, "the harness", traceback.format_exc())
+    size = sum(map(len, files.values()))
+    verdict = judge(target, path, size)
+    if verdict.kind in (SLOW, LARGE):  # code that loads costs once
+        gc.collect()
+        verdict = judge(target, path, size)
+    return verdict
+
+
+def write_files(files: dict[str, bytes], folder: Path) -> Path:
+    """Write files in an empty folder; return the path of the first."""
+    if folder.exists():
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True)
+    for name, data in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+    return folder / next(iter(files))
+
+
+def _warm(target: Target, number: int, folder: str, shared: SynchronizedArray[Any]) -> None:
+    """Compile and load what a sound file needs, so that no case pays for it."""
+    _progress(shared, -1)
+    run_case(target, target.seeds[number].parts, Path(folder))
+
+
+def _progress(shared: SynchronizedArray[Any], number: int) -> None:
+    import time
+
+    shared[STARTED], shared[CASE] = time.time(), number
+    if sys.platform != "win32":
+        import resource
+
+        used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+        slack = LONGEST_SECONDS if number >= 0 else 600  # kernels may have to be compiled
+        resource.setrlimit(resource.RLIMIT_CPU, (int(used) + slack, resource.getrlimit(resource.RLIMIT_CPU)[1]))
+
+
+def _limit_memory() -> None:
+    if sys.platform == "linux":
+        import resource
+
+        with open("/proc/self/statm") as file:
+            size = int(file.read().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (size + MOST_MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
+
+
+def _is_worn() -> bool:
+    if sys.platform != "linux":
+        return False
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") > WORN
+
+
+def _silence() -> None:
+    """Libraries in C print what they dislike."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)
+    os.dup2(null, 2)
