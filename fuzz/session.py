@@ -16,12 +16,15 @@ from typing import Any
 
 from fuzz.limits import ACCEPTED, BAD, BROKEN, CRASHED, HUNG, LARGE, REFUSED, SLOW, Verdict
 from fuzz.parts import Target
+from fuzz.reduction import reduce_finding
 from fuzz.worker import ACCEPTED as N_ACCEPTED
 from fuzz.worker import CASE, STARTED, Finding, Job, run_worker
 from fuzz.worker import REFUSED as N_REFUSED
 
 JOB_SECONDS = 2.0  # that a job should take
 WAIT_SECONDS = 120.0  # of the clock, for one case
+REDUCE_SECONDS = 60.0  # of the clock, to make one finding small
+REDUCED = 12  # findings that are made small
 START_SECONDS = 900.0  # of the clock, for sound files when kernels are compiled
 
 
@@ -34,6 +37,7 @@ class Options:
         cases: of each target, instead of a time; 0: as many as there is time for.
         seed: of the random numbers.
         targets: names of parsers; none: all.
+        kind: ``video`` (Python's parsers of geometry videos), ``mesh``, ``web`` (the player's); "": all.
         workers: processes.
         seeds: folder of the seed files.
         found: folder for cases that fail.
@@ -41,12 +45,15 @@ class Options:
         more: a folder of further mesh files, as seeds.
         first: number of the first case of each target.
         indices: whether kernels refuse indices out of bounds and negative ones.
+        longest: seconds of processor time after which a case counts as hung.
+        loader: what makes the targets.
     """
 
     seconds: float
     cases: int = 0
     seed: int = 1
     targets: tuple[str, ...] = ()
+    kind: str = ""
     workers: int = 2
     seeds: str = ""
     found: str = ""
@@ -54,6 +61,8 @@ class Options:
     more: str = ""
     first: int = 0
     indices: bool = False
+    longest: int = 20
+    loader: Callable[[Options], list[Target]] | None = None
 
 
 @dataclass
@@ -79,6 +88,8 @@ class _Worker:
 
 def load_targets(options: Options) -> list[Target]:
     """The parsers that are asked for, with their seeds."""
+    if options.loader is not None:
+        return options.loader(options)
     from fuzz.browser import browser_targets
     from fuzz.mesh_files import mesh_targets
     from fuzz.seeds import load_seeds
@@ -89,7 +100,12 @@ def load_targets(options: Options) -> list[Target]:
 
         refuse_bad_indices()
     videos, meshes = load_seeds(Path(options.seeds), Path(options.more) if options.more else None)
-    targets = [*video_targets(videos), *mesh_targets(meshes), *browser_targets(videos)]
+    kinds = {
+        "video": lambda: video_targets(videos),
+        "mesh": lambda: mesh_targets(meshes),
+        "web": lambda: browser_targets(videos),
+    }
+    targets = [target for kind, make in kinds.items() if options.kind in ("", kind) for target in make()]
     unknown = set(options.targets) - {target.name for target in targets}
     if unknown:
         raise KeyError(f"no target {', '.join(sorted(unknown))}; there are {', '.join(target.name for target in targets)}")
@@ -109,6 +125,7 @@ class Session:
         self.counts = {target.name: Count(next=options.first) for target in load_targets(options)}
         self.findings: dict[tuple[str, str, str], dict[str, Any]] = {}
         self.seconds = 0.0
+        self._failed_starts = 0
 
     def run(self) -> None:
         """Run all of it."""
@@ -126,6 +143,15 @@ class Session:
                     worker.process.kill()
                     worker.process.join()
                 shutil.rmtree(worker.folder, ignore_errors=True)
+
+    def reduce(self) -> None:
+        """Make the findings small, each in at most `REDUCE_SECONDS`."""
+        context = multiprocessing.get_context("spawn")
+        for finding in list(self.findings.values())[:REDUCED]:
+            process = context.Process(target=_reduce, args=(self.options, finding))
+            process.start()
+            process.join(3 * REDUCE_SECONDS)
+            process.kill()
 
     def to_json(self) -> dict[str, Any]:
         """Counts and findings as JSON values."""
@@ -222,11 +248,18 @@ class Session:
 
     def _is_stuck(self, worker: _Worker) -> bool:
         limit = WAIT_SECONDS if worker.shared[CASE] >= 0 else START_SECONDS
-        return time.time() - worker.shared[STARTED] > limit
+        return bool(time.time() - worker.shared[STARTED] > limit)
 
     def _bury(self, worker: _Worker) -> None:
-        """A worker that a case has ended: keep the case, start another, and go on behind it."""
+        """A worker that a case has ended: keep the case, start another, and go on behind it.
+
+        Raises:
+            RuntimeError: workers end before their first case, again and again.
+        """
         number, code, job = int(worker.shared[CASE]), worker.process.exitcode, worker.job
+        self._failed_starts = self._failed_starts + 1 if job is not None and number < 0 else 0
+        if self._failed_starts >= 3 * self.options.workers:
+            raise RuntimeError(f"workers end with status {code} before their first case of {job.target if job else 'any target'}")
         if job is not None:
             if number >= 0:
                 hung = code in (-signal.SIGKILL, -getattr(signal, "SIGXCPU", 0))
@@ -265,9 +298,15 @@ class Session:
         }
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "finding.json").write_text(json.dumps(self.findings[key], indent=1))
-        self._say(
-            f"{finding.target} case {finding.number}: {verdict.kind}, {verdict.place}: {verdict.detail.strip().splitlines()[-1][:300]}"
-        )
+        line = verdict.detail.strip().splitlines()[-1][:300]
+        self._say(f"{finding.target} case {finding.number}: {verdict.kind}, {verdict.place}: {line}")
+
+
+def _reduce(options: Options, finding: dict[str, Any]) -> None:
+    import dataclasses
+
+    (target,) = load_targets(dataclasses.replace(options, targets=(finding["target"],)))
+    reduce_finding(target, finding, options.seed, REDUCE_SECONDS)
 
 
 KINDS = (ACCEPTED, REFUSED, CRASHED, BROKEN, SLOW, LARGE, HUNG)
