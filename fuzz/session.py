@@ -18,7 +18,7 @@ from fuzz.limits import ACCEPTED, BAD, BROKEN, CRASHED, HUNG, LARGE, REFUSED, SL
 from fuzz.parts import Target
 from fuzz.reduction import reduce_finding
 from fuzz.worker import ACCEPTED as N_ACCEPTED
-from fuzz.worker import CASE, STARTED, Finding, Job, run_worker
+from fuzz.worker import BUSY, CASE, STARTED, Finding, Job, run_worker
 from fuzz.worker import REFUSED as N_REFUSED
 
 JOB_SECONDS = 2.0  # that a job should take
@@ -33,7 +33,7 @@ class Options:
     """What is run.
 
     Args:
-        seconds: of the clock.
+        seconds: of the clock, without those in which kernels are compiled and loaded.
         cases: of each target, instead of a time; 0: as many as there is time for.
         seed: of the random numbers.
         targets: names of parsers; none: all.
@@ -83,7 +83,6 @@ class _Worker:
     shared: Any
     folder: str
     job: Job | None = None
-    since: float = 0.0
 
 
 def load_targets(options: Options) -> list[Target]:
@@ -126,6 +125,7 @@ class Session:
         self.findings: dict[tuple[str, str, str], dict[str, Any]] = {}
         self.seconds = 0.0
         self._failed_starts = 0
+        self._warming = 0.0  # seconds that workers spent on loading, on average
 
     def run(self) -> None:
         """Run all of it."""
@@ -134,9 +134,12 @@ class Session:
         try:
             while any(worker.process for worker in workers):
                 for worker in workers:
-                    self._attend(worker, started)
+                    self._attend(worker)
                 wait([worker.connection for worker in workers if worker.process], 0.1)
-                self.seconds = time.monotonic() - started
+                elapsed = time.monotonic() - started
+                loading = sum(worker.job is not None and worker.shared[CASE] < 0 for worker in workers)
+                self._warming += (elapsed - self.seconds) * loading / len(workers)
+                self.seconds = elapsed
         finally:
             for worker in workers:
                 if worker.process:
@@ -185,7 +188,7 @@ class Session:
         theirs.close()
         return _Worker(process, ours, shared, folder)
 
-    def _attend(self, worker: _Worker, started: float) -> None:
+    def _attend(self, worker: _Worker) -> None:
         """Take what a worker has sent, or look whether it still lives; give it a job."""
         if not worker.process:
             return
@@ -202,18 +205,18 @@ class Session:
             self._bury(worker)
         else:
             if worker.job is None:
-                self._give(worker, started)
+                self._give(worker)
             elif self._is_stuck(worker):
                 worker.process.kill()
 
-    def _give(self, worker: _Worker, started: float) -> None:
+    def _give(self, worker: _Worker) -> None:
         options = self.options
         left = [
             (name, count)
             for name, count in self.counts.items()
             if not options.cases or count.next < options.first + options.cases
         ]
-        if not left or (not options.cases and time.monotonic() - started > options.seconds):
+        if not left or (not options.cases and self.seconds - self._warming > options.seconds):
             worker.connection.send(None)
             worker.process.join(10)
             worker.process.kill()
@@ -223,10 +226,10 @@ class Session:
         stop = count.next + count.job
         if options.cases:
             stop = min(stop, options.first + options.cases)
-        worker.job, worker.since = Job(name, count.next, stop), time.monotonic()
+        worker.job = Job(name, count.next, stop)
         worker.shared[STARTED] = time.time()
         worker.shared[CASE] = -1
-        worker.shared[N_ACCEPTED] = worker.shared[N_REFUSED] = 0
+        worker.shared[N_ACCEPTED] = worker.shared[N_REFUSED] = worker.shared[BUSY] = 0
         worker.connection.send(worker.job)
         count.next = stop
         count.seconds += 1e-3  # so that two workers do not choose alike
@@ -236,7 +239,7 @@ class Session:
         job = worker.job
         if job is None:
             return
-        count, took = self.counts[job.target], time.monotonic() - worker.since
+        count, took = self.counts[job.target], worker.shared[BUSY]
         done = (job.stop if stop is None else stop) - job.first
         count.cases += done
         count.seconds += took
@@ -259,7 +262,9 @@ class Session:
         number, code, job = int(worker.shared[CASE]), worker.process.exitcode, worker.job
         self._failed_starts = self._failed_starts + 1 if job is not None and number < 0 else 0
         if self._failed_starts >= 3 * self.options.workers:
-            raise RuntimeError(f"workers end with status {code} before their first case of {job.target if job else 'any target'}")
+            raise RuntimeError(
+                f"workers end with status {code} before their first case of {job.target if job else 'any target'}"
+            )
         if job is not None:
             if number >= 0:
                 hung = code in (-signal.SIGKILL, -getattr(signal, "SIGXCPU", 0))

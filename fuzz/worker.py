@@ -22,7 +22,7 @@ from fuzz.parts import Parts, Seed, Target
 WARM_SECONDS = 600  # of processor time of a sound file, whose kernels may have to be compiled
 MOST_MEMORY = 4 << 30  # bytes that a worker may take beside those it starts with
 WORN = 1 << 30  # bytes at which a worker is replaced
-CASE, STARTED, REFUSED, ACCEPTED, FOUND = range(5)  # numbers that the session reads while a worker is busy
+CASE, STARTED, REFUSED, ACCEPTED, BUSY = range(5)  # numbers that the session reads while a worker is busy
 
 
 @dataclass(frozen=True)
@@ -54,20 +54,21 @@ def run_worker(connection: Connection, shared: SynchronizedArray[Any], options: 
     _silence()
     targets = {target.name: target for target in load_targets(options)}
     _limit_memory()
-    warm: set[str] = set()
+    warm: set[tuple[object, str]] = set()  # parsers, and seeds that they have read
     while (job := connection.recv()) is not None:
         target = targets[job.target]
-        if target.name not in warm:
-            warm.add(target.name)
-            for number in range(len(target.seeds)):
-                _warm(target, number, options.folder, shared)
+        for seed in target.seeds:
+            if (target.parse, seed.name) not in warm:
+                warm.add((target.parse, seed.name))
+                _progress(shared, -1, WARM_SECONDS)  # kernels are compiled and loaded, so that no case pays for it
+                run_case(target, seed.parts, Path(options.folder))
         for number in range(job.first, job.stop):
             _progress(shared, number, options.longest)
             seed, verdict = _judge(target, options.seed, number, Path(options.folder))
             shared[REFUSED] += verdict.kind == limits.REFUSED
             shared[ACCEPTED] += verdict.kind == limits.ACCEPTED
+            shared[BUSY] += time.time() - shared[STARTED]
             if verdict.kind in BAD:
-                shared[FOUND] += 1
                 connection.send(Finding(target.name, number, seed.name, verdict, options.folder))
                 connection.recv()  # the session has copied the files
         shared[CASE] = -1
@@ -114,12 +115,6 @@ def write_files(files: dict[str, bytes], folder: Path) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
     return folder / next(iter(files))
-
-
-def _warm(target: Target, number: int, folder: str, shared: SynchronizedArray[Any]) -> None:
-    """Compile and load what a sound file needs, so that no case pays for it."""
-    _progress(shared, -1, WARM_SECONDS)
-    run_case(target, target.seeds[number].parts, Path(folder))
 
 
 def _progress(shared: SynchronizedArray[Any], number: int, longest: int) -> None:
