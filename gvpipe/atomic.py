@@ -62,6 +62,35 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
+def atomic_files(folder: str | os.PathLike[str]) -> Iterator[Path]:
+    """Give a temporary folder to write several files to; all move into ``folder`` if the block ends well, none if it does not.
+
+    Folders inside are joined with those that are there. ``folder`` is made if it is missing.
+
+    Raises:
+        OutputError: a folder is missing or read-only, the disk is full, a file would replace a folder.
+    """
+    target = Path(os.path.realpath(folder))
+    beside = next(path for path in (target, *target.parents) if path.is_dir())
+    temporary = beside / f".gvpipe-{secrets.token_hex(8)}"
+    try:
+        temporary.mkdir()
+        yield temporary
+        files = sorted(path.relative_to(temporary) for path in temporary.rglob("*") if path.is_file())
+        for name in files:
+            if (target / name).is_dir():
+                raise OutputError(f"cannot write {target / name}: it is a folder; choose another name")
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+        for name in files:
+            os.replace(temporary / name, target / name)
+    except OSError as exc:
+        raise output_error(folder, exc) from exc
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    _flush_folder(target)
+
+
+@contextlib.contextmanager
 def temporary_folder() -> Iterator[str]:
     """Give a new temporary folder, as `lasting_folder` does; it vanishes with its files when the block ends."""
     folder = lasting_folder()

@@ -22,6 +22,7 @@ from gvpipe.asset.part import Part
 from gvpipe.asset_coding.directory import Directory
 from gvpipe.asset_coding.listing import list_asset
 from gvpipe.asset_coding.reader import AssetReader
+from gvpipe.coarse_asset import add_asset
 from gvpipe.codec import GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file
@@ -132,6 +133,8 @@ class Player:
     def level(self, lod: int) -> MeshSequence:
         """The video as a sequence of a coarser mesh with the same motion; level 0 is the mesh itself.
 
+        It has what of attributes, fields, parts and materials survives; its notes say what does not (`gvpipe.coarse_asset`).
+
         Raises:
             InputError: there is no such level.
         """
@@ -139,7 +142,10 @@ class Player:
             return self.sequence()
         if not isinstance(self._reader, LevelReader) or not 0 < lod < len(self.levels):
             raise InputError(f"{self.path}: no level of detail {lod}; there are levels 0..{len(self.levels) - 1}")
-        return MeshSequence(_Level(self, lod), self._reader.level_faces(lod), self.fps, name=self.path, origin=self.origin)
+        with in_file(self.path):
+            faces, (points, kept) = self._reader.level_faces(lod), self._reader.level_points(lod)
+        level = MeshSequence(_Level(self, lod), faces, self.fps, name=self.path, origin=self.origin)
+        return add_asset(level, self.sequence(), points, kept, lod)
 
     @property
     def shape(self) -> tuple[int, ...]:

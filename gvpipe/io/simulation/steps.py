@@ -17,7 +17,7 @@ from gvpipe.arrays import Array, Float32, Float64, Floats
 from gvpipe.asset.attribute import MAX_COMPONENTS, Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.metadata import Metadata
-from gvpipe.errors import InputError
+from gvpipe.errors import InputError, TopologyChange
 from gvpipe.io.mesh import FrameValues
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
@@ -125,12 +125,9 @@ class StepFrames:
             reason = " ".join(str(exc).split())[:200] or type(exc).__name__
             raise InputError(f"{self._path}: frame {frame} cannot be read: {reason}; export it again") from exc
 
-    def _changed(self, frame: int, what: str) -> InputError:
-        start, at = self.start, self.start + frame
-        return InputError(
-            f"{self._path}: the topology changes at frame {at} ({what}); read the frames before it or from it on alone "
-            f"(frames, --frames {start}:{at} or --frames {at}:)"
-        )
+    def _changed(self, frame: int, what: str) -> TopologyChange:
+        at = self.start + frame
+        return TopologyChange.at(f"{self._path}: the topology changes at frame {at} ({what})", at, self.start)
 
 
 class StepColumn:
