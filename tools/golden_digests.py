@@ -18,8 +18,8 @@ GOLDEN = Path(__file__).resolve().parent.parent / "tests" / "golden"
 
 def main() -> None:
     """Print the name and the digest of each golden file."""
-    summary = __doc__.split("\n")[0] if __doc__ else ""
-    argparse.ArgumentParser(description=summary).parse_args()
+    raw = argparse.RawDescriptionHelpFormatter
+    argparse.ArgumentParser(description=__doc__, formatter_class=raw).parse_args()
     for path in sorted(GOLDEN.glob("*.mp4")):
         print(f"{path.stem} {digest(path)}")
 
