@@ -23,6 +23,7 @@ from fuzz.worker import REFUSED as N_REFUSED
 
 JOB_SECONDS = 2.0  # that a job should take
 WAIT_SECONDS = 120.0  # of the clock, for one case
+SAVE_SECONDS = 20.0  # between counts that are written
 REDUCE_SECONDS = 60.0  # of the clock, to make one finding small
 REDUCED = 12  # findings that are made small
 START_SECONDS = 900.0  # of the clock, for sound files when kernels are compiled
@@ -129,7 +130,7 @@ class Session:
 
     def run(self) -> None:
         """Run all of it."""
-        started = time.monotonic()
+        started, saved = time.monotonic(), 0.0
         workers = [self._start(number) for number in range(self.options.workers)]
         try:
             while any(worker.process for worker in workers):
@@ -140,7 +141,11 @@ class Session:
                 loading = sum(worker.job is not None and worker.shared[CASE] < 0 for worker in workers)
                 self._warming += (elapsed - self.seconds) * loading / len(workers)
                 self.seconds = elapsed
+                if elapsed > saved + SAVE_SECONDS:
+                    saved = elapsed
+                    self._save()
         finally:
+            self._save()
             for worker in workers:
                 if worker.process:
                     worker.process.kill()
@@ -173,6 +178,12 @@ class Session:
             },
             "findings": list(self.findings.values()),
         }
+
+    def _save(self) -> None:
+        """Keep the counts so far, so that a run that is ended leaves them."""
+        folder = Path(self.options.found)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "counts.json").write_text(json.dumps(self.to_json(), indent=1))
 
     def _start(self, number: int) -> _Worker:
         import dataclasses
