@@ -1,4 +1,4 @@
-"""Mutated inputs for every parser, with checksums repaired: no crash, no hang, no output that is not finite, no cost beyond the budget.
+"""Mutated files for every parser, with checksums repaired: no crash, no hang, nothing infinite, no cost beyond the budget.
 
     python -m fuzz --seconds 600
 

@@ -65,7 +65,7 @@ def _parse(target: Target, path: Path) -> Verdict:
     except target.refusal as exc:
         try:
             check_text(str(exc))
-            if path.name not in str(exc):
+            if not any(file.name in str(exc) for file in path.parent.rglob("*")):
                 raise BrokenPromise(f"a message without the file's name: {exc}")
         except BrokenPromise as broken:
             return Verdict(BROKEN, f"message at {_origin(exc)}", str(broken))

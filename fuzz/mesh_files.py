@@ -50,7 +50,7 @@ def parse_mesh(path: Path) -> None:
     stop = max(1, min(n_frames, MOST_VALUES // (3 * n_vertices)))
     check_positions(sequence.read(0, stop), (stop, n_vertices, 3))
     check_positions(sequence.read(n_frames - 1, n_frames), (1, n_vertices, 3))
-    check_asset(sequence)
+    check_asset(sequence, infinite=True)
 
 
 def split_files(files: Parts) -> Parts:

@@ -1,4 +1,4 @@
-"""Changes of bytes, of text and of JSON: each function makes one change, at a place that a generator of random numbers chooses."""
+"""Changes of bytes, of text and of JSON: each function makes one, at a place that random numbers choose."""
 
 from __future__ import annotations
 
@@ -34,8 +34,12 @@ ODD_BYTES = [
     b"\\",
     b" ",
 ]
-JSON_VALUES: list[Any] = [None, True, False, 0, 1, -1, 2, 3, 255, 65536, 1 << 31, -(1 << 31), 1 << 64, 10**30, -(10**30), 0.5, 1e39, -1e39, 1e308,
-                          float("nan"), float("inf"), "", "x", "\x1b[31m\n", "../x", "\ud800", [], {}, [[]], [None] * 3, {"": 0}, "9" * 5000]  # fmt: skip
+JSON_VALUES: list[Any] = [
+    *(None, True, False, 0, 1, -1, 2, 3, 255, 65536, 1 << 31, -(1 << 31), 1 << 64, 10**30, -(10**30)),
+    *(0.5, 1e39, -1e39, 1e308, float("nan"), float("inf")),
+    *("", "x", "\x1b[31m\n", "../x", "\ud800", "9" * 5000),
+    *([], {}, [[]], [None] * 3, {"": 0}),
+]
 FORMS = ["<u1", "<u2", "<u4", "<u8", "<f4", "<f8", ">u2", ">u4", ">f4"]  # of fields, as numpy names them
 NUMBER = re.compile(rb"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 LONGEST = 1 << 18  # bytes that a change may make of a part
@@ -92,7 +96,7 @@ def mutate_json(data: bytes, rng: Rng) -> bytes:
         return mutate_text(data, rng)
     try:
         tree = json.loads(data)
-    except ValueError:
+    except (ValueError, RecursionError):
         return mutate_text(data, rng)
     places = list(_places(tree))
     if not places:
@@ -194,7 +198,7 @@ def _places(tree: Any) -> list[tuple[Any, Any]]:
     return found
 
 
-def _near(value: float, rng: Rng) -> float:
+def _near(value: Any, rng: Rng) -> Any:
     match int(rng.integers(5)):
         case 0:
             return value + 1

@@ -31,8 +31,16 @@ def check_faces(faces: Array, n_vertices: int) -> None:
         raise BrokenPromise(f"triangles refer to vertices {faces.min()}..{faces.max()} of {n_vertices}")
 
 
-def check_asset(sequence: MeshSequence) -> None:
-    """Read what lies beside positions; raise `BrokenPromise` for numbers that are not finite, fields' holes (NaN) aside."""
+def check_asset(sequence: MeshSequence, infinite: bool = False) -> None:
+    """Read what lies beside positions.
+
+    Args:
+        sequence: that has it.
+        infinite: whether fields may be infinite, as in files of simulations; encoders refuse them later.
+
+    Raises:
+        BrokenPromise: numbers are not finite, but for the holes of fields (NaN).
+    """
     for name, attribute in sequence.attributes.items():
         values = np.asarray(attribute)
         if values.dtype.kind == "f" and not np.isfinite(values).all():
@@ -40,7 +48,7 @@ def check_asset(sequence: MeshSequence) -> None:
     for name, field in sequence.fields.items():
         for start in {0, max(0, len(sequence) - FRAMES)}:
             frames = np.asarray(field[start : start + FRAMES])
-            if frames.dtype.kind == "f" and np.isinf(frames).any():
+            if not infinite and frames.dtype.kind == "f" and np.isinf(frames).any():
                 raise BrokenPromise(f"field {name!r} is infinite")
     if sequence.polygons is not None and int(np.sum(np.asarray(sequence.polygons) - 2)) != len(sequence.faces):
         raise BrokenPromise("polygons and triangles do not fit")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +95,7 @@ def _make_meshes(folder: Path) -> None:
         _write(folder, suffix, "scene", lambda path: gvpipe.write(scene.part(0, 1), path))
     for suffix in ("npz", "glb", "usda", "usdc", "usdz", "abc", "vtkhdf", "pvd"):
         for name, sequence in (("plain", plain), ("scene", scene), ("quads", quads)):
-            _write(folder, suffix, name, lambda path, sequence=sequence: gvpipe.write(sequence, path))
+            _write(folder, suffix, name, partial(gvpipe.write, sequence))
     for suffix in CACHES:
         _write(folder, suffix[1:], "cache", lambda path: (gvpipe.write(plain, path), gvpipe.write(one, path.with_name(MESH))))
     for suffix, name, make in _made_by_tests():
@@ -121,7 +122,7 @@ def _made_by_tests() -> list[tuple[str, str, Callable[[Path], Any]]]:
         def encoded(each: Any) -> str:
             if form == "ASCII":
                 return str(files.inline(each, "ascii"))
-            return each.astype(">f4" if each.dtype.kind == "f" else ">i4").tobytes().decode("latin-1")
+            return bytes(each.astype(">f4" if each.dtype.kind == "f" else ">i4").tobytes()).decode("latin-1")
 
         text = files.LEGACY.format(form=form, **{name: encoded(each) for name, each in values.items()})
         return lambda path: path.write_bytes(text.encode("latin-1"))
@@ -144,23 +145,73 @@ def _made_by_tests() -> list[tuple[str, str, Callable[[Path], Any]]]:
     ]
 
 
-PLY = ("ply\nformat ascii 1.0\ncomment made here\nelement vertex 4\nproperty float x\nproperty float y\nproperty double z\n"
-       "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float heat\nelement face 2\nproperty list uchar int vertex_indices\n"
-       "property int group\nend_header\n0 0 0 1 2 3 0.5\n1 0 0 1 2 3 1.5\n1 1 0 1 2 3 2.5\n0 1 0 9 9 9 3.5\n3 0 1 2 7\n4 0 1 2 3 8\n")  # fmt: skip
+PLY = """ply
+format ascii 1.0
+comment made here
+element vertex 4
+property float x
+property float y
+property double z
+property uchar red
+property uchar green
+property uchar blue
+property float heat
+element face 2
+property list uchar int vertex_indices
+property int group
+end_header
+0 0 0 1 2 3 0.5
+1 0 0 1 2 3 1.5
+1 1 0 1 2 3 2.5
+0 1 0 9 9 9 3.5
+3 0 1 2 7
+4 0 1 2 3 8
+"""
 STL = (
     "solid made\n"
     + "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n" * 2
     + "endsolid\n"
 )
-OBJ = ("mtllib a.mtl\no one\nv 0 0 0 0.5 0.5 0.5\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\nusemtl red\ng left\ns 1\n"
-       "f 1/1/1 2/2/1 3/3/1\no two\nusemtl blue\nf -4//1 -2//1 -1//1\nl 1 2\n")  # fmt: skip
+OBJ = """mtllib a.mtl
+o one
+v 0 0 0 0.5 0.5 0.5
+v 1 0 0
+v 1 1 0
+v 0 1 0
+vt 0 0
+vt 1 0
+vt 1 1
+vn 0 0 1
+usemtl red
+g left
+s 1
+f 1/1/1 2/2/1 3/3/1
+o two
+usemtl blue
+f -4//1 -2//1 -1//1
+l 1 2
+"""
 MTL = "newmtl red\nKd 1 0 0\nKs 0.5 0.5 0.5\nNs 100\nd 0.5\nmap_Kd -s 1 2 1 a.png\nnewmtl blue\nKe 0 0 1\nPr 0.5\nPm 1\n"
+
+
+CASE = """FORMAT
+type: ensight gold
+GEOMETRY
+model: a.geo
+VARIABLE
+scalar per node: 1 heat a.heat**
+TIME
+time set: 1
+number of steps: 2
+filename start number: 3
+filename increment: 1
+time values: 0 0.5
+"""
 
 
 def _write_ensight(path: Path) -> None:
     points = "\n".join(f"{x:12.5e}" for x in np.arange(24.0))
-    path.write_text("FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: a.geo\nVARIABLE\nscalar per node: 1 heat a.heat**\n"
-                    "TIME\ntime set: 1\nnumber of steps: 2\nfilename start number: 3\nfilename increment: 1\ntime values: 0 0.5\n")  # fmt: skip
+    path.write_text(CASE)
     path.with_name("a.geo").write_text(
         f"a\nb\nnode id off\nelement id off\npart\n1\nbox\ncoordinates\n8\n{points}\nhexa8\n1\n1 2 3 4 5 6 7 8\n"
     )
@@ -190,7 +241,8 @@ def _write(folder: Path, suffix: str, name: str, make: Callable[[Path], Any]) ->
 
 def _files(folder: Path) -> Parts:
     """A seed's files by name, the main one first."""
-    names = sorted((path for path in folder.rglob("*") if path.is_file()), key=lambda path: (path.name[:2] != "a." or path.suffix[1:] != folder.parent.name, path.name))  # fmt: skip
+    main = f"a.{folder.parent.name}"
+    names = sorted((path for path in folder.rglob("*") if path.is_file()), key=lambda path: (path.name != main, path.name))
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in names}
 
 

@@ -16,12 +16,16 @@ from typing import Any
 
 from fuzz.limits import ACCEPTED, BAD, BROKEN, CRASHED, HUNG, LARGE, REFUSED, SLOW, Verdict
 from fuzz.parts import Target
+from fuzz.reduction import reduce_finding
 from fuzz.worker import ACCEPTED as N_ACCEPTED
-from fuzz.worker import CASE, STARTED, Finding, Job, run_worker
+from fuzz.worker import BUSY, CASE, STARTED, Finding, Job, run_worker
 from fuzz.worker import REFUSED as N_REFUSED
 
 JOB_SECONDS = 2.0  # that a job should take
 WAIT_SECONDS = 120.0  # of the clock, for one case
+SAVE_SECONDS = 20.0  # between counts that are written
+REDUCE_SECONDS = 60.0  # of the clock, to make one finding small
+REDUCED = 12  # findings that are made small
 START_SECONDS = 900.0  # of the clock, for sound files when kernels are compiled
 
 
@@ -30,10 +34,11 @@ class Options:
     """What is run.
 
     Args:
-        seconds: of the clock.
+        seconds: of the clock, without those in which kernels are compiled and loaded.
         cases: of each target, instead of a time; 0: as many as there is time for.
         seed: of the random numbers.
         targets: names of parsers; none: all.
+        kind: ``video`` (Python's parsers of geometry videos), ``mesh``, ``web`` (the player's); "": all.
         workers: processes.
         seeds: folder of the seed files.
         found: folder for cases that fail.
@@ -41,12 +46,15 @@ class Options:
         more: a folder of further mesh files, as seeds.
         first: number of the first case of each target.
         indices: whether kernels refuse indices out of bounds and negative ones.
+        longest: seconds of processor time after which a case counts as hung.
+        loader: what makes the targets.
     """
 
     seconds: float
     cases: int = 0
     seed: int = 1
     targets: tuple[str, ...] = ()
+    kind: str = ""
     workers: int = 2
     seeds: str = ""
     found: str = ""
@@ -54,6 +62,8 @@ class Options:
     more: str = ""
     first: int = 0
     indices: bool = False
+    longest: int = 20
+    loader: Callable[[Options], list[Target]] | None = None
 
 
 @dataclass
@@ -74,11 +84,12 @@ class _Worker:
     shared: Any
     folder: str
     job: Job | None = None
-    since: float = 0.0
 
 
 def load_targets(options: Options) -> list[Target]:
     """The parsers that are asked for, with their seeds."""
+    if options.loader is not None:
+        return options.loader(options)
     from fuzz.browser import browser_targets
     from fuzz.mesh_files import mesh_targets
     from fuzz.seeds import load_seeds
@@ -89,7 +100,12 @@ def load_targets(options: Options) -> list[Target]:
 
         refuse_bad_indices()
     videos, meshes = load_seeds(Path(options.seeds), Path(options.more) if options.more else None)
-    targets = [*video_targets(videos), *mesh_targets(meshes), *browser_targets(videos)]
+    kinds = {
+        "video": lambda: video_targets(videos),
+        "mesh": lambda: mesh_targets(meshes),
+        "web": lambda: browser_targets(videos),
+    }
+    targets = [target for kind, make in kinds.items() if options.kind in ("", kind) for target in make()]
     unknown = set(options.targets) - {target.name for target in targets}
     if unknown:
         raise KeyError(f"no target {', '.join(sorted(unknown))}; there are {', '.join(target.name for target in targets)}")
@@ -109,23 +125,41 @@ class Session:
         self.counts = {target.name: Count(next=options.first) for target in load_targets(options)}
         self.findings: dict[tuple[str, str, str], dict[str, Any]] = {}
         self.seconds = 0.0
+        self._failed_starts = 0
+        self._warming = 0.0  # seconds that workers spent on loading, on average
 
     def run(self) -> None:
         """Run all of it."""
-        started = time.monotonic()
+        started, saved = time.monotonic(), 0.0
         workers = [self._start(number) for number in range(self.options.workers)]
         try:
             while any(worker.process for worker in workers):
                 for worker in workers:
-                    self._attend(worker, started)
+                    self._attend(worker)
                 wait([worker.connection for worker in workers if worker.process], 0.1)
-                self.seconds = time.monotonic() - started
+                elapsed = time.monotonic() - started
+                loading = sum(worker.job is not None and worker.shared[CASE] < 0 for worker in workers)
+                self._warming += (elapsed - self.seconds) * loading / len(workers)
+                self.seconds = elapsed
+                if elapsed > saved + SAVE_SECONDS:
+                    saved = elapsed
+                    self._save()
         finally:
+            self._save()
             for worker in workers:
                 if worker.process:
                     worker.process.kill()
                     worker.process.join()
                 shutil.rmtree(worker.folder, ignore_errors=True)
+
+    def reduce(self) -> None:
+        """Make the findings small, each in at most `REDUCE_SECONDS`."""
+        context = multiprocessing.get_context("spawn")
+        for finding in list(self.findings.values())[:REDUCED]:
+            process = context.Process(target=_reduce, args=(self.options, finding))
+            process.start()
+            process.join(3 * REDUCE_SECONDS)
+            process.kill()
 
     def to_json(self) -> dict[str, Any]:
         """Counts and findings as JSON values."""
@@ -145,6 +179,12 @@ class Session:
             "findings": list(self.findings.values()),
         }
 
+    def _save(self) -> None:
+        """Keep the counts so far, so that a run that is ended leaves them."""
+        folder = Path(self.options.found)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "counts.json").write_text(json.dumps(self.to_json(), indent=1))
+
     def _start(self, number: int) -> _Worker:
         import dataclasses
 
@@ -159,7 +199,7 @@ class Session:
         theirs.close()
         return _Worker(process, ours, shared, folder)
 
-    def _attend(self, worker: _Worker, started: float) -> None:
+    def _attend(self, worker: _Worker) -> None:
         """Take what a worker has sent, or look whether it still lives; give it a job."""
         if not worker.process:
             return
@@ -176,18 +216,18 @@ class Session:
             self._bury(worker)
         else:
             if worker.job is None:
-                self._give(worker, started)
+                self._give(worker)
             elif self._is_stuck(worker):
                 worker.process.kill()
 
-    def _give(self, worker: _Worker, started: float) -> None:
+    def _give(self, worker: _Worker) -> None:
         options = self.options
         left = [
             (name, count)
             for name, count in self.counts.items()
             if not options.cases or count.next < options.first + options.cases
         ]
-        if not left or (not options.cases and time.monotonic() - started > options.seconds):
+        if not left or (not options.cases and self.seconds - self._warming > options.seconds):
             worker.connection.send(None)
             worker.process.join(10)
             worker.process.kill()
@@ -197,10 +237,10 @@ class Session:
         stop = count.next + count.job
         if options.cases:
             stop = min(stop, options.first + options.cases)
-        worker.job, worker.since = Job(name, count.next, stop), time.monotonic()
+        worker.job = Job(name, count.next, stop)
         worker.shared[STARTED] = time.time()
         worker.shared[CASE] = -1
-        worker.shared[N_ACCEPTED] = worker.shared[N_REFUSED] = 0
+        worker.shared[N_ACCEPTED] = worker.shared[N_REFUSED] = worker.shared[BUSY] = 0
         worker.connection.send(worker.job)
         count.next = stop
         count.seconds += 1e-3  # so that two workers do not choose alike
@@ -210,7 +250,7 @@ class Session:
         job = worker.job
         if job is None:
             return
-        count, took = self.counts[job.target], time.monotonic() - worker.since
+        count, took = self.counts[job.target], worker.shared[BUSY]
         done = (job.stop if stop is None else stop) - job.first
         count.cases += done
         count.seconds += took
@@ -222,11 +262,20 @@ class Session:
 
     def _is_stuck(self, worker: _Worker) -> bool:
         limit = WAIT_SECONDS if worker.shared[CASE] >= 0 else START_SECONDS
-        return time.time() - worker.shared[STARTED] > limit
+        return bool(time.time() - worker.shared[STARTED] > limit)
 
     def _bury(self, worker: _Worker) -> None:
-        """A worker that a case has ended: keep the case, start another, and go on behind it."""
+        """A worker that a case has ended: keep the case, start another, and go on behind it.
+
+        Raises:
+            RuntimeError: workers end before their first case, again and again.
+        """
         number, code, job = int(worker.shared[CASE]), worker.process.exitcode, worker.job
+        self._failed_starts = self._failed_starts + 1 if job is not None and number < 0 else 0
+        if self._failed_starts >= 3 * self.options.workers:
+            raise RuntimeError(
+                f"workers end with status {code} before their first case of {job.target if job else 'any target'}"
+            )
         if job is not None:
             if number >= 0:
                 hung = code in (-signal.SIGKILL, -getattr(signal, "SIGXCPU", 0))
@@ -265,9 +314,15 @@ class Session:
         }
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "finding.json").write_text(json.dumps(self.findings[key], indent=1))
-        self._say(
-            f"{finding.target} case {finding.number}: {verdict.kind}, {verdict.place}: {verdict.detail.strip().splitlines()[-1][:300]}"
-        )
+        line = verdict.detail.strip().splitlines()[-1][:300]
+        self._say(f"{finding.target} case {finding.number}: {verdict.kind}, {verdict.place}: {line}")
+
+
+def _reduce(options: Options, finding: dict[str, Any]) -> None:
+    import dataclasses
+
+    (target,) = load_targets(dataclasses.replace(options, targets=(finding["target"],)))
+    reduce_finding(target, finding, options.seed, REDUCE_SECONDS)
 
 
 KINDS = (ACCEPTED, REFUSED, CRASHED, BROKEN, SLOW, LARGE, HUNG)

@@ -6,6 +6,7 @@ import gc
 import os
 import shutil
 import sys
+import time
 import traceback
 import warnings
 from dataclasses import dataclass
@@ -16,12 +17,12 @@ from typing import Any
 
 from fuzz import limits
 from fuzz.limits import BAD, CRASHED, LARGE, SLOW, Verdict, judge
-from fuzz.parts import Parts, Target
+from fuzz.parts import Parts, Seed, Target
 
-LONGEST_SECONDS = 20  # of processor time of one case; the system then ends the process
+WARM_SECONDS = 600  # of processor time of a sound file, whose kernels may have to be compiled
 MOST_MEMORY = 4 << 30  # bytes that a worker may take beside those it starts with
 WORN = 1 << 30  # bytes at which a worker is replaced
-CASE, STARTED, REFUSED, ACCEPTED, FOUND = range(5)  # numbers that the session reads while a worker is busy
+CASE, STARTED, REFUSED, ACCEPTED, BUSY = range(5)  # numbers that the session reads while a worker is busy
 
 
 @dataclass(frozen=True)
@@ -53,27 +54,35 @@ def run_worker(connection: Connection, shared: SynchronizedArray[Any], options: 
     _silence()
     targets = {target.name: target for target in load_targets(options)}
     _limit_memory()
-    warm: set[str] = set()
+    warm: set[tuple[object, str]] = set()  # parsers, and seeds that they have read
     while (job := connection.recv()) is not None:
         target = targets[job.target]
-        if target.name not in warm:
-            warm.add(target.name)
-            for number in range(len(target.seeds)):
-                _warm(target, number, options.folder, shared)
+        for seed in target.seeds:
+            if (target.parse, seed.name) not in warm:
+                warm.add((target.parse, seed.name))
+                _progress(shared, -1, WARM_SECONDS)  # kernels are compiled and loaded, so that no case pays for it
+                run_case(target, seed.parts, Path(options.folder))
         for number in range(job.first, job.stop):
-            _progress(shared, number)
-            seed, parts = target.case(options.seed, number)
-            verdict = run_case(target, parts, Path(options.folder))
+            _progress(shared, number, options.longest)
+            seed, verdict = _judge(target, options.seed, number, Path(options.folder))
             shared[REFUSED] += verdict.kind == limits.REFUSED
             shared[ACCEPTED] += verdict.kind == limits.ACCEPTED
+            shared[BUSY] += time.time() - shared[STARTED]
             if verdict.kind in BAD:
-                shared[FOUND] += 1
                 connection.send(Finding(target.name, number, seed.name, verdict, options.folder))
                 connection.recv()  # the session has copied the files
         shared[CASE] = -1
         connection.send(None)
         if _is_worn():
             return
+
+
+def _judge(target: Target, run_seed: int, number: int, folder: Path) -> tuple[Seed, Verdict]:
+    try:
+        seed, parts = target.case(run_seed, number)
+    except Exception:
+        return target.seeds[0], Verdict(CRASHED, "the harness", traceback.format_exc())
+    return seed, run_case(target, parts, folder)
 
 
 def memory_folder() -> str | None:
@@ -108,22 +117,14 @@ def write_files(files: dict[str, bytes], folder: Path) -> Path:
     return folder / next(iter(files))
 
 
-def _warm(target: Target, number: int, folder: str, shared: SynchronizedArray[Any]) -> None:
-    """Compile and load what a sound file needs, so that no case pays for it."""
-    _progress(shared, -1)
-    run_case(target, target.seeds[number].parts, Path(folder))
-
-
-def _progress(shared: SynchronizedArray[Any], number: int) -> None:
-    import time
-
+def _progress(shared: SynchronizedArray[Any], number: int, longest: int) -> None:
+    """Say which case begins; the system ends this process if it takes longer, in seconds of processor time."""
     shared[STARTED], shared[CASE] = time.time(), number
     if sys.platform != "win32":
         import resource
 
         used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
-        slack = LONGEST_SECONDS if number >= 0 else 600  # kernels may have to be compiled
-        resource.setrlimit(resource.RLIMIT_CPU, (int(used) + slack, resource.getrlimit(resource.RLIMIT_CPU)[1]))
+        resource.setrlimit(resource.RLIMIT_CPU, (int(used) + longest + 1, resource.getrlimit(resource.RLIMIT_CPU)[1]))
 
 
 def _limit_memory() -> None:
