@@ -15,7 +15,7 @@ from uuid import UUID
 
 TARGET = Path(__file__).parents[1] / "gvpipe" / "web" / "src" / "constants.js"
 SHARED = {
-    "gvpipe.asset_coding.directory": "SECTION VERSION MOST MAX_BYTES",
+    "gvpipe.asset_coding.directory": "SECTION VERSION MOST MAX_BYTES SURFACE OCTAHEDRAL",
     "gvpipe.asset_coding.encoder": "ARRANGEMENT CODED",
     "gvpipe.connectivity.adaptive_mesh": "MAX_POINTS",
     "gvpipe.connectivity.adaptive_order": "MAX_VERTICES",
@@ -28,7 +28,7 @@ SHARED = {
     "gvpipe.connectivity.welded_mesh": "ADAPTIVE_MESH ADAPTIVE_ORDER",
     "gvpipe.container.bitstream": "MAGIC VERSION MAX_SECTIONS MAX_NAME MAX_HEADER MAX_FRAMES MAX_VERTICES",
     "gvpipe.container.mp4": "BOX_UUID MAX_BOXES",
-    "gvpipe.container.segments": "TINY HUGE",
+    "gvpipe.container.segments": "TINY HUGE LARGEST_STEP MAX_SEGMENT",
     "gvpipe.corrections.displacements": "MAX_POSITIONS NEAR",
     "gvpipe.entropy.block_coder": "PARAMETRIC",
     "gvpipe.entropy.decision_kernels": "ONE_BITS AHEAD RATE RATE_BITS",
@@ -40,7 +40,14 @@ SHARED = {
     "gvpipe.entropy.series": "MAX_CLASS",
     "gvpipe.entropy.tokens": "DIRECT TABLE_TOTAL MAX_TOKENS CHUNK",
     "gvpipe.errors": "REMEDY",
+    "gvpipe.fields.derived": "MAGNITUDE SIGNALS",
+    "gvpipe.fields.head": "MAX_VALUES VERSION",
+    "gvpipe.fields.prediction_kernels": "STEPS WHOLE FLOATS",
+    "gvpipe.fields.residual_kernels": "N_CONTEXTS N_FINE N_COARSE NODES N_MIXERS",
+    "gvpipe.fields.segment": "EXACT TRAJECTORIES DERIVED",
+    "gvpipe.fields.values": "MAX_COMPONENTS",
     "gvpipe.media.video": "MAX_SIDE",
+    "gvpipe.mesh.hierarchy": "MAX_WAVES",
     "gvpipe.rasterizer.colormaps": "MAGMA VIRIDIS",
     "gvpipe.repeated_frames": "SECTION",
     "gvpipe.trajectory.basis": "MAX_COMPONENTS MAX_SCALE PER_OCTAVE LEAST_OUTSIDE",
@@ -48,6 +55,7 @@ SHARED = {
     "gvpipe.trajectory.contexts": "SHORT LONG ONE PER_OCTAVE MAX_LEVEL FLOOR_SPAN FLOOR_NEAR POWERS POWER_ONE LOWEST HIGHEST "
     "N_CONTEXTS N_NEAR",
     "gvpipe.trajectory.prediction_kernels": "DOUBT",
+    "gvpipe.trajectory.spatial_neighbours": "OVERSHOOT RING_VARIANCE FAR_VARIANCE SURE LEAST",
     "gvpipe.trajectory.temporal_neighbours": "MAX_NEIGHBOURS VARIANCE MIN_BLOCK CUBIC LINEAR OFFSETS",
     "gvpipe.web.field_export": "CODING ORDERS MAX_VALUES",
     "gvcodecs.mcgv.base.surface": "STILL",
