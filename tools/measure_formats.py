@@ -3,8 +3,8 @@
     python tools/measure_formats.py ../shared/data [--only abc] [--markdown]
 
 Reading: every frame of an asset, as positions in world space, by gvpipe and by the format's own library alone: usd-core,
-alembic3d, ufbx, trimesh (frames of GLB, OBJ and PLY), h5py and meshio (simulations). Both run in turn, in this process, the
-fastest of `--repeats` counts; times are of the processor. gvpipe's time includes what the others leave out: triangles, attributes,
+alembic3d, trimesh (frames of GLB, OBJ and PLY), h5py and meshio (simulations). Both run in turn, in this process, the
+fastest of `--repeats` counts; times are of the processor. gvpipe's time has what the others leave out: triangles, attributes,
 materials, checks. Writing: `samba.npz` as `.glb`, `.usdc` and `.abc`.
 
 Status 1: reading takes more than twice the library's own time and 0.1 s more, or writing more than 3 s.

@@ -2,7 +2,7 @@
 
 What is printed, and how much of it, is `gvpipe.cli.console`'s; ``-`` in place of a file's name is `gvpipe.cli.pipes`'.
 
-Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage, 130 interrupted.
+Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage, 130 interrupted, 128 + n ended by signal n.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import atexit
 import gc
 import os
+import signal
 import sys
 import traceback
 from dataclasses import replace
@@ -21,6 +22,7 @@ from gvpipe import __version__
 from gvpipe.cli.console import Output, is_verbose, output_options, print_options
 from gvpipe.cli.conversion import convert
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
+from gvpipe.cli.process import Ended, ending_by_exception, replace_closed_streams
 from gvpipe.errors import GvpipeError
 
 if TYPE_CHECKING:
@@ -35,8 +37,10 @@ def main() -> None:
     """Run the command line and exit."""
     gc.set_threshold(COLLECTED)
     atexit.register(gc.freeze)  # what the process takes along when it ends need not be looked through
+    replace_closed_streams()
     try:
-        status = cli(standalone_mode=False, prog_name="gvpipe")
+        with ending_by_exception():
+            status = cli(standalone_mode=False, prog_name="gvpipe")
     except GvpipeError as exc:
         status = _fail(_one_line(exc), 1)
     except click.UsageError as exc:
@@ -46,14 +50,19 @@ def main() -> None:
         exc.show()
         status = 1
     except (click.Abort, KeyboardInterrupt):
-        status = _fail("interrupted; nothing was written", 130)
+        status = _fail("interrupted; no file is left half written", 130)
+    except Ended as exc:
+        status = _fail(f"ended by {signal.Signals(exc.number).name}; no file is left half written", 128 + exc.number)
     except MemoryError:
         status = _fail("not enough memory; encode fewer frames or vertices at a time, or give the sequence as frame files", 1)
     except BrokenPipeError:  # the reader of our output left, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1
-    except OSError as exc:  # files' own errors are GvpipeErrors already: what is left is our output, as on a full disk
-        status = _fail(f"cannot print the result: {exc.strerror or exc}; free some space or print elsewhere", 1)
+    except OSError as exc:  # those of files that are read or written are GvpipeErrors already
+        if is_verbose(sys.argv[1:]):
+            traceback.print_exc()
+        what = f"{exc.filename}: " if exc.filename else ""
+        status = _fail(f"{what}{exc.strerror or exc}; check the path, its permissions and the disk", 1)
     except Exception as exc:
         if is_verbose(sys.argv[1:]):
             traceback.print_exc()
@@ -370,7 +379,8 @@ def export_html(source: str, target: str, up: str | None, quality: float | None,
 def play(source: str, up: str | None, out: Output) -> None:
     """Play a geometry video in your browser.
 
-    Where no browser can be opened, the page's path is printed. The page is one file and needs no network.
+    Where no browser can be opened, the page's path is printed. The page is one file and needs no network. Pages that are older
+    than a day are removed by the next `gvpipe play`.
     """
     from pathlib import Path
 
@@ -378,8 +388,8 @@ def play(source: str, up: str | None, out: Output) -> None:
     from gvpipe.atomic import lasting_folder
     from gvpipe.web.browser import open_page
 
-    with source_path(source) as path, out.progress() as progress:
-        page = Path(lasting_folder()) / f"{Path(path).stem}.html"  # stays: the browser reads it later
+    with source_path(source) as path, lasting_folder() as folder, out.progress() as progress:
+        page = Path(folder) / f"{Path(path).stem}.html"  # stays: the browser reads it later
         report = web.export_html(path, page, up, None, progress)
     _tell_conversion(out, report)
     is_open = open_page(page)

@@ -7,7 +7,6 @@ alone.
 from __future__ import annotations
 
 import re
-import threading
 from collections.abc import Collection, Sequence
 from typing import Protocol
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.errors import InputError, TopologyChange
+from gvpipe.forks import ForkLock
 from gvpipe.io.mapped_pages import forget_pages
 from gvpipe.origin import choose_origin, narrow, rounding
 from gvpipe.sequence import check_finite
@@ -63,7 +63,7 @@ class SceneFrames:
         self._motions, self.times, self._where, self._unit, self._start = tuple(motions), times, where, unit, start
         self._files, self._n_read = files, 0  # bytes of frames since their pages were given back
         self._starts = np.cumsum([0, *(motion.n_vertices for motion in motions)])
-        self._lock = threading.Lock()  # neither library says that its Python objects may be shared by threads
+        self._lock = ForkLock()  # neither library says that its Python objects may be shared by threads
         self._still: list[Array | None] = [None] * len(self._motions)
         self.rounding = 0.0  # what float32 moved a coordinate by at most, model units, in the frames loaded so far
         self.first: Float64 = self._evaluate(0)
