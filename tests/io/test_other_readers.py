@@ -110,7 +110,7 @@ def test_positions_are_within_the_bound(pair: tuple[MeshSequence, MeshSequence],
     assert len(found) == N_FRAMES
     for ours, theirs in zip(expected, found, strict=True):
         if "%" not in name:
-            assert np.linalg.norm(ours - theirs, axis=1).max() <= bound
+            assert float(np.max(np.linalg.norm(ours - theirs, axis=1))) <= bound
             continue
         if name.endswith(".glb"):
             theirs = _back(theirs, source)
