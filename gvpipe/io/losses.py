@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from gvpipe.asset.metadata import NO_METADATA
 from gvpipe.notes import not_held
 from gvpipe.sequence import MeshSequence
+
+LISTED = 5  # names in a note
 
 
 def lost_notes(sequence: MeshSequence, format_name: str, held: Collection[str], more: Sequence[str] = ()) -> tuple[str, ...]:
@@ -28,3 +30,28 @@ def lost_notes(sequence: MeshSequence, format_name: str, held: Collection[str], 
     }
     left_out = [name for name, is_there in others.items() if is_there and name not in held]
     return not_held(format_name, [*dict.fromkeys(named), *left_out, *more])
+
+
+def shadowed(sequence: MeshSequence) -> list[str]:
+    """Names that an attribute and a field have both; normals are written by rules of their own."""
+    return [name for name in sequence.attributes if name in sequence.fields and name != "normal"]
+
+
+def shadow_note(names: Sequence[str], format_name: str) -> tuple[str, ...]:
+    """Of attributes that have the name of a field."""
+    return (f"{format_name} has one value of a name; the fields {', '.join(names)} stand for the attributes",) if names else ()
+
+
+def renamed_note(names: Mapping[str, str], format_name: str) -> tuple[str, ...]:
+    """Of names that a format does not allow, or gives a meaning of its own; by the old one the new one."""
+    changed = [f"{old!r} is {new!r}" for old, new in names.items() if old != new]
+    more = f" and {len(changed) - LISTED} more" if len(changed) > LISTED else ""
+    return (f"names were changed for {format_name}: {', '.join(changed[:LISTED])}{more}",) if changed else ()
+
+
+def unit_note(sequence: MeshSequence, format_name: str) -> tuple[str, ...]:
+    """Of attributes and fields whose units have no place."""
+    every = (*sequence.attributes.items(), *sequence.fields.items())
+    units = list(dict.fromkeys(f"{name} ({one.unit})" for name, one in every if one.unit))
+    listed = ", ".join(units[:LISTED]) + (f" and {len(units) - LISTED} more" if len(units) > LISTED else "")
+    return (f"{format_name} has no units of numbers; those of {listed} were left out",) if units else ()

@@ -20,7 +20,7 @@ from gvpipe.asset.material import Material
 from gvpipe.asset.polygons import polygon_corners, polygon_starts
 from gvpipe.io.even_polygons import is_even
 from gvpipe.io.frame_normals import frame_normals, turned_note
-from gvpipe.io.losses import lost_notes
+from gvpipe.io.losses import lost_notes, renamed_note, shadow_note, shadowed
 from gvpipe.io.mesh import FrameEncoder
 from gvpipe.io.pictures import picture_names
 from gvpipe.io.ply import COLOR_NAMES, NORMAL_NAMES, TEXTURE_FILE
@@ -77,7 +77,7 @@ def encode_ply(sequence: MeshSequence, shared: str) -> FrameEncoder:
         held |= {"materials"} if replace(sequence.materials[0], name="", base_color_texture=None) == Material() else set()
         held |= set() if any(part.name for part in sequence.parts) else {"parts"}
     wanted = [name for name in sequence.fields if name in columns or (name == "normal" and has_normals)]
-    notes = (*turned_note(normals, "PLY"), *lost_notes(sequence, "PLY", held))
+    notes = (*turned_note(normals, "PLY"), *lost_notes(sequence, "PLY", held), *_name_notes(sequence, columns))
     return FrameEncoder(encode, tuple(wanted), notes, beside)
 
 
@@ -101,6 +101,14 @@ def _columns(sequence: MeshSequence) -> dict[str, _Column]:
         values = None if isinstance(each, Field) else np.asarray(each)
         columns[name] = _Column(properties, f"<{_kind(each.dtype)}", each.domain, values)
     return columns
+
+
+def _name_notes(sequence: MeshSequence, columns: dict[str, _Column]) -> tuple[str, ...]:
+    """What was done to names: those of two things, and those that PLY does not allow or knows as something else."""
+    stems = {name: one.properties[0] for name, one in columns.items() if one.properties[0] not in COLOR_NAMES}
+    stems = {name: stem if len(columns[name].properties) == 1 else stem.removesuffix("_0") for name, stem in stems.items()}
+    twice = [name for name in shadowed(sequence) if name in columns]
+    return (*shadow_note(twice, "PLY"), *renamed_note(stems, "PLY"))
 
 
 def _kind(dtype: np.dtype[Any]) -> str:

@@ -7,7 +7,7 @@ alone.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -15,10 +15,12 @@ import numpy as np
 from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.errors import InputError, TopologyChange
 from gvpipe.forks import ForkLock
+from gvpipe.io.mapped_pages import forget_pages
 from gvpipe.origin import choose_origin, narrow, rounding
 from gvpipe.sequence import check_finite
 
 MAX_FRAMES = 1_000_000
+MOST_MAPPED = 32 << 20  # bytes of frames whose pages stay in memory
 
 
 class Motion(Protocol):
@@ -42,14 +44,24 @@ class SceneFrames:
         where: the file, for messages.
         unit: the file's name of a time, such as ``"time code"``.
         start: number of the first frame among all that the file has.
+        files: that the library has mapped into memory.
 
     Raises:
         InputError: here for the first frame, when sliced for any other: a coordinate that is not finite.
         TopologyChange: a mesh has another number of vertices than at first.
     """
 
-    def __init__(self, motions: Sequence[Motion], times: Array, where: str, unit: str, start: int = 0) -> None:
+    def __init__(
+        self,
+        motions: Sequence[Motion],
+        times: Array,
+        where: str,
+        unit: str,
+        start: int = 0,
+        files: Collection[str] = (),
+    ) -> None:
         self._motions, self.times, self._where, self._unit, self._start = tuple(motions), times, where, unit, start
+        self._files, self._n_read = files, 0  # bytes of frames since their pages were given back
         self._starts = np.cumsum([0, *(motion.n_vertices for motion in motions)])
         self._lock = ForkLock()  # neither library says that its Python objects may be shared by threads
         self._still: list[Array | None] = [None] * len(self._motions)
@@ -74,6 +86,10 @@ class SceneFrames:
             exact = self._evaluate(frame)[None]
             block[i] = narrow(exact, self.origin)[0]
             self.rounding = max(self.rounding, rounding(exact, block[i : i + 1], self.origin))
+            self._n_read += block[i].nbytes
+            if self._n_read > MOST_MAPPED:
+                forget_pages(self._files)
+                self._n_read = 0
         return block
 
     def at(self, time: float) -> Float64:

@@ -13,10 +13,11 @@ import numpy as np
 
 from gvpipe.arrays import Array, Int64
 from gvpipe.atomic import atomic_path
+from gvpipe.io.losses import renamed_note
 from gvpipe.io.pvd_writer import frame_times
 from gvpipe.io.simulation.hdf import import_h5py
 from gvpipe.io.simulation.poly_content import ROLES, PolyContent, poly_content
-from gvpipe.io.simulation.vtkhdf import POLY_GROUPS, ROOT
+from gvpipe.io.simulation.vtkhdf import POLY_GROUPS, ROOT, UNIT
 from gvpipe.sequence import MeshSequence
 
 VERSION = (2, 3)
@@ -32,7 +33,7 @@ def write_vtkhdf(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
         OutputError: the file cannot be written.
     """
     h5py = import_h5py(str(path))
-    content = poly_content(sequence, "VTKHDF")
+    content = poly_content(sequence, "VTKHDF", has_units=True)
     with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
         root = file.create_group(ROOT)
         root.attrs["Version"] = np.array(VERSION, np.int64)
@@ -41,7 +42,8 @@ def write_vtkhdf(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
         _write_polygons(root, content)
         _write_steps(root, sequence, content)
         _write_frames(root, sequence, content)
-    return content.notes
+    names = {name: _safe(name) for name in (*content.attributes, *content.fields)}
+    return (*content.notes, *renamed_note(names, "VTKHDF"))
 
 
 def _write_polygons(root: Any, content: PolyContent) -> None:
@@ -85,10 +87,13 @@ def _write_frames(root: Any, sequence: MeshSequence, content: PolyContent) -> No
             if content.role(domain, kind):
                 group.attrs[role] = np.bytes_(_safe(content.role(domain, kind)))
         for name, values in content.still(domain).items():
-            _dataset(group, _safe(name), _plain(values).shape, values.dtype)[...] = _plain(values)
+            held = _dataset(group, _safe(name), _plain(values).shape, values.dtype)
+            held[...] = _plain(values)
+            _write_unit(held, content.attributes[name].unit)
         for name, one in content.moving(domain).items():
             shape = (sequence.n_frames * n_rows, one.n_components)
             targets[name] = _dataset(group, _safe(name), shape if one.n_components > 1 else shape[:1], one.dtype)
+            _write_unit(targets[name], one.unit)
     for start, stop in sequence.spans():
         block = sequence.read_absolute(start, stop) if is_far else sequence.read(start, stop)
         points[start * sequence.n_vertices : stop * sequence.n_vertices] = block.reshape(-1, 3)
@@ -101,6 +106,12 @@ def _write_frames(root: Any, sequence: MeshSequence, content: PolyContent) -> No
 def _dataset(group: Any, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
     chunk = (min(CHUNK, max(shape[0], 1)), *shape[1:])
     return group.create_dataset(name, shape, dtype, chunks=chunk, compression="gzip", compression_opts=4, shuffle=True)
+
+
+def _write_unit(held: Any, unit: str) -> None:
+    """The unit as an attribute, which VTK passes over: its format has no place for one."""
+    if unit:
+        held.attrs[UNIT] = unit
 
 
 def _plain(values: Array) -> Array:

@@ -69,7 +69,7 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
     start = float(times[0])
     for motion in motions:
         motion.n_vertices = motion.count(start)
-    frames = SceneFrames(motions, times, where, "second", first)
+    frames = SceneFrames(motions, times, where, "second", first, [where])
     materials: list[str] = []
     read = [_read_mesh(motion, materials, (times, where, first)) for motion in motions]
     meshes = [mesh for mesh, _ in read]

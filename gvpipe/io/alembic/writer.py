@@ -16,6 +16,7 @@ from gvpipe.atomic import atomic_path
 from gvpipe.errors import InputError, OutputError
 from gvpipe.io.alembic.archive import EXTRA
 from gvpipe.io.alembic.param_writer import ParamWriter, filled, is_held
+from gvpipe.io.losses import renamed_note, shadow_note, shadowed, unit_note
 from gvpipe.io.scene_export import ExportMesh, export_layer, export_meshes, uncovered
 from gvpipe.io.scene_frames import one_line
 from gvpipe.io.scene_normals import SceneNormals
@@ -43,7 +44,7 @@ def write_alembic(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
             _write_archive(sequence, meshes, normals, str(temporary))  # the library closes the file when its objects are gone
     except RuntimeError as exc:
         raise OutputError(f"cannot write {path}: {one_line(exc)}; check the folder and the disk") from exc
-    return (*normals.notes, *_notes(sequence, meshes))
+    return (*normals.notes, *_notes(sequence, meshes), *_name_notes(sequence))
 
 
 def _write_archive(sequence: MeshSequence, meshes: list[ExportMesh], normals: SceneNormals, path: str) -> None:
@@ -148,6 +149,8 @@ class MeshWriter:
     def _describe(self, sample: Any) -> None:
         """Add texture coordinates and normals to the first sample, and the other attributes beside."""
         for name, attribute in self._normals.attributes.items():
+            if name in self._normals.fields:
+                continue
             layer = export_layer(name, attribute, self._mesh)
             if not len(layer.values) or not is_held(layer.kind, layer.values.shape[1]):
                 continue
@@ -173,6 +176,14 @@ class MeshWriter:
             taken.add(free)
             faces = self._schema.createFaceSet(free)
             faces.getSchema().set(AbcGeom.OFaceSetSchemaSample(filled(imath.IntArray, np.arange(first, stop, dtype=np.int32))))
+
+
+def _name_notes(sequence: MeshSequence) -> tuple[str, ...]:
+    """What was done to names and units: Alembic has neither units nor names with a slash, and one thing of a name."""
+    names = (*sequence.attributes, *sequence.fields, *(part.name for part in sequence.parts))
+    changed = {name: name.replace("/", "_") for name in (*names, *(each.name for each in sequence.materials))}
+    twice = shadow_note(shadowed(sequence), "Alembic")
+    return (*twice, *renamed_note(changed, "Alembic"), *unit_note(sequence, "Alembic"))
 
 
 def _notes(sequence: MeshSequence, meshes: list[ExportMesh]) -> tuple[str, ...]:

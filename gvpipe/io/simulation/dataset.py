@@ -21,11 +21,12 @@ class DataArray(NamedTuple):
 
     Args:
         read: returns ``(rows,)`` or ``(rows, C)``; called when the numbers are needed.
-        kind: as of `gvpipe.Attribute`, where the file says so; else ``""``.
+        kind, unit: as of `gvpipe.Attribute`, where the file says so; else ``""``.
     """
 
     read: Callable[[], Array]
     kind: str = ""
+    unit: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +84,7 @@ def _reader(name: str, one: DataArray, domain: str, rows: Array) -> Callable[[],
         if len(values) <= int(rows.max(initial=0)):
             raise ValueError(f"{name!r} has {len(values)} rows, which are fewer than its {domain} numbers need")
         values = plain_numbers(values[rows])
-        return FrameValues(values, domain, one.kind if _fits(one.kind, values) else guess(name, values))
+        return FrameValues(values, domain, one.kind if _fits(one.kind, values) else guess(name, values), one.unit)
 
     return read
 

@@ -14,7 +14,7 @@ from gvpipe.arrays import Array, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.polygons import polygon_corners, polygon_starts
-from gvpipe.io.losses import lost_notes
+from gvpipe.io.losses import lost_notes, shadow_note, shadowed
 from gvpipe.sequence import MeshSequence
 
 SAME = 0.01  # part of the range by which values inside of a polygon may differ
@@ -59,8 +59,8 @@ class PolyContent:
         return next((name for name, where, of in named if where == domain and of == kind), "")
 
 
-def poly_content(sequence: MeshSequence, format_name: str) -> PolyContent:
-    """Return what is written of a sequence; ``format_name`` is for notes."""
+def poly_content(sequence: MeshSequence, format_name: str, has_units: bool = False) -> PolyContent:
+    """Return what is written of a sequence; ``format_name`` is for notes, ``has_units`` whether it holds units."""
     fields = {name: one for name, one in sequence.fields.items() if one.domain in ("vertex", "triangle")}
     attributes = {name: one for name, one in sequence.attributes.items() if one.domain in ("vertex", "triangle")}
     attributes = {name: one for name, one in attributes.items() if name not in fields}
@@ -73,14 +73,15 @@ def poly_content(sequence: MeshSequence, format_name: str) -> PolyContent:
     counts = np.full(len(sequence.faces), 3, np.int64) if polygons is None else polygons.astype(np.int64)
     flat = sequence.faces.reshape(-1)
     nodes = flat if polygons is None else flat[polygon_corners(polygons)]
-    held = {*fields, *attributes, *(["polygons"] if polygons is not None else [])}
+    held = {*fields, *attributes, *(["polygons"] if polygons is not None else []), *(["units"] if has_units else [])}
+    twice = shadow_note([name for name in shadowed(sequence) if name in fields], format_name)
     return PolyContent(
         np.concatenate([np.zeros(1, np.int64), np.cumsum(counts)]),
         nodes.astype(np.int64),
         polygon_starts(counts),
         attributes,
         fields,
-        lost_notes(sequence, format_name, held),
+        (*lost_notes(sequence, format_name, held), *twice),
     )
 
 

@@ -22,6 +22,8 @@ from gvpipe.io.simulation.xml_grids import POLY_CELLS, ROLES, as_points
 from gvpipe.sequence import MeshSequence
 
 ROOT = "VTKHDF"
+UNIT = "Units"  # attribute of an array; gvpipe's own
+LONGEST_UNIT = 100  # characters
 POLY_GROUPS = {"Vertices": POLY_CELLS["Verts"], "Lines": POLY_CELLS["Lines"], "Polygons": POLY_CELLS["Polys"],
                "Strips": POLY_CELLS["Strips"]}  # fmt: skip
 MAX_STEPS = 10_000_000
@@ -168,7 +170,9 @@ class VtkHdfSteps:
         made = {}
         for name in self._file.names(f"{ROOT}/{group}"):
             at = self._offset(f"{group}Offsets/{name}", step, start)
-            made[name] = DataArray(partial(self._rows, f"{ROOT}/{group}/{name}", at, count), roles.get(name, ""))
+            path = f"{ROOT}/{group}/{name}"
+            unit = self._file.attribute(path, UNIT)[:LONGEST_UNIT]
+            made[name] = DataArray(partial(self._rows, path, at, count), roles.get(name, ""), unit)
         return made
 
     def _rows(self, path: str, start: int, count: int) -> Array:

@@ -12,31 +12,63 @@ from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.io.scene_export import ExportMesh, as_unit_range, export_layer
 from gvpipe.io.scene_mesh import Layer
+from gvpipe.io.usd.primvars import UV_NAME
 
 INTERPOLATIONS = {"constant": "constant", "polygon": "uniform", "vertex": "vertex", "corner": "faceVarying"}
+TAKEN = ("displayColor", "displayOpacity", "normals")  # names that have a meaning, for what does not have it
 BYTES = 16 << 20  # of a field's frames at a time
 
 
-def write_primvars(drawn: Any, mesh: ExportMesh, attributes: Mapping[str, Attribute]) -> list[str]:
-    """Write a mesh's attributes; returns notes."""
+def primvar_names(named: Mapping[str, Attribute | Field]) -> dict[str, str]:
+    """Names of primvars: ``st`` and ``normals`` for what they mean; others keep theirs, but for what USD does not allow.
+
+    A name that would mean something else in USD gets ``own_`` before it. No two are the same.
+
+    Examples:
+        >>> import numpy as np
+        >>> heat = Field(np.zeros((1, 1)))
+        >>> primvar_names({"uv": Attribute(np.zeros((1, 2)), "vertex", "uv"), "st": heat, "von mises": heat})
+        {'uv': 'st', 'st': 'own_st', 'von mises': 'von_mises'}
+    """
+    from pxr import Tf
+
+    result: dict[str, str] = {}
+    for name, one in sorted(named.items(), key=lambda item: item[1].kind not in ("uv", "normal", "color")):
+        if one.kind == "uv" and name.startswith("uv"):
+            plain = f"st{name[2:]}"
+        elif (name, one.kind) == ("normal", "normal"):
+            plain = "normals"
+        elif (name, one.kind) == ("color", "color"):
+            plain = "displayColor"
+        else:
+            plain = str(Tf.MakeValidIdentifier(name))
+            means_more = UV_NAME.fullmatch(plain) and one.kind != "uv"
+            plain = f"own_{plain}" if means_more or plain in TAKEN or plain.startswith("skel") else plain
+        free, number = plain, 1
+        while free in result.values():
+            free, number = f"{plain}_{number}", number + 1
+        result[name] = free
+    return {name: result[name] for name in named}
+
+
+def write_primvars(drawn: Any, mesh: ExportMesh, attributes: Mapping[str, Attribute], names: Mapping[str, str]) -> list[str]:
+    """Write a mesh's attributes under their names in USD; returns notes."""
     said: list[str] = []
     for name, attribute in attributes.items():
         layer = export_layer(name, attribute, mesh)
         if not len(layer.values):
             continue
-        if attribute.kind == "color" and name == "color":
+        if names[name] == "displayColor":
             _write_color(drawn, layer)
         else:
-            _write(drawn, _usd_name(name, attribute.kind), layer, layer.values)
+            _write(drawn, names[name], layer, layer.values)
         if attribute.domain == "triangle" and mesh.counts.max(initial=3) > 3:
             said.append(f"{name} is per triangle; USD has it per polygon, so that of the first triangle was written")
-        if attribute.unit:
-            said.append(f"USD has no units of primvars; that of {name} ({attribute.unit}) was left out")
     return said
 
 
 def write_field(name: str, field: Field, meshes: list[tuple[Any, ExportMesh]], start: float) -> None:
-    """Write a field as a primvar with a sample per frame, a bounded number of frames at a time."""
+    """Write a field as a primvar of a name, with a sample per frame, a bounded number of frames at a time."""
     domain = {"vertex": "vertex", "triangle": "polygon"}[field.domain]
     step = max(1, BYTES // (4 * field.shape[1] * field.n_components))
     for first in range(0, len(field), step):
@@ -45,12 +77,12 @@ def write_field(name: str, field: Field, meshes: list[tuple[Any, ExportMesh]], s
             rows = slice(*mesh.vertices) if domain == "vertex" else mesh.triangles[0] + _first_triangles(mesh)
             for i, frame in enumerate(block):
                 layer = Layer(name, field.kind, domain, frame[rows])
-                _write(drawn, _usd_name(name, field.kind), layer, layer.values, start + first + i)
+                _write(drawn, name, layer, layer.values, start + first + i)
 
 
-def write_layer(drawn: Any, layer: Layer, time: float) -> None:
-    """Write a layer's values at a time code; where they are indexed, the indices are those of every time."""
-    _write(drawn, _usd_name(layer.name, layer.kind), layer, layer.values, time)
+def write_normals(drawn: Any, layer: Layer, time: float) -> None:
+    """Write normals at a time code; where they are indexed, the indices are those of every time."""
+    _write(drawn, "normals", layer, layer.values, time)
 
 
 def _write_color(drawn: Any, layer: Layer) -> None:
@@ -94,15 +126,6 @@ def _python_name(type_name: str) -> str:
     """``texCoord2f[]`` as the library's Python names it: ``TexCoord2fArray``."""
     plain = type_name.removesuffix("[]")
     return f"{plain[0].upper()}{plain[1:]}Array"
-
-
-def _usd_name(name: str, kind: str) -> str:
-    """The usual name of a primvar: ``st``, ``normals``; others keep theirs."""
-    from pxr import Tf
-
-    if kind == "uv" and name.startswith("uv"):
-        return f"st{name[2:]}"
-    return "normals" if name == "normal" and kind == "normal" else str(Tf.MakeValidIdentifier(name))
 
 
 def _first_triangles(mesh: ExportMesh) -> Array:

@@ -61,7 +61,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
     times = times[first:stop]
     if float(times[0]) != start:  # meshes may have other vertices then
         motions = [UsdMotion(found.meshes[number], skins, places, float(times[0])) for number in kept]
-    frames = SceneFrames(motions, times, where, "time code", first)
+    frames = SceneFrames(motions, times, where, "time code", first, [layer.realPath for layer in stage.GetUsedLayers()])
     read = [_read_mesh(found.meshes[number], motion, materials, (times, where, first)) for number, motion in
             zip(kept, motions, strict=True)]  # fmt: skip
     meshes = [mesh for mesh, _ in read]

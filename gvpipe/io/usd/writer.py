@@ -17,12 +17,13 @@ from gvpipe import notes
 from gvpipe.arrays import Float32
 from gvpipe.atomic import atomic_path, unnamed_path
 from gvpipe.errors import InputError, OutputError
+from gvpipe.io.losses import renamed_note, shadow_note, shadowed, unit_note
 from gvpipe.io.scene_export import ExportMesh, export_meshes, uncovered
 from gvpipe.io.scene_frames import one_line
 from gvpipe.io.scene_normals import SceneNormals
 from gvpipe.io.usd.material_writer import MaterialWriter
 from gvpipe.io.usd.names import ADDED, identifier, name_prim
-from gvpipe.io.usd.primvar_writer import write_field, write_layer, write_primvars
+from gvpipe.io.usd.primvar_writer import primvar_names, write_field, write_normals, write_primvars
 from gvpipe.io.usd.stage import EXTRA
 from gvpipe.sequence import MeshSequence
 
@@ -97,15 +98,25 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str) -
         top.SetCustomDataByKey(ADDED, True)
     materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, image_names(sequence))
     normals = SceneNormals(sequence, "USD")
-    said = list(normals.notes)
+    attributes = {name: each for name, each in normals.attributes.items() if name not in normals.fields}
+    names = primvar_names({**attributes, **normals.fields})
+    usual = {name: one for name, one in names.items() if one not in ("st", "normals", "displayColor")}
+    own = {name: one for name, one in usual.items() if not (name.startswith("uv") and one == f"st{name[2:]}")}
+    said = [*normals.notes, *shadow_note(shadowed(sequence), "USD"), *renamed_note(own, "USD"), *unit_note(sequence, "USD")]
     drawn = [_define(stage, where, mesh, sequence, materials) for where, mesh in zip(paths, meshes, strict=True)]
     for each, mesh in zip(drawn, meshes, strict=True):
-        said.extend(write_primvars(each, mesh, normals.attributes))
+        said.extend(write_primvars(each, mesh, attributes, names))
     _write_frames(sequence, list(zip(drawn, meshes, strict=True)), normals, start)
     for field_name, field in normals.fields.items():
-        write_field(field_name, field, list(zip(drawn, meshes, strict=True)), start)
+        write_field(names[field_name], field, list(zip(drawn, meshes, strict=True)), start)
     stage.GetRootLayer().Save()
-    return (*dict.fromkeys(said), *_notes(sequence, meshes))
+    shown = {_full(mesh): where.rpartition("/")[2] for where, mesh in zip(paths, meshes, strict=True)}
+    parts = {old.rpartition("/")[2]: new for old, new in shown.items() if old.rpartition("/")[2] != new}
+    return (*dict.fromkeys(said), *renamed_note(parts, "USD"), *_notes(sequence, meshes))
+
+
+def _full(mesh: ExportMesh) -> str:
+    return f"{mesh.parent}/{mesh.name}"
 
 
 def _new_stage(path: Path) -> Any:
@@ -159,7 +170,7 @@ def _write_frames(sequence: MeshSequence, meshes: list[tuple[Any, ExportMesh]], 
             for writer, (drawn, mesh), own in zip(held, meshes, rows, strict=True):
                 writer.write(first + i, np.ascontiguousarray(whole[slice(*mesh.vertices)]))
                 if turned is not None:
-                    write_layer(drawn, normals.layer(turned, mesh, own), start + first + i)
+                    write_normals(drawn, normals.layer(turned, mesh, own), start + first + i)
 
 
 class PointsWriter:
