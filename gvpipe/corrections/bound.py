@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Float32, Float64, Floats, Int32
-from gvpipe.codec import FrameReader, GroupReader, LevelReader
+from gvpipe.codec import ClosableReader, FrameReader, GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.corrections.displacements import (
     MAX_STEPS,
@@ -126,6 +126,7 @@ class _Corrected:
     levels: list[int]
     level_faces: Callable[[int], Int32]
     group: Callable[[int], tuple[int, int]]
+    close: Callable[[], None]
 
     def __init__(self, reader: FrameReader, displacements: DisplacementReader) -> None:
         self._reader, self._displacements = reader, displacements
@@ -133,6 +134,8 @@ class _Corrected:
             self.levels, self.level_faces = reader.levels, reader.level_faces
         if isinstance(reader, GroupReader):
             self.group = reader.group
+        if isinstance(reader, ClosableReader):
+            self.close = reader.close
 
     @property
     def n_frames(self) -> int:
