@@ -175,11 +175,8 @@ class Player:
         if isinstance(key, slice):
             start, stop, step = key.indices(len(self))
             if step != 1:
-                return (
-                    np.stack([self[i] for i in range(start, stop, step)])
-                    if range(start, stop, step)
-                    else self._shared.read(0, 0)
-                )
+                frames = [self[i] for i in range(start, stop, step)]
+                return np.stack(frames) if frames else self._shared.read(0, 0)
             return self._shared.read(start, max(start, stop))
         index = operator.index(key)
         if not -len(self) <= index < len(self):

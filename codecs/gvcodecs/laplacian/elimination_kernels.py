@@ -31,9 +31,9 @@ class QuotientGraph(NamedTuple):
         n_elements: ``(n,)`` elements of an unknown, first in its list.
         size: ``(n,)`` length of the list: elements and unknowns of an unknown, unknowns of an element.
         weight: ``(n,)`` how many unknowns it stands for; 0 where it stands for none any more.
-        degree: ``(n,)`` of an unknown: a bound of its neighbours' weight; of an element: its own, 0 if absorbed.
+        degree: ``(n,)`` of an unknown: a bound of its neighbours' weight; of an element: its own, or 0.
         parent: ``(n,)`` the unknown that it is eliminated with, or NONE.
-        outside: ``(n,)`` of an element: weight of its unknowns that the present element lacks, if ``seen`` is the present stamp.
+        outside: ``(n,)`` of an element: weight that the present element lacks, if ``seen`` is the present stamp.
         seen, mark, tag: ``(n,)`` stamps.
         head: ``(n + 1,)`` first unknown of each degree; after, before: ``(n,)`` its chain.
     """
