@@ -21,6 +21,7 @@ from gvpipe.asset.part import Part
 from gvpipe.asset_coding.directory import Directory
 from gvpipe.asset_coding.listing import list_asset
 from gvpipe.asset_coding.reader import AssetReader
+from gvpipe.coarse_asset import add_asset
 from gvpipe.codec import GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file
@@ -34,7 +35,8 @@ from gvpipe.shared_reader import SharedReader
 class Player:
     """An open geometry video: a sequence of frames, each ``(V, 3) float32``, model units, relative to ``origin``.
 
-    A context manager; thread-safe.
+    A context manager; thread-safe. A forked process goes on with it. Pickled, it is opened again by its path, so the file must
+    still be there.
 
     ``video[k]`` decodes no more than the group of frames that frame k lies in, and keeps the last groups; frames asked for
     in a row, forwards or backwards, are decoded ahead on another thread. ``video[a:b]`` gives ``(b - a, V, 3)``.
@@ -47,13 +49,17 @@ class Player:
     def __init__(self, path: str | os.PathLike[str]) -> None:
         check_path(path, "the geometry video")
         self.path = os.fspath(path)
+        self._absolute = os.path.abspath(self.path)  # another process may have another working directory
         self.bitstream: Bitstream = read_file(path)
         with in_file(self.path):
             self._reader = open_reader(self.bitstream)
-            self._shared = SharedReader(self._reader, self.path)
+            self._shared = SharedReader(self.bitstream, self._reader, self.path)
             self._asset = AssetReader(self.bitstream, self._reader, self.path, self._shared.read)
         group = self._reader.group if isinstance(self._reader, GroupReader) else _alone
         self._cache = FrameCache(self._shared.read, group, len(self), 12 * self.bitstream.n_vertices)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self._absolute,)
 
     @property
     def faces(self) -> Int32:
@@ -132,6 +138,8 @@ class Player:
     def level(self, lod: int) -> MeshSequence:
         """The video as a sequence of a coarser mesh with the same motion; level 0 is the mesh itself.
 
+        It has what of attributes, fields, parts and materials survives; its notes say what does not (`gvpipe.coarse_asset`).
+
         Raises:
             InputError: there is no such level.
         """
@@ -139,7 +147,10 @@ class Player:
             return self.sequence()
         if not isinstance(self._reader, LevelReader) or not 0 < lod < len(self.levels):
             raise InputError(f"{self.path}: no level of detail {lod}; there are levels 0..{len(self.levels) - 1}")
-        return MeshSequence(_Level(self, lod), self._reader.level_faces(lod), self.fps, name=self.path, origin=self.origin)
+        with in_file(self.path):
+            faces, (points, kept) = self._reader.level_faces(lod), self._reader.level_points(lod)
+        level = MeshSequence(_Level(self, lod), faces, self.fps, name=self.path, origin=self.origin)
+        return add_asset(level, self.sequence(), points, kept, lod)
 
     @property
     def shape(self) -> tuple[int, ...]:
