@@ -93,6 +93,15 @@ class GroupReader(Protocol):
         ...
 
 
+@runtime_checkable
+class ClosableReader(Protocol):
+    """A frame reader that has threads."""
+
+    def close(self) -> None:
+        """End the threads; they come back when they are needed."""
+        ...
+
+
 class FrameReader(Protocol):
     """Frames of one bitstream; keeps no more than the last group of them."""
 

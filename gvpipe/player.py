@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import operator
 import os
-import threading
 from collections.abc import Iterator, Mapping
 from types import TracebackType
 from typing import Any, overload
@@ -27,10 +26,10 @@ from gvpipe.codec import GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file
 from gvpipe.errors import InputError, in_file
-from gvpipe.forks import renew_after_fork
 from gvpipe.frame_cache import FrameCache
 from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence, describe, numbers_of
+from gvpipe.shared_reader import SharedReader
 
 
 class Player:
@@ -54,20 +53,13 @@ class Player:
         self.bitstream: Bitstream = read_file(path)
         with in_file(self.path):
             self._reader = open_reader(self.bitstream)
-            self._asset = AssetReader(self.bitstream, self._reader, self.path, self._read)
-        self._lock = threading.Lock()
+            self._shared = SharedReader(self.bitstream, self._reader, self.path)
+            self._asset = AssetReader(self.bitstream, self._reader, self.path, self._shared.read)
         group = self._reader.group if isinstance(self._reader, GroupReader) else _alone
-        self._cache = FrameCache(self._read, group, len(self), 12 * self.bitstream.n_vertices)
-        self._is_half_read = False
-        renew_after_fork(self)
+        self._cache = FrameCache(self._shared.read, group, len(self), 12 * self.bitstream.n_vertices)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self._absolute,)
-
-    def after_fork(self) -> None:
-        """Go on in a forked child (`gvpipe.forks`)."""
-        self._is_half_read = self._lock.locked()
-        self._lock = threading.Lock()
 
     @property
     def faces(self) -> Int32:
@@ -194,8 +186,9 @@ class Player:
         if isinstance(key, slice):
             start, stop, step = key.indices(len(self))
             if step != 1:
-                return np.stack([self[i] for i in range(start, stop, step)]) if range(start, stop, step) else self._read(0, 0)
-            return self._read(start, max(start, stop))
+                frames = [self[i] for i in range(start, stop, step)]
+                return np.stack(frames) if frames else self._shared.read(0, 0)
+            return self._shared.read(start, max(start, stop))
         index = operator.index(key)
         if not -len(self) <= index < len(self):
             raise IndexError(f"frame {index} of {self.path}: there are {len(self)}")
@@ -229,16 +222,10 @@ class Player:
         self.close()
 
     def close(self) -> None:
-        """Let go of decoded frames and of the thread that reads ahead. The video stays usable."""
+        """Let go of decoded frames, attributes and fields, and of all threads. The video stays usable."""
         self._cache.close()
-
-    def _read(self, start: int, stop: int, lod: int = 0) -> Float32:
-        with self._lock, in_file(self.path):
-            if self._is_half_read:  # another thread was decoding at the time of a fork
-                self._reader, self._is_half_read = open_reader(self.bitstream), False
-            if lod and isinstance(self._reader, LevelReader):
-                return self._reader.read(start, stop, lod=lod)
-            return self._reader.read(start, stop)
+        self._shared.close()
+        self._asset.close()
 
 
 def _alone(frame: int) -> tuple[int, int]:
@@ -254,4 +241,4 @@ class _Level:
 
     def __getitem__(self, key: slice, /) -> Float32:
         start, stop, _ = key.indices(self.shape[0])
-        return self._player._read(start, max(start, stop), lod=self._lod)
+        return self._player._shared.read(start, max(start, stop), lod=self._lod)

@@ -15,6 +15,7 @@ other players run through these at the sequence's frame rate.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -22,7 +23,7 @@ from itertools import pairwise
 import numpy as np
 
 from gvpipe.arrays import Float32, Int32, Int64
-from gvpipe.codec import FrameReader, GroupReader, LevelReader
+from gvpipe.codec import ClosableReader, FrameReader, GroupReader, LevelReader
 from gvpipe.container.bitstream import MAX_FRAMES, Bitstream
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
@@ -116,13 +117,16 @@ class RepeatedFramesReader:
     level_faces: Callable[[int], Int32]
     level_points: Callable[[int], tuple[Int32, Int32]]
     group: Callable[[int], tuple[int, int]]
+    close: Callable[[], None]
 
     def __init__(self, distinct: FrameReader, repeated: RepeatedFrames) -> None:
         self.distinct, self.repeated, self._starts = distinct, repeated, repeated.starts
         if isinstance(distinct, LevelReader):
             self.levels, self.level_faces, self.level_points = distinct.levels, distinct.level_faces, distinct.level_points
         if isinstance(distinct, GroupReader):
-            self.group = self._group
+            self.group = functools.partial(_group, distinct.group, self._starts)  # not a method, which would refer to itself
+        if isinstance(distinct, ClosableReader):
+            self.close = distinct.close
 
     @property
     def n_frames(self) -> int:
@@ -136,7 +140,7 @@ class RepeatedFramesReader:
 
     def read(self, start: int, stop: int, lod: int = 0) -> Float32:
         """Return frames of a level: ``(stop - start, V, 3) float32``, model units."""
-        shown = self._shown(np.arange(start, stop))
+        shown = _shown(self._starts, np.arange(start, stop))
         first, end = (int(shown[0]), int(shown[-1]) + 1) if len(shown) else (0, 0)
         if lod and isinstance(self.distinct, LevelReader):
             frames = self.distinct.read(first, end, lod=lod)
@@ -144,14 +148,16 @@ class RepeatedFramesReader:
             frames = self.distinct.read(first, end)
         return frames if len(frames) == len(shown) else frames[shown - first]
 
-    def _group(self, frame: int) -> tuple[int, int]:
-        assert isinstance(self.distinct, GroupReader)
-        start, stop = self.distinct.group(int(self._shown(np.array([frame]))[0]))
-        return int(self._starts[start]), int(self._starts[stop])
 
-    def _shown(self, frames: Int64) -> Int64:
-        """The distinct frame that each frame shows."""
-        return np.asarray(np.searchsorted(self._starts, frames, side="right") - 1)
+def _shown(starts: Int64, frames: Int64) -> Int64:
+    """The distinct frame that each of ``frames`` shows, given the first frame of each distinct one."""
+    return np.asarray(np.searchsorted(starts, frames, side="right") - 1)
+
+
+def _group(group: Callable[[int], tuple[int, int]], starts: Int64, frame: int) -> tuple[int, int]:
+    """``(start, stop)`` of the frames that show what is decoded together with a frame."""
+    start, stop = group(int(_shown(starts, np.array([frame]))[0]))
+    return int(starts[start]), int(starts[stop])
 
 
 class _Distinct:

@@ -72,8 +72,24 @@ class AssetReader:
         known = {**attributes, **fields, **{each.name: each for each in self.directory.fields if each.coding == WEB}}
         newer = [each.name for each in (*self.directory.attributes, *self.directory.fields) if each.name not in known]
         self.skipped = ("all of it",) if self.directory.version > VERSION else tuple(newer)
-        self.attributes: Mapping[str, Attribute] = _Lazy(attributes, self._attribute, self._lock, path)
-        self.fields: Mapping[str, Field] = _Lazy(fields, self._field, self._lock, path)
+        self._attributes, self._made_attributes = attributes, dict[str, Attribute]()
+        self._fields, self._made_fields = fields, dict[str, Field]()
+
+    @property
+    def attributes(self) -> Mapping[str, Attribute]:
+        """Static numbers by name, decoded when they are asked for."""
+        return _Lazy(self._attributes, self._attribute, self._made_attributes, self._lock, self._path)
+
+    @property
+    def fields(self) -> Mapping[str, Field]:
+        """Animated numbers by name, decoded when they are asked for."""
+        return _Lazy(self._fields, self._field, self._made_fields, self._lock, self._path)
+
+    def close(self) -> None:
+        """Let go of decoded attributes and fields, which come back when they are asked for."""
+        with self._lock:
+            self._made_attributes.clear()
+            self._made_fields.clear()
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -250,11 +266,12 @@ def _of_two(coordinates: Array, listed: Listed) -> Array:
 
 
 class _Lazy(Mapping[str, Thing], Generic[Thing]):
-    """Things by name, each made when it is first asked for."""
+    """Things by name, each made when it is first asked for, and kept in ``made``."""
 
-    def __init__(self, listed: Mapping[str, Listed], make: Callable[[Listed], Thing], lock: ForkLock, path: str) -> None:
-        self._listed, self._make, self._lock, self._path = listed, make, lock, path
-        self._made: dict[str, Thing] = {}
+    def __init__(
+        self, listed: Mapping[str, Listed], make: Callable[[Listed], Thing], made: dict[str, Thing], lock: ForkLock, path: str
+    ) -> None:
+        self._listed, self._make, self._made, self._lock, self._path = listed, make, made, lock, path
 
     def __getitem__(self, name: str, /) -> Thing:
         with self._lock:

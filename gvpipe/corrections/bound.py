@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Float32, Float64, Floats, Int32
-from gvpipe.codec import FrameReader, GroupReader, LevelReader
+from gvpipe.codec import ClosableReader, FrameReader, GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.corrections.displacements import (
     MAX_STEPS,
@@ -127,6 +127,7 @@ class _Corrected:
     level_faces: Callable[[int], Int32]
     level_points: Callable[[int], tuple[Int32, Int32]]
     group: Callable[[int], tuple[int, int]]
+    close: Callable[[], None]
 
     def __init__(self, reader: FrameReader, displacements: DisplacementReader) -> None:
         self._reader, self._displacements = reader, displacements
@@ -134,6 +135,8 @@ class _Corrected:
             self.levels, self.level_faces, self.level_points = reader.levels, reader.level_faces, reader.level_points
         if isinstance(reader, GroupReader):
             self.group = reader.group
+        if isinstance(reader, ClosableReader):
+            self.close = reader.close
 
     @property
     def n_frames(self) -> int:

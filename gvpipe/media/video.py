@@ -237,6 +237,12 @@ class VideoReader:
         """``(first, last + 1)`` of the group of pictures that a frame lies in."""
         return self._groups[bisect_right(self._groups, (frame, self.n_frames)) - 1]
 
+    def close(self) -> None:
+        """Let go of decoded pictures, and end the threads; both come back when they are needed."""
+        pool, self._pool = self._pool, ThreadPoolExecutor(AHEAD)
+        pool.shutdown(cancel_futures=True)
+        self._cached = (-1, [])
+
     def read(self, start: int, stop: int) -> Iterator[tuple[int, list[Plane]]]:
         """Yield ``(first frame, planes)`` for the frames ``start`` to ``stop``, one group of pictures at a time.
 

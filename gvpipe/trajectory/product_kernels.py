@@ -1,7 +1,8 @@
 """Kernels: products and solutions in the decoding path, with the same bits on every machine.
 
-A BLAS chooses the order of its sums, and fuses products with sums, as suits the processor. Here every sum runs over its terms
-first to last, and nothing is fused. On the skinny matrices of decoders this takes no longer: they are loaded once for many rows.
+A BLAS chooses the order of its sums, and fuses products with sums, as suits the processor. Here every sum runs over its
+terms first to last, and nothing is fused. On the skinny matrices of decoders this takes no longer: they are loaded once for
+many rows.
 
 Loops run over slices of rows: LLVM makes vector instructions of these alone.
 """
@@ -70,7 +71,7 @@ def multiply(matrix: Rows, vectors: Float64) -> Float64:
 
 @compiled
 def solve_definite(matrix: Float64, right: Float64) -> None:
-    """Turn right-hand sides ``(n, m)`` of a symmetric, positive definite ``matrix (n, n)``, which is destroyed, into solutions."""
+    """Turn right-hand sides ``(n, m)`` of a symmetric, positive definite ``matrix (n, n)`` into solutions; it is destroyed."""
     n = len(matrix)
     for k in range(n):
         for i in range(k + 1, n):

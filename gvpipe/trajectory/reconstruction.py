@@ -24,7 +24,7 @@ class Segment:
     coefficients: Float64
 
     def positions(self, start: int, stop: int) -> Float64:
-        """Points of the segment's frames ``start`` to ``stop``: ``(stop - start, 3, P)``; no sum depends on what else is read."""
+        """Points of frames ``start`` to ``stop``: ``(stop - start, 3, P)``; no sum depends on what else is read."""
         from gvpipe.trajectory.product_kernels import weighted_sums
 
         rows = slice(3 * start, 3 * stop)

@@ -151,7 +151,7 @@ def _still_order(flags: Bool, point_faces: Int32) -> CausalOrder:
 
 
 def _fit_still(positions: Float64, basis: Basis) -> Float64:
-    """Coefficients ``(S, R)`` as `gvpipe.trajectory.basis.fit_coefficients` would find them for points that stay at ``positions``.
+    """Coefficients ``(S, R)`` as `gvpipe.trajectory.basis.fit_coefficients` finds them for points that stay at ``positions``.
 
     The fit is linear in a position, so that three axes and the mean are solved for, with the same bits on every machine.
     """

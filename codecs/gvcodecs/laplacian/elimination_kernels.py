@@ -1,9 +1,9 @@
 """Kernels: in which order the unknowns of a sparse symmetric system are eliminated, and what its factor will cost.
 
-Eliminating an unknown couples all its neighbours with each other. The minimum-degree heuristic takes the unknown with the fewest
-neighbours next. The graph is kept as a *quotient graph*: an eliminated unknown becomes an element, the list of the unknowns
-that it coupled. Unknowns with the same neighbours become one, of a weight. Degrees are upper bounds, which are cheap. Everything
-is an integer, so that encoder and decoder, and every machine, find one order.
+Eliminating an unknown couples all its neighbours with each other. The minimum-degree heuristic takes the unknown with the
+fewest neighbours next. The graph is kept as a *quotient graph*: an eliminated unknown becomes an element, the list of the
+unknowns that it coupled. Unknowns with the same neighbours become one, of a weight. Degrees are upper bounds, which are cheap.
+Everything is an integer, so that encoder and decoder, and every machine, find one order.
 
 The factor's size follows from the weights of the elements. So a search stops as soon as a limit is passed, before
 anything is factored.
@@ -31,9 +31,9 @@ class QuotientGraph(NamedTuple):
         n_elements: ``(n,)`` elements of an unknown, first in its list.
         size: ``(n,)`` length of the list: elements and unknowns of an unknown, unknowns of an element.
         weight: ``(n,)`` how many unknowns it stands for; 0 where it stands for none any more.
-        degree: ``(n,)`` of an unknown: a bound of its neighbours' weight; of an element: its unknowns' weight, 0 if absorbed.
+        degree: ``(n,)`` of an unknown: a bound of its neighbours' weight; of an element: its own, or 0.
         parent: ``(n,)`` the unknown that it is eliminated with, or NONE.
-        outside: ``(n,)`` of an element: weight of its unknowns that the present element lacks, if ``seen`` is the present stamp.
+        outside: ``(n,)`` of an element: weight that the present element lacks, if ``seen`` is the present stamp.
         seen, mark, tag: ``(n,)`` stamps.
         head: ``(n + 1,)`` first unknown of each degree; after, before: ``(n,)`` its chain.
     """
@@ -263,10 +263,10 @@ def _join_alike(graph: QuotientGraph, lists: Int32, pivot: int, stamp: int) -> N
 @compiled
 def _all_tagged(graph: QuotientGraph, lists: Int32, j: int, tag: int) -> bool:
     """Whether all that is in the list of unknown j has the tag."""
+    n_tagged = 0
     for k in range(graph.start[j], graph.start[j] + graph.size[j]):
-        if graph.tag[lists[k]] != tag:
-            return False
-    return True
+        n_tagged += graph.tag[lists[k]] == tag
+    return bool(n_tagged == graph.size[j])
 
 
 @compiled

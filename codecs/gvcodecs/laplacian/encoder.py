@@ -72,7 +72,6 @@ class Laplacian(BaseCodec):
     version: ClassVar[int] = VERSION_STILL
     summary: ClassVar[str] = "trajectory PCA through geometric Laplacians: smallest files at equal perceived distortion"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
-    same_bits: ClassVar[bool] = False  # its solver depends on the machine
 
     quality: float = 75.0  # 0..100, higher is better
     operator: str = "mean-value"  # mean-value, cotangent or tutte

@@ -1,8 +1,8 @@
 """Kernels: the factors L D L^T of a sparse symmetric, positive definite matrix, and solutions with them.
 
-L has ones on its diagonal, which are not stored. Its columns are kept one after the other, rows ascending. Unknowns are numbered
-by their order of elimination. Every sum runs in one order, term by term, and no product is fused with a sum. So the results have
-the same bits on every machine.
+L has ones on its diagonal, which are not stored. Its columns are kept one after the other, rows ascending. Unknowns are
+numbered by their order of elimination. Every sum runs in one order, term by term, and no product is fused with a sum. So the
+results have the same bits on every machine.
 """
 
 from __future__ import annotations

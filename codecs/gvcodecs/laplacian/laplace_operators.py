@@ -64,7 +64,11 @@ def laplacian(points: Float64, faces: Int32, operator: str = "mean-value") -> sp
     total = np.bincount(row, weights.data, n_vertices)
     has_neighbours = np.flatnonzero(total > 0)
     shares = -weights.data / np.where(total > 0, total, 1.0)[row]
-    parts = [(row, weights.indices, shares), (has_neighbours, has_neighbours, np.ones(len(has_neighbours)))]
+    columns: Int32 = weights.indices
+    parts: list[tuple[Integers, Integers, Float64]] = [
+        (row, columns, shares),
+        (has_neighbours, has_neighbours, np.ones(len(has_neighbours))),
+    ]
     return _sum_pairs(parts, n_vertices, beside=False)
 
 

@@ -23,7 +23,7 @@ def add_up(values: Float64) -> float:
 
 
 def power(values: Float64, exponent: float) -> Float64:
-    """``values (n,) ** exponent``, for positive values and an exponent >= 0, by square roots: `pow` differs between machines."""
+    """``values (n,) ** exponent``, values positive, exponent >= 0, by square roots: `pow` differs between machines."""
     result, root = np.ones(len(values)), values
     for _ in range(int(exponent)):
         result = result * values

@@ -83,6 +83,10 @@ class McgvReader:
         """``(start, stop)`` of the group of pictures that a frame lies in."""
         return self._video.group(frame)
 
+    def close(self) -> None:
+        """Let go of decoded pictures, and of the threads that decode them; both come back when they are needed."""
+        self._video.close()
+
     def read(self, start: int, stop: int) -> Float32:
         """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
 

@@ -97,6 +97,10 @@ class TrajectoryReader:
         matrix = Blend(surface.base[surface.members], weights, header.clusters).matrix()
         return _Shared(np.ascontiguousarray(surface.base.T), layout, matrix)
 
+    def close(self) -> None:
+        """Let go of decoded pictures, and of the threads that decode them; both come back when they are needed."""
+        self._video.close()
+
     def read(self, start: int, stop: int) -> Float32:
         """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
 

@@ -112,7 +112,7 @@ class Dictionary:
         scaled = sums[..., self.n_affine :] * (self.scale * (step / UNIT))
         result = np.empty_like(scaled)
         for c, where in enumerate(self.slices):
-            affine = (sums[..., 4 * c : 4 * c + 4] * (step / UNIT)).reshape(-1, 4)
+            affine: Float64 = (sums[..., 4 * c : 4 * c + 4] * (step / UNIT)).reshape(-1, 4).astype(np.float64)
             moved = weighted_sums(affine, np.ascontiguousarray(self.functions[:, where]))
             result[..., where] = idct(scaled[..., where], norm="ortho") + moved.reshape(*sums.shape[:2], -1)
         return np.asarray(result + self.rest)

@@ -34,6 +34,9 @@ class NoPictures:
         start = frame - (frame - self._bounds[s]) % CHUNK
         return start, min(start + CHUNK, self._bounds[s + 1])
 
+    def close(self) -> None:
+        """There is nothing to let go of."""
+
     def read(self, start: int, stop: int) -> Iterator[tuple[int, list[NDArray[np.uint8]]]]:
         """Yield the frames ``start`` to ``stop`` at once: the first, and for each ``(3, 1)`` samples."""
         yield start, [self._plane] * (stop - start)

@@ -1,0 +1,107 @@
+"""The factors: an order of elimination, what it costs, and solutions; limits of work on both sides."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from scipy import sparse
+from tubes import tube
+
+import gvcodecs.laplacian.domain as domain
+from gvcodecs.laplacian import Laplacian
+from gvcodecs.laplacian.extended_laplacian import thin_hubs
+from gvcodecs.laplacian.laplace_operators import laplacian
+from gvcodecs.laplacian.normal_equations import (
+    NO_LIMIT,
+    Fill,
+    NormalEquations,
+    Singular,
+    TooMuchFill,
+    count_fill,
+    most_products,
+)
+from gvpipe.arrays import Float64, Int32
+from gvpipe.sequence import MeshSequence
+
+
+def random_mesh(n_points: int) -> Int32:
+    """Two triangles a point, which connect points at random: no small cut parts them."""
+    faces = np.random.default_rng(0).integers(0, n_points, (2 * n_points, 3)).astype(np.int32)
+    return np.asarray(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
+
+
+def operator_of(faces: Int32, n_points: int) -> sparse.csr_array:
+    return thin_hubs(laplacian(np.zeros((n_points, 3)), faces, "tutte"))
+
+
+def held(operator: sparse.csr_array) -> Float64:
+    """What holds every 16th point, and those without a row."""
+    return np.where((np.arange(operator.shape[0]) % 16 == 0) | (np.diff(operator.indptr) == 0), 1.0, 0.0)
+
+
+@pytest.mark.parametrize("kind", ["tube", "random", "hub", "loose"])
+def test_solutions_are_those_of_a_dense_solver_and_the_count_of_fill_bounds_the_factor(kind: str) -> None:
+    faces, n = {
+        "tube": (tube(12, 40)[1], 480),
+        "random": (random_mesh(150), 150),
+        "hub": (np.stack([0 * np.arange(99), np.arange(1, 100), np.arange(2, 101)], axis=1).astype(np.int32), 101),
+        "loose": (np.zeros((0, 3), np.int32), 40),
+    }[kind]
+    operator = operator_of(faces, n)
+    weights = held(operator)
+    equations = NormalEquations(operator, weights)
+    right = np.random.default_rng(1).standard_normal((n, 40))
+    dense = (operator.T @ operator).toarray() + np.diag(weights)
+    assert np.allclose(equations.solve(right), np.linalg.solve(dense, right), rtol=1e-7, atol=1e-7)
+    assert np.allclose(equations.multiply(right), operator @ right)
+    some = np.arange(0, n, 3, dtype=np.int32)
+    assert np.allclose(equations.multiply_transposed(some, right[some]), operator[some].T @ right[some])
+    entries = len(equations._factors.rows)
+    assert 0.99 * equations.fill.entries <= entries <= equations.fill.entries
+    assert count_fill(operator, NO_LIMIT) == equations.fill
+
+
+def test_the_order_of_elimination_fills_a_surface_no_more_than_scipys() -> None:
+    n = 60
+    i = np.arange(n * n).reshape(n, n)
+    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    operator = operator_of(np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]).astype(np.int32), n * n)
+    normal = sparse.csc_array(operator.T @ operator + sparse.diags_array(held(operator)))
+    theirs = sparse.linalg.splu(normal, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    fill = count_fill(operator, NO_LIMIT)
+    assert fill.entries < 1.1 * theirs.L.nnz
+    assert fill.products < most_products(n * n) / 4
+
+
+def test_what_nothing_holds_is_singular() -> None:
+    operator = operator_of(tube(12, 40)[1], 480)
+    with pytest.raises(Singular, match="holds point"):
+        NormalEquations(sparse.csr_array((5, 5)), np.zeros(5))
+    assert NormalEquations(operator, held(operator)).fill > Fill(0, 0)
+
+
+def test_random_triangles_are_counted_refused_and_coded_without_deltas(monkeypatch: pytest.MonkeyPatch) -> None:
+    """6,000 such points made factors of 18 million entries: two minutes to encode."""
+    n = 6000
+    faces = random_mesh(n)
+    operator = operator_of(faces, n)
+    fill = count_fill(operator, most_products(n))
+    assert fill.products > most_products(n)
+    with pytest.raises(TooMuchFill, match="encode it as pca"):
+        NormalEquations(operator, held(operator))
+    frames = np.random.default_rng(2).standard_normal((1, n, 3)) + 0.1 * np.arange(3)[:, None, None]
+    sequence = MeshSequence(frames.astype(np.float32), faces)
+    before = time.process_time()
+    bitstream = Laplacian(quality=40).encode(sequence).bitstream
+    assert time.process_time() - before < 60  # compilation included
+    assert (bitstream.header["operator"], bitstream.header["anchors"]) == ("tutte", 1)
+    assert Laplacian.reader(bitstream).read(0, 3).shape == (3, n, 3)
+    small = 800  # a file that an encoder without the limit would have written
+    monkeypatch.setattr(domain, "most_products", lambda n_points: NO_LIMIT)
+    monkeypatch.setattr("gvcodecs.laplacian.normal_equations.most_products", lambda n_points: NO_LIMIT)
+    bitstream = Laplacian(quality=40).encode(MeshSequence(sequence.read(0, 3)[:, :small], random_mesh(small))).bitstream
+    monkeypatch.setattr("gvcodecs.laplacian.normal_equations.most_products", lambda n_points: 1 << 20)
+    with pytest.raises(TooMuchFill, match="800 points"):
+        Laplacian.reader(bitstream)
