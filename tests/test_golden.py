@@ -19,22 +19,11 @@ from gvpipe.registry import codec_class
 
 CURRENT: dict[str, tuple[str, dict[str, Any]]] = {
     "laplacian-2-still": ("laplacian", {"segment": 7}),
-    "mcgv-4-h264": ("mcgv", {"prediction": "blended", "gop": 5, "segment": 7, "placement": "tiles"}),
-    "mcgv-4-affine": ("mcgv", {"clusters": 5, "prediction": "affine", "placement": "halves"}),
-    "mcgv-4-outliers": ("mcgv", {"prediction": "affine", "clusters": 1, "quality": 95, "gop": 5}),
-    "mcgv-4-charts": ("mcgv", {"prediction": "blended", "clusters": 5, "profile": "precise", "placement": "charts"}),
-    "mcgv-4-jpeg": (
-        "mcgv",
-        {"prediction": "blended", "clusters": 5, "image": "jpeg", "reorder": True, "placement": "halves"},
-    ),
-    "mcgv-4-klt": ("mcgv", {"prediction": "blended", "transform": "klt", "segment": 7}),
-    "mcgv-4-klt-10": (
-        "mcgv",
-        {"prediction": "blended", "transform": "klt", "profile": "precise", "placement": "charts", "reorder": True},
-    ),
-    "mcgv-4-seams": ("mcgv", {"gop": 5, "placement": "halves"}),
-    "mcgv-4-still": ("mcgv", {"gop": 5, "segment": 7, "placement": "tiles"}),
-    "mcgv-4-rigid": ("mcgv", {"segment": 20}),
+    "mcgv-5-h264": ("mcgv", {"gop": 5, "segment": 7, "placement": "tiles"}),
+    "mcgv-5-klt": ("mcgv", {"transform": "klt", "segment": 7, "reorder": True}),
+    "mcgv-5-seams": ("mcgv", {"gop": 5, "placement": "halves"}),
+    "mcgv-5-still": ("mcgv", {"gop": 5, "segment": 7, "placement": "tiles"}),
+    "mcgv-5-rigid": ("mcgv", {"segment": 20}),
     "pca-2-still": ("pca", {"segment": 7}),
     "pdct-2-asset": ("pdct", {}),
     "pdct-2-seams": ("pdct", {"clusters": 3, "segment": 7, "kept": 0.3}),

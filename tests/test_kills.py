@@ -69,6 +69,8 @@ def test_two_hundred_kills(sequence: MeshSequence, video: Path, folder: Path, tm
     finished = [0] * len(commands)
     for number, (command, source, target) in enumerate(commands):
         program = [sys.executable, "-m", "gvpipe", command, str(source), str(target), "--quiet"]
+        for path in folder.iterdir():
+            path.unlink()
         subprocess.run(program, check=True, env=environment)  # compiles what is not
         begun = time.monotonic()
         subprocess.run(program, check=True, env=environment)

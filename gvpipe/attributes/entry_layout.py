@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gvpipe.arrays import Int32, Int64
-from gvpipe.attributes.surface import Surface, opposite_corners
+from gvpipe.attributes.surface import Surface
+from gvpipe.mesh.topology import opposite_corners
 
 if TYPE_CHECKING:
     from gvpipe.attributes.match_kernels import Entries
@@ -52,8 +53,8 @@ class EntryLayout:
 
     def entries(self) -> Entries:
         """Order the entries, and find those at one place: of one position, or, without positions, of one vertex."""
-        from gvpipe.attributes.entry_kernels import EntryOrder, order_by_corners, order_by_edges
         from gvpipe.attributes.match_kernels import Entries
+        from gvpipe.mesh.entry_kernels import EntryOrder, order_by_corners, order_by_edges
 
         n, surface = self.n_entries, self.surface
         places = np.arange(n)

@@ -1,6 +1,6 @@
 """Kernels that predict numbers: texture coordinates, colours, scalars, vectors, ranks of labels.
 
-Predictions are averages over an entry's gates (`gvpipe.attributes.entry_kernels`), in float64, in a fixed order. The geometric
+Predictions are averages over an entry's gates (`gvpipe.mesh.entry_kernels`), in float64, in a fixed order. The geometric
 one maps a triangle's shape in space to the plane of the texture, as Draco's `MeshPredictionSchemeTexCoordsPortable` does. The
 side on which the third corner lies follows from triangles before, so that no bit says so.
 """
@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Float32, Float64, Int32, Int64
-from gvpipe.attributes.entry_kernels import EntryOrder
 from gvpipe.attributes.match_kernels import (
     N_CLASSES,
     Entries,
@@ -24,6 +23,7 @@ from gvpipe.attributes.match_kernels import (
 )
 from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
+from gvpipe.mesh.entry_kernels import EntryOrder
 
 LAST, MEAN, PARALLELOGRAM, CONFORMAL, AFFINE = range(5)  # methods
 LEAST_HEIGHT = 0.25  # of a triangle whose map is trusted, in heights of the triangle that is predicted by it

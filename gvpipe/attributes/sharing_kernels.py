@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Int32, Int64
-from gvpipe.attributes.corner_kernels import next_corner, previous_corner
 from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
+from gvpipe.mesh.corner_kernels import next_corner, previous_corner
 from gvpipe.mesh.corner_lists import link_corners
 
 SAME, NEW, OLDER = 0, 1, 2  # symbols; an older entry's number is added to the last

@@ -11,7 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Int32, Int64
+from gvpipe.arrays import Float32, Int32, Int64
+from gvpipe.mesh.topology import opposite_corners
 from gvpipe.mesh.unique_rows import row_ids
 
 
@@ -52,26 +53,3 @@ class Surface:
     def opposite(self) -> Int64:
         """`opposite_corners` of the faces."""
         return opposite_corners(self.faces)
-
-
-def opposite_corners(triangles: Array) -> Int64:
-    """``(3T,)`` the corner opposite to each corner of ``triangles (T, 3)``, -1 without one.
-
-    Corners across one edge are paired in ascending order: the first with the second, the third with the fourth. A side between
-    equal vertices is no edge.
-
-    Examples:
-        >>> opposite_corners(np.array([[0, 1, 2], [0, 2, 3]])).tolist()
-        [-1, 5, -1, -1, -1, 1]
-    """
-    ends = np.sort(triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2).astype(np.int64), axis=1)  # (3T, 2) of the far edge
-    keys = ends[:, 0] << 32 | ends[:, 1]
-    corners = np.flatnonzero(ends[:, 0] != ends[:, 1])
-    corners = corners[np.argsort(keys[corners], kind="stable")]
-    place = np.arange(len(corners))
-    is_first = np.diff(keys[corners], prepend=-1) != 0
-    in_run = place - np.maximum.accumulate(np.where(is_first, place, 0))
-    seconds = np.flatnonzero(in_run % 2 == 1)
-    opposite = np.full(triangles.size, -1, np.int64)
-    opposite[corners[seconds]], opposite[corners[seconds - 1]] = corners[seconds - 1], corners[seconds]
-    return opposite

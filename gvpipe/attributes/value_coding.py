@@ -16,8 +16,8 @@ import numpy as np
 from gvpipe.arrays import Int64
 from gvpipe.attributes.entry_layout import EntryLayout
 from gvpipe.attributes.storage import DIRECTIONS, FLOATS, TANGENTS, Storage, float_values
-from gvpipe.attributes.surface import opposite_corners
 from gvpipe.container.cursor import Cursor
+from gvpipe.mesh.topology import opposite_corners
 
 if TYPE_CHECKING:
     from gvpipe.attributes.match_kernels import Entries

@@ -38,6 +38,7 @@ class EncodedMesh:
     mesh: bytes
     order: bytes  # empty: decode in the codec's order
     permutation: Array  # (V,) int64: decoded vertex i is the given vertex permutation[i]
+    is_adaptive: bool = False  # whether the mesh stream is the adaptive one of `welded_mesh`
 
 
 @dataclass(frozen=True)

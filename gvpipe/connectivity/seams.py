@@ -9,7 +9,7 @@ Streams: vertices of each point less one [integers]; then one of two codings of 
 - in order of point and corner, the number's difference from that of the point's corner before [integers];
 - across edges (`edge_seams`).
 
-Order stream: `vertex_order`, points in place of positions.
+Order stream: `vertex_order`, points in place of positions, or `adaptive_order`.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Array, Int64
+from gvpipe.connectivity import adaptive_order
 from gvpipe.connectivity.edge_seams import decode_across_edges, encode_across_edges
 from gvpipe.connectivity.seam_corners import SeamCorners, are_first, find_seam_corners
 from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
@@ -26,6 +27,7 @@ from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import corrupt_section
 from gvpipe.mesh.unique_rows import corners_from_smallest
 
+WORTHWHILE = 0.96  # of the bytes, up to which an order that adapts is chosen: it decodes more slowly
 MAX_SEAM_VERTICES = 7  # larger numbers of vertices of a point share a context
 
 
@@ -39,6 +41,7 @@ class CodedSeams:
         permutation: ``(V,)`` the given vertex of each decoded one.
         faces: ``(T, 3)`` decoded triangles.
         points: ``(V,)`` the point of each decoded vertex.
+        is_adaptive: whether ``order`` is of `adaptive_order`.
     """
 
     counts: bytes
@@ -47,10 +50,11 @@ class CodedSeams:
     permutation: Array
     faces: Array
     points: Array
+    is_adaptive: bool = False
 
 
 def encode_seams(
-    faces: Array, points: Array, point_faces: Array, n_points: int, reorder: bool, across: bool = False
+    faces: Array, points: Array, point_faces: Array, n_points: int, reorder: bool, across: bool = False, adaptive: bool = False
 ) -> CodedSeams:
     """Code which vertices the corners of ``point_faces`` use.
 
@@ -61,6 +65,7 @@ def encode_seams(
         n_points: P.
         reorder: let the decoder see the codec's vertex order.
         across: code corners across edges (`edge_seams`).
+        adaptive: the order may be coded by `adaptive_order`, where that is much smaller.
     """
     # triangles alike over points are matched in order of appearance: which is which does not matter
     corner_order = corners_from_smallest(points[faces])
@@ -73,17 +78,39 @@ def encode_seams(
     rank = np.argsort(permutation)
     if reorder:
         return CodedSeams(counts, stream, b"", permutation, rank[corners], points[permutation])
-    order = encode_order(rank, _as_lattice(points[permutation]), rank[corners])
-    return CodedSeams(counts, stream, order, np.arange(len(points)), corners, points)
+    order, is_adaptive = _encode_order(rank, points[permutation], rank[corners], adaptive)
+    return CodedSeams(counts, stream, order, np.arange(len(points)), corners, points, is_adaptive)
+
+
+def _encode_order(visits: Array, points: Array, faces: Array, adaptive: bool) -> tuple[bytes, bool]:
+    """The stream of an order, and whether it is that of `adaptive_order`."""
+    order = encode_order(visits, _as_lattice(points), faces)
+    if adaptive and len(points) <= adaptive_order.MAX_VERTICES:
+        other = adaptive_order.encode_adaptive_order(visits, points, faces)
+        if len(other) < WORTHWHILE * len(order):
+            return other, True
+    return order, False
 
 
 def decode_seams(
-    counts: bytes, corners: bytes, order: bytes, point_faces: Array, n_points: int, across: bool = False
+    counts: bytes,
+    corners: bytes,
+    order: bytes,
+    point_faces: Array,
+    n_points: int,
+    across: bool = False,
+    adaptive: bool = False,
 ) -> tuple[Array, Array]:
-    """Mirror of `encode_seams`: triangles ``(T, 3)`` over vertices, and the point of each vertex ``(V,)``."""
+    """Mirror of `encode_seams`: triangles ``(T, 3)`` over vertices, and the point of each vertex ``(V,)``.
+
+    ``adaptive``: the order is of `adaptive_order`.
+    """
     faces, points = _decode_corners(counts, corners, point_faces, n_points, across)
     if order:
-        visits = decode_order(order, _as_lattice(points), faces)
+        if adaptive:
+            visits = adaptive_order.decode_adaptive_order(order, points, faces)
+        else:
+            visits = decode_order(order, _as_lattice(points), faces)
         points, faces = points[visits], np.argsort(visits)[faces]
     return faces, points
 

@@ -63,17 +63,25 @@ def encode_mesh(faces: Int32, points: Array, reorder: bool) -> tuple[EncodedMesh
     """
     faces, points = faces.astype(np.int64), points.astype(np.int64)
     n_points = int(points.max()) + 1
-    point_faces = points[faces]
-    try:
-        carried = _encode_draco(point_faces)
-        parts, place, coded_faces = _place_points(point_faces, n_points, carried)
-    except (ValueError, CorruptFile):
-        parts, place, coded_faces = _place_points(point_faces, n_points, _NOTHING)
-    coded = encode_seams(faces, place[points], coded_faces, n_points, reorder)
+    parts, permutation, coded_faces = encode_triangles(points[faces], n_points)
+    coded = encode_seams(faces, np.argsort(permutation)[points], coded_faces, n_points, reorder)
     head = HEADER.pack(*(len(part) for part in parts[:2]), len(parts[2]), len(coded.counts), parts[3], n_points)
     streams = head + b"".join([*parts[:3], coded.counts, coded.corners])
     decoded = Topology(coded.faces.astype(np.int32), coded.points, coded_faces.astype(np.int32), n_points)
     return EncodedMesh(streams, coded.order, coded.permutation), decoded
+
+
+def encode_triangles(faces: Array, n_points: int) -> tuple[tuple[bytes, bytes, bytes, int], Array, Array]:
+    """Code triangles ``(T, 3)`` over P points.
+
+    Returns:
+        Draco's stream, merges, loose triangles and how many these are; the given point ``(P,)`` of each decoded one; and the
+        decoded triangles.
+    """
+    try:
+        return _place_points(faces, n_points, _encode_draco(faces))
+    except (ValueError, CorruptFile):
+        return _place_points(faces, n_points, _NOTHING)
 
 
 def decode_mesh(mesh: bytes, order: bytes, n_vertices: int) -> Topology:
@@ -83,11 +91,20 @@ def decode_mesh(mesh: bytes, order: bytes, n_vertices: int) -> Topology:
     if n_points > min(MAX_VERTICES, n_vertices) or n_loose > MAX_PER_BYTE * len(mesh):
         raise cursor.corrupt(f"{n_points} points and {n_loose} loose triangles in {len(mesh)} bytes")
     draco, merges, loose = cursor.take(bytes_draco), cursor.take(bytes_merges), cursor.take(bytes_loose)
-    point_faces = _point_faces(draco, merges, loose, n_loose)
+    point_faces = decode_triangles(draco, merges, loose, n_loose)
     if point_faces.size and (point_faces.min() < 0 or point_faces.max() >= n_points):
         raise cursor.corrupt("a triangle names a point that does not exist")
     faces, points = decode_seams(cursor.take(bytes_counts), cursor.rest(), order, point_faces, n_points)
     return Topology(faces.astype(np.int32), points, point_faces.astype(np.int32), n_points)
+
+
+def decode_triangles(draco: bytes, merges: bytes, loose: bytes, n_loose: int) -> Array:
+    """Triangles over points, smallest point first: Draco's with its split vertices merged, then the loose ones.
+
+    Mirror of `encode_triangles`; raises `CorruptFile`. The caller checks the points.
+    """
+    faces, n_vertices = _decode_draco(draco)
+    return np.concatenate([smallest_first(_merge(faces, n_vertices, merges)), decode_table(loose, n_loose)])
 
 
 def read_mesh(bitstream: Bitstream) -> Topology:
@@ -136,7 +153,7 @@ def _encode_draco(faces: Array) -> _Carried:
 
 
 def _place_points(faces: Array, n_points: int, carried: _Carried) -> tuple[tuple[bytes, bytes, bytes, int], Array, Array]:
-    """The streams of triangles over points, the codec's number of each point ``(P,)``, and the triangles as decoded."""
+    """What `encode_triangles` returns, of triangles over points and what Draco carries of them."""
     draco, draco_faces, came_from = carried
     _, first, inverse = np.unique(came_from, return_index=True, return_inverse=True)
     again = np.flatnonzero(first[inverse] != np.arange(len(came_from)))  # Draco vertices whose point came before
@@ -145,16 +162,10 @@ def _place_points(faces: Array, n_points: int, carried: _Carried) -> tuple[tuple
     carried_points = came_from[np.sort(first)]
     is_left = np.ones(n_points, bool)
     is_left[carried_points] = False
-    place = np.argsort(np.concatenate([carried_points, np.flatnonzero(is_left)]))
+    permutation = np.concatenate([carried_points, np.flatnonzero(is_left)])
     merged = smallest_first(_merge(draco_faces, len(came_from), merges))
-    loose = left_out(smallest_first(place[faces]), merged)
-    return (draco, merges, encode_table(loose), len(loose)), place, np.concatenate([merged, loose])
-
-
-def _point_faces(draco: bytes, merges: bytes, loose: bytes, n_loose: int) -> Array:
-    """Triangles over points, smallest point first: Draco's with its split vertices merged, then the loose ones."""
-    faces, n_vertices = _decode_draco(draco)
-    return np.concatenate([smallest_first(_merge(faces, n_vertices, merges)), decode_table(loose, n_loose)])
+    loose = left_out(smallest_first(np.argsort(permutation)[faces]), merged)
+    return (draco, merges, encode_table(loose), len(loose)), permutation, np.concatenate([merged, loose])
 
 
 def _merge(faces: Array, n_vertices: int, merges: bytes) -> Array:

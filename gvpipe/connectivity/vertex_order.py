@@ -67,7 +67,7 @@ def encode_order(visits: Array, points: Array, faces: Array) -> bytes:
     if n_vertices > MAX_VERTICES:
         raise InputError(f"{n_vertices} vertices: a vertex order holds at most {MAX_VERTICES}; use reorder=True")
     coded = CodedVisits(np.full(n_vertices, -1, np.int64), np.zeros(n_vertices, np.int64), visits.astype(np.int64))
-    _compiled_traverse()(_neighbours(points, faces), REACH, coded, False)
+    _compiled_traverse()(neighbour_lists(points, faces), REACH, coded, False)
 
     symbols, low, sizes = _split(coded.ranks, coded.jumps)
     table = _quantised(np.bincount(symbols, minlength=N_SYMBOLS))
@@ -109,7 +109,7 @@ def decode_order(data: bytes, points: Array, faces: Array) -> Array:
     if not coder.maybe_exhausted():
         raise corrupt_section("order", "bytes left over")
     coded = CodedVisits(*_joined(symbols, low), np.zeros(n_vertices, np.int64))
-    n_done = _compiled_traverse()(_neighbours(points, faces), REACH, coded, True)
+    n_done = _compiled_traverse()(neighbour_lists(points, faces), REACH, coded, True)
     if n_done != n_vertices:
         raise corrupt_section("order", f"no vertex has the rank sent for vertex {n_done}")
     return coded.visits
@@ -153,7 +153,8 @@ def _weights(table: Array) -> Float64:
     return np.where(code < 8, code, (8 + code % 8) << np.maximum(code // 8 - 1, 0)).astype(np.float64)
 
 
-def _neighbours(points: Array, faces: Array) -> NeighbourLists:
+def neighbour_lists(points: Array, faces: Array) -> NeighbourLists:
+    """What a search reaches from each vertex, of ``points (V, 3)``, lattice units, and ``faces (T, 3)``."""
     rows = np.ascontiguousarray(points, np.int64)
     by_point = sort_rows(rows)
     same = (rows[by_point[1:]] == rows[by_point[:-1]]).all(axis=1)
@@ -162,7 +163,7 @@ def _neighbours(points: Array, faces: Array) -> NeighbourLists:
 
 
 def _sorted_lists(points: Array, faces: Array, twins: Array) -> tuple[Array, Array]:
-    """The lists of `_neighbours`: each sorted by squared distance, then by number; nobody twice."""
+    """The lists of `neighbour_lists`: each sorted by squared distance, then by number; nobody twice."""
     n_vertices = len(points)
     starts = np.zeros(n_vertices + 1, np.int64)
     for t in range(len(faces)):

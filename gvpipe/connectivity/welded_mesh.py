@@ -5,6 +5,9 @@ are coded once. The mesh over points, with positions, is that of `base_mesh`; `s
 
 Mesh stream: [varint] length, mesh of points (`base_mesh`, codec order); [varint] length, counts; corners (`seams`).
 Order stream: `seams`.
+
+Adaptive mesh stream: [8 bits] flags, then the same. Flag 1: the mesh of points is of `adaptive_mesh`; 2: the order is of
+`adaptive_order`. An encoder takes them where they are smaller; where neither is, the stream is the other one.
 """
 
 from __future__ import annotations
@@ -16,12 +19,15 @@ import numpy as np
 from scipy import sparse
 
 from gvpipe.arrays import Array, Int32, Int64
-from gvpipe.connectivity.base_mesh import EncodedMesh, decode_base, encode_base
+from gvpipe.connectivity import adaptive_mesh
+from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base
 from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.mesh.topology import adjacency
 from gvpipe.mesh.unique_rows import smallest_first
+
+ADAPTIVE_MESH, ADAPTIVE_ORDER = 1, 2  # flags
 
 
 @dataclass(frozen=True)
@@ -52,36 +58,61 @@ class WeldedMesh:
 
 
 def encode_points(
-    lattice: Array, faces: Array, points: Array, reorder: bool, across: bool = False
+    lattice: Array, faces: Array, points: Array, reorder: bool, across: bool = False, adaptive: bool = False
 ) -> tuple[EncodedMesh, WeldedMesh]:
     """Code a mesh of ``points (V,)``, 0..P-1, at ``lattice (P, 3)`` with triangles ``faces (T, 3)`` over V vertices.
 
     Returns the streams, and the mesh as decoding returns it. ``reorder`` lets the decoder see the codec's vertex order, and
-    ``across`` codes seams across edges (`gvpipe.connectivity.edge_seams`). Triangles may come back in another order, and
-    rotated.
+    ``across`` codes seams across edges (`gvpipe.connectivity.edge_seams`). ``adaptive`` allows the adaptive stream. Triangles
+    may come back in another order, and rotated.
     """
     faces, points = faces.astype(np.int64), points.astype(np.int64)
-    streams, base = encode_base(lattice, points[faces], reorder=True)
-    place = np.argsort(streams.permutation)
+    mesh, flags, permutation, base = _encode_mesh(lattice, points[faces], adaptive)
+    place = np.argsort(permutation)
     point_faces = smallest_first(base.faces.astype(np.int64))
-    coded = encode_seams(faces, place[points], point_faces, len(lattice), reorder, across)
-    mesh = pack_block(streams.mesh) + pack_block(coded.counts) + coded.corners
+    coded = encode_seams(faces, place[points], point_faces, len(lattice), reorder, across, adaptive)
+    flags |= ADAPTIVE_ORDER if coded.is_adaptive else 0
+    head = bytes([flags]) if flags else b""
+    mesh = head + pack_block(mesh) + pack_block(coded.counts) + coded.corners
     decoded = WeldedMesh(coded.faces.astype(np.int32), coded.points, base.points, point_faces.astype(np.int32))
-    return EncodedMesh(mesh, coded.order, coded.permutation), decoded
+    return EncodedMesh(mesh, coded.order, coded.permutation, is_adaptive=flags > 0), decoded
 
 
-def decode_points(mesh: bytes, order: bytes, across: bool = False) -> WeldedMesh:
-    """Mirror of `encode_points`. Raises CorruptFile for anything malformed."""
+def _encode_mesh(lattice: Array, faces: Array, adaptive: bool) -> tuple[bytes, int, Array, BaseMesh]:
+    """The smaller mesh stream of points, its flag, the given point of each decoded one, and what a decoder has."""
+    streams, base = encode_base(lattice, faces, reorder=True)
+    if adaptive and len(lattice) <= adaptive_mesh.MAX_POINTS:
+        mesh, permutation, own = adaptive_mesh.encode_adaptive_mesh(lattice, faces)
+        if len(mesh) < len(streams.mesh):
+            points = lattice[permutation].astype(np.int32)
+            return mesh, ADAPTIVE_MESH, permutation, BaseMesh(points, own.astype(np.int32), np.arange(len(points)))
+    return streams.mesh, 0, streams.permutation, base
+
+
+def decode_points(mesh: bytes, order: bytes, across: bool = False, adaptive: bool = False) -> WeldedMesh:
+    """Mirror of `encode_points`; ``adaptive``: of an adaptive stream. Raises CorruptFile for anything malformed."""
     cursor = Cursor(mesh, "mesh")
-    base = decode_base(cursor.block(), b"")
-    point_faces = smallest_first(base.faces.astype(np.int64))
+    flags = cursor.take(1)[0] if adaptive else 0
+    if flags > ADAPTIVE_MESH + ADAPTIVE_ORDER:
+        raise cursor.corrupt(f"flags {flags} are unknown")
+    points, own = _decode_mesh(cursor.block(), bool(flags & ADAPTIVE_MESH))
+    point_faces = smallest_first(own.astype(np.int64))
     counts = cursor.block()
-    faces, point = decode_seams(counts, cursor.rest(), order, point_faces, len(base.points), across)
-    return WeldedMesh(faces.astype(np.int32), point, base.points, point_faces.astype(np.int32))
+    is_adaptive = bool(flags & ADAPTIVE_ORDER)
+    faces, point = decode_seams(counts, cursor.rest(), order, point_faces, len(points), across, is_adaptive)
+    return WeldedMesh(faces.astype(np.int32), point, points.astype(np.int32), point_faces.astype(np.int32))
 
 
-def read_points(bitstream: Bitstream, across: bool = False) -> WeldedMesh:
+def _decode_mesh(mesh: bytes, adaptive: bool) -> tuple[Array, Array]:
+    """Mirror of `_encode_mesh`: points ``(P, 3)`` and triangles over them."""
+    if adaptive:
+        return adaptive_mesh.decode_adaptive_mesh(mesh)
+    base = decode_base(mesh, b"")
+    return base.points, base.faces
+
+
+def read_points(bitstream: Bitstream, across: bool = False, adaptive: bool = False) -> WeldedMesh:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
-    mesh = decode_points(bitstream.section("mesh"), bitstream.section("order"), across)
+    mesh = decode_points(bitstream.section("mesh"), bitstream.section("order"), across, adaptive)
     bitstream.check_size(len(mesh.point), len(mesh.faces))
     return mesh

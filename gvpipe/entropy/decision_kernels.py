@@ -27,6 +27,7 @@ from gvpipe.entropy.logistic_tables import LIMIT, squash_table, stretch_table
 ONE_BITS = 22  # of a context's probability
 TOP = 1 << 24  # range below which a byte leaves
 RANGE = (1 << 32) - 1
+AHEAD = 3  # bytes that a decoder has asked for beyond the last one of a stream, at its end
 LOW, EXTENT, PLACE = 0, 1, 2  # of a coder's state; in a decoder LOW is the code's distance from the lower end
 RATE_BITS = 18  # a mixer's learning: error times logit, shifted by so much
 RATE = 5

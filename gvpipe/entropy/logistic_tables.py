@@ -17,6 +17,15 @@ LIMIT = 2815  # largest logit, 1 / 256: a probability of 65535 / 65536
 SPACING = 16  # logits between two exact values; between them squash is linear
 
 
+def _knots() -> tuple[int, ...]:
+    context = Context(prec=30)
+    powers = [context.exp(context.divide(Decimal(-logit), Decimal(256))) for logit in range(-LIMIT - 1, 1, SPACING)]
+    return tuple(int(context.divide(Decimal(1 << 24), 1 + power)) for power in powers)
+
+
+KNOTS = _knots()  # 2**24 times the probability, rounded down, of every 16th logit, -LIMIT - 1 to 0
+
+
 @functools.cache
 def squash_table() -> Int64:
     """Probabilities ``(2 LIMIT + 1,)`` of logits ``-LIMIT..LIMIT``, 1..65535.
@@ -25,12 +34,7 @@ def squash_table() -> Int64:
         >>> squash_table()[[0, 2815, 5630]].tolist()
         [1, 32768, 65535]
     """
-    context = Context(prec=30)
-    knots = []  # 2**24 times the probability, rounded down, of logits -LIMIT - 1 to 0
-    for logit in range(-LIMIT - 1, 1, SPACING):
-        power = context.exp(context.divide(Decimal(-logit), Decimal(256)))
-        knots.append(int(context.divide(Decimal(1 << 24), 1 + power)))
-    exact = np.array([*knots, 0], np.int64)
+    exact = np.array([*KNOTS, 0], np.int64)
     place, part = np.divmod(np.arange(LIMIT + 1) + 1, SPACING)  # of logits -LIMIT to 0
     below = (exact[place] * (SPACING - part) + exact[place + 1] * part) // SPACING
     lower = np.maximum(1, (below + 128) >> 8)

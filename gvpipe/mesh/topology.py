@@ -1,4 +1,4 @@
-"""Vertex adjacency and what follows from it: k-rings, connected components.
+"""Vertex adjacency and what follows from it: k-rings, connected components; corners across edges.
 
 Everything is a sparse matrix or an array over all vertices at once; a *k-ring* of a vertex is every vertex that a path of
 at most k edges reaches, the vertex itself included.
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from gvpipe.arrays import Int32
+from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.mesh.unique_rows import row_ids
 
 
@@ -58,3 +58,26 @@ def weld(points: NDArray[np.generic]) -> tuple[NDArray[np.intp], NDArray[np.intp
         return first, found
     _, first, inverse = np.unique(points, axis=0, return_index=True, return_inverse=True)
     return first, inverse.ravel()
+
+
+def opposite_corners(triangles: Array) -> Int64:
+    """``(3T,)`` the corner opposite to each corner of ``triangles (T, 3)``, -1 without one.
+
+    Corners across one edge are paired in ascending order: the first with the second, the third with the fourth. A side between
+    equal vertices is no edge.
+
+    Examples:
+        >>> opposite_corners(np.array([[0, 1, 2], [0, 2, 3]])).tolist()
+        [-1, 5, -1, -1, -1, 1]
+    """
+    ends = np.sort(triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2).astype(np.int64), axis=1)  # (3T, 2) of the far edge
+    keys = ends[:, 0] << 32 | ends[:, 1]
+    corners = np.flatnonzero(ends[:, 0] != ends[:, 1])
+    corners = corners[np.argsort(keys[corners], kind="stable")]
+    place = np.arange(len(corners))
+    is_first = np.diff(keys[corners], prepend=-1) != 0
+    in_run = place - np.maximum.accumulate(np.where(is_first, place, 0))
+    seconds = np.flatnonzero(in_run % 2 == 1)
+    opposite = np.full(triangles.size, -1, np.int64)
+    opposite[corners[seconds]], opposite[corners[seconds - 1]] = corners[seconds - 1], corners[seconds]
+    return opposite

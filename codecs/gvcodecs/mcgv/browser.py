@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gvpipe.container.bitstream import Bitstream
 
-VERSION = 4  # the highest that gvpipe/web/src/mcgv reads
+VERSION = 5  # the highest that gvpipe/web/src/mcgv reads
 PROFILE = "h264-8"  # the one that a browser gives back sample by sample
 
 

@@ -15,8 +15,8 @@
 ``trajectories.N`` klt, in place of ``transforms.N``: principal trajectories of segment N (`pictures.trajectories`)
 =================  ==========================================================================================
 
-Files without pictures (version 4) have ``mesh``, ``order``, ``still``, ``weights`` and ``transforms.N`` alone; the header's key
-``pictures`` is then false, and nothing in it tells of pictures.
+Files of version 5 may code ``mesh`` and ``order`` by adaptive contexts. Files without pictures (from version 4 on) have ``mesh``,
+``order``, ``still``, ``weights`` and ``transforms.N`` alone; the header's key ``pictures`` is then false, and nothing in it tells of pictures.
 
 Slots are the points that move (`surface`). In versions 1 and 2 every vertex is a slot, ``mesh`` and ``order`` are those of
 `gvpipe.connectivity.base_mesh`, and there is no section ``still``. Version 1 knows affine prediction and charts alone.

@@ -31,7 +31,7 @@ class Settings(BaseCodec):
     """
 
     id: ClassVar[str] = "mcgv"
-    version: ClassVar[int] = 4
+    version: ClassVar[int] = 5
     summary: ClassVar[str] = "multi-chart geometry video: residual images of a blended affine prediction, as H.264 or JPEG"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
 
@@ -118,7 +118,7 @@ class Settings(BaseCodec):
         return "tiles" if n_points <= MAX_TILED else "halves"
 
     def bitstream(
-        self, sequence: MeshSequence, header: Mapping[str, Any], sections: Mapping[str, bytes], video: bytes
+        self, sequence: MeshSequence, header: Mapping[str, Any], sections: Mapping[str, bytes], video: bytes, version: int
     ) -> Bitstream:
-        """The bitstream of a sequence."""
-        return self._bitstream(sequence, header, sections, video)
+        """The bitstream of a sequence; ``version`` is the oldest that reads it."""
+        return self._bitstream(sequence, header, sections, video, version)

@@ -89,7 +89,7 @@ def begin(job: Job, step: float, target_error: float, point: Int64 | None = None
     positions = quantise_base(settings, lattice, first[members])
     coded, mesh = job.memo(
         f"base {lattice.step} {len(members)}",
-        lambda: encode_points(positions, given.faces, point, settings.reorder, across=True),
+        lambda: encode_points(positions, given.faces, point, settings.reorder, True, settings.is_blended),
     )
     sources = coded.permutation[mesh.members]  # the given vertex of each point
     is_still = still[sources].copy()

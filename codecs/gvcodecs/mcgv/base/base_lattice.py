@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from gvcodecs.mcgv.base.distinct_positions import keep_apart
+from gvcodecs.mcgv.base.regular_spacing import align_step
 from gvcodecs.mcgv.settings import Settings
 from gvpipe.arrays import Float32, Int32
 from gvpipe.mesh.lattice import Lattice
@@ -36,7 +37,7 @@ def choose_lattice(settings: Settings, first: Float32, step: float) -> Lattice:
         if len(np.unique(lattice.quantise(first), axis=0)) >= DISTINCT * n_positions:
             break
         step = max(step / FINER, finest)
-    return Lattice.spaced(first, step)
+    return Lattice.spaced(first, align_step(first, step))
 
 
 def quantise_base(settings: Settings, lattice: Lattice, first: Float32) -> Int32:

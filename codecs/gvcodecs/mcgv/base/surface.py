@@ -71,7 +71,7 @@ def read_surface(bitstream: Bitstream, header: Header) -> DecodedBase:
         order = np.argsort(base.visits)
         rest = placed.astype(np.float32)
         return DecodedBase(base.faces, rest, own, own, base.points, placed, point, members, points, order)
-    mesh = read_points(bitstream, across=bitstream.version > 3)
+    mesh = read_points(bitstream, bitstream.version > 3, bitstream.version > 4)
     n_points = len(mesh.lattice)
     still = decode_flags(bitstream.section(STILL), n_points, STILL) if STILL in bitstream.sections else np.zeros(n_points, bool)
     moves = np.flatnonzero(~still)

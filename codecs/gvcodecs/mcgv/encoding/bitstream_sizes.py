@@ -9,7 +9,7 @@ from gvcodecs.mcgv.pictures.outliers import SECTION as OUTLIERS
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.rate_control.step_search import StepTrial
 
-POSTER = 1200  # bytes that stand in place of pictures, about
+POSTER = 1000  # bytes that stand in place of pictures, about
 FALL = 0.2  # bytes of one blend go with the error to the power of about minus this
 
 

@@ -63,5 +63,6 @@ def _code(job: Job, candidate: Candidate, step: float) -> tuple[Start, Coded]:
 
 def _assemble(job: Job, start: Start, coded: Coded) -> Encoded:
     header = coded.header(job.settings, start).to_json()
-    bitstream = job.settings.bitstream(job.sequence, header, coded.all_sections(start), coded.video)
+    version = 5 if start.coded.is_adaptive else 4
+    bitstream = job.settings.bitstream(job.sequence, header, coded.all_sections(start), coded.video, version)
     return Encoded(bitstream, start.coded.permutation)

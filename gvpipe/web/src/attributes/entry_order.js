@@ -1,6 +1,6 @@
 /**
  * The order in which an attribute's entries are coded, and the *gates* of each: the earlier entries that predict it. Mirrors
- * `gvpipe.attributes.entry_kernels`.
+ * `gvpipe.mesh.entry_kernels`.
  */
 
 import { linkCorners, nextCorner, previousCorner } from "./corners.js";

@@ -68,7 +68,7 @@ function merge({ keys, faces }) {
 }
 
 /** Rows of three integers: deflated byte planes of row differences. */
-async function decodeTable(data, rows) {
+export async function decodeTable(data, rows) {
   if (rows === 0) {
     if (data.length) throw corrupt("mesh", "bytes of loose rows where there are none");
     return new Float64Array(0);

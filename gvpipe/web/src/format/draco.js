@@ -15,7 +15,20 @@ let draco = null;
  * @returns {Promise<{keys: Int32Array, faces: Uint32Array}>} (n, 4) positions and occurrence numbers of Draco's points, and
  *   (t, 3) triangles over them, flat
  */
-export async function decodeDraco(stream) {
+export function decodeDraco(stream) {
+  return decodeMesh(stream, (...parts) => ({ keys: readKeys(...parts), faces: readFaces(...parts) }));
+}
+
+/**
+ * The same without positions, which mean nothing.
+ *
+ * @param {Uint8Array} stream @returns {Promise<{nVertices: number, faces: Uint32Array}>}
+ */
+export function decodeDracoTriangles(stream) {
+  return decodeMesh(stream, (...parts) => ({ nVertices: parts[2].num_points(), faces: readFaces(...parts) }));
+}
+
+async function decodeMesh(stream, read) {
   checkHeader(stream);
   draco ??= createDraco({ wasmBinary });
   const module = await draco;
@@ -24,7 +37,7 @@ export async function decodeDraco(stream) {
   try {
     const status = decoder.DecodeArrayToMesh(stream, stream.length, mesh);
     if (!status.ok()) throw corrupt("mesh", "Draco cannot decode it");
-    return { keys: readKeys(module, decoder, mesh), faces: readFaces(module, decoder, mesh) };
+    return read(module, decoder, mesh);
   } catch (error) {
     throw error instanceof WebAssembly.RuntimeError ? corrupt("mesh", "Draco cannot decode it") : error;
   } finally {

@@ -4,6 +4,7 @@
  */
 
 import { SEAMS_MAX_SEAM_VERTICES as MAX_SEAM_VERTICES, VERTEX_ORDER_MAX_VERTICES as MAX_VERTICES } from "../constants.js";
+import { decodeAdaptiveOrder } from "./adaptive_order.js";
 import { corrupt } from "./errors.js";
 import { decodeIntegers } from "./integers.js";
 import { decodeSeams } from "./edge_seams.js";
@@ -14,16 +15,17 @@ import { decodeOrder } from "./vertex_order.js";
  * @param {Uint8Array} order section
  * @param {Uint32Array} pointFaces (T, 3) triangles over points, smallest point first, flat
  * @param {number} nPoints P @param {boolean} across whether seams are coded across edges (`edge_seams.js`)
+ * @param {boolean} adaptive whether the order is that of `adaptive_order.js`
  * @returns {{faces: Uint32Array, point: Int32Array}} triangles (T, 3) over vertices, flat, and the point of each vertex (V)
  */
-export function decodeCopies(counts, copies, order, pointFaces, nPoints, across) {
+export function decodeCopies(counts, copies, order, pointFaces, nPoints, across, adaptive) {
   const { faces, point } = decodeCorners(counts, copies, pointFaces, nPoints, across);
   if (order.length === 0) return { faces, point };
   const n = point.length;
   const lattice = new Int32Array(3 * n); // for the walk: equal where points are
   for (let v = 0; v < n; v++) lattice[3 * v] = point[v];
   const visits = new Int32Array(n);
-  decodeOrder(order, lattice, faces, visits);
+  (adaptive ? decodeAdaptiveOrder : decodeOrder)(order, lattice, faces, visits);
   const rank = new Int32Array(n); // the user's vertex of each of the codec's
   visits.forEach((visit, v) => (rank[visit] = v));
   return { faces: faces.map((vertex) => rank[vertex]), point: visits.map((visit) => point[visit]) };

@@ -52,7 +52,7 @@ function decodeRanks(decoder, weights, n) {
 }
 
 /** Neighbours by triangle edges, and by shared positions, of each vertex, nearest first: `starts` (V + 1), `neighbours`. */
-function findNeighbours(points, faces) {
+export function findNeighbours(points, faces) {
   const n = points.length / 3;
   const twins = previousEqual(points, 3);
   const pairs = [];
@@ -94,26 +94,45 @@ function sortNeighbours(points, starts, unsorted) {
 }
 
 /** Fill `visits`; returns the vertices done: fewer than V where a rank or a jump points nowhere. */
-function walk({ starts, neighbours }, ranks, jumps, visits) {
-  const n = visits.length;
-  const visited = new Uint8Array(n);
-  const seenBy = new Int32Array(n).fill(-1); // the last search that saw a vertex
-  const queue = new Int32Array(Math.min(REACH, n) + 1);
-  const left = Int32Array.from({ length: n }, (_, v) => v); // not visited, in the order that removals by swapping leave
-  const place = left.slice();
-  let firstLeft = 0;
+function walk(lists, ranks, jumps, visits) {
+  const search = new Search(lists, visits);
+  for (let v = 0; v < visits.length; v++) {
+    const target = ranks[v] < 0 ? search.left[jumps[v]] : search.find(v, ranks[v]);
+    if (target < 0) return v;
+    search.visit(v, target);
+  }
+  return visits.length;
+}
 
-  /** The vertex of that rank among the unvisited ones that a search from vertex `before` sees; -1: none. */
-  function search(v, before) {
+/** A breadth-first search from each vertex, over unvisited ones. */
+export class Search {
+  /** @param {{starts: Uint32Array, neighbours: Uint32Array}} lists @param {Int32Array} visits (V) filled by `visit` */
+  constructor(lists, visits) {
+    const n = visits.length;
+    this.lists = lists;
+    this.visits = visits;
+    this.visited = new Uint8Array(n);
+    this.left = Int32Array.from({ length: n }, (_, v) => v); // not visited, in the order that removals by swapping leave
+    this.place = this.left.slice();
+    this.seenBy = new Int32Array(n).fill(-1); // the last search that saw a vertex
+    this.queue = new Int32Array(Math.min(REACH, n) + 1);
+    this.firstLeft = 0;
+  }
+
+  /** The vertex of a rank among the unvisited ones that a search from the vertex before v sees; -1: none. */
+  find(v, wanted) {
+    const { visits, visited, seenBy, queue, firstLeft } = this;
+    const { starts, neighbours } = this.lists;
+    const n = visits.length;
     let [head, tail, rank, seed] = [0, 0, 0, firstLeft];
     /** Take y into the search; true if it is the one. */
     const see = (y) => {
       if (seenBy[y] === v) return false;
       seenBy[y] = v;
       queue[tail++] = y;
-      return !visited[y] && rank++ === ranks[v];
+      return !visited[y] && rank++ === wanted;
     };
-    if (v > 0) see(before);
+    if (v > 0) see(visits[v - 1]);
     while (tail < REACH) {
       if (head === tail) {
         // the component is exhausted: go on with the first vertex left in the codec's order
@@ -128,16 +147,16 @@ function walk({ starts, neighbours }, ranks, jumps, visits) {
     return -1;
   }
 
-  for (let v = 0; v < n; v++) {
-    const target = ranks[v] < 0 ? left[jumps[v]] : search(v, v > 0 ? visits[v - 1] : -1);
-    if (target < 0) return v;
+  /** Note that the user's vertex v is the codec's `target`. */
+  visit(v, target) {
+    const { visits, visited, left, place } = this;
+    const n = visits.length;
     visits[v] = target;
     visited[target] = 1;
     const hole = place[target];
     const last = left[n - 1 - v];
     left[hole] = last;
     place[last] = hole;
-    while (firstLeft < n && visited[firstLeft]) firstLeft++;
+    while (this.firstLeft < n && visited[this.firstLeft]) this.firstLeft++;
   }
-  return n;
 }

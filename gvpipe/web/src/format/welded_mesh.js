@@ -3,6 +3,8 @@
  * `docs/format.md`, section 5.5.
  */
 
+import { WELDED_MESH_ADAPTIVE_MESH as ADAPTIVE_MESH, WELDED_MESH_ADAPTIVE_ORDER as ADAPTIVE_ORDER } from "../constants.js";
+import { decodeAdaptiveMesh, smallestFirst } from "./adaptive_mesh.js";
 import { decodeBase } from "./base_mesh.js";
 import { decodeCopies } from "./seams.js";
 import { Cursor } from "./cursor.js";
@@ -16,25 +18,17 @@ import { Cursor } from "./cursor.js";
  *
  * @param {Uint8Array} mesh @param {Uint8Array} order sections
  * @param {boolean} across whether seams are coded across edges (`seams.js`)
+ * @param {boolean} adaptive whether the stream is the adaptive one (section 5.9)
  * @returns {Promise<PointMesh>}
  */
-export async function decodePoints(mesh, order, across) {
+export async function decodePoints(mesh, order, across, adaptive) {
   const cursor = new Cursor(mesh, "mesh");
-  const base = await decodeBase(cursor.take(cursor.varint(cursor.left, "a length")), new Uint8Array(0));
+  const flags = adaptive ? cursor.u8() : 0;
+  if (flags > ADAPTIVE_MESH + ADAPTIVE_ORDER) throw cursor.corrupt(`flags ${flags} are unknown`);
+  const stream = cursor.take(cursor.varint(cursor.left, "a length"));
+  const base = flags & ADAPTIVE_MESH ? await decodeAdaptiveMesh(stream) : await decodeBase(stream, new Uint8Array(0));
   const pointFaces = smallestFirst(base.faces);
   const counts = cursor.take(cursor.varint(cursor.left, "a length"));
-  const { faces, point } = decodeCopies(counts, cursor.rest(), order, pointFaces, base.visits.length, across);
+  const { faces, point } = decodeCopies(counts, cursor.rest(), order, pointFaces, base.points.length / 3, across, Boolean(flags & ADAPTIVE_ORDER));
   return { faces, point, lattice: base.points, pointFaces };
-}
-
-/** Rotate each triangle so that its smallest index leads; winding stays. */
-function smallestFirst(faces) {
-  const turned = new Uint32Array(faces.length);
-  for (let i = 0; i < faces.length; i += 3) {
-    const [a, b, c] = [faces[i], faces[i + 1], faces[i + 2]];
-    if (a <= b && a <= c) turned.set([a, b, c], i);
-    else if (b <= c) turned.set([b, c, a], i);
-    else turned.set([c, a, b], i);
-  }
-  return turned;
 }

@@ -84,6 +84,7 @@ async function readPoints(payload) {
     payload.section("mesh"),
     payload.section("order"),
     payload.header.version > 3,
+    payload.header.version > 4,
   );
   checkCounts(payload.header, point.length, faces);
   const n = lattice.length / 3;

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Bool, Int32, Int64
-from gvpipe.attributes.corner_kernels import next_corner, previous_corner
 from gvpipe.compiled import compiled
+from gvpipe.mesh.corner_kernels import next_corner, previous_corner
 from gvpipe.mesh.corner_lists import link_corners
 
 LEVELS = 4  # entries that complete this many triangles less one, or more, are alike

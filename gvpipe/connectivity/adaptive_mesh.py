@@ -1,0 +1,74 @@
+"""Triangles and lattice positions of points <-> bytes, as in `base_mesh`, with positions that adapt.
+
+Draco codes connectivity alone (`topology_only`); positions follow, in the order of `gvpipe.mesh.entry_kernels`. Why: objects
+recur, and grids are regular. What followed the last residuals before, and coordinates that were seen before, predict the next
+ones (`position_kernels`), where Draco has one table for all.
+
+Stream: [varint] P; blocks: Draco's stream, merges, loose triangles; [varint] loose triangles; decisions
+(`gvpipe.entropy.decision_kernels`) to the end.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gvpipe.arrays import Array, Int64
+from gvpipe.connectivity.base_mesh import MAX_PER_BYTE
+from gvpipe.connectivity.topology_only import decode_triangles, encode_triangles
+from gvpipe.container.cursor import Cursor, pack_block, varint
+from gvpipe.mesh.topology import opposite_corners
+
+if TYPE_CHECKING:
+    from gvpipe.entropy.decision_kernels import Mixing
+    from gvpipe.mesh.entry_kernels import EntryOrder
+
+MAX_POINTS = 1 << 13  # larger meshes take too long
+MAX_BYTES = 24  # per point, of a stream
+
+
+def encode_adaptive_mesh(points: Array, faces: Array) -> tuple[bytes, Array, Array]:
+    """Code lattice ``points (P, 3)``, 0..2**31 - 1, with triangles ``faces (T, 3)``.
+
+    Returns:
+        The stream, the given point ``(P,)`` of each decoded one, and the decoded triangles.
+    """
+    from gvpipe.connectivity.position_kernels import code_positions
+    from gvpipe.entropy.decision_kernels import finish, start_encoder
+
+    parts, permutation, coded = encode_triangles(faces.astype(np.int64), len(points))
+    state, data = start_encoder(), np.zeros(MAX_BYTES * len(points) + 64, np.uint8)
+    moved = np.ascontiguousarray(points[permutation], np.int64)
+    code_positions(*_known(coded, len(points)), state, data, False, moved)
+    head = [varint(len(points)), *map(pack_block, parts[:3]), varint(parts[3])]
+    return b"".join([*head, data[: finish(state, data)].tobytes()]), permutation, coded
+
+
+def decode_adaptive_mesh(stream: bytes) -> tuple[Int64, Array]:
+    """Mirror of `encode_adaptive_mesh`: points ``(P, 3)`` and triangles ``(T, 3)``; raises `CorruptFile`."""
+    from gvpipe.connectivity.position_kernels import code_positions
+    from gvpipe.entropy.decision_kernels import AHEAD, PLACE, start_decoder
+
+    cursor = Cursor(stream, "mesh")
+    n_points = cursor.varint(MAX_POINTS, "the number of points")
+    draco, merges, loose = cursor.block(), cursor.block(), cursor.block()
+    faces = decode_triangles(draco, merges, loose, cursor.varint(MAX_PER_BYTE * len(stream), "the number of loose triangles"))
+    if faces.size and (faces.min() < 0 or faces.max() >= n_points):
+        raise cursor.corrupt("a triangle names a point that does not exist")
+    data = np.frombuffer(bytearray(cursor.rest()), np.uint8)  # kernels want it writable
+    state, points = start_decoder(data), np.zeros((n_points, 3), np.int64)
+    fits = code_positions(*_known(faces, n_points), state, data, True, points)
+    if not fits or state[PLACE] != len(data) + AHEAD:
+        raise cursor.corrupt("its decisions name no positions")
+    return points, faces
+
+
+def _known(faces: Array, n_points: int) -> tuple[EntryOrder, Mixing]:
+    """The order of points, and what was learnt of them: nothing."""
+    from gvpipe.connectivity.position_kernels import N_CONTEXTS, N_GROUPS
+    from gvpipe.entropy.number_kernels import new_number_mixing
+    from gvpipe.mesh.entry_kernels import order_by_corners
+
+    triangles = np.ascontiguousarray(faces, np.int32)
+    return order_by_corners(triangles, opposite_corners(triangles), n_points), new_number_mixing(N_CONTEXTS, N_GROUPS)

@@ -1,0 +1,90 @@
+"""Adaptive positions and orders: every awkward mesh comes back, repetition costs next to nothing, and no bytes do harm."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sequences import grid
+
+from gvpipe.connectivity.adaptive_mesh import decode_adaptive_mesh, encode_adaptive_mesh
+from gvpipe.connectivity.adaptive_order import decode_adaptive_order, encode_adaptive_order
+from gvpipe.connectivity.welded_mesh import decode_points, encode_points
+from gvpipe.errors import CorruptFile
+
+FLAT = np.array([[0, 1, 2], [0, 0, 1], [1, 1, 1], [0, 1, 2]])  # doubled and collapsed triangles
+
+
+def sheets(count: int, side: int = 7) -> tuple[np.ndarray, np.ndarray]:
+    """So many bent sheets beside each other, alike."""
+    places, faces = grid(side)
+    places = np.rint(100 * np.column_stack([places[:, :2], np.sin(3 * places[:, 0]) + 1])).astype(np.int64)
+    places -= places.min(axis=0)
+    return (
+        np.concatenate([places + np.array([200 * k, 0, 0]) for k in range(count)]),
+        np.concatenate([faces.astype(np.int64) + k * len(places) for k in range(count)]),
+    )
+
+
+@pytest.mark.parametrize(
+    "mesh", [sheets(1), sheets(9), (np.arange(12).reshape(4, 3), FLAT), (np.ones((3, 3), np.int64), FLAT[:0])]
+)
+def test_meshes_come_back(mesh: tuple[np.ndarray, np.ndarray]) -> None:
+    points, faces = mesh
+    stream, permutation, own = encode_adaptive_mesh(points, faces)
+    decoded, triangles = decode_adaptive_mesh(stream)
+    assert np.array_equal(decoded, points[permutation])
+    assert np.array_equal(triangles, own)
+    assert sorted(map(sorted, permutation[triangles].tolist())) == sorted(map(sorted, faces.tolist()))
+
+
+def test_what_recurs_costs_next_to_nothing() -> None:
+    one, nine = (len(encode_adaptive_mesh(*sheets(count))[0]) for count in (1, 9))
+    assert nine < 4 * one
+    (points, faces), draw = sheets(9), np.random.default_rng(1)
+    shuffled = np.concatenate([49 * k + draw.permutation(49) if not k else 49 * k + np.arange(49) for k in range(9)])
+    assert len(encode_adaptive_order(np.arange(len(points)), np.arange(len(points)), faces)) < 60
+    stream = encode_adaptive_order(shuffled, np.arange(len(points)), faces)
+    assert np.array_equal(decode_adaptive_order(stream, np.arange(len(points)), faces), shuffled)
+
+
+@pytest.mark.parametrize("reorder", [False, True])
+def test_welded_meshes_choose_what_is_smaller(reorder: bool) -> None:
+    points, faces = sheets(9)
+    vertices = np.arange(len(points))
+    coded, mesh = encode_points(points, faces, vertices, reorder, True, True)
+    plain, _ = encode_points(points, faces, vertices, reorder, True)
+    assert coded.is_adaptive and len(coded.mesh) + len(coded.order) < len(plain.mesh) + len(plain.order)
+    decoded = decode_points(coded.mesh, coded.order, True, True)
+    assert np.array_equal(decoded.lattice, mesh.lattice)
+    assert np.array_equal(decoded.faces, mesh.faces)
+    assert np.array_equal(decoded.lattice[decoded.point], points[coded.permutation])
+    with pytest.raises(CorruptFile, match="flags 4 are unknown"):
+        decode_points(b"\x04" + coded.mesh[1:], coded.order, True, True)
+
+
+def test_prefixes_and_longer_streams_are_refused() -> None:
+    points, faces = sheets(2, 5)
+    stream = encode_adaptive_mesh(points, faces)[0]
+    order = encode_adaptive_order(np.random.default_rng(0).permutation(50), np.arange(50), faces)
+    for wrong in [*(stream[:end] for end in range(len(stream))), stream + b"\0"]:
+        with pytest.raises(CorruptFile):
+            decode_adaptive_mesh(wrong)
+    for wrong in (order[:-2], order + b"\0"):
+        with pytest.raises(CorruptFile):
+            decode_adaptive_order(wrong, np.arange(50), faces)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 400), st.integers(1, 255))
+def test_no_byte_does_harm(place: int, change: int) -> None:
+    points, faces = sheets(2, 5)
+    stream = bytearray(encode_adaptive_mesh(points, faces)[0])
+    stream[place % len(stream)] ^= change
+    try:
+        decoded, triangles = decode_adaptive_mesh(bytes(stream))
+    except CorruptFile:
+        return
+    assert decoded.min() >= 0
+    assert not len(triangles) or triangles.max() < len(decoded)
