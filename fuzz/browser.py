@@ -101,7 +101,7 @@ _nodes = threading.local()
 
 
 def browser_targets(seeds: tuple[Seed, ...]) -> list[Target]:
-    """The parsers of geometry videos as browsers have them; none without Node, or on Windows, whose pipes cannot be waited for."""
+    """The parsers of geometry videos as browsers have them; none without Node, or on Windows, where pipes cannot be polled."""
     if shutil.which("node") is None or sys.platform == "win32":
         return []
     played = tuple(seed for seed in seeds if json.loads(seed.parts[JSON])["codec"] in READ)
