@@ -7,6 +7,7 @@ import json
 import select
 import shutil
 import subprocess
+import sys
 import threading
 from pathlib import Path
 from typing import Any
@@ -100,8 +101,8 @@ _nodes = threading.local()
 
 
 def browser_targets(seeds: tuple[Seed, ...]) -> list[Target]:
-    """The parsers of geometry videos as browsers have them; none without Node."""
-    if shutil.which("node") is None:
+    """The parsers of geometry videos as browsers have them; none without Node, or on Windows, where pipes cannot be polled."""
+    if shutil.which("node") is None or sys.platform == "win32":
         return []
     played = tuple(seed for seed in seeds if json.loads(seed.parts[JSON])["codec"] in READ)
     targets = [target for target in video_targets(played) if target.seeds]

@@ -15,10 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from fuzz.limits import BAD
-from fuzz.seeds import FOLDER
-from fuzz.session import Options, load_targets
-from fuzz.worker import memory_folder, run_case
+ROOT = Path(__file__).resolve().parent.parent
 
 
 class Choices:
@@ -52,24 +49,40 @@ class Choices:
         return np.asarray(values)[self.integers(0, len(values), size)]
 
 
+def kernel_modules() -> list[str]:
+    """Modules with compiled functions, which numba must see as they are."""
+    found = []
+    for root in (ROOT, ROOT / "codecs"):
+        for path in (path for name in ("gvpipe", "gvcodecs") for path in (root / name).rglob("*.py")):
+            if "@compiled" in path.read_text("utf-8"):
+                found.append(".".join(path.relative_to(root).with_suffix("").parts))
+    return found
+
+
 def main() -> None:
     """Let atheris run one target; arguments after its name are libFuzzer's."""
     import atheris
 
-    name = sys.argv.pop(1)
-    with atheris.instrument_imports(include=["gvpipe", "gvcodecs"]):
+    name, folder = sys.argv.pop(1), Path(tempfile.mkdtemp())
+    with atheris.instrument_imports(
+        include=["gvpipe", "gvcodecs"], exclude=kernel_modules()
+    ):  # some modules load when a file needs them
+        from fuzz.limits import BAD
+        from fuzz.seeds import FOLDER
+        from fuzz.session import Options, load_targets
+        from fuzz.worker import run_case
+
         (target,) = load_targets(Options(0, targets=(name,), seeds=str(FOLDER)))
-    folder = Path(tempfile.mkdtemp(dir=memory_folder()))
 
-    def test(data: bytes) -> None:
-        rng: Any = Choices(data)
-        seed = target.seeds[int(rng.integers(len(target.seeds)))]
-        verdict = run_case(target, target.mutate(dict(seed.parts), rng, target.seeds), folder)
-        if verdict.kind in BAD:
-            raise RuntimeError(f"{verdict.kind}: {verdict.place}\n{verdict.detail}")
+        def test(data: bytes) -> None:
+            rng: Any = Choices(data)
+            seed = target.seeds[int(rng.integers(len(target.seeds)))]
+            verdict = run_case(target, target.mutate(dict(seed.parts), rng, target.seeds), folder)
+            if verdict.kind in BAD:
+                raise RuntimeError(f"{verdict.kind}: {verdict.place}\n{verdict.detail}")
 
-    atheris.Setup(sys.argv, test)
-    atheris.Fuzz()
+        atheris.Setup([sys.argv[0], "-len_control=0", "-max_len=200", *sys.argv[1:]], test)
+        atheris.Fuzz()
 
 
 if __name__ == "__main__":

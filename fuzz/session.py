@@ -100,12 +100,8 @@ def load_targets(options: Options) -> list[Target]:
 
         refuse_bad_indices()
     videos, meshes = load_seeds(Path(options.seeds), Path(options.more) if options.more else None)
-    kinds = {
-        "video": lambda: video_targets(videos),
-        "mesh": lambda: mesh_targets(meshes),
-        "web": lambda: browser_targets(videos),
-    }
-    targets = [target for kind, make in kinds.items() if options.kind in ("", kind) for target in make()]
+    kinds = {"video": video_targets(videos), "mesh": mesh_targets(meshes), "web": browser_targets(videos)}
+    targets = [target for kind, group in kinds.items() if options.kind in ("", kind) for target in group]
     unknown = set(options.targets) - {target.name for target in targets}
     if unknown:
         raise KeyError(f"no target {', '.join(sorted(unknown))}; there are {', '.join(target.name for target in targets)}")

@@ -27,8 +27,8 @@ def check_number(value: object, role: str) -> None:
 
 
 def show(value: object) -> str:
-    """A value and its type, short: ``5 (int)``."""
-    text = repr(value)
+    """A value and its type, short, in one line: ``5 (int)``."""
+    text = " ".join(repr(value).split())
     return f"{text if len(text) <= 40 else text[:37] + '...'} ({type(value).__name__})"
 
 

@@ -27,7 +27,8 @@ def as_polygons(given: Any, faces: Int32, parts: tuple[Part, ...], where: str) -
     counts = np.asarray(given)
     if counts.ndim != 1 or (counts.size and counts.dtype.kind not in "iu"):
         raise InputError(f"{where}: polygons are {show(given)}; (polygons,) numbers of corners are needed")
-    if counts.min(initial=3) < 3 or int((counts.astype(np.int64) - 2).sum()) != len(faces):
+    out_of_range = counts.min(initial=3) < 3 or counts.max(initial=3) > len(faces) + 2  # the largest ones would wrap in a sum
+    if out_of_range or int((counts.astype(np.int64) - 2).sum()) != len(faces):
         raise InputError(f"{where}: the polygons' fans are not {len(faces)} triangles; each has its corners less 2")
     if counts.max(initial=3) == 3:
         return None

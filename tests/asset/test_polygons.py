@@ -44,6 +44,18 @@ def test_wrong_polygons_are_refused(polygons: list[Any], message: str) -> None:
         as_polygons(polygons, FACES, (), "mesh")
 
 
+def test_a_message_is_one_line() -> None:
+    """Arrays of two dimensions have rows below each other."""
+    with pytest.raises(InputError, match=r"^mesh: polygons are array\(\[\[4\], \[3\]\]\) \(ndarray\)"):
+        as_polygons(np.array([[4], [3]]), FACES, (), "mesh")
+
+
+def test_numbers_whose_sum_wraps() -> None:
+    """Two that add up to 2^64 more than the triangles need."""
+    with pytest.raises(InputError, match="the polygons' fans are not 3 triangles"):
+        as_polygons(np.array([2**63, 2**63 + 7], np.uint64), FACES, (), "mesh")
+
+
 def test_a_polygon_is_of_one_part() -> None:
     parts = (Part("a", (0, 7), (0, 1)), Part("b", (0, 7), (1, 3)))
     with pytest.raises(InputError, match="part 'b' starts inside a polygon"):
