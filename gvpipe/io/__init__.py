@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gvpipe.errors import InputError
+from gvpipe.io.damage import check_file
 from gvpipe.io.export import write_frames
 from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames import read_frames
@@ -56,8 +57,7 @@ def read(
     reader = READERS.get(suffix)
     # a pattern of frames may end in .glb, too
     if reader is not None and (os.path.isfile(path) or (suffix not in FRAME_FORMATS and not os.path.isdir(path))):
-        if not os.path.isfile(path):
-            raise InputError(f"{path}: no such file; check the path")
+        check_file(Path(path))
         sequence = reader(Path(path), ReadOptions(fps, clip, mesh, frames))
         if sequence is not None:
             return sequence if suffix in SIMULATIONS else _span(sequence, frames)

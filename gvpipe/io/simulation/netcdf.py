@@ -9,6 +9,7 @@ import numpy as np
 
 from gvpipe.arrays import Array
 from gvpipe.errors import InputError
+from gvpipe.io.damage import WHOLE, reading
 from gvpipe.io.simulation.hdf import SIGNATURE, HdfFile, open_hdf
 from gvpipe.io.simulation.limits import check_bytes
 
@@ -38,8 +39,6 @@ def open_netcdf(path: Path) -> NetCdf:
     size = path.stat().st_size
     with open(path, "rb") as file:
         head = file.read(8)
-    if not head:
-        raise InputError(f"{path} is empty; export it again")
     if head == SIGNATURE:
         return Hdf4(open_hdf(path))
     if head[:3] != b"CDF":
@@ -56,11 +55,8 @@ class Classic:
         from scipy.io import netcdf_file
 
         self._size = size
-        try:
+        with reading(path, "netCDF", remedy=WHOLE):
             self._file: Any = netcdf_file(path, "r", mmap=True)
-        except Exception as exc:  # damaged headers raise nearly anything inside SciPy
-            reason = " ".join(str(exc).split())[:120] or type(exc).__name__
-            raise InputError(f"{path} cannot be read as netCDF, or is cut short ({reason}); export it again") from exc
 
     def has(self, name: str) -> bool:
         return name in self._file.variables

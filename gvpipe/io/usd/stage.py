@@ -14,8 +14,9 @@ import numpy as np
 
 from gvpipe.arrays import Float64
 from gvpipe.errors import InputError
+from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_frames import between_note, frame_times, one_line
+from gvpipe.io.scene_frames import between_note, frame_times
 
 EXTRA = "USD files need the package usd-core; install it by: pip install 'gvpipe[usd]'"
 SIGNATURES = {  # first bytes by extension; .usd is text or binary
@@ -63,15 +64,12 @@ def open_stage(path: Path) -> Any:
 @contextmanager
 def usd_errors(path: Path) -> Iterator[None]:
     """Turn what the library raises into `InputError`, and keep its warnings from the terminal."""
-    from pxr import Tf, UsdUtils
+    from pxr import UsdUtils
 
     silencer = UsdUtils.CoalescingDiagnosticDelegate()
     try:
-        yield
-    except InputError:
-        raise
-    except (Tf.ErrorException, RuntimeError, ValueError, TypeError, OverflowError, MemoryError) as exc:
-        raise InputError(f"{path} cannot be read as USD: {one_line(exc)}; export it again") from exc
+        with reading(path, "USD"):
+            yield
     finally:
         silencer.TakeUncoalescedDiagnostics()
         del silencer

@@ -100,7 +100,7 @@ def test_a_moving_node(tmp_path: Path) -> None:
 def test_takes_by_name(tmp_path: Path) -> None:
     (tmp_path / "a.fbx").write_text(FBX)
     assert len(gvpipe.io.read(tmp_path / "a.fbx", clip="Lift")) == 25
-    with pytest.raises(InputError, match=r"no take 'Lfit'; there are 'Lift'"):
+    with pytest.raises(InputError, match=r"has no clip 'Lfit'; there are: 'Lift'; did you mean 'Lift'"):
         gvpipe.io.read(tmp_path / "a.fbx", clip="Lfit")
 
 
