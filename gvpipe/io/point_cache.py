@@ -110,10 +110,9 @@ def read_npy(path: Path, options: ReadOptions, read_mesh: MeshReader) -> MeshSeq
         InputError: no mesh is given, the file is not an array of numbers of that shape, the mesh has other vertices.
     """
     with reading(path, ".npy", remedy="write it by numpy.save"):
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-    if not isinstance(array, np.ndarray) or array.ndim != 3 or array.shape[2] != 3 or array.dtype.kind not in "fiu":
-        shape = f"shape {array.shape} and type {array.dtype}" if isinstance(array, np.ndarray) else "several arrays"
-        raise InputError(f"{path} has {shape}; (frames, vertices, 3) numbers are needed")
+        array = np.lib.format.open_memmap(path, mode="r")  # numpy.load would open archives, too
+    if array.ndim != 3 or array.shape[2] != 3 or array.dtype.kind not in "fiu":
+        raise InputError(f"{path} has shape {array.shape} and type {array.dtype}; (frames, vertices, 3) numbers are needed")
     return _sequence(path, Cache(array), options, read_mesh)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -54,9 +55,19 @@ class Classic:
     def __init__(self, path: Path, size: int) -> None:
         from scipy.io import netcdf_file
 
+        class QuietFile(netcdf_file):
+            """A file that closes without a warning where arrays of a damaged one are still mapped."""
+
+            def close(self) -> None:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", RuntimeWarning)
+                    super().close()
+
+            __del__ = close
+
         self._size = size
         with reading(path, "netCDF", remedy=WHOLE):
-            self._file: Any = netcdf_file(path, "r", mmap=True)
+            self._file: Any = QuietFile(path, "r", mmap=True)
 
     def has(self, name: str) -> bool:
         return name in self._file.variables
