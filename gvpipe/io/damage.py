@@ -45,6 +45,8 @@ def check_file(path: Path) -> None:
     """Raise `InputError` unless a path is that of a file that has bytes; a pipe or a device would be read for ever."""
     try:
         state = path.stat()
+    except FileNotFoundError as exc:
+        raise InputError(f"{path}: no such file; check the path") from exc
     except OSError as exc:
         raise InputError(f"{path} cannot be read: {exc.strerror}; check the path") from exc
     if not stat.S_ISREG(state.st_mode):
@@ -54,8 +56,9 @@ def check_file(path: Path) -> None:
 
 
 def unreadable(path: Path, kind: str, reason: str, at: str = "", remedy: str = AGAIN) -> InputError:
-    """The error of a file that cannot be read; arguments as of `reading`."""
-    return InputError(f"{path}{f': {at}' if at else ''} cannot be read{f' as {kind}' if kind else ''}: {reason}; {remedy}")
+    """The error of a file that cannot be read; arguments as of `reading`. A reason that ends in a remedy keeps its own."""
+    again = "" if "; " in reason else f"; {remedy}"
+    return InputError(f"{path}{f': {at}' if at else ''} cannot be read{f' as {kind}' if kind else ''}: {reason}{again}")
 
 
 def reason_of(exc: BaseException) -> str:

@@ -2,15 +2,18 @@
 
 Corners at exactly equal positions in the first frame become one vertex, numbered by first appearance. The same map joins the
 corners of all other frames. Where corners that were one vertex part later, connectivity is not constant and the frame is
-refused. Reading is trimesh's; writing is one structured array.
+refused.
+
+A binary file has a header of 80 bytes, the number of triangles, and 50 bytes for each. A text file has solids, one after the
+other. A file whose size is what its number of triangles needs is binary, though its header may begin as text does.
 """
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -24,6 +27,10 @@ from gvpipe.sequence import MeshSequence, check_finite
 
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 HEADER_BYTES = 80
+START = HEADER_BYTES + 4  # of the triangles of a binary file
+SOLID = re.compile(rb"\s*solid\b([^\r\n]*)(.*?)(\bendsolid\b[^\r\n]*|\Z)", re.DOTALL | re.IGNORECASE)
+FACET = re.compile(rb"\bfacet\b", re.IGNORECASE)
+CORNER = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 
 
 class StlLoader:
@@ -40,7 +47,7 @@ class StlLoader:
 
         Raises:
             InputError: corners that were one vertex in the first file are apart in this one.
-            Exception: the file cannot be read; trimesh raises many kinds, and the caller names the file.
+            ValueError: the file cannot be read; the caller names it.
         """
         exact, solids = _load_corners(path)
         if self._first is None:
@@ -69,13 +76,33 @@ class StlLoader:
 
 def _load_corners(path: Path) -> tuple[Float64, list[tuple[str, int]]]:
     """All corners, ``(3 T, 3)``, and the solids' names and triangles; binary files have one solid."""
-    import trimesh
-
-    scene: Any = trimesh.load_scene(path, file_type="stl", process=False)
-    solids = [np.asarray(solid.vertices, np.float64)[solid.faces.reshape(-1)] for solid in scene.geometry.values()]
+    data = path.read_bytes()
+    n_triangles = struct.unpack_from("<I", data, HEADER_BYTES)[0] if len(data) >= START else -1
+    if len(data) == START + n_triangles * RECORD.itemsize:
+        solids = [("", np.frombuffer(data, RECORD, offset=START)["corners"].reshape(-1, 3).astype(np.float64))]
+    elif SOLID.match(data):
+        solids = [_parse_solid(found) for found in SOLID.finditer(data)]
+    else:
+        said = f"its header says {n_triangles} triangles, {START + n_triangles * RECORD.itemsize} bytes, but " * (
+            n_triangles >= 0
+        )
+        raise ValueError(f"{said}it has {len(data)} bytes, and is no text; it is another format or cut short")
+    solids = [solid for solid in solids if len(solid[1])]
     if not solids:
         raise ValueError("it has no triangles")
-    return np.concatenate(solids), [(name, len(solid) // 3) for name, solid in zip(scene.geometry, solids, strict=True)]
+    return np.concatenate([corners for _, corners in solids]), [(name, len(corners) // 3) for name, corners in solids]
+
+
+def _parse_solid(found: re.Match[bytes]) -> tuple[str, Float64]:
+    """Name and corners ``(3 T, 3)`` of a solid in text; raises `ValueError`."""
+    name, body, end = found.groups()
+    if not end:
+        raise ValueError("a solid has no 'endsolid'; the file is cut short")
+    n_facets = len(FACET.findall(body))
+    words = [word for row in CORNER.findall(body) for word in row]
+    if len(words) != 9 * n_facets:
+        raise ValueError(f"a solid of {n_facets} facets has {len(words) // 3} vertices; three for each are needed")
+    return name.decode("utf-8", "replace").strip(), np.array(words, "S").astype(np.float64).reshape(-1, 3)
 
 
 def _make_parts(solids: list[tuple[str, int]], faces: Int32) -> tuple[Part, ...]:

@@ -6,6 +6,7 @@ import os
 import shutil
 import struct
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,7 +14,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fbx_files import FBX
+from gltf_files import square_file
 from input_files import EXTRAS, KINDS, MARK, NEED_MESH, PACKAGES, TEXTS, is_installed, read_all
+from PIL import Image
 
 from gvpipe import io
 from gvpipe.errors import InputError
@@ -158,3 +162,97 @@ def test_missing_side_files(copied: Any, suffix: str, side: str) -> None:
     gone.unlink()
     with refused(path, gone.name, "missing"):
         read_all(path)
+
+
+OUTSIDE = ("../out.bin", "/etc/passwd", "deep/../../out.bin")
+NAMED = {  # files that name another one, and what becomes of a name outside of their folder
+    "a.gltf": '{{"asset": {{"version": "2.0"}}, "buffers": [{{"uri": "{0}", "byteLength": 4}}], "meshes": [{{"primitives": '
+    '[{{"attributes": {{"POSITION": 0}}}}]}}], "nodes": [{{"mesh": 0}}], "accessors": [{{"bufferView": 0, "count": 3, '
+    '"componentType": 5126, "type": "VEC3"}}], "bufferViews": [{{"buffer": 0, "byteLength": 4}}]}}',
+    "a.pvd": '<VTKFile type="Collection"><Collection><DataSet timestep="0" file="{0}"/></Collection></VTKFile>',
+    "a.series": '{{"files": [{{"name": "{0}", "time": 0}}]}}',
+    "a.pvtu": '<VTKFile type="PUnstructuredGrid"><PUnstructuredGrid><Piece Source="{0}"/></PUnstructuredGrid></VTKFile>',
+    "a.case": "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: {0}\n",
+    "a.xdmf": '<Xdmf><Domain><Grid Name="a"><Topology TopologyType="Triangle"><DataItem Format="Binary" Dimensions="2 3">{0}'
+    "</DataItem></Topology><Geometry><DataItem/></Geometry></Grid></Domain></Xdmf>",
+    "b.xdmf": '<Xdmf><Domain><Grid Name="a"><Topology TopologyType="Triangle"><DataItem Format="HDF" Dimensions="2 3">{0}:/x'
+    "</DataItem></Topology><Geometry><DataItem/></Geometry></Grid></Domain></Xdmf>",
+}
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_paths_that_leave_the_folder(tmp_path: Path, name: str) -> None:
+    (tmp_path / "in" / "deep").mkdir(parents=True)
+    (tmp_path / "out.bin").write_bytes(bytes(400))
+    path = tmp_path / "in" / name
+    for outside in OUTSIDE:
+        path.write_text(NAMED[name].format(outside))
+        with refused(path, "folder"):
+            read_all(path)
+    (path.parent / "link.bin").symlink_to(tmp_path / "out.bin")
+    path.write_text(NAMED[name].format("link.bin"))
+    with refused(path, "folder"):
+        read_all(path)
+
+
+def test_pictures_outside_of_the_folder(tmp_path: Path) -> None:
+    """OBJ goes without a picture or a .mtl file that lies elsewhere, with a note."""
+    (tmp_path / "in").mkdir()
+    Image.new("RGB", (4, 4)).save(tmp_path / "out.png")
+    mesh, looks = tmp_path / "in" / "a.obj", tmp_path / "in" / "a.mtl"
+    for library, picture in (
+        ("a.mtl", "../out.png"),
+        ("a.mtl", "/etc/passwd"),
+        ("../a.mtl", "x.png"),
+        ("/etc/passwd", "x.png"),
+    ):
+        mesh.write_text(f"mtllib {library}\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n")
+        looks.write_text(f"newmtl a\nmap_Kd {picture}\n")
+        read = read_all(mesh)
+        assert not read.images and any("lies outside of the folder" in note for note in read.notes)
+
+
+NO_MESH: dict[str, bytes] = {
+    "a.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\n",
+    "a.off": b"OFF\n0 0 0\n",
+    "a.stl": bytes(84),
+    "a.usda": b"#usda 1.0\n",
+    "a.gltf": b'{"asset": {"version": "2.0"}}',
+    "a.fbx": FBX.replace('C: "OO",1,2', "").encode(),
+    "a.pvd": b'<VTKFile type="Collection"><Collection/></VTKFile>',
+    "a.series": b'{"files": []}',
+    "a.xdmf": b"<Xdmf><Domain/></Xdmf>",
+    "a.case": b"FORMAT\ntype: ensight gold\n",
+    "a.vtk": b"# vtk DataFile Version 3.0\na\nASCII\nDATASET POLYDATA\nPOINTS 1 float\n0 0 0\n",
+    "a.pc2": struct.pack("<12siiffi", b"POINTCACHE2\0", 1, 4, 0.0, 1.0, 0),
+    "a.mdd": struct.pack(">ii", 0, 4),
+}
+
+
+@pytest.mark.parametrize("name", NO_MESH)
+def test_no_mesh_and_no_frames(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    if not is_installed(path.suffix):
+        pytest.skip("its package is missing")
+    path.write_bytes(NO_MESH[name])
+    with refused(path):
+        read_all(path)
+
+
+def test_nested_nodes(tmp_path: Path) -> None:
+    """Twenty thousand nodes, one in the other, are read without recursion, and in about a second."""
+    file = square_file()
+    file.tree["nodes"] = [{"children": [k + 1]} for k in range(20_000)] + [{"mesh": 0}]
+    started = time.process_time()
+    assert read_all(file.write(tmp_path / "a.glb")).n_vertices == 4
+    assert time.process_time() - started < 10
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_command_leaves_nothing(run: Any, copied: Any, tmp_path: Path, suffix: str) -> None:
+    path = copied(suffix)
+    path.write_bytes(OTHERS[1])
+    before = sorted(tmp_path.rglob("*"))
+    ended = run("convert", path, tmp_path / "out.npz", *(("--mesh", path.parent / "base.obj") if suffix in NEED_MESH else ()))
+    assert ended.status == 1 and ended.err.startswith("Error: ") and ended.err.count("\n") == 1 and not ended.out
+    assert sorted(tmp_path.rglob("*")) == before

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import sys
 import tempfile
 import zipfile
 from pathlib import Path
@@ -157,13 +156,6 @@ def test_output_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         f"cannot write {tmp_path / 'a.npz'}: No space left on device; free some space or choose another disk"
     )
     assert os.listdir(tmp_path) == ["file"]
-
-
-def test_trimesh_loads_only_when_needed() -> None:
-    import subprocess
-
-    code = "import sys, gvpipe.io; sys.exit('trimesh' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 @pytest.mark.parametrize("suffix", ["obj", "ply", "off", "glb"])

@@ -414,3 +414,18 @@ def test_mesh_without_parts(tmp_path: Path) -> None:
     assert [(part.name, part.parent) for part in read.parts] == [("walk", "")]
     assert np.array_equal(read.faces, bare.faces)
     assert np.array_equal(read[:], bare[:])
+
+
+@pytest.mark.parametrize("arc", ['def "a" (references = @../b.usda@) {}', 'def "a" (payload = @../b.usda@) {}', "sublayer"])
+def test_stages_outside_of_the_folder(tmp_path: Path, arc: str) -> None:
+    """A file shows nothing from elsewhere; a file below its folder may be shown."""
+    (tmp_path / "in" / "below").mkdir(parents=True)
+    text = '#usda 1.0\n(defaultPrim = "m")\ndef Mesh "m" {' + TRIANGLE + "}\n"
+    for place in (tmp_path, tmp_path / "in" / "below"):
+        (place / "b.usda").write_text(text)
+    head = "#usda 1.0\n" + ("(subLayers = [@../b.usda@])\n" if arc == "sublayer" else arc)
+    (tmp_path / "in" / "a.usda").write_text(head)
+    with pytest.raises(InputError, match=r"a\.usda takes what it shows from outside of its folder: .*b\.usda; put that inside"):
+        io.read(tmp_path / "in" / "a.usda")
+    (tmp_path / "in" / "c.usda").write_text(head.replace("@../", "@below/"))
+    assert io.read(tmp_path / "in" / "c.usda").n_vertices == 3

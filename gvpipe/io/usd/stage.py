@@ -75,11 +75,15 @@ def usd_errors(path: Path) -> Iterator[None]:
         del silencer
 
 
-def outside_note(stage: Any, path: Path) -> tuple[str, ...]:
-    """Of layers that lie outside of the file's folder."""
+def check_inside(stage: Any, path: Path) -> None:
+    """Raise `InputError` if a layer that the stage uses lies outside of the file's folder."""
     folder = Path(os.path.realpath(path)).parent
     outside = [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath and not is_inside(layer.realPath, folder)]
-    return (f"it refers to {len(outside)} files outside of its folder, such as {outside[0]}",) if outside else ()
+    if outside:
+        raise InputError(
+            f"{path} takes what it shows from outside of its folder: {outside[0]}; put that inside, or make one file of all "
+            "(usdcat --flatten)"
+        )
 
 
 def is_inside(path: str, folder: Path) -> bool:
