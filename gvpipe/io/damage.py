@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from gvpipe.arguments import did_you_mean
-from gvpipe.errors import InputError
+from gvpipe.errors import InputError, TopologyChange
 
 AGAIN, FRAME_AGAIN = "export it again", "export this frame again"
 WHOLE = "it may be cut short, so export it again"
@@ -34,7 +34,7 @@ def reading(path: Path, kind: str, at: str = "", remedy: str = AGAIN) -> Iterato
     try:
         yield
     except InputError as exc:
-        if path.name in str(exc):
+        if path.name in str(exc) or isinstance(exc, TopologyChange):
             raise
         raise InputError(f"{path}: {exc}") from exc
     except Exception as exc:
