@@ -156,7 +156,7 @@ def read(
         path: an ``.npz``, an ``.mp4``, a scene (animated glTF, USD, Alembic), a point cache (``.pc2``, ``.mdd``, ``.npy``), or
             frame files as a folder, a glob, a ``%04d`` pattern, a list or one file.
         fps: frames per second; overrides the file's. Frame files have 30 by default, glTF files the rate of their keys.
-        clip: name of the animation to read, of a glTF file that has several; None: the first.
+        clip: name of the animation to read, of a glTF or FBX file that has several; None: the first.
         mesh: a file with the triangles of a point cache.
         frames: first frame that is read, and the one after the last (None: all that follow).
 

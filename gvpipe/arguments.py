@@ -34,5 +34,6 @@ def show(value: object) -> str:
 
 def did_you_mean(name: object, names: Iterable[str]) -> str:
     """``; did you mean 'quality'?``, or nothing where no name is near."""
-    near = difflib.get_close_matches(str(name).lower(), list(names), 1, 0.6)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    known = {each.lower(): each for each in reversed(list(names))}
+    near = difflib.get_close_matches(str(name).lower(), list(known), 1, 0.6)
+    return f"; did you mean {known[near[0]]!r}?" if near else ""

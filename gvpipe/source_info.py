@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from gvpipe.arguments import StrPath
 from gvpipe.asset.listing import Things, list_things
@@ -21,7 +24,9 @@ class SourceInfo:
     Args:
         bytes: of the file; None for a folder or several files.
         attributes, fields: as in `gvpipe.Info`, without bound and bytes.
-        clips: names of the animations of a glTF file.
+        time_range: seconds of the first and the last frame.
+        clips: names of the animations of a glTF file, of the takes of an FBX file.
+        clip_ranges: first and last second of each clip.
     """
 
     vertices: int
@@ -38,7 +43,9 @@ class SourceInfo:
     materials: list[str]
     images: list[dict[str, Any]]
     metadata: dict[str, Any]
+    time_range: list[float]
     clips: list[str]
+    clip_ranges: list[list[float]]
     notes: list[str]
 
     def to_json(self) -> dict[str, Any]:
@@ -58,6 +65,7 @@ def source_info(path: StrPath, clip: str | None = None, mesh: StrPath | None = N
     name = os.fspath(path)
     sequence = read(name, None, clip, mesh)
     first = sequence[0]
+    clips = list_clips(name)
     things = Things(sequence.parts, sequence.polygons, sequence.materials, sequence.images, sequence.metadata)
     return SourceInfo(
         vertices=sequence.n_vertices,
@@ -69,10 +77,22 @@ def source_info(path: StrPath, clip: str | None = None, mesh: StrPath | None = N
         origin=sequence.origin.tolist(),
         attributes=_attributes(sequence),
         fields=_fields(sequence),
-        clips=list_clips(name),
+        time_range=_time_range(sequence),
+        clips=[clip.name for clip in clips],
+        clip_ranges=[[clip.start, clip.stop] for clip in clips],
         notes=list(sequence.notes),
         **list_things(things),
     )
+
+
+def _time_range(sequence: MeshSequence) -> list[float]:
+    """Seconds of the first and the last frame, by the file's own times where its steps are uneven."""
+    start, listed = sequence.metadata.start_time, sequence.metadata.texts.get("times", "").split()
+    with contextlib.suppress(ValueError):  # a text of that name may hold anything
+        times = [float(time) for time in listed]
+        if len(times) == sequence.n_frames and np.isfinite(times).all():
+            return [times[0], times[-1]]
+    return [start, start + (sequence.n_frames - 1) / sequence.fps]
 
 
 def _attributes(sequence: MeshSequence) -> list[dict[str, Any]]:

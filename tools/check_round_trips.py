@@ -77,8 +77,10 @@ def describe(sequence: gvpipe.MeshSequence) -> str:
     return ", ".join([*held, f"{len(sequence.materials)} materials", f"{len(sequence.images)} images"])
 
 
-def differences(source: gvpipe.MeshSequence, decoded: gvpipe.MeshSequence, info: gvpipe.Info | None) -> list[str]:
-    """What of a sequence did not come back; bounds are those of ``info``, or 0."""
+def differences(
+    source: gvpipe.MeshSequence, decoded: gvpipe.MeshSequence, info: gvpipe.Info | None, rounding: float = 1e-7
+) -> list[str]:
+    """What of a sequence did not come back; bounds are those of ``info``, or 0, and what is rounded beside."""
     wrong = []
     for what in ("parts", "materials", "images", "metadata"):
         if getattr(source, what) != getattr(decoded, what):
@@ -91,7 +93,7 @@ def differences(source: gvpipe.MeshSequence, decoded: gvpipe.MeshSequence, info:
         largest = error["max"]
         if largest is None:
             wrong.append(f"{name} is missing")
-        elif largest > bounds.get(name, 0.0) * SLACK + 1e-7:
+        elif largest > bounds.get(name, 0.0) * SLACK + rounding:
             wrong.append(f"{name} is {largest:.2g} off, {bounds.get(name, 0.0):.2g} allowed")
     return [*wrong, *seams_that_differ(source, decoded)]
 
@@ -128,14 +130,14 @@ def polygons_of(sequence: gvpipe.MeshSequence) -> list[tuple[int, ...]]:
     return sorted(tuple(corners[a:b].tolist()) for a, b in zip(starts, stops, strict=True) if b - a > 3)
 
 
-def again(decoded: gvpipe.MeshSequence, path: Path) -> str:
+def again(decoded: gvpipe.MeshSequence, path: Path, rounding: float = 1e-7) -> str:
     """What differs after a sequence was written and read again."""
     try:
         notes = gvpipe.write(decoded, path)
         read = gvpipe.read(path, fps=decoded.fps)
         if read.n_vertices != decoded.n_vertices:
             return f"{read.n_vertices} vertices, split along seams"
-        wrong: list[Any] = differences(decoded, read, None)
+        wrong: list[Any] = differences(decoded, read, None, rounding)
     except GvpipeError as exc:
         return str(exc).replace(str(path), path.name)
     said = f" (said: {'; '.join(notes)})" if notes else ""

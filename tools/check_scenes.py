@@ -77,7 +77,7 @@ def check(folder: Path, kind: str | None, only: str) -> Iterator[Row]:
         wanted = entry["kind"] in KINDS and entry["kind"] in (kind or entry["kind"]) and only in entry["file"]
         if wanted and path.suffix.lower() in READERS:
             references = [folder / "reference" / name for name in entry["reference"].split()]
-            yield check_file(path, entry["file"], references, _mesh_beside(path))
+            yield check_file(path, entry["file"], references, mesh_beside(path))
 
 
 def check_file(path: Path, name: str, references: list[Path], mesh: Path | None) -> Row:
@@ -145,7 +145,7 @@ def _path(part: Part) -> str:
     return "/" + "/".join(filter(None, (part.parent, part.name)))
 
 
-def _mesh_beside(path: Path) -> Path | None:
+def mesh_beside(path: Path) -> Path | None:
     """The mesh of a point cache: the OBJ in its folder or the one above."""
     if path.suffix.lower() not in (".pc2", ".mdd", ".npy"):
         return None

@@ -41,6 +41,15 @@ def asset_lines(info: Info | SourceInfo) -> Iterator[str]:
         yield "metadata: " + ", ".join(f"{key} {value}" for key, value in said.items())
 
 
+def time_lines(info: SourceInfo) -> Iterator[str]:
+    """Yield the seconds from the first frame to the last, and the clips with theirs."""
+    if info.frames > 1:
+        yield f"time: {info.time_range[0]:g}..{info.time_range[1]:g} s"
+    if info.clips:
+        spans = zip(info.clips, info.clip_ranges, strict=True)
+        yield "clips: " + ", ".join(f"{name} ({start:g}..{stop:g} s)" for name, (start, stop) in spans)
+
+
 def _described(each: dict[str, Any]) -> str:
     unit = f" {each['unit']}" if each["unit"] else ""
     span = f", {each['range'][0]:g}..{each['range'][1]:g}{unit}" if each.get("range") else ""

@@ -113,7 +113,7 @@ def cli() -> None:
     metavar="NAME=BOUND",
     help="The same for an animated field; 0.1%,nan=keep keeps NaN as holes.",
 )
-@click.option("--clip", metavar="NAME", help="The animation to read, of a glTF file that has several. [default: the first]")
+@click.option("--clip", metavar="NAME", help="The animation to read, of a file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
 @click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.mp4, ...")
@@ -273,7 +273,7 @@ def decode(
 
 @cli.command()
 @click.argument("source", metavar="FILE")
-@click.option("--clip", metavar="NAME", help="The animation to look at, of a glTF file that has several. [default: the first]")
+@click.option("--clip", metavar="NAME", help="The animation to look at, of a file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @output_options
 def info(source: str, clip: str | None, mesh: str | None, out: Output) -> None:
@@ -304,16 +304,14 @@ def info(source: str, clip: str | None, mesh: str | None, out: Output) -> None:
 
 def _source_info(source: str, path: str, clip: str | None, mesh: str | None, out: Output) -> None:
     """Print what is read of an input that is no geometry video."""
-    from gvpipe.cli.asset_lines import asset_lines, shape_lines
+    from gvpipe.cli.asset_lines import asset_lines, shape_lines, time_lines
     from gvpipe.source_info import source_info
 
     found = source_info(path, clip, mesh)
     out.json(found.to_json())
     out.text(shown(source, STDIN) + ("" if found.bytes is None else f": {_size(found.bytes)}"))
-    for line in [*shape_lines(found), *asset_lines(found)]:
+    for line in [*shape_lines(found), *asset_lines(found), *time_lines(found)]:
         out.text(line)
-    if found.clips:
-        out.text(f"clips: {', '.join(found.clips)}")
     for note in found.notes:
         out.note(note)
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @click.argument("source", metavar="INPUT")
 @click.argument("target", metavar="OUTPUT")
 @click.option("--fps", type=float, help="Frames per second, instead of the input's; animated glTF is sampled at it.")
-@click.option("--clip", metavar="NAME", help="The animation to read, of a glTF file that has several. [default: the first]")
+@click.option("--clip", metavar="NAME", help="The animation to read, of a file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @click.option("--start", type=int, help="First frame. [default: 0]")
 @click.option("--stop", type=int, help="Frame after the last. [default: the end]")

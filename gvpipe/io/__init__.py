@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from gvpipe.errors import InputError
+from gvpipe.io.cut_pictures import cut_notes
+from gvpipe.io.damage import check_file
 from gvpipe.io.export import write_frames
 from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames import read_frames
@@ -46,6 +49,18 @@ def read(
         InputError: the path or what it holds cannot be used. Frame files after the first are read, and may raise it,
             when their positions are.
     """
+    sequence = _read(path, fps, clip, mesh, frames)
+    cut = cut_notes(sequence.images)
+    return replace(sequence, notes=(*sequence.notes, *cut)) if cut else sequence
+
+
+def _read(
+    path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    fps: float | None,
+    clip: str | None,
+    mesh: str | os.PathLike[str] | None,
+    frames: tuple[int, int | None] | None,
+) -> MeshSequence:
     if not isinstance(path, str | os.PathLike):
         _refuse_clip(clip, "a list of files")
         return read_frames([os.fspath(file) for file in path], fps, frames)
@@ -58,8 +73,7 @@ def read(
     reader = READERS.get(suffix)
     # a pattern of frames may end in .glb, too
     if reader is not None and (os.path.isfile(path) or (suffix not in FRAME_FORMATS and not os.path.isdir(path))):
-        if not os.path.isfile(path):
-            raise InputError(f"{path}: no such file; check the path")
+        check_file(Path(path))
         sequence = reader(Path(path), ReadOptions(fps, clip, mesh, frames))
         if sequence is not None:
             return sequence if suffix in (*SIMULATIONS, *SCENES) else _span(sequence, frames)

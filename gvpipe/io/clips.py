@@ -1,23 +1,30 @@
-"""Names of the clips of a glTF file."""
+"""Clips of a file that has several animations: glTF's animations, FBX's takes."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
-from gvpipe.errors import InputError
-from gvpipe.io.gltf import read_clip_names
+from gvpipe.io.fbx import read_takes
+from gvpipe.io.gltf import read_clips
 from gvpipe.io.scene_formats import GLTF
 
 
-def list_clips(path: str) -> list[str]:
-    """The clips of a glTF file that ``gvpipe.read(path, clip=...)`` takes, in its order; none for other files.
+class ClipRange(NamedTuple):
+    """The name of a clip, as ``gvpipe.read(path, clip=...)`` takes it, and its first and last second."""
+
+    name: str
+    start: float
+    stop: float
+
+
+def list_clips(path: str) -> list[ClipRange]:
+    """The clips of a glTF or FBX file, in its order; none for other files.
 
     Raises:
         InputError: the file cannot be read.
     """
-    if Path(path).suffix.lower() not in GLTF or not Path(path).is_file():
+    suffix = Path(path).suffix.lower()
+    if not Path(path).is_file() or suffix not in (*GLTF, ".fbx"):
         return []
-    try:
-        return read_clip_names(Path(path))
-    except ValueError as exc:
-        raise InputError(f"{path} cannot be read: {exc}; export it again") from exc
+    return [ClipRange(*each) for each in (read_takes if suffix == ".fbx" else read_clips)(Path(path))]

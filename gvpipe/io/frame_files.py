@@ -14,6 +14,7 @@ import numpy as np
 
 from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.errors import InputError, TopologyChange
+from gvpipe.io.damage import FRAME_AGAIN, check_file, reading
 from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.mesh import Loader, Mesh
 from gvpipe.io.spool import Spool
@@ -133,14 +134,8 @@ def load_mesh(loader: Loader, path: Path, frame: int) -> Mesh:
     Raises:
         InputError: it cannot be read; the message names the file and, for a coordinate, frame and vertex.
     """
-    try:
+    check_file(path)
+    with reading(path, path.suffix[1:].upper(), remedy=FRAME_AGAIN):
         mesh = loader(path)
-    except InputError as exc:
-        if path.name in str(exc):
-            raise
-        raise InputError(f"{path}: {exc}") from exc
-    except Exception as exc:  # damaged files raise nearly anything inside NumPy, json and trimesh
-        reason = getattr(exc, "strerror", None) or " ".join(str(exc).split())[:200] or type(exc).__name__
-        raise InputError(f"{path} cannot be read as {path.suffix[1:].upper()}: {reason}; export this frame again") from exc
     check_finite(narrow(mesh.positions[None], np.zeros(3)), str(path), frame)
     return mesh

@@ -7,7 +7,6 @@ the time of writing. It holds everything that a sequence has; `gvpipe.io.npz_ass
 from __future__ import annotations
 
 import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +19,13 @@ from gvpipe.asset.field import Field
 from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.atomic import unnamed_path
 from gvpipe.errors import InputError
+from gvpipe.io.damage import reading
 from gvpipe.io.mesh import as_color
 from gvpipe.io.npz_asset import USUAL, asset_members, meta_units, read_asset
-from gvpipe.io.npz_fields import NpzField, write_field
+from gvpipe.io.npz_fields import WRITE_AGAIN, NpzField, write_field
+from gvpipe.io.npz_odd import FIELD, is_known, odd_notes
 from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS
 from gvpipe.sequence import MeshSequence
-
-MEMBERS = ("vertices", "faces", "fps", "polygons", "asset", "meta", *USUAL)
-PREFIXES = ("attribute_", "indices_", "image_")
 
 
 def write_npz(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
@@ -61,16 +59,19 @@ def read_npz(path: Path, fps: float | None = None) -> MeshSequence:
     Raises:
         InputError: not an archive, damaged, a missing array or a wrong shape.
     """
-    arrays, field_names, held = _load(path)
+    arrays, field_names, members = _load(path)
     for key in ("vertices", "faces"):
         if key not in arrays:
+            held = ", ".join(members) or "nothing"
             raise InputError(f"{path} has no array {key!r} (it holds {held}); 'vertices' and 'faces' are needed")
     vertices, faces = _as_vertices(arrays["vertices"], path), arrays["faces"]
     is_assumed = fps is None and "fps" not in arrays and len(vertices) > 1
     asset: dict[str, Any] = {}
+    odd: tuple[str, ...] = ()
     if faces.ndim == 2 and faces.shape[1] == 3 and faces.dtype.kind in "iu":  # else the sequence refuses them
         arrays |= {} if "asset" in arrays else {name: _as_usual(name, arrays[name], path) for name in USUAL if name in arrays}
         asset = read_asset(arrays, faces, vertices.shape[1], path)
+        odd = odd_notes(members, arrays, path)
         meta = str(arrays["meta"]) if "meta" in arrays and arrays["meta"].dtype.kind == "U" else ""
         rows = {"vertex": vertices.shape[1], "triangle": len(faces)}
         asset["fields"] = _fields(field_names, asset["fields"], meta_units(meta), rows, path)
@@ -81,31 +82,24 @@ def read_npz(path: Path, fps: float | None = None) -> MeshSequence:
         faces,
         fps if fps is not None else _as_fps(arrays["fps"], path) if "fps" in arrays else DEFAULT_FPS,
         name=str(path),
-        notes=(ASSUMED_FPS,) if is_assumed else (),
+        notes=(*((ASSUMED_FPS,) if is_assumed else ()), *odd),
         **asset,
     )
 
 
-def _load(path: Path) -> tuple[dict[str, NDArray[Any]], list[str], str]:
-    """The arrays that are understood, names of fields, which are not loaded, and all members as a text."""
-    try:
-        with open(path, "rb") as file:  # opened here because `numpy.load` leaves damaged files open
-            if not zipfile.is_zipfile(file):
-                raise InputError(f"{path} is not an .npz archive, or is cut short; write it again with numpy.savez")
-            file.seek(0)
-            with np.load(file, allow_pickle=False) as archive:
-                if len(set(archive.files)) < len(archive.files):
-                    raise InputError(f"{path} has two members of one name; write it again with numpy.savez")
-                arrays = {key: archive[key] for key in archive.files if key in MEMBERS or key.startswith(PREFIXES)}
-                fields = [key.removeprefix("field_") for key in archive.files if key.startswith("field_")]
-                return arrays, fields, ", ".join(archive.files) or "nothing"
-    except InputError:
-        raise
-    # an archive that lies about a size or a type can raise nearly anything inside NumPy, zipfile and zlib
-    except (OSError, ValueError, TypeError, KeyError, EOFError, MemoryError, NotImplementedError, RuntimeError,
-            SyntaxError, OverflowError, zipfile.BadZipFile, zlib.error) as exc:  # fmt: skip
-        reason = " ".join(str(exc).split())[:150]
-        raise InputError(f"{path} cannot be read as .npz ({reason}); write it again with numpy.savez") from exc
+def _load(path: Path) -> tuple[dict[str, NDArray[Any]], list[str], list[str]]:
+    """The arrays that are understood, names of fields, which are not loaded, and names of all members."""
+    # opened here because `numpy.load` leaves damaged files open
+    with reading(path, ".npz", remedy=WRITE_AGAIN), open(path, "rb") as file:
+        if not zipfile.is_zipfile(file):
+            raise InputError(f"{path} is not an .npz archive, or is cut short; {WRITE_AGAIN}")
+        file.seek(0)
+        with np.load(file, allow_pickle=False) as archive:
+            if len(set(archive.files)) < len(archive.files):
+                raise InputError(f"{path} has two members of one name; {WRITE_AGAIN}")
+            arrays = {key: archive[key] for key in archive.files if is_known(key)}
+            fields = [key.removeprefix(FIELD) for key in archive.files if key.startswith(FIELD) and key != FIELD]
+            return arrays, fields, list(archive.files)
 
 
 def _fields(

@@ -60,7 +60,7 @@ def read_asset(members: Mapping[str, Array], faces: Int32, n_vertices: int, path
     Raises:
         InputError: a member or the description cannot be.
     """
-    described = _read_description(members, path)
+    described = read_description(members, path)
     parts = tuple(from_plain(Part, one, f"{path}: part") for one in _list(described, "parts", path))
     rows = {"vertex": n_vertices, "corner": 3 * len(faces), "triangle": len(faces), "part": len(parts)}
     details = {key: _objects(described, key, path) for key in ("attributes", "fields")}
@@ -129,7 +129,8 @@ def _member(name: str, each: Attribute) -> str:
     return name if is_usual else f"attribute_{name}"
 
 
-def _read_description(members: Mapping[str, Array], path: Path) -> dict[str, Any]:
+def read_description(members: Mapping[str, Array], path: Path) -> dict[str, Any]:
+    """The member ``asset``, empty where there is none; raises `InputError`."""
     if "asset" not in members:
         return {}
     try:

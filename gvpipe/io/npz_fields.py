@@ -10,8 +10,8 @@ from __future__ import annotations
 import tempfile
 import weakref
 import zipfile
-import zlib
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import IO, Any
 
@@ -21,9 +21,10 @@ from gvpipe.arrays import Array
 from gvpipe.asset.field import Field
 from gvpipe.errors import InputError
 from gvpipe.forks import ForkLock, renew_after_fork
+from gvpipe.io.damage import reading
 
 BLOCK_BYTES = 1 << 24  # of a member, held at a time
-ZIP_ERRORS = (OSError, ValueError, EOFError, KeyError, RuntimeError, NotImplementedError, zipfile.BadZipFile, zlib.error)
+WRITE_AGAIN = "write it again with numpy.savez"
 
 
 def write_field(file: IO[bytes], field: Field) -> None:
@@ -52,12 +53,9 @@ class NpzField:
         self._lock = ForkLock()
         self._file: IO[bytes] | None = None
         renew_after_fork(self)
-        try:
-            with zipfile.ZipFile(path) as archive, archive.open(f"{member}.npy") as file:
-                self.shape, self._is_fortran, self.dtype = _read_header(file)
-                n_bytes = archive.getinfo(f"{member}.npy").file_size - file.tell()
-        except ZIP_ERRORS as exc:
-            raise self._damaged(exc) from exc
+        with self._reading(), zipfile.ZipFile(path) as archive, archive.open(f"{member}.npy") as file:
+            self.shape, self._is_fortran, self.dtype = _read_header(file)
+            n_bytes = archive.getinfo(f"{member}.npy").file_size - file.tell()
         if self.dtype.kind not in "fiub" or len(self.shape) not in (2, 3):
             raise InputError(
                 f"{path}: {member!r} has shape {self.shape} and type {self.dtype}; numbers (frames, rows) or (frames, rows, "
@@ -75,10 +73,8 @@ class NpzField:
         start, stop, _ = key.indices(self.shape[0])
         with self._lock:
             if self._file is None:
-                try:
+                with self._reading():
                     self._file = self._inflate()
-                except ZIP_ERRORS as exc:
-                    raise self._damaged(exc) from exc
                 weakref.finalize(self, self._file.close)
             self._file.seek(start * self._bytes_frame)
             data = self._file.read((stop - start) * self._bytes_frame)
@@ -121,9 +117,8 @@ class NpzField:
             n = min(step, n_rows - at)
             yield at, np.frombuffer(file.read(n * n_frames * self.dtype.itemsize), self.dtype).reshape(n, n_frames)
 
-    def _damaged(self, exc: Exception) -> InputError:
-        reason = " ".join(str(exc).split())[:150]
-        return InputError(f"{self._path}: {self._member!r} cannot be read ({reason}); write it again with numpy.savez")
+    def _reading(self) -> AbstractContextManager[None]:
+        return reading(self._path, "", repr(self._member), WRITE_AGAIN)
 
 
 def _read_header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:

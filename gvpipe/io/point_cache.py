@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from gvpipe.arrays import Array, Float32
 from gvpipe.atomic import unnamed_path
 from gvpipe.errors import InputError
+from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS, origin_left_out
 from gvpipe.sequence import MeshSequence
@@ -108,13 +109,10 @@ def read_npy(path: Path, options: ReadOptions, read_mesh: MeshReader) -> MeshSeq
     Raises:
         InputError: no mesh is given, the file is not an array of numbers of that shape, the mesh has other vertices.
     """
-    try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except Exception as exc:  # damaged headers raise nearly anything inside NumPy
-        raise InputError(f"{path} cannot be read as .npy ({' '.join(str(exc).split())[:150]}); write it by numpy.save") from exc
-    if not isinstance(array, np.ndarray) or array.ndim != 3 or array.shape[2] != 3 or array.dtype.kind not in "fiu":
-        shape = f"shape {array.shape} and type {array.dtype}" if isinstance(array, np.ndarray) else "several arrays"
-        raise InputError(f"{path} has {shape}; (frames, vertices, 3) numbers are needed")
+    with reading(path, ".npy", remedy="write it by numpy.save"):
+        array = np.lib.format.open_memmap(path, mode="r")  # numpy.load would open archives, too
+    if array.ndim != 3 or array.shape[2] != 3 or array.dtype.kind not in "fiu":
+        raise InputError(f"{path} has shape {array.shape} and type {array.dtype}; (frames, vertices, 3) numbers are needed")
     return _sequence(path, Cache(array), options, read_mesh)
 
 

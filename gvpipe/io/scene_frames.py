@@ -6,8 +6,8 @@ alone.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Sequence
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.errors import InputError, TopologyChange
 from gvpipe.forks import ForkLock
+from gvpipe.io.damage import reading
 from gvpipe.io.mapped_pages import forget_pages
 from gvpipe.origin import choose_origin, narrow, rounding
 from gvpipe.sequence import check_finite
@@ -111,12 +112,8 @@ class SceneFrames:
         return result
 
     def _checked(self, motion: Motion, time: float, moment: str, frame: int) -> Array:
-        try:
+        with reading(Path(self._where), "", f"mesh {motion.name!r} at {moment}"):
             positions = motion.at(time)
-        except InputError:
-            raise
-        except Exception as exc:  # the libraries raise kinds of their own for damaged samples
-            raise InputError(f"{self._where}: mesh {motion.name!r} cannot be read at {moment}: {one_line(exc)}") from exc
         if len(positions) != motion.n_vertices:
             what = f"mesh {motion.name!r} has {len(positions)} vertices at {moment}, {motion.n_vertices} at first"
             raise TopologyChange.at(f"{self._where}: {what}", frame, self._start)
@@ -126,19 +123,6 @@ class SceneFrames:
 def first_frame_of(moment: float, times: Array) -> int:
     """The first of frames at ``times`` that shows a sample of some moment."""
     return int(np.searchsorted(times, moment - 1e-6))
-
-
-def one_line(exc: BaseException) -> str:
-    """The text of a library's error as one short line, without where in the library's sources it arose."""
-    try:
-        text = str(exc)
-    except UnicodeError:  # it quotes a damaged file
-        return "its text is damaged"
-    usd = re.search(r" in file \S+ : '(.*?)'?\s*(?:$|Error in)", text, re.DOTALL)
-    text = re.sub(r"parse error matching .*? at '", "parse error at '", usd[1], flags=re.DOTALL) if usd else text
-    alembic = text.rsplit("EXCEPTION:", 1)
-    text = alembic[-1] if len(alembic) > 1 else text
-    return " ".join(text.split())[:200] or type(exc).__name__
 
 
 def even_times(samples: Float64, fps: float | None, default: float, where: str) -> tuple[Float64, float, tuple[str, ...]]:

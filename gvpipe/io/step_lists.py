@@ -13,6 +13,7 @@ import numpy as np
 
 from gvpipe.arrays import Float64
 from gvpipe.errors import InputError
+from gvpipe.io.damage import reading
 from gvpipe.io.frame_columns import split_columns
 from gvpipe.io.frame_files import FrameFiles
 from gvpipe.io.options import ReadOptions
@@ -35,16 +36,11 @@ def read_step_list(path: Path, options: ReadOptions) -> MeshSequence:
     Raises:
         InputError: it is no such list, names a file that is missing or lies outside its folder, or a file cannot be read.
     """
-    try:
+    with reading(path, path.suffix[1:], remedy="save it again"):
         listed = _read_list(path)
         start, stop = options.span(len(listed), str(path))
         listed = listed[start:stop]
         files = [side_file(path, name, "step") for _, name in listed]
-    except InputError:
-        raise
-    except (OSError, ValueError, TypeError, KeyError) as exc:
-        reason = " ".join(str(exc).split())[:200]
-        raise InputError(f"{path} cannot be read as {path.suffix[1:]}: {reason}; save it again") from exc
     return read_listed(files, np.array([time for time, _ in listed], np.float64), path, options, start)
 
 
@@ -87,8 +83,6 @@ def _read_list(path: Path) -> list[tuple[float, str]]:
     if path.stat().st_size > LARGEST_LIST:
         raise ValueError(f"it has {path.stat().st_size} bytes; a list has at most {LARGEST_LIST}")
     data = path.read_bytes()
-    if not data.strip():
-        raise ValueError("the file is empty")
     listed = _from_json(data) if path.suffix.lower() == ".series" else _from_xml(data)
     listed.sort(key=lambda pair: pair[0])
     if not listed:

@@ -3,11 +3,16 @@
 Corners at exactly equal positions in the first frame become one vertex, numbered by first appearance. The same map joins the
 corners of all other frames. Where corners that were one vertex part later, connectivity is not constant and the frame is
 refused. Reading is trimesh's; writing is one structured array.
+
+A binary file has a header of 80 bytes, the number of triangles, and 50 bytes for each. A file whose size fits that number is
+binary, though its header may begin as text does.
 """
 
 from __future__ import annotations
 
+import io
 import struct
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -24,6 +29,7 @@ from gvpipe.sequence import MeshSequence, check_finite
 
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 HEADER_BYTES = 80
+START = HEADER_BYTES + 4  # of the triangles of a binary file
 
 
 class StlLoader:
@@ -71,11 +77,34 @@ def _load_corners(path: Path) -> tuple[Float64, list[tuple[str, int]]]:
     """All corners, ``(3 T, 3)``, and the solids' names and triangles; binary files have one solid."""
     import trimesh
 
-    scene: Any = trimesh.load_scene(path, file_type="stl", process=False)
+    data = path.read_bytes()
+    _check_whole(data)
+    scene: Any = trimesh.load_scene(io.BytesIO(data), file_type="stl", process=False)
     solids = [np.asarray(solid.vertices, np.float64)[solid.faces.reshape(-1)] for solid in scene.geometry.values()]
-    if not solids:
+    if not any(map(len, solids)):
         raise ValueError("it has no triangles")
     return np.concatenate(solids), [(name, len(solid) // 3) for name, solid in zip(scene.geometry, solids, strict=True)]
+
+
+def _check_whole(data: bytes) -> None:
+    """Raise `ValueError` for what trimesh would refuse without a cause, or read in part."""
+    n_triangles = struct.unpack_from("<I", data, HEADER_BYTES)[0] if len(data) >= START else -1
+    needed = START + n_triangles * RECORD.itemsize
+    if len(data) == needed:
+        return
+    try:
+        text = data.decode()
+    except UnicodeDecodeError:
+        text = ""
+    if not text.lstrip().lower().startswith("solid"):
+        said = f"its header says {n_triangles} triangles, {needed} bytes, but " if n_triangles >= 0 else ""
+        raise ValueError(f"{said}it has {len(data)} bytes, and is no text; it is another format or cut short")
+    lines = [line.split()[0].lower() for line in text.splitlines() if line.strip()]
+    counts = Counter(lines)
+    if counts["endsolid"] < counts["solid"]:
+        raise ValueError("a solid has no 'endsolid'; the file is cut short")
+    if counts["vertex"] != 3 * counts["facet"]:
+        raise ValueError(f"its {counts['facet']} facets have {counts['vertex']} vertices; three for each are needed")
 
 
 def _make_parts(solids: list[tuple[str, int]], faces: Int32) -> tuple[Part, ...]:

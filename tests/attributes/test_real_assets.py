@@ -13,7 +13,7 @@ from gvpipe.attributes.surface import Surface
 from gvpipe.attributes.surface_normals import largest_error
 
 sys.path.append(str(ROOT / "tools"))
-from measure_attributes import draco_bytes, own_bytes, read_gltf  # type: ignore[import-not-found]
+from measure_attributes import draco_bytes, own_bytes, read_gltf
 
 ASSETS = DATA / "assets" / "gltf"
 FILES = ["CesiumMan_Binary/CesiumMan.glb", "Fox/Fox.glb", "gdx_pbrTest_8influences/pbrTest.gltf"]

@@ -35,7 +35,7 @@ def test_an_archive_with_everything(run: Run, tmp_path: Path) -> None:
     assert values["bounding_box"]["min"] == given[0].min(axis=0).tolist()
     gvpipe.encode(given, tmp_path / "a.mp4", "pca")
     of_video = json.loads(run("info", tmp_path / "a.mp4", "--json").out)
-    assert set(values) - set(of_video) == {"clips"}
+    assert set(values) - set(of_video) == {"clips", "clip_ranges", "time_range"}
     assert all(values[key] == of_video[key] for key in ("frames", "vertices", "materials", "images", "metadata"))
     text = run("info", tmp_path / "a.npz").out
     assert f"{given.n_vertices} vertices" in text and "attribute uv: uv, 2 x float32" in text and "bytes" in text
@@ -72,12 +72,12 @@ def two_clips(path: Path) -> None:
 def test_clips_of_a_gltf_file(run: Run, tmp_path: Path) -> None:
     two_clips(tmp_path / "a.glb")
     values = json.loads(run("info", tmp_path / "a.glb", "--json").out)
-    assert values["clips"] == ["Walk", "Run"] and values["frames"] == 31
+    assert values["clips"] == ["Walk", "Run"] and values["clip_ranges"] == [[0, 1], [0, 2]] and values["frames"] == 31
     values = json.loads(run("info", tmp_path / "a.glb", "--clip", "Run", "--json").out)
     assert values["frames"] == 61
-    assert "clips: Walk, Run\n" in run("info", tmp_path / "a.glb").out
+    assert "time: 0..1 s\nclips: Walk (0..1 s), Run (0..2 s)\n" in run("info", tmp_path / "a.glb").out
     ended = run("info", tmp_path / "a.glb", "--clip", "Rum")
-    assert ended.status == 1 and "its clips: Walk, Run" in ended.err and ended.err.count("\n") == 1
+    assert ended.status == 1 and "there are: 'Walk', 'Run'" in ended.err and ended.err.count("\n") == 1
 
 
 def test_a_point_cache_needs_its_mesh(run: Run, sequence: MeshSequence, tmp_path: Path) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +68,7 @@ BAD_ARCHIVES = {
     "no faces": ({"vertices": OK["vertices"]}, "no array 'faces'"),
     "flat": ({**OK, "vertices": np.zeros((3, 3))}, "'vertices' has shape (3, 3)"),
     "text": ({**OK, "vertices": np.full((1, 3, 3), "a")}, "'vertices' has shape (1, 3, 3) and type <U1"),
-    "objects": ({**OK, "vertices": np.full((1, 3, 3), None)}, "cannot be read as .npz (Object arrays"),
+    "objects": ({**OK, "vertices": np.full((1, 3, 3), None)}, "cannot be read as .npz: Object arrays"),
     "faces": ({**OK, "faces": FACES[:, :2]}, "faces have shape (3, 2)"),
     "index": ({**OK, "faces": FACES + 1}, "vertex indices must lie in 0..2"),
     "fps": ({**OK, "fps": np.arange(3)}, "'fps' has shape (3,)"),
@@ -91,7 +93,7 @@ def test_npz_errors(tmp_path: Path, arrays: Any, message: str) -> None:
 def test_npz_damaged(tmp_path: Path) -> None:
     io.write(grid(2, 2), tmp_path / "a.npz")
     whole = (tmp_path / "a.npz").read_bytes()
-    for stop in range(0, len(whole), 7):
+    for stop in range(1, len(whole), 7):
         (tmp_path / "b.npz").write_bytes(whole[:stop])
         with pytest.raises(InputError, match=r"is not an .npz archive, or is cut short"):
             io.read(tmp_path / "b.npz")
@@ -239,7 +241,44 @@ def test_a_damaged_field_is_refused_when_it_is_read(tmp_path: Path, order: Any) 
     at = whole.index(heat.tobytes(order)[:8]) + 90_000
     (tmp_path / "a.npz").write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
     read = io.read(tmp_path / "a.npz")
-    with pytest.raises(InputError, match=r"a.npz: 'field_heat' cannot be read \(Bad CRC-32 .*write it again"):
+    with pytest.raises(InputError, match=r"a.npz: 'field_heat' cannot be read: Bad CRC-32 .*write it again"):
         read.fields["heat"].read(0, 2)
     with pytest.raises(InputError, match="'field_heat' cannot be read"):
         read.fields["heat"].read(0, 2)
+
+
+def test_misspelt_members_are_noted(tmp_path: Path) -> None:
+    """What means nothing is left out with a note: a misspelt field would be lost without a word."""
+    described = {"version": 1, "atributes": {}, "attributes": {"gone": {"domain": "vertex", "kind": "scalar", "unit": ""}}}
+    vertices, faces = np.eye(3)[None], np.array([[0, 1, 2]])
+    odd_members: dict[str, Any] = {"Fps": 30, "feild_heat": np.zeros((1, 3))}
+    np.savez(
+        tmp_path / "a.npz",
+        vertices=vertices,
+        faces=faces,
+        **odd_members,
+        indices_heat=np.zeros(3, int),
+        image_0=np.zeros(3, np.uint8),
+        attribute_=[1, 2, 3],
+    )
+    read = io.read(tmp_path / "a.npz")
+    odd = "'Fps', 'feild_heat', 'indices_heat', 'image_0', 'attribute_'"
+    assert read.notes == (f"members of the archive mean nothing and were left out: {odd}; did you mean 'fps'?",)
+    assert not read.fields and not read.attributes
+    np.savez(tmp_path / "a.npz", vertices=vertices, faces=faces, asset=np.array(json.dumps(described)))
+    assert io.read(tmp_path / "a.npz").notes == (
+        "'asset' has keys that mean nothing: 'atributes'; did you mean 'attributes'?",
+        "'asset' describes attributes that are not there: 'gone'",
+    )
+
+
+def test_damaged_lzma(tmp_path: Path) -> None:
+    io.write(grid(1, 2), tmp_path / "a.npz")
+    with zipfile.ZipFile(tmp_path / "a.npz") as plain, zipfile.ZipFile(tmp_path / "b.npz", "w", zipfile.ZIP_LZMA) as packed:
+        for name in plain.namelist():
+            packed.writestr(name, plain.read(name))
+    data = bytearray((tmp_path / "b.npz").read_bytes())
+    data[60:80] = bytes([0x55]) * 20
+    (tmp_path / "b.npz").write_bytes(data)
+    with pytest.raises(InputError, match=r"b\.npz cannot be read as \.npz: "):
+        io.read(tmp_path / "b.npz")

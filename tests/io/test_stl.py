@@ -55,3 +55,25 @@ def test_solids_are_parts(tmp_path: Path) -> None:
     assert read.parts == (Part("lid", (0, 3), (0, 1)), Part("big box", (0, 6), (1, 3)))
     notes = io.write(read, tmp_path / "b.stl")
     assert notes == ("STL has no place for parts; left out (.npz holds everything)",)
+
+
+def test_damaged_files(tmp_path: Path) -> None:
+    """Sizes that do not fit are said; a text needs its ends, and three numbers for each vertex."""
+    io.write(grid(1), tmp_path / "a.stl")
+    whole = (tmp_path / "a.stl").read_bytes()
+    text = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n"
+    for data, words in (
+        (whole[:-1], "its header says 50 triangles, 2584 bytes, but it has 2583 bytes"),
+        (whole + b"more", "but it has 2588 bytes"),
+        (b"\x99" * 40, "it has 40 bytes, and is no text"),
+        (text[:-10], "has no 'endsolid'"),
+        (text.replace(b"vertex 1 0 0\n", b""), "its 1 facets have 2 vertices"),
+        (text.replace(b"1 0 0", b"1 x 0"), ""),
+        (b"solid a\nendsolid a\n", "it has no triangles"),
+    ):
+        (tmp_path / "a.stl").write_bytes(data)
+        with pytest.raises(InputError, match=r"a\.stl cannot be read as STL: ") as caught:
+            io.read(tmp_path / "a.stl")
+        assert words in str(caught.value)
+    (tmp_path / "a.stl").write_bytes(b"solid " + whole[6:])  # binary, though it begins like a text
+    assert len(io.read(tmp_path / "a.stl").faces) == 50

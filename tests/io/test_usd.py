@@ -374,7 +374,7 @@ def test_points_that_change_in_number(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".usda", ".usdc", ".usd", ".usdz"])
-@pytest.mark.parametrize("data", [b"", b"PNG and no stage", b"v 0 0 0\n"])
+@pytest.mark.parametrize("data", [b"PNG and no stage", b"v 0 0 0\n"])
 def test_other_files_under_the_name(tmp_path: Path, suffix: str, data: bytes) -> None:
     path = tmp_path / f"a{suffix}"
     path.write_bytes(data)
@@ -414,3 +414,18 @@ def test_mesh_without_parts(tmp_path: Path) -> None:
     assert [(part.name, part.parent) for part in read.parts] == [("walk", "")]
     assert np.array_equal(read.faces, bare.faces)
     assert np.array_equal(read[:], bare[:])
+
+
+@pytest.mark.parametrize("arc", ['def "a" (references = @../b.usda@) {}', 'def "a" (payload = @../b.usda@) {}', "sublayer"])
+def test_stages_outside_of_the_folder(tmp_path: Path, arc: str) -> None:
+    """A file shows nothing from elsewhere; a file below its folder may be shown."""
+    (tmp_path / "in" / "below").mkdir(parents=True)
+    text = '#usda 1.0\n(defaultPrim = "m")\ndef Mesh "m" {' + TRIANGLE + "}\n"
+    for place in (tmp_path, tmp_path / "in" / "below"):
+        (place / "b.usda").write_text(text)
+    head = "#usda 1.0\n" + ("(subLayers = [@../b.usda@])\n" if arc == "sublayer" else arc)
+    (tmp_path / "in" / "a.usda").write_text(head)
+    with pytest.raises(InputError, match=r"a\.usda takes what it shows from outside of its folder: .*b\.usda; put that inside"):
+        io.read(tmp_path / "in" / "a.usda")
+    (tmp_path / "in" / "c.usda").write_text(head.replace("@../", "@below/"))
+    assert io.read(tmp_path / "in" / "c.usda").n_vertices == 3

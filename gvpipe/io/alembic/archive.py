@@ -5,14 +5,12 @@ The library's schemas crash when their objects are gone before them. So a node k
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gvpipe.errors import InputError
-from gvpipe.io.scene_frames import one_line
+from gvpipe.io.damage import reading
 
 EXTRA = "Alembic files need the package alembic3d; install it by: pip install 'gvpipe[alembic]'"
 OGAWA, HDF5 = b"Ogawa", b"\x89HDF"
@@ -67,19 +65,8 @@ def open_archive(path: Path) -> Any:
         raise InputError(f"{path} is not an Alembic file ({begins}); export it again")
     if len(head) < 8 or head[len(OGAWA)] != CLOSED:
         raise InputError(f"{path} was not written to its end; export it again")
-    with alembic_errors(path):
+    with reading(path, "Alembic"):
         return Abc.IArchive(str(path))
-
-
-@contextmanager
-def alembic_errors(path: Path) -> Iterator[None]:
-    """Turn what the library raises into `InputError`."""
-    try:
-        yield
-    except InputError:
-        raise
-    except (RuntimeError, ValueError, TypeError, IndexError, OverflowError, MemoryError, UnicodeError) as exc:
-        raise InputError(f"{path} cannot be read as Alembic: {one_line(exc)}; export it again") from exc
 
 
 def sample_of(held: Any, number: int) -> Any:

@@ -15,9 +15,10 @@ from gvpipe.arrays import Float64, Int64
 from gvpipe.asset.material import Material
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError, TopologyChange
-from gvpipe.io.alembic.archive import Node, alembic_errors, find_meshes, open_archive, sample_of
+from gvpipe.io.alembic.archive import Node, find_meshes, open_archive, sample_of
 from gvpipe.io.alembic.motion import AlembicMotion, around
 from gvpipe.io.alembic.params import changing_normals, layers_of, sampled_of
+from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_fields import join_fields, misfit_note
 from gvpipe.io.scene_frames import SceneFrames, even_times, first_frame_of
@@ -40,7 +41,7 @@ def read_alembic(path: Path, options: ReadOptions) -> MeshSequence:
             changes in the frames that are read, a position is not finite.
     """
     archive = open_archive(path)
-    with alembic_errors(path):
+    with reading(path, "Alembic"):
         return _read_archive(archive, path, options)
 
 

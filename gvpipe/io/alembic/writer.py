@@ -16,9 +16,9 @@ from gvpipe.atomic import atomic_path
 from gvpipe.errors import InputError, OutputError
 from gvpipe.io.alembic.archive import EXTRA
 from gvpipe.io.alembic.param_writer import ParamWriter, filled, is_held
+from gvpipe.io.damage import reason_of
 from gvpipe.io.losses import renamed_note, shadow_note, shadowed, unit_note
 from gvpipe.io.scene_export import ExportMesh, export_layer, export_meshes, uncovered
-from gvpipe.io.scene_frames import one_line
 from gvpipe.io.scene_normals import SceneNormals
 from gvpipe.notes import not_held
 from gvpipe.sequence import MeshSequence
@@ -43,7 +43,7 @@ def write_alembic(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
         with atomic_path(path) as temporary:
             _write_archive(sequence, meshes, normals, str(temporary))  # the library closes the file when its objects are gone
     except RuntimeError as exc:
-        raise OutputError(f"cannot write {path}: {one_line(exc)}; check the folder and the disk") from exc
+        raise OutputError(f"cannot write {path}: {reason_of(exc)}; check the folder and the disk") from exc
     return (*normals.notes, *_notes(sequence, meshes), *_name_notes(sequence))
 
 

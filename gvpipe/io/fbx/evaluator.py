@@ -104,7 +104,8 @@ class FbxScene:
 
     def _evaluate(self, time: float) -> tuple[Any, list[Any]]:
         """The scene at a time, and its nodes."""
-        options = {"evaluate_skinning": True, "evaluate_caches": True}
+        # without the last, caches stay at rest; `_load` has looked where their files are
+        options = {"evaluate_skinning": True, "evaluate_caches": True, "load_external_files": True}
         now = hold(self._ufbx.evaluate_scene(self._scene, self._anim, time, **options))
         return now, listed(now.nodes)
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.errors import InputError
+from gvpipe.io.damage import unreadable
 
 
 class FbxProcess:
@@ -56,10 +57,9 @@ class FbxProcess:
         try:
             state, result = pickle.load(self._process.stdout)
         except (EOFError, OSError, pickle.UnpicklingError) as exc:
-            raise InputError(f"{self._path} cannot be read as FBX: ufbx, which is experimental, died; export it again") from exc
+            raise unreadable(self._path, "FBX", "ufbx, which is experimental, died") from exc
         if state == "refused":
-            reason = str(result).removeprefix(f"{self._path}: ")
-            raise InputError(f"{self._path} cannot be read as FBX: {reason}; export it again")
+            raise unreadable(self._path, "FBX", str(result).removeprefix(f"{self._path}: "))
         return result
 
 

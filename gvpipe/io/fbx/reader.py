@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.arguments import did_you_mean
 from gvpipe.arrays import Array, Float64
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
+from gvpipe.io.damage import reading, unknown_name
 from gvpipe.io.fbx.evaluator import Described, Take
 from gvpipe.io.fbx.process import FbxProcess
 from gvpipe.io.options import ReadOptions
@@ -58,12 +58,15 @@ def read_fbx(path: Path, options: ReadOptions) -> MeshSequence:
     Raises:
         InputError: ufbx is missing, the file is damaged, it has no mesh, there is no such take, a position is not finite.
     """
+    with reading(path, "FBX"):
+        return _read_fbx(path, options)
+
+
+def _read_fbx(path: Path, options: ReadOptions) -> MeshSequence:
     where = str(path)
-    if not path.stat().st_size:
-        raise InputError(f"{path} is empty; export it again")
     process = FbxProcess(path)
     takes: list[Take] = process.ask("takes")
-    take, take_notes = _take(takes, options.clip, where)
+    take, take_notes = _take(takes, options.clip)
     if take is not None:
         process.ask("choose", takes.index(take))
     held: Described = process.ask("describe", take.start if take else 0.0)
@@ -98,12 +101,17 @@ def read_fbx(path: Path, options: ReadOptions) -> MeshSequence:
     )
 
 
-def _take(takes: list[Take], clip: str | None, where: str) -> tuple[Take | None, tuple[str, ...]]:
+def read_takes(path: Path) -> list[Take]:
+    """The takes of a file; raises `InputError`."""
+    takes: list[Take] = FbxProcess(path).ask("takes")
+    return takes
+
+
+def _take(takes: list[Take], clip: str | None) -> tuple[Take | None, tuple[str, ...]]:
     """The take that is read, None if the file has none, and notes."""
     names = [take.name for take in takes]
     if clip is not None and clip not in names:
-        there = f"there are {', '.join(map(repr, names))}" if names else "it has none"
-        raise InputError(f"{where} has no take {clip!r}; {there}{did_you_mean(clip, names)}")
+        raise unknown_name("clip", clip, names)
     if not takes:
         return None, ()
     number = 0 if clip is None else names.index(clip)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gvpipe.io.gltf.reader import GltfLoader, read_animated, read_clip_names, read_poses
+from gvpipe.io.gltf.reader import GltfLoader, read_animated, read_clips, read_poses
 from gvpipe.io.gltf.writer import encode_glb, write_animated
 
-__all__ = ["GltfLoader", "encode_glb", "read_animated", "read_clip_names", "read_poses", "write_animated"]
+__all__ = ["GltfLoader", "encode_glb", "read_animated", "read_clips", "read_poses", "write_animated"]

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arguments import did_you_mean
 from gvpipe.arrays import Float64
+from gvpipe.io.damage import unknown_name
 from gvpipe.io.gltf.accessors import Accessors
 from gvpipe.io.gltf.document import Document
 from gvpipe.io.gltf.interpolation import MODES, Curve
@@ -70,14 +70,22 @@ def find_clip(document: Document, name: str | None) -> int:
     """The number of the animation of that name; of the first that moves anything for None.
 
     Raises:
-        ValueError: there is none of that name.
+        InputError: there is none of that name.
     """
     names = [text(clip, "name") or f"animation_{number}" for number, clip in enumerate(document.items("animations"))]
     chosen = clip_names(document)[0] if name is None else name
     if chosen not in names:
-        listed = ", ".join(names) or "none"
-        raise ValueError(f"it has no clip {chosen!r}{did_you_mean(chosen, names)}; its clips: {listed[:300]}")
+        raise unknown_name("clip", chosen, names)
     return names.index(chosen)
+
+
+def clip_times(accessors: Accessors, name: str) -> tuple[float, float]:
+    """First and last second of the keys of an animation; raises `ValueError`."""
+    clip, where = accessors.document.item("animations", find_clip(accessors.document, name))
+    inputs = {integer(one, "input", where) for one in objects(clip, "samplers", where)}
+    keys = [accessors.read_floats(one, ("SCALAR",), where) for one in sorted(inputs)]
+    every = np.concatenate([np.zeros((int(not keys), 1), np.float32), *keys])
+    return float(every.min()), float(every.max())
 
 
 def read_clip(accessors: Accessors, number: int, morph_counts: dict[int, int]) -> Clip:

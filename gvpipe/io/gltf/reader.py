@@ -14,7 +14,9 @@ import numpy as np
 from gvpipe.arrays import Array, Float32, Float64, Floats, Int64
 from gvpipe.asset.attribute import guess_kind
 from gvpipe.errors import InputError
-from gvpipe.io.gltf.clips import Clip, clip_names, key_rate
+from gvpipe.io.damage import reading
+from gvpipe.io.gltf.accessors import Accessors
+from gvpipe.io.gltf.clips import Clip, clip_names, clip_times, key_rate
 from gvpipe.io.gltf.document import load_document
 from gvpipe.io.gltf.json_fields import rounded_up
 from gvpipe.io.gltf.poses import Poses
@@ -128,24 +130,19 @@ def read_animated(path: Path, options: ReadOptions = NO_OPTIONS) -> MeshSequence
     Raises:
         InputError: it cannot be read, or has no such clip.
     """
-    try:
+    with reading(path, path.suffix[1:].upper()):
         document = load_document(path)
         names = clip_names(document)
         if not names and options.clip is None:
             return None
-        if not names:
-            raise ValueError(f"it has no animation, so no clip {options.clip!r}")
         return _sequence(path, read_scene(document, options.clip), options.fps, names)
-    except InputError as exc:
-        raise InputError(str(exc) if str(path) in str(exc) else f"{path}: {exc}") from exc
-    except Exception as exc:  # damaged files may raise nearly anything inside numpy
-        reason = getattr(exc, "strerror", None) or " ".join(str(exc).split())[:300] or type(exc).__name__
-        raise InputError(f"{path} cannot be read as {path.suffix[1:].upper()}: {reason}; export it again") from exc
 
 
-def read_clip_names(path: Path) -> list[str]:
-    """Names of the file's animations that move anything; raises `ValueError`."""
-    return clip_names(load_document(path))
+def read_clips(path: Path) -> list[tuple[str, float, float]]:
+    """Name, first and last second of each of the file's animations that move anything; raises `InputError`."""
+    with reading(path, path.suffix[1:].upper()):
+        accessors = Accessors(load_document(path))
+        return [(name, *clip_times(accessors, name)) for name in clip_names(accessors.document)]
 
 
 def read_poses(path: Path, clip: str | None = None) -> Poses:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.arrays import Array, Float64, Floats
-from gvpipe.errors import InputError
+from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.cells import Cells, equal_cells, join_cells, structured_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
@@ -61,13 +61,8 @@ def read_ensight(path: Path, options: ReadOptions) -> MeshSequence:
     Raises:
         InputError: it is no such file, a file that it names is missing or damaged, or it has elements that are not read.
     """
-    try:
+    with reading(path, "EnSight"):
         steps = EnsightSteps(path)
-    except InputError:
-        raise
-    except (OSError, ValueError) as exc:
-        reason = " ".join(str(exc).split())[:200]
-        raise InputError(f"{path} cannot be read as EnSight: {reason}; export it again") from exc
     return read_steps(steps, path, options, steps.notes)
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.arrays import Array, Float64, Floats
-from gvpipe.errors import InputError
+from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.cells import Cells, equal_cells, join_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
@@ -54,13 +54,8 @@ def read_exodus(path: Path, options: ReadOptions) -> MeshSequence:
         InputError: it is no such file, is damaged, or has elements that are not read.
     """
     file = open_netcdf(path)
-    try:
+    with reading(path, "Exodus"):
         steps = ExodusSteps(file)
-    except InputError:
-        raise
-    except Exception as exc:  # damaged files raise nearly anything inside SciPy and h5py
-        reason = " ".join(str(exc).split())[:200] or type(exc).__name__
-        raise InputError(f"{path} cannot be read as Exodus: {reason}; export it again") from exc
     return read_steps(steps, path, options, steps.notes)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from gvpipe.errors import InputError
+from gvpipe.io.damage import FRAME_AGAIN, reading
 from gvpipe.io.mesh import FrameValues, Mesh
 from gvpipe.io.simulation.cells import Cells
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
@@ -49,13 +49,8 @@ class SurfaceLoader:
 
 def _guarded(path: Path, name: str, read: Callable[[], FrameValues]) -> FrameValues:
     """Numbers of a file; raises `InputError` with its name for whatever goes wrong."""
-    try:
+    with reading(path, "", repr(name), FRAME_AGAIN):
         return read()
-    except InputError:
-        raise
-    except Exception as exc:  # damaged files raise nearly anything inside NumPy
-        reason = " ".join(str(exc).split())[:200] or type(exc).__name__
-        raise InputError(f"{path}: {name!r} cannot be read: {reason}; export this frame again") from exc
 
 
 STEP_LOADERS: dict[str, Callable[[], SurfaceLoader]] = {

@@ -13,6 +13,7 @@ import numpy as np
 
 from gvpipe.arrays import Array
 from gvpipe.errors import InputError
+from gvpipe.io.damage import WHOLE, reading
 from gvpipe.io.simulation.limits import check_bytes
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -31,19 +32,15 @@ def open_hdf(path: Path) -> HdfFile:
     """Open a file for reading.
 
     Raises:
-        InputError: h5py is missing, or the file is no HDF5, empty or cut short.
+        InputError: h5py is missing, or the file is no HDF5, or cut short.
     """
     h5py = import_h5py(str(path))
     size = path.stat().st_size
-    if not size:
-        raise InputError(f"{path} is empty; export it again")
     with open(path, "rb") as file:
         if file.read(8) != SIGNATURE:
             raise InputError(f"{path} is not an HDF5 file; export it again")
-    try:
+    with reading(path, "HDF5", remedy=WHOLE):
         return HdfFile(h5py, h5py.File(path, "r", locking=False), size)
-    except OSError as exc:
-        raise InputError(f"{path} cannot be read as HDF5, or is cut short ({' '.join(str(exc).split())[:120]})") from exc
 
 
 class HdfFile:

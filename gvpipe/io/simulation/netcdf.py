@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from gvpipe.arrays import Array
 from gvpipe.errors import InputError
+from gvpipe.io.damage import WHOLE, reading
 from gvpipe.io.simulation.hdf import SIGNATURE, HdfFile, open_hdf
 from gvpipe.io.simulation.limits import check_bytes
 
@@ -38,8 +40,6 @@ def open_netcdf(path: Path) -> NetCdf:
     size = path.stat().st_size
     with open(path, "rb") as file:
         head = file.read(8)
-    if not head:
-        raise InputError(f"{path} is empty; export it again")
     if head == SIGNATURE:
         return Hdf4(open_hdf(path))
     if head[:3] != b"CDF":
@@ -55,12 +55,19 @@ class Classic:
     def __init__(self, path: Path, size: int) -> None:
         from scipy.io import netcdf_file
 
+        class QuietFile(netcdf_file):
+            """A file that closes without a warning where arrays of a damaged one are still mapped."""
+
+            def close(self) -> None:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", RuntimeWarning)
+                    super().close()
+
+            __del__ = close
+
         self._size = size
-        try:
-            self._file: Any = netcdf_file(path, "r", mmap=True)
-        except Exception as exc:  # damaged headers raise nearly anything inside SciPy
-            reason = " ".join(str(exc).split())[:120] or type(exc).__name__
-            raise InputError(f"{path} cannot be read as netCDF, or is cut short ({reason}); export it again") from exc
+        with reading(path, "netCDF", remedy=WHOLE):
+            self._file: Any = QuietFile(path, "r", mmap=True)
 
     def has(self, name: str) -> bool:
         return name in self._file.variables

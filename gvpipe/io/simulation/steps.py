@@ -18,6 +18,7 @@ from gvpipe.asset.field import Field
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError, TopologyChange
 from gvpipe.forks import ForkLock
+from gvpipe.io.damage import reading
 from gvpipe.io.mesh import FrameValues
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
@@ -116,14 +117,8 @@ class StepFrames:
 
     def guarded(self, frame: int, read: Callable[[], Result]) -> Result:
         """What ``read`` returns; raises `InputError` naming file and frame for whatever goes wrong inside."""
-        try:
-            with self._lock:
-                return read()
-        except InputError:
-            raise
-        except Exception as exc:  # damaged files raise nearly anything inside NumPy, h5py and SciPy
-            reason = " ".join(str(exc).split())[:200] or type(exc).__name__
-            raise InputError(f"{self._path}: frame {frame} cannot be read: {reason}; export it again") from exc
+        with reading(self._path, "", f"frame {frame}"), self._lock:
+            return read()
 
     def _changed(self, frame: int, what: str) -> TopologyChange:
         at = self.start + frame

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.arrays import Array, Float64, Floats, Int64
-from gvpipe.errors import InputError
+from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.cells import Cells, join_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
@@ -40,12 +40,8 @@ def read_vtkhdf(path: Path, options: ReadOptions) -> MeshSequence:
         InputError: h5py is missing, it is no such file, it is damaged, or its data set is of another kind.
     """
     file = open_hdf(path)
-    try:
+    with reading(path, "VTKHDF"):
         steps = VtkHdfSteps(file)
-    except InputError:
-        raise
-    except Exception as exc:  # damaged files raise nearly anything inside h5py
-        raise InputError(f"{path} cannot be read as VTKHDF: {' '.join(str(exc).split())[:200]}; export it again") from exc
     return read_steps(steps, path, options)
 
 

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from gvpipe.arrays import Array, Float64, Floats
-from gvpipe.errors import InputError
+from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.cells import SIZES, Cells, equal_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
@@ -49,12 +49,8 @@ def read_xdmf(path: Path, options: ReadOptions) -> MeshSequence:
     Raises:
         InputError: h5py is missing for HDF5, it is no such file, it is damaged, or a file that it names is missing.
     """
-    try:
+    with reading(path, "XDMF"):
         steps = XdmfSteps(path)
-    except InputError:
-        raise
-    except Exception as exc:  # damaged files raise nearly anything inside the XML parser
-        raise InputError(f"{path} cannot be read as XDMF: {' '.join(str(exc).split())[:200]}; export it again") from exc
     return read_steps(steps, path, options)
 
 

@@ -22,7 +22,7 @@ from gvpipe.io.usd.meshes import find_meshes, groups_of, polygons_of
 from gvpipe.io.usd.motion import Skins, UsdMotion
 from gvpipe.io.usd.names import name_of, parent_path
 from gvpipe.io.usd.primvars import layers_of, sampled_of
-from gvpipe.io.usd.stage import open_stage, outside_note, stage_times, usd_errors
+from gvpipe.io.usd.stage import check_inside, open_stage, stage_times, usd_errors
 from gvpipe.sequence import MeshSequence
 
 
@@ -34,8 +34,8 @@ def read_usd(path: Path, options: ReadOptions) -> MeshSequence:
         options: `fps` samples the stage's range at that rate instead of once per time code; `frames` are those that are read.
 
     Raises:
-        InputError: usd-core is missing, the file is damaged or refers to a file that is missing, it has no mesh, a
-            mesh's topology changes in the frames that are read, a position is not finite.
+        InputError: usd-core is missing, the file is damaged or refers to a file that is missing or outside of its folder,
+            it has no mesh, a mesh's topology changes in the frames that are read, a position is not finite.
     """
     stage = open_stage(path)
     with usd_errors(path):
@@ -46,6 +46,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
     from pxr import UsdGeom
 
     where = str(path)
+    check_inside(stage, path)
     found = find_meshes(stage)
     skins, materials = Skins(stage), Materials(stage, path)
     places = UsdGeom.XformCache()
@@ -80,7 +81,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
         attributes,
         where,
         frames.origin,
-        (*found.notes, *time_notes, *materials.notes(), *layer_notes, *unruled, *misfits, *outside_note(stage, path)),
+        (*found.notes, *time_notes, *materials.notes(), *layer_notes, *unruled, *misfits),
         fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,

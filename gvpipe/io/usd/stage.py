@@ -14,8 +14,9 @@ import numpy as np
 
 from gvpipe.arrays import Float64
 from gvpipe.errors import InputError
+from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_frames import between_note, frame_times, one_line
+from gvpipe.io.scene_frames import between_note, frame_times
 
 EXTRA = "USD files need the package usd-core; install it by: pip install 'gvpipe[usd]'"
 SIGNATURES = {  # first bytes by extension; .usd is text or binary
@@ -63,25 +64,26 @@ def open_stage(path: Path) -> Any:
 @contextmanager
 def usd_errors(path: Path) -> Iterator[None]:
     """Turn what the library raises into `InputError`, and keep its warnings from the terminal."""
-    from pxr import Tf, UsdUtils
+    from pxr import UsdUtils
 
     silencer = UsdUtils.CoalescingDiagnosticDelegate()
     try:
-        yield
-    except InputError:
-        raise
-    except (Tf.ErrorException, RuntimeError, ValueError, TypeError, OverflowError, MemoryError) as exc:
-        raise InputError(f"{path} cannot be read as USD: {one_line(exc)}; export it again") from exc
+        with reading(path, "USD"):
+            yield
     finally:
         silencer.TakeUncoalescedDiagnostics()
         del silencer
 
 
-def outside_note(stage: Any, path: Path) -> tuple[str, ...]:
-    """Of layers that lie outside of the file's folder."""
+def check_inside(stage: Any, path: Path) -> None:
+    """Raise `InputError` if a layer that the stage uses lies outside of the file's folder."""
     folder = Path(os.path.realpath(path)).parent
     outside = [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath and not is_inside(layer.realPath, folder)]
-    return (f"it refers to {len(outside)} files outside of its folder, such as {outside[0]}",) if outside else ()
+    if outside:
+        raise InputError(
+            f"{path} takes what it shows from outside of its folder: {outside[0]}; put that inside, or make one file of all "
+            "(usdcat --flatten)"
+        )
 
 
 def is_inside(path: str, folder: Path) -> bool:

@@ -17,9 +17,9 @@ from gvpipe import notes
 from gvpipe.arrays import Float32
 from gvpipe.atomic import atomic_path, unnamed_path
 from gvpipe.errors import InputError, OutputError
+from gvpipe.io.damage import reason_of
 from gvpipe.io.losses import renamed_note, shadow_note, shadowed, unit_note
 from gvpipe.io.scene_export import ExportMesh, export_meshes, uncovered
-from gvpipe.io.scene_frames import one_line
 from gvpipe.io.scene_normals import SceneNormals
 from gvpipe.io.usd.material_writer import MaterialWriter
 from gvpipe.io.usd.names import ADDED, identifier, name_prim
@@ -51,7 +51,7 @@ def write_usd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
             said = _write_stage(sequence, temporary, path.stem, folder.name)
         _write_images(sequence, folder)
     except (Tf.ErrorException, RuntimeError) as exc:
-        raise OutputError(f"cannot write {path}: {one_line(exc)}; check the folder and the disk") from exc
+        raise OutputError(f"cannot write {path}: {reason_of(exc)}; check the folder and the disk") from exc
     return said
 
 

@@ -3,87 +3,20 @@
 from __future__ import annotations
 
 import importlib.util
+import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fbx_files import FBX, with_cache, with_texture, write_mc
 from folders import DATA
+from PIL import Image
+from scipy.spatial import KDTree
 
 import gvpipe.io
 from gvpipe.errors import InputError
 
 pytest.importorskip("ufbx")
-
-SECOND = 46186158000  # ticks of FBX
-FBX = f"""; FBX 7.4.0 project file
-FBXHeaderExtension:  {{
-	FBXHeaderVersion: 1003
-	FBXVersion: 7400
-}}
-GlobalSettings:  {{
-	Version: 1000
-	Properties70:  {{
-		P: "UpAxis", "int", "Integer", "",1
-		P: "UpAxisSign", "int", "Integer", "",1
-		P: "FrontAxis", "int", "Integer", "",2
-		P: "FrontAxisSign", "int", "Integer", "",1
-		P: "CoordAxis", "int", "Integer", "",0
-		P: "CoordAxisSign", "int", "Integer", "",1
-		P: "UnitScaleFactor", "double", "Number", "",1
-		P: "TimeMode", "enum", "", "",11
-	}}
-}}
-Objects:  {{
-	Geometry: 1, "Geometry::quad", "Mesh" {{
-		Vertices: *12 {{
-			a: 0,0,0,1,0,0,1,1,0,0,1,0
-		}}
-		PolygonVertexIndex: *4 {{
-			a: 0,1,2,-4
-		}}
-		GeometryVersion: 124
-	}}
-	Model: 2, "Model::box", "Mesh" {{
-		Version: 232
-	}}
-	AnimationStack: 3, "AnimStack::Lift", "" {{
-		Properties70:  {{
-			P: "LocalStart", "KTime", "Time", "",0
-			P: "LocalStop", "KTime", "Time", "",{SECOND}
-		}}
-	}}
-	AnimationLayer: 4, "AnimLayer::base", "" {{
-	}}
-	AnimationCurveNode: 5, "AnimCurveNode::T", "" {{
-	}}
-	AnimationCurve: 6, "AnimCurve::", "" {{
-		KeyVer: 4008
-		KeyTime: *2 {{
-			a: 0,{SECOND}
-		}}
-		KeyValueFloat: *2 {{
-			a: 0,24
-		}}
-		KeyAttrFlags: *1 {{
-			a: 4
-		}}
-		KeyAttrDataFloat: *4 {{
-			a: 0,0,0,0
-		}}
-		KeyAttrRefCount: *1 {{
-			a: 2
-		}}
-	}}
-}}
-Connections:  {{
-	C: "OO",1,2
-	C: "OO",2,0
-	C: "OO",4,3
-	C: "OO",5,4
-	C: "OP",5,2, "Lcl Translation"
-	C: "OP",6,5, "d|Y"
-}}
-"""
 
 
 def test_a_moving_node(tmp_path: Path) -> None:
@@ -100,7 +33,7 @@ def test_a_moving_node(tmp_path: Path) -> None:
 def test_takes_by_name(tmp_path: Path) -> None:
     (tmp_path / "a.fbx").write_text(FBX)
     assert len(gvpipe.io.read(tmp_path / "a.fbx", clip="Lift")) == 25
-    with pytest.raises(InputError, match=r"no take 'Lfit'; there are 'Lift'"):
+    with pytest.raises(InputError, match=r"has no clip 'Lfit'; there are: 'Lift'; did you mean 'Lift'"):
         gvpipe.io.read(tmp_path / "a.fbx", clip="Lfit")
 
 
@@ -108,6 +41,68 @@ def test_no_mesh(tmp_path: Path) -> None:
     (tmp_path / "a.fbx").write_text(FBX.replace('C: "OO",1,2', ""))
     with pytest.raises(InputError, match="no polygon mesh"):
         gvpipe.io.read(tmp_path / "a.fbx")
+
+
+SLIDING = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]) + np.arange(25)[:, None, None] * np.array([0.5, 0, 0])
+
+
+@pytest.mark.parametrize("kind", ["pc2", "mc"])
+def test_geometry_caches_move(tmp_path: Path, kind: str) -> None:
+    """A cache slides by half a unit a frame, and its node rises by one."""
+    if kind == "pc2":
+        head = struct.pack("<12siiffi", b"POINTCACHE2\0", 1, 4, 0.0, 1.0, 25)
+        (tmp_path / "c.pc2").write_bytes(head + SLIDING.astype("<f4").tobytes())
+        (tmp_path / "a.fbx").write_text(with_cache("c.pc2"))
+    else:
+        write_mc(tmp_path / "c.mc", SLIDING)
+        (tmp_path / "a.fbx").write_text(with_cache("c.xml", 2, "quad"))
+    read = gvpipe.io.read(tmp_path / "a.fbx")
+    rising = np.arange(25)[:, None, None] * np.array([0, 1, 0])
+    assert np.allclose(read.read(0, 25), SLIDING + rising, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("../c.pc2", "lies outside the file's folder"), ("/etc/passwd", "lies outside"), ("gone.pc2", "'gone.pc2' is missing")],
+)
+def test_geometry_caches_lie_beside_the_file(tmp_path: Path, name: str, words: str) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "c.pc2").write_bytes(bytes(40))
+    (tmp_path / "in" / "a.fbx").write_text(with_cache(name))
+    with pytest.raises(InputError, match=words):
+        gvpipe.io.read(tmp_path / "in" / "a.fbx")
+
+
+def test_damaged_cache(tmp_path: Path) -> None:
+    (tmp_path / "c.pc2").write_bytes(b"POINTCACHE2\0" + b"x" * 50)
+    (tmp_path / "a.fbx").write_text(with_cache("c.pc2"))
+    with pytest.raises(InputError, match=r"a\.fbx cannot be read as FBX: Failed to load geometry cache"):
+        gvpipe.io.read(tmp_path / "a.fbx")
+
+
+def test_textures_lie_beside_the_file(tmp_path: Path) -> None:
+    """A picture is read from the file's folder; what is elsewhere or missing becomes a note."""
+    (tmp_path / "in").mkdir()
+    Image.new("RGB", (4, 4)).save(tmp_path / "in" / "a.png")
+    Image.new("RGB", (4, 4)).save(tmp_path / "b.png")
+    for name, found in (("a.png", 1), ("../b.png", 0), ("/etc/passwd", 0)):
+        (tmp_path / "in" / "a.fbx").write_text(with_texture(name))
+        read = gvpipe.io.read(tmp_path / "in" / "a.fbx")
+        assert len(read.images) == found and read.materials[0].name == "paint"
+        assert any("was left out" in note for note in read.notes) == (not found)
+
+
+@pytest.mark.parametrize(("name", "first"), [("maya_cache_sine", 1), ("max_cache_box", 0)])
+def test_caches_of_other_programs(name: str, first: int) -> None:
+    """Vertices are those that Maya (its own cache) and 3ds Max (PC2) exported; Max's have four digits and another order."""
+    folder = DATA / "assets" / "pointcache"
+    if not folder.is_dir():
+        pytest.skip("no shared data")
+    read = gvpipe.io.read(next(folder.glob(f"*/{name}_7500_binary.fbx")))
+    reference = np.load(next((DATA / "reference").glob(f"{name}*_frames.npz")))
+    for frame, expected in zip(reference["frames"], reference["positions"], strict=True):
+        apart, near = map(np.asarray, KDTree(read.read_absolute(frame - first, frame - first + 1)[0]).query(expected))
+        assert apart.max() < 1e-5 * np.linalg.norm(np.ptp(expected, axis=0)) and len(np.unique(near)) == len(expected)
 
 
 def test_missing_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,7 @@ from gvpipe.errors import InputError
 BROKEN = DATA / "assets" / "gltf_broken"
 
 
-@pytest.mark.parametrize("data", [b"", b"glTF", b"glTF\x02\0\0\0\xff\xff\xff\xff", b"[]", b"{", b'{"nodes": 3}', b"\xff\xfe"])
+@pytest.mark.parametrize("data", [b"glTF", b"glTF\x02\0\0\0\xff\xff\xff\xff", b"[]", b"{", b'{"nodes": 3}', b"\xff\xfe"])
 def test_damaged_files_are_one_clear_line(tmp_path: Path, data: bytes) -> None:
     (tmp_path / "bad.glb").write_bytes(data)
     with pytest.raises(InputError, match="bad.glb cannot be read"):

@@ -41,7 +41,7 @@ def test_clip_and_rate_are_chosen(tmp_path: Path) -> None:
     read = gvpipe.read(path, fps=8, clip="up")
     assert read.shape[0] == 5 and read.fps == 8 and read.metadata.start_time == 0.5
     assert read.read(0, 5)[:, 0, 1].tolist() == [0, 0, 0, 0, 3]
-    with pytest.raises(InputError, match="a.glb cannot be read as GLB: it has no clip 'ap'; its clips: go, up;"):
+    with pytest.raises(InputError, match="a.glb: it has no clip 'ap'; there are: 'go', 'up'; did you mean 'up'"):
         gvpipe.read(path, clip="ap")
     with pytest.raises(InputError, match="it has no animation, so no clip 'go'"):
         gvpipe.read(square_file().write(tmp_path / "still.glb"), clip="go")
