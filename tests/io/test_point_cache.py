@@ -76,16 +76,13 @@ def test_no_mesh_and_another_mesh(tmp_path: Path, suffix: str) -> None:
 
 HEAD = struct.Struct("<12siiffi")
 BAD = {
-    "empty.pc2": (b"", "is not a PC2 point cache"),
     "other.pc2": (b"v 0 0 0\n" * 20, "is not a PC2 point cache"),
     "newer.pc2": (HEAD.pack(b"POINTCACHE2\0", 2, 1, 0, 1, 1) + bytes(12), "of version 2; version 1 is understood"),
     "negative.pc2": (HEAD.pack(b"POINTCACHE2\0", 1, -1, 0, 1, 1), "1 samples of -1 vertices"),
     "cut.pc2": (HEAD.pack(b"POINTCACHE2\0", 1, 1000, 0, 1, 1000) + bytes(64), "1000 samples of 1000 vertices, 12000032 bytes"),
     "huge.pc2": (HEAD.pack(b"POINTCACHE2\0", 1, 2**31 - 1, 0, 1, 2**31 - 1), "but has 32"),
-    "empty.mdd": (b"", "is not an MDD point cache"),
     "other.mdd": (b"v 0 0 0\n" * 20, "it is another format or cut short"),
     "negative.mdd": (struct.pack(">ii", -5, 3), "-5 samples of 3 vertices"),
-    "empty.npy": (b"", "cannot be read as .npy"),
     "pickle.npy": (
         b"\x93NUMPY\x01\x00\x2e\x00{'descr': '|O', 'fortran_order': False, 'shape': (1,)}\n",
         "cannot be read as .npy",
