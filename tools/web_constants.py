@@ -51,7 +51,6 @@ SHARED = {
     "gvpipe.trajectory.prediction_kernels": "DOUBT",
     "gvpipe.trajectory.spatial_neighbours": "OVERSHOOT RING_VARIANCE FAR_VARIANCE SURE LEAST",
     "gvpipe.trajectory.temporal_neighbours": "MAX_NEIGHBOURS VARIANCE MIN_BLOCK CUBIC LINEAR OFFSETS",
-    "gvpipe.web.field_export": "CODING ORDERS MAX_VALUES",
     "gvcodecs.mcgv.base.surface": "STILL",
     "gvcodecs.mcgv.browser": "VERSION PROFILE",
     "gvcodecs.mcgv.header": "OF_PICTURES PREDICTIONS PLACEMENTS MAX_CLUSTERS MAX_SEGMENTS",

@@ -1,7 +1,6 @@
 """A geometry video and its player as one HTML file that needs no network.
 
-What: page = ``page.html`` with the player's bundle inline and the MP4 file as base64 text, so that it opens from a disk. Only
-fields are coded anew (`gvpipe.web.asset_export`).
+What: page = ``page.html`` with the player's bundle inline and the MP4 file as base64 text, so that it opens from a disk.
 Why: browsers load no modules and fetch no files for a page that is itself a file.
 
 A codec knows which of its files browsers play (`gvpipe.registry.browser_obstacle`). Any other file is decoded and encoded anew
@@ -20,7 +19,6 @@ from typing import Any
 
 from gvpipe.atomic import atomic_path, temporary_folder
 from gvpipe.codec import Progress
-from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import write_file
 from gvpipe.errors import InputError, OutputError
 from gvpipe.player import Player
@@ -28,7 +26,7 @@ from gvpipe.quality_scale import error_of, quality_of
 from gvpipe.rate_control.purposes import SERVES, WEB
 from gvpipe.rate_control.trials import Trial, Trials
 from gvpipe.registry import browser_obstacle, make_codec
-from gvpipe.web.asset_export import carry_asset, with_web_fields
+from gvpipe.web.asset_export import carry_asset
 
 SUFFIXES = (".html", ".htm")
 AXES = ("y", "z")
@@ -97,17 +95,17 @@ def export_html(
         up = player.metadata.up_axis if player.metadata.up_axis in AXES else "y"
     obstacle = browser_obstacle(player.bitstream)
     if not obstacle:
-        shown = with_web_fields(player)
-        if shown is player.bitstream:
-            return _write_page(player.path, player.path, target, up)
-        return _write_bitstream(player.path, shown, target, up)
+        return _write_page(player.path, player.path, target, up)
     trial = _convert(player, QUALITY if quality is None else quality, progress)
     remaining = browser_obstacle(trial.bitstream)
     if remaining:
         raise InputError(f"the web player does not read {remaining} yet; use an older gvpipe to convert")
     x, y, z = player.bitstream.origin
     bitstream = carry_asset(player, trial.encoded, trial.codec)
-    page = _write_bitstream(player.path, replace(bitstream, origin=(x, y, z)), target, up)
+    with temporary_folder() as folder:
+        path = os.path.join(folder, "converted.mp4")
+        write_file(replace(bitstream, origin=(x, y, z)), path)
+        page = _write_page(player.path, path, target, up)
     added = trial.errors
     return ExportReport(page.bytes, page.video_bytes, obstacle, added.rmse_diag, added.max_diag, added.kg)
 
@@ -125,13 +123,6 @@ def _convert(player: Player, quality: float, progress: Progress | None) -> Trial
             break
         quality = quality_of(error_of(quality) * INSIDE * allowed / trial.errors.kg)
     return min(tried, key=lambda trial: trial.errors.kg or 0.0)
-
-
-def _write_bitstream(name: str, bitstream: Bitstream, target: Path, up: str) -> ExportReport:
-    with temporary_folder() as folder:
-        path = os.path.join(folder, "converted.mp4")
-        write_file(bitstream, path)
-        return _write_page(name, path, target, up)
 
 
 def _write_page(name: str, video: str | os.PathLike[str], target: Path, up: str) -> ExportReport:

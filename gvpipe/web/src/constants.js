@@ -175,11 +175,6 @@ export const TEMPORAL_NEIGHBOURS_CUBIC = new Map([[-3, -0.0625], [-1, 0.5625], [
 export const TEMPORAL_NEIGHBOURS_LINEAR = new Map([[-1, 0.5], [1, 0.5]]);
 export const TEMPORAL_NEIGHBOURS_OFFSETS = [-1, 1, -3, 3, -2, -5, 5, -4];
 
-// gvpipe.web.field_export
-export const FIELD_EXPORT_CODING = 256;
-export const FIELD_EXPORT_ORDERS = 3;
-export const FIELD_EXPORT_MAX_VALUES = 67108864;
-
 // gvcodecs.mcgv.base.surface
 export const SURFACE_STILL = "still";
 
