@@ -61,6 +61,8 @@ export const BLOCK_CODER_PARAMETRIC = 1;
 
 // gvpipe.entropy.decision_kernels
 export const DECISION_KERNELS_ONE_BITS = 22;
+export const DECISION_KERNELS_PLACE = 2;
+export const DECISION_KERNELS_RANGE = 4294967295;
 
 // gvpipe.entropy.integers
 export const INTEGERS_MAX_CONTEXTS = 65536;
@@ -103,6 +105,8 @@ export const HEAD_VERSION = 1;
 export const PREDICTION_KERNELS_STEPS = 0;
 export const PREDICTION_KERNELS_WHOLE = 1;
 export const PREDICTION_KERNELS_FLOATS = 2;
+export const PREDICTION_KERNELS_N_FILTERS = 2;
+export const PREDICTION_KERNELS_N_SHARED = 5;
 
 // gvpipe.fields.residual_kernels
 export const RESIDUAL_KERNELS_N_CONTEXTS = 7;
