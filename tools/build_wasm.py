@@ -67,10 +67,10 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
         SCALAR,
         SCALAR,
     ],
-    "gvpipe.fields.trajectory_kernels.add_components": [ROWS, ROWS, ROWS],
     "gvpipe.trajectory.prediction_kernels.predict_kalman": [
         ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS]),
     ],
+    "gvpipe.trajectory.product_kernels.weighted_sums": [ROWS, ROWS],
 }
 
 TRIPLE = "wasm32-unknown-unknown"

@@ -43,7 +43,8 @@ def encode_trajectories(target: Float64, n_frames: int, causal: CausalOrder, sha
     n_components = reduced.coefficients.shape[1]
     ranked, decoded = np.zeros(reduced.coefficients.shape, np.int64), np.zeros(reduced.coefficients.shape)
     predict_vectors(causal, reduced.step, ranked, decoded, reduced.coefficients, "kalman", 1.8)
-    left = np.rint(target - _by_component(_rebuild(decoded, reduced.decoded), n_frames))
+    base = _rebuild(decoded, reduced.decoded)
+    left = np.rint(target - _by_component(base, n_frames))
     if max(np.abs(left).max(initial=0), np.abs(ranked).max(initial=0)) >= LARGEST:
         return None
     residuals = np.empty_like(ranked)
@@ -80,13 +81,11 @@ def decode_trajectories(data: bytes, shape: tuple[int, int], causal: CausalOrder
     return _by_component(_rebuild(decoded, basis), n_frames) + left
 
 
-def _rebuild(coefficients: Float64, basis: Basis) -> Float64:
-    """Trajectories ``(R, N)``, N = F C: not by BLAS, whose sums have another order on every machine."""
-    from gvpipe.fields.trajectory_kernels import add_components
+def _rebuild(decoded: Float64, basis: Basis) -> Float64:
+    """``(R, F C)`` values of rows with coefficients ``decoded (R, K)``."""
+    from gvpipe.trajectory.product_kernels import weighted_sums
 
-    rows = np.zeros((len(coefficients), len(basis.mean)))
-    add_components(np.ascontiguousarray(coefficients), np.ascontiguousarray(basis.vectors.T), rows)
-    return rows + basis.mean
+    return weighted_sums(decoded, np.ascontiguousarray(basis.vectors.T)) + basis.mean
 
 
 def _by_frame(columns: Float64, n_frames: int) -> Float64:

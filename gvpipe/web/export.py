@@ -17,9 +17,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from gvpipe.atomic import atomic_path, temporary_folder
+from gvpipe.atomic import unnamed_path
 from gvpipe.codec import Progress
-from gvpipe.container.mp4 import write_file
+from gvpipe.container.mp4 import file_bytes
 from gvpipe.errors import InputError, OutputError
 from gvpipe.player import Player
 from gvpipe.quality_scale import error_of, quality_of
@@ -95,17 +95,14 @@ def export_html(
         up = player.metadata.up_axis if player.metadata.up_axis in AXES else "y"
     obstacle = browser_obstacle(player.bitstream)
     if not obstacle:
-        return _write_page(player.path, player.path, target, up)
+        return _write_page(player.path, Path(player.path).read_bytes(), target, up)
     trial = _convert(player, QUALITY if quality is None else quality, progress)
     remaining = browser_obstacle(trial.bitstream)
     if remaining:
         raise InputError(f"the web player does not read {remaining} yet; use an older gvpipe to convert")
     x, y, z = player.bitstream.origin
     bitstream = carry_asset(player, trial.encoded, trial.codec)
-    with temporary_folder() as folder:
-        path = os.path.join(folder, "converted.mp4")
-        write_file(replace(bitstream, origin=(x, y, z)), path)
-        page = _write_page(player.path, path, target, up)
+    page = _write_page(player.path, file_bytes(replace(bitstream, origin=(x, y, z))), target, up)
     added = trial.errors
     return ExportReport(page.bytes, page.video_bytes, obstacle, added.rmse_diag, added.max_diag, added.kg)
 
@@ -125,8 +122,7 @@ def _convert(player: Player, quality: float, progress: Progress | None) -> Trial
     return min(tried, key=lambda trial: trial.errors.kg or 0.0)
 
 
-def _write_page(name: str, video: str | os.PathLike[str], target: Path, up: str) -> ExportReport:
-    data = Path(video).read_bytes()
+def _write_page(name: str, data: bytes, target: Path, up: str) -> ExportReport:
     shipped = files("gvpipe.web")
     page = (shipped / "page.html").read_text("utf-8")
     values = {
@@ -137,6 +133,6 @@ def _write_page(name: str, video: str | os.PathLike[str], target: Path, up: str)
     }
     parts = page.split("$$")  # text, name, text, name, ..., text
     text = "".join(values[part] if i % 2 else part for i, part in enumerate(parts)).encode()
-    with atomic_path(target) as temporary:
+    with unnamed_path(target) as temporary:
         temporary.write_bytes(text)
     return ExportReport(len(text), len(data))

@@ -204,7 +204,7 @@ def test_fields_equal_pythons(placement: str, module: Module, site: Site, monkey
         "cell": Field(rng.integers(-40, 3000, (60, len(sheet.faces))).astype(np.int16), "triangle"),
         "normal": Field((normals / np.linalg.norm(normals, axis=2, keepdims=True)).astype(np.float32), kind="normal"),
     }
-    bounds = {"stress": "0.01,nan=keep", "moved": 0.01, "cell": "exact", "normal": 1.0}
+    bounds: dict[str, float | str] = {"stress": "0.01,nan=keep", "moved": 0.01, "cell": "exact", "normal": 1.0}
     settings = {**asset_files.FAST, "placement": placement}
     gvpipe.encode(rebuilt(sheet, fields=fields), site[0] / "x.mp4", fields=bounds, **settings)
     with gvpipe.open(site[0] / "x.mp4") as video:
