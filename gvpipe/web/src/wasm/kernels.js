@@ -52,10 +52,11 @@ export class Kernels {
    */
   array(type, shape, values = null) {
     const count = shape.reduce((a, b) => a * b, 1);
+    const used = this.#end; // what lies behind is zero, and costs nothing until it is written
     const pointer = this.#allocate(count * TYPES[type].BYTES_PER_ELEMENT);
     const array = { type, shape, pointer };
     if (values) this.view(array).set(values);
-    else this.view(array).fill(type === "int64" ? 0n : 0);
+    else if (pointer < used) this.view(array).fill(type === "int64" ? 0n : 0);
     return array;
   }
 
