@@ -18,19 +18,16 @@ import gvpipe
 from gvpipe.container.mp4 import read_file, write_file
 from gvpipe.player import Player
 from gvpipe.sequence import MeshSequence
-from gvpipe.web.asset_export import with_web_fields
 
 FAST: dict[str, Any] = {"preset": "ultrafast", "clusters": 3, "gop": 4}
 
 
 def write_asset(path: Path, sequence: MeshSequence, bounds: Mapping[str, float | str] | None = None, **settings: Any) -> Player:
-    """Encode a sequence with all that it has, fields as the web player reads them; attributes are exact but for ``bounds``."""
+    """Encode a sequence with all that it has, exactly but for the attributes of ``bounds``."""
     attributes = {**dict.fromkeys(sequence.attributes, "exact"), **(bounds or {})}
     fields = dict.fromkeys(sequence.fields, "exact,nan=keep")
     gvpipe.encode(sequence, path, attributes=attributes, fields=fields, **{**FAST, **settings})
-    written = Player(path)
-    write_file(with_web_fields(written), path)
-    return written
+    return Player(path)
 
 
 def replace_asset(path: Path, listing: Any, sections: Mapping[str, bytes]) -> None:

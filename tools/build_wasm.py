@@ -33,12 +33,18 @@ TARGET = Path(__file__).parents[1] / "gvpipe" / "web" / "src" / "wasm"
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
 ENVIRONMENT = {"NUMBA_OPT": "0", "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}  # as `compile_kernel` needs it
 
-INTS, FLOATS, BYTES, FLAGS = "int32[1]", "float64[1]", "uint8[1]", "bool[1]"  # element type and dimensions of an array
+INTS, LONGS, FLOATS, BYTES, FLAGS = (
+    "int32[1]",
+    "int64[1]",
+    "float64[1]",
+    "uint8[1]",
+    "bool[1]",
+)  # element type and dimensions of an array
 TRIANGLES, ROWS, NUMBERS, SCALAR = "int32[2]", "float64[2]", "int64[2]", "int64"
 CAUSAL = ("gvpipe.trajectory.causal_order.CausalOrder", [INTS, INTS, INTS, FLOATS, FLOATS, INTS, INTS, "bool"])
 MIXING = (
     "gvpipe.entropy.decision_kernels.Mixing",
-    [NUMBERS, "uint8[2]", NUMBERS, "int64[1]", "int64[1]", "int64[1]", "int64[1]"],
+    [NUMBERS, "uint8[2]", NUMBERS, LONGS, LONGS, LONGS, LONGS],
 )
 KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and NamedTuples of both
     "gvpipe.mesh.decimation.decimate": [TRIANGLES, SCALAR, SCALAR],
@@ -46,19 +52,25 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
     "gvpipe.fields.dual_kernels.find_dual": [TRIANGLES, SCALAR],
     "gvpipe.fields.residual_kernels.decode_rows": [
         ("gvpipe.fields.residual_kernels.Residuals", [NUMBERS, SCALAR, FLAGS, CAUSAL]),
+        ("gvpipe.fields.residual_kernels.Forecast", [LONGS, LONGS, LONGS, LONGS]),
         MIXING,
+        LONGS,
         BYTES,
+        SCALAR,
+        SCALAR,
     ],
     "gvpipe.fields.prediction_kernels.predict_rows": [
         (
             "gvpipe.fields.prediction_kernels.FieldCoding",
-            [CAUSAL, SCALAR, FLAGS, SCALAR, "float64", NUMBERS, ROWS, ROWS],
+            [CAUSAL, SCALAR, FLAGS, SCALAR, "float64", NUMBERS, ROWS, ROWS, "float64[3]"],
         ),
+        SCALAR,
+        SCALAR,
     ],
-    "gvpipe.fields.trajectory_kernels.add_components": [ROWS, ROWS, ROWS],
     "gvpipe.trajectory.prediction_kernels.predict_kalman": [
         ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS]),
     ],
+    "gvpipe.trajectory.product_kernels.weighted_sums": [ROWS, ROWS],
 }
 
 TRIPLE = "wasm32-unknown-unknown"

@@ -29,7 +29,6 @@ from gvpipe.errors import InputError
 
 SECTION, ARRANGEMENT = "asset", "arrangement"
 CODED, SURFACE, OCTAHEDRAL = 1, 2, 3  # codings of fields; attributes have the first
-WEB = 256  # of fields in web pages (`gvpipe.web.field_export`)
 VERSION = 1
 MOST = 1 << 16  # parts, materials, images, attributes or fields
 MAX_BYTES = 1 << 26  # of the JSON, inflated

@@ -103,34 +103,19 @@ def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Pl
     return Plan(attributes, fields, images, tuple(left_out))
 
 
-@dataclass(frozen=True)
-class FieldCoding:
-    """Another coding of fields than that of `gvpipe.fields`.
-
-    Args:
-        id: its number in section ``asset``.
-        encode: from a field, the mesh's ``faces (T, 3)`` and the bound that it may have (0: exact), to a section and the bound
-            that this keeps.
-    """
-
-    id: int
-    encode: Callable[[Field, Int32, float], tuple[bytes, float]]
-
-
 class AssetCoder:
     """Codes one sequence's asset beside any of its bitstreams.
 
     Args:
         sequence: whose asset it is.
         options: what a user asks.
-        fields: how fields are coded; None: by `gvpipe.fields`.
 
     Raises:
         InputError: as `plan_asset`.
     """
 
-    def __init__(self, sequence: MeshSequence, options: AssetOptions = NO_OPTIONS, fields: FieldCoding | None = None) -> None:
-        self._sequence, self._coding = sequence, fields
+    def __init__(self, sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> None:
+        self._sequence = sequence
         self.plan = plan_asset(sequence, options)
         self._fields: dict[tuple[str, bytes], bytes] = {}
         self._meshes: dict[tuple[str, bytes], FieldMesh] = {}
@@ -223,14 +208,9 @@ class AssetCoder:
             section = f"field.{number}"
             rows = origins.of(field.domain)
             assert rows is not None  # fields are on vertices or triangles
-            moved, bound = field.select(rows), found.bound
-            if self._coding:
-                coding = self._coding.id
-                sections[section], bound = self._coding.encode(moved, surface.faces, bound)
-            else:
-                coding, sections[section] = self._code_field(name, moved, found, surface, reader)
+            coding, sections[section] = self._code_field(name, field.select(rows), found, surface, reader)
             components = field.n_components if len(field.shape) == 3 else 0
-            listed.append(_listed(name, field, components, bound, section, span, coding))
+            listed.append(_listed(name, field, components, found.bound, section, span, coding))
         return tuple(listed)
 
     def _code_field(

@@ -26,7 +26,6 @@ from gvpipe.asset_coding.directory import (
     SECTION,
     SURFACE,
     VERSION,
-    WEB,
     Directory,
     Listed,
     unpack_directory,
@@ -69,7 +68,7 @@ class AssetReader:
             self.directory = unpack_directory(bitstream.section(SECTION), bitstream.n_vertices)
         attributes = {each.name: each for each in self.directory.attributes if each.coding == CODED}
         fields = {each.name: each for each in self.directory.fields if _is_known(each)}
-        known = {**attributes, **fields, **{each.name: each for each in self.directory.fields if each.coding == WEB}}
+        known = {*attributes, *fields}
         newer = [each.name for each in (*self.directory.attributes, *self.directory.fields) if each.name not in known]
         self.skipped = ("all of it",) if self.directory.version > VERSION else tuple(newer)
         self._attributes, self._made_attributes = attributes, dict[str, Attribute]()
@@ -94,11 +93,9 @@ class AssetReader:
     @property
     def notes(self) -> tuple[str, ...]:
         """What this version of gvpipe skips, a line."""
-        of_pages = [each.name for each in self.directory.fields if each.coding == WEB]
-        notes = [f"fields of a web page, which browsers alone read, are skipped: {', '.join(of_pages)}"] if of_pages else []
-        if self.skipped:
-            notes.append(f"a newer gvpipe wrote beside the positions what this one skips: {', '.join(self.skipped)}")
-        return tuple(notes)
+        if not self.skipped:
+            return ()
+        return (f"a newer gvpipe wrote beside the positions what this one skips: {', '.join(self.skipped)}",)
 
     @cached_property
     def _arrangement(self) -> Arrangement:

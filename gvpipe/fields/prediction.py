@@ -77,5 +77,7 @@ def _run(residuals: Int64, decoded: Float64, target: Float64, shared: tuple[int,
 
     n_frames, causal, still, kind = shared
     number = kernels.FLOATS if kind.unit else kernels.WHOLE if kind.whole else kernels.STEPS
-    target = np.ascontiguousarray(target)
-    kernels.predict_rows(kernels.FieldCoding(causal, n_frames, still, number, kind.unit, residuals, decoded, target))
+    target, n_rows = np.ascontiguousarray(target), len(causal.order)
+    learnt = np.zeros((n_rows, kernels.N_FILTERS, kernels.N_SHARED + 2))
+    coding = kernels.FieldCoding(causal, n_frames, still, number, kind.unit, residuals, decoded, target, learnt)
+    kernels.predict_rows(coding, 0, n_rows)

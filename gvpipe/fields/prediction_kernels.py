@@ -39,6 +39,7 @@ class FieldCoding(NamedTuple):
         residuals: ``(R, N)``, N = C F columns.
         decoded: ``(R, N)``.
         target: ``(R, N)`` what to code; ``(0, 0)``: decode.
+        learnt: ``(R, N_FILTERS, N_SHARED + 2)`` what rows' filters came to; zeros at first.
     """
 
     causal: CausalOrder
@@ -49,6 +50,7 @@ class FieldCoding(NamedTuple):
     residuals: Int64
     decoded: Float64
     target: Float64
+    learnt: Float64
 
 
 class Filter(NamedTuple):
@@ -74,8 +76,11 @@ class Filter(NamedTuple):
 
 
 @compiled
-def predict_rows(coding: FieldCoding) -> None:
-    """Code all rows (there is a target), filling residuals and decoded values, or fill decoded values from residuals."""
+def predict_rows(coding: FieldCoding, first_rank: int, end_rank: int) -> None:
+    """Code some ranks' rows (there is a target), filling residuals and decoded values, or fill decoded values from residuals.
+
+    Those before must be coded. Browsers, whose fast code is ready some calls later, ask for a few at a time.
+    """
     causal, n_columns = coding.causal, coding.decoded.shape[1]
     most = N_SHARED + MOST_NEAR
     state = Filter(
@@ -87,9 +92,9 @@ def predict_rows(coding: FieldCoding) -> None:
         np.zeros(N_FILTERS),
         np.zeros(N_FILTERS),
     )
-    learnt = np.zeros((len(causal.order), N_FILTERS, N_SHARED + 2))  # what rows' filters came to
+    learnt = coding.learnt
     base = np.zeros(n_columns)
-    for i in range(len(causal.order)):
+    for i in range(first_rank, end_rank):
         row, first = causal.order[i], causal.starts[i]
         n_near = min(causal.starts[i + 1] - first, MOST_NEAR)
         for n in range(n_columns):

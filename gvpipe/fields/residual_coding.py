@@ -54,13 +54,17 @@ def decode_residuals(
     Raises:
         CorruptFile: the bytes are not as many as the residuals take.
     """
-    from gvpipe.fields.residual_kernels import Residuals, decode_rows
+    from gvpipe.entropy.decision_kernels import PLACE, start_decoder
+    from gvpipe.fields.residual_kernels import Residuals, decode_rows, new_forecast
 
     n_rows = len(causal.order)
     values = np.zeros((n_rows, n_columns), np.int64)
     none = np.zeros(n_rows, np.bool_)
     residuals = Residuals(values, n_frames, none if still is None else still, causal)
-    if not decode_rows(residuals, _mixing(), np.frombuffer(bytearray(data), np.uint8)):
+    bytes_ = np.frombuffer(bytearray(data), np.uint8)
+    state = start_decoder(bytes_)
+    is_whole = decode_rows(residuals, new_forecast(residuals), _mixing(), state, bytes_, 0, n_rows)
+    if not is_whole or state[PLACE] < len(data):
         raise corrupt_section(name, "its residuals do not decode")
     return values
 

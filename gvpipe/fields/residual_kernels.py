@@ -8,7 +8,7 @@ import numpy as np
 
 from gvpipe.arrays import Bool, Int64, UInt8
 from gvpipe.compiled import compiled
-from gvpipe.entropy.decision_kernels import Mixing, code_decision, code_plain, finish, start_decoder, start_encoder
+from gvpipe.entropy.decision_kernels import PLACE, Mixing, code_decision, code_plain, finish, start_encoder
 from gvpipe.trajectory.causal_order import CausalOrder
 
 N_CONTEXTS = 7
@@ -81,7 +81,7 @@ def encode_rows(residuals: Residuals, mixing: Mixing) -> UInt8:
     """Return the bytes of all residuals."""
     state = start_encoder()
     out = np.zeros(1 << 12, np.uint8)
-    forecast = _new_forecast(residuals)
+    forecast = new_forecast(residuals)
     for i in range(len(residuals.causal.order)):
         needed = state[2] + ROOM * residuals.values.shape[1] + 64
         if needed > len(out):
@@ -94,19 +94,22 @@ def encode_rows(residuals: Residuals, mixing: Mixing) -> UInt8:
 
 
 @compiled
-def decode_rows(residuals: Residuals, mixing: Mixing, data: UInt8) -> bool:
-    """Fill the residuals' values from ``data``; return whether these are as long as what was decoded."""
-    state = start_decoder(data)
-    forecast = _new_forecast(residuals)
-    for i in range(len(residuals.causal.order)):
+def decode_rows(
+    residuals: Residuals, forecast: Forecast, mixing: Mixing, state: Int64, data: UInt8, first_rank: int, end_rank: int
+) -> bool:
+    """Fill some ranks' values from ``data``, those after the ranks decoded before; return False behind its end.
+
+    Browsers, whose fast code is ready some calls later, ask for a few at a time.
+    """
+    for i in range(first_rank, end_rank):
         _code_row(i, residuals, forecast, mixing, state, data, True)
-        if state[2] > len(data) + LOOK_AHEAD:
+        if state[PLACE] > len(data) + LOOK_AHEAD:
             return False
-    return bool(state[2] >= len(data))
+    return True
 
 
 @compiled
-def _new_forecast(residuals: Residuals) -> Forecast:
+def new_forecast(residuals: Residuals) -> Forecast:
     n_rows, n_columns = residuals.values.shape
     return Forecast(
         np.zeros(n_columns, np.int64), np.zeros(n_columns, np.int64), np.zeros(n_columns, np.int64), np.zeros(n_rows, np.int64)

@@ -1,7 +1,6 @@
 """A geometry video and its player as one HTML file that needs no network.
 
-What: page = ``page.html`` with the player's bundle inline and the MP4 file as base64 text, so that it opens from a disk. Only
-fields are coded anew (`gvpipe.web.asset_export`).
+What: page = ``page.html`` with the player's bundle inline and the MP4 file as base64 text, so that it opens from a disk.
 Why: browsers load no modules and fetch no files for a page that is itself a file.
 
 A codec knows which of its files browsers play (`gvpipe.registry.browser_obstacle`). Any other file is decoded and encoded anew
@@ -27,7 +26,7 @@ from gvpipe.quality_scale import error_of, quality_of
 from gvpipe.rate_control.purposes import SERVES, WEB
 from gvpipe.rate_control.trials import Trial, Trials
 from gvpipe.registry import browser_obstacle, make_codec
-from gvpipe.web.asset_export import carry_asset, with_web_fields
+from gvpipe.web.asset_export import carry_asset
 
 SUFFIXES = (".html", ".htm")
 AXES = ("y", "z")
@@ -96,10 +95,7 @@ def export_html(
         up = player.metadata.up_axis if player.metadata.up_axis in AXES else "y"
     obstacle = browser_obstacle(player.bitstream)
     if not obstacle:
-        shown = with_web_fields(player)
-        if shown is player.bitstream:
-            return _write_page(player.path, Path(player.path).read_bytes(), target, up)
-        return _write_page(player.path, file_bytes(shown), target, up)
+        return _write_page(player.path, Path(player.path).read_bytes(), target, up)
     trial = _convert(player, QUALITY if quality is None else quality, progress)
     remaining = browser_obstacle(trial.bitstream)
     if remaining:

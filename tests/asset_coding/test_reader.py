@@ -104,10 +104,6 @@ def test_what_a_newer_version_wrote_is_skipped_and_told(bitstream: Bitstream) ->
     asset = AssetReader(with_section(bitstream, SECTION, packed), reader)
     assert list(asset.fields) == ["flow", "state"]
     assert "stress" in asset.notes[0]
-    pages = tuple(dataclasses.replace(each, coding=256) for each in directory.fields)
-    packed = pack_directory(dataclasses.replace(directory, fields=pages))
-    notes = AssetReader(with_section(bitstream, SECTION, packed), reader).notes
-    assert notes == ("fields of a web page, which browsers alone read, are skipped: stress, flow, state",)
 
 
 def test_errors_name_the_file(tmp_path: Path, bitstream: Bitstream) -> None:

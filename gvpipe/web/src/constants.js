@@ -91,6 +91,8 @@ export const DECISION_KERNELS_ONE_BITS = 22;
 export const DECISION_KERNELS_AHEAD = 3;
 export const DECISION_KERNELS_RATE = 5;
 export const DECISION_KERNELS_RATE_BITS = 18;
+export const DECISION_KERNELS_PLACE = 2;
+export const DECISION_KERNELS_RANGE = 4294967295;
 
 // gvpipe.entropy.integers
 export const INTEGERS_MAX_CONTEXTS = 65536;
@@ -143,6 +145,8 @@ export const HEAD_VERSION = 1;
 export const PREDICTION_KERNELS_STEPS = 0;
 export const PREDICTION_KERNELS_WHOLE = 1;
 export const PREDICTION_KERNELS_FLOATS = 2;
+export const PREDICTION_KERNELS_N_FILTERS = 2;
+export const PREDICTION_KERNELS_N_SHARED = 5;
 
 // gvpipe.fields.residual_kernels
 export const RESIDUAL_KERNELS_N_CONTEXTS = 7;
@@ -214,11 +218,6 @@ export const TEMPORAL_NEIGHBOURS_MIN_BLOCK = 48;
 export const TEMPORAL_NEIGHBOURS_CUBIC = new Map([[-3, -0.0625], [-1, 0.5625], [1, 0.5625], [3, -0.0625]]);
 export const TEMPORAL_NEIGHBOURS_LINEAR = new Map([[-1, 0.5], [1, 0.5]]);
 export const TEMPORAL_NEIGHBOURS_OFFSETS = [-1, 1, -3, 3, -2, -5, 5, -4];
-
-// gvpipe.web.field_export
-export const FIELD_EXPORT_CODING = 256;
-export const FIELD_EXPORT_ORDERS = 3;
-export const FIELD_EXPORT_MAX_VALUES = 67108864;
 
 // gvcodecs.mcgv.base.surface
 export const SURFACE_STILL = "still";

@@ -143,7 +143,7 @@ export class GeometryVideo {
     this.parts = asset.parts;
     /** `Map` by name of `{domain, kind, components, unit, values (N, C), indices (rows) or null, fullScale}`. */
     this.attributes = asset.attributes;
-    /** `Map` by name of `CodedField`s and `WebField`s: `frame(k)` is a promise of an array (R, C) of the field's `type`. */
+    /** `Map` by name of `CodedField`s: `frame(k)` is a promise of an array (R, C) of the field's `type`. */
     this.fields = asset.fields;
     this.materials = asset.materials;
     /** `{name, mediaType, data}` */

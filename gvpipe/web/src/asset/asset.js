@@ -12,7 +12,6 @@ import {
   DIRECTORY_VERSION as VERSION,
   ENCODER_ARRANGEMENT as ARRANGEMENT,
   ENCODER_CODED as CODED,
-  FIELD_EXPORT_CODING as WEB_CODING,
 } from "../constants.js";
 import { decodeAttribute } from "../attributes/attribute_coding.js";
 import { Surface } from "../attributes/surface.js";
@@ -25,7 +24,6 @@ import { TYPES } from "../fields/head.js";
 import code from "../wasm/kernels.wasm";
 import { AssetEntry } from "./asset_entry.js";
 import { readImages, readMaterials } from "./materials.js";
-import { WebField, findParents } from "./web_field.js";
 
 const MAX_PARTS = 2 ** 22;
 const MAX_COMPONENTS = 64;
@@ -68,14 +66,11 @@ export async function readAsset(payload, video, positions) {
   const first = list.flag("geometry", false) ? await video.frame(0) : null;
   const attributes = readAttributes(list, payload, new Surface(indices, video.vertexCount, first, parts.length), notes);
   const host = new FieldHost(code, Int32Array.from(indices), video.vertexCount, positions);
-  const fields = readFields(list, payload, { ...sizes(video), indices, host }, notes);
+  const { frameCount, vertexCount, triangleCount } = video;
+  const fields = readFields(list, payload, { frameCount, vertexCount, triangleCount, host }, notes);
   const metadata = list.given.metadata ?? {};
   const close = () => host.close();
   return { indices, parts, attributes, fields, materials, images, polygons, metadata, notes, close };
-}
-
-function sizes({ frameCount, vertexCount, triangleCount }) {
-  return { frameCount, vertexCount, triangleCount };
 }
 
 async function readJson(data) {
@@ -134,51 +129,42 @@ function readAttributes(list, payload, surface, notes) {
   return attributes;
 }
 
-function readFields(list, payload, { frameCount, vertexCount, triangleCount, indices, host }, notes) {
+function readFields(list, payload, { frameCount, vertexCount, triangleCount, host }, notes) {
   const fields = new Map();
   const names = new Set();
-  const parents = {}; // by domain
   const hasKernels = WebAssembly.validate(code);
   for (const given of list.list("fields", MAX_ITEMS)) {
     const entry = new AssetEntry(given, "a field");
     const name = entry.text("name");
-    const domain = entry.word("domain", ["vertex", "triangle"]);
-    const coding = entry.integer("coding", undefined, 0, MAX_ITEMS);
     if (names.has(name)) throw corrupt(SECTION, `there are two fields ${name}`);
     names.add(name);
+    const coding = entry.integer("coding", undefined, 0, MAX_ITEMS);
     const problem = obstacle(coding, given, hasKernels);
     if (problem) {
       notes.push(`field ${name} is not shown: ${problem}`);
       continue;
     }
-    const type = coding === WEB_CODING ? "float32" : entry.word("dtype", TYPES);
     const checked = {
       name,
-      domain,
-      type,
+      domain: entry.word("domain", ["vertex", "triangle"]),
+      type: entry.word("dtype", TYPES),
       kind: entry.word("kind", KINDS),
       components: entry.integer("components", undefined, 0, MAX_COMPONENTS),
       unit: entry.text("unit", ""),
       bound: entry.number("bound", 0, 0, HUGE),
       range: given.range == null ? null : entry.numbers("range", 2, undefined, -HUGE, HUGE),
       section: entry.text("section"),
-      fullScale: FULL_SCALES[entry.text("dtype")] ?? 1,
     };
+    const rows = checked.domain === "vertex" ? vertexCount : triangleCount;
     const data = payload.section(checked.section);
-    if (coding === WEB_CODING) {
-      parents[domain] ??= domain === "vertex" ? findParents(vertexCount, indices) : findParents(triangleCount, []);
-      fields.set(name, new WebField(checked, data, frameCount, parents[domain]));
-    } else {
-      const rows = domain === "vertex" ? vertexCount : triangleCount;
-      fields.set(name, new CodedField(checked, coding === OCTAHEDRAL, data, frameCount, rows, host));
-    }
+    const fullScale = FULL_SCALES[checked.type] ?? 1;
+    fields.set(name, new CodedField({ ...checked, fullScale }, coding === OCTAHEDRAL, data, frameCount, rows, host));
   }
   return fields;
 }
 
 /** Why a field cannot be read; "" if it can. */
 function obstacle(coding, { kind, components }, hasKernels) {
-  if (coding === WEB_CODING) return "";
   if (coding === SURFACE) return "it follows from the surface, as the player's own normals do";
   const isKnown = coding === CODED || (coding === OCTAHEDRAL && kind === "normal" && components === 3);
   if (!isKnown) return "a newer gvpipe wrote it";

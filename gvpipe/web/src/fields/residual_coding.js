@@ -2,6 +2,8 @@
 
 import {
   DECISION_KERNELS_ONE_BITS as ONE_BITS,
+  DECISION_KERNELS_PLACE as PLACE,
+  DECISION_KERNELS_RANGE as RANGE,
   RESIDUAL_KERNELS_NODES as NODES,
   RESIDUAL_KERNELS_N_COARSE as N_COARSE,
   RESIDUAL_KERNELS_N_CONTEXTS as N_CONTEXTS,
@@ -11,6 +13,8 @@ import {
 import { corrupt } from "../format/errors.js";
 import { SQUASH, STRETCH } from "./logistic_tables.js";
 
+const LEAST_ROWS = 16; // of a call
+const BLOCK_TIME = 20; // ms that a call takes, about
 const SEEN = 250; // last uses of a slot that count
 const N_SLOTS = N_FINE * N_COARSE * NODES;
 
@@ -29,10 +33,35 @@ export function decodeResiduals(kernels, causal, data, [columns, frames], name, 
   const flags = still ?? kernels.array("bool", [rows]);
   const mixing = newMixing(kernels);
   const bytes = kernels.array("uint8", [data.length], data);
-  const [isWhole] = kernels.call("decode_rows", values, frames, flags, ...causal, ...mixing, bytes);
-  for (const array of [bytes, ...mixing]) kernels.free(array);
-  if (!isWhole) throw corrupt(name, "its residuals do not decode");
+  const forecast = [columns, columns, columns, rows].map((count) => kernels.array("int64", [count]));
+  const state = kernels.array("int64", [3], startState(data));
+  const given = [values, frames, flags, ...causal, ...forecast, ...mixing, state, bytes];
+  const isWhole = inBlocks(rows, (first, end) => kernels.call("decode_rows", ...given, first, end)[0] === 1);
+  if (!isWhole || kernels.view(state)[PLACE] < data.length) throw corrupt(name, "its residuals do not decode");
+  for (const array of [bytes, state, ...forecast, ...mixing]) kernels.free(array);
   return values;
+}
+
+/**
+ * Call a kernel for some ranks of R at a time. Browsers compile it well while it runs, and take that for the next call.
+ *
+ * @param {number} rows @param {(first: number, end: number) => boolean} call false ends it @returns {boolean}
+ */
+export function inBlocks(rows, call) {
+  let size = LEAST_ROWS;
+  for (let first = 0, end = 0; first < rows; first = end) {
+    end = Math.min(first + size, rows);
+    const started = performance.now();
+    if (!call(first, end)) return false;
+    if (performance.now() - started < BLOCK_TIME / 2) size *= 2;
+  }
+  return true;
+}
+
+/** Mirrors `start_decoder` of `gvpipe.entropy.decision_kernels`. */
+function startState(data) {
+  const code = [0, 1, 2, 3].reduce((sum, i) => sum * 256 + (data[i] ?? 0), 0);
+  return [code, RANGE, 4].map(BigInt);
 }
 
 /** Mirrors `new_mixing` of `gvpipe.entropy.decision_kernels`. */

@@ -2,6 +2,8 @@
 
 import {
   PREDICTION_KERNELS_FLOATS as FLOATS,
+  PREDICTION_KERNELS_N_FILTERS as N_FILTERS,
+  PREDICTION_KERNELS_N_SHARED as N_SHARED,
   PREDICTION_KERNELS_STEPS as STEPS,
   PREDICTION_KERNELS_WHOLE as WHOLE,
   SEGMENTS_LARGEST_STEP as LARGEST_STEP,
@@ -13,7 +15,7 @@ import { Cursor } from "../format/cursor.js";
 import { decodeIntegers } from "../format/integers.js";
 import { derivedValues, takeDerivation } from "./derived.js";
 import { decodeHoles } from "./holes.js";
-import { decodeResiduals } from "./residual_coding.js";
+import { decodeResiduals, inBlocks } from "./residual_coding.js";
 import { decodeTrajectories } from "./trajectories.js";
 import { bytesOf, newValues, rounding, valuesOf } from "./values.js";
 
@@ -93,7 +95,9 @@ async function fillOthers(cursor, { mode, type, flags, shown }, found, place) {
     const decoded = kernels.array("float64", [rows, width * frames]);
     const kind = mode !== EXACT ? STEPS : isWhole ? WHOLE : FLOATS;
     const unit = kind === FLOATS ? step : 0;
-    kernels.call("predict_rows", ...causal, frames, still, kind, unit, residuals, decoded, kernels.array("float64", [0, 0]));
+    const [target, learnt] = [kernels.array("float64", [0, 0]), kernels.array("float64", [rows, N_FILTERS, N_SHARED + 2])];
+    const given = [...causal, frames, still, kind, unit, residuals, decoded, target, learnt];
+    inBlocks(rows, (first, end) => kernels.call("predict_rows", ...given, first, end));
     const view = kernels.view(decoded);
     value = (row, k, frame) => view[(row * width + k) * frames + frame];
   }

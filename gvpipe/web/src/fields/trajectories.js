@@ -25,8 +25,7 @@ export function decodeTrajectories(data, [frames, components], { kernels, causal
     mean[n] = basis.columns[n * width];
     for (let k = 0; k < count; k++) vectors[k * size + n] = basis.columns[n * width + k + 1];
   }
-  const sums = kernels.array("float64", [rows, size]);
-  kernels.call("add_components", coefficients, kernels.array("float64", [count, size], vectors), sums);
+  const [sums] = kernels.call("weighted_sums", coefficients, kernels.array("float64", [count, size], vectors));
   const left = decodeResiduals(kernels, causal, cursor.rest(), [size, frames], name);
   const [found, words] = [kernels.view(sums), kernels.words(left)];
   return (row, component, frame) => {

@@ -237,6 +237,7 @@ export class GeometryVideoElement extends HTMLElement {
     const { video } = this;
     const field = video.fields.get(this.getAttribute("field")) ?? null;
     this.#field = field;
+    this.#say(field ? `Decoding ${field.name} …` : "");
     try {
       await field?.load(this.currentFrame);
     } catch (error) {
@@ -244,6 +245,7 @@ export class GeometryVideoElement extends HTMLElement {
       return;
     }
     if (video !== this.video || field !== this.#field || !this.#stage?.model) return;
+    this.#say("");
     const range = this.#stage.setField(field, this.colormap, this.range);
     const hasMap = field !== null && field.kind !== "color";
     this.#panel.setField(field?.name ?? "", this.colormap, hasMap);

@@ -22,7 +22,7 @@ const ROWS = 16; // of pixels of the texture
 /** A field's colours at the vertices of a mesh, frame by frame, in arrays that stay. */
 export class FieldColours {
   /**
-   * @param {import("../asset/web_field.js").WebField} field
+   * @param {import("../fields/coded_field.js").CodedField} field
    * @param {Uint32Array} rows (R) the field's row of each render vertex
    * @param {Float32Array|null} table (SIZE, 3) linear colours for vertices; null: vertices get their place in a texture
    */

@@ -17,7 +17,7 @@ export class Legend {
     this.root.hidden = true;
   }
 
-  /** @param {import("../asset/web_field.js").WebField} field @param {string} colormap @param {[number, number]} range */
+  /** @param {import("../fields/coded_field.js").CodedField} field @param {string} colormap @param {[number, number]} range */
   show(field, colormap, [low, high]) {
     const what = field.components > 1 ? `|${field.name}|` : field.name;
     this.title.textContent = field.unit ? `${what}, ${field.unit}` : what;

@@ -24,6 +24,7 @@ const PAGE = 65536;
 const HEADER = 64; // bytes before the data of what kernels allocate
 const SMALL = 1 << 20; // bytes; below, sizes are powers of two
 const ALIGNMENT = 64;
+const RESULT = 1024; // bytes; a tuple of ten arrays takes fewer
 
 /** An array in the memory of kernels: C order. @typedef {{type: string, shape: number[], pointer: number}} KernelArray */
 
@@ -40,6 +41,7 @@ export class Kernels {
 
   #exports;
   #end; // of what was ever allocated
+  #result; // where results are written
   #free = new Map(); // bytes -> pointers of blocks of that size
 
   /**
@@ -50,10 +52,11 @@ export class Kernels {
    */
   array(type, shape, values = null) {
     const count = shape.reduce((a, b) => a * b, 1);
+    const used = this.#end; // what lies behind is zero, and costs nothing until it is written
     const pointer = this.#allocate(count * TYPES[type].BYTES_PER_ELEMENT);
     const array = { type, shape, pointer };
     if (values) this.view(array).set(values);
-    else this.view(array).fill(type === "int64" ? 0n : 0);
+    else if (pointer < used) this.view(array).fill(type === "int64" ? 0n : 0);
     return array;
   }
 
@@ -81,8 +84,8 @@ export class Kernels {
     const signature = SIGNATURES[name];
     if (given.length !== signature.given.length) throw new TypeError(`${name} takes ${signature.given.length} arguments`);
     const unpacked = given.flatMap((value, i) => (value.shape ? unpackArray(value, signature.given[i]) : [unpackScalar(value, signature.given[i])]));
-    const result = this.#allocate(8 * ALIGNMENT);
-    const status = this.#exports[name](result, result + 7 * ALIGNMENT, ...unpacked);
+    const result = (this.#result ??= this.#allocate(2 * RESULT));
+    const status = this.#exports[name](result, result + RESULT, ...unpacked); // the error's place is not read
     if (!DONE.includes(status)) throw new WebAssembly.RuntimeError(`kernel ${name} fails with status ${status}`);
     return this.#results(signature.returned, result);
   }
