@@ -39,15 +39,20 @@ class Player:
     ``video[k]`` decodes no more than the group of frames that frame k lies in, and keeps the last groups; frames asked for
     in a row, forwards or backwards, are decoded ahead on another thread. ``video[a:b]`` gives ``(b - a, V, 3)``.
 
+    Args:
+        path: of the file.
+        unlimited: let it take whatever memory and work it asks for; by default its size limits both (`gvpipe.budget`).
+
     Raises:
         InputError: there is no such file.
+        OverBudget: here or later: it asks for more than a file of its size may take.
         FormatError: it is not a geometry video, or it is damaged; the kinds are in `gvpipe.errors`.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], *, unlimited: bool = False) -> None:
         check_path(path, "the geometry video")
         self.path = os.fspath(path)
-        self.bitstream: Bitstream = read_file(path)
+        self.bitstream: Bitstream = read_file(path, unlimited)
         with in_file(self.path):
             self._reader = open_reader(self.bitstream)
             self._asset = AssetReader(self.bitstream, self._reader, self.path, self._read)

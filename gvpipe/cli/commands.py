@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gvpipe import __version__
-from gvpipe.cli.console import Output, is_verbose, output_options, print_options
+from gvpipe.cli.console import Output, is_verbose, output_options, print_options, unlimited_option
 from gvpipe.cli.conversion import convert
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.errors import GvpipeError
@@ -107,6 +107,7 @@ def cli() -> None:
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
 @click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp.")
+@unlimited_option
 @output_options
 def encode(
     sources: tuple[str, ...],
@@ -128,6 +129,7 @@ def encode(
     mesh: str | None,
     frames: str | None,
     textures: str | None,
+    unlimited: bool,
     out: Output,
 ) -> None:
     """Encode a mesh sequence as a geometry video.
@@ -164,6 +166,7 @@ def encode(
         source = first if len(sources) == 1 else list(sources)
         beside: dict[str, Any] = {"clip": clip, "mesh": mesh, "frames": _parse_frames(frames), "textures": textures}
         beside |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
+        beside |= {"unlimited": unlimited}
         report = api.encode(source, path, chosen, progress, fps, **targets, **beside)  # type: ignore[arg-type]  # by name
     out = out.carrying(target)
     for note in report.notes:
@@ -195,6 +198,7 @@ def encode(
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail: 0 the mesh, higher is coarser.")
 @click.option("--local", is_flag=True, help="Leave out the origin of a mesh far from the world's: float32 positions near 0.")
+@unlimited_option
 @output_options
 def decode(
     source: str,
@@ -205,6 +209,7 @@ def decode(
     parts: tuple[str, ...],
     lod: int,
     local: bool,
+    unlimited: bool,
     out: Output,
 ) -> None:
     """Decode a geometry video.
@@ -218,7 +223,7 @@ def decode(
 
     out = out.carrying(target)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
-        player = api.open(given)
+        player = api.open(given, unlimited=unlimited)
         start, stop = api.frame_range(player, start, stop)
         sequence = chosen(player.level(lod).part(start, stop), parts, fps, "decode", progress)
         noticed = api.write(sequence.local() if local else sequence, path, start)
@@ -237,8 +242,9 @@ def decode(
 @click.argument("source", metavar="FILE")
 @click.option("--clip", metavar="NAME", help="The animation to look at, of a glTF file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
+@unlimited_option
 @output_options
-def info(source: str, clip: str | None, mesh: str | None, out: Output) -> None:
+def info(source: str, clip: str | None, mesh: str | None, unlimited: bool, out: Output) -> None:
     """Tell what a geometry video (- for standard input) holds and where its bytes go, or what is read of any other input."""
     from gvpipe import api
     from gvpipe.cli.asset_lines import asset_lines, shape_lines
@@ -249,7 +255,7 @@ def info(source: str, clip: str | None, mesh: str | None, out: Output) -> None:
             return
         if clip is not None or mesh is not None:
             raise click.UsageError("--clip and --mesh are for sources; a geometry video has neither")
-        found = api.info(path)
+        found = api.info(path, unlimited=unlimited)
     out.json(found.to_json())
     out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}")
     for line in shape_lines(found):
@@ -285,8 +291,9 @@ def _source_info(source: str, path: str, clip: str | None, mesh: str | None, out
 @click.argument("distorted", metavar="DISTORTED")
 @click.option("--clip", metavar="NAME", help="The animation of REFERENCE, of a file that has several. [default: the first]")
 @click.option("--fps", type=float, help="Frames per second at which REFERENCE is sampled.")
+@unlimited_option
 @output_options
-def compare(reference: str, distorted: str, clip: str | None, fps: float | None, out: Output) -> None:
+def compare(reference: str, distorted: str, clip: str | None, fps: float | None, unlimited: bool, out: Output) -> None:
     """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos, one may be - for standard input."""
     from gvpipe import api
     from gvpipe.metrics import comparison
@@ -295,7 +302,9 @@ def compare(reference: str, distorted: str, clip: str | None, fps: float | None,
         raise click.UsageError("both are -, and there is one standard input", click.get_current_context())
     with source_path(reference) as one, source_path(distorted) as other, out.progress() as progress:
         result = comparison.compare(
-            api.read(one, fps, clip), api.read(other), lambda done, of: progress("compare", done / of) if progress else None
+            api.read(one, fps, clip, unlimited=unlimited),
+            api.read(other, unlimited=unlimited),
+            lambda done, of: progress("compare", done / of) if progress else None,
         )
     values = result.to_json()
     out.json(values)
@@ -317,8 +326,9 @@ cli.add_command(convert)
 @click.argument("target", metavar="OUT.html")
 @click.option("--up", type=click.Choice(["y", "z"]), help="The axis that stands upright. [default: the file's own, else y]")
 @click.option("--quality", type=float, help="0-100, of a conversion: the error that it may add. [default: 90]")
+@unlimited_option
 @output_options
-def export_html(source: str, target: str, up: str | None, quality: float | None, out: Output) -> None:
+def export_html(source: str, target: str, up: str | None, quality: float | None, unlimited: bool, out: Output) -> None:
     """Write a web page of one file that plays a geometry video, without a network.
 
     Browsers read codec mcgv in its web profile; other files are converted, which adds an error that is told: KG 0.044 or less
@@ -327,7 +337,7 @@ def export_html(source: str, target: str, up: str | None, quality: float | None,
     from gvpipe import web
 
     with source_path(source) as path, out.progress() as progress:
-        report = web.export_html(path, target, up, quality, progress)
+        report = web.export_html(path, target, up, quality, progress, unlimited=unlimited)
     out.json(report.to_json())
     size = f"{_size(report.bytes)}, {_size(report.video_bytes)} of which are the geometry video"
     out.text(f"{shown(source, STDIN)} -> {target} ({size})")
@@ -337,8 +347,9 @@ def export_html(source: str, target: str, up: str | None, quality: float | None,
 @cli.command()
 @click.argument("source", metavar="FILE.mp4")
 @click.option("--up", type=click.Choice(["y", "z"]), help="The axis that stands upright. [default: the file's own, else y]")
+@unlimited_option
 @output_options
-def play(source: str, up: str | None, out: Output) -> None:
+def play(source: str, up: str | None, unlimited: bool, out: Output) -> None:
     """Play a geometry video in your browser.
 
     Where no browser can be opened, the page's path is printed. The page is one file and needs no network.
@@ -351,7 +362,7 @@ def play(source: str, up: str | None, out: Output) -> None:
 
     with source_path(source) as path, out.progress() as progress:
         page = Path(lasting_folder()) / f"{Path(path).stem}.html"  # stays: the browser reads it later
-        report = web.export_html(path, page, up, None, progress)
+        report = web.export_html(path, page, up, None, progress, unlimited=unlimited)
     _tell_conversion(out, report)
     is_open = open_page(page)
     if not is_open:
@@ -379,6 +390,7 @@ def play(source: str, up: str | None, out: Output) -> None:
 @click.option("--range", "limits", metavar="A,B", help="Ends of the colours, or symmetric. [default: the range drawn]")
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Paint this part only; repeat for more.")
 @click.option("--plain", "--no-textures", "plain", is_flag=True, help="Leave out materials, textures and colours.")
+@unlimited_option
 @output_options
 def render(source: str, target: str, size: str, limits: str | None, out: Output, **options: Any) -> None:
     """Paint a geometry video or a sequence as a picture or a film; needs no display and no GPU."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from gvpipe.cli.console import Output, output_options
+from gvpipe.cli.console import Output, output_options, unlimited_option
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, shown, source_path, target_path
 from gvpipe.errors import InputError
 
@@ -21,6 +21,7 @@ from gvpipe.errors import InputError
 @click.option("--start", type=int, default=0, show_default=True, help="First frame.")
 @click.option("--stop", type=int, help="Frame after the last. [default: the end]")
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
+@unlimited_option
 @output_options
 def convert(
     source: str,
@@ -31,6 +32,7 @@ def convert(
     start: int,
     stop: int | None,
     parts: tuple[str, ...],
+    unlimited: bool,
     out: Output,
 ) -> None:
     """Write a mesh sequence in another format.
@@ -44,7 +46,7 @@ def convert(
     out = out.carrying(target)
     _check_target(source, target)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
-        whole = api.read(given, fps, clip, mesh)
+        whole = api.read(given, fps, clip, mesh, unlimited=unlimited)
         start, stop = api.frame_range(whole, start, stop)
         sequence = chosen(whole.part(start, stop), parts, None, "convert", progress)
         noticed = [*whole.notes, *api.write(sequence, path, start)]

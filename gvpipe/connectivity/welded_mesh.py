@@ -16,8 +16,9 @@ import numpy as np
 from scipy import sparse
 
 from gvpipe.arrays import Array, Int32, Int64
-from gvpipe.connectivity.base_mesh import EncodedMesh, decode_base, encode_base
+from gvpipe.connectivity.base_mesh import EncodedMesh, decode_base, encode_base, keep_mesh
 from gvpipe.connectivity.seams import decode_seams, encode_seams
+from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.mesh.topology import adjacency
@@ -70,18 +71,22 @@ def encode_points(
     return EncodedMesh(mesh, coded.order, coded.permutation), decoded
 
 
-def decode_points(mesh: bytes, order: bytes, across: bool = False) -> WeldedMesh:
-    """Mirror of `encode_points`. Raises CorruptFile for anything malformed."""
+def decode_points(
+    mesh: bytes, order: bytes, across: bool = False, n_vertices: int = MAX_VERTICES, n_triangles: int = 2 * MAX_VERTICES
+) -> WeldedMesh:
+    """Mirror of `encode_points`, for a mesh of at most ``n_vertices`` and ``n_triangles``; raises `CorruptFile`."""
     cursor = Cursor(mesh, "mesh")
-    base = decode_base(cursor.block(), b"")
+    base = decode_base(cursor.block(), b"", n_vertices, n_triangles)
     point_faces = smallest_first(base.faces.astype(np.int64))
     counts = cursor.block()
-    faces, point = decode_seams(counts, cursor.rest(), order, point_faces, len(base.points), across)
+    faces, point = decode_seams(counts, cursor.rest(), order, point_faces, len(base.points), across, n_vertices=n_vertices)
     return WeldedMesh(faces.astype(np.int32), point, base.points, point_faces.astype(np.int32))
 
 
 def read_points(bitstream: Bitstream, across: bool = False) -> WeldedMesh:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
-    mesh = decode_points(bitstream.section("mesh"), bitstream.section("order"), across)
+    n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
+    keep_mesh(bitstream)
+    mesh = decode_points(bitstream.section("mesh"), bitstream.section("order"), across, n_vertices, n_triangles)
     bitstream.check_size(len(mesh.point), len(mesh.faces))
     return mesh

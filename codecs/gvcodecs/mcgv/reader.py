@@ -30,6 +30,8 @@ from gvpipe.corrections.displacements import DisplacementReader, PointVertices
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import VideoReader
 
+BYTES_PER_PIXEL, BYTES_PER_SLOT = 4, 200
+
 
 class McgvReader:
     """Frames of an ``mcgv`` bitstream. The shared sections are decoded when they are first needed, beside the video.
@@ -103,13 +105,15 @@ class McgvReader:
     def _outliers(self) -> DisplacementReader:
         bitstream, surface = self._bitstream, self._surface
         shared = PointVertices.of(surface.vertices, surface.slot, surface.n_slots)
-        return DisplacementReader(bitstream.section(SECTION), bitstream.n_frames, surface.n_slots, SECTION, shared)
+        return DisplacementReader(
+            bitstream.section(SECTION), bitstream.n_frames, surface.n_slots, SECTION, shared, budget=bitstream.budget
+        )
 
 
 def _open_video(bitstream: Bitstream, header: Header, bounds: list[int]) -> VideoReader | NoPictures:
     if not header.pictures:
         return NoPictures(bounds, header.profile.middle)
-    return VideoReader(bitstream.video, header.profile, header.width, 3 * header.height)
+    return VideoReader(bitstream.video, header.profile, header.width, 3 * header.height, bitstream.budget)
 
 
 def read_layout(bitstream: Bitstream, header: Header, surface: DecodedBase, groups: Integers | None = None) -> Layout:
@@ -118,9 +122,11 @@ def read_layout(bitstream: Bitstream, header: Header, surface: DecodedBase, grou
     Raises:
         CorruptFile: they are not what an encoder writes.
     """
+    n_pixels = header.width * header.height
+    bitstream.budget.ask(f"a layout of {n_pixels} pixels", BYTES_PER_PIXEL * n_pixels + BYTES_PER_SLOT * surface.n_slots)
     if not header.pictures:
         return Layout(1, 1, np.zeros(surface.n_slots, np.int64))
-    if header.width * header.height < surface.n_slots:
+    if n_pixels < surface.n_slots:
         raise CorruptFile(f"header: planes of {header.width}x{header.height} do not hold {surface.n_slots} samples")
     if header.placement == "halves":
         groups = surface.points.pieces()[surface.point] if groups is None else groups
