@@ -146,9 +146,7 @@ def unpack_payload(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstrea
         entries = []
         for _ in range(count):
             name = cursor.take(min(cursor.take(1)[0], MAX_NAME))
-            if not NAME.fullmatch(name):
-                raise cursor.corrupt("a section's name is not of a to z, 0 to 9 and dots")
-            entries.append((name.decode("ascii"), *cursor.struct(ENTRY)))
+            entries.append((name, *cursor.struct(ENTRY)))
         table = payload[: len(payload) - cursor.left]
         (checksum,) = cursor.struct(CHECKSUM)
     except CorruptFile as exc:
@@ -157,15 +155,18 @@ def unpack_payload(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstrea
         raise
     if zlib.crc32(table) != checksum:
         raise cursor.corrupt("its checksum does not match")
+    if not all(NAME.fullmatch(name) for name, _, _ in entries):
+        raise cursor.corrupt("a section's name is not of a to z, 0 to 9 and dots")
     return _read_header(_read_sections(cursor, entries), budget)
 
 
-def _read_sections(cursor: Cursor, entries: list[tuple[str, int, int]]) -> dict[str, bytes]:
+def _read_sections(cursor: Cursor, entries: list[tuple[bytes, int, int]]) -> dict[str, bytes]:
     wanted = sum(length for _, length, _ in entries)
     if wanted > cursor.left:
         raise TruncatedFile(f"the sections need {wanted} bytes, {cursor.left} are there; get the file again from its source")
     sections: dict[str, bytes] = {}
-    for name, length, checksum in entries:
+    for encoded, length, checksum in entries:
+        name = encoded.decode("ascii")
         data = cursor.take(length)
         if zlib.crc32(data) != checksum:
             raise corrupt_section(name, "its checksum does not match")

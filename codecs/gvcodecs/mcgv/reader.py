@@ -5,6 +5,7 @@ A frame costs its group of pictures (H.264) or its one picture (JPEG), if there 
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 
@@ -27,7 +28,7 @@ from gvpipe.arrays import Float32, Int32, Integers
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.corrections.displacements import DisplacementReader, PointVertices
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import CorruptFile, corrupt
 from gvpipe.media.video import VideoReader
 
 BYTES_PER_PIXEL, BYTES_PER_SLOT = 4, 200
@@ -89,7 +90,7 @@ class McgvReader:
         """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
 
         Raises:
-            CorruptFile: a section or the video does not decode.
+            CorruptFile: a section or the video does not decode, or not to finite positions.
         """
         groups = self._video.read(start, stop)
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
@@ -99,6 +100,10 @@ class McgvReader:
         if self._header.outliers:
             self._outliers.apply(start, result)
         self._surface.fill_still(result)
+        with np.errstate(invalid="ignore"):
+            total = float(result.sum(dtype=np.float64))  # finite where all are; faster than to look at each
+        if not math.isfinite(total):
+            raise corrupt(f"frames {start} to {stop - 1} do not decode to finite positions")
         return result
 
     @cached_property
