@@ -16,10 +16,11 @@ import numpy as np
 from gvpipe import notes
 from gvpipe.arguments import StrPath, check_path, show
 from gvpipe.asset_coding.options import AssetOptions
+from gvpipe.budget import Budget
 from gvpipe.codec import Codec, Encoded, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import bytes_by_part, write_file
-from gvpipe.errors import InputError, OutputError, SettingError
+from gvpipe.errors import InputError, OutputError, OverBudget, SettingError
 from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
@@ -31,6 +32,7 @@ from gvpipe.registry import encode_sequence, make_codec
 from gvpipe.rendering.poster import poster_of
 from gvpipe.sequence import MeshSequence
 
+COSTLY_VERTEX = 400  # bytes of memory, with its triangles: less than any codec takes
 VIDEO_SUFFIXES = (".mp4", ".m4v")
 
 if TYPE_CHECKING:
@@ -284,7 +286,7 @@ def encode(
         sections=bytes_by_part(bitstream, size),
         tried=[trial.to_json() for trial in coded.tried],
         reason=coded.reason,
-        notes=_notes(sequence, target, asset.plan.left_out),
+        notes=[*_notes(sequence, target, asset.plan.left_out), *_refusal(path, bitstream, size)],
     )
 
 
@@ -531,6 +533,17 @@ def _notes(sequence: MeshSequence, target: Target | None, left_out: Sequence[str
     loose = notes.loose_bound(target.value, diagonal) if target and target.measure == "max" else ()
     rounded = notes.rounded(sequence.rounding, diagonal)
     return [*sequence.notes, *loose, *rounded, *notes.not_carried(sorted(left_out))]
+
+
+def _refusal(path: StrPath, bitstream: Bitstream, size: int) -> list[str]:
+    """A note if the file that was written is refused without ``unlimited``; looked at where vertices are many for its size."""
+    if COSTLY_VERTEX * bitstream.n_vertices < Budget(size).memory:
+        return []
+    try:
+        Player(path)[0]
+    except OverBudget as exc:
+        return [notes.over_budget(str(exc).partition(": ")[2].partition(";")[0])]
+    return []
 
 
 def _is_among(path: StrPath, source: MeshSequence | Source) -> bool:

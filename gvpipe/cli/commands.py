@@ -47,7 +47,9 @@ def main() -> None:
     except (click.Abort, KeyboardInterrupt):
         status = _fail("interrupted; nothing was written", 130)
     except MemoryError:
-        status = _fail("not enough memory; encode fewer frames or vertices at a time, or give the sequence as frame files", 1)
+        status = _fail(
+            "not enough memory; take fewer frames at a time (encode: --frames or --segment, decode: --start and --stop)", 1
+        )
     except BrokenPipeError:  # the reader of our output left, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1

@@ -6,6 +6,7 @@ the time of writing. It holds everything that a sequence has; `gvpipe.io.npz_ass
 
 from __future__ import annotations
 
+import lzma
 import zipfile
 import zlib
 from pathlib import Path
@@ -103,7 +104,7 @@ def _load(path: Path) -> tuple[dict[str, NDArray[Any]], list[str], str]:
         raise
     # an archive that lies about a size or a type can raise nearly anything inside NumPy, zipfile and zlib
     except (OSError, ValueError, TypeError, KeyError, EOFError, MemoryError, NotImplementedError, RuntimeError,
-            SyntaxError, OverflowError, zipfile.BadZipFile, zlib.error) as exc:  # fmt: skip
+            SyntaxError, OverflowError, zipfile.BadZipFile, zlib.error, lzma.LZMAError) as exc:  # fmt: skip
         reason = " ".join(str(exc).split())[:150]
         raise InputError(f"{path} cannot be read as .npz ({reason}); write it again with numpy.savez") from exc
 

@@ -7,6 +7,7 @@ fastest, is turned on its way there.
 
 from __future__ import annotations
 
+import lzma
 import tempfile
 import threading
 import weakref
@@ -23,7 +24,10 @@ from gvpipe.asset.field import Field
 from gvpipe.errors import InputError
 
 BLOCK_BYTES = 1 << 24  # of a member, held at a time
-ZIP_ERRORS = (OSError, ValueError, EOFError, KeyError, RuntimeError, NotImplementedError, zipfile.BadZipFile, zlib.error)
+ZIP_ERRORS = (
+    *(OSError, ValueError, EOFError, KeyError, RuntimeError, NotImplementedError),
+    *(zipfile.BadZipFile, zlib.error, lzma.LZMAError),
+)
 
 
 def write_field(file: IO[bytes], field: Field) -> None:
