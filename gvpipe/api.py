@@ -11,8 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from gvpipe import notes
 from gvpipe.arguments import StrPath, check_path, show
 from gvpipe.asset_coding.options import AssetOptions
@@ -37,6 +35,7 @@ VIDEO_SUFFIXES = (".mp4", ".m4v")
 
 if TYPE_CHECKING:
     from gvpipe.asset_coding.encoder import AssetCoder
+    from gvpipe.io.runs import Run
     from gvpipe.rasterizer.camera import Camera
 
 Source = StrPath | Sequence[StrPath]
@@ -189,6 +188,25 @@ def read(
     return sequence if fps is None else sequence.with_fps(fps)
 
 
+def read_runs(
+    path: Source,
+    fps: float | None = None,
+    clip: str | None = None,
+    mesh: StrPath | None = None,
+    frames: tuple[int, int | None] | None = None,
+) -> list[Run]:
+    """Read an input whose vertices or triangles may change, as one sequence for each run of frames where they do not.
+
+    The arguments are those of `read`. A run has ``start``, ``stop`` and ``sequence``.
+
+    Raises:
+        InputError, FormatError: the path or what it holds cannot be used.
+    """
+    from gvpipe.io.runs import find_runs
+
+    return find_runs(lambda span: read(path, fps, clip, mesh, span), frames)
+
+
 def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> list[str]:
     """Write a mesh sequence as ``.npz``, or as frame files named by a pattern (``out/%04d.obj``), numbered from ``start``.
 
@@ -301,11 +319,11 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
     """
     player = Player(path, unlimited=unlimited)
     start, stop = frame_range(player, start, stop)
-    # positions before faces: the video decodes on other threads while the mesh does on this one
-    positions = np.asarray(player.level(lod).positions[start:stop]) if lod else player[start:stop]
     if lod:
-        return MeshSequence(positions, player.level(lod).faces, player.fps, name=player.path, origin=player.origin)
-    whole = player.sequence()
+        whole = player.level(lod)
+        positions = whole.read(start, stop)
+    else:  # positions before faces: the video decodes on other threads while the mesh does on this one
+        positions, whole = player[start:stop], player.sequence()
     fields = {name: each.part(start, stop) for name, each in whole.fields.items()}
     return dataclasses.replace(whole, positions=positions, fields=fields)
 

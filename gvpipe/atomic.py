@@ -3,6 +3,9 @@
 The content goes to a temporary file in the same folder, is flushed to the disk and then takes the final name in one
 step. An interrupted or failed write leaves no half file and never damages an older one. What is only needed for a while goes
 to a temporary folder.
+
+Where the system has files without names (Linux, most file systems), the content goes to one of those (`unnamed_path`). Then
+nothing is left even if the process is killed. Libraries that look at the name, or that replace the file, need `atomic_path`.
 """
 
 from __future__ import annotations
@@ -13,12 +16,15 @@ import os
 import secrets
 import shutil
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from gvpipe.errors import OutputError
 
 PREFIX = "gvpipe-"  # of the names of temporary folders
+LASTING_PREFIX = "gvpipe-play-"  # of those that stay for a while
+LASTING_SECONDS = 24 * 3600
 REMEDIES = {
     errno.ENOSPC: "free some space or choose another disk",
     errno.EDQUOT: "free some space or choose another disk",
@@ -43,9 +49,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises:
         OutputError: the folder is missing or read-only, the disk is full, ``path`` is not an ordinary file.
     """
-    target = Path(os.path.realpath(path))  # through a symbolic link, so that the link stays one
-    if os.path.exists(target) and not os.path.isfile(target):  # replacing a folder fails late; replacing /dev/null succeeds
-        raise OutputError(f"cannot write {path}: it exists and is not an ordinary file; choose another name")
+    target = _target(path)
     temporary = target.with_name(f".gvpipe-{secrets.token_hex(8)}{target.suffix}")
     try:
         # made here rather than by `tempfile`, whose files are private: the result gets the user's usual permissions
@@ -62,31 +66,148 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
+def unnamed_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Give a path to write to, as `atomic_path` does, which leads to a file without a name where the system has such.
+
+    It says nothing of the format, and is to be opened only: it must be neither replaced nor removed.
+
+    Raises:
+        OutputError: as `atomic_path`.
+    """
+    target = _target(path)
+    try:
+        held = os.open(target.parent, os.O_TMPFILE | os.O_RDWR, 0o666)  # with the user's usual permissions
+        held_path = Path(f"/proc/self/fd/{held}")
+        if not held_path.exists():
+            os.close(held)
+            raise FileNotFoundError
+    except (OSError, AttributeError):  # no such system or file system; if the folder is at fault, the other way says so
+        with atomic_path(path) as temporary:
+            yield temporary
+        return
+    try:
+        yield held_path
+        os.fsync(held)
+        _give_name(held_path, target)
+    except OSError as exc:
+        raise output_error(path, exc) from exc
+    finally:
+        os.close(held)
+    _flush_folder(target.parent)
+
+
+@contextlib.contextmanager
+def atomic_files(folder: str | os.PathLike[str]) -> Iterator[Path]:
+    """Give a temporary folder to write several files to; all move into ``folder`` if the block ends well, none if it does not.
+
+    Folders inside are joined with those that are there. ``folder`` is made if it is missing.
+
+    Raises:
+        OutputError: a folder is missing or read-only, the disk is full, a file would replace a folder.
+    """
+    target = Path(os.path.realpath(folder))
+    beside = next(path for path in (target, *target.parents) if path.is_dir())
+    temporary = beside / f".gvpipe-{secrets.token_hex(8)}"
+    try:
+        temporary.mkdir()
+        yield temporary
+        files = sorted(path.relative_to(temporary) for path in temporary.rglob("*") if path.is_file())
+        for name in files:
+            if (target / name).is_dir():
+                raise OutputError(f"cannot write {target / name}: it is a folder; choose another name")
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+        for name in files:
+            os.replace(temporary / name, target / name)
+    except OSError as exc:
+        raise output_error(folder, exc) from exc
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    _flush_folder(target)
+
+
+@contextlib.contextmanager
 def temporary_folder() -> Iterator[str]:
-    """Give a new temporary folder, as `lasting_folder` does; it vanishes with its files when the block ends."""
-    folder = lasting_folder()
+    """Give a new folder among the system's temporary files; it vanishes with its files when the block ends.
+
+    Raises:
+        OutputError: no folder can be made there.
+    """
+    folder = _new_folder(PREFIX)
     try:
         yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def lasting_folder() -> str:
-    """Return the path of a new folder among the system's temporary files, which stays.
+@contextlib.contextmanager
+def lasting_folder() -> Iterator[str]:
+    """Give a new folder among the system's temporary files, which stays if the block ends well.
+
+    Those of a user that are older than `LASTING_SECONDS` are removed, so that they do not pile up.
 
     Raises:
         OutputError: no folder can be made there.
     """
+    _remove_old_folders()
+    folder = _new_folder(LASTING_PREFIX)
     try:
-        return tempfile.mkdtemp(prefix=PREFIX)
-    except OSError as exc:
-        raise output_error(tempfile.gettempdir(), exc) from exc
+        yield folder
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
 
 
 def output_error(path: str | os.PathLike[str], exc: OSError) -> OutputError:
     """The error to raise for a failed write to ``path``: one line with the system's reason and a remedy."""
     remedy = REMEDIES.get(exc.errno or 0, "check the folder and the disk")
     return OutputError(f"cannot write {os.fspath(path)}: {exc.strerror or exc}; {remedy}")
+
+
+def _new_folder(prefix: str) -> str:
+    try:
+        return tempfile.mkdtemp(prefix=prefix)
+    except OSError as exc:
+        raise output_error(tempfile.gettempdir(), exc) from exc
+
+
+def _remove_old_folders() -> None:
+    """Remove what `lasting_folder` made long ago, for this user."""
+    oldest = time.time() - LASTING_SECONDS
+    with contextlib.suppress(OSError), os.scandir(tempfile.gettempdir()) as entries:
+        for entry in entries:
+            if not entry.name.startswith(LASTING_PREFIX) or not entry.is_dir(follow_symlinks=False):
+                continue
+            found = entry.stat(follow_symlinks=False)
+            if found.st_mtime < oldest and (not hasattr(os, "getuid") or found.st_uid == os.getuid()):
+                shutil.rmtree(entry.path, ignore_errors=True)
+
+
+def _target(path: str | os.PathLike[str]) -> Path:
+    """Where a file goes: through a symbolic link, so that the link stays one."""
+    target = Path(os.path.realpath(path))
+    if os.path.exists(target) and not os.path.isfile(target):  # replacing a folder fails late; replacing /dev/null succeeds
+        raise OutputError(f"cannot write {path}: it exists and is not an ordinary file; choose another name")
+    return target
+
+
+def _give_name(held: Path, target: Path) -> None:
+    """Let a file without a name have one: at once if it is free, else by a spare name, since no link replaces a file."""
+    folder = os.open(target.parent, os.O_PATH)  # given a folder, Python's `link` follows ``held`` to the file
+    try:
+        try:
+            os.link(held, target.name, dst_dir_fd=folder)
+            return
+        except FileExistsError:
+            spare = f".gvpipe-{secrets.token_hex(8)}"
+        try:
+            os.link(held, spare, dst_dir_fd=folder)
+            os.replace(spare, target.name, src_dir_fd=folder, dst_dir_fd=folder)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                os.unlink(spare, dir_fd=folder)
+            raise
+    finally:
+        os.close(folder)
 
 
 def _flush_to_disk(path: Path) -> None:

@@ -75,6 +75,10 @@ class LevelReader(Protocol):
         """Return the triangles of a level: ``(n, 3) int32``, indices of the vertices that `read` returns for it."""
         ...
 
+    def level_points(self, lod: int) -> tuple[Int32, Int32]:
+        """Return the point of each vertex of level 0, ``(V,) int32``, and that of each vertex of a level above, ascending."""
+        ...
+
     def read(self, start: int, stop: int, lod: int = 0) -> Float32:
         """Return frames of a level: ``(stop - start, levels[lod], 3) float32``, model units; decodes only what it needs."""
         ...

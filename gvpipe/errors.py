@@ -4,7 +4,8 @@ One tree, so that a caller can catch as much or as little as needed::
 
     GvpipeError
     ├── InputError           a sequence, a setting or a path that cannot be used (also a ValueError)
-    │   └── SettingError     a codec setting out of range or unknown
+    │   ├── SettingError     a codec setting out of range or unknown
+    │   └── TopologyChange   vertices or triangles change at a frame, which it names
     ├── OutputError          the result cannot be written (disk full, no such folder)
     └── FormatError          a file that cannot be read as a geometry video
         ├── NotGeometryVideo     not an MP4, or an MP4 that gvpipe did not write
@@ -36,6 +37,20 @@ class InputError(GvpipeError, ValueError):
 
 class SettingError(InputError):
     """A codec setting is unknown or out of range."""
+
+
+class TopologyChange(InputError):
+    """The mesh has other vertices or triangles from a frame on: ``frame``, counted in the whole input."""
+
+    def __init__(self, message: str, frame: int) -> None:
+        super().__init__(message)
+        self.frame = frame
+
+    @classmethod
+    def at(cls, what: str, frame: int, start: int = 0) -> TopologyChange:
+        """The error for what changes at a frame, of an input that is read from ``start`` on."""
+        remedy = f"read some frames (--frames {start}:{frame} or --frames {frame}:), or write several files (--split)"
+        return cls(f"{what}; {remedy}", frame)
 
 
 class OutputError(GvpipeError):

@@ -15,6 +15,7 @@ from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 import numpy as np
 
 from gvpipe.arrays import Float32
+from gvpipe.forks import renew_after_fork
 
 CACHE_BYTES = 64 << 20  # of decoded positions
 AHEAD_FRAMES = 8  # fetched ahead at least, in whole groups
@@ -41,6 +42,14 @@ class FrameCache:
         self._lock = threading.Lock()
         self._worker: ThreadPoolExecutor | None = None
         self._last, self._direction, self._run = -1, 0, 0
+        renew_after_fork(self)
+
+    def after_fork(self) -> None:
+        """Begin anew in a forked child: threads that would fill the groups are not there."""
+        self._lock = threading.Lock()
+        self._worker = None
+        self._groups = OrderedDict()
+        self._run = 0
 
     def frame(self, index: int) -> Float32:
         """A copy of one frame ``(V, 3)``; raises what ``read`` raises."""

@@ -58,11 +58,9 @@ def over_budget(reason: str) -> str:
     return f"the file is so small for its mesh that reading it needs --unlimited ({reason})"
 
 
-def coarser_level(lod: int, has_asset: bool) -> tuple[str, ...]:
-    """Of a level of detail of a video that has more than positions."""
-    if not (lod and has_asset):
-        return ()
-    return (f"level {lod} has positions and triangles alone; attributes, fields and parts are of level 0",)
+def coarser_level(lod: int, names: Sequence[str]) -> tuple[str, ...]:
+    """Of what a level of detail has no place for."""
+    return (f"level of detail {lod} leaves out {', '.join(names)}",) if names else ()
 
 
 def origin_left_out(origin: Sequence[float]) -> str:

@@ -7,6 +7,7 @@ import operator
 import os
 import threading
 from collections.abc import Iterator, Mapping
+from functools import partial
 from types import TracebackType
 from typing import Any, overload
 
@@ -22,10 +23,12 @@ from gvpipe.asset.part import Part
 from gvpipe.asset_coding.directory import Directory
 from gvpipe.asset_coding.listing import list_asset
 from gvpipe.asset_coding.reader import AssetReader
+from gvpipe.coarse_asset import add_asset
 from gvpipe.codec import GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file
 from gvpipe.errors import InputError, in_file
+from gvpipe.forks import renew_after_fork
 from gvpipe.frame_cache import FrameCache
 from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence, describe, numbers_of
@@ -34,7 +37,8 @@ from gvpipe.sequence import MeshSequence, describe, numbers_of
 class Player:
     """An open geometry video: a sequence of frames, each ``(V, 3) float32``, model units, relative to ``origin``.
 
-    A context manager; thread-safe.
+    A context manager; thread-safe. A forked process goes on with it. Pickled, it is opened again by its path, so the file must
+    still be there.
 
     ``video[k]`` decodes no more than the group of frames that frame k lies in, and keeps the last groups; frames asked for
     in a row, forwards or backwards, are decoded ahead on another thread. ``video[a:b]`` gives ``(b - a, V, 3)``.
@@ -52,6 +56,8 @@ class Player:
     def __init__(self, path: str | os.PathLike[str], *, unlimited: bool = False) -> None:
         check_path(path, "the geometry video")
         self.path = os.fspath(path)
+        self._absolute = os.path.abspath(self.path)  # another process may have another working directory
+        self._unlimited = unlimited
         self.bitstream: Bitstream = read_file(path, unlimited)
         with in_file(self.path):
             self._reader = open_reader(self.bitstream)
@@ -59,6 +65,16 @@ class Player:
         self._lock = threading.Lock()
         group = self._reader.group if isinstance(self._reader, GroupReader) else _alone
         self._cache = FrameCache(self._read, group, len(self), 12 * self.bitstream.n_vertices)
+        self._is_half_read = False
+        renew_after_fork(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(type(self), unlimited=self._unlimited), (self._absolute,)
+
+    def after_fork(self) -> None:
+        """Go on in a forked child (`gvpipe.forks`)."""
+        self._is_half_read = self._lock.locked()
+        self._lock = threading.Lock()
 
     @property
     def faces(self) -> Int32:
@@ -137,6 +153,8 @@ class Player:
     def level(self, lod: int) -> MeshSequence:
         """The video as a sequence of a coarser mesh with the same motion; level 0 is the mesh itself.
 
+        It has what of attributes, fields, parts and materials survives; its notes say what does not (`gvpipe.coarse_asset`).
+
         Raises:
             InputError: there is no such level.
         """
@@ -144,7 +162,10 @@ class Player:
             return self.sequence()
         if not isinstance(self._reader, LevelReader) or not 0 < lod < len(self.levels):
             raise InputError(f"{self.path}: no level of detail {lod}; there are levels 0..{len(self.levels) - 1}")
-        return MeshSequence(_Level(self, lod), self._reader.level_faces(lod), self.fps, name=self.path, origin=self.origin)
+        with in_file(self.path):
+            faces, (points, kept) = self._reader.level_faces(lod), self._reader.level_points(lod)
+        level = MeshSequence(_Level(self, lod), faces, self.fps, name=self.path, origin=self.origin)
+        return add_asset(level, self.sequence(), points, kept, lod)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -220,6 +241,8 @@ class Player:
 
     def _read(self, start: int, stop: int, lod: int = 0) -> Float32:
         with self._lock, in_file(self.path):
+            if self._is_half_read:  # another thread was decoding at the time of a fork
+                self._reader, self._is_half_read = open_reader(self.bitstream), False
             if lod and isinstance(self._reader, LevelReader):
                 return self._reader.read(start, stop, lod=lod)
             return self._reader.read(start, stop)

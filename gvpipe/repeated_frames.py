@@ -116,12 +116,13 @@ class RepeatedFramesReader:
 
     levels: list[int]
     level_faces: Callable[[int], Int32]
+    level_points: Callable[[int], tuple[Int32, Int32]]
     group: Callable[[int], tuple[int, int]]
 
     def __init__(self, distinct: FrameReader, repeated: RepeatedFrames) -> None:
         self.distinct, self.repeated, self._starts = distinct, repeated, repeated.starts
         if isinstance(distinct, LevelReader):
-            self.levels, self.level_faces = distinct.levels, distinct.level_faces
+            self.levels, self.level_faces, self.level_points = distinct.levels, distinct.level_faces, distinct.level_points
         if isinstance(distinct, GroupReader):
             self.group = self._group
 

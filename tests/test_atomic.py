@@ -6,11 +6,12 @@ import os
 import re
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import pytest
 
-from gvpipe.atomic import atomic_path, lasting_folder, temporary_folder
+from gvpipe.atomic import atomic_path, lasting_folder, temporary_folder, unnamed_path
 from gvpipe.errors import OutputError
 
 
@@ -29,6 +30,40 @@ def test_atomic_path(tmp_path: Path) -> None:
     assert os.listdir(tmp_path) == ["a.mp4"]
     with pytest.raises(OutputError, match="not an ordinary file"), atomic_path(tmp_path):
         pass
+
+
+@pytest.mark.parametrize("has_unnamed", [True, False])
+def test_unnamed_path(has_unnamed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not has_unnamed:
+        monkeypatch.delattr(os, "O_TMPFILE", raising=False)
+    target = tmp_path / "a.mp4"
+    for old in ("", "old"):
+        with pytest.raises(KeyboardInterrupt), unnamed_path(target) as temporary:
+            temporary.write_text("half")
+            raise KeyboardInterrupt
+        assert [path.read_text() for path in tmp_path.iterdir()] == [old] * bool(old)
+        with unnamed_path(target) as temporary:
+            temporary.write_text("longer than old")
+            temporary.write_text("old")
+        assert target.read_text() == "old"
+        assert os.listdir(tmp_path) == ["a.mp4"]
+    (tmp_path / "plain").touch()
+    assert target.stat().st_mode == (tmp_path / "plain").stat().st_mode
+    with pytest.raises(OutputError, match="not an ordinary file"), unnamed_path(tmp_path):
+        pass
+    with pytest.raises(OutputError, match="create its folder first"), unnamed_path(tmp_path / "missing" / "a.mp4"):
+        pass
+
+
+@pytest.mark.skipif(not hasattr(os, "O_TMPFILE"), reason="this system has no files without names")
+def test_a_file_without_a_name(tmp_path: Path) -> None:
+    try:
+        os.close(os.open(tmp_path, os.O_TMPFILE | os.O_RDWR))
+    except OSError:
+        pytest.skip("this file system has no files without names")
+    with unnamed_path(tmp_path / "a.mp4") as temporary:
+        temporary.write_text("half")
+        assert not os.listdir(tmp_path)  # so a process that is killed here leaves nothing
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="permissions and links of POSIX")
@@ -51,7 +86,26 @@ def test_a_temporary_folder_vanishes(tmp_path: Path, monkeypatch: pytest.MonkeyP
         assert [name.startswith("gvpipe-") for name in os.listdir(tmp_path)] == [True]
         raise KeyboardInterrupt
     assert not os.listdir(tmp_path)
-    assert Path(lasting_folder()).parent == tmp_path
+
+
+def test_a_lasting_folder_stays_for_a_day(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with pytest.raises(KeyboardInterrupt), lasting_folder() as folder:
+        Path(folder, "a.html").touch()
+        raise KeyboardInterrupt
+    assert not os.listdir(tmp_path)
+    with lasting_folder() as first:
+        Path(first, "a.html").touch()
+    (tmp_path / "gvpipe-play-file").touch()
+    with lasting_folder() as second:
+        pass
+    assert os.path.exists(Path(first, "a.html"))
+    day_before_last = time.time() - 2 * 24 * 3600
+    for name in os.listdir(tmp_path):
+        os.utime(tmp_path / name, (day_before_last, day_before_last))
+    with lasting_folder() as third:
+        pass
+    assert sorted(os.listdir(tmp_path)) == sorted(["gvpipe-play-file", os.path.basename(third)]) and second != third
 
 
 def test_no_place_for_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

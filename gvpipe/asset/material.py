@@ -7,7 +7,9 @@ KHR_materials_unlit.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from collections.abc import Collection
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 from gvpipe.arguments import show
 from gvpipe.asset.attribute import check_word
@@ -116,6 +118,13 @@ class Material:
         """Its textures by field name."""
         named = ((field.name, getattr(self, field.name)) for field in fields(self))
         return {name: value for name, value in named if isinstance(value, Texture)}
+
+
+def with_uv(materials: tuple[Material, ...], names: Collection[str]) -> tuple[Material, ...]:
+    """Return the materials without the textures whose coordinates are none of the attributes ``names``."""
+    gone = [[role for role, texture in each.textures.items() if texture.uv not in names] for each in materials]
+    none: list[dict[str, Any]] = [dict.fromkeys(roles) for roles in gone]
+    return tuple(replace(each, **changes) for each, changes in zip(materials, none, strict=True))
 
 
 def check_materials(materials: tuple[Material, ...], n_images: int, where: str) -> tuple[Material, ...]:

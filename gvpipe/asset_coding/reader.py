@@ -6,11 +6,9 @@ Attributes and fields are decoded when they are asked for.
 from __future__ import annotations
 
 import dataclasses
-import threading
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager
 from functools import cached_property
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
@@ -38,6 +36,7 @@ from gvpipe.budget import Budget
 from gvpipe.codec import FrameReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import InputError, corrupt_section, in_file
+from gvpipe.forks import ForkLock
 from gvpipe.mesh.hierarchy import keep_hierarchy
 
 if TYPE_CHECKING:  # decoders load when a file has something for them: most have not
@@ -49,7 +48,6 @@ BYTES_PER_TRIANGLE = 200  # of the surface that attributes are coded over
 BYTES_PER_VALUE, SECONDS_PER_VALUE = 60, 1e-6  # of an attribute
 Read = Callable[[int, int], Float32]
 Thing = TypeVar("Thing")
-Lock = AbstractContextManager[bool]
 
 
 class AssetReader:
@@ -68,7 +66,7 @@ class AssetReader:
     def __init__(self, bitstream: Bitstream, reader: FrameReader, path: str = "", read: Read | None = None) -> None:
         self._bitstream, self._reader, self._path = bitstream, reader, path
         self._read = read or reader.read
-        self._lock: Lock = threading.RLock()
+        self._lock = ForkLock()
         self._meshes: dict[str, FieldMesh] = {}
         self.directory = Directory()
         if SECTION in bitstream.sections:
@@ -229,11 +227,17 @@ class _FieldValues:
     """A field's frames, decoded when they are sliced."""
 
     def __init__(
-        self, read: Callable[[int, int], Array], shape: tuple[int, ...], listed: Listed, lock: Lock, path: str
+        self, read: Callable[[int, int], Array], shape: tuple[int, ...], listed: Listed, lock: ForkLock, path: str
     ) -> None:
         self._read, self._lock, self._listed, self._path = read, lock, listed, path
         self.dtype = np.dtype(listed.dtype)
         self.shape: tuple[int, ...] = shape
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        raise TypeError(
+            f"field {self._listed.name!r} of {self._path or 'a geometry video'} cannot be pickled, since its frames are "
+            "decoded when they are read; pickle the video (gvpipe.open), and take the field from it afterwards"
+        )
 
     def __getitem__(self, key: slice, /) -> Array:
         start, stop, _ = key.indices(self.shape[0])
@@ -265,7 +269,7 @@ def _of_two(coordinates: Array, listed: Listed) -> Array:
 class _Lazy(Mapping[str, Thing], Generic[Thing]):
     """Things by name, each made when it is first asked for."""
 
-    def __init__(self, listed: Mapping[str, Listed], make: Callable[[Listed], Thing], lock: Lock, path: str) -> None:
+    def __init__(self, listed: Mapping[str, Listed], make: Callable[[Listed], Thing], lock: ForkLock, path: str) -> None:
         self._listed, self._make, self._lock, self._path = listed, make, lock, path
         self._made: dict[str, Thing] = {}
 

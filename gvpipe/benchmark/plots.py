@@ -12,7 +12,7 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
-from gvpipe.atomic import atomic_path, output_error
+from gvpipe.atomic import output_error, unnamed_path
 from gvpipe.benchmark.report import BenchReport, Curve
 from gvpipe.errors import InputError
 
@@ -48,7 +48,7 @@ def draw(report: BenchReport, folder: str | os.PathLike[str], peers: Peers | Non
     paths = []
     for name, curves in by_sequence.items():
         path = Path(folder) / f"{name}.png"
-        with atomic_path(path) as temporary:
+        with unnamed_path(path) as temporary:
             _draw_sequence(name, curves, (peers or {}).get(name, {}), temporary)
         paths.append(path)
     return paths
@@ -103,7 +103,7 @@ def _draw_sequence(name: str, curves: list[Curve], peers: dict[str, list[dict[st
         panel.xaxis.set_minor_formatter(NullFormatter())
     figure.legend(list(labelled.values()), list(labelled), loc="outside lower center", ncols=LEGEND_COLUMNS, fontsize="small")
     figure.suptitle(f"{name}: {curves[0].vertices} vertices, {curves[0].frames} frames")
-    figure.savefig(path, dpi=100, metadata={"Software": None})
+    figure.savefig(path, format="png", dpi=100, metadata={"Software": None})
 
 
 def _number(text: str | None) -> float | None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gvpipe.atomic import atomic_path
+from gvpipe.atomic import unnamed_path
 from gvpipe.errors import InputError
 
 NUMBER = int | float | None
@@ -70,7 +70,7 @@ class BenchReport:
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the JSON file; raises `OutputError` if that fails."""
-        with atomic_path(path) as temporary:
+        with unnamed_path(path) as temporary:
             temporary.write_text(json.dumps(self.to_json(), indent=1, allow_nan=False) + "\n", "utf-8")
 
     @classmethod

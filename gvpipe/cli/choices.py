@@ -1,15 +1,37 @@
-"""What a user chooses of a sequence before it is written: parts, a frame rate. Reading it shows how far it is."""
+"""What a user chooses of a sequence before it is written: frames, parts, a frame rate. Reading it shows how far it is."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import click
+
 from gvpipe.part_choice import parts_alone
 
 if TYPE_CHECKING:
     from gvpipe.codec import Progress
     from gvpipe.sequence import MeshSequence
+
+
+def parse_frames(text: str | None) -> tuple[int, int | None] | None:
+    """``10:50`` as ``(10, 50)``; raises `click.UsageError`."""
+    if text is None:
+        return None
+    first, colon, last = text.partition(":")
+    try:
+        if not colon:
+            raise ValueError
+        return int(first or 0), int(last) if last else None
+    except ValueError as exc:
+        raise click.UsageError(f"--frames {text}: A:B is needed, such as --frames 10:50") from exc
+
+
+def chosen_frames(start: int | None, stop: int | None, frames: str | None) -> tuple[int, int | None]:
+    """First frame and the one after the last, of --start and --stop or of --frames; raises `click.UsageError`."""
+    if frames is not None and (start is not None or stop is not None):
+        raise click.UsageError("give --frames A:B, or --start and --stop, not both")
+    return parse_frames(frames) or (start or 0, stop)
 
 
 def chosen(

@@ -2,7 +2,7 @@
 
 What is printed, and how much of it, is `gvpipe.cli.console`'s; ``-`` in place of a file's name is `gvpipe.cli.pipes`'.
 
-Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage, 130 interrupted.
+Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage, 130 interrupted, 128 + n ended by signal n.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import atexit
 import gc
 import os
+import signal
 import sys
 import traceback
 from dataclasses import replace
@@ -21,9 +22,11 @@ from gvpipe import __version__
 from gvpipe.cli.console import Output, is_verbose, output_options, print_options, unlimited_option
 from gvpipe.cli.conversion import convert
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
+from gvpipe.cli.process import Ended, ending_by_exception, replace_closed_streams
 from gvpipe.errors import GvpipeError
 
 if TYPE_CHECKING:
+    from gvpipe.api import Report
     from gvpipe.web import ExportReport
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
@@ -34,8 +37,10 @@ def main() -> None:
     """Run the command line and exit."""
     gc.set_threshold(COLLECTED)
     atexit.register(gc.freeze)  # what the process takes along when it ends need not be looked through
+    replace_closed_streams()
     try:
-        status = cli(standalone_mode=False, prog_name="gvpipe")
+        with ending_by_exception():
+            status = cli(standalone_mode=False, prog_name="gvpipe")
     except GvpipeError as exc:
         status = _fail(_one_line(exc), 1)
     except click.UsageError as exc:
@@ -45,7 +50,9 @@ def main() -> None:
         exc.show()
         status = 1
     except (click.Abort, KeyboardInterrupt):
-        status = _fail("interrupted; nothing was written", 130)
+        status = _fail("interrupted; no file is left half written", 130)
+    except Ended as exc:
+        status = _fail(f"ended by {signal.Signals(exc.number).name}; no file is left half written", 128 + exc.number)
     except MemoryError:
         status = _fail(
             "not enough memory; take fewer frames at a time (encode: --frames or --segment, decode: --start and --stop)", 1
@@ -53,8 +60,11 @@ def main() -> None:
     except BrokenPipeError:  # the reader of our output left, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1
-    except OSError as exc:  # files' own errors are GvpipeErrors already: what is left is our output, as on a full disk
-        status = _fail(f"cannot print the result: {exc.strerror or exc}; free some space or print elsewhere", 1)
+    except OSError as exc:  # those of files that are read or written are GvpipeErrors already
+        if is_verbose(sys.argv[1:]):
+            traceback.print_exc()
+        what = f"{exc.filename}: " if exc.filename else ""
+        status = _fail(f"{what}{exc.strerror or exc}; check the path, its permissions and the disk", 1)
     except Exception as exc:
         if is_verbose(sys.argv[1:]):
             traceback.print_exc()
@@ -108,6 +118,7 @@ def cli() -> None:
 @click.option("--clip", metavar="NAME", help="The animation to read, of a glTF file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
+@click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.mp4, ...")
 @click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp.")
 @unlimited_option
 @output_options
@@ -130,6 +141,7 @@ def encode(
     clip: str | None,
     mesh: str | None,
     frames: str | None,
+    split: bool,
     textures: str | None,
     unlimited: bool,
     out: Output,
@@ -142,7 +154,9 @@ def encode(
     'walk/$F4.obj'), a geometry video, or - for an .npz or a geometry video on standard input. OUTPUT - is standard output.
     """
     from gvpipe import api
-    from gvpipe.rate_control.purposes import candidates, name_with
+    from gvpipe.cli.choices import parse_frames
+    from gvpipe.cli.splitting import write_runs
+    from gvpipe.rate_control.purposes import candidates
     from gvpipe.registry import codec_class
 
     if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
@@ -150,14 +164,16 @@ def encode(
         raise click.UsageError(message, click.get_current_context())
     if len(sources) > 1 and PIPE in sources:
         raise click.UsageError("- is one input among others; give it alone", click.get_current_context())
+    if split and target == PIPE:
+        raise click.UsageError("--split writes several files, and OUTPUT is -; give a file's name", click.get_current_context())
     targets = {"target_rmse": target_rmse, "target_kg": target_kg, "target_bpvf": target_bpvf, "max_error": max_error}
     if sum(value is not None for value in targets.values()) > 1:
         raise click.UsageError("give one of --target-rmse, --target-kg, --target-bpvf and --max-error")
     settings = _parse_pairs(pairs)
     if quality is not None and "quality" in settings:
         raise click.UsageError("give --quality or --set quality=, not both")
-    given = {"quality": quality, "segment": segment, "reorder": reorder or None}
-    settings.update({key: str(value) for key, value in given.items() if value is not None})
+    plain = {"quality": quality, "segment": segment, "reorder": reorder or None}
+    settings.update({key: str(value) for key, value in plain.items() if value is not None})
     chosen = candidates(
         codec,
         purpose,
@@ -166,18 +182,35 @@ def encode(
     )
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
-        beside: dict[str, Any] = {"clip": clip, "mesh": mesh, "frames": _parse_frames(frames), "textures": textures}
-        beside |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
-        beside |= {"unlimited": unlimited}
-        report = api.encode(source, path, chosen, progress, fps, **targets, **beside)  # type: ignore[arg-type]  # by name
+        given: dict[str, Any] = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames)}
+        wanted: dict[str, Any] = {**targets, "textures": textures}
+        wanted |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
+        if split:
+            runs = api.read_runs(source, **given)
+            written = write_runs(runs, target, lambda run, own: api.encode(run.sequence, own, chosen, progress, **wanted))
+        else:
+            report = api.encode(source, path, chosen, progress, **given, **wanted, unlimited=unlimited)
     out = out.carrying(target)
+    name = shown(sources[0], STDIN) + (f" and {len(sources) - 1} more" if len(sources) > 1 else "")
+    if not split:
+        out.json(report.to_json())
+        _print_report(out, report, name, shown(target, STDOUT))
+        return
+    spans = [{"output": file, "start": run.start, "stop": run.stop} for (file, _), run in zip(written, runs, strict=True)]
+    out.json({"files": [{**span, **report.to_json()} for span, (_, report) in zip(spans, written, strict=True)]})
+    for (file, report), run in zip(written, runs, strict=True):
+        _print_report(out, report, f"{name}, frames {run.start}:{run.stop}", file)
+
+
+def _print_report(out: Output, report: Report, name: str, target: str) -> None:
+    """Print what an encode did, as text and notes."""
+    from gvpipe.rate_control.purposes import name_with
+
     for note in report.notes:
         out.note(note)
-    out.json(report.to_json())
     shape = f"{report.frames} frames, {report.vertices} vertices"
-    name = shown(sources[0], STDIN) + (f" and {len(sources) - 1} more" if len(sources) > 1 else "")
     size = f"{_size(report.bytes)}, {report.bpvf:.3f} bits per vertex and frame"
-    out.text(f"{name} ({shape}) -> {shown(target, STDOUT)} ({size})")
+    out.text(f"{name} ({shape}) -> {target} ({size})")
     seconds = dict(report.seconds)
     stages = ", ".join(f"{name} {value:.1f}" for name, value in seconds.items() if name != "encode" and value >= 0.05)
     out.text(f"{seconds['encode']:.1f} s: {stages}")
@@ -194,8 +227,9 @@ def encode(
 @cli.command()
 @click.argument("source", metavar="FILE.mp4")
 @click.argument("target", metavar="OUTPUT")
-@click.option("--start", type=int, default=0, show_default=True, help="First frame.")
+@click.option("--start", type=int, help="First frame. [default: 0]")
 @click.option("--stop", type=int, help="Frame after the last. [default: the end]")
+@click.option("--frames", metavar="A:B", help="The same as --start A --stop B; either may be left out.")
 @click.option("--fps", type=float, help="Frames per second of the output, instead of the file's.")
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail: 0 the mesh, higher is coarser.")
@@ -205,8 +239,9 @@ def encode(
 def decode(
     source: str,
     target: str,
-    start: int,
+    start: int | None,
     stop: int | None,
+    frames: str | None,
     fps: float | None,
     parts: tuple[str, ...],
     lod: int,
@@ -216,21 +251,23 @@ def decode(
 ) -> None:
     """Decode a geometry video.
 
-    OUTPUT is an .npz, a scene (.glb, .usdc, .usda, .usdz, .abc), a point cache (.pc2, .mdd, .npy), .pvd, .vtkhdf, or a
-    pattern of frame files such as out/%04d.obj (also .ply, .stl, .off, .glb, .vtp), or - for an .npz on standard output. FILE -
-    is a geometry video on standard input.
+    OUTPUT is an .npz, a scene (.glb, .usdc, .usda, .usdz, .abc), a point cache (.pc2, .mdd, .npy), .pvd, .vtkhdf, a
+    folder of vertex animation textures (.openvat), or a pattern of frame files such as out/%04d.obj (also .ply, .stl, .off,
+    .glb, .vtp), or - for an .npz on standard output. FILE - is a geometry video on standard input.
     """
     from gvpipe import api, notes
-    from gvpipe.cli.choices import chosen
+    from gvpipe.cli.choices import chosen, chosen_frames
 
     out = out.carrying(target)
+    first, last = chosen_frames(start, stop, frames)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         player = api.open(given, unlimited=unlimited)
-        start, stop = api.frame_range(player, start, stop)
-        sequence = chosen(player.level(lod).part(start, stop), parts, fps, "decode", progress)
+        start, stop = api.frame_range(player, first, last)
+        level = player.level(lod)
+        sequence = chosen(level.part(start, stop), parts, fps, "decode", progress)
         noticed = api.write(sequence.local() if local else sequence, path, start)
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
-    noticed += notes.coarser_level(lod, bool(player.attributes or player.fields or player.parts))
+    noticed += level.notes if lod else ()
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
@@ -354,7 +391,8 @@ def export_html(source: str, target: str, up: str | None, quality: float | None,
 def play(source: str, up: str | None, unlimited: bool, out: Output) -> None:
     """Play a geometry video in your browser.
 
-    Where no browser can be opened, the page's path is printed. The page is one file and needs no network.
+    Where no browser can be opened, the page's path is printed. The page is one file and needs no network. Pages that are older
+    than a day are removed by the next `gvpipe play`.
     """
     from pathlib import Path
 
@@ -362,8 +400,8 @@ def play(source: str, up: str | None, unlimited: bool, out: Output) -> None:
     from gvpipe.atomic import lasting_folder
     from gvpipe.web.browser import open_page
 
-    with source_path(source) as path, out.progress() as progress:
-        page = Path(lasting_folder()) / f"{Path(path).stem}.html"  # stays: the browser reads it later
+    with source_path(source) as path, lasting_folder() as folder, out.progress() as progress:
+        page = Path(folder) / f"{Path(path).stem}.html"  # stays: the browser reads it later
         report = web.export_html(path, page, up, None, progress, unlimited=unlimited)
     _tell_conversion(out, report)
     is_open = open_page(page)
@@ -522,18 +560,6 @@ def _parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:
             raise click.UsageError(f"--set {pair}: KEY=VALUE is needed, such as --set clusters=30")
         settings[key.strip()] = value.strip()
     return settings
-
-
-def _parse_frames(text: str | None) -> tuple[int, int | None] | None:
-    if text is None:
-        return None
-    first, colon, last = text.partition(":")
-    try:
-        if not colon:
-            raise ValueError
-        return int(first or 0), int(last) if last else None
-    except ValueError as exc:
-        raise click.UsageError(f"--frames {text}: A:B is needed, such as --frames 10:50") from exc
 
 
 def _parse_bounds(option: str, texts: tuple[str, ...]) -> dict[str, str]:

@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gvpipe.errors import OutputError
+
 if TYPE_CHECKING:
     from gvpipe.codec import Progress
 
@@ -50,7 +52,7 @@ class Output:
     def text(self, line: object) -> None:
         """Print a line of a result for people."""
         if not self.quiet and not self.as_json:
-            click.echo(line, err=self.beside)
+            _print(line, self.beside)
 
     def note(self, line: str) -> None:
         """Print what the user should know, one line."""
@@ -60,7 +62,7 @@ class Output:
     def json(self, values: dict[str, Any]) -> None:
         """Print a result as one JSON object, if that is asked for."""
         if self.as_json:
-            click.echo(json.dumps(values, allow_nan=False), err=self.beside)
+            _print(json.dumps(values, allow_nan=False), self.beside)
 
     @contextlib.contextmanager
     def progress(self) -> Iterator[Progress | None]:
@@ -119,6 +121,16 @@ def print_options(command: Command) -> Command:
 def is_verbose(arguments: list[str]) -> bool:
     """Whether a command line asks for tracebacks; looked at before, and whether or not, it is parsed."""
     return any(argument in VERBOSE for argument in arguments)
+
+
+def _print(text: object, beside: bool) -> None:
+    """Print a result; raises `OutputError`, but leaves a reader that left to `gvpipe.cli.commands.main`."""
+    try:
+        click.echo(text, err=beside)
+    except BrokenPipeError:
+        raise
+    except OSError as exc:
+        raise OutputError(f"cannot print the result: {exc.strerror or exc}; free some space or print elsewhere") from exc
 
 
 class _Noting(logging.Handler):

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gvpipe.cli.console import Output, output_options, unlimited_option
-from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, shown, source_path, target_path
+from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.errors import InputError
+
+if TYPE_CHECKING:
+    from gvpipe.sequence import MeshSequence
 
 
 @click.command()
@@ -18,9 +25,12 @@ from gvpipe.errors import InputError
 @click.option("--fps", type=float, help="Frames per second, instead of the input's; animated glTF is sampled at it.")
 @click.option("--clip", metavar="NAME", help="The animation to read, of a glTF file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
-@click.option("--start", type=int, default=0, show_default=True, help="First frame.")
+@click.option("--start", type=int, help="First frame. [default: 0]")
 @click.option("--stop", type=int, help="Frame after the last. [default: the end]")
+@click.option("--frames", metavar="A:B", help="Only frames A to B - 1; the others are not read. Either may be left out.")
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
+@click.option("--lod", type=int, default=0, show_default=True, help="Level of detail of a geometry video; higher is coarser.")
+@click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.glb, ...")
 @unlimited_option
 @output_options
 def convert(
@@ -29,9 +39,12 @@ def convert(
     fps: float | None,
     clip: str | None,
     mesh: str | None,
-    start: int,
+    start: int | None,
     stop: int | None,
+    frames: str | None,
     parts: tuple[str, ...],
+    lod: int,
+    split: bool,
     unlimited: bool,
     out: Output,
 ) -> None:
@@ -41,15 +54,30 @@ def convert(
     what a format cannot hold, which is said.
     """
     from gvpipe import api
-    from gvpipe.cli.choices import chosen
+    from gvpipe.cli.choices import chosen, chosen_frames, parse_frames
 
     out = out.carrying(target)
+    first, last = chosen_frames(start, stop, frames)
     _check_target(source, target)
+    if split:
+        if lod or start is not None or stop is not None or target == PIPE:
+            raise click.UsageError("--split goes with --frames, and not with --start, --stop, --lod or an OUTPUT of -")
+        options = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames)}
+        _convert_split(source, target, options, parts, out)
+        return
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
-        whole = api.read(given, fps, clip, mesh, unlimited=unlimited)
-        start, stop = api.frame_range(whole, start, stop)
-        sequence = chosen(whole.part(start, stop), parts, None, "convert", progress)
-        noticed = [*whole.notes, *api.write(sequence, path, start)]
+        read = (
+            _level_reader(given, lod, unlimited) if lod else partial(api.read, given, clip=clip, mesh=mesh, unlimited=unlimited)
+        )
+        if frames is not None:
+            some = read(fps=fps, frames=(first, last))
+            start, stop = first, first + len(some)
+        else:
+            whole = read(fps=fps)
+            start, stop = api.frame_range(whole, first, last)
+            some = whole.part(start, stop)
+        sequence = chosen(some, parts, None, "convert", progress)
+        noticed = [*some.notes, *api.write(sequence, path, start)]
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
@@ -57,6 +85,54 @@ def convert(
     out.json({**values, "origin": sequence.origin.tolist(), "notes": noticed})
     shape = f"{stop - start} frames, {sequence.n_vertices} vertices"
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")
+
+
+def _convert_split(source: str, target: str, options: dict[str, Any], parts: tuple[str, ...], out: Output) -> None:
+    """Convert each run of frames of one topology."""
+    from gvpipe import api
+    from gvpipe.cli.choices import chosen
+    from gvpipe.cli.splitting import write_runs
+
+    with source_path(source) as given, out.progress() as progress:
+        runs = api.read_runs(given, **options)
+        ready = [replace(run, sequence=chosen(run.sequence, parts, None, "convert", progress)) for run in runs]
+        written = write_runs(ready, target, lambda run, path: api.write(run.sequence, path, run.start))
+    every = (note for run, (_, said) in zip(runs, written, strict=True) for note in (*run.sequence.notes, *said))
+    noticed = list(dict.fromkeys(every))
+    for note in noticed:
+        out.note(note)
+    files = [
+        {
+            "output": name,
+            "start": run.start,
+            "stop": run.stop,
+            "frames": run.stop - run.start,
+            "fps": run.sequence.fps,
+            "vertices": run.sequence.n_vertices,
+            "triangles": len(run.sequence.faces),
+            "origin": run.sequence.origin.tolist(),
+        }
+        for (name, _), run in zip(written, ready, strict=True)
+    ]
+    out.json({"files": files, "notes": noticed})
+    for each in files:
+        shape = f"{each['frames']} frames, {each['vertices']} vertices"
+        out.text(f"{shown(source, STDIN)}, frames {each['start']}:{each['stop']} -> {each['output']} ({shape})")
+
+
+def _level_reader(source: str, lod: int, unlimited: bool) -> Callable[..., MeshSequence]:
+    """What reads frames of a level of detail of a geometry video, at a frame rate."""
+    from gvpipe import api
+
+    if not is_video(source):
+        raise InputError(f"{source} has no levels of detail; encode it with --codec pca, whose files have them")
+    level = api.open(source, unlimited=unlimited).level(lod)
+
+    def read(fps: float | None, frames: tuple[int, int | None] | None = None) -> MeshSequence:
+        own = level if fps is None else level.with_fps(fps)
+        return own if frames is None else own.part(*api.frame_range(own, *frames))
+
+    return read
 
 
 def _check_target(source: str, target: str) -> None:

@@ -57,7 +57,7 @@ def target_path(target: str, suffix: str) -> Iterator[str]:
     with temporary_folder() as folder, _renamed(folder, STDOUT):
         path = os.path.join(folder, STDOUT + suffix)
         yield path
-        with open(path, "rb") as file:
+        with _wrapped(STDOUT), open(path, "rb") as file:
             shutil.copyfileobj(file, sys.stdout.buffer)
             sys.stdout.buffer.flush()
 
@@ -91,6 +91,8 @@ def _suffix(head: bytes) -> str:
 def _wrapped(path: str) -> Iterator[None]:
     try:
         yield
+    except BrokenPipeError:  # the reader of standard output left
+        raise
     except OSError as exc:
         raise output_error(path, exc) from exc
 

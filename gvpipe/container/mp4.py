@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import IO, Any
 from uuid import UUID
 
-from gvpipe.atomic import atomic_path
+from gvpipe.atomic import unnamed_path
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.bitstream import VERSION, Bitstream, pack_payload, unpack_payload
 from gvpipe.container.sample_tables import check_tables
@@ -54,13 +54,18 @@ def write_file(bitstream: Bitstream, path: str | os.PathLike[str], check: Callab
         OutputError: the file cannot be written; an older file of that name is left as it was.
     """
     video, box = _pack(bitstream)
-    with atomic_path(path) as temporary:
+    with unnamed_path(path) as temporary:
         with open(temporary, "wb") as file:
             file.write(video)
             file.write(box)
         if check is not None:
-            check(read_file(temporary))
+            check(read_file(temporary, unlimited=True))
     return len(video) + len(box)
+
+
+def file_bytes(bitstream: Bitstream) -> bytes:
+    """The file that `write_file` would write."""
+    return b"".join(_pack(bitstream))
 
 
 def file_size(bitstream: Bitstream) -> int:

@@ -125,12 +125,13 @@ class _Corrected:
 
     levels: list[int]
     level_faces: Callable[[int], Int32]
+    level_points: Callable[[int], tuple[Int32, Int32]]
     group: Callable[[int], tuple[int, int]]
 
     def __init__(self, reader: FrameReader, displacements: DisplacementReader) -> None:
         self._reader, self._displacements = reader, displacements
         if isinstance(reader, LevelReader):
-            self.levels, self.level_faces = reader.levels, reader.level_faces
+            self.levels, self.level_faces, self.level_points = reader.levels, reader.level_faces, reader.level_points
         if isinstance(reader, GroupReader):
             self.group = reader.group
 

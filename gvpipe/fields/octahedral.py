@@ -75,7 +75,8 @@ def from_octahedral(coordinates: Array) -> Float32:
     height = 1 - np.abs(square).sum(axis=-1, keepdims=True)
     unfolded = np.where(height < 0, (1 - np.abs(square[..., ::-1])) * _signs(square), square)
     vectors = np.concatenate([unfolded, height], axis=-1)
-    vectors /= np.sqrt(np.einsum("...k,...k->...", vectors, vectors))[..., None]
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    vectors /= np.sqrt(x * x + y * y + z * z)[..., None]  # in this order, as the web player has it
     return vectors.astype(np.float32)
 
 

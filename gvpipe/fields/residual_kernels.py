@@ -159,7 +159,8 @@ def _look_around(i: int, residuals: Residuals, forecast: Forecast) -> int:
     count = min(count, ring if ring else count, N_NEAR)
     forecast.signs[:] = 0
     if count == 0:
-        forecast.near[:] = forecast.profile
+        for n in range(n_columns):
+            forecast.near[n] = forecast.profile[n]
         return 0
     forecast.near[:] = 0
     usual = 0

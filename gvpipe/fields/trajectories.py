@@ -21,7 +21,7 @@ from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.segments import LARGEST_STEP
 from gvpipe.fields.residual_coding import LARGEST, decode_residuals, encode_residuals
-from gvpipe.trajectory.basis import decode_basis, reduce_trajectories
+from gvpipe.trajectory.basis import Basis, decode_basis, reduce_trajectories
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.prediction import predict_vectors
 
@@ -44,7 +44,7 @@ def encode_trajectories(target: Float64, n_frames: int, causal: CausalOrder, sha
     n_components = reduced.coefficients.shape[1]
     ranked, decoded = np.zeros(reduced.coefficients.shape, np.int64), np.zeros(reduced.coefficients.shape)
     predict_vectors(causal, reduced.step, ranked, decoded, reduced.coefficients, "kalman", 1.8)
-    base = decoded @ reduced.decoded.vectors.T + reduced.decoded.mean
+    base = _rebuild(decoded, reduced.decoded)
     left = np.rint(target - _by_component(base, n_frames))
     if max(np.abs(left).max(initial=0), np.abs(ranked).max(initial=0)) >= LARGEST:
         return None
@@ -82,7 +82,14 @@ def decode_trajectories(
     decoded = np.zeros(residuals.shape)
     predict_vectors(causal, step, np.ascontiguousarray(residuals[causal.order]), decoded, None, "kalman", 1.8)
     left = decode_residuals(cursor.rest(), n_axes * n_frames, n_frames, causal, name)
-    return _by_component(decoded @ basis.vectors.T + basis.mean, n_frames) + left
+    return _by_component(_rebuild(decoded, basis), n_frames) + left
+
+
+def _rebuild(decoded: Float64, basis: Basis) -> Float64:
+    """``(R, F C)`` values of rows with coefficients ``decoded (R, K)``."""
+    from gvpipe.trajectory.product_kernels import weighted_sums
+
+    return weighted_sums(decoded, np.ascontiguousarray(basis.vectors.T)) + basis.mean
 
 
 def _by_frame(columns: Float64, n_frames: int) -> Float64:

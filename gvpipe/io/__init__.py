@@ -16,7 +16,7 @@ from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames import read_frames
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.pattern import match_pattern
-from gvpipe.io.scene_formats import HAVE_CLIPS, SIMULATIONS, WRITERS, scene_readers
+from gvpipe.io.scene_formats import HAVE_CLIPS, OPENVAT, SCENES, SIMULATIONS, WRITERS, scene_readers
 from gvpipe.sequence import MeshSequence
 
 __all__ = ["READERS", "WRITERS", "read", "write"]
@@ -48,11 +48,13 @@ def read(
     """
     if not isinstance(path, str | os.PathLike):
         _refuse_clip(clip, "a list of files")
-        return _span(read_frames([os.fspath(file) for file in path], fps), frames)
+        return read_frames([os.fspath(file) for file in path], fps, frames)
     path = os.fspath(path)
     suffix = Path(path).suffix.lower()
     if suffix not in HAVE_CLIPS or not os.path.isfile(path):
         _refuse_clip(clip, path)
+    if suffix == OPENVAT:
+        raise InputError(f"{path}: vertex animation textures are written, not read; give what they were made of")
     reader = READERS.get(suffix)
     # a pattern of frames may end in .glb, too
     if reader is not None and (os.path.isfile(path) or (suffix not in FRAME_FORMATS and not os.path.isdir(path))):
@@ -60,8 +62,8 @@ def read(
             raise InputError(f"{path}: no such file; check the path")
         sequence = reader(Path(path), ReadOptions(fps, clip, mesh, frames))
         if sequence is not None:
-            return sequence if suffix in SIMULATIONS else _span(sequence, frames)
-    return _span(read_frames(path, fps), frames)
+            return sequence if suffix in (*SIMULATIONS, *SCENES) else _span(sequence, frames)
+    return read_frames(path, fps, frames)
 
 
 READERS = scene_readers(read)
@@ -72,8 +74,8 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
 
     Args:
         path: an ``.npz``, a scene (animated ``.glb``, ``.usda``, ``.usdc``, ``.usd``, ``.usdz``, ``.abc``), a point cache
-            (``.pc2``, ``.mdd``, ``.npy``), a pattern of frame files (``out/%04d.obj``) or a folder (existing, or ending in
-            ``/``).
+            (``.pc2``, ``.mdd``, ``.npy``), a folder of vertex animation textures (``.openvat``), a pattern of frame files
+            (``out/%04d.obj``) or a folder (existing, or ending in ``/``).
         start: number of the first frame file.
 
     Raises:
@@ -85,13 +87,14 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
     writer = WRITERS.get(suffix)
     # .glb may be a frame, too: of a pattern, or of a sequence of one
     is_frame = suffix in FRAME_FORMATS and (sequence.n_frames == 1 or match_pattern(path) is not None or os.path.isdir(path))
-    if writer is not None and not path.endswith(("/", os.sep)) and not is_frame:
+    is_folder = path.endswith(("/", os.sep)) and suffix != OPENVAT
+    if writer is not None and not is_folder and not is_frame:
         return writer(sequence, Path(path)) or ()
     return write_frames(sequence, path, start)
 
 
 def _span(sequence: MeshSequence, frames: tuple[int, int | None] | None) -> MeshSequence:
-    """Some frames of a sequence; simulations take theirs before their topology is compared."""
+    """Some frames of a sequence; formats whose topology may change take theirs before it is compared."""
     return sequence if frames is None else sequence.part(*ReadOptions(frames=frames).span(len(sequence), sequence.name))
 
 

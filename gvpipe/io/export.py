@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from gvpipe.asset.field import Field
-from gvpipe.atomic import atomic_path, output_error
+from gvpipe.atomic import output_error, unnamed_path
 from gvpipe.errors import InputError
 from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.pattern import match_pattern
@@ -54,7 +54,7 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> tuple[str
         except OSError as exc:
             raise output_error(target.parent, exc) from exc
     for name, data in encoder.beside.items():
-        with atomic_path(target.with_name(name)) as temporary:
+        with unnamed_path(target.with_name(name)) as temporary:
             temporary.write_bytes(data)
     wanted = {name: sequence.fields[name] for name in encoder.fields}
     for first, stop in _spans(sequence, wanted):
@@ -62,7 +62,7 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> tuple[str
         fields = {name: field.read(first, stop) for name, field in wanted.items()}
         for i, positions in enumerate(block):
             data = encoder.encode(positions, {name: values[i] for name, values in fields.items()})
-            with atomic_path(target.with_name(pattern.name(start + first + i)) if pattern else target) as temporary:
+            with unnamed_path(target.with_name(pattern.name(start + first + i)) if pattern else target) as temporary:
                 temporary.write_bytes(data)
     return encoder.notes
 

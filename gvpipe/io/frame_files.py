@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.arrays import Array, Float32, Float64
-from gvpipe.errors import InputError
+from gvpipe.errors import InputError, TopologyChange
 from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.mesh import Loader, Mesh
 from gvpipe.io.spool import Spool
@@ -29,13 +29,15 @@ class FrameFiles:
     Args:
         paths: the files in frame order, all of one format.
 
+        start: number of the first file among all that there are, for messages.
+
     Raises:
-        InputError: here for the first file, when sliced for any other: unreadable, not finite, or of another
-            connectivity than the first.
+        InputError: here for the first file, when sliced for any other: unreadable, or not finite.
+        TopologyChange: a file has another connectivity than the first.
     """
 
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self.paths = list(paths)
+    def __init__(self, paths: Sequence[Path], start: int = 0) -> None:
+        self.paths, self._start = list(paths), start
         self._loader: Loader = FRAME_FORMATS[self.paths[0].suffix.lower()].loader()
         self.first = load_mesh(self._loader, self.paths[0], 0)
         self.origin: Float64 = choose_origin(self.first.positions[None])
@@ -70,19 +72,13 @@ class FrameFiles:
             ("triangles", len(mesh.faces), len(self.first.faces)),
         ):
             if here != there:
-                raise InputError(
-                    f"{path.name} has {here} {noun}, {first_path.name} has {there}; "
-                    f"all frames need the same vertices and triangles in the same order{_remedy(frame)}"
-                )
+                raise self._changed(frame, f"{path.name} has {here} {noun}, {first_path.name} has {there}")
         if mesh.faces is not self.first.faces:
             differing = np.flatnonzero((mesh.faces != self.first.faces).any(axis=1))
             if len(differing):
                 at = int(differing[0])
-                raise InputError(
-                    f"triangle {at} is {mesh.faces[at].tolist()} in {path.name}, "
-                    f"but {self.first.faces[at].tolist()} in {first_path.name}; "
-                    f"all frames need the same triangles in the same order{_remedy(frame)}"
-                )
+                where = f"triangle {at} is {mesh.faces[at].tolist()} in {path.name}"
+                raise self._changed(frame, f"{where}, but {self.first.faces[at].tolist()} in {first_path.name}")
         self._spool.store(frame, self._narrow(mesh))
         for name, (first, spool) in self._columns.items():
             spool.store(frame, self.values(mesh, name, frame, first))
@@ -119,16 +115,16 @@ class FrameFiles:
                 block[i] = self.values(self.load(frame), name, frame, first)
         return block
 
+    def _changed(self, frame: int, what: str) -> TopologyChange:
+        """The error for a frame of another topology."""
+        at = self._start + frame
+        return TopologyChange.at(f"{what} (frame {at}); all frames need the same vertices and triangles", at, self._start)
+
     def _narrow(self, mesh: Mesh) -> Float32:
         positions = narrow(mesh.positions[None], self.origin)
         self.rounding = max(self.rounding, rounding(mesh.positions[None], positions, self.origin))
         result: Float32 = positions[0]
         return result
-
-
-def _remedy(frame: int) -> str:
-    """What reads the frames before one whose topology is another."""
-    return f" (it is frame {frame}; --frames 0:{frame} reads those before it)"
 
 
 def load_mesh(loader: Loader, path: Path, frame: int) -> Mesh:

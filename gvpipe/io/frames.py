@@ -9,12 +9,20 @@ from pathlib import Path
 from gvpipe.io.discovery import find_frames, order_list, sibling_note
 from gvpipe.io.frame_columns import split_columns
 from gvpipe.io.frame_files import FrameFiles
+from gvpipe.io.options import ReadOptions
 from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS, given_order
 from gvpipe.sequence import MeshSequence
 
 
-def read_frames(path: str | Sequence[str], fps: float | None = None) -> MeshSequence:
+def read_frames(
+    path: str | Sequence[str], fps: float | None = None, span: tuple[int, int | None] | None = None
+) -> MeshSequence:
     """Read a folder, glob, pattern, list or single file of frames; what is static is that of the first.
+
+    Args:
+        path: what names the files.
+        fps: frames per second.
+        span: number of the first file that is read, and of the one after the last (None: all that follow).
 
     Raises:
         InputError: no frames, gaps, mixed formats, or a first frame that cannot be read.
@@ -28,7 +36,8 @@ def read_frames(path: str | Sequence[str], fps: float | None = None) -> MeshSequ
         files, is_kept = order_list([Path(file) for file in path])
         name = f"{files[0]} and {len(files) - 1} more"
         noticed = (given_order(len(files)),) if is_kept else ()
-    frames = FrameFiles(files)
+    first_file, stop = ReadOptions(frames=span).span(len(files), name)
+    frames = FrameFiles(files[first_file:stop], first_file)
     first = frames.first
     columns = split_columns(frames)
     frames.forget_animated()

@@ -19,7 +19,7 @@ from gvpipe.arrays import Array
 from gvpipe.asset.attribute import WIDTHS
 from gvpipe.asset.field import Field
 from gvpipe.asset.metadata import NO_METADATA, Metadata
-from gvpipe.atomic import atomic_path
+from gvpipe.atomic import unnamed_path
 from gvpipe.errors import InputError
 from gvpipe.io.mesh import as_color
 from gvpipe.io.npz_asset import USUAL, asset_members, meta_units, read_asset
@@ -42,7 +42,7 @@ def write_npz(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     # `numpy.savez_compressed` wants all frames at once, so the large members are written by hand
     descr, read = ("<f8", sequence.read_absolute) if sequence.origin.any() else ("<f4", sequence.read)
     header = {"descr": descr, "fortran_order": False, "shape": (sequence.n_frames, sequence.n_vertices, 3)}
-    with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+    with unnamed_path(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         with archive.open(_member("vertices"), "w", force_zip64=True) as file:
             np.lib.format.write_array_header_1_0(file, header)
             for start, stop in sequence.spans():

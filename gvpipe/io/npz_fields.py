@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import lzma
 import tempfile
-import threading
 import weakref
 import zipfile
 import zlib
@@ -22,6 +21,7 @@ import numpy as np
 from gvpipe.arrays import Array
 from gvpipe.asset.field import Field
 from gvpipe.errors import InputError
+from gvpipe.forks import ForkLock, renew_after_fork
 
 BLOCK_BYTES = 1 << 24  # of a member, held at a time
 ZIP_ERRORS = (
@@ -53,8 +53,9 @@ class NpzField:
 
     def __init__(self, path: Path, member: str) -> None:
         self._path, self._member = path, member
-        self._lock = threading.Lock()
+        self._lock = ForkLock()
         self._file: IO[bytes] | None = None
+        renew_after_fork(self)
         try:
             with zipfile.ZipFile(path) as archive, archive.open(f"{member}.npy") as file:
                 self.shape, self._is_fortran, self.dtype = _read_header(file)
@@ -69,6 +70,10 @@ class NpzField:
         self._bytes_frame = int(np.prod(self.shape[1:], dtype=object)) * self.dtype.itemsize
         if n_bytes != self._bytes_frame * self.shape[0]:
             raise InputError(f"{path}: {member!r} has {n_bytes} bytes, its shape {self.shape} needs others; write it again")
+
+    def after_fork(self) -> None:
+        """Inflate anew in a forked child: it would share the position in the file with its parent."""
+        self._file = None
 
     def __getitem__(self, key: slice, /) -> Array:
         start, stop, _ = key.indices(self.shape[0])

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.arrays import Array, Float32
-from gvpipe.atomic import atomic_path
+from gvpipe.atomic import unnamed_path
 from gvpipe.errors import InputError
 from gvpipe.io.options import ReadOptions
 from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS, origin_left_out
@@ -155,7 +155,7 @@ def write_npy(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
 
 
 def _write(sequence: MeshSequence, path: Path, head: bytes, dtype: str, name: str) -> tuple[str, ...]:
-    with atomic_path(path) as temporary, open(temporary, "wb") as file:
+    with unnamed_path(path) as temporary, open(temporary, "wb") as file:
         file.write(head)
         for _, block in sequence.chunks():
             file.write(np.ascontiguousarray(block, dtype).data)

@@ -8,7 +8,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from gvpipe.arrays import Float64
-from gvpipe.atomic import atomic_path
+from gvpipe.atomic import unnamed_path
 from gvpipe.io.export import write_frames
 from gvpipe.sequence import MeshSequence
 
@@ -30,7 +30,7 @@ def write_pvd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
         for frame, time in enumerate(frame_times(sequence))
     )
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian"><Collection>\n'
-    with atomic_path(path) as temporary:
+    with unnamed_path(path) as temporary:
         temporary.write_text(f"{head}{listed}</Collection></VTKFile>\n", "utf-8")
     return notes
 

@@ -10,6 +10,7 @@ from gvpipe.io.alembic import read_alembic, write_alembic
 from gvpipe.io.fbx import read_fbx
 from gvpipe.io.gltf import read_animated, write_animated
 from gvpipe.io.npz import read_npz, write_npz
+from gvpipe.io.openvat import write_openvat
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.point_cache import read_mdd, read_npy, read_pc2, write_mdd, write_npy, write_pc2
 from gvpipe.io.pvd_writer import write_pvd
@@ -27,6 +28,7 @@ SceneReader = Callable[[Path, ReadOptions], MeshSequence | None]  # None for a f
 SceneWriter = Callable[[MeshSequence, Path], tuple[str, ...] | None]  # what the format cannot hold, a line each
 
 USD = (".usda", ".usdc", ".usd", ".usdz")
+SCENES = (*USD, ".abc")  # whose topology may change
 GLTF = (".glb", ".gltf")
 SIMULATIONS: dict[str, SceneReader] = {
     **dict.fromkeys((".pvd", ".series"), read_step_list),
@@ -35,6 +37,7 @@ SIMULATIONS: dict[str, SceneReader] = {
     **dict.fromkeys((".e", ".exo", ".ex2"), read_exodus),
     **dict.fromkeys((".case", ".encas"), read_ensight),
 }
+OPENVAT = ".openvat"
 HAVE_CLIPS = (*GLTF, ".fbx")
 
 WRITERS: dict[str, SceneWriter] = {
@@ -47,6 +50,7 @@ WRITERS: dict[str, SceneWriter] = {
     ".npy": write_npy,
     ".pvd": write_pvd,
     ".vtkhdf": write_vtkhdf,
+    OPENVAT: write_openvat,
 }
 
 

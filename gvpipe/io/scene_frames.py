@@ -7,14 +7,14 @@ alone.
 from __future__ import annotations
 
 import re
-import threading
 from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 
 from gvpipe.arrays import Array, Float32, Float64
-from gvpipe.errors import InputError
+from gvpipe.errors import InputError, TopologyChange
+from gvpipe.forks import ForkLock
 from gvpipe.origin import choose_origin, narrow, rounding
 from gvpipe.sequence import check_finite
 
@@ -41,16 +41,17 @@ class SceneFrames:
         times: of the frames, in the file's own unit.
         where: the file, for messages.
         unit: the file's name of a time, such as ``"time code"``.
+        start: number of the first frame among all that the file has.
 
     Raises:
-        InputError: here for the first frame, when sliced for any other: a mesh has another number of vertices than at
-            first, or a coordinate that is not finite.
+        InputError: here for the first frame, when sliced for any other: a coordinate that is not finite.
+        TopologyChange: a mesh has another number of vertices than at first.
     """
 
-    def __init__(self, motions: Sequence[Motion], times: Array, where: str, unit: str) -> None:
-        self._motions, self.times, self._where, self._unit = tuple(motions), times, where, unit
+    def __init__(self, motions: Sequence[Motion], times: Array, where: str, unit: str, start: int = 0) -> None:
+        self._motions, self.times, self._where, self._unit, self._start = tuple(motions), times, where, unit, start
         self._starts = np.cumsum([0, *(motion.n_vertices for motion in motions)])
-        self._lock = threading.Lock()  # neither library says that its Python objects may be shared by threads
+        self._lock = ForkLock()  # neither library says that its Python objects may be shared by threads
         self._still: list[Array | None] = [None] * len(self._motions)
         self.rounding = 0.0  # what float32 moved a coordinate by at most, model units, in the frames loaded so far
         self.first: Float64 = self._evaluate(0)
@@ -77,22 +78,23 @@ class SceneFrames:
 
     def at(self, time: float) -> Float64:
         """Positions ``(V, 3)`` at any time of the file's own, with the origin; raises `InputError`."""
-        return self._evaluate_at(time, f"({self._unit} {time:g})")
+        return self._evaluate_at(time, f"({self._unit} {time:g})", 0)
 
     def _evaluate(self, frame: int) -> Float64:
         time = float(self.times[frame])
-        return self._evaluate_at(time, f"frame {frame} ({self._unit} {time:g})")
+        number = self._start + frame
+        return self._evaluate_at(time, f"frame {number} ({self._unit} {time:g})", number)
 
-    def _evaluate_at(self, time: float, moment: str) -> Float64:
+    def _evaluate_at(self, time: float, moment: str, frame: int) -> Float64:
         result = np.empty(self.shape[1:], np.float64)
         with self._lock:
             for number, motion in enumerate(self._motions):
                 span = slice(self._starts[number], self._starts[number + 1])
                 still = self._still[number]
-                result[span] = self._checked(motion, time, moment) if still is None else still
+                result[span] = self._checked(motion, time, moment, frame) if still is None else still
         return result
 
-    def _checked(self, motion: Motion, time: float, moment: str) -> Array:
+    def _checked(self, motion: Motion, time: float, moment: str, frame: int) -> Array:
         try:
             positions = motion.at(time)
         except InputError:
@@ -100,11 +102,14 @@ class SceneFrames:
         except Exception as exc:  # the libraries raise kinds of their own for damaged samples
             raise InputError(f"{self._where}: mesh {motion.name!r} cannot be read at {moment}: {one_line(exc)}") from exc
         if len(positions) != motion.n_vertices:
-            raise InputError(
-                f"{self._where}: mesh {motion.name!r} has {len(positions)} vertices at {moment}, {motion.n_vertices} at first; "
-                "its topology changes, so export it with constant topology"
-            )
+            what = f"mesh {motion.name!r} has {len(positions)} vertices at {moment}, {motion.n_vertices} at first"
+            raise TopologyChange.at(f"{self._where}: {what}", frame, self._start)
         return positions
+
+
+def first_frame_of(moment: float, times: Array) -> int:
+    """The first of frames at ``times`` that shows a sample of some moment."""
+    return int(np.searchsorted(times, moment - 1e-6))
 
 
 def one_line(exc: BaseException) -> str:

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import contextlib
 import tempfile
-import threading
 import weakref
 from io import FileIO
 
 import numpy as np
 
 from gvpipe.arrays import Array
+from gvpipe.forks import ForkLock, renew_after_fork
 
 
 class Spool:
@@ -27,8 +27,18 @@ class Spool:
     def __init__(self, n_frames: int, bytes_frame: int) -> None:
         self._stored = np.zeros(n_frames, bool)
         self._bytes_frame = bytes_frame
-        self._lock = threading.Lock()
+        self._lock = ForkLock()
         self._file: FileIO | None = None
+        self._open()
+        renew_after_fork(self)
+
+    def after_fork(self) -> None:
+        """Begin anew in a forked child: it would share the position in the file with its parent."""
+        self._stored[:] = False
+        self._open()
+
+    def _open(self) -> None:
+        self._file = None
         with contextlib.suppress(OSError):
             self._file = tempfile.TemporaryFile(prefix="gvpipe-", buffering=0)  # noqa: SIM115 - lives as long as self
             weakref.finalize(self, self._file.close)

@@ -45,10 +45,10 @@ def read_step_list(path: Path, options: ReadOptions) -> MeshSequence:
     except (OSError, ValueError, TypeError, KeyError) as exc:
         reason = " ".join(str(exc).split())[:200]
         raise InputError(f"{path} cannot be read as {path.suffix[1:]}: {reason}; save it again") from exc
-    return read_listed(files, np.array([time for time, _ in listed], np.float64), path, options)
+    return read_listed(files, np.array([time for time, _ in listed], np.float64), path, options, start)
 
 
-def read_listed(files: list[Path], times: Float64, path: Path, options: ReadOptions) -> MeshSequence:
+def read_listed(files: list[Path], times: Float64, path: Path, options: ReadOptions, start: int = 0) -> MeshSequence:
     """Return the sequence of files of one time step each; raises `InputError`.
 
     Args:
@@ -56,13 +56,14 @@ def read_listed(files: list[Path], times: Float64, path: Path, options: ReadOpti
         times: ``(F,)`` seconds.
         path: that lists them.
         options: ``fps``.
+        start: number of the first file in the list.
     """
     suffixes = {file.suffix.lower() for file in files}
     if len(suffixes) > 1 or not suffixes <= set(STEP_LOADERS):
         raise InputError(
             f"{path} lists {', '.join(sorted(suffixes))} files; files of one of {', '.join(STEP_LOADERS)} are needed"
         )
-    frames = FrameFiles(files)
+    frames = FrameFiles(files, start)
     first, columns = frames.first, split_columns(frames)
     timing = time_steps(times, len(files), options.fps)
     metadata = replace(first.metadata, start_time=timing.start, source=path.name, texts=timing.texts)

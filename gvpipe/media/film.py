@@ -11,15 +11,21 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.arrays import UInt8
-from gvpipe.media.video import PROFILES, PlainPackets, x264_options
+from gvpipe.media.video import PROFILES, PlainPackets, VideoWriter, check_x264, has_x264, x264_options
 
 FILM = {"preset": "medium", "crf": "20"}  # x264 codes for the eye
+JPEG_STEP = 16  # levels: 2 kB for a poster
 
 
 def write_film(path: Path, pictures: Iterable[UInt8], fps: float) -> None:
-    """Write an MP4 film of ``(height, width, 3)`` sRGB pictures with even sides; x264 codes them for the eye."""
+    """Write an MP4 film of ``(height, width, 3)`` sRGB pictures with even sides; x264 codes them for the eye.
+
+    Raises:
+        InputError: this FFmpeg has no x264.
+    """
     import av
 
+    check_x264()
     rate = Fraction(fps).limit_denominator(1001) or Fraction(1, 1001)
     with av.open(os.fspath(path), "w", format="mp4", options={"fflags": "+bitexact", "movflags": "+faststart"}) as container:
         stream = container.add_stream("libx264", rate, options={**FILM, "x264-params": "threads=1:log-level=0"})
@@ -40,9 +46,11 @@ def write_film(path: Path, pictures: Iterable[UInt8], fps: float) -> None:
 
 
 def hold_picture(plane: UInt8, fps: float, n_frames: int, quality: int) -> bytes:
-    """Return an MP4 file of one ``h264-8`` plane with even sides that lasts ``n_frames``."""
+    """Return an MP4 file of one ``h264-8`` plane with even sides that lasts ``n_frames``; a JPEG where there is no x264."""
     import av
 
+    if not has_x264():
+        return _hold_jpeg(plane, fps / n_frames)
     profile, rate = PROFILES["h264-8"], Fraction(fps).limit_denominator(1001) or Fraction(1, 1001)
     height, width = plane.shape
     neutral = np.full((height // 2, width), profile.middle, np.uint8)
@@ -57,3 +65,12 @@ def hold_picture(plane: UInt8, fps: float, n_frames: int, quality: int) -> bytes
             packet.duration = n_frames
             container.mux(packet)
     return file.getvalue()
+
+
+def _hold_jpeg(plane: UInt8, fps: float) -> bytes:
+    """Return the same as one JPEG at a rate of one picture for all frames."""
+    levels, profile = PROFILES["h264-8"], PROFILES["jpeg"]
+    spread = np.interp(plane, (levels.low, levels.high), (profile.low, profile.high))
+    with VideoWriter(profile, plane.shape[1], plane.shape[0], fps, JPEG_STEP) as writer:
+        writer.add(np.rint(spread).astype(profile.dtype))
+        return writer.finish()

@@ -8,6 +8,9 @@ Three profiles, each one luma picture per frame, chroma neutral:
 
 A video is an MP4 file in memory with this one track. H.264 is coded in closed groups of pictures (GOPs), so that any frame
 costs at most its group. x264 runs on one thread because its output depends on their number.
+
+x264 writes H.264; FFmpeg's own decoder reads it. PyAV's wheels have both. An FFmpeg may be built without x264, whose licence
+is the GPL: then H.264 is read, and not written.
 """
 
 from __future__ import annotations
@@ -27,7 +30,8 @@ from numpy.typing import NDArray
 
 from gvpipe.arrays import Float64, Integers, UInt8
 from gvpipe.budget import UNLIMITED, Budget
-from gvpipe.errors import CorruptFile, corrupt
+from gvpipe.errors import CorruptFile, InputError, corrupt
+from gvpipe.forks import renew_after_fork
 from gvpipe.media.jpeg import decode_jpeg, encode_jpeg
 from gvpipe.media.picture_limits import BYTES_PER_PIXEL, picture_limits
 
@@ -118,6 +122,9 @@ class VideoWriter:
         preset: x264's.
         b_frames: H.264: pictures predicted from both sides between two others, at most. They take fewer bits, but every
             picture of the file then takes 8 bytes more in its tables.
+
+    Raises:
+        InputError: H.264 is asked for, and this FFmpeg has no x264.
     """
 
     def __init__(
@@ -135,6 +142,8 @@ class VideoWriter:
 
         self._profile, self._shape, self._quality = profile, (height, width), quality
         self._count = 0
+        if profile.codec != "mjpeg":
+            check_x264()
         self._file = io.BytesIO()
         self._container = av.open(self._file, "w", format="mp4", options={"fflags": "+bitexact"})
         rate = Fraction(fps).limit_denominator(1001) or Fraction(1, 1001)
@@ -219,6 +228,11 @@ class VideoReader:
             raise corrupt("the video does not start with a key frame")
         self._groups = list(zip(starts, [*starts[1:], len(self._packets)], strict=True))
         self._cached: tuple[int, list[Plane]] = (-1, [])
+        self._pool = ThreadPoolExecutor(AHEAD)
+        renew_after_fork(self)
+
+    def after_fork(self) -> None:
+        """Have threads in a forked child, too."""
         self._pool = ThreadPoolExecutor(AHEAD)
 
     @property
@@ -322,6 +336,22 @@ class PlainPackets:
         for packet in result:
             packet.stream = self._stream
         return result
+
+
+def has_x264() -> bool:
+    """Whether this FFmpeg writes H.264 by x264."""
+    import av
+
+    return "libx264" in av.codec.codecs_available
+
+
+def check_x264() -> None:
+    """Raise `InputError` where H.264 cannot be written."""
+    if not has_x264():
+        raise InputError(
+            "PyAV was built with an FFmpeg that has no libx264, which writes H.264; --set image=jpeg needs none, nor do "
+            "--codec pca, laplacian and pdct, or install PyAV from its wheel"
+        )
 
 
 def x264_options(quality: int, gop: int, preset: str, b_frames: int = B_FRAMES) -> dict[str, str]:

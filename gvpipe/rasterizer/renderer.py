@@ -21,6 +21,7 @@ import numpy as np
 
 from gvpipe.arrays import Float32, Floats, Int32, UInt8
 from gvpipe.errors import InputError
+from gvpipe.forks import renew_after_fork
 from gvpipe.rasterizer.camera import Camera
 from gvpipe.rasterizer.colormaps import colormap
 from gvpipe.rasterizer.colours import BACK, BACKGROUND, FRONT, HOLE, srgb_codes, to_linear
@@ -32,6 +33,7 @@ SHADINGS = ("smooth", "flat")
 SIZE_RANGE = (16, 8192)  # pixels, of either side
 SAMPLES_RANGE = (1, 8)  # per pixel and axis
 THREADS = min(4, os.cpu_count() or 1)
+BANDS = 12  # several per thread, since some are empty; each passes over all triangles, so not many
 GLOSS = 0.05  # of the highlight
 EVENNESS = 0.5  # of the light on a field
 MAX_LAYERS = 4  # see-through surfaces that a sample shows, one behind the other
@@ -88,6 +90,11 @@ class Renderer:
             hole=to_linear(HOLE),
             codes=srgb_codes(),
         )
+        self._pool = ThreadPoolExecutor(THREADS)
+        renew_after_fork(self)
+
+    def after_fork(self) -> None:
+        """Have threads in a forked child, too."""
         self._pool = ThreadPoolExecutor(THREADS)
 
     @classmethod
@@ -212,6 +219,5 @@ class Renderer:
         return buffer.triangles
 
     def _in_bands(self, paint: Callable[[int, int], object]) -> None:
-        # several bands per thread, since some are empty
-        edges = np.linspace(0, self.size[1], 2 * THREADS + 1 if THREADS > 1 else 2).round().astype(int).tolist()
+        edges = np.linspace(0, self.size[1], BANDS + 1 if THREADS > 1 else 2).round().astype(int).tolist()
         list(self._pool.map(lambda band: paint(*band), pairwise(edges)))

@@ -1,7 +1,8 @@
 """Samples of textures: anisotropic, trilinear, in linear light.
 
 A fragment's square covers a parallelogram of the image. The mip level is that of its shorter side; up to `MAX_TAPS` samples are
-averaged along the longer one, so that surfaces seen at a grazing angle keep their detail across.
+averaged along the longer one, so that surfaces seen at a grazing angle keep their detail across. Textures of numbers whose
+detail hardly shows (metallic, roughness, occlusion) take one bilinear sample.
 Source: L. Williams, Pyramidal Parametrics, SIGGRAPH 1983; J. McCormack et al., Feline: Fast Elliptical Lines for Anisotropic
 Texture Mapping, SIGGRAPH 1999, whose ellipse is here the parallelogram's longer side. Kernels only: they import numba.
 """
@@ -15,7 +16,7 @@ import numpy as np
 from gvpipe.arrays import Array
 from gvpipe.compiled import compiled
 from gvpipe.rasterizer.fragment_kernels import place_texture
-from gvpipe.rasterizer.scene import Fragments, Look
+from gvpipe.rasterizer.scene import METALLIC_ROUGHNESS, OCCLUSION, Fragments, Look
 from gvpipe.rasterizer.textures import FULL
 
 MAX_TAPS = 8
@@ -27,12 +28,16 @@ MIRROR, CLAMP = 1, 2
 def sample_role(look: Look, role: int, fragments: Fragments, n: int) -> None:
     """Fill a role's samples of all fragments."""
     place_texture(look, role, fragments, n)
-    sample(look, fragments, n, fragments.samples[role])
+    sample(look, fragments, n, role != METALLIC_ROUGHNESS and role != OCCLUSION, fragments.samples[role])
 
 
 @compiled
-def sample(look: Look, fragments: Fragments, n: int, result: Array) -> None:
-    """Fill ``result (n, 4)`` with RGBA, 0..1, of the textures that were placed; 1 where there is none."""
+def sample(look: Look, fragments: Fragments, n: int, is_fine: bool, result: Array) -> None:
+    """Fill ``result (n, 4)`` with RGBA, 0..1, of the textures that were placed; 1 where there is none.
+
+    Args:
+        is_fine: mixes levels and averages along footprints; else takes one bilinear sample, a third of the work.
+    """
     shown, at, table = fragments.textures, fragments.uv, look.textures
     numbers, levels, counts = look.texels.numbers, look.texels.levels, look.texels.counts
     for k in range(n):
@@ -44,7 +49,12 @@ def sample(look: Look, fragments: Fragments, n: int, result: Array) -> None:
         one = (at[k, 1, 0] * width) ** 2 + (at[k, 1, 1] * height) ** 2
         two = (at[k, 2, 0] * width) ** 2 + (at[k, 2, 1] * height) ** 2
         along = 1 if one > two else 2
-        n_taps, level, part = _footprint(max(one, two), min(one, two), counts[image])
+        longer, shorter = max(one, two), min(one, two)
+        if not is_fine:
+            longer = shorter = math.sqrt(longer * shorter)
+        n_taps, level, part = _footprint(longer, shorter, counts[image])
+        if not is_fine:
+            level, part = level + (part > 0.5), 0.0
         is_nearest = table[shown[k], 4] != 0 and level == 0 and part <= 0.0
         red = green = blue = alpha = 0.0
         scale = 1.0 / (n_taps * FULL)
@@ -86,7 +96,7 @@ def _footprint(longer: float, shorter: float, count: int) -> tuple[int, int, flo
         longer = LARGEST
     if longer <= 1.0:
         return 1, 0, 0.0
-    n_taps = int(math.sqrt(min(longer / max(shorter, 1.0), float(MAX_TAPS * MAX_TAPS))) + 0.5)
+    n_taps = int(math.sqrt(min(longer / max(shorter, 1.0), float(MAX_TAPS * MAX_TAPS))))
     longer /= n_taps * n_taps
     level = 0  # found by steps: a logarithm would take as long as all the rest
     while longer >= 4.0 and level < count - 1:

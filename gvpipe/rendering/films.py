@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from gvpipe.arrays import Float64, Int32, UInt8
-from gvpipe.atomic import atomic_path
+from gvpipe.atomic import unnamed_path
 from gvpipe.codec import Progress
 from gvpipe.errors import InputError
 from gvpipe.part_choice import only_parts
@@ -162,7 +162,7 @@ def write_pictures(
     if options.error_max is not None and reference is None:
         raise InputError("error_max ends the colours of errors; give error_of too")
     film = _plan(sequence, suffix, options, reference)
-    with atomic_path(path) as temporary:
+    with unnamed_path(path) as temporary:
         WRITERS[suffix](film, temporary, progress)
     return film.renderer.notes
 

@@ -39,7 +39,7 @@ def _write_png(pictures: Pictures, path: Path, progress: Progress | None) -> Non
     from PIL import Image
 
     for picture in _painted(pictures, progress):
-        Image.fromarray(picture).save(path, optimize=True)
+        Image.fromarray(picture).save(path, "PNG", optimize=True)
 
 
 def _write_gif(pictures: Pictures, path: Path, progress: Progress | None) -> None:
@@ -57,7 +57,7 @@ def _write_gif(pictures: Pictures, path: Path, progress: Progress | None) -> Non
         for picture in _painted(pictures, progress, step)
     )
     first = next(images)
-    first.save(path, save_all=True, append_images=images, duration=durations.tolist(), loop=0, disposal=1)
+    first.save(path, "GIF", save_all=True, append_images=images, duration=durations.tolist(), loop=0, disposal=1)
 
 
 def _write_mp4(pictures: Pictures, path: Path, progress: Progress | None) -> None:

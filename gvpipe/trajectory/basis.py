@@ -41,8 +41,10 @@ MAX_COMPONENTS = 1 << 14
 BYTES_PER_VALUE, SECONDS_PER_VALUE = 40, 0.3e-6  # of a basis or of coefficients: residuals, contexts, numbers, a copy
 MAX_SCALE = 8 * 64  # scales run from 2**-64 to 2**64 steps
 PER_OCTAVE = 8
+ROOTS = np.array([math.isqrt(math.isqrt(math.isqrt(1 << (8 * 60 + i)))) / 2**60 for i in range(PER_OCTAVE)])  # 2 ** (i / 8)
 PER_STEP_OCTAVE = 1024  # steps are 0.07 % apart
 BLOCK = 1024  # vertices rebuilt at a time
+RIDGE, LEAST = 1e-9, 1e-12  # on the diagonal of a basis' Gram matrix: a vector of a tiny segment may decode to zero
 LEAST_OUTSIDE = 0.2  # part of a basis' errors that is taken to lie outside its span, at least
 
 
@@ -247,8 +249,8 @@ def fit_coefficients(trajectories: Float64, basis: Basis) -> Float64:
         return np.zeros((len(trajectories), 0))
     projected = (trajectories - basis.mean) @ basis.vectors  # (V, R)
     gram = basis.vectors.T @ basis.vectors
-    gram[np.diag_indices_from(gram)] *= 1 + 1e-9  # a basis vector of a tiny segment may decode to zero
-    gram[np.diag_indices_from(gram)] += 1e-12
+    gram[np.diag_indices_from(gram)] *= 1 + RIDGE
+    gram[np.diag_indices_from(gram)] += LEAST
     fitted: Float64 = cho_solve(cho_factor(gram), projected.T).T
     return np.ascontiguousarray(fitted)
 
@@ -265,7 +267,8 @@ def squared_errors(trajectories: Float64, basis: Basis, coefficients: Float64) -
 
 def _scales(levels: Int64, n_points: int, step: float) -> Float64:
     """Scales of the mean's column and of the others."""
-    return np.concatenate([[np.sqrt(n_points)], step * 2.0 ** (levels / PER_OCTAVE)])
+    octaves, parts = np.divmod(levels, PER_OCTAVE)
+    return np.concatenate([[np.sqrt(n_points)], step * np.ldexp(ROOTS[parts], octaves.astype(np.int32))])
 
 
 def _basis_step(step: float, shape: tuple[int, ...]) -> float:

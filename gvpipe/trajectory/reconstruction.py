@@ -12,6 +12,7 @@ from gvpipe.arrays import Float32, Float64, Integers
 from gvpipe.errors import corrupt
 from gvpipe.trajectory.basis import Basis
 
+TOGETHER = 8  # frames rebuilt at once
 MAX_FLOAT32 = float(np.finfo(np.float32).max)
 
 
@@ -21,6 +22,15 @@ class Segment:
 
     basis: Basis
     coefficients: Float64
+
+    def positions(self, start: int, stop: int) -> Float64:
+        """Points of the segment's frames ``start`` to ``stop``: ``(stop - start, 3, P)``; no sum depends on what else is read."""
+        from gvpipe.trajectory.product_kernels import weighted_sums
+
+        rows = slice(3 * start, 3 * stop)
+        sums = weighted_sums(np.ascontiguousarray(self.basis.vectors[rows]), self.coefficients)
+        sums += self.basis.mean[rows, None]
+        return sums.reshape(stop - start, 3, -1)
 
 
 def read_frames(start: int, stop: int, bounds: list[int], points: Integers, decode: Callable[[int], Segment]) -> Float32:
@@ -42,11 +52,11 @@ def read_frames(start: int, stop: int, bounds: list[int], points: Integers, deco
         if first >= last:
             continue
         segment = decode(s)
-        for frame in range(first, last):  # one by one, so that a frame's sums do not depend on what else is read
-            axes = slice(3 * (frame - begin), 3 * (frame - begin + 1))
-            positions = segment.basis.vectors[axes] @ segment.coefficients + segment.basis.mean[axes, None]  # (3, P)
-            np.take(positions, points, axis=1, out=buffer)
-            if not np.abs(buffer).max(initial=0) <= MAX_FLOAT32:
-                raise corrupt(f"frame {frame} does not decode to finite positions")
-            result[frame - start] = buffer.T
+        for frame in range(first, last, TOGETHER):
+            positions = segment.positions(frame - begin, min(frame + TOGETHER, last) - begin)  # (n, 3, P)
+            for i in range(len(positions)):
+                np.take(positions[i], points, axis=1, out=buffer)
+                if not np.abs(buffer).max(initial=0) <= MAX_FLOAT32:
+                    raise corrupt(f"frame {frame + i} does not decode to finite positions")
+                result[frame + i - start] = buffer.T
     return result

@@ -18,10 +18,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from gvpipe.atomic import atomic_path, temporary_folder
+from gvpipe.atomic import unnamed_path
 from gvpipe.codec import Progress
-from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.mp4 import write_file
+from gvpipe.container.mp4 import file_bytes
 from gvpipe.errors import InputError, OutputError
 from gvpipe.player import Player
 from gvpipe.quality_scale import error_of, quality_of
@@ -102,15 +101,15 @@ def export_html(
     if not obstacle:
         shown = with_web_fields(player)
         if shown is player.bitstream:
-            return _write_page(player.path, player.path, target, up)
-        return _write_bitstream(player.path, shown, target, up)
+            return _write_page(player.path, Path(player.path).read_bytes(), target, up)
+        return _write_page(player.path, file_bytes(shown), target, up)
     trial = _convert(player, QUALITY if quality is None else quality, progress)
     remaining = browser_obstacle(trial.bitstream)
     if remaining:
         raise InputError(f"the web player does not read {remaining} yet; use an older gvpipe to convert")
     x, y, z = player.bitstream.origin
     bitstream = carry_asset(player, trial.encoded, trial.codec)
-    page = _write_bitstream(player.path, replace(bitstream, origin=(x, y, z)), target, up)
+    page = _write_page(player.path, file_bytes(replace(bitstream, origin=(x, y, z))), target, up)
     added = trial.errors
     return ExportReport(page.bytes, page.video_bytes, obstacle, added.rmse_diag, added.max_diag, added.kg)
 
@@ -130,15 +129,7 @@ def _convert(player: Player, quality: float, progress: Progress | None) -> Trial
     return min(tried, key=lambda trial: trial.errors.kg or 0.0)
 
 
-def _write_bitstream(name: str, bitstream: Bitstream, target: Path, up: str) -> ExportReport:
-    with temporary_folder() as folder:
-        path = os.path.join(folder, "converted.mp4")
-        write_file(bitstream, path)
-        return _write_page(name, path, target, up)
-
-
-def _write_page(name: str, video: str | os.PathLike[str], target: Path, up: str) -> ExportReport:
-    data = Path(video).read_bytes()
+def _write_page(name: str, data: bytes, target: Path, up: str) -> ExportReport:
     shipped = files("gvpipe.web")
     page = (shipped / "page.html").read_text("utf-8")
     values = {
@@ -149,6 +140,6 @@ def _write_page(name: str, video: str | os.PathLike[str], target: Path, up: str)
     }
     parts = page.split("$$")  # text, name, text, name, ..., text
     text = "".join(values[part] if i % 2 else part for i, part in enumerate(parts)).encode()
-    with atomic_path(target) as temporary:
+    with unnamed_path(target) as temporary:
         temporary.write_bytes(text)
     return ExportReport(len(text), len(data))

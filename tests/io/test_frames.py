@@ -19,7 +19,7 @@ def test_frames_that_differ(tmp_path: Path, suffix: str) -> None:
     io.write(sequence, tmp_path / f"w%d.{suffix}")
     other = MeshSequence(np.concatenate([sequence.read(1, 2)] * 2, axis=1), sequence.faces)
     io.write(other, tmp_path / f"w1.{suffix}")
-    with pytest.raises(InputError, match=f"w1.{suffix} has 74 vertices, w0.{suffix} has 37; all frames"):
+    with pytest.raises(InputError, match=f"w1.{suffix} has 74 vertices, w0.{suffix} has 37 .frame 1.; all frames"):
         io.read(tmp_path).read(0, 2)
     faces = sequence.faces.copy()
     faces[31] = faces[31][::-1]
@@ -30,7 +30,7 @@ def test_frames_that_differ(tmp_path: Path, suffix: str) -> None:
         error.value
     )
     io.write(MeshSequence(sequence.read(1, 2), sequence.faces[:-1]), tmp_path / f"w1.{suffix}")
-    with pytest.raises(InputError, match=f"w1.{suffix} has 49 triangles, w0.{suffix} has 50; all frames"):
+    with pytest.raises(InputError, match=f"w1.{suffix} has 49 triangles, w0.{suffix} has 50 .frame 1.; all frames"):
         io.read(tmp_path).read(0, 2)
 
 

@@ -369,7 +369,7 @@ def test_bad_stages(tmp_path: Path, name: str) -> None:
 
 def test_points_that_change_in_number(tmp_path: Path) -> None:
     read = io.read(stage(tmp_path, f'def Mesh "m" {{ {FEWER} }}'))
-    with pytest.raises(InputError, match="has 4 vertices at frame 2 .time code 3., 3 at first; its topology changes"):
+    with pytest.raises(InputError, match="has 4 vertices at frame 2 .time code 3., 3 at first; .*--frames 0:2 or --frames 2:"):
         read.read(0, 3)
 
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import av
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from sequences import waving
 
-from gvpipe.errors import CorruptFile
+import gvpipe
+from gvpipe.errors import CorruptFile, InputError
 from gvpipe.media.film import hold_picture
 from gvpipe.media.video import PROFILES, Profile, VideoReader, VideoWriter
 
@@ -89,6 +92,29 @@ def test_no_byte_tells_the_coders_options() -> None:
         hold_picture(np.full((16, 16), 99, np.uint8), 25, 9, 30),
     ):
         assert b"x264" not in data and b"options" not in data
+
+
+def test_without_x264(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """As with an FFmpeg without the GPL: everything is read, and all but H.264 is written."""
+    profile = PROFILES["h264-8"]
+    video = code(profile, moving(profile, 7))
+    planes = read(open_video(video, profile))
+    monkeypatch.setattr(av.codec, "codecs_available", av.codec.codecs_available - {"libx264", "libx264rgb"})
+    np.testing.assert_array_equal(read(open_video(video, profile)), planes)
+    gvpipe.encode(waving(4, 5), tmp_path / "a.mp4", codec="pca")
+    assert gvpipe.decode(tmp_path / "a.mp4").shape == (5, 16, 3)
+    gvpipe.encode(waving(4, 5), tmp_path / "a.mp4", image="jpeg", prediction="affine", clusters=2)
+    with av.open(tmp_path / "a.mp4") as container:
+        assert container.streams.video[0].codec_context.name == "mjpeg"
+    for write in (
+        lambda: gvpipe.encode(waving(4, 5), tmp_path / "b.mp4", prediction="affine", clusters=2),
+        lambda: gvpipe.render(waving(4, 5), tmp_path / "b.mp4"),
+    ):
+        with pytest.raises(InputError, match="no libx264, which writes H.264; --set image=jpeg needs none"):
+            write()
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"]
+    with av.open(io.BytesIO(hold_picture(np.full((16, 16), 99, np.uint8), 25, 50, 30)), "r") as container:
+        assert float(container.duration or 0) / av.time_base == pytest.approx(2)
 
 
 @pytest.mark.parametrize("profile", ALL, ids=lambda p: p.name)

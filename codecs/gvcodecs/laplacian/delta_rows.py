@@ -17,7 +17,6 @@ Source: Vasa, Marras, Hormann and Brunnett 2014, section 7. Departures: a ridge 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from gvpipe.arrays import Bool, Float64, Int32
@@ -70,32 +69,21 @@ def delta_causal_order(
         differential: ``(P, 3)`` differential coordinates of the average mesh; zero without one.
     """
     from gvcodecs.laplacian.neighbour_search import causal_around
+    from gvcodecs.laplacian.rigid_kernels import rigid_weights
 
     graph = neighbours.sorted_indices()
     starts_of, ends = graph.indptr.astype(np.int32), graph.indices.astype(np.int32)
     starts, near = causal_around(order, limits, starts_of, ends, N_CAUSAL[prediction], REACH)
     counts = np.diff(starts)
-    vector = np.repeat(np.arange(len(order)), counts)
     rank = np.zeros(len(differential), np.int32)
     rank[order] = np.arange(len(order))
     return CausalOrder(
         order=np.arange(len(order), dtype=np.int32),
         starts=starts,
         neighbours=rank[near],
-        weights=_rigid_weights(differential[order], differential[near], vector),
+        weights=rigid_weights(differential[order], differential[near], starts, RIDGE, TINY),
         variances=np.full(len(near), VARIANCE),
         ring_sizes=counts.astype(np.int32) if prediction == "rigid" else np.minimum(counts, N_RING).astype(np.int32),
         blocks=blocks,
         affine=False,
     )
-
-
-def _rigid_weights(own: Float64, causal: Float64, vector: NDArray[np.intp]) -> Float64:
-    """Weights of causal neighbours, from differential coordinates ``own (n, 3)`` and ``causal (m, 3)`` of ``vector (m,)``."""
-    normal = np.zeros((len(own), 3, 3))
-    for a in range(3):
-        for b in range(3):
-            normal[:, a, b] = np.bincount(vector, causal[:, a] * causal[:, b], len(own))
-    ridge = RIDGE * np.trace(normal, axis1=1, axis2=2) + TINY
-    solved = np.linalg.solve(normal + ridge[:, None, None] * np.eye(3), own[:, :, None])[:, :, 0]
-    return np.asarray(np.einsum("mi,mi->m", causal, solved[vector]))

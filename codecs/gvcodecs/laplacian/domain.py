@@ -9,10 +9,11 @@ from scipy import sparse
 
 from gvcodecs.laplacian.anchors import Anchors, choose_anchors
 from gvcodecs.laplacian.delta_rows import border_order, delta_causal_order, delta_order
-from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian, thin_hubs
+from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian, scale_rows, thin_hubs
 from gvcodecs.laplacian.header import CoefficientCoding
 from gvcodecs.laplacian.laplace_operators import laplacian
 from gvcodecs.laplacian.mesh_scale import fineness
+from gvcodecs.laplacian.normal_equations import count_fill, most_products
 from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy
 from gvpipe.mesh.topology import adjacency, components, unique_edges
@@ -56,9 +57,16 @@ class Domain:
 
 def build_surface(point_faces: Int32, n_points: int) -> Surface:
     """Take in the mesh ``point_faces (T, 3)``."""
-    faces = point_faces[(point_faces != np.roll(point_faces, 1, axis=1)).all(axis=1)]
+    faces = _proper(point_faces)
     hierarchy = build_hierarchy(faces, n_points)
     return Surface(faces, unique_edges(faces), adjacency(faces, n_points), hierarchy, hierarchy_order(hierarchy))
+
+
+def is_factorable(point_faces: Int32, n_points: int) -> bool:
+    """Whether the least squares over a mesh stay within `most_products`, whatever the operator."""
+    faces, limit = _proper(point_faces), most_products(n_points)
+    operator = thin_hubs(laplacian(np.zeros((n_points, 3)), faces, "tutte"))
+    return count_fill(operator, limit).products <= limit
 
 
 def build_domain(surface: Surface, average: Float64 | None, coding: CoefficientCoding, is_still: Bool | None = None) -> Domain:
@@ -83,8 +91,14 @@ def build_domain(surface: Surface, average: Float64 | None, coding: CoefficientC
     has_deltas = (np.bincount(component_of[~is_anchor], minlength=int(component_of.max()) + 1) > 0)[component_of]
     has_deltas &= ~is_still
     scale = np.ones(n_points) if average is None else fineness(average, surface.edges, coding.edge_power)
-    operator = sparse.diags_array(scale * has_deltas) @ thin_hubs(laplacian(points, surface.faces, coding.operator))
-    operator = sparse.csr_array(operator)
+    operator = scale_rows(thin_hubs(laplacian(points, surface.faces, coding.operator)), scale * has_deltas)
+    system = ExtendedLaplacian(operator, anchors.points, 1 / coding.anchor_ratio, anchors.is_free)
     order, blocks, limits = delta_order(coding.delta_prediction, surface.hierarchy, traversal, has_deltas)
-    causal = delta_causal_order(coding.delta_prediction, order, blocks, limits, surface.neighbours, operator @ points)
-    return Domain(anchors, order, causal, ExtendedLaplacian(operator, anchors.points, 1 / coding.anchor_ratio, anchors.is_free))
+    causal = delta_causal_order(coding.delta_prediction, order, blocks, limits, surface.neighbours, system.deltas(points))
+    return Domain(anchors, order, causal, system)
+
+
+def _proper(faces: Int32) -> Int32:
+    """The triangles of three different points."""
+    proper: Int32 = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    return proper

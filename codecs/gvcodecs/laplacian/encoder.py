@@ -26,7 +26,7 @@ from gvcodecs.laplacian.average import average_mesh
 from gvcodecs.laplacian.average_coding import NAME, encode_average
 from gvcodecs.laplacian.coefficients import encode_coefficients
 from gvcodecs.laplacian.delta_rows import DELTA_PREDICTIONS
-from gvcodecs.laplacian.domain import Domain, build_domain, build_surface
+from gvcodecs.laplacian.domain import Domain, build_domain, build_surface, is_factorable
 from gvcodecs.laplacian.header import (
     COARSEST,
     FINEST,
@@ -127,6 +127,8 @@ class Laplacian(BaseCodec):
             float(self.anchor_ratio),
             float(self.basis_ratio),
         )
+        if not memo("is_factorable", lambda: is_factorable(shared.mesh.point_faces, shared.mesh.n_points)):
+            coding = coding.without_deltas()
         if coding.needs_average:
             report("average", 0)
         average, domain = memo("domain", lambda: _prepare(sequence, shared, coding, still))

@@ -2,7 +2,7 @@
 
 The operator's rows give every point's difference from its neighbours' weighted average, each row divided by the step that the
 point's deltas are to have; below them stands one row per anchor, weighted by how much finer anchors are quantised than deltas.
-Coefficients solve the normal equations, factorised once for all components and segments.
+Coefficients solve the normal equations, factored once for all components and segments (`normal_equations`).
 
 Rounding errors of deltas add up to a slow drift over the surface. The anchors' values are all that can still be chosen once the
 deltas are rounded, so the encoder chooses those whose solution comes closest to the true coefficients, by conjugate gradients
@@ -15,15 +15,13 @@ Source: Vasa, Marras, Hormann and Brunnett 2014, section 6; anchors in closed lo
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from scipy import sparse
 
+from gvcodecs.laplacian.normal_equations import NormalEquations
 from gvpipe.arrays import Bool, Float64, Int32
 
 MAX_NEIGHBOURS = 64  # of a row
-COLUMNS = 32  # solved at once
 FITTING_STEPS = 2  # of conjugate gradients: a third saves under 1 % of the bytes, and costs two solutions
 TINY = 1e-300  # divides where there is nothing to fit
 
@@ -53,29 +51,36 @@ def thin_hubs(operator: sparse.csr_array) -> sparse.csr_array:
     return sparse.csr_array((data[kept], (row[kept], operator.indices[kept])), shape=shape)
 
 
+def scale_rows(operator: sparse.csr_array, scale: Float64) -> sparse.csr_array:
+    """Multiply the rows of ``operator (P, P)`` by ``scale (P,)``; rows scaled by 0 become empty."""
+    counts = np.diff(operator.indptr)
+    kept = np.repeat(scale != 0, counts)
+    starts = np.concatenate([[0], np.cumsum(np.where(scale != 0, counts, 0))])
+    data = (operator.data * np.repeat(scale, counts))[kept]
+    return sparse.csr_array((data, operator.indices[kept], starts), shape=operator.shape)
+
+
 class ExtendedLaplacian:
     """Args:
     operator: ``(P, P)``, rows scaled as deltas are quantised; rows of points without deltas empty.
     anchors: ``(A,)`` points, at least one in each component of the operator's graph, and all points of empty rows.
     weight: of an anchor's row, beside 1 for a delta's.
     is_free: ``(A,)`` the anchors whose values the encoder may choose; all if None.
+
+    Raises:
+        TooMuchFill, Singular: of `NormalEquations`.
     """
 
     def __init__(self, operator: sparse.csr_array, anchors: Int32, weight: float, is_free: Bool | None = None) -> None:
-        from scipy.sparse.linalg import splu
-
-        self._operator, self._anchors, self._weight = operator, anchors, weight
+        self._n_points, self._anchors, self._weight = operator.shape[0], anchors, weight
         self._is_free = np.ones(len(anchors), bool) if is_free is None else is_free
         held = np.zeros(operator.shape[0])
         held[anchors] = weight * weight
-        normal = sparse.csc_array(operator.T @ operator + sparse.diags_array(held))
-        # minimum degree: the normal matrix' pattern is symmetric, and it is definite, so that no pivoting is needed
-        options = {"SymmetricMode": True}
-        self._factors: Any = splu(normal, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        self.equations = NormalEquations(operator, held)
 
     def deltas(self, coefficients: Float64) -> Float64:
         """Deltas ``(P, R)`` of ``coefficients (P, R)``."""
-        return np.asarray(self._operator @ coefficients)
+        return self.equations.multiply(coefficients)
 
     def solve(self, points: Int32, deltas: Float64, anchored: Float64) -> Float64:
         """Return the coefficients ``(P, R)`` that fit best.
@@ -85,9 +90,9 @@ class ExtendedLaplacian:
             deltas: ``(D, R)`` of these points.
             anchored: ``(A, R)`` coefficients of the anchors.
         """
-        right = self._operator[points].T @ deltas
+        right = self.equations.multiply_transposed(points, deltas)
         right[self._anchors] += self._weight**2 * anchored
-        return self._divide(right)
+        return self.equations.solve(right)
 
     def fit_anchors(self, points: Int32, deltas: Float64, wanted: Float64) -> Float64:
         """Return values of the anchors ``(A, R)`` whose solution, with these rounded ``deltas``, comes near ``wanted (P, R)``.
@@ -111,17 +116,10 @@ class ExtendedLaplacian:
 
     def _spread(self, anchored: Float64) -> Float64:
         """The solution ``(P, R)`` where all deltas are 0."""
-        right = np.zeros((self._operator.shape[0], anchored.shape[1]))
+        right = np.zeros((self._n_points, anchored.shape[1]))
         right[self._anchors] = self._weight**2 * anchored
-        return self._divide(right)
+        return self.equations.solve(right)
 
     def _gather(self, solution: Float64) -> Float64:
         """The transpose of `_spread`: ``(P, R)`` to ``(A, R)``."""
-        return self._weight**2 * self._divide(solution)[self._anchors]
-
-    def _divide(self, right: Float64) -> Float64:
-        """Solve the normal equations, a few columns at a time: more do not fit the cache and take up to twice as long."""
-        solved = np.empty_like(right)
-        for first in range(0, right.shape[1], COLUMNS):
-            solved[:, first : first + COLUMNS] = self._factors.solve(right[:, first : first + COLUMNS])
-        return solved
+        return self._weight**2 * self.equations.solve(solution)[self._anchors]

@@ -15,7 +15,7 @@ sections.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from gvcodecs.laplacian.anchors import ANCHOR_CHOICES
@@ -59,6 +59,10 @@ class CoefficientCoding:
     def needs_average(self) -> bool:
         """Whether there is an average mesh: the combinatorial operator needs none but for section 7's prediction."""
         return self.operator != "tutte" or self.delta_prediction == "rigid"
+
+    def without_deltas(self) -> CoefficientCoding:
+        """The same with all points as anchors: nothing is left to be solved for."""
+        return replace(self, operator="tutte", delta_prediction="kalman", anchors=1)
 
     @classmethod
     def of(cls, bitstream: Bitstream) -> CoefficientCoding:

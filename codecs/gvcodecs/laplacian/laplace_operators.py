@@ -26,8 +26,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from gvcodecs.laplacian.vectors import dot, norm
-from gvpipe.arrays import Float64, Int32
+from gvcodecs.laplacian.vectors import add_up, dot, norm
+from gvpipe.arrays import Float64, Int32, Integers
 
 OPERATORS = ("mean-value", "cotangent", "tutte")
 LEAST = 0.2  # least weight, in mean weights of its row; 0.01 needs up to 3 % more bits at equal errors of edges
@@ -56,13 +56,16 @@ def laplacian(points: Float64, faces: Int32, operator: str = "mean-value") -> sp
         weights.data[:] = 1.0
     else:
         to_b, to_c = points[b] - points[a], points[c] - points[a]
-        scale = float(np.sqrt(np.mean(to_b * to_b) * 3)) if len(a) else 0.0
+        scale = float(np.sqrt(add_up(dot(to_b, to_b)) / len(a))) if len(a) else 0.0
         formula = {"mean-value": _mean_value, "cotangent": _cotangent}[operator]
         weights = formula(to_b, to_c, scale or 1.0, (a, b, c), n_vertices)
         _raise_to_least(weights)
-    total = weights.sum(axis=1)
-    shares = sparse.diags_array(1 / np.where(total > 0, total, 1.0)) @ weights
-    return sparse.csr_array(sparse.diags_array((total > 0).astype(np.float64)) - shares)
+    row = np.repeat(np.arange(n_vertices), np.diff(weights.indptr))
+    total = np.bincount(row, weights.data, n_vertices)
+    has_neighbours = np.flatnonzero(total > 0)
+    shares = -weights.data / np.where(total > 0, total, 1.0)[row]
+    parts = [(row, weights.indices, shares), (has_neighbours, has_neighbours, np.ones(len(has_neighbours)))]
+    return _sum_pairs(parts, n_vertices, beside=False)
 
 
 def _mean_value(to_b: Float64, to_c: Float64, scale: float, corners: tuple[Int32, ...], n_vertices: int) -> sparse.csr_array:
@@ -85,15 +88,24 @@ def _cotangent(to_b: Float64, to_c: Float64, scale: float, corners: tuple[Int32,
 def _raise_to_least(weights: sparse.csr_array) -> None:
     """Raise weights below `LEAST` of the mean of their row's positive part; rows that hardly have one become equal weights."""
     n_neighbours = np.diff(weights.indptr)
-    positive = sparse.csr_array((np.maximum(weights.data, 0), weights.indices, weights.indptr), shape=weights.shape)
-    mean = positive.sum(axis=1) / np.maximum(n_neighbours, 1)
-    faintest = FAINTEST * float(mean.mean() if len(mean) else 0)
+    row = np.repeat(np.arange(len(n_neighbours)), n_neighbours)
+    mean = np.bincount(row, np.maximum(weights.data, 0), len(n_neighbours)) / np.maximum(n_neighbours, 1)
+    faintest = FAINTEST * (add_up(mean) / max(1, len(mean)))
     least = LEAST * np.maximum(mean, faintest or 1.0)
     weights.data = np.maximum(weights.data, np.repeat(least, n_neighbours))
 
 
-def _sum_pairs(parts: list[tuple[Int32, Int32, Float64]], n_vertices: int) -> sparse.csr_array:
-    """Sum values by ordered pair of vertices, zeros kept; a side that a degenerate triangle collapses is no pair."""
+def _sum_pairs(parts: list[tuple[Integers, Integers, Float64]], n_vertices: int, beside: bool = True) -> sparse.csr_array:
+    """Sum values by ordered pair of vertices, in the order given, zeros kept.
+
+    With ``beside``, a side that a degenerate triangle collapses is no pair.
+    """
     rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
-    pair = rows != columns
-    return sparse.csr_array((values[pair], (rows[pair], columns[pair])), shape=(n_vertices, n_vertices))
+    pair = rows != columns if beside else np.ones(len(rows), bool)
+    keys = rows[pair].astype(np.int64) * n_vertices + columns[pair]
+    order = np.argsort(keys, kind="stable")
+    is_first = np.diff(keys[order], prepend=-1) != 0
+    sums = np.bincount(np.cumsum(is_first) - 1, values[pair][order], int(is_first.sum()))
+    row, column = np.divmod(keys[order[is_first]], max(1, n_vertices))
+    starts = np.searchsorted(row, np.arange(n_vertices + 1))
+    return sparse.csr_array((sums, column, starts), shape=(n_vertices, n_vertices))

@@ -1,6 +1,6 @@
 """From a ``laplacian`` bitstream back to frames.
 
-Opening it factorises the extended Laplacian, the first frame of a segment costs the segment's decoding, and each after that one
+Opening it factors the extended Laplacian, the first frame of a segment costs the segment's decoding, and each after that one
 product of a small matrix with the coefficients.
 """
 
@@ -12,6 +12,7 @@ from gvcodecs.laplacian.average_coding import NAME, decode_average
 from gvcodecs.laplacian.coefficients import decode_coefficients
 from gvcodecs.laplacian.domain import Domain, Surface, build_domain, build_surface
 from gvcodecs.laplacian.header import Header
+from gvcodecs.laplacian.normal_equations import Singular
 from gvpipe.arrays import Float32, Int32
 from gvpipe.connectivity.topology_only import read_mesh
 from gvpipe.container.bitstream import Bitstream
@@ -27,6 +28,7 @@ class LaplacianReader:
 
     Raises:
         CorruptFile: a section does not hold what it must.
+        TooMuchFill: the triangles make factoring take too long.
     """
 
     def __init__(self, bitstream: Bitstream) -> None:
@@ -36,7 +38,7 @@ class LaplacianReader:
         surface = build_surface(self._mesh.point_faces, self._mesh.n_points)
         try:
             self._domain = self._build_domain(surface)
-        except RuntimeError as exc:  # SuperLU: singular
+        except Singular as exc:
             raise corrupt_section("average", "its Laplacian cannot be inverted") from exc
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
         self._kept: tuple[int, Segment] | None = None

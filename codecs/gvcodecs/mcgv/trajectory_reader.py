@@ -27,8 +27,8 @@ from gvpipe.container.cursor import Cursor
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import VideoReader
-from gvpipe.trajectory.basis import Basis
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES
+from gvpipe.trajectory.reconstruction import Segment
 
 BYTES_PER_SAMPLE, SECONDS_PER_SAMPLE = 48, 0.1e-6
 MAX_FLOAT32 = float(np.finfo(np.float32).max)
@@ -51,11 +51,10 @@ class _Shared:
 
 @dataclass(frozen=True)
 class _Segment:
-    """A decoded segment: its number, its basis, and its slots' coefficients ``(R, S)``."""
+    """A decoded segment: its number, its basis and its slots' coefficients ``(R, S)``."""
 
     number: int
-    basis: Basis
-    coefficients: Float64
+    trajectories: Segment
 
 
 class TrajectoryReader:
@@ -109,12 +108,10 @@ class TrajectoryReader:
         """
         surface, base = self._surface, self._shared.base
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
-        for frame in range(start, stop):  # one by one, so that a frame's sums do not depend on what else is read
+        for frame in range(start, stop):
             s = locate(self._bounds, frame)
             segment = self._decode(s)
-            rows = slice(3 * (frame - self._bounds[s]), 3 * (frame - self._bounds[s] + 1))
-            placed = segment.basis.vectors[rows] @ segment.coefficients  # (3, S)
-            placed += segment.basis.mean[rows, None]
+            placed = segment.trajectories.positions(frame - self._bounds[s], frame - self._bounds[s] + 1)[0]  # (3, S)
             placed += base
             if not np.abs(placed).max(initial=0) <= MAX_FLOAT32:
                 raise CorruptFile(f"frame {frame} does not decode to finite positions; get the file again from its source")
@@ -130,10 +127,9 @@ class TrajectoryReader:
             n_values = self._images.components[s] * len(point)
             budget.ask(f"section {name!r}", BYTES_PER_SAMPLE * n_values, SECONDS_PER_SAMPLE * n_values)
             samples, step = self._samples(s), self._images.steps[s]
-            basis, coefficients = decode_segment(
-                Cursor(data, name), samples, step, self._shared.matrix, point, n_frames, budget
-            )
-            self._segment = _Segment(s, basis, coefficients)
+            matrix = self._shared.matrix
+            basis, coefficients = decode_segment(Cursor(data, name), samples, step, matrix, point, n_frames, budget)
+            self._segment = _Segment(s, Segment(basis, coefficients))
         return self._segment
 
     def _samples(self, s: int) -> Float64:

@@ -68,6 +68,11 @@ class PcaReader:
         numbers[alive] = np.arange(len(alive))
         return numbers[level_faces(self._mesh.point_faces, self._mesh.n_points, waves_left)]
 
+    def level_points(self, lod: int) -> tuple[Int32, Int32]:
+        """Return the point ``(V,) int32`` of each vertex of level 0, and that of each vertex of a level above 0, ascending."""
+        self._check_level(lod)
+        return self._mesh.points, self._alive(lod)
+
     def read(self, start: int, stop: int, lod: int = 0) -> Float32:
         """Return frames ``start`` to ``stop`` of a level: ``(stop - start, V, 3) float32``, model units.
 

@@ -86,14 +86,16 @@ class Dictionary:
         result = np.empty((len(positions), 3, positions.shape[1]))
         for k, where in zip(self.clusters, self.slices, strict=True):
             local = positions[:, where] - origins[:, k, None]
-            result[:, :, where] = axes[:, k] @ local.swapaxes(1, 2)
+            result[:, :, where] = sum(axes[:, k, :, j, None] * local[:, None, :, j] for j in range(3))
         return result
 
     def to_world(self, local: Float64, origins: Float64, axes: Float64) -> Float64:
         """Mirror of `to_local`: ``(n, 3, N) -> (n, N, 3)``."""
         result = np.empty((len(local), local.shape[2], 3))
         for k, where in zip(self.clusters, self.slices, strict=True):
-            result[:, where] = local[:, :, where].swapaxes(1, 2) @ axes[:, k] + origins[:, k, None]
+            part = local[:, :, where]
+            for j in range(3):
+                result[:, where, j] = sum(part[:, i] * axes[:, k, i, j, None] for i in range(3)) + origins[:, k, j, None]
         return result
 
     def transform(self, signals: Float64) -> Float64:
@@ -105,11 +107,14 @@ class Dictionary:
 
     def rebuild(self, sums: Int64, step: float) -> Float64:
         """Local coordinates ``(n, 3, N)`` of coefficients ``sums (n, 3, C)``."""
+        from gvpipe.trajectory.product_kernels import weighted_sums
+
         scaled = sums[..., self.n_affine :] * (self.scale * (step / UNIT))
         result = np.empty_like(scaled)
         for c, where in enumerate(self.slices):
-            affine = sums[..., 4 * c : 4 * c + 4] * (step / UNIT)
-            result[..., where] = idct(scaled[..., where], norm="ortho") + affine @ self.functions[:, where]
+            affine = (sums[..., 4 * c : 4 * c + 4] * (step / UNIT)).reshape(-1, 4)
+            moved = weighted_sums(affine, np.ascontiguousarray(self.functions[:, where]))
+            result[..., where] = idct(scaled[..., where], norm="ortho") + moved.reshape(*sums.shape[:2], -1)
         return np.asarray(result + self.rest)
 
 

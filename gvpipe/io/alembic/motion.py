@@ -26,16 +26,22 @@ class AlembicMotion:
         self.moves = self._positions.getNumSamples() > 1 or any(parent.schema.getNumSamples() > 1 for parent in node.parents)
         self.n_vertices = len(_sample(self._positions, 0)) if self._positions.getNumSamples() else 0
 
+    def count(self, time: float) -> int:
+        """Vertices that it has at a time, seconds."""
+        return len(_sample(self._positions, around(self._positions, time)[0]))
+
     def samples(self) -> Iterable[float]:
-        """Times of all samples that move it, seconds."""
-        for schema in (self._positions, *(parent.schema for parent in self.node.parents)):
+        """Times of all samples that move it or change its polygons, seconds."""
+        mesh = self.node.schema
+        topology = [each for each in (mesh.getFaceCountsProperty(), mesh.getFaceIndicesProperty()) if not each.isConstant()]
+        for schema in (self._positions, *topology, *(parent.schema for parent in self.node.parents)):
             if schema.getNumSamples() > 1:
                 sampling = schema.getTimeSampling()
                 yield from (sampling.getSampleTime(i) for i in range(schema.getNumSamples()))
 
     def at(self, time: float) -> Array:
         """Positions ``(n, 3)`` in world space at a time in seconds."""
-        low, high, part = _around(self._positions, time)
+        low, high, part = around(self._positions, time)
         points = _sample(self._positions, low)
         if part:
             after = _sample(self._positions, high)
@@ -48,7 +54,7 @@ class AlembicMotion:
         """``(4, 4)`` from the mesh's space into the world's, applied to rows."""
         total = np.eye(4)
         for parent in self.node.parents:
-            low, high, part = _around(parent.schema, time)
+            low, high, part = around(parent.schema, time)
             first = sample_of(parent.schema, low)
             matrix = np.array(first.getMatrix(), np.float64)
             if part:
@@ -63,8 +69,8 @@ def _sample(positions: Any, number: int) -> Float64:
     return np.array(sample_of(positions, number), np.float64).reshape(-1, 3)
 
 
-def _around(schema: Any, time: float) -> tuple[int, int, float]:
-    """The samples before and after a time, and how far it is between them, 0 at a sample."""
+def around(schema: Any, time: float) -> tuple[int, int, float]:
+    """The samples of a schema or a property before and after a time, and how far it is between them, 0 at a sample."""
     count = schema.getNumSamples()
     if count < 2:
         return 0, 0, 0.0

@@ -32,23 +32,24 @@ READERS = {  # (type, components, interpretation): name of the library's class, 
 }
 
 
-def layers_of(schema: Any, polygons: SceneMesh, turn: Float64) -> tuple[tuple[Layer, ...], list[str]]:
-    """Return a mesh's layers at its first sample, and the names of what does not fit it.
+def layers_of(schema: Any, polygons: SceneMesh, time: float, turn: Float64) -> tuple[tuple[Layer, ...], list[str]]:
+    """Return a mesh's layers at a time, and the names of what does not fit it.
 
     Args:
         schema: of a polygon mesh or a subdivision cage.
         polygons: the same mesh, without layers.
+        time: of the first frame, seconds.
         turn: ``(3, 3)`` how its directions turn into world space.
     """
     layers: list[Layer] = []
     left: list[str] = []
     if hasattr(schema, "getNormalsParam"):
-        normals = _layer("normal", "normal", schema.getNormalsParam(), polygons)
+        normals = _layer("normal", "normal", schema.getNormalsParam(), polygons, time)
         if normals is not None:
             layers.append(_turned(normals, turn))
-    uv = _layer("uv", "uv", schema.getUVsParam(), polygons)
+    uv = _layer("uv", "uv", schema.getUVsParam(), polygons, time)
     layers.extend([uv] if uv is not None else [])
-    changing = sampled_of(schema, polygons)
+    changing = sampled_of(schema, polygons, time)
     for name, kind, param in _others(schema):
         if name in changing:
             continue
@@ -56,7 +57,7 @@ def layers_of(schema: Any, polygons: SceneMesh, turn: Float64) -> tuple[tuple[La
             name = _numbered("color", layers)
         elif kind == "uv":
             name = _numbered("uv", layers)
-        layer = _layer(name, kind, param, polygons)
+        layer = _layer(name, kind, param, polygons, time)
         if layer is None:
             left.append(name)
         elif layer.domain != "constant" or kind == "color":
@@ -70,7 +71,7 @@ def changing_normals(schema: Any) -> bool:
     return bool(param and param.valid() and param.getNumSamples() > 1 and not param.isConstant())
 
 
-def sampled_of(schema: Any, polygons: SceneMesh) -> dict[str, Sampled]:
+def sampled_of(schema: Any, polygons: SceneMesh, time: float) -> dict[str, Sampled]:
     """The parameters of a mesh that change over time and can be fields: per vertex or polygon, not indexed, no uv."""
     found: dict[str, Sampled] = {}
     n_colors = 0
@@ -79,7 +80,7 @@ def sampled_of(schema: Any, polygons: SceneMesh) -> dict[str, Sampled]:
         n_colors += kind == "color"
         if kind == "uv" or param.isIndexed() or param.getNumSamples() < 2 or param.isConstant():
             continue
-        layer = _layer(name, kind, param, polygons)
+        layer = _layer(name, kind, param, polygons, time)
         if layer is not None and layer.domain in ("vertex", "polygon"):
             found[label] = Sampled(Values(schema, param, layer.values.shape[1]), kind, layer.domain)
     return found
@@ -118,11 +119,13 @@ def _others(schema: Any) -> list[tuple[str, str, Any]]:
     return found
 
 
-def _layer(name: str, kind: str, param: Any, polygons: SceneMesh) -> Layer | None:
+def _layer(name: str, kind: str, param: Any, polygons: SceneMesh, time: float) -> Layer | None:
     """A parameter as a layer, or None if it is absent or has not the rows that its scope needs."""
     if not (param and param.valid() and param.getNumSamples()):
         return None
-    value = param.getIndexedValue()
+    from alembic3d import Abc
+
+    value = param.getIndexedValue(Abc.ISampleSelector(time))
     values = np.array(value.getVals())
     values = values.reshape(len(values), -1)
     if not values.size or (values.dtype.kind == "f" and not np.isfinite(values).all()):

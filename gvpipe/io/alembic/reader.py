@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Int64
+from gvpipe.arrays import Float64, Int64
 from gvpipe.asset.material import Material
 from gvpipe.asset.metadata import Metadata
-from gvpipe.errors import InputError
+from gvpipe.errors import InputError, TopologyChange
 from gvpipe.io.alembic.archive import Node, alembic_errors, find_meshes, open_archive, sample_of
-from gvpipe.io.alembic.motion import AlembicMotion
+from gvpipe.io.alembic.motion import AlembicMotion, around
 from gvpipe.io.alembic.params import changing_normals, layers_of, sampled_of
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_fields import join_fields, misfit_note
-from gvpipe.io.scene_frames import SceneFrames, even_times
+from gvpipe.io.scene_frames import SceneFrames, even_times, first_frame_of
 from gvpipe.io.scene_layers import join_layers
 from gvpipe.io.scene_mesh import SceneMesh, join
 from gvpipe.io.scene_normals import first_normals_note
@@ -33,11 +33,11 @@ def read_alembic(path: Path, options: ReadOptions) -> MeshSequence:
 
     Args:
         path: an .abc of the Ogawa kind.
-        options: `fps` samples the archive's range at that rate instead of at its samples.
+        options: `fps` samples the archive's range at that rate instead of at its samples; `frames` are those that are read.
 
     Raises:
         InputError: alembic3d is missing, the file is damaged or of the HDF5 kind, it has no mesh, a mesh's topology
-            changes, a position is not finite.
+            changes in the frames that are read, a position is not finite.
     """
     archive = open_archive(path)
     with alembic_errors(path):
@@ -64,13 +64,18 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
         notes.append(f"{', '.join(drawn)} beside the meshes were left out")
     samples = np.unique(np.fromiter((time for motion in motions for time in motion.samples()), np.float64))
     times, fps, time_notes = even_times(samples, options.fps, DEFAULT_FPS, where)
-    frames = SceneFrames(motions, times, where, "second")
+    first, stop = options.span(len(times), where)
+    times = times[first:stop]
+    start = float(times[0])
+    for motion in motions:
+        motion.n_vertices = motion.count(start)
+    frames = SceneFrames(motions, times, where, "second", first)
     materials: list[str] = []
-    read = [_read_mesh(motion, materials, float(times[0]), where) for motion in motions]
+    read = [_read_mesh(motion, materials, (times, where, first)) for motion in motions]
     meshes = [mesh for mesh, _ in read]
     joined = join(meshes, where)
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
-    sampled = [sampled_of(motion.node.schema, mesh) for motion, mesh in zip(motions, meshes, strict=True)]
+    sampled = [sampled_of(motion.node.schema, mesh, start) for motion, mesh in zip(motions, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times)
     moves = any(changing_normals(motion.node.schema) for motion in motions)
     unruled = first_normals_note(moves, attributes, joined.faces, frames[0:1][0])
@@ -87,14 +92,19 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
         parts=joined.parts,
         polygons=joined.polygons,
         materials=tuple(Material(name) for name in materials),
-        metadata=_metadata(archive, path, float(times[0])),
+        metadata=_metadata(archive, path, start),
     )
 
 
-def _read_mesh(motion: AlembicMotion, materials: list[str], time: float, where: str) -> tuple[SceneMesh, list[str]]:
-    """One mesh with its layers, and the names of parameters that were left out; new materials are added to the list."""
-    node = motion.node
-    counts, corners = _polygons(node, where)
+def _read_mesh(motion: AlembicMotion, materials: list[str], frames: tuple[Float64, str, int]) -> tuple[SceneMesh, list[str]]:
+    """One mesh with its layers, and the names of parameters that were left out; new materials are added to the list.
+
+    Args:
+        motion, materials: what is read.
+        frames: their times, the file, and the number of the first.
+    """
+    node, time = motion.node, float(frames[0][0])
+    counts, corners = _polygons(node, *frames)
     groups, names = _face_sets(node.schema, len(counts))
     materials.extend(name for name in names if name and name not in materials)
     bound = tuple(materials.index(name) if name else None for name in names)
@@ -102,24 +112,28 @@ def _read_mesh(motion: AlembicMotion, materials: list[str], time: float, where: 
     is_mirrored = bool(np.linalg.det(turn) < 0)
     parent, _, name = node.path.strip("/").rpartition("/")
     plain = SceneMesh(name, parent, motion.n_vertices, counts, corners, groups, bound, not is_mirrored)
-    layers, left = layers_of(node.schema, plain, turn)
+    layers, left = layers_of(node.schema, plain, time, turn)
     return replace(plain, layers=layers), left
 
 
-def _polygons(node: Node, where: str) -> tuple[Int64, Int64]:
-    """Corners per polygon and the vertex of each corner; raises `InputError` where they change."""
+def _polygons(node: Node, times: Float64, where: str, start: int) -> tuple[Int64, Int64]:
+    """Corners per polygon and the vertex of each corner; raises `TopologyChange` where they change in the frames."""
     found = []
     for held in (node.schema.getFaceCountsProperty(), node.schema.getFaceIndicesProperty()):
-        first = np.array(held.getValue(), np.int64).reshape(-1)
-        for number in range(1, held.getNumSamples()):
-            if held.isConstant():
-                break
-            if not np.array_equal(np.array(sample_of(held, number), np.int64).reshape(-1), first):
-                raise InputError(
-                    f"{where}: the topology of mesh {node.path} changes at frame {number}; export it with constant topology"
-                )
+        first = _integers(held, around(held, float(times[0]))[0])
+        sampling, count = held.getTimeSampling(), 1 if held.isConstant() else held.getNumSamples()
+        for number in range(1, count):
+            moment = float(sampling.getSampleTime(number))
+            if times[0] < moment <= times[-1] + 1e-6 and not np.array_equal(_integers(held, number), first):
+                at = start + first_frame_of(moment, times)
+                what = f"the topology of mesh {node.path} changes at frame {at} (second {moment:g})"
+                raise TopologyChange.at(f"{where}: {what}", at, start)
         found.append(first)
     return found[0], found[1]
+
+
+def _integers(held: Any, number: int) -> Int64:
+    return np.array(sample_of(held, number), np.int64).reshape(-1)
 
 
 def _face_sets(schema: Any, n_polygons: int) -> tuple[Int64, list[str]]:

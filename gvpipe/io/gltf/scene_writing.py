@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32
+from gvpipe.arrays import Array, Float32, Float64
+from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
 from gvpipe.io.gltf.attribute_writing import GltfAttribute, as_gltf, name_attributes
 from gvpipe.io.gltf.glb import INDICES, VERTICES, Glb
@@ -132,14 +133,19 @@ def _write_mesh(glb: Glb, shape: Shape, positions: Float32, attributes: tuple[Gl
     return glb.append("meshes", {"primitives": primitives} | ({"name": shape.name} if shape.name else {}))
 
 
+def world_matrix(metadata: Metadata) -> Float64:
+    """``(3, 3)`` that takes positions of a scene, as columns, to metres and Y up."""
+    turn = np.array(TURNS.get(metadata.up_axis, (0, 0, 0, 1.0)))
+    return compose(np.zeros(3), turn, np.full(3, metadata.metres_per_unit or 1.0))[:3, :3]
+
+
 def _place(sequence: MeshSequence) -> tuple[Json, tuple[str, ...]]:
     """The transform of the scene's nodes to metres and Y up, and a note if it changes anything."""
     metadata, origin = sequence.metadata, sequence.origin
     turn = TURNS.get(metadata.up_axis)
     scale = metadata.metres_per_unit or 1.0
-    matrix = compose(np.zeros(3), np.array(turn or (0, 0, 0, 1.0)), np.full(3, scale))
     place: Json = {}
-    place |= {"translation": (matrix[:3, :3] @ origin).tolist()} if origin.any() else {}
+    place |= {"translation": (world_matrix(metadata) @ origin).tolist()} if origin.any() else {}
     place |= {"rotation": list(turn)} if turn else {}
     place |= {"scale": [scale] * 3} if scale != 1 else {}
     steps = [f"turned from {metadata.up_axis.upper()} up" if turn else "", f"scaled by {scale:g}" if scale != 1 else ""]

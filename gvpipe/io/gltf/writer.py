@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.arrays import Array, Float32
-from gvpipe.atomic import atomic_path
+from gvpipe.atomic import unnamed_path
 from gvpipe.errors import InputError
 from gvpipe.io.gltf.attribute_writing import GltfAttribute
 from gvpipe.io.gltf.clips import FPS
@@ -65,7 +65,7 @@ def write_animated(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     glb = Glb()
     try:
         n_targets = _write_animation(glb, prepared)
-        with atomic_path(path) as temporary, open(temporary, "wb") as file:
+        with unnamed_path(path) as temporary, open(temporary, "wb") as file:
             try:
                 glb.write(file)
             except ValueError as exc:

@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -17,7 +16,8 @@ from gvpipe.arrays import Array, Float32, Float64, Floats
 from gvpipe.asset.attribute import MAX_COMPONENTS, Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.metadata import Metadata
-from gvpipe.errors import InputError
+from gvpipe.errors import InputError, TopologyChange
+from gvpipe.forks import ForkLock
 from gvpipe.io.mesh import FrameValues
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
@@ -62,7 +62,7 @@ class StepFrames:
     def __init__(self, steps: Steps, first: int, stop: int, path: Path) -> None:
         self._steps, self.start, self._path = steps, first, path
         self._n_frames = stop - first
-        self._lock = threading.Lock()  # HDF5 and netCDF files are read by one thread at a time
+        self._lock = ForkLock()  # HDF5 and netCDF files are read by one thread at a time
         self.first = self.guarded(0, lambda: steps.open(first))
         self._cells = self.guarded(0, self.first.cells)
         self._n_points = -1
@@ -125,12 +125,9 @@ class StepFrames:
             reason = " ".join(str(exc).split())[:200] or type(exc).__name__
             raise InputError(f"{self._path}: frame {frame} cannot be read: {reason}; export it again") from exc
 
-    def _changed(self, frame: int, what: str) -> InputError:
-        start, at = self.start, self.start + frame
-        return InputError(
-            f"{self._path}: the topology changes at frame {at} ({what}); read the frames before it or from it on alone "
-            f"(frames, --frames {start}:{at} or --frames {at}:)"
-        )
+    def _changed(self, frame: int, what: str) -> TopologyChange:
+        at = self.start + frame
+        return TopologyChange.at(f"{self._path}: the topology changes at frame {at} ({what})", at, self.start)
 
 
 class StepColumn:

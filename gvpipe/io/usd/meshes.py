@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Int64
-from gvpipe.errors import InputError
+from gvpipe.arrays import Array, Int64
+from gvpipe.errors import TopologyChange
+from gvpipe.io.scene_frames import first_frame_of
 from gvpipe.io.usd.materials import Materials
 
 HIDDEN_PURPOSES = ("guide", "proxy")
@@ -67,22 +68,27 @@ def find_meshes(stage: Any) -> Found:
     return Found(tuple(meshes), tuple(notes))
 
 
-def polygons_of(mesh: Any, time: float, where: str) -> tuple[Int64, Int64]:
+def polygons_of(mesh: Any, times: Array, where: str, start: int = 0) -> tuple[Int64, Int64]:
     """Return corners per polygon ``(P,)`` and the vertex of each corner.
 
+    Args:
+        mesh: the UsdGeom.Mesh.
+        times: time codes of the frames.
+        where: the file, for messages.
+        start: number of the first frame.
+
     Raises:
-        InputError: they change over time.
+        TopologyChange: they change in these frames.
     """
     result = []
     for attribute in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()):
-        first = _integers(attribute, time)
-        if attribute.ValueMightBeTimeVarying():
-            for number, moment in enumerate(attribute.GetTimeSamples()):
-                if not np.array_equal(_integers(attribute, moment), first):
-                    raise InputError(
-                        f"{where}: the topology of mesh {_path(mesh)} changes at frame {number} (time code {moment:g}); "
-                        "export it with constant topology"
-                    )
+        first = _integers(attribute, float(times[0]))
+        samples = attribute.GetTimeSamples() if attribute.ValueMightBeTimeVarying() else []
+        for moment in (each for each in samples if times[0] < each <= times[-1] + 1e-6):
+            if not np.array_equal(_integers(attribute, moment), first):
+                number = start + first_frame_of(moment, times)
+                what = f"the topology of mesh {_path(mesh)} changes at frame {number} (time code {moment:g})"
+                raise TopologyChange.at(f"{where}: {what}", number, start)
         result.append(first)
     return result[0], result[1]
 

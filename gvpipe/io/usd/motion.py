@@ -91,11 +91,15 @@ class UsdMotion:
         self._shapes = BlendShapes(self._query) if self._query and self._query.HasBlendShapes() else None
         self.moves = self._points.ValueMightBeTimeVarying() or bool(self._skeleton and self._skeleton.moves)
         self.moves = self.moves or any(part.TransformMightBeTimeVarying() for part in self._ancestors())
+        topology = (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr())
+        self._topology = [each for each in topology if each.ValueMightBeTimeVarying()]
         self.n_vertices = len(self._points.Get(start) or ())
 
     def samples(self) -> Iterable[float]:
-        """Times of all samples that move it."""
+        """Times of all samples that move it or change its polygons."""
         yield from self._points.GetTimeSamples()
+        for attribute in self._topology:
+            yield from attribute.GetTimeSamples()
         yield from self._skeleton.samples() if self._skeleton else ()
         for part in self._ancestors():
             yield from part.GetTimeSamples()

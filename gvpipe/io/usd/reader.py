@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gvpipe.arrays import Float64
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
 from gvpipe.io.options import ReadOptions
@@ -30,11 +31,11 @@ def read_usd(path: Path, options: ReadOptions) -> MeshSequence:
 
     Args:
         path: .usda, .usdc, .usd or .usdz; files that it refers to are read too.
-        options: `fps` samples the stage's range at that rate instead of once per time code.
+        options: `fps` samples the stage's range at that rate instead of once per time code; `frames` are those that are read.
 
     Raises:
         InputError: usd-core is missing, the file is damaged or refers to a file that is missing, it has no mesh, a
-            mesh's topology changes, a position is not finite.
+            mesh's topology changes in the frames that are read, a position is not finite.
     """
     stage = open_stage(path)
     with usd_errors(path):
@@ -56,8 +57,12 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
     motions = [motions[number] for number in kept]
     samples = (sample for motion in motions for sample in motion.samples())
     times, fps, time_notes = stage_times(stage, samples, options, where)
-    frames = SceneFrames(motions, times, where, "time code")
-    read = [_read_mesh(found.meshes[number], motion, materials, float(times[0]), where) for number, motion in
+    first, stop = options.span(len(times), where)
+    times = times[first:stop]
+    if float(times[0]) != start:  # meshes may have other vertices then
+        motions = [UsdMotion(found.meshes[number], skins, places, float(times[0])) for number in kept]
+    frames = SceneFrames(motions, times, where, "time code", first)
+    read = [_read_mesh(found.meshes[number], motion, materials, (times, where, first)) for number, motion in
             zip(kept, motions, strict=True)]  # fmt: skip
     meshes = [mesh for mesh, _ in read]
     joined = join(meshes, where)
@@ -85,12 +90,19 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
     )
 
 
-def _read_mesh(mesh: Any, motion: UsdMotion, materials: Materials, time: float, where: str) -> tuple[SceneMesh, list[str]]:
-    """One mesh with its layers, and the names of primvars that were left out."""
+def _read_mesh(
+    mesh: Any, motion: UsdMotion, materials: Materials, frames: tuple[Float64, str, int]
+) -> tuple[SceneMesh, list[str]]:
+    """One mesh with its layers, and the names of primvars that were left out.
+
+    Args:
+        mesh, motion, materials: what is read.
+        frames: their time codes, the file, and the number of the first.
+    """
     from pxr import UsdGeom
 
-    prim = mesh.GetPrim()
-    counts, corners = polygons_of(mesh, time, where)
+    prim, time = mesh.GetPrim(), float(frames[0][0])
+    counts, corners = polygons_of(mesh, *frames)
     groups, bound = groups_of(mesh, len(counts), materials)
     turn = motion.linear(time)
     whole = turn if turn.ndim == 2 else turn.mean(axis=0)

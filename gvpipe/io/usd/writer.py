@@ -15,7 +15,7 @@ import numpy as np
 
 from gvpipe import notes
 from gvpipe.arrays import Float32
-from gvpipe.atomic import atomic_path
+from gvpipe.atomic import atomic_path, unnamed_path
 from gvpipe.errors import InputError, OutputError
 from gvpipe.io.scene_export import ExportMesh, export_meshes, uncovered
 from gvpipe.io.scene_frames import one_line
@@ -233,7 +233,7 @@ def _write_images(sequence: MeshSequence, folder: Path) -> None:
     except OSError as exc:
         raise OutputError(f"cannot write {folder}: {exc.strerror}; choose another folder") from exc
     for name, image in zip(image_names(sequence), sequence.images, strict=True):
-        with atomic_path(folder / name) as temporary:
+        with unnamed_path(folder / name) as temporary:
             temporary.write_bytes(image.data)
 
 

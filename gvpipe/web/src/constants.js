@@ -5,6 +5,8 @@ export const DIRECTORY_SECTION = "asset";
 export const DIRECTORY_VERSION = 1;
 export const DIRECTORY_MOST = 65536;
 export const DIRECTORY_MAX_BYTES = 67108864;
+export const DIRECTORY_SURFACE = 2;
+export const DIRECTORY_OCTAHEDRAL = 3;
 
 // gvpipe.asset_coding.encoder
 export const ENCODER_ARRANGEMENT = "arrangement";
@@ -47,6 +49,8 @@ export const MP4_MAX_BOXES = 65536;
 // gvpipe.container.segments
 export const SEGMENTS_TINY = 1e-60;
 export const SEGMENTS_HUGE = 1e+39;
+export const SEGMENTS_LARGEST_STEP = 6.80564733841877e+38;
+export const SEGMENTS_MAX_SEGMENT = 100000;
 
 // gvpipe.corrections.displacements
 export const DISPLACEMENTS_MAX_POSITIONS = 1048576;
@@ -55,8 +59,15 @@ export const DISPLACEMENTS_NEAR = 3;
 // gvpipe.entropy.block_coder
 export const BLOCK_CODER_PARAMETRIC = 1;
 
+// gvpipe.entropy.decision_kernels
+export const DECISION_KERNELS_ONE_BITS = 22;
+
 // gvpipe.entropy.integers
 export const INTEGERS_MAX_CONTEXTS = 65536;
+
+// gvpipe.entropy.logistic_tables
+export const LOGISTIC_TABLES_LIMIT = 2815;
+export const LOGISTIC_TABLES_SPACING = 16;
 
 // gvpipe.entropy.parametric_tables
 export const PARAMETRIC_TABLES_N_TOKENS = 40;
@@ -80,8 +91,39 @@ export const TOKENS_CHUNK = 16;
 // gvpipe.errors
 export const ERRORS_REMEDY = "get the file again from its source";
 
+// gvpipe.fields.derived
+export const DERIVED_MAGNITUDE = 1;
+export const DERIVED_SIGNALS = [6, 1];
+
+// gvpipe.fields.head
+export const HEAD_MAX_VALUES = 16777216;
+export const HEAD_VERSION = 1;
+
+// gvpipe.fields.prediction_kernels
+export const PREDICTION_KERNELS_STEPS = 0;
+export const PREDICTION_KERNELS_WHOLE = 1;
+export const PREDICTION_KERNELS_FLOATS = 2;
+
+// gvpipe.fields.residual_kernels
+export const RESIDUAL_KERNELS_N_CONTEXTS = 7;
+export const RESIDUAL_KERNELS_N_FINE = 64;
+export const RESIDUAL_KERNELS_N_COARSE = 16;
+export const RESIDUAL_KERNELS_NODES = 256;
+export const RESIDUAL_KERNELS_N_MIXERS = 64;
+
+// gvpipe.fields.segment
+export const SEGMENT_EXACT = 0;
+export const SEGMENT_TRAJECTORIES = 2;
+export const SEGMENT_DERIVED = 3;
+
+// gvpipe.fields.values
+export const VALUES_MAX_COMPONENTS = 256;
+
 // gvpipe.media.video
 export const VIDEO_MAX_SIDE = 16384;
+
+// gvpipe.mesh.hierarchy
+export const HIERARCHY_MAX_WAVES = 64;
 
 // gvpipe.rasterizer.colormaps
 export const COLORMAPS_MAGMA = "\n000004 030311 0a0822 130d33 1d1146 28115a 36106a 430f76 50127c 5d177f 691c81 762181 822681 8f2a81 9c2e7f a9327d b63779 c33b75\ncf4170 db486a e65163 ee5c5e f5695c f9785d fb8761 fd9668 fea571 feb47b fec387 fed194 fde0a2 fceeb0 fcfdbf\n";
@@ -117,6 +159,13 @@ export const CONTEXTS_N_NEAR = 6;
 
 // gvpipe.trajectory.prediction_kernels
 export const PREDICTION_KERNELS_DOUBT = 0.0001;
+
+// gvpipe.trajectory.spatial_neighbours
+export const SPATIAL_NEIGHBOURS_OVERSHOOT = 0.2;
+export const SPATIAL_NEIGHBOURS_RING_VARIANCE = 0.3;
+export const SPATIAL_NEIGHBOURS_FAR_VARIANCE = 0.1;
+export const SPATIAL_NEIGHBOURS_SURE = 512;
+export const SPATIAL_NEIGHBOURS_LEAST = 0.05;
 
 // gvpipe.trajectory.temporal_neighbours
 export const TEMPORAL_NEIGHBOURS_MAX_NEIGHBOURS = 6;

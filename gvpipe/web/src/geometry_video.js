@@ -37,11 +37,14 @@ export class GeometryVideo {
       const repeated = readRepeatedFrames(payload);
       const reader = await McgvReader.open(repeated.distinctPayload(payload));
       const { fps } = payload.header;
-      pictures = reader.samples
-        ? await openPictures(file, fps, repeated, reader.pictureSize, reader.samples)
-        : await DecodedPictures.without(fps, repeated, reader.zeroLevels);
+      const open = () =>
+        reader.samples
+          ? openPictures(file, fps, repeated, reader.pictureSize, reader.samples)
+          : DecodedPictures.without(fps, repeated, reader.zeroLevels);
+      pictures = await open();
       const video = new GeometryVideo(payload.header, file.length, repeated, reader, pictures);
-      video.#takeAsset(await readAsset(payload, video));
+      video.#openBeside = open;
+      video.#takeAsset(await readAsset(payload, video, (k) => video.#positionsBeside(k)));
       return video;
     } catch (error) {
       pictures?.close();
@@ -54,6 +57,10 @@ export class GeometryVideo {
   #reader;
   #pictures;
   #queue = Promise.resolve();
+  #openBeside; // opens pictures of their own for fields that follow from positions
+  #beside = null; // a promise of them
+  #queueBeside = Promise.resolve();
+  #closeAsset;
 
   constructor(header, byteLength, repeated, reader, pictures) {
     this.frameCount = header.frames;
@@ -126,6 +133,8 @@ export class GeometryVideo {
   /** Free the video; the object is of no use afterwards. */
   close() {
     this.#pictures.close();
+    this.#beside?.then((pictures) => pictures.close()).catch(() => {});
+    this.#closeAsset();
   }
 
   #takeAsset(asset) {
@@ -134,7 +143,7 @@ export class GeometryVideo {
     this.parts = asset.parts;
     /** `Map` by name of `{domain, kind, components, unit, values (N, C), indices (rows) or null, fullScale}`. */
     this.attributes = asset.attributes;
-    /** `Map` by name of `WebField`s: `frame(k)` is a promise of `Float32Array` (R, C). */
+    /** `Map` by name of `CodedField`s and `WebField`s: `frame(k)` is a promise of an array (R, C) of the field's `type`. */
     this.fields = asset.fields;
     this.materials = asset.materials;
     /** `{name, mediaType, data}` */
@@ -144,6 +153,21 @@ export class GeometryVideo {
     this.metadata = asset.metadata;
     /** What of the file is not read, a line each. */
     this.notes = asset.notes;
+    this.#closeAsset = asset.close;
+  }
+
+  /** The positions of frame k by pictures of their own, so that what plays goes on. */
+  #positionsBeside(k) {
+    this.#beside ??= this.#openBeside();
+    const result = this.#queueBeside.then(async () => {
+      const pictures = await this.#beside;
+      await pictures.seek(k);
+      const positions = new Float32Array(3 * this.vertexCount);
+      this.#reader.rebuild(this.#repeated.distinctOf(k), pictures.levels(), positions);
+      return positions;
+    });
+    this.#queueBeside = result.catch(() => {});
+    return result;
   }
 
   #read(k, positions) {

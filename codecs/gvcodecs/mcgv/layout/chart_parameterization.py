@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from gvcodecs.mcgv.layout.xatlas_process import run_xatlas
 from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.mesh.topology import adjacency
 
-MAX_COST = 8.0  # xatlas' limit for growing a chart (its default is 2): fewer, larger charts cost fewer blocks
 SMALL_CHART = 12  # points; a chart below dissolves into a neighbour
 UNASSIGNED = 0xFFFFFFFF
 
@@ -67,10 +67,7 @@ def parameterize(base: Float64, faces: Int32, clusters: Int32) -> Atlas:
 
 def _xatlas(unit: Float64, faces: Int32, clusters: Int32, n_clusters: int) -> tuple[Int64, Float64]:
     """Return ``(P,)`` charts, -1 where there is none, and ``(P, 2)`` places."""
-    import xatlas
-
-    atlas = xatlas.Atlas()
-    sources = []
+    sources, meshes = [], []
     corners = unit[faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     solid = faces[area > 0]
@@ -78,20 +75,14 @@ def _xatlas(unit: Float64, faces: Int32, clusters: Int32, n_clusters: int) -> tu
         touching = solid[(clusters[solid] == k).any(axis=1)]
         if len(touching):
             points, indices = np.unique(touching, return_inverse=True)
-            atlas.add_mesh(unit[points].astype(np.float32), indices.reshape(-1, 3).astype(np.uint32))
+            meshes.append((unit[points].astype(np.float32), indices.reshape(-1, 3).astype(np.uint32)))
             sources.append((k, points))
     chart, uv = np.full(len(unit), -1, np.int64), np.zeros((len(unit), 2))
     if not sources:
         return chart, uv
-    options, packing = xatlas.ChartOptions(), xatlas.PackOptions()
-    options.max_cost = MAX_COST
-    packing.texels_per_unit = 64.0  # only a scale here: charts are packed into blocks by `packing`
-    packing.rotate_charts = False
-    atlas.generate(options, packing)
     first = 0
-    for mesh, (k, points) in enumerate(sources):
-        vertex, indices, places = atlas.get_mesh(mesh)
-        own = np.asarray(atlas.get_mesh_vertex_assignment(mesh)[1], np.int64)
+    for (k, points), (vertex, indices, places, own) in zip(sources, run_xatlas(meshes), strict=True):
+        own = np.asarray(own, np.int64)
         point = points[np.asarray(vertex, np.int64)]
         own = np.where(own == UNASSIGNED, -1, own)
         corner = own[np.asarray(indices, np.int64).reshape(-1, 3)[:, 0]]
@@ -101,7 +92,7 @@ def _xatlas(unit: Float64, faces: Int32, clusters: Int32, n_clusters: int) -> tu
         order = np.flatnonzero(usable)
         order = order[np.argsort(n_triangles[own[order]], kind="stable")]
         chart[point[order]] = first + own[order]
-        uv[point[order]] = np.asarray(places, np.float64)[order] * (atlas.width, atlas.height) / atlas.texels_per_unit
+        uv[point[order]] = places[order]
         first += int(own.max()) + 1
     return chart, uv
 

@@ -76,10 +76,13 @@ class AffinePredictor:
 
     def predict(self, transforms: Float64) -> Float64:
         """Equation 3: ``(n, V, 3)`` predicted positions for ``transforms (n, K, 4, 3)``, model units."""
+        from gvpipe.trajectory.product_kernels import weighted_sums
+
         n = len(transforms)
         planes = np.empty((3 * n, len(self._order)))  # vertices cluster after cluster
         for k, part in enumerate(self._slices):
-            np.matmul(transforms[:, k].swapaxes(1, 2).reshape(3 * n, 4), self._columns[:, part], out=planes[:, part])
+            rows = transforms[:, k].swapaxes(1, 2).reshape(3 * n, 4)
+            planes[:, part] = weighted_sums(rows, np.ascontiguousarray(self._columns[:, part]))
         return np.asarray(planes.reshape(n, 3, -1).swapaxes(1, 2)[:, self._rank])
 
     def squared_errors(self, frames: Float64, transforms: Float64) -> Float64:

@@ -19,6 +19,7 @@ from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
 from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.trajectory.sparse_rows import multiply
 
 BYTES_PER_POINT, SECONDS_PER_POINT = 400, 1e-6
 CHUNK = 16  # frames whose transforms are made at a time
@@ -45,7 +46,7 @@ def code_blended(start: Start, fitted: Fitted, report: Progress) -> CodedMotion:
 
     def predict(first: int, stop: int) -> Float64:
         s = locate(bounds, first)
-        moved = fit.matrix @ segments[s].rows(first - bounds[s], stop - bounds[s])  # (P, 3n)
+        moved = multiply(fit.matrix, segments[s].rows(first - bounds[s], stop - bounds[s]))  # (P, 3n)
         return np.asarray(base + moved.reshape(len(moved), stop - first, 3).swapaxes(0, 1))
 
     return CodedMotion(fitted.n_clusters, start.step, coded, predict)

@@ -22,6 +22,7 @@ import numpy as np
 from scipy import sparse
 
 from gvpipe.arrays import Float64, Int32
+from gvpipe.trajectory.sparse_rows import multiply
 
 INFLUENCES = 4  # most clusters that a point follows
 TOTAL = 64  # weights are integers that add up to this
@@ -58,13 +59,14 @@ class Blend:
         outer = self.homogeneous[:, :, None] * self.homogeneous[:, None, :]
         rows, columns = weights.clusters.ravel(), np.repeat(np.arange(len(base)), parts.shape[1])
         squares = sparse.csr_array((np.square(parts).ravel(), (rows, columns)), shape=(n_clusters, len(base)))
-        energy = (squares @ outer.reshape(-1, 16)).reshape(n_clusters, 4, 4)
+        energy = multiply(squares, outer.reshape(-1, 16)).reshape(n_clusters, 4, 4)
         self._inverse = _whiten(energy)  # (K, 4, 4)
 
     def matrix(self) -> sparse.csr_array:
         """B in coordinates of equal weight: ``(P, 4K)``."""
         n_points = len(self.homogeneous)
-        local = np.einsum("pjrc,pc->pjr", self._inverse[self.weights.clusters], self.homogeneous)  # (P, 4, 4)
+        inverse = self._inverse[self.weights.clusters]  # (P, 4, 4, 4)
+        local = sum(inverse[..., c] * self.homogeneous[:, None, None, c] for c in range(4))  # (P, 4, 4)
         values = (self.weights.weights / TOTAL)[:, :, None] * local
         columns = 4 * self.weights.clusters[:, :, None] + np.arange(4)
         rows = np.broadcast_to(np.arange(n_points)[:, None, None], values.shape)
@@ -73,7 +75,8 @@ class Blend:
 
     def transforms(self, rows: Float64) -> Float64:
         """``(K, 4, m)`` transforms in model units for ``rows (4K, m)`` of equal weight."""
-        return np.asarray(self._inverse.swapaxes(1, 2) @ rows.reshape(self.n_clusters, 4, -1))
+        blocks = rows.reshape(self.n_clusters, 4, -1)
+        return np.asarray(sum(self._inverse[:, i, :, None] * blocks[:, i, None] for i in range(4)))
 
 
 class BlendFit:
@@ -111,7 +114,16 @@ def solve_normal(normal: Float64, right: Float64) -> Float64:
 def _whiten(energy: Float64) -> Float64:
     """Inverse Cholesky factors ``(K, 4, 4)`` of clusters' energies ``(K, 4, 4)``."""
     trace = np.trace(energy, axis1=1, axis2=2)
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(energy + (FLAT * trace + LEAST_ENERGY)[:, None, None] * np.eye(4))))
+    raised = energy + (FLAT * trace + LEAST_ENERGY)[:, None, None] * np.eye(4)
+    factor, inverse = np.zeros_like(energy), np.zeros_like(energy)
+    for i in range(4):  # term by term: a library's order of sums depends on the machine
+        for j in range(i + 1):
+            left = raised[:, i, j] - sum(factor[:, i, k] * factor[:, j, k] for k in range(j))
+            factor[:, i, j] = np.sqrt(left) if i == j else left / factor[:, j, j]
+        for j in range(i + 1):
+            left = (i == j) - sum(factor[:, i, k] * inverse[:, k, j] for k in range(j, i))
+            inverse[:, i, j] = left / factor[:, i, i]
+    return inverse
 
 
 def homogeneous(base: Float64) -> Float64:

@@ -44,8 +44,11 @@ class Trajectories:
 
     def rows(self, start: int, stop: int) -> Float64:
         """``(4K, 3 (stop - start))`` rows of the segment's frames ``start`` to ``stop``, frame by frame, x y z."""
+        from gvpipe.trajectory.product_kernels import weighted_sums
+
         span = slice(3 * start, 3 * stop)
-        return np.asarray(self.coefficients @ self.basis.vectors[span].T + self.basis.mean[span])
+        sums = weighted_sums(self.coefficients, np.ascontiguousarray(self.basis.vectors[span].T))
+        return np.asarray(sums + self.basis.mean[span])
 
 
 def encode_trajectories(rows: Float64, step: float) -> tuple[bytes, Trajectories]:

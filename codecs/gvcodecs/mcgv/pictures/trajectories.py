@@ -36,6 +36,7 @@ from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import InputError
 from gvpipe.trajectory.basis import Basis, decode_basis, reduce_trajectories
+from gvpipe.trajectory.sparse_rows import multiply
 
 PLANES = 3  # to a picture
 MAX_OUTLIER = 1 << 38  # steps
@@ -73,7 +74,7 @@ def encode_segment(trajectories: Float64, fit: BlendFit, largest: float, error: 
     reduced = reduce_trajectories(trajectories, error)
     step, head, coefficients = reduced.step, reduced.basis, reduced.coefficients
     rows, transforms = encode_coefficients(fit.fit(coefficients), step)
-    left = (coefficients - fit.matrix @ transforms) / step
+    left = (coefficients - multiply(fit.matrix, transforms)) / step
     section = pack_block(head) + pack_block(rows) + _encode_outliers(left, largest)
     return CodedSegment(step, section, np.ascontiguousarray(left.T))
 
@@ -109,7 +110,7 @@ def decode_segment(
     transforms = decode_coefficients(rows, matrix.shape[1] // 4, n_components, step, cursor.name)
     _decode_outliers(cursor, samples)
     samples *= step
-    samples += np.ascontiguousarray((matrix @ transforms).T)[:, point]
+    samples += np.ascontiguousarray(multiply(matrix, transforms).T)[:, point]
     return basis, samples
 
 

@@ -7,6 +7,8 @@ import {
   DIRECTORY_MAX_BYTES as MAX_BYTES,
   DIRECTORY_MOST as MAX_ITEMS,
   DIRECTORY_SECTION as SECTION,
+  DIRECTORY_SURFACE as SURFACE,
+  DIRECTORY_OCTAHEDRAL as OCTAHEDRAL,
   DIRECTORY_VERSION as VERSION,
   ENCODER_ARRANGEMENT as ARRANGEMENT,
   ENCODER_CODED as CODED,
@@ -17,6 +19,10 @@ import { Surface } from "../attributes/surface.js";
 import { decodeArrangement } from "../attributes/triangle_order.js";
 import { corrupt } from "../format/errors.js";
 import { inflate } from "../format/inflate.js";
+import { CodedField } from "../fields/coded_field.js";
+import { FieldHost } from "../fields/field_host.js";
+import { TYPES } from "../fields/head.js";
+import code from "../wasm/kernels.wasm";
 import { AssetEntry } from "./asset_entry.js";
 import { readImages, readMaterials } from "./materials.js";
 import { WebField, findParents } from "./web_field.js";
@@ -39,15 +45,17 @@ export const NO_ASSET = {
   polygons: null,
   metadata: {},
   notes: [],
+  close() {},
 };
 
 /**
  * @param {import("../format/payload.js").Payload} payload
  * @param {import("../geometry_video.js").GeometryVideo} video of its positions
+ * @param {(frame: number) => Promise<Float32Array>} positions of any frame, beside what the video shows
  * @returns {Promise<typeof NO_ASSET>} `indices` are the triangles in the asset's order
  * @throws {GeometryVideoError} a member or a section is not as gvpipe writes it
  */
-export async function readAsset(payload, video) {
+export async function readAsset(payload, video, positions) {
   if (!payload.sections.has(SECTION)) return NO_ASSET;
   const list = new AssetEntry(await readJson(payload.section(SECTION)), "the list");
   if (list.integer("version", undefined, 1, 2 ** 31) > VERSION) {
@@ -57,11 +65,17 @@ export async function readAsset(payload, video) {
   const materials = readMaterials(list.list("materials", MAX_ITEMS), images.length);
   const notes = [];
   const { parts, indices, polygons } = readParts(list, payload, video, materials.length);
-  const positions = list.flag("geometry", false) ? await video.frame(0) : null;
-  const attributes = readAttributes(list, payload, new Surface(indices, video.vertexCount, positions, parts.length), notes);
-  const fields = readFields(list, payload, video, notes);
+  const first = list.flag("geometry", false) ? await video.frame(0) : null;
+  const attributes = readAttributes(list, payload, new Surface(indices, video.vertexCount, first, parts.length), notes);
+  const host = new FieldHost(code, Int32Array.from(indices), video.vertexCount, positions);
+  const fields = readFields(list, payload, { ...sizes(video), indices, host }, notes);
   const metadata = list.given.metadata ?? {};
-  return { indices, parts, attributes, fields, materials, images, polygons, metadata, notes };
+  const close = () => host.close();
+  return { indices, parts, attributes, fields, materials, images, polygons, metadata, notes, close };
+}
+
+function sizes({ frameCount, vertexCount, triangleCount }) {
+  return { frameCount, vertexCount, triangleCount };
 }
 
 async function readJson(data) {
@@ -120,37 +134,53 @@ function readAttributes(list, payload, surface, notes) {
   return attributes;
 }
 
-function readFields(list, payload, { frameCount, vertexCount, triangleCount, indices }, notes) {
+function readFields(list, payload, { frameCount, vertexCount, triangleCount, indices, host }, notes) {
   const fields = new Map();
+  const names = new Set();
   const parents = {}; // by domain
+  const hasKernels = WebAssembly.validate(code);
   for (const given of list.list("fields", MAX_ITEMS)) {
     const entry = new AssetEntry(given, "a field");
     const name = entry.text("name");
     const domain = entry.word("domain", ["vertex", "triangle"]);
-    const dtype = entry.text("dtype");
     const coding = entry.integer("coding", undefined, 0, MAX_ITEMS);
-    if (fields.has(name)) throw corrupt(SECTION, `there are two fields ${name}`);
-    if (given.kind === "normal") {
-      notes.push(`field ${name} is not used: light falls on normals computed from the surface`);
+    if (names.has(name)) throw corrupt(SECTION, `there are two fields ${name}`);
+    names.add(name);
+    const problem = obstacle(coding, given, hasKernels);
+    if (problem) {
+      notes.push(`field ${name} is not shown: ${problem}`);
       continue;
     }
-    if (coding !== WEB_CODING) {
-      notes.push(`field ${name} is not shown: gvpipe export-html makes a page that shows it`);
-      continue;
-    }
+    const type = coding === WEB_CODING ? "float32" : entry.word("dtype", TYPES);
     const checked = {
       name,
       domain,
+      type,
       kind: entry.word("kind", KINDS),
       components: entry.integer("components", undefined, 0, MAX_COMPONENTS),
       unit: entry.text("unit", ""),
       bound: entry.number("bound", 0, 0, HUGE),
       range: given.range == null ? null : entry.numbers("range", 2, undefined, -HUGE, HUGE),
       section: entry.text("section"),
-      fullScale: FULL_SCALES[dtype] ?? 1,
+      fullScale: FULL_SCALES[entry.text("dtype")] ?? 1,
     };
-    parents[domain] ??= domain === "vertex" ? findParents(vertexCount, indices) : findParents(triangleCount, []);
-    fields.set(name, new WebField(checked, payload.section(checked.section), frameCount, parents[domain]));
+    const data = payload.section(checked.section);
+    if (coding === WEB_CODING) {
+      parents[domain] ??= domain === "vertex" ? findParents(vertexCount, indices) : findParents(triangleCount, []);
+      fields.set(name, new WebField(checked, data, frameCount, parents[domain]));
+    } else {
+      const rows = domain === "vertex" ? vertexCount : triangleCount;
+      fields.set(name, new CodedField(checked, coding === OCTAHEDRAL, data, frameCount, rows, host));
+    }
   }
   return fields;
+}
+
+/** Why a field cannot be read; "" if it can. */
+function obstacle(coding, { kind, components }, hasKernels) {
+  if (coding === WEB_CODING) return "";
+  if (coding === SURFACE) return "it follows from the surface, as the player's own normals do";
+  const isKnown = coding === CODED || (coding === OCTAHEDRAL && kind === "normal" && components === 3);
+  if (!isKnown) return "a newer gvpipe wrote it";
+  return hasKernels ? "" : "this browser has no WebAssembly with SIMD; a newer one is needed";
 }

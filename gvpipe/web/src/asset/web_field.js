@@ -32,6 +32,7 @@ export class WebField {
     this.name = entry.name;
     this.kind = entry.kind;
     this.domain = entry.domain;
+    this.type = entry.type;
     this.unit = entry.unit;
     this.components = entry.components || 1;
     this.frameCount = frames;

@@ -11,32 +11,36 @@ import { temporalOrder } from "./temporal_neighbours.js";
 import { decodeIntegers } from "./integers.js";
 import { MAX_VALUES, decodeVectors } from "./coefficient_coding.js";
 
+/** 2 ** (i / PER_OCTAVE), rounded correctly: browsers' own powers need not be. */
+const ROOTS = [1, 1.0905077326652577, 1.189207115002721, 1.2968395546510096, 1.4142135623730951, 1.5422108254079407, 1.681792830507429, 1.8340080864093424];
+
 /**
  * @typedef {object} Basis
  * @property {number} components R
- * @property {Float64Array} columns (3F, 1 + R) flat: the mean trajectory, then the principal ones
+ * @property {Float64Array} columns (A F, 1 + R) flat: the mean trajectory, then the principal ones
  *
  * @param {Uint8Array} data
  * @param {number} frames of the segment @param {number} points whose trajectories these are
  * @param {number} step quantisation step, model units
  * @param {string} name of the section, for messages
+ * @param {number} axes A, coordinates of a frame
  * @returns {Basis}
  */
-export function decodeBasis(data, frames, points, step, name) {
+export function decodeBasis(data, frames, points, step, name, axes = 3) {
   const cursor = new Cursor(data, name);
-  const components = cursor.varint(Math.min(MAX_COMPONENTS, 3 * frames), "the number of components");
+  const components = cursor.varint(Math.min(MAX_COMPONENTS, axes * frames), "the number of components");
   const levels = decodeIntegers(cursor.take(cursor.varint(cursor.left, "a length")), components, null, name);
   const scales = [Math.sqrt(points)];
   let level = 0;
   for (const difference of levels) {
     level += difference;
     if (Math.abs(level) > MAX_SCALE) throw cursor.corrupt("a scale is out of range");
-    scales.push(step * 2 ** (level / PER_OCTAVE));
+    scales.push(step * 2 ** Math.floor(level / PER_OCTAVE) * ROOTS[level & (PER_OCTAVE - 1)]);
   }
   const width = components + 1;
-  if (3 * frames * width > MAX_VALUES) throw cursor.corrupt(`${components} components over ${frames} frames`);
-  const coarse = step / Math.sqrt(Math.max(LEAST_OUTSIDE, 1 - width / (3 * frames)));
-  const columns = decodeVectors(cursor.rest(), width, coarse, temporalOrder(frames), name);
+  if (axes * frames * width > MAX_VALUES) throw cursor.corrupt(`${components} components over ${frames} frames`);
+  const coarse = step / Math.sqrt(Math.max(LEAST_OUTSIDE, 1 - width / (axes * frames)));
+  const columns = decodeVectors(cursor.rest(), width, coarse, temporalOrder(frames, axes), name);
   for (let i = 0; i < columns.length; i++) columns[i] /= scales[i % width];
   return { components, columns };
 }

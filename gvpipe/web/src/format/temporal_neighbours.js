@@ -14,17 +14,20 @@ import {
 
 const BEFORE = new Map([[-1, 1]]);
 
-/** @param {number} frames @returns {import("./prediction.js").CausalOrder} of 3 F vectors; vector 3 f + a is axis a of frame f */
-export function temporalOrder(frames) {
+/**
+ * @param {number} frames F @param {number} axes A: three of positions
+ * @returns {import("./prediction.js").CausalOrder} of A F vectors; vector A f + a is axis a of frame f
+ */
+export function temporalOrder(frames, axes) {
   const causal = { order: [], starts: [0], neighbours: [], weights: [], variances: [], ringSizes: [], blocks: [0] };
   const isDone = new Uint8Array(frames);
   const add = (frame, step) => {
     const offsets = OFFSETS.filter((o) => isDone[frame + o * step]).slice(0, MAX_NEIGHBOURS);
     const prior = [CUBIC, LINEAR, BEFORE].find((p) => [...p.keys()].every((o) => offsets.includes(o)));
-    for (let axis = 0; axis < 3; axis++) {
-      causal.order.push(3 * frame + axis);
+    for (let axis = 0; axis < axes; axis++) {
+      causal.order.push(axes * frame + axis);
       for (const o of offsets) {
-        causal.neighbours.push(3 * (frame + o * step) + axis);
+        causal.neighbours.push(axes * (frame + o * step) + axis);
         causal.weights.push(prior?.get(o) ?? 0);
         causal.variances.push(VARIANCE);
       }

@@ -42,8 +42,9 @@ export class Panel {
   /** @param {import("../geometry_video.js").GeometryVideo} video @param {string[]} parts their names, each once */
   setVideo(video, parts) {
     const plain = video.materials.length ? "material" : "surface";
-    this.fields.replaceChildren(new Option(plain, ""), ...[...video.fields.keys()].map((name) => new Option(labelOf(video, name), name)));
-    this.fields.parentElement.hidden = !video.fields.size;
+    const shown = [...video.fields.keys()].filter((name) => video.fields.get(name).kind !== "normal"); // they have one length
+    this.fields.replaceChildren(new Option(plain, ""), ...shown.map((name) => new Option(labelOf(video, name), name)));
+    this.fields.parentElement.hidden = !shown.length;
     this.names = parts;
     this.hidden = new Set();
     this.parts.hidden = parts.length < 2;

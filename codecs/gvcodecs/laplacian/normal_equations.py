@@ -1,0 +1,127 @@
+"""Least squares with a sparse operator: the normal equations, factored as L D L^T.
+
+The order of elimination follows from the triangles in integers (`elimination_kernels`), and with it the size of the factor. On
+surfaces it grows as P log P entries, and the work as P sqrt(P): 70 entries and 4200 products a point for 10,000 points, 130 and
+22,000 for 100,000. On triangles that connect points at random it grows as P^2 and P^3. So work is limited before it begins.
+
+Factors are plain arrays, sums run in one order (`factor_kernels`): the solution has the same bits on every machine.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from gvpipe.arrays import Float64, Int32, Int64
+from gvpipe.errors import FormatError
+from gvpipe.trajectory.sparse_rows import as_rows
+
+if TYPE_CHECKING:
+    from scipy import sparse
+
+    from gvcodecs.laplacian.factor_kernels import Factors
+    from gvpipe.trajectory.product_kernels import Rows
+
+COLUMNS = 32  # solved at once: more do not fit the cache
+FREE_PRODUCTS = 1 << 27  # that any system may take
+PRODUCTS = 512  # that P points may take beside, times P sqrt(P): 7 times what a square grid of 100,000 points needs
+NO_LIMIT = 1 << 62
+
+
+class Fill(NamedTuple):
+    """What a factor costs.
+
+    Args:
+        entries: below the diagonal, of 12 bytes each.
+        products: of two entries, that factoring takes.
+    """
+
+    entries: int
+    products: int
+
+
+class TooMuchFill(FormatError):
+    """A factor would take more products than its number of points allows."""
+
+
+class Singular(ArithmeticError):
+    """The normal equations have no single solution."""
+
+
+def most_products(n_points: int) -> int:
+    """How many products a factor over P points may take."""
+    return FREE_PRODUCTS + PRODUCTS * n_points * math.isqrt(n_points)
+
+
+def count_fill(operator: sparse.csr_array, limit: int) -> Fill:
+    """What factoring the normal equations of ``operator (P, P)`` costs; what was counted so far, if products pass the limit."""
+    from gvcodecs.laplacian.operator_kernels import transpose
+
+    rows = as_rows(operator)
+    return _eliminate(rows, transpose(rows), limit)[2]
+
+
+class NormalEquations:
+    """The factored system ``L^T L + diag(held)``.
+
+    Args:
+        operator: ``(P, P)`` L, by rows, columns ascending.
+        held: ``(P,)`` added to the diagonal.
+
+    Raises:
+        TooMuchFill: the factor takes more than `most_products`.
+        Singular: an unknown is held by nothing.
+    """
+
+    def __init__(self, operator: sparse.csr_array, held: Float64) -> None:
+        from gvcodecs.laplacian.factor_kernels import factor_pattern, factorise
+        from gvcodecs.laplacian.operator_kernels import normal_matrix, transpose
+
+        self._rows = as_rows(operator)
+        transposed = transpose(self._rows)
+        self._order, columns, self.fill = _eliminate(self._rows, transposed, most_products(len(held)))
+        if self.fill.products > most_products(len(held)):
+            limit = f"{len(held)} points may take {most_products(len(held))} products"
+            raise TooMuchFill(f"its triangles couple points at random: factoring takes too long, {limit}; encode it as pca")
+        matrix = normal_matrix(self._rows, transposed, held, self._order, len(columns) // 2)
+        pattern = factor_pattern(matrix.starts, matrix.rows, self.fill.entries)
+        factors, at = factorise(matrix, *pattern)
+        if at >= 0:
+            raise Singular(f"no equation holds point {self._order[at]}")
+        self._factors: Factors = factors
+
+    def multiply(self, vectors: Float64) -> Float64:
+        """The operator times ``vectors (P, R)``."""
+        from gvpipe.trajectory.product_kernels import multiply
+
+        return multiply(self._rows, np.ascontiguousarray(vectors))
+
+    def multiply_transposed(self, points: Int32, vectors: Float64) -> Float64:
+        """The operator's transpose times vectors that are zero but at ``points (D,)``: ``(D, R)`` to ``(P, R)``."""
+        from gvcodecs.laplacian.operator_kernels import multiply_transposed
+
+        return multiply_transposed(self._rows, points, np.ascontiguousarray(vectors))
+
+    def solve(self, right: Float64) -> Float64:
+        """Solutions ``(P, R)`` for right-hand sides ``(P, R)``."""
+        from gvcodecs.laplacian.factor_kernels import solve_in_place
+
+        solved = np.empty_like(right)
+        for first in range(0, right.shape[1], COLUMNS):
+            part = right[self._order, first : first + COLUMNS]
+            solve_in_place(self._factors, part)
+            solved[self._order, first : first + COLUMNS] = part
+        return solved
+
+
+def _eliminate(rows: Rows, transposed: Rows, limit: int) -> tuple[Int32, Int32, Fill]:
+    """Order of elimination ``(P,)``, the normal matrix' columns beside its diagonal, and the factor's cost."""
+    from gvcodecs.laplacian.elimination_kernels import order_unknowns
+    from gvcodecs.laplacian.operator_kernels import normal_pattern
+
+    starts: Int64
+    starts, columns = normal_pattern(rows, transposed)
+    order, entries, products = order_unknowns(starts, columns, limit)
+    return order, columns, Fill(entries, products)

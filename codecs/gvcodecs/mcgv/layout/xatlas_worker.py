@@ -1,0 +1,64 @@
+"""The process that runs xatlas: meshes come in, their charts go out, as pickles.
+
+It ends without xatlas's destructor, which can wait for its own threads for ever (`xatlas_process` says more). It is run as a
+file and imports NumPy and xatlas alone, so that it starts in a tenth of a second of processor time.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import sys
+import traceback
+from typing import Any
+
+MAX_COST = 8.0  # xatlas' limit for growing a chart (its default is 2): fewer, larger charts cost fewer blocks
+TEXELS_PER_UNIT = 64.0  # only a scale here: charts are packed into blocks by `packing`
+
+Mesh = tuple[Any, Any]  # positions (n, 3) float32, triangles (m, 3) uint32
+Charts = tuple[Any, Any, Any, Any]  # of one mesh, see `make_charts`
+_atlases: list[Any] = []  # they stay until the process ends, so that none is destroyed
+
+
+def main() -> None:
+    """Answer one request."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # nothing but the answer may reach it
+    pickle.dump(make_charts(pickle.load(sys.stdin.buffer)), answers, protocol=5)
+    answers.flush()
+
+
+def make_charts(meshes: list[Mesh]) -> list[Charts]:
+    """Charts of meshes; none crosses from one mesh to another.
+
+    Returns for each mesh: the vertex ``(k,)`` of each place, triangles ``(t, 3)`` of places, the places ``(k, 2) float64`` in
+    the mesh's unit, and the chart ``(k,) uint32`` of each place, numbered over all meshes.
+    """
+    import xatlas
+
+    atlas = xatlas.Atlas()
+    _atlases.append(atlas)
+    for positions, triangles in meshes:
+        atlas.add_mesh(positions, triangles)
+    options, packing = xatlas.ChartOptions(), xatlas.PackOptions()
+    options.max_cost = MAX_COST
+    packing.texels_per_unit = TEXELS_PER_UNIT
+    packing.rotate_charts = False
+    atlas.generate(options, packing)
+    size = (atlas.width, atlas.height)
+    charts = []
+    for number in range(len(meshes)):
+        vertex, triangles, places = atlas.get_mesh(number)
+        places = places.astype("f8") * size / atlas.texels_per_unit
+        charts.append((vertex, triangles, places, atlas.get_mesh_vertex_assignment(number)[1]))
+    return charts
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except BaseException:
+        traceback.print_exc()
+        sys.stderr.flush()
+        os._exit(1)
+    os._exit(0)

@@ -1,0 +1,109 @@
+// Reads geometry videos with the web player's bundle: a file's path on each line of standard input, a line of JSON for each.
+//
+//     node browser.mjs BUNDLE.js
+//
+// Node has no video decoder. A stand-in gives grey pictures of the size that the header wants, one for each sample.
+import { readFileSync } from "node:fs";
+import { createInterface } from "node:readline";
+import { pathToFileURL } from "node:url";
+import { inflateSync } from "node:zlib";
+
+const MOST_VALUES = 2 ** 22; // coordinates that are read of a file
+const UUID = Buffer.from("6a1f0c523d7b4e0e9c5567e4f0a7d1b9", "hex");
+const { process } = globalThis;
+let size = [0, 0];
+
+class Picture {
+  constructor(timestamp) {
+    this.timestamp = timestamp;
+    this.format = "I420";
+    this.visibleRect = { width: size[0], height: size[1] };
+  }
+  allocationSize() {
+    return (size[0] * size[1] * 3) >> 1;
+  }
+  async copyTo(buffer) {
+    buffer.fill(126);
+    return [{ offset: 0, stride: size[0] }];
+  }
+  close() {}
+}
+
+globalThis.EncodedVideoChunk = class {
+  constructor({ timestamp }) {
+    this.timestamp = timestamp;
+  }
+};
+
+globalThis.VideoDecoder = class {
+  constructor({ output }) {
+    Object.assign(this, { output, state: "unconfigured", decodeQueueSize: 0 });
+  }
+  configure() {
+    this.state = "configured";
+  }
+  decode({ timestamp }) {
+    this.output(new Picture(timestamp));
+  }
+  async flush() {}
+  close() {
+    this.state = "closed";
+  }
+};
+
+delete globalThis.process; // Draco's wrapper then takes this for a page
+globalThis.window = globalThis;
+const { GeometryVideo, GeometryVideoError } = await import(pathToFileURL(process.argv[2]));
+
+/** Of a picture, as the header has it; [16, 16] where it has none. */
+function pictureSize(file) {
+  try {
+    const at = file.lastIndexOf(UUID) + 28; // behind the magic, the version and the count
+    const name = at + 1 + file[at];
+    const count = file.readUInt16LE(at - 2);
+    let table = at;
+    const length = Number(file.readBigUInt64LE(name));
+    for (let i = 0; i < count; i++) table += 1 + file[table] + 12;
+    const { width, height } = JSON.parse(inflateSync(file.subarray(table + 4, table + 4 + length))).settings;
+    return width * height <= 2 ** 24 ? [width, 3 * height] : [16, 16];
+  } catch {
+    return [16, 16];
+  }
+}
+
+async function read(path) {
+  const file = readFileSync(path);
+  size = pictureSize(file);
+  const video = await GeometryVideo.load(new Uint8Array(file));
+  try {
+    const { frameCount, vertexCount, indices } = video;
+    for (const vertex of indices) if (vertex >= vertexCount) return `triangles refer to vertex ${vertex} of ${vertexCount}`;
+    const count = Math.max(1, Math.min(frameCount, Math.floor(MOST_VALUES / (3 * vertexCount))));
+    for (const k of [...Array(count).keys(), frameCount - 1]) {
+      if (!(await video.frame(k)).every(Number.isFinite)) return "positions are not finite";
+    }
+    if (![...video.bounds.min, ...video.bounds.max].every(Number.isFinite)) return "bounds are not finite";
+    for (const { values } of video.attributes.values()) {
+      if (!values.every(Number.isFinite)) return "an attribute is not finite";
+    }
+    for (const field of video.fields.values()) for (const k of [0, frameCount - 1]) await field.frame(k);
+    return "";
+  } finally {
+    video.close();
+  }
+}
+
+for await (const path of createInterface({ input: process.stdin })) {
+  const before = { memory: process.memoryUsage().rss, ...process.cpuUsage() };
+  let result;
+  try {
+    const broken = await read(path);
+    result = broken ? { kind: "broken", text: broken } : { kind: "accepted", text: "" };
+  } catch (error) {
+    const refused = error instanceof GeometryVideoError;
+    result = refused ? { kind: "refused", text: error.message } : { kind: "crashed", text: `${error}`, stack: `${error?.stack}` };
+  }
+  const used = process.cpuUsage(before);
+  const peak = Math.max(process.resourceUsage().maxRSS * 1024, process.memoryUsage().rss);
+  process.stdout.write(`${JSON.stringify({ ...result, seconds: (used.user + used.system) / 1e6, peak, before: before.memory })}\n`);
+}

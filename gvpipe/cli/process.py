@@ -1,0 +1,83 @@
+"""What the process of a command inherits: streams that may be closed, and signals that end it.
+
+A closed standard stream leaves its number to the next file that is opened, and whatever a library prints would go there. So
+the null device takes its place first. Signals that ask a command to end become an exception, so that it cleans up.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import io
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from types import FrameType
+from typing import Any, NoReturn, TextIO, cast
+
+ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))  # Windows has no SIGHUP
+
+
+class Ended(BaseException):
+    """A signal asks the process to end.
+
+    Args:
+        number: of the signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+@contextlib.contextmanager
+def ending_by_exception() -> Iterator[None]:
+    """Let signals that end the process raise `Ended`; ignored ones, as under ``nohup``, stay ignored."""
+    if threading.current_thread() is not threading.main_thread():  # Python handles signals there alone
+        yield
+        return
+    handled = [number for number in ENDING if signal.getsignal(number) == signal.SIG_DFL]
+    for number in handled:
+        signal.signal(number, _raise)
+    try:
+        yield
+    finally:
+        for number in handled:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def replace_closed_streams() -> None:
+    """Put something in the place of closed standard streams: empty input, output that reports an error, silent errors."""
+    for descriptor in (0, 1, 2):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # it takes the lowest free number, which is this one
+    if sys.stdin is None:
+        sys.stdin = open(os.devnull, encoding="utf-8")  # noqa: SIM115 - lives as long as the process
+    if sys.stdout is None:
+        sys.stdout = cast(TextIO, ClosedOutput())
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - lives as long as the process
+
+
+class ClosedOutput(io.TextIOBase):
+    """Standard output that is closed: whatever is written to it is an error."""
+
+    @property
+    def buffer(self) -> Any:
+        """For bytes, the same."""
+        return self
+
+    def write(self, text: Any, /) -> int:
+        """Raise `OSError`, if there is anything to write."""
+        if not text:
+            return 0
+        raise OSError(errno.EBADF, "standard output is closed")
+
+
+def _raise(number: int, frame: FrameType | None) -> NoReturn:
+    signal.signal(number, signal.SIG_DFL)  # asked again, it ends at once
+    raise Ended(number)

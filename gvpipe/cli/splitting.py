@@ -1,0 +1,69 @@
+"""``--split``: several files for an input whose topology changes, all of them or none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from gvpipe.atomic import atomic_files
+from gvpipe.errors import InputError, OutputError
+
+if TYPE_CHECKING:
+    from gvpipe.io.runs import Run
+
+Result = TypeVar("Result")
+
+
+def write_runs(runs: Sequence[Run], target: str, write: Callable[[Run, Path], Result]) -> list[tuple[str, Result]]:
+    """Write each run to a file; return the files' names and what ``write`` returned.
+
+    Args:
+        runs: of the input.
+        target: name of the output; `run_names` says what becomes of it. A pattern of frame files stays as it is, since frames
+            are numbered as in the input.
+        write: writes a run to a path.
+
+    Raises:
+        InputError, OutputError: a run cannot be written, or two runs need files of one name; nothing is left.
+    """
+    from gvpipe.io.pattern import match_pattern
+
+    folder, name = (Path(target), "%04d.obj") if target.endswith("/") else (Path(target).parent, Path(target).name)
+    names = [name] * len(runs) if match_pattern(name) else run_names(name, len(runs))
+    results = []
+    with atomic_files(folder) as temporary:
+        for number, (run, own) in enumerate(zip(runs, names, strict=True)):
+            apart = temporary / f"run{number}"
+            apart.mkdir()
+            try:
+                results.append((str(folder / own), write(run, apart / own)))
+            except (InputError, OutputError) as exc:
+                raise type(exc)(str(exc).replace(str(apart), str(folder))) from exc
+            _join(apart, temporary, folder)
+    return results
+
+
+def run_names(name: str, count: int) -> list[str]:
+    """Names of files, one for each run.
+
+    Examples:
+        >>> run_names("walk.mp4", 2), run_names("walk.mp4", 1)
+        (['walk-000.mp4', 'walk-001.mp4'], ['walk.mp4'])
+    """
+    plain = Path(name)
+    digits = max(3, len(str(count - 1)))
+    return [name] if count == 1 else [f"{plain.stem}-{number:0{digits}d}{plain.suffix}" for number in range(count)]
+
+
+def _join(apart: Path, into: Path, shown: Path) -> None:
+    """Move files; those of one name, such as the materials of OBJ frames, must be equal."""
+    for path in sorted(path for path in apart.rglob("*") if path.is_file()):
+        name = path.relative_to(apart)
+        made = into / name
+        if made.exists() and made.read_bytes() != path.read_bytes():
+            raise InputError(f"{shown / name} would hold other materials in each run; convert the runs apart by --frames")
+        made.parent.mkdir(parents=True, exist_ok=True)
+        path.replace(made)
+    for emptied in sorted((path for path in (apart, *apart.rglob("*")) if path.is_dir()), reverse=True):
+        emptied.rmdir()

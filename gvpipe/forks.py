@@ -1,0 +1,57 @@
+"""Locks and threads in processes that `os.fork` made, as `multiprocessing` and PyTorch's DataLoader do on Linux.
+
+A fork copies one thread alone. A lock that another thread held stays locked in the child for ever, a pool waits for threads
+that are not there, and an open file shares its position with the parent. So whoever has such things registers here, and makes
+them anew in the child.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import weakref
+from types import TracebackType
+from typing import Protocol
+
+
+class Forkable(Protocol):
+    """What holds locks, threads or positions in files."""
+
+    def after_fork(self) -> None:
+        """Make them anew, in the child; no other thread runs there yet."""
+        ...
+
+
+_registered: weakref.WeakSet[Forkable] = weakref.WeakSet()
+
+
+def renew_after_fork(thing: Forkable) -> None:
+    """Let ``thing.after_fork()`` be called in every child process that is forked while ``thing`` is alive."""
+    _registered.add(thing)
+
+
+class ForkLock:
+    """A re-entrant lock that is free in a forked child; a context manager."""
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        renew_after_fork(self)
+
+    def __enter__(self) -> bool:
+        return self._lock.__enter__()
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._lock.__exit__(kind, error, trace)
+
+    def after_fork(self) -> None:
+        """Forget who held it."""
+        self._lock = threading.RLock()
+
+
+def _renew() -> None:
+    for thing in list(_registered):
+        thing.after_fork()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
+    os.register_at_fork(after_in_child=_renew)

@@ -1,0 +1,126 @@
+/** An animated field as files have it: segments, decoded when one of their frames is asked for. Mirrors `gvpipe.fields.reader`. */
+
+import { corrupt } from "../format/errors.js";
+import { readHead } from "./head.js";
+import { fromOctahedral } from "./octahedral.js";
+
+const KEPT_BYTES = 64 * 2 ** 20; // of decoded segments
+const KEPT_SEGMENTS = 2; // at least: the one shown and the next
+
+export class CodedField {
+  #head;
+  #host;
+  #isOctahedral;
+  #segments = new Map(); // number -> values (n, R, C), the one used last at the end
+  #loading = new Map(); // number -> promise
+
+  /**
+   * @param {object} entry of section `asset`, checked @param {boolean} isOctahedral whether its vectors are coded as two coordinates
+   * @param {Uint8Array} data its section @param {number} frameCount F @param {number} rowCount R
+   * @param {import("./field_host.js").FieldHost} host
+   */
+  constructor(entry, isOctahedral, data, frameCount, rowCount, host) {
+    this.name = entry.name;
+    this.kind = entry.kind;
+    this.domain = entry.domain;
+    this.unit = entry.unit;
+    this.type = entry.type;
+    this.components = entry.components || 1;
+    this.frameCount = frameCount;
+    this.rowCount = rowCount;
+    this.section = entry.section;
+    /** Largest difference of a value from the source's; degrees of normals. */
+    this.bound = entry.bound;
+    /** `[low, high]` of all components, or null if all are holes. */
+    this.range = entry.range;
+    /** What colours of this type count as 1. */
+    this.fullScale = entry.fullScale;
+    /** Largest length of a vector in what was decoded. */
+    this.largest = 0;
+    this.#host = host;
+    this.#isOctahedral = isOctahedral;
+    this.#head = readHead(data, frameCount, rowCount, entry.section);
+    const { components, type } = this.#head;
+    if (components !== (isOctahedral ? 2 : this.components) || type !== entry.type) {
+      throw corrupt(entry.section, "it does not hold what section 'asset' lists");
+    }
+  }
+
+  /** A promise of frame k: (R, C) values in an array of the field's type, NaN for holes. @returns {Promise<Float32Array|Int32Array>} */
+  async frame(k) {
+    if (!Number.isInteger(k) || k < 0 || k >= this.frameCount) throw new RangeError(`frame ${k}: there are ${this.frameCount}`);
+    const number = this.#numberOf(k);
+    return this.#frameOf(await this.#load(number), k, number).slice();
+  }
+
+  /**
+   * Fill `values (R, C)` with frame k if it is in memory, and load what comes next.
+   * @returns {boolean} whether it was
+   */
+  read(k, values) {
+    const number = this.#numberOf(k);
+    const segment = this.#segments.get(number);
+    if (!segment) return false;
+    this.#segments.delete(number); // to come last
+    this.#segments.set(number, segment);
+    values.set(this.#frameOf(segment, k, number));
+    const next = (number + 1) % this.#head.segments.length;
+    if (!this.#segments.has(next)) this.#load(next).catch(() => {}); // reported when it is shown
+    return true;
+  }
+
+  /** A promise that frame k is in memory. */
+  async load(k) {
+    await this.#load(this.#numberOf(k));
+  }
+
+  /** The segment that has frame k. */
+  #numberOf(k) {
+    const { bounds } = this.#head;
+    let number = Math.floor((k * (bounds.length - 1)) / this.frameCount); // even cuts: this one or the next
+    while (bounds[number + 1] <= k) number++;
+    return number;
+  }
+
+  #frameOf(segment, k, number) {
+    const size = this.rowCount * this.components;
+    const start = (k - this.#head.bounds[number]) * size;
+    return segment.subarray(start, start + size);
+  }
+
+  #load(number) {
+    if (this.#segments.has(number)) return Promise.resolve(this.#segments.get(number));
+    if (!this.#loading.has(number)) {
+      const loading = this.#decode(number).finally(() => this.#loading.delete(number));
+      this.#loading.set(number, loading);
+    }
+    return this.#loading.get(number);
+  }
+
+  async #decode(number) {
+    const { segments, bounds, components, type } = this.#head;
+    const [start, stop] = [bounds[number], bounds[number + 1]];
+    const { frameCount, domain, section } = this;
+    const job = { data: segments[number].slice(), start, stop, frameCount, components, type, domain, name: section };
+    const decoded = await this.#host.decode(job);
+    const values = this.#isOctahedral ? fromOctahedral(decoded) : decoded;
+    if (this.components > 1) this.largest = Math.max(this.largest, longest(values, this.components));
+    this.#segments.set(number, values);
+    for (const old of this.#segments.keys()) {
+      if (this.#segments.size <= KEPT_SEGMENTS || this.#segments.size * values.byteLength <= KEPT_BYTES) break;
+      this.#segments.delete(old);
+    }
+    return values;
+  }
+}
+
+/** The largest length of the rows of `values (n, C)`; holes count for nothing. */
+function longest(values, components) {
+  let most = 0;
+  for (let i = 0; i < values.length; i += components) {
+    let sum = 0;
+    for (let c = i; c < i + components; c++) sum += values[c] * values[c];
+    if (sum > most) most = sum;
+  }
+  return Math.sqrt(most);
+}

@@ -1,0 +1,50 @@
+/** Segments of a mesh's fields, decoded by kernels: in a worker, or on the page where there is none. */
+
+import { corrupt } from "../format/errors.js";
+import { Kernels } from "../wasm/kernels.js";
+import { rowOrder } from "./mesh.js";
+import { decodeSegment } from "./segment.js";
+
+export class FieldDecoder {
+  #orders = {}; // by domain, promises
+
+  /** @param {Uint8Array} code of kernels @param {Int32Array} faces (3T) @param {number} vertexCount */
+  constructor(code, faces, vertexCount) {
+    this.code = code;
+    this.faces = faces;
+    this.vertexCount = vertexCount;
+  }
+
+  /**
+   * @param {{data: Uint8Array, start: number, stop: number, frameCount: number, components: number, type: string, domain: string,
+   *   name: string}} job a segment: frames `start` to `stop` of `frameCount`
+   * @param {(frame: number) => Promise<Float32Array>} positions of a frame, asked for if values follow from them
+   * @returns {Promise<Float32Array|Int32Array>} (n, R, C)
+   * @throws {GeometryVideoError} it is not as gvpipe writes it @throws {RangeError} it needs more memory than there is
+   */
+  async decode({ data, start, stop, frameCount, components, type, domain, name }, positions) {
+    try {
+      const order = await (this.#orders[domain] ??= this.#findOrder(domain));
+      const kernels = await Kernels.open(this.code);
+      const span = { start, frameCount, faces: domain === "triangle" ? this.faces : null, positions };
+      const shape = [stop - start, order.order.length, components];
+      return await decodeSegment(data, shape, type, { kernels, causal: placed(kernels, order), name, span });
+    } catch (error) {
+      if (!(error instanceof WebAssembly.RuntimeError)) throw error;
+      throw corrupt(name, `it does not decode: ${error.message}`);
+    }
+  }
+
+  async #findOrder(domain) {
+    return rowOrder(await Kernels.open(this.code), this.faces, this.vertexCount, domain);
+  }
+}
+
+/** An order in the memory of kernels: the members of Python's `CausalOrder`. */
+function placed(kernels, { order, starts, neighbours, weights, variances, ringSizes }) {
+  const ints = (values) => kernels.array("int32", [values.length], values);
+  const floats = (values) => kernels.array("float64", [values.length], values);
+  const blocks = ints([0, order.length]);
+  return [ints(order), ints(starts), ints(neighbours), floats(weights), floats(variances), ints(ringSizes), blocks, true];
+}
+

@@ -1,0 +1,177 @@
+"""``--split``: inputs whose topology changes become several files, all of them or none."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sequences import grid
+
+import gvpipe
+from gvpipe.atomic import atomic_files
+from gvpipe.errors import InputError, OutputError, TopologyChange
+from gvpipe.io.runs import find_runs
+from gvpipe.sequence import MeshSequence
+
+Run = Callable[..., Any]
+SIZES = (5, 5, 5, 7, 7, 4)  # sheets of so many vertices a side, frame after frame
+SPANS = [(0, 3), (3, 5), (5, 6)]
+FAST = ("--set", "preset=ultrafast", "--set", "clusters=3", "--set", "gop=4")
+
+
+def sheet(side: int, frame: int) -> tuple[Any, Any]:
+    points, faces = grid(side)
+    return (points + np.array([0, 0, 0.1 * frame])).astype(np.float32), faces.astype(np.int32)
+
+
+def write_objs(folder: Path) -> Path:
+    for frame, side in enumerate(SIZES):
+        points, faces = sheet(side, frame)
+        gvpipe.write(MeshSequence(points[None], faces), folder / "f_%02d.obj", frame)
+    return folder
+
+
+def write_usd(path: Path) -> Path:
+    pytest.importorskip("pxr")
+    from pxr import Usd, UsdGeom, Vt
+
+    stage: Any = Usd.Stage.CreateNew(str(path))
+    stage.SetStartTimeCode(1)
+    stage.SetEndTimeCode(len(SIZES))
+    stage.SetTimeCodesPerSecond(24)
+    mesh = UsdGeom.Mesh.Define(stage, "/sheet")
+    heat = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("heat", _types().FloatArray, "vertex")
+    for frame, side in enumerate(SIZES):
+        points, faces = sheet(side, frame)
+        mesh.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), frame + 1)
+        mesh.CreateFaceVertexCountsAttr().Set(Vt.IntArray([3] * len(faces)), frame + 1)
+        mesh.CreateFaceVertexIndicesAttr().Set(Vt.IntArray.FromNumpy(faces.reshape(-1)), frame + 1)
+        heat.Set(Vt.FloatArray.FromNumpy(np.arange(len(points), dtype=np.float32)), frame + 1)
+    stage.Save()
+    return path
+
+
+def _types() -> Any:
+    from pxr import Sdf
+
+    return Sdf.ValueTypeNames
+
+
+def write_abc(path: Path) -> Path:
+    pytest.importorskip("alembic3d")
+    import imath
+    from alembic3d import Abc, AbcCoreAbstract, AbcGeom
+
+    archive = Abc.OArchive(str(path))
+    mesh = AbcGeom.OPolyMesh(archive.getTop(), "sheet")
+    schema = mesh.getSchema()
+    schema.setTimeSampling(AbcCoreAbstract.TimeSampling(1 / 24, 1 / 24))
+    for frame, side in enumerate(SIZES):
+        points, faces = sheet(side, frame)
+        sample = AbcGeom.OPolyMeshSchemaSample()
+        held = imath.V3fArray(len(points))
+        np.asarray(held)[...] = points
+        corners, counts = imath.IntArray(3 * len(faces)), imath.IntArray(len(faces))
+        np.asarray(corners)[...] = faces[:, ::-1].reshape(-1)
+        np.asarray(counts)[...] = 3
+        sample.setPositions(held)
+        sample.setFaceIndices(corners)
+        sample.setFaceCounts(counts)
+        schema.set(sample)
+    return path
+
+
+@pytest.fixture(params=["obj", "usd", "abc"])
+def changing(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """An input of three topologies."""
+    source = tmp_path / "in"
+    source.mkdir()
+    if request.param == "obj":
+        return write_objs(source)
+    return write_usd(source / "a.usda") if request.param == "usd" else write_abc(source / "a.abc")
+
+
+def test_each_run_is_a_file(run: Run, changing: Path, tmp_path: Path) -> None:
+    ended = run("convert", changing, tmp_path / "out.npz", "--split", "--fps", 24, "--json")
+    assert ended.status == 0, ended.err
+    files = json.loads(ended.out)["files"]
+    assert [Path(each["output"]).name for each in files] == [f"out-{number:03d}.npz" for number in range(3)]
+    assert [(each["start"], each["stop"]) for each in files] == SPANS
+    for each in files:
+        found = gvpipe.read(each["output"])
+        assert found.fps == 24 and found.n_frames == each["frames"]
+        for i, frame in enumerate(range(each["start"], each["stop"])):
+            points, faces = sheet(SIZES[frame], frame)
+            assert np.abs(found.read(i, i + 1)[0] - points).max() < 1e-6 and len(found.faces) == len(faces)
+        if changing.suffix == ".usda":
+            heat = found.fields.get("heat") or found.attributes["heat"]
+            assert np.asarray(heat[0]).size in (1, found.n_vertices)
+
+
+def test_without_it_the_change_is_refused(run: Run, changing: Path, tmp_path: Path) -> None:
+    ended = run("encode", changing, tmp_path / "a.mp4")
+    assert ended.status == 1 and "frame 3" in ended.err and "--split" in ended.err and ended.err.count("\n") <= 2
+    assert "--frames 0:3 or --frames 3:" in ended.err and not (tmp_path / "a.mp4").exists()
+    later = gvpipe.read(changing, frames=(3, 5))
+    assert later.n_vertices == 49 and np.abs(later.read(1, 2)[0] - sheet(7, 4)[0]).max() < 1e-6
+    with pytest.raises(TopologyChange) as caught:
+        gvpipe.read(changing, frames=(4, None)).read(0, 2)
+    assert caught.value.frame == 5
+
+
+def test_geometry_videos(run: Run, tmp_path: Path) -> None:
+    source = write_objs(tmp_path / "in")
+    ended = run("encode", source, tmp_path / "a.mp4", "--split", *FAST, "--json", "--frames", "1:5")
+    files = json.loads(ended.out)["files"]
+    assert ended.status == 0 and [(each["start"], each["stop"], each["vertices"]) for each in files] == [(1, 3, 25), (3, 5, 49)]
+    assert sorted(path.name for path in tmp_path.glob("*.mp4")) == ["a-000.mp4", "a-001.mp4"]
+    assert [len(gvpipe.open(each["output"])) for each in files] == [2, 2]
+    ended = run("encode", source, tmp_path / "b.mp4", "--split", *FAST, "--frames", ":3")
+    assert f"frames 0:3 (3 frames, 25 vertices) -> {tmp_path / 'b.mp4'}" in ended.out  # one run: the name as it was given
+
+
+def test_frames_keep_their_numbers(run: Run, tmp_path: Path) -> None:
+    source = write_objs(tmp_path / "in")
+    assert run("convert", source, tmp_path / "out" / "%02d.ply", "--split").status == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [f"{frame:02d}.ply" for frame in range(6)]
+    assert gvpipe.read(tmp_path / "out" / "05.ply").n_vertices == 16
+
+
+def test_all_or_nothing(run: Run, tmp_path: Path) -> None:
+    source = write_objs(tmp_path / "in")
+    (tmp_path / "in" / "f_05.obj").write_text("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    before = sorted(tmp_path.iterdir())
+    ended = run("encode", source, tmp_path / "a.mp4", "--split", *FAST)
+    assert ended.status == 1 and "f_05.obj" in ended.err and sorted(tmp_path.iterdir()) == before
+    (tmp_path / "b-001.npz").mkdir()
+    ended = run("convert", source, tmp_path / "b.npz", "--split", "--frames", ":5")
+    assert ended.status == 1 and "is a folder" in ended.err and not (tmp_path / "b-000.npz").exists()
+    assert run("encode", source, "-", "--split").status == 2
+    assert run("convert", source, tmp_path / "c.npz", "--split", "--stop", 3).status == 2
+    with pytest.raises(OutputError), atomic_files(tmp_path / "in" / "f_00.obj" / "x") as folder:
+        (folder / "a").write_text("")
+
+
+def test_a_later_change_may_be_met_first() -> None:
+    """Readers that compare a few frames before all do so."""
+    frames = np.repeat([0, 1, 2], [4, 3, 2])
+
+    def read(span: tuple[int, int | None]) -> MeshSequence:
+        start, stop = span[0], span[1] or len(frames)
+        for frame in (stop - 1, (start + stop) // 2, *range(start, stop)):
+            if frames[frame] != frames[start]:
+                raise TopologyChange.at("it changes", frame, start)
+        return MeshSequence(np.zeros((stop - start, 3, 3), np.float32), np.array([[0, 1, 2]]))
+
+    assert [(run.start, run.stop) for run in find_runs(read)] == [(0, 4), (4, 7), (7, 9)]
+    assert [(run.start, run.stop) for run in find_runs(read, (2, 6))] == [(2, 4), (4, 6)]
+
+    def broken(span: tuple[int, int | None]) -> MeshSequence:
+        raise TopologyChange.at("it changes", span[0])
+
+    with pytest.raises(InputError, match="it changes"):
+        find_runs(broken)

@@ -1,0 +1,86 @@
+"""xatlas may hang or die: the encoder goes on, or says so."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gvcodecs.mcgv.layout import xatlas_process, xatlas_worker
+from gvcodecs.mcgv.layout.xatlas_process import run_xatlas
+from gvcodecs.mcgv.layout.xatlas_worker import Mesh
+from gvpipe.errors import InputError
+
+# one that writes its own name into a file each time, and works from the second time on
+SECOND_TIME = """
+import pickle, sys, time
+with open({tries!r}, "a") as tries:
+    tries.write("x")
+if open({tries!r}).read() == "x":
+    {first}
+print("library output", file=sys.stderr)
+sys.stdout.buffer.write(pickle.dumps("charts"))
+"""
+# the worker's steps, in processes that are forked from one that has no threads: 10,000 starts in two minutes
+MANY = """
+import os, signal, sys
+import numpy as np, xatlas
+from gvcodecs.mcgv.layout.xatlas_worker import make_charts
+
+turn = np.arange(12) * np.pi / 6
+ring = np.stack([np.cos(turn), np.sin(turn), 0 * turn], 1).astype(np.float32)
+tube = np.concatenate([ring, ring + np.float32([0, 0, 1])])
+i = np.arange(12); j = (i + 1) % 12
+triangles = np.concatenate([np.stack([i, j, i + 12], 1), np.stack([j, j + 12, i + 12], 1)]).astype(np.uint32)
+for _ in range(int(sys.argv[1])):
+    child = os.fork()
+    if not child:
+        signal.alarm(60)
+        charts = make_charts([(tube, triangles), (ring[:3], triangles[:1] * 0 + np.uint32([0, 1, 2]))])
+        os._exit(0 if len(charts) == 2 else 1)
+    assert os.waitpid(child, 0)[1] == 0
+print("none hung")
+"""
+
+
+def square() -> Mesh:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+    return corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+
+
+def test_charts_of_two_meshes() -> None:
+    for vertex, triangles, places, chart in run_xatlas([square(), square()]):
+        assert sorted(vertex) == [0, 1, 2, 3] and len(triangles) == 2 and len(set(chart)) == 1
+        sides = np.linalg.norm(np.diff(places[np.argsort(vertex)], axis=0), axis=1)
+        np.testing.assert_allclose(sides, 1, atol=0.1)  # places have the mesh's unit
+
+
+@pytest.mark.parametrize("first", ["time.sleep(600)", "sys.exit(3)", "import os, signal; os.kill(os.getpid(), signal.SIGTERM)"])
+def test_a_process_that_hangs_or_dies_once(first: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _use(SECOND_TIME.format(tries=str(tmp_path / "tries"), first=first), tmp_path, monkeypatch)
+    charts: object = run_xatlas([square()])
+    assert charts == "charts"
+    assert (tmp_path / "tries").read_text() == "xx"
+
+
+def test_a_process_that_dies_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _use("raise ValueError('no such mesh')", tmp_path, monkeypatch)
+    with pytest.raises(InputError, match=r"status 1 \(ValueError: no such mesh\), 2 times; --set placement=halves"):
+        run_xatlas([square()])
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="this system has no fork")
+def test_ten_thousand_starts_and_ends() -> None:
+    done = subprocess.run([sys.executable, "-c", MANY, "10000"], capture_output=True, text=True, timeout=1500)
+    assert (done.stdout, done.stderr) == ("none hung\n", "")
+
+
+def _use(program: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run another program in the worker's place, with little patience."""
+    (folder / "worker.py").write_text(program)
+    monkeypatch.setattr(xatlas_worker, "__file__", str(folder / "worker.py"))
+    monkeypatch.setattr(xatlas_process, "SECONDS", 3.0)

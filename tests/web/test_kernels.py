@@ -1,0 +1,146 @@
+"""Kernels as WebAssembly, in Node: what they make of recorded calls is what numba made of them, bit for bit."""
+
+from __future__ import annotations
+
+import json
+import runpy
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from folders import DATA, ROOT, SAMPLES
+from waves import EXACT, SHEET, SHEET_FACES, wave
+
+import gvpipe
+from gvpipe.fields.encoder import encode_field
+from gvpipe.fields.mesh import FieldMesh
+from gvpipe.fields.reader import FieldReader
+from gvpipe.fields.segment import MODES
+from gvpipe.fields.values import FieldBound
+
+NODE = pytest.mark.skipif(shutil.which("node") is None, reason="no node")
+TOOL = ROOT / "tools" / "build_wasm.py"
+KERNELS = runpy.run_path(str(TOOL))["KERNELS"]
+FIELDS = sorted((DATA / "fields").glob("*.npz"))
+MOST = 300  # frames x rows x components of a real field that is decoded here, in thousands
+
+Call = tuple[str, list[Any], list[Any], list[Any]]  # name, arguments before and after, results
+
+
+@NODE
+@pytest.mark.parametrize("mode", MODES[:3])
+def test_kernels_equal_numba_on_fields(mode: str, tmp_path: Path) -> None:
+    """Of vertices and of triangles, with rows that keep their values."""
+    values = wave(n_components=2)
+    values[:, ::7] = values[0, ::7]
+    cells = values[:, SHEET_FACES].mean(axis=2)
+    with recorded() as calls:
+        decode(values, FieldMesh(SHEET_FACES, len(SHEET)), mode)
+        decode(cells, FieldMesh(SHEET_FACES, len(SHEET), "triangle"), mode)
+    used = {name for name, *_ in calls}
+    assert used >= {"decimate", "traverse", "find_dual", "decode_rows"}
+    assert ("predict_kalman" if mode == "trajectories" else "predict_rows") in used
+    compare(calls, tmp_path)
+
+
+@NODE
+def test_kernels_equal_numba_on_a_sample(tmp_path: Path) -> None:
+    gvpipe.encode(SAMPLES / "flag.npz", tmp_path / "flag.mp4", preset="fast")
+    with recorded() as calls, gvpipe.open(tmp_path / "flag.mp4") as video:
+        video.fields["strain"].read(0, len(video))
+    compare(calls, tmp_path)
+
+
+@NODE
+@pytest.mark.slow
+@pytest.mark.skipif(not FIELDS, reason="no ../shared/data")
+@pytest.mark.parametrize("path", FIELDS, ids=lambda path: path.stem)
+def test_kernels_equal_numba_on_real_fields(path: Path, tmp_path: Path) -> None:
+    with np.load(path) as data:
+        faces, n_vertices = data["faces"].astype(np.int32), data["vertices"].shape[1]
+        for key in [key for key in data.files if key.startswith("field_")]:
+            values = data[key].reshape(*data[key].shape[:2], -1)
+            domain = "vertex" if values.shape[1] == n_vertices else "triangle"
+            values = values[: max(2, 1000 * MOST // values[0].size)]
+            with recorded() as calls:
+                decode(values, FieldMesh(faces, n_vertices, domain))
+            compare(calls, tmp_path)
+
+
+def decode(values: np.ndarray[Any, Any], mesh: FieldMesh, mode: str = "") -> None:
+    """Code a field within 1/200 of its range, in one mode or the best, and decode it."""
+    bound = EXACT if mode == "exact" else FieldBound(float(np.nanmax(values) - np.nanmin(values)) / 200)
+    modes = (mode,) if mode else MODES[:3]
+    holes = bool(np.isnan(values).any())
+    section = encode_field(lambda start, stop: values[start:stop], len(values), mesh, bound, holes=holes, modes=modes)
+    FieldReader(section, len(values), FieldMesh(mesh.faces, mesh.n_vertices, mesh.domain), "field").read(0, len(values))
+
+
+@contextmanager
+def recorded() -> Iterator[list[Call]]:
+    """The calls of `KERNELS` while it is open, but for those that encode."""
+    calls: list[Call] = []
+    with pytest.MonkeyPatch.context() as patch:
+        for path in KERNELS:
+            module, _, name = path.rpartition(".")
+            patch.setattr(import_module(module), name, noting(getattr(import_module(module), name), name, calls))
+        yield calls
+
+
+def noting(kernel: Callable[..., Any], name: str, calls: list[Call]) -> Callable[..., Any]:
+    def call(*given: Any) -> Any:
+        before = [copied(each) for each in unpacked(given)]
+        result = kernel(*given)
+        encodes = name.startswith("predict") and before[-1].size
+        if not encodes:
+            calls.append(
+                (name, before, [copied(each) for each in unpacked(given)], [copied(each) for each in unpacked(result)])
+            )
+        return result
+
+    return call
+
+
+def unpacked(value: Any) -> list[Any]:
+    """Arrays and numbers of tuples in tuples; nothing of None."""
+    if isinstance(value, tuple):
+        return [each for part in value for each in unpacked(part)]
+    return [] if value is None else [value]
+
+
+def copied(value: Any) -> Any:
+    return value.copy() if isinstance(value, np.ndarray) else value
+
+
+def compare(calls: list[Call], folder: Path) -> None:
+    """Arguments and results after the same calls of WebAssembly are equal, as bytes."""
+    assert calls
+    data, listed = bytearray(), []
+    for name, before, *_ in calls:
+        given: list[Any] = []
+        for value in before:
+            if isinstance(value, np.ndarray):
+                given.append({"type": value.dtype.name, "shape": value.shape, "at": len(data)})
+                data += value.tobytes()
+            else:
+                given.append(float(value))
+        listed.append({"name": name, "given": given})
+    (folder / "calls.json").write_text(json.dumps(listed))
+    (folder / "calls.bin").write_bytes(data)
+    script = Path(__file__).with_name("run_kernels.mjs")
+    done = subprocess.run(["node", script, folder], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    found = (folder / "results.bin").read_bytes()
+    for (name, _, after, result), own in zip(calls, json.loads((folder / "results.json").read_text()), strict=True):
+        for number, (value, kept) in enumerate(zip([*after, *result], [*own["given"], *own["returned"]], strict=True)):
+            if not isinstance(value, np.ndarray):
+                assert value == kept, (name, number)
+                continue
+            assert (value.dtype.name, list(value.shape)) == (kept["type"], kept["shape"]), (name, number)
+            assert value.tobytes() == found[kept["at"] : kept["at"] + value.nbytes], (name, number)

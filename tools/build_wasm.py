@@ -1,0 +1,218 @@
+"""Compiled kernels of gvpipe as WebAssembly: python tools/build_wasm.py writes gvpipe/web/src/wasm/.
+
+`KERNELS` lists the functions with ``@compiled`` that the web player calls, and the types of their arguments. The functions
+themselves know nothing of it:
+
+1. numba makes LLVM's intermediate code of each, unoptimised, so that nothing in it depends on this machine;
+2. names and constants that belong to this process are taken out;
+3. llvmlite links all into one module, optimises it and makes an object file for wasm32 with SIMD;
+4. ``wasm-ld`` of PyPI's package ``ziglang`` makes ``kernels.wasm`` of it. Allocation stays an import.
+
+``signatures.js`` says how to call them. Extra ``wasm`` pins the compilers' versions, since others write other bytes.
+``--check`` compares the bytes with the files that are there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import tomllib
+import warnings
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+TARGET = Path(__file__).parents[1] / "gvpipe" / "web" / "src" / "wasm"
+PROJECT = Path(__file__).parents[1] / "pyproject.toml"
+ENVIRONMENT = {"NUMBA_OPT": "0", "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}  # as `compile_kernel` needs it
+
+INTS, FLOATS, BYTES, FLAGS = "int32[1]", "float64[1]", "uint8[1]", "bool[1]"  # element type and dimensions of an array
+TRIANGLES, ROWS, NUMBERS, SCALAR = "int32[2]", "float64[2]", "int64[2]", "int64"
+CAUSAL = ("gvpipe.trajectory.causal_order.CausalOrder", [INTS, INTS, INTS, FLOATS, FLOATS, INTS, INTS, "bool"])
+MIXING = (
+    "gvpipe.entropy.decision_kernels.Mixing",
+    [NUMBERS, "uint8[2]", NUMBERS, "int64[1]", "int64[1]", "int64[1]", "int64[1]"],
+)
+KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and NamedTuples of both
+    "gvpipe.mesh.decimation.decimate": [TRIANGLES, SCALAR, SCALAR],
+    "gvpipe.mesh.traversal.traverse": [TRIANGLES, INTS, SCALAR],
+    "gvpipe.fields.dual_kernels.find_dual": [TRIANGLES, SCALAR],
+    "gvpipe.fields.residual_kernels.decode_rows": [
+        ("gvpipe.fields.residual_kernels.Residuals", [NUMBERS, SCALAR, FLAGS, CAUSAL]),
+        MIXING,
+        BYTES,
+    ],
+    "gvpipe.fields.prediction_kernels.predict_rows": [
+        (
+            "gvpipe.fields.prediction_kernels.FieldCoding",
+            [CAUSAL, SCALAR, FLAGS, SCALAR, "float64", NUMBERS, ROWS, ROWS],
+        ),
+    ],
+    "gvpipe.fields.trajectory_kernels.add_components": [ROWS, ROWS, ROWS],
+    "gvpipe.trajectory.prediction_kernels.predict_kalman": [
+        ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS]),
+    ],
+}
+
+TRIPLE = "wasm32-unknown-unknown"
+LAYOUT = "e-m:e-p:32:32-p10:8:8-p20:8:8-i64:64-i128:128-n32:64-S128-ni:1:10:20"
+FEATURES = "+simd128,+bulk-memory,+nontrapping-fptoint,+sign-ext,+mutable-globals"
+LINK = ["--no-entry", "--strip-all", "--allow-undefined", "--export=__heap_base", "-z", "stack-size=65536"]
+REPLACED = [  # of the intermediate code
+    (r",? align \d+", ""),  # of 64-bit pointers
+    (r"(@numba\.dynamic\.globals\.\S+ = )linkonce global ptr inttoptr \(i64 \d+ to ptr\)", r"\1internal global ptr null"),
+    (r"(@\S+ = )common ", r"\1internal "),
+    (r"@sqrt\(", "@llvm.sqrt.f64("),
+    (r"\n  store ptr @\.const\.picklebuf[^\n]*", ""),  # texts of exceptions
+]
+
+
+def main() -> None:
+    """Write the files, or compare them."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="compare with the files that are there, and write none")
+    is_check = parser.parse_args().check
+    check_versions()
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ.update(ENVIRONMENT, NUMBA_CACHE_DIR=folder)  # before numba loads; what is cached elsewhere is optimised
+        files = build(Path(folder))
+    for name, data in files.items():
+        if not is_check:
+            TARGET.mkdir(exist_ok=True)
+            (TARGET / name).write_bytes(data)
+        elif (TARGET / name).read_bytes() != data:
+            sys.exit(f"{TARGET / name} is not what the kernels compile to; run python tools/build_wasm.py")
+    print(", ".join(f"{name} {len(data)} bytes" for name, data in files.items()))
+
+
+def check_versions() -> None:
+    """Stop where another version of a compiler is installed than extra ``wasm`` names."""
+    for requirement in tomllib.loads(PROJECT.read_text("utf-8"))["project"]["optional-dependencies"]["wasm"]:
+        name, wanted = requirement.split("==")
+        try:
+            found = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            found = "missing"
+        if found != wanted:
+            sys.exit(f"{name} is {found}; {wanted} is needed: pip install -e '.[wasm]'")
+
+
+def build(folder: Path) -> dict[str, bytes]:
+    """The files by name; ``folder`` takes what is made on the way."""
+    codes, signatures = [], {}
+    for path, arguments in KERNELS.items():
+        code, signatures[name_of(path)] = compile_kernel(path, arguments)
+        codes.append(code)
+    made, linked = folder / "kernels.o", folder / "kernels.wasm"
+    made.write_bytes(make_object(codes, list(signatures)))
+    exports = [f"--export={name}" for name in signatures]
+    subprocess.run([sys.executable, "-m", "ziglang", "wasm-ld", *LINK, *exports, made, "-o", linked], check=True)
+    lines = [f"  {name}: {json.dumps(signature)}," for name, signature in signatures.items()]
+    text = "\n".join(
+        [
+            "// Made by tools/build_wasm.py: arguments of each kernel with NamedTuples unpacked, and what it returns.",
+            "export const SIGNATURES = {",
+            *lines,
+            "};\n",
+        ]
+    )
+    return {"kernels.wasm": linked.read_bytes(), "signatures.js": text.encode()}
+
+
+def name_of(path: str) -> str:
+    """A kernel's name alone."""
+    return path.rpartition(".")[2]
+
+
+def load(path: str) -> Any:
+    """What a path with dots names."""
+    module, _, name = path.rpartition(".")
+    return getattr(import_module(module), name)
+
+
+def compile_kernel(path: str, arguments: list[Any]) -> tuple[str, dict[str, list[str]]]:
+    """A kernel's intermediate code, and its signature for JavaScript."""
+    from numba.core import compiler, registry
+    from numba.core.errors import NumbaWarning
+
+    target = registry.cpu_target
+    flags = compiler.Flags()
+    flags.nrt, flags.no_cpython_wrapper, flags.no_cfunc_wrapper = True, True, True
+    types = tuple(numba_type(argument) for argument in arguments)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NumbaWarning)  # that unoptimised code is not cached
+        made = compiler.compile_extra(target.typing_context, target.target_context, load(path).py_func, types, None, flags, {})
+    code = made.library.get_llvm_str().replace(made.fndesc.llvm_func_name, name_of(path))
+    code = re.sub(r'target triple = ".*"', f'target triple = "{TRIPLE}"', code)
+    code = re.sub(r'target datalayout = ".*"', f'target datalayout = "{LAYOUT}"', code)
+    for pattern, replacement in REPLACED:
+        code = re.sub(pattern, replacement, code)
+    given = [each for argument in arguments for each in unpacked(argument)]
+    return code, {"given": given, "returned": list(returned(made.signature.return_type))}
+
+
+def numba_type(argument: Any) -> Any:
+    """numba's type of an argument of `KERNELS`."""
+    from numba import types
+
+    if not isinstance(argument, str):
+        path, fields = argument
+        return types.NamedTuple([numba_type(field) for field in fields], load(path))
+    name, _, dimensions = argument.rstrip("]").partition("[")
+    element = types.boolean if name == "bool" else getattr(types, name)
+    return types.Array(element, int(dimensions), "C") if dimensions else element
+
+
+def unpacked(argument: Any) -> Iterator[str]:
+    """The arrays and scalars of an argument."""
+    if isinstance(argument, str):
+        yield argument
+    else:
+        for field in argument[1]:
+            yield from unpacked(field)
+
+
+def returned(kind: Any) -> Iterator[str]:
+    """The arrays and scalars of a result, spelt as in `KERNELS`."""
+    from numba import types
+
+    if isinstance(kind, types.BaseTuple):
+        for each in kind.types:
+            yield from returned(each)
+    elif isinstance(kind, types.Array):
+        yield f"{kind.dtype}[{kind.ndim}]"
+    elif kind != types.none:
+        yield str(kind)
+
+
+def make_object(codes: list[str], exported: list[str]) -> bytes:
+    """The object file of all kernels' intermediate code."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    whole, *others = [llvm.parse_assembly(code) for code in codes]
+    for other in others:
+        whole.link_in(other)
+    for function in whole.functions:
+        if not function.is_declaration and function.name not in exported:
+            function.linkage = llvm.Linkage.internal
+    for variable in whole.global_variables:
+        if not variable.is_declaration:
+            variable.linkage = llvm.Linkage.internal
+    machine = llvm.Target.from_triple(TRIPLE).create_target_machine(features=FEATURES, opt=3)
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization = options.slp_vectorization = True
+    llvm.create_pass_builder(machine, options).getModulePassManager().run(whole, llvm.create_pass_builder(machine, options))
+    return bytes(machine.emit_object(whole))
+
+
+if __name__ == "__main__":
+    main()
