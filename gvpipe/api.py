@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 from gvpipe import notes
 from gvpipe.arguments import StrPath, check_path, show
 from gvpipe.asset_coding.options import AssetOptions
+from gvpipe.budget import Budget
 from gvpipe.codec import Codec, Encoded, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import bytes_by_part, write_file
-from gvpipe.errors import InputError, OutputError, SettingError
+from gvpipe.errors import InputError, OutputError, OverBudget, SettingError
 from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
@@ -29,6 +30,7 @@ from gvpipe.registry import encode_sequence, make_codec
 from gvpipe.rendering.poster import poster_of
 from gvpipe.sequence import MeshSequence
 
+COSTLY_VERTEX = 400  # bytes of memory, with its triangles: less than any codec takes
 VIDEO_SUFFIXES = (".mp4", ".m4v")
 
 if TYPE_CHECKING:
@@ -38,7 +40,7 @@ if TYPE_CHECKING:
 
 Source = StrPath | Sequence[StrPath]
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
-ASSET = ("attributes", "fields", "textures", "clip", "mesh", "frames")
+ASSET = ("attributes", "fields", "textures", "clip", "mesh", "frames", "unlimited")
 KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", *ASSET)  # of `encode`
 
 
@@ -149,6 +151,8 @@ def read(
     clip: str | None = None,
     mesh: StrPath | None = None,
     frames: tuple[int, int | None] | None = None,
+    *,
+    unlimited: bool = False,
 ) -> MeshSequence:
     """Read a mesh sequence, or a geometry video as one.
 
@@ -159,6 +163,7 @@ def read(
         clip: name of the animation to read, of a glTF or FBX file that has several; None: the first.
         mesh: a file with the triangles of a point cache.
         frames: first frame that is read, and the one after the last (None: all that follow).
+        unlimited: as for `open`, of a geometry video.
 
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
@@ -177,7 +182,7 @@ def read(
         return read_sequence(one, fps, clip, mesh, frames)
     if clip is not None:
         raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
-    sequence = Player(one).sequence()
+    sequence = Player(one, unlimited=unlimited).sequence()
     if frames is not None:
         sequence = sequence.part(*frame_range(sequence, *frames))
     return sequence if fps is None else sequence.with_fps(fps)
@@ -238,6 +243,7 @@ def encode(
     clip: str | None = None,
     mesh: StrPath | None = None,
     frames: tuple[int, int | None] | None = None,
+    unlimited: bool = False,
     **settings: Any,
 ) -> Report:
     """Encode a sequence into a geometry video.
@@ -263,7 +269,7 @@ def encode(
         fields: the same for animated fields; ``"0.1%,nan=keep"`` keeps NaN as holes.
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
-        clip, mesh, frames: as for `read`.
+        clip, mesh, frames, unlimited: as for `read`.
 
     Raises:
         InputError: the source, a setting or the path cannot be used, or no quality meets the target.
@@ -278,7 +284,7 @@ def encode(
         raise SettingError(f"more than one target is given; choose one of {', '.join(targets)}")
     given = _candidates(codec, settings, purpose)
     clock = _StageClock(progress)
-    sequence = _open_source(source, path, fps, clip, mesh, frames)
+    sequence = _open_source(source, path, fps, {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited})
     target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
     asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
     coded = _code(sequence, given, target, asset, clock)
@@ -298,18 +304,20 @@ def encode(
         sections=bytes_by_part(bitstream, size),
         tried=[trial.to_json() for trial in coded.tried],
         reason=coded.reason,
-        notes=_notes(sequence, target, asset.plan.left_out),
+        notes=[*_notes(sequence, target, asset.plan.left_out), *_refusal(path, bitstream, size)],
     )
 
 
-def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0) -> MeshSequence:
+def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0, *, unlimited: bool = False) -> MeshSequence:
     """Decode frames ``start`` to ``stop`` of a geometry video into memory; ``lod`` above 0 asks for a coarser mesh.
+
+    With ``unlimited`` the file may take whatever memory and work it asks for (`Player`).
 
     Raises:
         InputError: no such file, or the frames or the level are not in it.
         FormatError: not a geometry video, or a damaged one.
     """
-    player = Player(path)
+    player = Player(path, unlimited=unlimited)
     start, stop = frame_range(player, start, stop)
     if lod:
         whole = player.level(lod)
@@ -320,9 +328,9 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0)
     return dataclasses.replace(whole, positions=positions, fields=fields)
 
 
-def open(path: StrPath) -> Player:
+def open(path: StrPath, *, unlimited: bool = False) -> Player:
     """Open a geometry video for random access; see `Player`; raises TypeError for what is no path."""
-    return Player(path)
+    return Player(path, unlimited=unlimited)
 
 
 def render(
@@ -345,6 +353,7 @@ def render(
     parts: str | Sequence[str] = (),
     plain: bool = False,
     progress: Progress | None = None,
+    unlimited: bool = False,
 ) -> list[str]:
     """Paint a sequence, or a geometry video, as ``.png``, ``.gif`` or ``.mp4``; return what should be known, a line each.
 
@@ -370,6 +379,7 @@ def render(
         parts: the name of the part to paint, or several; none: all.
         plain: paint the shape alone, without materials and colours.
         progress: called with ``"render"`` and the part that is done.
+        unlimited: as for `read`.
 
     Raises:
         InputError: a value that cannot be, a sequence without triangles, a reference that does not fit, an unknown field or
@@ -400,19 +410,19 @@ def render(
     for given in (source, error_of):
         if given is not None and _is_among(path, given):
             raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
-    reference = error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of)
-    sequence = source if isinstance(source, MeshSequence) else read(source)
+    reference = error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of, unlimited=unlimited)
+    sequence = source if isinstance(source, MeshSequence) else read(source, unlimited=unlimited)
     return list(write_pictures(sequence, target, options, reference, progress))
 
 
-def info(path: StrPath) -> Info:
-    """Return what a geometry video is and where its bytes go.
+def info(path: StrPath, *, unlimited: bool = False) -> Info:
+    """Return what a geometry video is and where its bytes go; ``unlimited`` as for `Player`.
 
     Raises:
         InputError: no such file.
         FormatError: not a geometry video, or a damaged one.
     """
-    player = Player(path)
+    player = Player(path, unlimited=unlimited)
     bitstream = player.bitstream
     first = player[0]
     size = os.path.getsize(path)
@@ -471,19 +481,18 @@ def _open_source(
     source: MeshSequence | Source,
     path: StrPath,
     fps: float | None,
-    clip: str | None,
-    mesh: StrPath | None,
-    frames: tuple[int, int | None] | None,
+    options: dict[str, Any],
 ) -> MeshSequence:
-    """The sequence to encode, which must not be the file to write."""
+    """The sequence to encode, which must not be the file to write; ``options`` are those of `read`."""
     if isinstance(source, MeshSequence):
+        frames = options["frames"]
         source = source if frames is None else source.part(*frame_range(source, *frames))
         return source if fps is None else source.with_fps(fps)
     if not isinstance(source, list | tuple):
         check_path(source, "gvpipe.encode's source", "a MeshSequence or ")
     if _is_among(path, source):
         raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
-    return read(source, fps, clip, mesh, frames)
+    return read(source, fps, **options)
 
 
 def _target(
@@ -542,6 +551,17 @@ def _notes(sequence: MeshSequence, target: Target | None, left_out: Sequence[str
     loose = notes.loose_bound(target.value, diagonal) if target and target.measure == "max" else ()
     rounded = notes.rounded(sequence.rounding, diagonal)
     return [*sequence.notes, *loose, *rounded, *notes.not_carried(sorted(left_out))]
+
+
+def _refusal(path: StrPath, bitstream: Bitstream, size: int) -> list[str]:
+    """A note if the file that was written is refused without ``unlimited``; looked at where vertices are many for its size."""
+    if COSTLY_VERTEX * bitstream.n_vertices < Budget(size).memory:
+        return []
+    try:
+        Player(path)[0]
+    except OverBudget as exc:
+        return [notes.over_budget(str(exc).partition(": ")[2].partition(";")[0])]
+    return []
 
 
 def _is_among(path: StrPath, source: MeshSequence | Source) -> bool:

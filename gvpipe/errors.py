@@ -12,7 +12,8 @@ One tree, so that a caller can catch as much or as little as needed::
         ├── NewerVersion         written by a newer gvpipe
         ├── StrippedFile         the payload box was removed, e.g. by remuxing
         ├── TruncatedFile        the file ends early
-        └── CorruptFile          a checksum, a length or an index does not hold
+        ├── CorruptFile          a checksum, a length or an index does not hold
+        └── OverBudget           it takes more memory or work than a file of its size may
 
 Third-party errors are wrapped where they arise (``raise ... from exc``); every message names the file, frame
 or value, the limit and what to do about it.
@@ -78,6 +79,10 @@ class TruncatedFile(FormatError):
 
 class CorruptFile(FormatError):
     """A checksum, a length or an index in the file does not hold."""
+
+
+class OverBudget(FormatError):
+    """The file takes more memory or work than its size warrants (`gvpipe.budget`)."""
 
 
 def corrupt(what: str) -> CorruptFile:

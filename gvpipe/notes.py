@@ -53,6 +53,11 @@ def not_carried(names: Sequence[str]) -> tuple[str, ...]:
     return (f"the file does not carry {', '.join(names)}",) if names else ()
 
 
+def over_budget(reason: str) -> str:
+    """Of a file that is refused because it is very small for what it holds."""
+    return f"the file is so small for its mesh that reading it needs --unlimited ({reason})"
+
+
 def coarser_level(lod: int, names: Sequence[str]) -> tuple[str, ...]:
     """Of what a level of detail has no place for."""
     return (f"level of detail {lod} leaves out {', '.join(names)}",) if names else ()

@@ -6,6 +6,7 @@ import contextlib
 import operator
 import os
 from collections.abc import Iterator, Mapping
+from functools import partial
 from types import TracebackType
 from typing import Any, overload
 
@@ -41,16 +42,22 @@ class Player:
     ``video[k]`` decodes no more than the group of frames that frame k lies in, and keeps the last groups; frames asked for
     in a row, forwards or backwards, are decoded ahead on another thread. ``video[a:b]`` gives ``(b - a, V, 3)``.
 
+    Args:
+        path: of the file.
+        unlimited: let it take whatever memory and work it asks for; by default its size limits both (`gvpipe.budget`).
+
     Raises:
         InputError: there is no such file.
+        OverBudget: here or later: it asks for more than a file of its size may take.
         FormatError: it is not a geometry video, or it is damaged; the kinds are in `gvpipe.errors`.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], *, unlimited: bool = False) -> None:
         check_path(path, "the geometry video")
         self.path = os.fspath(path)
         self._absolute = os.path.abspath(self.path)  # another process may have another working directory
-        self.bitstream: Bitstream = read_file(path)
+        self._unlimited = unlimited
+        self.bitstream: Bitstream = read_file(path, unlimited)
         with in_file(self.path):
             self._reader = open_reader(self.bitstream)
             self._shared = SharedReader(self.bitstream, self._reader, self.path)
@@ -59,7 +66,7 @@ class Player:
         self._cache = FrameCache(self._shared.read, group, len(self), 12 * self.bitstream.n_vertices)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self._absolute,)
+        return partial(type(self), unlimited=self._unlimited), (self._absolute,)
 
     @property
     def faces(self) -> Int32:

@@ -30,6 +30,7 @@ from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.sequence import MeshSequence
 
 SECTION = "holds"
+BYTES_PER_RUN, SECONDS_PER_RUN = 80, 0.2e-6
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,7 @@ def read_repeated_frames(bitstream: Bitstream) -> RepeatedFrames | None:
         return None
     cursor = Cursor(bitstream.section(SECTION), SECTION)
     n_distinct = cursor.varint(min(bitstream.n_frames, MAX_FRAMES), "the number of distinct frames")
+    bitstream.budget.keep(f"{n_distinct} distinct frames", BYTES_PER_RUN * n_distinct, SECONDS_PER_RUN * n_distinct)
     lengths = decode_integers(cursor.rest(), n_distinct, name=SECTION) + 1
     outside = lengths.min(initial=1) < 1 or lengths.max(initial=1) > bitstream.n_frames
     if outside or int(lengths.sum()) != bitstream.n_frames:

@@ -6,7 +6,6 @@ nothing on trust: an unknown field, a wrong type or a list of another length is 
 
 from __future__ import annotations
 
-import math
 import types
 import typing
 from dataclasses import MISSING, Field, fields, is_dataclass
@@ -15,6 +14,8 @@ from typing import Any
 import numpy as np
 
 from gvpipe.errors import InputError
+
+LARGEST = float(np.finfo(np.float64).max)  # an integer of JSON may exceed it
 
 
 def to_plain(value: Any) -> dict[str, Any]:
@@ -89,7 +90,7 @@ def _typed(hint: Any, value: Any, where: str) -> Any:
             raise InputError(f"{where} is {_short(value)}; an object of texts is needed")
         return value
     if hint is float:
-        if type(value) not in (int, float) or not math.isfinite(value):
+        if type(value) not in (int, float) or not abs(value) <= LARGEST:
             raise InputError(f"{where} is {_short(value)}; a finite number is needed")
         return float(value)
     if type(value) is not hint or (hint is int and abs(value) >= 1 << 31):

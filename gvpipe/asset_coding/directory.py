@@ -24,6 +24,7 @@ from gvpipe.asset.material import Material, check_materials
 from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part
 from gvpipe.asset.plain import from_plain, to_plain
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.json_object import JsonObject, pack_json, unpack_json
 from gvpipe.errors import InputError
 
@@ -103,9 +104,9 @@ def pack_directory(directory: Directory) -> bytes:
     )
 
 
-def unpack_directory(data: bytes, n_vertices: int) -> Directory:
-    """Mirror of `pack_directory`; ``n_vertices`` limits the parts' ranges; raises `CorruptFile`."""
-    values = unpack_json(data, SECTION, MAX_BYTES)
+def unpack_directory(data: bytes, n_vertices: int, budget: Budget = UNLIMITED) -> Directory:
+    """Mirror of `pack_directory`; ``n_vertices`` limits the parts' ranges; raises `CorruptFile` or `OverBudget`."""
+    values = unpack_json(data, SECTION, MAX_BYTES, budget)
     version = values.integer("version", 1, 1 << 16)
     if version > VERSION:
         return Directory(version=version)

@@ -31,16 +31,20 @@ from gvpipe.asset_coding.directory import (
     unpack_directory,
     vertex_starts,
 )
+from gvpipe.budget import Budget
 from gvpipe.codec import FrameReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import InputError, corrupt_section, in_file
 from gvpipe.forks import ForkLock
+from gvpipe.mesh.hierarchy import keep_hierarchy
 
 if TYPE_CHECKING:  # decoders load when a file has something for them: most have not
     from gvpipe.attributes.surface import Surface
     from gvpipe.attributes.triangle_order import Arrangement
     from gvpipe.fields.mesh import FieldMesh
 
+BYTES_PER_TRIANGLE = 200  # of the surface that attributes are coded over
+BYTES_PER_VALUE, SECONDS_PER_VALUE = 60, 1e-6  # of an attribute
 Read = Callable[[int, int], Float32]
 Thing = TypeVar("Thing")
 
@@ -65,7 +69,7 @@ class AssetReader:
         self._meshes: dict[str, FieldMesh] = {}
         self.directory = Directory()
         if SECTION in bitstream.sections:
-            self.directory = unpack_directory(bitstream.section(SECTION), bitstream.n_vertices)
+            self.directory = unpack_directory(bitstream.section(SECTION), bitstream.n_vertices, bitstream.budget)
         attributes = {each.name: each for each in self.directory.attributes if each.coding == CODED}
         fields = {each.name: each for each in self.directory.fields if _is_known(each)}
         known = {*attributes, *fields}
@@ -168,6 +172,9 @@ class AssetReader:
         from gvpipe.attributes.attribute_coding import decode_attribute
 
         data = self._bitstream.section(listed.section)
+        n_values = self._rows(listed.domain) * listed.components
+        budget, memory = self._bitstream.budget, BYTES_PER_TRIANGLE * len(self.faces) + BYTES_PER_VALUE * n_values
+        budget.ask(f"attribute {listed.name!r}", memory, SECONDS_PER_VALUE * n_values)
         references = []
         if listed.domain == "corner":
             earlier = self.directory.attributes[: self.directory.attributes.index(listed)]
@@ -183,6 +190,13 @@ class AssetReader:
             made = Attribute(values, listed.domain, listed.kind, indices, listed.unit, f"attribute {listed.name!r}")
         except InputError as exc:
             raise corrupt_section(listed.section, str(exc)) from exc
+        wanted = (self._rows(listed.domain), listed.components)
+        if made.shape != wanted or made.dtype.name != listed.dtype:
+            raise corrupt_section(listed.section, f"it holds {made.shape} {made.dtype}, not {wanted} {listed.dtype}")
+        return made
+
+    def _rows(self, domain: str) -> int:
+        """How many of a domain's things the mesh has."""
         n_triangles = len(self.faces)
         rows = {
             "vertex": self._bitstream.n_vertices,
@@ -190,10 +204,7 @@ class AssetReader:
             "triangle": n_triangles,
             "part": len(self.directory.parts),
         }
-        wanted = (rows[listed.domain], listed.components)
-        if made.shape != wanted or made.dtype.name != listed.dtype:
-            raise corrupt_section(listed.section, f"it holds {made.shape} {made.dtype}, not {wanted} {listed.dtype}")
-        return made
+        return rows[domain]
 
     def _field(self, listed: Listed) -> Field:
         values = _FieldValues(self._frames_of(listed), self._shape_of(listed), listed, self._lock, self._path)
@@ -216,9 +227,10 @@ class AssetReader:
             rule = unpack_rule(data, listed.section)
             return lambda start, stop: rule.normals(self._read(start, stop), self._surface)
         if listed.domain not in self._meshes:
+            _keep_rows(self._bitstream.budget, listed.domain, self._bitstream.n_vertices, len(self.faces))
             self._meshes[listed.domain] = FieldMesh(self.faces, self._bitstream.n_vertices, listed.domain)
         mesh = self._meshes[listed.domain]
-        reader = FieldReader(data, self._bitstream.n_frames, mesh, listed.section, self._read)
+        reader = FieldReader(data, self._bitstream.n_frames, mesh, listed.section, self._read, budget=self._bitstream.budget)
         if listed.coding == OCTAHEDRAL:
             return lambda start, stop: from_octahedral(_of_two(reader.read(start, stop), listed))
         return reader.read
@@ -247,6 +259,11 @@ class _FieldValues:
             if block.shape[1:] != (self.shape[1], self._listed.components or 1) or block.dtype != self.dtype:
                 raise corrupt_section(self._listed.section, "it does not hold what the section 'asset' lists")
         return block if self._listed.components else block[:, :, 0]
+
+
+def _keep_rows(budget: Budget, domain: str, n_vertices: int, n_triangles: int) -> None:
+    """Check that a file may take the hierarchy of a field's rows; triangles' rows have about twice as many of their own."""
+    keep_hierarchy(budget, *((n_vertices, n_triangles) if domain == "vertex" else (n_triangles, 2 * n_triangles)))
 
 
 def _is_known(listed: Listed) -> bool:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gvpipe import __version__
-from gvpipe.cli.console import Output, is_verbose, output_options, print_options
+from gvpipe.cli.console import Output, is_verbose, output_options, print_options, unlimited_option
 from gvpipe.cli.conversion import convert
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.cli.process import Ended, ending_by_exception, replace_closed_streams
@@ -54,7 +54,9 @@ def main() -> None:
     except Ended as exc:
         status = _fail(f"ended by {signal.Signals(exc.number).name}; no file is left half written", 128 + exc.number)
     except MemoryError:
-        status = _fail("not enough memory; encode fewer frames or vertices at a time, or give the sequence as frame files", 1)
+        status = _fail(
+            "not enough memory; take fewer frames at a time (encode: --frames or --segment, decode: --start and --stop)", 1
+        )
     except BrokenPipeError:  # the reader of our output left, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1
@@ -118,6 +120,7 @@ def cli() -> None:
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
 @click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.mp4, ...")
 @click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp.")
+@unlimited_option
 @output_options
 def encode(
     sources: tuple[str, ...],
@@ -140,6 +143,7 @@ def encode(
     frames: str | None,
     split: bool,
     textures: str | None,
+    unlimited: bool,
     out: Output,
 ) -> None:
     """Encode a mesh sequence as a geometry video.
@@ -185,7 +189,7 @@ def encode(
             runs = api.read_runs(source, **given)
             written = write_runs(runs, target, lambda run, own: api.encode(run.sequence, own, chosen, progress, **wanted))
         else:
-            report = api.encode(source, path, chosen, progress, **given, **wanted)
+            report = api.encode(source, path, chosen, progress, **given, **wanted, unlimited=unlimited)
     out = out.carrying(target)
     name = shown(sources[0], STDIN) + (f" and {len(sources) - 1} more" if len(sources) > 1 else "")
     if not split:
@@ -230,6 +234,7 @@ def _print_report(out: Output, report: Report, name: str, target: str) -> None:
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail: 0 the mesh, higher is coarser.")
 @click.option("--local", is_flag=True, help="Leave out the origin of a mesh far from the world's: float32 positions near 0.")
+@unlimited_option
 @output_options
 def decode(
     source: str,
@@ -241,6 +246,7 @@ def decode(
     parts: tuple[str, ...],
     lod: int,
     local: bool,
+    unlimited: bool,
     out: Output,
 ) -> None:
     """Decode a geometry video.
@@ -255,7 +261,7 @@ def decode(
     out = out.carrying(target)
     first, last = chosen_frames(start, stop, frames)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
-        player = api.open(given)
+        player = api.open(given, unlimited=unlimited)
         start, stop = api.frame_range(player, first, last)
         level = player.level(lod)
         sequence = chosen(level.part(start, stop), parts, fps, "decode", progress)
@@ -275,8 +281,9 @@ def decode(
 @click.argument("source", metavar="FILE")
 @click.option("--clip", metavar="NAME", help="The animation to look at, of a file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
+@unlimited_option
 @output_options
-def info(source: str, clip: str | None, mesh: str | None, out: Output) -> None:
+def info(source: str, clip: str | None, mesh: str | None, unlimited: bool, out: Output) -> None:
     """Tell what a geometry video (- for standard input) holds and where its bytes go, or what is read of any other input."""
     from gvpipe import api
     from gvpipe.cli.asset_lines import asset_lines, shape_lines
@@ -287,7 +294,7 @@ def info(source: str, clip: str | None, mesh: str | None, out: Output) -> None:
             return
         if clip is not None or mesh is not None:
             raise click.UsageError("--clip and --mesh are for sources; a geometry video has neither")
-        found = api.info(path)
+        found = api.info(path, unlimited=unlimited)
     out.json(found.to_json())
     out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}")
     for line in shape_lines(found):
@@ -321,8 +328,9 @@ def _source_info(source: str, path: str, clip: str | None, mesh: str | None, out
 @click.argument("distorted", metavar="DISTORTED")
 @click.option("--clip", metavar="NAME", help="The animation of REFERENCE, of a file that has several. [default: the first]")
 @click.option("--fps", type=float, help="Frames per second at which REFERENCE is sampled.")
+@unlimited_option
 @output_options
-def compare(reference: str, distorted: str, clip: str | None, fps: float | None, out: Output) -> None:
+def compare(reference: str, distorted: str, clip: str | None, fps: float | None, unlimited: bool, out: Output) -> None:
     """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos, one may be - for standard input."""
     from gvpipe import api
     from gvpipe.metrics import comparison
@@ -331,7 +339,9 @@ def compare(reference: str, distorted: str, clip: str | None, fps: float | None,
         raise click.UsageError("both are -, and there is one standard input", click.get_current_context())
     with source_path(reference) as one, source_path(distorted) as other, out.progress() as progress:
         result = comparison.compare(
-            api.read(one, fps, clip), api.read(other), lambda done, of: progress("compare", done / of) if progress else None
+            api.read(one, fps, clip, unlimited=unlimited),
+            api.read(other, unlimited=unlimited),
+            lambda done, of: progress("compare", done / of) if progress else None,
         )
     values = result.to_json()
     out.json(values)
@@ -353,8 +363,9 @@ cli.add_command(convert)
 @click.argument("target", metavar="OUT.html")
 @click.option("--up", type=click.Choice(["y", "z"]), help="The axis that stands upright. [default: the file's own, else y]")
 @click.option("--quality", type=float, help="0-100, of a conversion: the error that it may add. [default: 90]")
+@unlimited_option
 @output_options
-def export_html(source: str, target: str, up: str | None, quality: float | None, out: Output) -> None:
+def export_html(source: str, target: str, up: str | None, quality: float | None, unlimited: bool, out: Output) -> None:
     """Write a web page of one file that plays a geometry video, without a network.
 
     Browsers read codec mcgv in its web profile; other files are converted, which adds an error that is told: KG 0.044 or less
@@ -363,7 +374,7 @@ def export_html(source: str, target: str, up: str | None, quality: float | None,
     from gvpipe import web
 
     with source_path(source) as path, out.progress() as progress:
-        report = web.export_html(path, target, up, quality, progress)
+        report = web.export_html(path, target, up, quality, progress, unlimited=unlimited)
     out.json(report.to_json())
     size = f"{_size(report.bytes)}, {_size(report.video_bytes)} of which are the geometry video"
     out.text(f"{shown(source, STDIN)} -> {target} ({size})")
@@ -373,8 +384,9 @@ def export_html(source: str, target: str, up: str | None, quality: float | None,
 @cli.command()
 @click.argument("source", metavar="FILE.mp4")
 @click.option("--up", type=click.Choice(["y", "z"]), help="The axis that stands upright. [default: the file's own, else y]")
+@unlimited_option
 @output_options
-def play(source: str, up: str | None, out: Output) -> None:
+def play(source: str, up: str | None, unlimited: bool, out: Output) -> None:
     """Play a geometry video in your browser.
 
     Where no browser can be opened, the page's path is printed. The page is one file and needs no network. Pages that are older
@@ -388,7 +400,7 @@ def play(source: str, up: str | None, out: Output) -> None:
 
     with source_path(source) as path, lasting_folder() as folder, out.progress() as progress:
         page = Path(folder) / f"{Path(path).stem}.html"  # stays: the browser reads it later
-        report = web.export_html(path, page, up, None, progress)
+        report = web.export_html(path, page, up, None, progress, unlimited=unlimited)
     _tell_conversion(out, report)
     is_open = open_page(page)
     if not is_open:
@@ -416,6 +428,7 @@ def play(source: str, up: str | None, out: Output) -> None:
 @click.option("--range", "limits", metavar="A,B", help="Ends of the colours, or symmetric. [default: the range drawn]")
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Paint this part only; repeat for more.")
 @click.option("--plain", "--no-textures", "plain", is_flag=True, help="Leave out materials, textures and colours.")
+@unlimited_option
 @output_options
 def render(source: str, target: str, size: str, limits: str | None, out: Output, **options: Any) -> None:
     """Paint a geometry video or a sequence as a picture or a film; needs no display and no GPU."""

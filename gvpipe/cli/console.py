@@ -95,6 +95,11 @@ class Output:
             logger.setLevel(level)
 
 
+unlimited_option = click.option(
+    "--unlimited", is_flag=True, help="Let a geometry video take whatever memory and time it asks for: you trust its source."
+)
+
+
 def output_options(command: Command) -> Command:
     """Give a command ``--json``, ``--quiet`` and ``--verbose``, and call it with ``out``, an `Output`."""
     as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gvpipe.cli.console import Output, output_options
+from gvpipe.cli.console import Output, output_options, unlimited_option
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.errors import InputError
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail of a geometry video; higher is coarser.")
 @click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.glb, ...")
+@unlimited_option
 @output_options
 def convert(
     source: str,
@@ -44,6 +45,7 @@ def convert(
     parts: tuple[str, ...],
     lod: int,
     split: bool,
+    unlimited: bool,
     out: Output,
 ) -> None:
     """Write a mesh sequence in another format.
@@ -64,7 +66,9 @@ def convert(
         _convert_split(source, target, options, parts, out)
         return
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
-        read = _level_reader(given, lod) if lod else partial(api.read, given, clip=clip, mesh=mesh)
+        read = (
+            _level_reader(given, lod, unlimited) if lod else partial(api.read, given, clip=clip, mesh=mesh, unlimited=unlimited)
+        )
         if frames is not None:
             some = read(fps=fps, frames=(first, last))
             start, stop = first, first + len(some)
@@ -116,13 +120,13 @@ def _convert_split(source: str, target: str, options: dict[str, Any], parts: tup
         out.text(f"{shown(source, STDIN)}, frames {each['start']}:{each['stop']} -> {each['output']} ({shape})")
 
 
-def _level_reader(source: str, lod: int) -> Callable[..., MeshSequence]:
+def _level_reader(source: str, lod: int, unlimited: bool) -> Callable[..., MeshSequence]:
     """What reads frames of a level of detail of a geometry video, at a frame rate."""
     from gvpipe import api
 
     if not is_video(source):
         raise InputError(f"{source} has no levels of detail; encode it with --codec pca, whose files have them")
-    level = api.open(source).level(lod)
+    level = api.open(source, unlimited=unlimited).level(lod)
 
     def read(fps: float | None, frames: tuple[int, int | None] | None = None) -> MeshSequence:
         own = level if fps is None else level.with_fps(fps)

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gvpipe.arrays import Array, Int64
-from gvpipe.connectivity.base_mesh import MAX_PER_BYTE
+from gvpipe.connectivity.base_mesh import MAX_PER_BYTE, check_draco_header
 from gvpipe.connectivity.topology_only import decode_triangles, encode_triangles
+from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.mesh.topology import opposite_corners
 
@@ -45,15 +46,23 @@ def encode_adaptive_mesh(points: Array, faces: Array) -> tuple[bytes, Array, Arr
     return b"".join([*head, data[: finish(state, data)].tobytes()]), permutation, coded
 
 
-def decode_adaptive_mesh(stream: bytes) -> tuple[Int64, Array]:
-    """Mirror of `encode_adaptive_mesh`: points ``(P, 3)`` and triangles ``(T, 3)``; raises `CorruptFile`."""
+def decode_adaptive_mesh(
+    stream: bytes, n_vertices: int = MAX_POINTS, n_triangles: int = 2 * MAX_VERTICES
+) -> tuple[Int64, Array]:
+    """Mirror of `encode_adaptive_mesh`: points ``(P, 3)``, at most ``n_vertices``, and triangles, at most ``n_triangles``.
+
+    Raises:
+        CorruptFile: malformed, or larger.
+    """
     from gvpipe.connectivity.position_kernels import code_positions
     from gvpipe.entropy.decision_kernels import AHEAD, PLACE, start_decoder
 
     cursor = Cursor(stream, "mesh")
-    n_points = cursor.varint(MAX_POINTS, "the number of points")
+    n_points = cursor.varint(min(MAX_POINTS, n_vertices), "the number of points")
     draco, merges, loose = cursor.block(), cursor.block(), cursor.block()
-    faces = decode_triangles(draco, merges, loose, cursor.varint(MAX_PER_BYTE * len(stream), "the number of loose triangles"))
+    check_draco_header(draco, n_triangles)
+    n_loose = cursor.varint(min(n_triangles, MAX_PER_BYTE * len(stream)), "the number of loose triangles")
+    faces = decode_triangles(draco, merges, loose, n_loose)
     if faces.size and (faces.min() < 0 or faces.max() >= n_points):
         raise cursor.corrupt("a triangle names a point that does not exist")
     data = np.frombuffer(bytearray(cursor.rest()), np.uint8)  # kernels want it writable

@@ -30,6 +30,9 @@ COMPRESSION_LEVEL = 10  # Draco's best; 20 ms for 10k vertices
 MAX_DRACO_COORDINATE = (1 << 22) - 1  # Draco's time and memory grow with the range: 31 bits take 90 s for 81 vertices
 DRACO_PREFIX = b"DRACO\x02\x02\x01\x01\x00\x00"  # version 2.2, triangular mesh, Edgebreaker, no metadata
 MAX_PER_BYTE = 1024  # no allocation beyond what this many bytes can honestly hold; deflate's own limit is near
+PEAK_PER_VERTEX, PEAK_PER_TRIANGLE = 160, 160  # bytes
+KEPT_PER_VERTEX, KEPT_PER_TRIANGLE = 24, 24
+SECONDS_PER_VERTEX, SECONDS_PER_TRIANGLE = 0.4e-6, 0.3e-6
 GENERIC = 4  # draco::GeometryAttribute::GENERIC
 
 
@@ -79,9 +82,9 @@ def encode_base(points: Array, faces: Array, reorder: bool) -> tuple[EncodedMesh
     return EncodedMesh(mesh, order, own), decoded
 
 
-def decode_base(mesh: bytes, order: bytes) -> BaseMesh:
-    """Mirror of `encode_base`. Raises CorruptFile for anything malformed."""
-    points, faces = _decode_mesh(mesh)
+def decode_base(mesh: bytes, order: bytes, n_vertices: int = MAX_VERTICES, n_triangles: int = 2 * MAX_VERTICES) -> BaseMesh:
+    """Mirror of `encode_base`, for a mesh of at most ``n_vertices`` and ``n_triangles``; raises `CorruptFile`."""
+    points, faces = _decode_mesh(mesh, n_vertices, n_triangles)
     visits = np.arange(len(points))
     if order:
         visits = decode_order(order, points, faces)
@@ -91,9 +94,19 @@ def decode_base(mesh: bytes, order: bytes) -> BaseMesh:
 
 def read_base(bitstream: Bitstream) -> BaseMesh:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
-    base = decode_base(bitstream.section("mesh"), bitstream.section("order"))
+    keep_mesh(bitstream)
+    base = decode_base(bitstream.section("mesh"), bitstream.section("order"), bitstream.n_vertices, bitstream.n_triangles)
     bitstream.check_size(len(base.points), len(base.faces))
     return base
+
+
+def keep_mesh(bitstream: Bitstream) -> None:
+    """Check that a file may take the memory and work of a mesh of its size; raises `OverBudget`."""
+    n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
+    what = f"a mesh of {n_vertices} vertices and {n_triangles} triangles"
+    bitstream.budget.ask(what, PEAK_PER_VERTEX * n_vertices + PEAK_PER_TRIANGLE * n_triangles)
+    seconds = SECONDS_PER_VERTEX * n_vertices + SECONDS_PER_TRIANGLE * n_triangles
+    bitstream.budget.keep(what, KEPT_PER_VERTEX * n_vertices + KEPT_PER_TRIANGLE * n_triangles, seconds)
 
 
 def _encode_draco(points: Array, faces: Array) -> bytes:
@@ -164,7 +177,6 @@ def _decode_draco(draco: bytes) -> tuple[Array, Array]:
 
     if not draco:
         return np.zeros((0, 4), np.int64), np.zeros((0, 3), np.int64)
-    check_draco_header(draco)
     try:
         decoded = DracoPy.decode(draco)
         points, attributes = decoded.points, decoded.attributes
@@ -190,22 +202,27 @@ def _decode_draco(draco: bytes) -> tuple[Array, Array]:
     return keys[representatives[by_appearance]], np.argsort(by_appearance)[ids][faces]
 
 
-def check_draco_header(draco: bytes) -> None:
-    """Refuse counts that the stream cannot hold before Draco allocates for them."""
+def check_draco_header(draco: bytes, n_triangles: int) -> None:
+    """Refuse counts that the stream, or a mesh of ``n_triangles``, cannot hold before Draco allocates for them."""
+    if not draco:
+        return
     if not draco.startswith(DRACO_PREFIX):
         raise corrupt_section("mesh", "not the kind of Draco stream that is written here")
     cursor = Cursor(draco, "mesh")
     cursor.take(len(DRACO_PREFIX) + 1)  # the last byte is the traversal type
-    for elements in ("vertices", "faces"):
+    for elements, most in (("vertices", 3 * n_triangles), ("faces", n_triangles)):
         count = cursor.varint((1 << 35) - 1, f"Draco's number of {elements}")
-        if count > MAX_PER_BYTE * len(draco):
+        if count > min(most, MAX_PER_BYTE * len(draco)):
             raise cursor.corrupt(f"{count} elements in {len(draco)} bytes")
 
 
-def _decode_mesh(mesh: bytes) -> tuple[Array, Array]:
+def _decode_mesh(mesh: bytes, n_vertices: int, n_triangles: int) -> tuple[Array, Array]:
     cursor = Cursor(mesh, "mesh")
     bytes_draco, n_loose_points, n_loose_faces, bytes_points = cursor.struct(HEADER)
+    if n_loose_points > n_vertices or n_loose_faces > n_triangles:
+        raise cursor.corrupt(f"{n_loose_points} loose vertices and {n_loose_faces} loose triangles")
     draco, loose_points = cursor.take(bytes_draco), cursor.take(bytes_points)
+    check_draco_header(draco, n_triangles)
     keys, draco_faces = _decode_draco(draco)
     points = np.concatenate([keys[:, :3], decode_table(loose_points, n_loose_points)])
     faces = np.concatenate([draco_faces, decode_table(cursor.rest(), n_loose_faces)])

@@ -100,12 +100,14 @@ def decode_seams(
     n_points: int,
     across: bool = False,
     adaptive: bool = False,
+    *,
+    n_vertices: int = MAX_VERTICES,
 ) -> tuple[Array, Array]:
-    """Mirror of `encode_seams`: triangles ``(T, 3)`` over vertices, and the point of each vertex ``(V,)``.
+    """Mirror of `encode_seams`: triangles ``(T, 3)`` over at most ``n_vertices``, and the point of each vertex ``(V,)``.
 
     ``adaptive``: the order is of `adaptive_order`.
     """
-    faces, points = _decode_corners(counts, corners, point_faces, n_points, across)
+    faces, points = _decode_corners(_decode_counts(counts, n_points, n_vertices), corners, point_faces, across)
     if order:
         if adaptive:
             visits = adaptive_order.decode_adaptive_order(order, points, faces)
@@ -148,16 +150,21 @@ def _filled(differences: Array, contexts: Array, is_first: Array) -> Array:
     return result
 
 
-def _decode_corners(counts_data: bytes, data: bytes, point_faces: Array, n_points: int, across: bool) -> tuple[Array, Array]:
-    """Mirror of `_encode_corners`: triangles over vertices, and the point of each vertex."""
-    counts = 1 + decode_integers(counts_data, n_points, name="mesh")
-    if n_points and (counts.min() < 1 or counts.max() > MAX_VERTICES or counts.sum() > MAX_VERTICES):
+def _decode_counts(data: bytes, n_points: int, n_vertices: int) -> Array:
+    """How many vertices each point has: ``(P,)``."""
+    counts = 1 + decode_integers(data, n_points, name="mesh")
+    if n_points and (counts.min() < 1 or counts.max() > n_vertices or counts.sum() > n_vertices):
         raise corrupt_section("mesh", "a number of copies is out of range")
+    return counts
+
+
+def _decode_corners(counts: Array, data: bytes, point_faces: Array, across: bool) -> tuple[Array, Array]:
+    """Mirror of `_encode_corners`: triangles over vertices, and the point of each vertex."""
     numbers = decode_across_edges(data, point_faces, counts) if across else _decode_differences(data, point_faces, counts)
     flat = point_faces.ravel()
     starts = np.cumsum(counts) - counts
     faces: Array = (starts[flat] + numbers).reshape(-1, 3)
-    return faces, np.repeat(np.arange(n_points), counts)
+    return faces, np.repeat(np.arange(len(counts)), counts)
 
 
 def _decode_differences(data: bytes, point_faces: Array, counts: Array) -> Array:

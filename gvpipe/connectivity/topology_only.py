@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Array, Int32
-from gvpipe.connectivity.base_mesh import COMPRESSION_LEVEL, MAX_PER_BYTE, EncodedMesh, check_draco_header
+from gvpipe.connectivity.base_mesh import COMPRESSION_LEVEL, MAX_PER_BYTE, EncodedMesh, check_draco_header, keep_mesh
 from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.bitstream import Bitstream
@@ -84,17 +84,18 @@ def encode_triangles(faces: Array, n_points: int) -> tuple[tuple[bytes, bytes, b
         return _place_points(faces, n_points, _NOTHING)
 
 
-def decode_mesh(mesh: bytes, order: bytes, n_vertices: int) -> Topology:
-    """Mirror of `encode_mesh`, for a mesh of at most ``n_vertices``. Raises CorruptFile for anything malformed."""
+def decode_mesh(mesh: bytes, order: bytes, n_vertices: int, n_triangles: int = 2 * MAX_VERTICES) -> Topology:
+    """Mirror of `encode_mesh`, for a mesh of at most ``n_vertices`` and ``n_triangles``; raises `CorruptFile`."""
     cursor = Cursor(mesh, "mesh")
     bytes_draco, bytes_merges, bytes_loose, bytes_counts, n_loose, n_points = cursor.struct(HEADER)
-    if n_points > min(MAX_VERTICES, n_vertices) or n_loose > MAX_PER_BYTE * len(mesh):
+    if n_points > min(MAX_VERTICES, n_vertices) or n_loose > min(n_triangles, MAX_PER_BYTE * len(mesh)):
         raise cursor.corrupt(f"{n_points} points and {n_loose} loose triangles in {len(mesh)} bytes")
     draco, merges, loose = cursor.take(bytes_draco), cursor.take(bytes_merges), cursor.take(bytes_loose)
+    check_draco_header(draco, n_triangles)
     point_faces = decode_triangles(draco, merges, loose, n_loose)
     if point_faces.size and (point_faces.min() < 0 or point_faces.max() >= n_points):
         raise cursor.corrupt("a triangle names a point that does not exist")
-    faces, points = decode_seams(cursor.take(bytes_counts), cursor.rest(), order, point_faces, n_points)
+    faces, points = decode_seams(cursor.take(bytes_counts), cursor.rest(), order, point_faces, n_points, n_vertices=n_vertices)
     return Topology(faces.astype(np.int32), points, point_faces.astype(np.int32), n_points)
 
 
@@ -109,7 +110,9 @@ def decode_triangles(draco: bytes, merges: bytes, loose: bytes, n_loose: int) ->
 
 def read_mesh(bitstream: Bitstream) -> Topology:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
-    mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"), bitstream.n_vertices)
+    n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
+    keep_mesh(bitstream)
+    mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"), n_vertices, n_triangles)
     bitstream.check_size(len(mesh.points), len(mesh.faces))
     return mesh
 
@@ -195,7 +198,6 @@ def _decode_draco(draco: bytes) -> tuple[Array, int]:
 
     if not draco:
         return np.zeros((0, 3), np.int64), 0
-    check_draco_header(draco)
     try:
         decoded = DracoPy.decode(draco)
         faces, n_vertices = decoded.faces.astype(np.int64), len(decoded.points)

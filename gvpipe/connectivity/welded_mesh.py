@@ -20,8 +20,9 @@ from scipy import sparse
 
 from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.connectivity import adaptive_mesh
-from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base
+from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base, keep_mesh
 from gvpipe.connectivity.seams import decode_seams, encode_seams
+from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.mesh.topology import adjacency
@@ -89,30 +90,45 @@ def _encode_mesh(lattice: Array, faces: Array, adaptive: bool) -> tuple[bytes, i
     return streams.mesh, 0, streams.permutation, base
 
 
-def decode_points(mesh: bytes, order: bytes, across: bool = False, adaptive: bool = False) -> WeldedMesh:
-    """Mirror of `encode_points`; ``adaptive``: of an adaptive stream. Raises CorruptFile for anything malformed."""
+def decode_points(
+    mesh: bytes,
+    order: bytes,
+    across: bool = False,
+    adaptive: bool = False,
+    n_vertices: int = MAX_VERTICES,
+    n_triangles: int = 2 * MAX_VERTICES,
+) -> WeldedMesh:
+    """Mirror of `encode_points`, for a mesh of at most ``n_vertices`` and ``n_triangles``; raises `CorruptFile`.
+
+    ``adaptive``: of an adaptive stream.
+    """
     cursor = Cursor(mesh, "mesh")
     flags = cursor.take(1)[0] if adaptive else 0
     if flags > ADAPTIVE_MESH + ADAPTIVE_ORDER:
         raise cursor.corrupt(f"flags {flags} are unknown")
-    points, own = _decode_mesh(cursor.block(), bool(flags & ADAPTIVE_MESH))
+    points, own = _decode_mesh(cursor.block(), bool(flags & ADAPTIVE_MESH), n_vertices, n_triangles)
     point_faces = smallest_first(own.astype(np.int64))
     counts = cursor.block()
     is_adaptive = bool(flags & ADAPTIVE_ORDER)
-    faces, point = decode_seams(counts, cursor.rest(), order, point_faces, len(points), across, is_adaptive)
+    faces, point = decode_seams(
+        counts, cursor.rest(), order, point_faces, len(points), across, is_adaptive, n_vertices=n_vertices
+    )
     return WeldedMesh(faces.astype(np.int32), point, points.astype(np.int32), point_faces.astype(np.int32))
 
 
-def _decode_mesh(mesh: bytes, adaptive: bool) -> tuple[Array, Array]:
+def _decode_mesh(mesh: bytes, adaptive: bool, n_vertices: int, n_triangles: int) -> tuple[Array, Array]:
     """Mirror of `_encode_mesh`: points ``(P, 3)`` and triangles over them."""
     if adaptive:
-        return adaptive_mesh.decode_adaptive_mesh(mesh)
-    base = decode_base(mesh, b"")
+        return adaptive_mesh.decode_adaptive_mesh(mesh, n_vertices, n_triangles)
+    base = decode_base(mesh, b"", n_vertices, n_triangles)
     return base.points, base.faces
 
 
 def read_points(bitstream: Bitstream, across: bool = False, adaptive: bool = False) -> WeldedMesh:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
-    mesh = decode_points(bitstream.section("mesh"), bitstream.section("order"), across, adaptive)
+    n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
+    keep_mesh(bitstream)
+    sections = bitstream.section("mesh"), bitstream.section("order")
+    mesh = decode_points(*sections, across, adaptive, n_vertices, n_triangles)
     bitstream.check_size(len(mesh.point), len(mesh.faces))
     return mesh

@@ -13,13 +13,16 @@ checked against what is left before anything is sliced from it.
 from __future__ import annotations
 
 import json
+import re
 import struct
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor
+from gvpipe.container.json_object import JsonObject, unpack_json
 from gvpipe.errors import CorruptFile, NewerVersion, TruncatedFile, corrupt, corrupt_section
 
 MAGIC = b"gvpipe\r\n"
@@ -28,11 +31,13 @@ MAX_SECTIONS = 4096
 MAX_NAME = 64
 MAX_HEADER = 1 << 20  # bytes, inflated
 HEADER = "header"
+NAME = re.compile(rb"[a-z0-9.]+")  # of a section
 
 PREFIX = struct.Struct("<HH")
 ENTRY = struct.Struct("<QI")
 CHECKSUM = struct.Struct("<I")
 
+SLOWEST, FASTEST = 5e-324, 100_000.0  # frames per second
 MAX_FRAMES = 1 << 24
 MAX_VERTICES = 1 << 28
 
@@ -57,6 +62,7 @@ class Bitstream:
         origin: what to add to positions, model units (`gvpipe.origin`); the same for every codec.
         video: an MP4 file whose one track holds the codec's images; empty for codecs that have none, whose files show a
             poster (`gvpipe.rendering.poster`) instead.
+        budget: what its readers may take (`gvpipe.budget`).
     """
 
     codec: str
@@ -69,6 +75,7 @@ class Bitstream:
     sections: Mapping[str, bytes] = field(default_factory=dict)
     video: bytes = b""
     origin: tuple[float, float, float] = NO_ORIGIN
+    budget: Budget = field(default=UNLIMITED, compare=False, repr=False)
 
     def section(self, name: str) -> bytes:
         """Return a section's bytes; raises `CorruptFile` if there is none of that name."""
@@ -84,40 +91,10 @@ class Bitstream:
                 f"{self.n_triangles}; get the file again from its source"
             )
 
-    def number(self, key: str, low: float, high: float) -> float:
-        """Return a number of the header; raises `CorruptFile` unless it lies in ``low..high``."""
-        value: float | None = self.header.get(key)
-        if value is None or not _is_number(value, low, high):
-            raise CorruptFile(f"header: {key!r} is {value!r}; a number in {low}..{high} is needed")
-        return value
-
-    def integer(self, key: str, low: int, high: int) -> int:
-        """Return an integer of the header; raises `CorruptFile` unless it lies in ``low..high``."""
-        value = self.number(key, low, high)
-        if not isinstance(value, int):
-            raise CorruptFile(f"header: {key!r} is {value!r}; an integer is needed")
-        return value
-
-    def numbers(self, key: str, count: int, low: float, high: float) -> tuple[float, ...]:
-        """Return a list of ``count`` numbers of the header; raises `CorruptFile` unless each lies in ``low..high``."""
-        values = self.header.get(key)
-        if not (isinstance(values, list) and len(values) == count and all(_is_number(value, low, high) for value in values)):
-            raise corrupt(f"header: {key!r} is not {count} numbers in {low}..{high}")
-        return tuple(values)
-
-    def integers(self, key: str, count: int, low: int, high: int) -> tuple[int, ...]:
-        """Return a list of ``count`` integers of the header; raises `CorruptFile` unless each lies in ``low..high``."""
-        values = tuple(value for value in self.numbers(key, count, low, high) if isinstance(value, int))
-        if len(values) != count:
-            raise corrupt(f"header: {key!r} is not {count} integers")
-        return values
-
-    def choice(self, key: str, choices: tuple[str, ...]) -> str:
-        """Return a word of the header; raises `CorruptFile` unless it is one of ``choices``."""
-        value = self.header.get(key)
-        if value not in choices:
-            raise CorruptFile(f"header: no {key} {value!r}; there are {', '.join(choices)}")
-        return str(value)
+    @property
+    def fields(self) -> JsonObject:
+        """The header, to be read field by field, each checked against its type and range."""
+        return JsonObject(self.header, HEADER)
 
 
 def pack_payload(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
@@ -143,13 +120,18 @@ def pack_payload(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
     return b"".join([table, CHECKSUM.pack(zlib.crc32(table)), *sections.values()])
 
 
-def unpack_payload(payload: bytes) -> tuple[Bitstream, dict[str, Any]]:
+def unpack_payload(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstream, JsonObject]:
     """Mirror of `pack_payload`: the bitstream without its video, and the container's part of the header.
+
+    Args:
+        payload: the bytes.
+        budget: of the file, which the bitstream carries on to its readers.
 
     Raises:
         NewerVersion: the payload's version is above `VERSION`.
         TruncatedFile: it ends before its sections do.
         CorruptFile: anything else is not as written.
+        OverBudget: the header inflates to more than the file may take.
     """
     if payload[: len(MAGIC)] != MAGIC:
         raise corrupt("the payload does not start with gvpipe's magic")
@@ -164,7 +146,7 @@ def unpack_payload(payload: bytes) -> tuple[Bitstream, dict[str, Any]]:
         entries = []
         for _ in range(count):
             name = cursor.take(min(cursor.take(1)[0], MAX_NAME))
-            entries.append((name.decode("ascii", "replace"), *cursor.struct(ENTRY)))
+            entries.append((name, *cursor.struct(ENTRY)))
         table = payload[: len(payload) - cursor.left]
         (checksum,) = cursor.struct(CHECKSUM)
     except CorruptFile as exc:
@@ -173,15 +155,18 @@ def unpack_payload(payload: bytes) -> tuple[Bitstream, dict[str, Any]]:
         raise
     if zlib.crc32(table) != checksum:
         raise cursor.corrupt("its checksum does not match")
-    return _read_header(_read_sections(cursor, entries))
+    if not all(NAME.fullmatch(name) for name, _, _ in entries):
+        raise cursor.corrupt("a section's name is not of a to z, 0 to 9 and dots")
+    return _read_header(_read_sections(cursor, entries), budget)
 
 
-def _read_sections(cursor: Cursor, entries: list[tuple[str, int, int]]) -> dict[str, bytes]:
+def _read_sections(cursor: Cursor, entries: list[tuple[bytes, int, int]]) -> dict[str, bytes]:
     wanted = sum(length for _, length, _ in entries)
     if wanted > cursor.left:
         raise TruncatedFile(f"the sections need {wanted} bytes, {cursor.left} are there; get the file again from its source")
     sections: dict[str, bytes] = {}
-    for name, length, checksum in entries:
+    for encoded, length, checksum in entries:
+        name = encoded.decode("ascii")
         data = cursor.take(length)
         if zlib.crc32(data) != checksum:
             raise corrupt_section(name, "its checksum does not match")
@@ -192,40 +177,21 @@ def _read_sections(cursor: Cursor, entries: list[tuple[str, int, int]]) -> dict[
     return sections
 
 
-def _read_header(sections: dict[str, bytes]) -> tuple[Bitstream, dict[str, Any]]:
-    try:
-        inflater = zlib.decompressobj()
-        header = json.loads(inflater.decompress(sections.pop(HEADER), MAX_HEADER))
-        bitstream = Bitstream(
-            codec=str(header["codec"]),
-            version=_count(header["version"], 1, 1 << 16),
-            n_frames=_count(header["frames"], 1, MAX_FRAMES),
-            n_vertices=_count(header["vertices"], 1, MAX_VERTICES),
-            n_triangles=_count(header["triangles"], 0, 2 * MAX_VERTICES),
-            fps=float(header["fps"]),
-            header=dict(header["settings"]),
-            sections=sections,
-            origin=_read_origin(header.get("origin", list(NO_ORIGIN))),
-        )
-        if not 0 < bitstream.fps <= 100_000:
-            raise ValueError(f"fps {bitstream.fps}")
-        return bitstream, dict(header["container"])
-    except (KeyError, TypeError, ValueError, OverflowError, RecursionError, zlib.error) as exc:
-        raise corrupt(f"the header is not as gvpipe writes it ({exc})") from exc
-
-
-def _is_number(value: object, low: float, high: float) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
-
-
-def _read_origin(value: object) -> tuple[float, float, float]:
-    if not isinstance(value, list) or len(value) != 3 or not all(_is_number(x, -MAX_ORIGIN, MAX_ORIGIN) for x in value):
-        raise ValueError(f"origin {value!r}")
-    x, y, z = map(float, value)
-    return x, y, z
-
-
-def _count(value: object, low: int, high: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise ValueError(f"{value!r} is not an integer in {low}..{high}")
-    return value
+def _read_header(sections: dict[str, bytes], budget: Budget) -> tuple[Bitstream, JsonObject]:
+    if HEADER not in sections:
+        raise corrupt(f"section {HEADER!r} is missing")
+    header = unpack_json(sections.pop(HEADER), HEADER, MAX_HEADER, budget)
+    x, y, z = header.numbers("origin", 3, -MAX_ORIGIN, MAX_ORIGIN, NO_ORIGIN)
+    bitstream = Bitstream(
+        codec=header.text("codec"),
+        version=header.integer("version", 1, 1 << 16),
+        n_frames=header.integer("frames", 1, MAX_FRAMES),
+        n_vertices=header.integer("vertices", 1, MAX_VERTICES),
+        n_triangles=header.integer("triangles", 0, 2 * MAX_VERTICES),
+        fps=header.number("fps", SLOWEST, FASTEST),
+        header=header.object("settings").plain,
+        sections=sections,
+        origin=(x, y, z),
+        budget=budget,
+    )
+    return bitstream, header.object("container")

@@ -8,9 +8,12 @@ import zlib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.errors import CorruptFile, corrupt_section
 
 MAX_TEXT = 1 << 16  # characters
+BYTES_PER_CHARACTER = 32  # of parsed JSON, at most: "{}," is an object of 64 bytes and its place in a list
+SECONDS_PER_CHARACTER = 0.2e-6
 
 
 class JsonObject:
@@ -137,21 +140,25 @@ def pack_json(values: Mapping[str, Any]) -> bytes:
     return zlib.compress(json.dumps(values, separators=(",", ":"), allow_nan=False, ensure_ascii=False).encode(), 9)
 
 
-def unpack_json(data: bytes, section: str, most: int) -> JsonObject:
+def unpack_json(data: bytes, section: str, most: int, budget: Budget = UNLIMITED) -> JsonObject:
     """Mirror of `pack_json`.
 
     Args:
         data: the section.
         section: its name.
         most: bytes that it may inflate to.
+        budget: of the file.
 
     Raises:
         CorruptFile: it is not deflated JSON of an object, or larger.
+        OverBudget: it inflates to more than the file may take.
     """
+    room = min(most, budget.memory_left // BYTES_PER_CHARACTER)
     try:
         inflater = zlib.decompressobj()
-        text = inflater.decompress(data, most)
-        if inflater.unconsumed_tail or not inflater.eof or inflater.unused_data:
+        text = inflater.decompress(data, int(room) + 1)
+        budget.ask(f"section {section!r}", BYTES_PER_CHARACTER * len(text), SECONDS_PER_CHARACTER * len(text))
+        if len(text) > most or inflater.unconsumed_tail or not inflater.eof or inflater.unused_data:
             raise ValueError(f"more than {most} bytes, or cut short")
         return JsonObject(json.loads(text, parse_constant=_refuse, parse_float=_finite), section)
     except (ValueError, RecursionError, zlib.error) as exc:

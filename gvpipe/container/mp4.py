@@ -25,8 +25,11 @@ from typing import IO, Any
 from uuid import UUID
 
 from gvpipe.atomic import unnamed_path
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.bitstream import VERSION, Bitstream, pack_payload, unpack_payload
-from gvpipe.errors import REMEDY, CorruptFile, InputError, NewerVersion, NotGeometryVideo, StrippedFile, TruncatedFile, corrupt
+from gvpipe.container.sample_tables import check_tables
+from gvpipe.errors import REMEDY, FormatError, InputError, NewerVersion, NotGeometryVideo, StrippedFile, TruncatedFile, corrupt
+from gvpipe.media.picture_limits import picture_limits
 
 BOX_UUID = UUID("6a1f0c52-3d7b-4e0e-9c55-67e4f0a7d1b9")
 TAG = "comment"
@@ -35,6 +38,8 @@ BOX = struct.Struct(">I4s")
 LARGE = struct.Struct(">Q")
 ENCODE_FIRST = "encode the sequence first: gvpipe encode INPUT OUTPUT.mp4"
 MAX_BOXES = 1 << 16
+MAX_CRC = (1 << 32) - 1
+PLAYED = (b"ftyp", b"moov", b"mdat", b"free", b"skip", b"wide", b"uuid")  # boxes that may come before the payload
 
 
 def write_file(bitstream: Bitstream, path: str | os.PathLike[str], check: Callable[[Bitstream], None] | None = None) -> int:
@@ -54,7 +59,7 @@ def write_file(bitstream: Bitstream, path: str | os.PathLike[str], check: Callab
             file.write(video)
             file.write(box)
         if check is not None:
-            check(read_file(temporary))
+            check(read_file(temporary, unlimited=True))
     return len(video) + len(box)
 
 
@@ -68,19 +73,23 @@ def file_size(bitstream: Bitstream) -> int:
     return sum(map(len, _pack(bitstream)))
 
 
-def read_file(path: str | os.PathLike[str]) -> Bitstream:
+def read_file(path: str | os.PathLike[str], unlimited: bool = False) -> Bitstream:
     """Read and check the bitstream of an MP4 file.
+
+    Args:
+        path: of the file.
+        unlimited: let it take whatever memory and work it asks for; by default its size limits both (`gvpipe.budget`).
 
     Raises:
         InputError: there is no such file, or it cannot be read.
-        NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile: see `gvpipe.errors`.
+        NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile, OverBudget: see `gvpipe.errors`.
     """
     path = Path(path)
     try:
         with open(path, "rb") as file:
             size = os.fstat(file.fileno()).st_size
-            return _read(file, size)
-    except (NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile) as exc:
+            return _read(file, size, Budget(None if unlimited else size))
+    except FormatError as exc:
         raise type(exc)(f"{path}: {exc}") from exc
     except IsADirectoryError as exc:
         raise InputError(f"{path} is a folder and no geometry video; {ENCODE_FIRST}") from exc
@@ -93,43 +102,62 @@ def read_file(path: str | os.PathLike[str]) -> Bitstream:
 def bytes_by_part(bitstream: Bitstream, size: int) -> dict[str, int]:
     """Bytes of the codec's sections, of the video's samples and of everything else in a file of ``size`` bytes."""
     parts = {name: len(data) for name, data in bitstream.sections.items()}
-    parts["video"] = _inspect(io.BytesIO(bitstream.video)).n_bytes
+    parts["video"] = _inspect(bitstream.video, bitstream.budget).n_bytes
     return {**parts, "container": size - sum(parts.values())}
 
 
 def _pack(bitstream: Bitstream) -> tuple[bytes, bytes]:
     """The two parts of a file: the video with its tag, the box with the payload."""
     identity = _content_id(bitstream)
-    payload = pack_payload(bitstream, {"id": identity, "video_crc32": _inspect(io.BytesIO(bitstream.video)).checksum})
-    return _remux(bitstream.video, f"{VERSION} {identity}"), _box(payload)
+    track = _inspect(bitstream.video)
+    checksums = {"video_crc32": track.checksum, "track_crc32": track.configuration}
+    return _remux(bitstream.video, f"{VERSION} {identity}"), _box(pack_payload(bitstream, {"id": identity, **checksums}))
 
 
-def _read(file: IO[bytes], size: int) -> Bitstream:
-    video_end, payload_range = _find_payload(file, size)
-    file.seek(0)
-    video = file.read(video_end)
-    track = _inspect(io.BytesIO(video))
-    tag = track.tag
-    if payload_range is None:
-        if tag:
+def _read(file: IO[bytes], size: int, budget: Budget) -> Bitstream:
+    layout = _find_payload(file, size)
+    if layout.payload is None:
+        if _is_tagged(file, layout):
             raise StrippedFile(f"its geometry was stripped, as remuxing or re-encoding does; {REMEDY}")
         raise NotGeometryVideo(f"an MP4 file, but not one that gvpipe wrote; {ENCODE_FIRST}")
+    file.seek(0)
+    video = file.read(layout.video_end)
+    check_tables(video[slice(*layout.moov)], layout.video_end)
+    track = _inspect(video, budget)
+    tag = track.tag
     version = tag.partition(" ")[0]
     if version.isascii() and version.isdecimal() and len(version) < 10 and int(version) > VERSION:
         raise NewerVersion(f"container version {version}, this gvpipe reads up to {VERSION}; upgrade gvpipe")
-    file.seek(payload_range[0])
-    bitstream, container = unpack_payload(file.read(payload_range[1] - payload_range[0]))
+    file.seek(layout.payload[0])
+    bitstream, container = unpack_payload(file.read(layout.payload[1] - layout.payload[0]), budget)
     identity = _content_id(bitstream)
-    if container.get("id") != identity or (tag and tag.split()[-1] != identity):
+    if container.text("id") != identity or (tag and tag.split()[-1] != identity):
         raise corrupt("its geometry belongs to another file")
-    if container.get("video_crc32") != track.checksum:
+    if container.integer("video_crc32", 0, MAX_CRC) != track.checksum:
         raise corrupt("its video is damaged, or was re-encoded")
+    if container.integer("track_crc32", 0, MAX_CRC, track.configuration) != track.configuration:
+        raise corrupt("the description of its video is damaged")
     return replace(bitstream, video=video)
 
 
-def _find_payload(file: IO[bytes], size: int) -> tuple[int, tuple[int, int] | None]:
-    """Walk the top-level boxes: where the video ends, and the payload's range if there is one."""
-    position, found = 0, None
+def _is_tagged(file: IO[bytes], layout: _Layout) -> bool:
+    """Whether a file without a payload has gvpipe's tag; FFmpeg is not asked, since such files may be of any kind."""
+    file.seek(layout.moov[0])
+    return TAG_PREFIX.encode() in file.read(layout.moov[1] - layout.moov[0])
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Where things are in a file: the end of what players read, the ``moov`` box, and the payload if there is one."""
+
+    video_end: int
+    moov: tuple[int, int]
+    payload: tuple[int, int] | None
+
+
+def _find_payload(file: IO[bytes], size: int) -> _Layout:
+    """Walk the top-level boxes."""
+    position, found, moov, alien = 0, None, (0, 0), b""
     kinds: list[bytes] = []
     while position < size:
         file.seek(position)
@@ -158,6 +186,10 @@ def _find_payload(file: IO[bytes], size: int) -> tuple[int, tuple[int, int] | No
                 if found:
                     raise corrupt("it holds two geometries")
                 found = (position, (start + 16, position + length))
+        if not found and (kind not in PLAYED or (kind == b"moov" and kind in kinds)):
+            alien = alien or kind
+        if kind == b"moov" and not found:
+            moov = (position, position + length)
         kinds.append(kind)
         position += length
     if not kinds:
@@ -165,7 +197,11 @@ def _find_payload(file: IO[bytes], size: int) -> tuple[int, tuple[int, int] | No
     for kind in (b"moov", b"mdat"):
         if kind not in kinds:
             raise TruncatedFile(f"its {kind.decode('ascii')} box is missing; {REMEDY}")
-    return (found[0], found[1]) if found else (size, None)
+    if not found:
+        return _Layout(size, moov, None)
+    if alien:
+        raise corrupt(f"a box {alien.decode('ascii')!r} comes before its geometry; gvpipe writes one 'moov' and one 'mdat'")
+    return _Layout(found[0], moov, found[1])
 
 
 def _box(payload: bytes) -> bytes:
@@ -213,25 +249,38 @@ def _remux(video: bytes, tag: str) -> bytes:
 
 @dataclass(frozen=True)
 class _Track:
-    """gvpipe's tag ("" if there is none), and the CRC-32 and size of the samples of the video tracks."""
+    """What an MP4 file's tag says and its video tracks hold.
+
+    Args:
+        tag: gvpipe's tag, "" if there is none.
+        checksum: CRC-32 of the samples; n_bytes: their size.
+        configuration: CRC-32 of what decoders are set up with (the content of ``avcC``), then of one byte for each sample: 1 if
+            it is a key frame.
+    """
 
     tag: str
     checksum: int
     n_bytes: int
+    configuration: int
 
 
-def _inspect(video: IO[bytes]) -> _Track:
+def _inspect(video: bytes, budget: Budget = UNLIMITED) -> _Track:
     import av
 
-    checksum = n_bytes = 0
+    checksum = n_bytes = configuration = 0
     try:
-        with av.open(video, "r", format="mp4") as container:
+        with av.open(io.BytesIO(video), "r", format="mp4", stream_options=picture_limits(budget)) as container:
             comment = str(container.metadata.get(TAG, "")).strip()
             tag = comment.removeprefix(TAG_PREFIX) if comment.startswith(TAG_PREFIX) else ""
             tracks: list[Any] = list(container.streams.video)
+            for track in tracks:
+                context = track.codec_context
+                configuration = zlib.crc32((context.extradata if context else None) or b"", configuration)
             for packet in container.demux(tracks) if tracks else ():
                 checksum = zlib.crc32(bytes(packet), checksum)
                 n_bytes += packet.size
+                if packet.size:
+                    configuration = zlib.crc32(bytes([packet.is_keyframe]), configuration)
     except (av.FFmpegError, UnicodeDecodeError, ValueError) as exc:
         raise corrupt(f"its video cannot be read ({exc})") from exc
-    return _Track(tag, checksum, n_bytes)
+    return _Track(tag, checksum, n_bytes, configuration)

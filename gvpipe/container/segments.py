@@ -36,7 +36,7 @@ def cut(n_frames: int, longest: int, most: int) -> list[int]:
 
 def read_segments(bitstream: Bitstream, most: int, key: str = "segments") -> int:
     """How many segments a header has; raises `CorruptFile` if above ``most``, or if one is empty or too long."""
-    segments = bitstream.integer(key, 1, min(most, bitstream.n_frames))
+    segments = bitstream.fields.integer(key, 1, min(most, bitstream.n_frames))
     if count_longest(bitstream.n_frames, segments) > MAX_SEGMENT:
         raise CorruptFile(f"header: {bitstream.n_frames} frames in {segments} {key}; at most {MAX_SEGMENT} each are allowed")
     return segments
@@ -44,4 +44,4 @@ def read_segments(bitstream: Bitstream, most: int, key: str = "segments") -> int
 
 def read_steps(bitstream: Bitstream, segments: int) -> tuple[float, ...]:
     """Quantisation step of each segment, model units; raises `CorruptFile` for values out of range."""
-    return tuple(map(float, bitstream.numbers("steps", segments, SMALLEST_STEP, LARGEST_STEP)))
+    return bitstream.fields.numbers("steps", segments, SMALLEST_STEP, LARGEST_STEP)

@@ -116,8 +116,8 @@ def correct(bitstream: Bitstream, reader: FrameReader) -> FrameReader:
     """
     if SECTION not in bitstream.sections:
         return reader
-    section = bitstream.section(SECTION)
-    return _Corrected(reader, DisplacementReader(section, bitstream.n_frames, bitstream.n_vertices, SECTION))
+    section, budget = bitstream.section(SECTION), bitstream.budget
+    return _Corrected(reader, DisplacementReader(section, bitstream.n_frames, bitstream.n_vertices, SECTION, budget=budget))
 
 
 class _Corrected:

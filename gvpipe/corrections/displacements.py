@@ -21,12 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.arrays import Float32, Int64
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.container.segments import HUGE, TINY
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import corrupt_section
 
 HEAD = struct.Struct("<d")
+BYTES_PER_GROUP, SECONDS_PER_GROUP = 100, 1e-6
+BYTES_PER_DISPLACED, SECONDS_PER_DISPLACED = 200, 0.5e-6
 MAX_POSITIONS = 1 << 20  # of a group, unless one frame has more
 MAX_STEPS = 1 << 38  # magnitude of a displacement, steps
 NEAR = 3  # magnitudes of the axes before that the contexts of y and z distinguish
@@ -108,13 +111,23 @@ class DisplacementReader:
         n_frames, n_vertices: F, and how many vertices, or points that vertices share, there are displacements for.
         name: of the section, for messages.
         shared: the vertices of each point; None: the section displaces vertices.
+        budget: of the file.
 
     Raises:
         CorruptFile: here or later: the section is not what `encode_displacements` writes.
     """
 
-    def __init__(self, data: bytes, n_frames: int, n_vertices: int, name: str, shared: PointVertices | None = None) -> None:
-        self._shared = shared
+    def __init__(
+        self,
+        data: bytes,
+        n_frames: int,
+        n_vertices: int,
+        name: str,
+        shared: PointVertices | None = None,
+        *,
+        budget: Budget = UNLIMITED,
+    ) -> None:
+        self._shared, self._budget = shared, budget
         cursor = Cursor(data, name)
         (self.step,) = cursor.struct(HEAD)
         if not TINY < self.step < HUGE:  # NaN neither
@@ -122,7 +135,9 @@ class DisplacementReader:
         self.group = cursor.varint(most_frames(n_vertices), "the frames of a group")
         if not self.group:
             raise cursor.corrupt("its groups have no frames")
-        lengths = [cursor.varint(cursor.left, "a length") for _ in range(-(-n_frames // self.group))]
+        n_groups = -(-n_frames // self.group)
+        budget.keep(f"section {name!r}", BYTES_PER_GROUP * n_groups, SECONDS_PER_GROUP * n_groups)
+        lengths = [cursor.varint(cursor.left, "a length") for _ in range(n_groups)]
         self._groups = [cursor.take(length) for length in lengths]
         cursor.end()
         self._n_frames, self._n_vertices, self._name = n_frames, n_vertices, name
@@ -144,13 +159,13 @@ class DisplacementReader:
         last = self._last  # once: other threads may read too
         if last is None or last[0] != number:
             n_frames = min(self.group, self._n_frames - number * self.group)
-            found = decode_group(self._groups[number], n_frames, self._n_vertices, self._name)
+            found = decode_group(self._groups[number], n_frames, self._n_vertices, self._name, self._budget)
             last = self._last = (number, self._shared.spread(found) if self._shared else found)
         return last[1]
 
 
-def decode_group(data: bytes, n_frames: int, n_vertices: int, name: str) -> Displacements:
-    """Mirror of `encode_group`; raises `CorruptFile`."""
+def decode_group(data: bytes, n_frames: int, n_vertices: int, name: str, budget: Budget = UNLIMITED) -> Displacements:
+    """Mirror of `encode_group`; raises `CorruptFile`, or `OverBudget` if it displaces more than the file may."""
     if not data:
         none = np.zeros(0, np.int64)
         return Displacements(none, none, np.zeros((0, 3), np.int64))
@@ -160,6 +175,7 @@ def decode_group(data: bytes, n_frames: int, n_vertices: int, name: str) -> Disp
     def take(count: int, contexts: Int64 | None = None) -> Int64:
         return decode_integers(cursor.block(), count, contexts, name)
 
+    budget.ask(f"section {name!r}", BYTES_PER_DISPLACED * n_runs, SECONDS_PER_DISPLACED * n_runs)
     gaps, lengths = take(n_runs), take(n_runs) + 1
     limit = n_frames * n_vertices
     if gaps.min(initial=0) < 0 or lengths.min(initial=1) < 1 or max(gaps.max(initial=0), lengths.max(initial=0)) > limit:
@@ -167,7 +183,10 @@ def decode_group(data: bytes, n_frames: int, n_vertices: int, name: str) -> Disp
     ends = np.cumsum(gaps + lengths)
     if n_runs and not (0 < ends[-1] <= limit and (np.diff(ends) > 0).all()):
         raise cursor.corrupt("its runs do not fit the frames and vertices")
-    at = np.repeat(ends - np.cumsum(lengths), lengths) + np.arange(int(lengths.sum()))
+    n_displaced = int(lengths.sum())
+    what = f"section {name!r}, {n_displaced} displacements in {n_frames} frames,"
+    budget.ask(what, BYTES_PER_DISPLACED * n_displaced, SECONDS_PER_DISPLACED * n_displaced)
+    at = np.repeat(ends - np.cumsum(lengths), lengths) + np.arange(n_displaced)
     x = take(len(at))
     y = take(len(at), _context(x))
     z = take(len(at), _context(x, y))

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from gvpipe.arrays import Array
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.errors import InputError
 from gvpipe.fields.derived import Motion, Positions, Span
 from gvpipe.fields.head import read_head
@@ -23,14 +24,25 @@ class FieldReader:
         mesh: the field's rows, as when it was encoded.
         name: of the section, for messages.
         positions: as for the encoder: needed if it had them.
+        budget: of the file.
 
     Raises:
         CorruptFile: here or later: the section is not what `gvpipe.fields.encoder.encode_field` writes.
     """
 
-    def __init__(self, data: bytes, n_frames: int, mesh: FieldMesh, name: str, positions: Positions | None = None) -> None:
+    def __init__(
+        self,
+        data: bytes,
+        n_frames: int,
+        mesh: FieldMesh,
+        name: str,
+        positions: Positions | None = None,
+        *,
+        budget: Budget = UNLIMITED,
+    ) -> None:
         self._head, self._segments = read_head(data, n_frames, mesh.n_rows, name)
         self._bounds = self._head.bounds(n_frames)
+        self._budget = budget
         self._mesh, self._name, self._n_frames = mesh, name, n_frames
         self._motion = None if positions is None else Motion(positions, n_frames, mesh)
         self._last: tuple[int, Array] | None = None
@@ -75,7 +87,7 @@ class FieldReader:
         last = self._last  # once: other threads may read too
         if last is None or last[0] != s:
             span = None if self._motion is None else Span(self._motion, self._bounds[s], self._bounds[s + 1])
-            place = Place(self._mesh.causal, self._name, span)
+            place = Place(self._mesh.causal, self._name, span, self._budget)
             shape = (self._bounds[s + 1] - self._bounds[s], *self.shape[1:])
             last = self._last = s, decode_segment(self._segments[s], shape, self.dtype, place)
         return last[1]

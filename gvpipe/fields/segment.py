@@ -31,6 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Array, Float64, Int64
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.segments import LARGEST_STEP
 from gvpipe.entropy.integers import decode_integers
@@ -46,6 +47,8 @@ from gvpipe.trajectory.causal_order import CausalOrder
 EXACT, PREDICTION, TRAJECTORIES, DERIVED = range(4)
 MODES = ("exact", "prediction", "trajectories", "derived")
 STEP = struct.Struct("<d")
+BYTES_PER_VALUE, SECONDS_PER_VALUE = 40, 0.4e-6
+BYTES_PER_FLAG, SECONDS_PER_FLAG = 24, 0.2e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +59,13 @@ class Place:
         causal: the order of the R rows.
         name: of the section, for messages.
         span: the motion of the segment's frames; None where positions are not known.
+        budget: of the file.
     """
 
     causal: CausalOrder
     name: str
     span: Span | None = None
+    budget: Budget = UNLIMITED
 
 
 def decode_segment(data: bytes, shape: tuple[int, ...], dtype: np.dtype[np.generic], place: Place) -> Array:
@@ -81,7 +86,12 @@ def decode_segment(data: bytes, shape: tuple[int, ...], dtype: np.dtype[np.gener
     """
     n_frames, n_rows, n_components = shape
     cursor = Cursor(data, place.name)
-    holes = decode_holes(cursor.block(), (n_frames, n_rows, n_components), place.causal, place.name)
+    n_values, what = n_frames * n_rows * n_components, f"section {place.name!r}, {n_frames} frames of {n_rows} rows,"
+    place.budget.ask(what, dtype.itemsize * n_values)
+    mask = cursor.block()
+    if mask:
+        place.budget.ask(what, BYTES_PER_FLAG * n_values, SECONDS_PER_FLAG * n_values)
+    holes = decode_holes(mask, (n_frames, n_rows, n_components), place.causal, place.name)
     if holes is not None and dtype.kind != "f":
         raise cursor.corrupt("integers have holes")
     frames = _decode_holds(cursor.block(), n_frames, place.name)
@@ -90,6 +100,9 @@ def decode_segment(data: bytes, shape: tuple[int, ...], dtype: np.dtype[np.gener
     if mode >= len(MODES) or (flags > 1).any():
         raise cursor.corrupt(f"its mode is {mode}, its flags {flags.tolist()}")
     constant = flags > 0
+    n_coded = (int(frames[-1]) + 1) * n_rows * int((~constant).sum())
+    memory = dtype.itemsize * n_values + (dtype.itemsize + 1) * (int(frames[-1]) + 1) * n_rows * n_components
+    place.budget.ask(what, memory + BYTES_PER_VALUE * n_coded, SECONDS_PER_VALUE * n_coded)
     result = np.zeros((int(frames[-1]) + 1, n_rows, n_components), dtype)
     if n_rows:
         result[:, :, constant] = cursor.array(dtype.str, int(constant.sum()))
@@ -142,7 +155,7 @@ def _decode_numbers(cursor: Cursor, way: tuple[int, bool], kept: tuple[int, Int6
     if flags:
         still = decode_residuals(flags, 1, 1, causal, cursor.name)[:, 0] != 0
     if mode == TRAJECTORIES:
-        columns = decode_trajectories(cursor.rest(), (n_frames, n_components), causal, cursor.name)
+        columns = decode_trajectories(cursor.rest(), (n_frames, n_components), causal, cursor.name, place.budget)
         return np.asarray(by_frame(columns, n_frames) * step)
     base = None
     if mode == DERIVED:

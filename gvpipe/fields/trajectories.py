@@ -17,6 +17,7 @@ import struct
 import numpy as np
 
 from gvpipe.arrays import Float64
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.segments import LARGEST_STEP
 from gvpipe.fields.residual_coding import LARGEST, decode_residuals, encode_residuals
@@ -54,7 +55,9 @@ def encode_trajectories(target: Float64, n_frames: int, causal: CausalOrder, sha
     return STEP.pack(reduced.step) + pack_block(reduced.basis) + pack_block(coefficients) + corrections
 
 
-def decode_trajectories(data: bytes, shape: tuple[int, int], causal: CausalOrder, name: str) -> Float64:
+def decode_trajectories(
+    data: bytes, shape: tuple[int, int], causal: CausalOrder, name: str, budget: Budget = UNLIMITED
+) -> Float64:
     """Mirror of `encode_trajectories`: values ``(R, N)`` in steps.
 
     Args:
@@ -62,6 +65,7 @@ def decode_trajectories(data: bytes, shape: tuple[int, int], causal: CausalOrder
         shape: F and C.
         causal: the order of the R rows.
         name: of the section, for messages.
+        budget: of the file.
 
     Raises:
         CorruptFile: the bytes are not what the encoder writes.
@@ -72,7 +76,7 @@ def decode_trajectories(data: bytes, shape: tuple[int, int], causal: CausalOrder
     if not 0 < step <= LARGEST_STEP:  # NaN neither
         raise cursor.corrupt(f"a step of coefficients is {step}")
     n_rows = len(causal.order)
-    basis = decode_basis(cursor.block(), n_frames, n_rows, step, name, n_axes)
+    basis = decode_basis(cursor.block(), n_frames, n_rows, step, name, n_axes, budget=budget)
     n_components = basis.vectors.shape[1]
     residuals = decode_residuals(cursor.block(), n_components, max(1, n_components), causal, name)
     decoded = np.zeros(residuals.shape)

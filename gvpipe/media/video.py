@@ -29,16 +29,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.arrays import Float64, Integers, UInt8
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.errors import CorruptFile, InputError, corrupt
 from gvpipe.forks import renew_after_fork
 from gvpipe.media.jpeg import decode_jpeg, encode_jpeg
+from gvpipe.media.picture_limits import BYTES_PER_PIXEL, picture_limits
 
 if TYPE_CHECKING:
     import av
 
 B_FRAMES = 8  # between two others, at most
 AHEAD = 2  # groups of pictures decoded ahead of the reader
+SPARE_PIXELS = 1 << 16  # for margins that FFmpeg adds
 MAX_SIDE = 16384  # pixels, of a picture that is read
+SECONDS_PER_PIXEL = 3e-9  # of H.264 without residuals, the cheapest
 QP_RANGE = (1, 51)  # 0 would be lossless, which is another H.264 profile that browsers do not read
 # measured on chicken, cow and samba (docs/decisions/0094-mcgv-x264-settings.md): psycho-visual choices and the deblocking
 # filter only cost here, since blocks are separate charts; long pyramids of B-frames (`B_FRAMES`) suit residuals that change
@@ -208,14 +212,17 @@ class VideoReader:
         data: an MP4 file.
         profile: that it was written with.
         width, height: of a plane.
+        budget: of the file.
 
     Raises:
         CorruptFile: no such video track.
+        OverBudget: here or later: pictures take more than the file may.
     """
 
-    def __init__(self, data: bytes, profile: Profile, width: int, height: int) -> None:
-        self.profile, self.shape = profile, (height, width)
-        self._packets, self._extradata = _demux(data, profile, width, height)
+    def __init__(self, data: bytes, profile: Profile, width: int, height: int, budget: Budget = UNLIMITED) -> None:
+        self.profile, self.shape, self._budget = profile, (height, width), budget
+        budget.ask(f"a picture of {width}x{height}", BYTES_PER_PIXEL * width * height)
+        self._packets, self._extradata = _demux(data, profile, width, height, budget)
         starts = [i for i, packet in enumerate(self._packets) if packet.is_keyframe]
         if not starts or starts[0] != 0:
             raise corrupt("the video does not start with a key frame")
@@ -275,6 +282,7 @@ class VideoReader:
         if number != group:
             first, last = self._groups[group]
             packets = self._packets[first:last]
+            self._ask_for(len(packets))
             if self.profile.codec == "mjpeg":
                 planes = [decode_jpeg(bytes(packet), *self.shape) for packet in packets]
             else:
@@ -282,12 +290,21 @@ class VideoReader:
             self._cached = (group, planes)
         return planes
 
+    def _ask_for(self, n_pictures: int) -> None:
+        """Check that there is room for a group, which is decoded whole."""
+        pixels = n_pictures * self.shape[0] * self.shape[1]
+        size = pixels * self.profile.dtype.itemsize * 3 // 2  # with chroma, which the decoder's memory holds
+        what = f"a group of {n_pictures} pictures of {self.shape[1]}x{self.shape[0]}"
+        self._budget.ask(what, size, SECONDS_PER_PIXEL * pixels)
+
     def _decode_h264(self, packets: list[av.Packet[Any]]) -> list[Plane]:
         import av
 
         decoder = av.CodecContext.create("h264", "r")
         decoder.extradata = self._extradata
         decoder.thread_count = 1
+        height, width = self.shape
+        decoder.options = {"max_pixels": str(2 * width * height + SPARE_PIXELS)}  # whatever the packets say
         try:
             pictures: list[Any] = []
             for packet in packets:
@@ -349,11 +366,11 @@ def x264_options(quality: int, gop: int, preset: str, b_frames: int = B_FRAMES) 
     return {"preset": preset, "x264-params": ":".join(f"{key}={value}" for key, value in settings.items())}
 
 
-def _demux(data: bytes, profile: Profile, width: int, height: int) -> tuple[list[av.Packet[Any]], bytes | None]:
+def _demux(data: bytes, profile: Profile, width: int, height: int, budget: Budget) -> tuple[list[av.Packet[Any]], bytes | None]:
     import av
 
     try:
-        with av.open(io.BytesIO(data), "r", format="mp4") as container:
+        with av.open(io.BytesIO(data), "r", format="mp4", stream_options=picture_limits(budget)) as container:
             if len(container.streams.video) != 1:
                 raise CorruptFile(f"the file has {len(container.streams.video)} video tracks; one is needed")
             stream = container.streams.video[0]

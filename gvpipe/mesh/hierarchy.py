@@ -20,8 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.arrays import Int32
+from gvpipe.budget import Budget
 
 MAX_WAVES = 64
+PEAK_PER_VERTEX, PEAK_PER_TRIANGLE = 120, 230  # bytes, with the weights of a causal order
+KEPT_PER_VERTEX, KEPT_PER_TRIANGLE = 60, 180
+SECONDS_PER_VERTEX, SECONDS_PER_TRIANGLE = 1e-6, 2e-6
 MIN_BLOCK = 48  # vertices; smaller waves are joined to one block, since a block is coded at once
 
 
@@ -45,6 +49,14 @@ class Hierarchy:
     rings: Int32
     blocks: Int32
     waves: Int32
+
+
+def keep_hierarchy(budget: Budget, n_vertices: int, n_triangles: int) -> None:
+    """Check that a file may take the memory and work of a hierarchy and of what follows from it; raises `OverBudget`."""
+    what = f"a hierarchy of {n_vertices} vertices and {n_triangles} triangles"
+    budget.ask(what, PEAK_PER_VERTEX * n_vertices + PEAK_PER_TRIANGLE * n_triangles)
+    seconds = SECONDS_PER_VERTEX * n_vertices + SECONDS_PER_TRIANGLE * n_triangles
+    budget.keep(what, KEPT_PER_VERTEX * n_vertices + KEPT_PER_TRIANGLE * n_triangles, seconds)
 
 
 def build_hierarchy(faces: Int32, n_vertices: int) -> Hierarchy:

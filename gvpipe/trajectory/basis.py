@@ -27,6 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Float64, Int64
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_vectors, encode_vectors
@@ -37,6 +38,7 @@ THRESHOLD = 0.2
 NEGLIGIBLE = 0.01  # part of the error that all components left out may add
 ROUNDING = 1e-13  # of the total energy: eigenvalues below are noise
 MAX_COMPONENTS = 1 << 14
+BYTES_PER_VALUE, SECONDS_PER_VALUE = 40, 0.3e-6  # of a basis or of coefficients: residuals, contexts, numbers, a copy
 MAX_SCALE = 8 * 64  # scales run from 2**-64 to 2**64 steps
 PER_OCTAVE = 8
 ROOTS = np.array([math.isqrt(math.isqrt(math.isqrt(1 << (8 * 60 + i)))) / 2**60 for i in range(PER_OCTAVE)])  # 2 ** (i / 8)
@@ -206,10 +208,27 @@ def encode_basis(principal: Principal, n_components: int, n_points: int, step: f
     return varint(n_components) + pack_block(head) + data, Basis(decoded[:, 0], decoded[:, 1:])
 
 
-def decode_basis(data: bytes, n_frames: int, n_points: int, step: float, name: str, n_axes: int = 3) -> Basis:
-    """Mirror of `encode_basis`; raises `CorruptFile` if the bytes are not what it writes."""
+def decode_basis(
+    data: bytes,
+    n_frames: int,
+    n_points: int,
+    step: float,
+    name: str,
+    n_axes: int = 3,
+    *,
+    budget: Budget = UNLIMITED,
+) -> Basis:
+    """Mirror of `encode_basis`.
+
+    Raises:
+        CorruptFile: the bytes are not what it writes.
+        OverBudget: the basis and the coefficients of ``n_points`` take more than the file may.
+    """
     cursor = Cursor(data, name)
     n_components = cursor.varint(min(MAX_COMPONENTS, n_axes * n_frames), "the number of components")
+    n_values = (n_points + n_axes * n_frames) * (n_components + 1)
+    what = f"section {name!r}, {n_components} trajectories over {n_frames} frames for {n_points} points,"
+    budget.ask(what, BYTES_PER_VALUE * n_values, SECONDS_PER_VALUE * n_values)
     head = cursor.block()
     levels = np.cumsum(decode_integers(head, n_components, name=name))
     if (np.abs(levels) > MAX_SCALE).any():

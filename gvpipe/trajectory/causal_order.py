@@ -42,7 +42,7 @@ def select_vectors(causal: CausalOrder, keep: Bool) -> CausalOrder:
 
 def leave_out(causal: CausalOrder, given: Bool) -> CausalOrder:
     """Leave out the vectors that ``given (n,)`` marks, which are decoded beforehand; vectors keep their numbers."""
-    return _keep_ranks(causal, ~given[causal.order])
+    return _keep_ranks(causal, ~given[causal.order]) if given.any() else causal
 
 
 def _keep_ranks(causal: CausalOrder, keep: Bool) -> CausalOrder:

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int32
+from gvpipe.arrays import Float64, Int32
 from gvpipe.mesh.hierarchy import Hierarchy
 from gvpipe.trajectory.causal_order import CausalOrder
 
 OVERSHOOT = 0.2
 RING_VARIANCE, FAR_VARIANCE = 0.3, 0.1  # of the weights
 TRAVERSAL_BLOCK = 512  # vertices of a traversal that are entropy coded at once
+BLOCK = 1 << 13  # vertices whose priors are worked out at once
 SURE, LEAST = (
     512,
     0.05,
@@ -28,30 +29,43 @@ SURE, LEAST = (
 
 def hierarchy_order(hierarchy: Hierarchy, overshoot: float = OVERSHOOT) -> CausalOrder:
     """Return the order of all V vertices, coarse to fine; ``overshoot`` must be 0 for predictors that see the ring alone."""
-    counts = np.diff(hierarchy.starts)
-    rank = np.repeat(np.arange(len(counts)), counts)  # of the vertex that a neighbour belongs to
-    number = np.arange(len(rank)) - hierarchy.starts[rank]  # of the neighbour among that vertex' own
-    ring = np.abs(hierarchy.rings)[rank]
-    beyond = counts[rank] - ring
-    in_ring = number < ring
-    extra = overshoot * (beyond > 0)
-    weights = np.where(in_ring, (1 + extra) / np.maximum(ring, 1), -extra / np.maximum(beyond, 1))
-    at_boundary = hierarchy.rings[rank] < 0
-    ends = (number == 0) | (number == ring - 1)
-    weights = np.where(at_boundary, np.where(ends & (ring > 1), 0.5, 1.0 * (ring == 1)), weights)
-    coarse = ring == 0
-    parallelogram = np.where(number == 2, -1.0, 1.0)
-    weights = np.where(coarse, np.where(beyond == 3, parallelogram, 1 / np.maximum(beyond, 1)), weights)
+    n_pairs = len(hierarchy.neighbours)
+    weights, variances = np.empty(n_pairs), np.empty(n_pairs)
+    for first in range(0, len(hierarchy.rings), BLOCK):  # at once, they would take most of the memory
+        block = slice(first, first + BLOCK)
+        pairs = slice(int(hierarchy.starts[first]), int(hierarchy.starts[block.start : block.stop + 1][-1]))
+        weights[pairs], variances[pairs] = _priors(hierarchy, block, overshoot)
     return CausalOrder(
         order=hierarchy.order,
         starts=hierarchy.starts,
         neighbours=hierarchy.neighbours,
         weights=weights,
-        variances=np.where(in_ring | coarse, RING_VARIANCE, FAR_VARIANCE) * np.clip(rank / SURE, LEAST, 1.0),
+        variances=variances,
         ring_sizes=np.abs(hierarchy.rings),
         blocks=hierarchy.blocks,
         affine=True,
     )
+
+
+def _priors(hierarchy: Hierarchy, block: slice, overshoot: float) -> tuple[Float64, Float64]:
+    """Prior weights and variances of the neighbours of a block of vertices, each as long as these neighbours."""
+    starts = hierarchy.starts[block.start : block.stop + 1]
+    counts, rings = np.diff(starts), hierarchy.rings[block]
+    own = np.repeat(np.arange(len(counts)), counts)  # the block's vertex that a neighbour belongs to
+    number = np.arange(len(own)) - (starts - starts[0])[own]  # of the neighbour among that vertex' own
+    ring = np.abs(rings)[own]
+    beyond = counts[own] - ring
+    in_ring = number < ring
+    extra = overshoot * (beyond > 0)
+    weights = np.where(in_ring, (1 + extra) / np.maximum(ring, 1), -extra / np.maximum(beyond, 1))
+    at_boundary = rings[own] < 0
+    ends = (number == 0) | (number == ring - 1)
+    weights = np.where(at_boundary, np.where(ends & (ring > 1), 0.5, 1.0 * (ring == 1)), weights)
+    coarse = ring == 0
+    parallelogram = np.where(number == 2, -1.0, 1.0)
+    weights = np.where(coarse, np.where(beyond == 3, parallelogram, 1 / np.maximum(beyond, 1)), weights)
+    rank = block.start + own
+    return weights, np.where(in_ring | coarse, RING_VARIANCE, FAR_VARIANCE) * np.clip(rank / SURE, LEAST, 1.0)
 
 
 def traversal_order(faces: Int32, n_vertices: int) -> CausalOrder:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Bool, Float32, Float64, Int32, Integers
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
 from gvpipe.container.bitstream import Bitstream
@@ -33,6 +34,8 @@ from gvpipe.trajectory.still_vertices import decode_flags, encode_flags, find_st
 
 SECTION = "still"
 HEAD = struct.Struct("<d3f")
+BYTES_PER_STILL, SECONDS_PER_STILL = 240, 1e-6
+SECONDS_PER_PRODUCT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -57,14 +60,19 @@ class StillPoints:
         """How many components a segment may have, still points counted."""
         return MAX_VALUES // len(self.flags)
 
-    def given(self, basis: Basis) -> Float64 | None:
+    def given(self, basis: Basis, budget: Budget = UNLIMITED) -> Float64 | None:
         """``(P, R)`` coefficients of the still points in a segment's decoded basis, in closest fit; None if all points move.
 
         Raises:
             CorruptFile: more than `most_components`.
+            OverBudget: their trajectories take more than the file may.
         """
         if not self.flags.any():
             return None
+        n_still, n_coordinates = len(self.flags) - self.n_moving, len(basis.mean)
+        n_values = n_still * (2 * n_coordinates + 3 * basis.vectors.shape[1])
+        what = f"coefficients of {n_still} still points over {n_coordinates // 3} frames"
+        budget.ask(what, 8 * n_values, SECONDS_PER_PRODUCT * n_still * n_coordinates * basis.vectors.shape[1])
         if basis.vectors.shape[1] > self.most_components:
             size = f"{basis.vectors.shape[1]} components of {len(self.flags)} points"
             raise corrupt_section(SECTION, f"{size}")
@@ -99,6 +107,7 @@ def read_still(bitstream: Bitstream, mesh: Topology) -> StillPoints:
     """Decode the section of a bitstream, none if it has none; raises `CorruptFile`."""
     if SECTION not in bitstream.sections:
         return no_still(mesh.n_points)
+    bitstream.budget.ask(f"{mesh.n_points} still points", BYTES_PER_STILL * mesh.n_points, SECONDS_PER_STILL * mesh.n_points)
     return decode_still(bitstream.section(SECTION), mesh.point_faces, mesh.n_points)
 
 

@@ -67,6 +67,8 @@ def export_html(
     up: str | None = None,
     quality: float | None = None,
     progress: Progress | None = None,
+    *,
+    unlimited: bool = False,
 ) -> ExportReport:
     """Write a page of one file that plays a geometry video.
 
@@ -77,6 +79,7 @@ def export_html(
         quality: 0..100, of the conversion where there is one: the error that it may add (`gvpipe.quality_scale`); `QUALITY` if
             None.
         progress: called with a stage's name and the part of it that is done.
+        unlimited: let the geometry video take whatever memory and work it asks for (`gvpipe.player.Player`).
 
     Raises:
         InputError: there is no such file, or an argument cannot be used.
@@ -90,7 +93,7 @@ def export_html(
         raise InputError(f"up is {up!r}; one of {', '.join(AXES)} is needed")
     if not os.path.isdir(target.parent):
         raise OutputError(f"cannot write {target}: no folder {target.parent}; create it first")
-    player = Player(source)
+    player = Player(source, unlimited=unlimited)
     if up is None:
         up = player.metadata.up_axis if player.metadata.up_axis in AXES else "y"
     obstacle = browser_obstacle(player.bitstream)

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gvpipe.errors import CorruptFile
-from gvpipe.media.jpeg import decode_jpeg, encode_jpeg
+from gvpipe.media.jpeg import END_OF_IMAGE, decode_jpeg, encode_jpeg
 
 SIZES = [(8, 8), (16, 48), (50, 34), (1, 1), (7, 129)]
 STEPS = [255, 100, 40, 16, 8, 4, 2, 1]
@@ -87,3 +87,16 @@ def test_hostile_data() -> None:
         except CorruptFile:
             continue
         assert back.shape == (24, 40) and back.dtype == np.uint8
+
+
+def test_other_formats_and_colours_are_refused_before_they_are_decoded() -> None:
+    plane = np.zeros((24, 40), np.uint8)
+    for kind in (".bmp", ".png", ".tiff"):
+        data = cv2.imencode(kind, plane)[1].tobytes() + END_OF_IMAGE
+        with pytest.raises(CorruptFile, match="no JPEG"):
+            decode_jpeg(data, 24, 40)
+    progressive = cv2.imencode(".jpg", plane, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1].tobytes()
+    with pytest.raises(CorruptFile, match="no JPEG"):
+        decode_jpeg(progressive, 24, 40)
+    with pytest.raises(CorruptFile, match="3 components"):
+        decode_jpeg(cv2.imencode(".jpg", np.zeros((24, 40, 3), np.uint8))[1].tobytes(), 24, 40)

@@ -67,15 +67,16 @@ class CoefficientCoding:
     @classmethod
     def of(cls, bitstream: Bitstream) -> CoefficientCoding:
         """From the header of a bitstream; raises `CorruptFile` for values out of range."""
+        fields = bitstream.fields
         return cls(
-            bitstream.choice("operator", OPERATORS),
-            bitstream.choice("delta_prediction", DELTA_PREDICTIONS),
-            bitstream.integer("anchors", 1, MAX_SPACING),
-            bitstream.choice("anchor_choice", ANCHOR_CHOICES),
-            float(bitstream.number("edge_power", 0, MOST_POWER)),
-            float(bitstream.number("average_step", FINEST, COARSEST)),
-            float(bitstream.number("anchor_ratio", LEAST_RATIO, MOST_RATIO)),
-            float(bitstream.number("basis_ratio", LEAST_RATIO, MOST_RATIO)),
+            fields.choice("operator", OPERATORS),
+            fields.choice("delta_prediction", DELTA_PREDICTIONS),
+            fields.integer("anchors", 1, MAX_SPACING),
+            fields.choice("anchor_choice", ANCHOR_CHOICES),
+            fields.number("edge_power", 0, MOST_POWER),
+            fields.number("average_step", FINEST, COARSEST),
+            fields.number("anchor_ratio", LEAST_RATIO, MOST_RATIO),
+            fields.number("basis_ratio", LEAST_RATIO, MOST_RATIO),
         )
 
 

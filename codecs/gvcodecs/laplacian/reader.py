@@ -75,10 +75,17 @@ class LaplacianReader:
         if self._kept is None or self._kept[0] != s:
             step, section = self._header.steps[s], self._bitstream.section
             name, n_frames = f"basis.{s}", self._bounds[s + 1] - self._bounds[s]
-            basis = decode_basis(section(name), n_frames, self._still.n_moving, step * self._header.coding.basis_ratio, name)
+            basis = decode_basis(
+                section(name),
+                n_frames,
+                self._still.n_moving,
+                step * self._header.coding.basis_ratio,
+                name,
+                budget=self._bitstream.budget,
+            )
             names = (f"anchors.{s}", f"deltas.{s}")
             anchors, deltas = (section(name) for name in names)
-            n_components, given = basis.vectors.shape[1], self._still.given(basis)
+            n_components, given = basis.vectors.shape[1], self._still.given(basis, self._bitstream.budget)
             domain, coding = self._domain, self._header.coding
             coefficients = decode_coefficients(anchors, deltas, n_components, step, domain, coding, names, given)
             self._kept = s, Segment(basis, np.ascontiguousarray(coefficients.T))

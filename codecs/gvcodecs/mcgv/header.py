@@ -35,6 +35,7 @@ from typing import Any
 
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.lattice_field import read_lattice
 from gvpipe.container.segments import HUGE, TINY
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import MAX_SIDE, PROFILES, Profile
@@ -104,36 +105,34 @@ class Header:
         """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
         if "pictures" in bitstream.header:
             return cls._without_pictures(bitstream)
-        words = {"prediction": "affine", "placement": "charts"} if bitstream.version == 1 else bitstream.header
-        prediction, placement = str(words.get("prediction")), str(words.get("placement"))
-        if prediction not in PREDICTIONS or placement not in PLACEMENTS:
-            raise CorruptFile(f"header: no prediction {prediction!r} with placement {placement!r}; one of them is unknown")
+        fields = bitstream.fields
+        prediction, placement = "affine", "charts"
+        if bitstream.version > 1:
+            prediction, placement = fields.choice("prediction", PREDICTIONS), fields.choice("placement", PLACEMENTS)
         if placement == "tiles" and prediction != "blended":
-            raise CorruptFile(f"header: no placement {placement!r} with prediction {prediction!r}; get the file again")
-        profile = PROFILES.get(str(bitstream.header.get("profile")))
-        if profile is None:
-            raise CorruptFile(f"header: no profile {bitstream.header.get('profile')!r}; there are {', '.join(PROFILES)}")
+            raise fields.wrong("placement", "another one with prediction affine")
+        profile = PROFILES[fields.choice("profile", tuple(PROFILES))]
         segments = _read_segments(bitstream)
         images = TrajectoryHeader.of(bitstream, segments)
         header = cls(
             prediction=prediction,
             placement=placement,
             profile=profile,
-            block=bitstream.integer("block", 2, 64),
-            width=bitstream.integer("width", 2, MAX_SIDE),
-            height=bitstream.integer("height", 2, MAX_SIDE // 3),
-            clusters=bitstream.integer("clusters", 1, MAX_CLUSTERS),
+            block=fields.integer("block", 2, 64),
+            width=fields.integer("width", 2, MAX_SIDE),
+            height=fields.integer("height", 2, MAX_SIDE // 3),
+            clusters=fields.integer("clusters", 1, MAX_CLUSTERS),
             segments=segments,
-            base=_read_base(bitstream),
-            transform_step=1.0 if images else bitstream.number("transform_step", TINY, HUGE),
-            residual_step=1.0 if images else bitstream.number("residual_step", TINY, HUGE),
-            outliers="outliers" in bitstream.header,
+            base=read_lattice(fields),
+            transform_step=1.0 if images else fields.number("transform_step", TINY, HUGE),
+            residual_step=1.0 if images else fields.number("residual_step", TINY, HUGE),
+            outliers=fields.flag("outliers"),
             images=images,
         )
-        if header.outliers and (bitstream.header["outliers"] is not True or bitstream.version == 1 or images):
-            raise CorruptFile(f"header: no outliers {bitstream.header['outliers']!r} in such a file; get the file again")
+        if "outliers" in fields and (not header.outliers or bitstream.version == 1 or images):
+            raise fields.wrong("outliers", "none in such a file")
         if images and (prediction != "blended" or profile.codec != "h264"):
-            raise CorruptFile(f"header: no trajectory images with prediction {prediction!r} and profile {profile.name!r}")
+            raise fields.wrong("transform", f"none with prediction {prediction} and profile {profile.name}")
         if header.width % header.block or header.height % header.block:
             raise CorruptFile(f"header: planes of {header.width}x{header.height} are not whole blocks of {header.block}")
         if placement != "charts" and header.block not in (8, 16):
@@ -142,27 +141,19 @@ class Header:
 
     @classmethod
     def _without_pictures(cls, bitstream: Bitstream) -> Header:
+        fields = bitstream.fields
         alien = [key for key in (*OF_PICTURES, "outliers", "transform") if key in bitstream.header]
-        if bitstream.header["pictures"] is not False or bitstream.version < 4 or alien:
-            raise CorruptFile(f"header: pictures {bitstream.header['pictures']!r} beside {alien}; get the file again")
+        if fields.flag("pictures") or bitstream.version < 4 or alien:
+            raise fields.wrong("pictures", f"none of {', '.join(alien) or 'it in such a file'}")
         return cls(
-            prediction=bitstream.choice("prediction", ("blended",)),
-            clusters=bitstream.integer("clusters", 1, MAX_CLUSTERS),
+            prediction=fields.choice("prediction", ("blended",)),
+            clusters=fields.integer("clusters", 1, MAX_CLUSTERS),
             segments=_read_segments(bitstream),
-            base=_read_base(bitstream),
-            transform_step=bitstream.number("transform_step", TINY, HUGE),
+            base=read_lattice(fields),
+            transform_step=fields.number("transform_step", TINY, HUGE),
             pictures=False,
         )
 
 
 def _read_segments(bitstream: Bitstream) -> int:
-    return bitstream.integer("segments", 1, min(MAX_SEGMENTS, bitstream.n_frames))
-
-
-def _read_base(bitstream: Bitstream) -> Lattice:
-    base = bitstream.header.get("base")
-    if not (isinstance(base, list) and len(base) == 4 and all(isinstance(v, int | float) for v in base)):
-        raise CorruptFile(f"header: base is {base!r}; an origin and a step are needed")
-    if not (base[3] > 0 and all(abs(v) < HUGE for v in base)):  # NaN neither
-        raise CorruptFile(f"header: base is {base!r}, out of range")
-    return Lattice((base[0], base[1], base[2]), base[3])
+    return bitstream.fields.integer("segments", 1, min(MAX_SEGMENTS, bitstream.n_frames))

@@ -5,6 +5,7 @@ A frame costs its group of pictures (H.264) or its one picture (JPEG), if there 
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 
@@ -27,8 +28,10 @@ from gvpipe.arrays import Float32, Int32, Integers
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.corrections.displacements import DisplacementReader, PointVertices
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import CorruptFile, corrupt
 from gvpipe.media.video import VideoReader
+
+BYTES_PER_PIXEL, BYTES_PER_SLOT = 4, 200
 
 
 class McgvReader:
@@ -91,7 +94,7 @@ class McgvReader:
         """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units.
 
         Raises:
-            CorruptFile: a section or the video does not decode.
+            CorruptFile: a section or the video does not decode, or not to finite positions.
         """
         groups = self._video.read(start, stop)
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
@@ -101,19 +104,25 @@ class McgvReader:
         if self._header.outliers:
             self._outliers.apply(start, result)
         self._surface.fill_still(result)
+        with np.errstate(invalid="ignore"):
+            total = float(result.sum(dtype=np.float64))  # finite where all are; faster than to look at each
+        if not math.isfinite(total):
+            raise corrupt(f"frames {start} to {stop - 1} do not decode to finite positions")
         return result
 
     @cached_property
     def _outliers(self) -> DisplacementReader:
         bitstream, surface = self._bitstream, self._surface
         shared = PointVertices.of(surface.vertices, surface.slot, surface.n_slots)
-        return DisplacementReader(bitstream.section(SECTION), bitstream.n_frames, surface.n_slots, SECTION, shared)
+        return DisplacementReader(
+            bitstream.section(SECTION), bitstream.n_frames, surface.n_slots, SECTION, shared, budget=bitstream.budget
+        )
 
 
 def _open_video(bitstream: Bitstream, header: Header, bounds: list[int]) -> VideoReader | NoPictures:
     if not header.pictures:
         return NoPictures(bounds, header.profile.middle)
-    return VideoReader(bitstream.video, header.profile, header.width, 3 * header.height)
+    return VideoReader(bitstream.video, header.profile, header.width, 3 * header.height, bitstream.budget)
 
 
 def read_layout(bitstream: Bitstream, header: Header, surface: DecodedBase, groups: Integers | None = None) -> Layout:
@@ -122,9 +131,11 @@ def read_layout(bitstream: Bitstream, header: Header, surface: DecodedBase, grou
     Raises:
         CorruptFile: they are not what an encoder writes.
     """
+    n_pixels = header.width * header.height
+    bitstream.budget.ask(f"a layout of {n_pixels} pixels", BYTES_PER_PIXEL * n_pixels + BYTES_PER_SLOT * surface.n_slots)
     if not header.pictures:
         return Layout(1, 1, np.zeros(surface.n_slots, np.int64))
-    if header.width * header.height < surface.n_slots:
+    if n_pixels < surface.n_slots:
         raise CorruptFile(f"header: planes of {header.width}x{header.height} do not hold {surface.n_slots} samples")
     if header.placement == "halves":
         groups = surface.points.pieces()[surface.point] if groups is None else groups

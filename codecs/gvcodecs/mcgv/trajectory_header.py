@@ -7,7 +7,6 @@ from typing import Any
 
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import count_longest, read_steps
-from gvpipe.errors import CorruptFile
 from gvpipe.trajectory.basis import MAX_COMPONENTS
 
 TRANSFORMS = ("none", "klt")
@@ -37,8 +36,10 @@ class TrajectoryHeader:
         """Mirror of `to_json`, None where pictures are frames; raises `CorruptFile` for values out of range."""
         if "transform" not in bitstream.header:
             return None
-        if bitstream.header["transform"] != "klt" or bitstream.version == 1:
-            raise CorruptFile(f"header: version {bitstream.version} has no transform {bitstream.header['transform']!r}")
+        fields = bitstream.fields
+        if bitstream.version == 1:
+            raise fields.wrong("transform", "a later version")
+        fields.choice("transform", TRANSFORMS[1:])
         most = min(MAX_COMPONENTS, 3 * count_longest(bitstream.n_frames, segments))
-        components = bitstream.integers("components", segments, 0, most)
-        return cls(bitstream.integer("fineness", 1, MAX_FINENESS), components, read_steps(bitstream, segments))
+        components = fields.integers("components", segments, 0, most)
+        return cls(fields.integer("fineness", 1, MAX_FINENESS), components, read_steps(bitstream, segments))

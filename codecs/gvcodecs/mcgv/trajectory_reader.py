@@ -14,6 +14,7 @@ from scipy import sparse
 from gvcodecs.mcgv.base.surface import DecodedBase, read_surface
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.layout import Layout
+from gvcodecs.mcgv.motion.blended import keep_blend
 from gvcodecs.mcgv.motion.contract import locate
 from gvcodecs.mcgv.motion.skinning import Blend
 from gvcodecs.mcgv.motion.weight_coding import decode_weights
@@ -29,6 +30,7 @@ from gvpipe.media.video import VideoReader
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES
 from gvpipe.trajectory.reconstruction import Segment
 
+BYTES_PER_SAMPLE, SECONDS_PER_SAMPLE = 48, 0.1e-6
 MAX_FLOAT32 = float(np.finfo(np.float32).max)
 
 
@@ -67,7 +69,7 @@ class TrajectoryReader:
         self._bounds = segment_starts(bitstream.n_frames, header.segments)
         counts = [count_pictures(n) for n in images.components]
         self._pictures = np.concatenate([[0], np.cumsum(counts)])  # first picture of every segment, and their number
-        self._video = VideoReader(bitstream.video, header.profile, header.width, PLANES * header.height)
+        self._video = VideoReader(bitstream.video, header.profile, header.width, PLANES * header.height, bitstream.budget)
         if self._video.n_frames != sum(counts):
             raise CorruptFile(f"the video has {self._video.n_frames} pictures, the header tells of {sum(counts)}")
         self._segment: _Segment | None = None
@@ -93,6 +95,7 @@ class TrajectoryReader:
         if n_components * surface.n_slots > MAX_VALUES:
             raise CorruptFile(f"header: {n_components} components of {surface.n_slots} samples; {MAX_VALUES} values at most")
         layout = read_layout(self._bitstream, header, surface)
+        keep_blend(self._bitstream, surface, header)
         weights = decode_weights(self._bitstream.section("weights"), surface.points.neighbours, header.clusters)
         matrix = Blend(surface.base[surface.members], weights, header.clusters).matrix()
         return _Shared(np.ascontiguousarray(surface.base.T), layout, matrix)
@@ -124,9 +127,12 @@ class TrajectoryReader:
         if self._segment is None or self._segment.number != s:
             name, point = f"trajectories.{s}", self._surface.point
             n_frames = self._bounds[s + 1] - self._bounds[s]
-            data = self._bitstream.section(name)
+            data, budget = self._bitstream.section(name), self._bitstream.budget
+            n_values = self._images.components[s] * len(point)
+            budget.ask(f"section {name!r}", BYTES_PER_SAMPLE * n_values, SECONDS_PER_SAMPLE * n_values)
             samples, step = self._samples(s), self._images.steps[s]
-            basis, coefficients = decode_segment(Cursor(data, name), samples, step, self._shared.matrix, point, n_frames)
+            matrix = self._shared.matrix
+            basis, coefficients = decode_segment(Cursor(data, name), samples, step, matrix, point, n_frames, budget)
             self._segment = _Segment(s, Segment(basis, coefficients))
         return self._segment
 

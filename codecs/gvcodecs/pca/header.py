@@ -47,5 +47,6 @@ class Header:
     @classmethod
     def of(cls, bitstream: Bitstream) -> Header:
         """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
-        predictor, segments = bitstream.choice("predictor", PREDICTORS), read_segments(bitstream, MAX_SEGMENTS)
-        return cls(predictor, float(bitstream.number("beta", 0.1, 1.99)), segments, read_steps(bitstream, segments))
+        fields, segments = bitstream.fields, read_segments(bitstream, MAX_SEGMENTS)
+        predictor = fields.choice("predictor", PREDICTORS)
+        return cls(predictor, fields.number("beta", 0.1, 1.99), segments, read_steps(bitstream, segments))

@@ -13,7 +13,7 @@ from gvpipe.connectivity.topology_only import read_mesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import InputError
-from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy, level_faces
+from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy, keep_hierarchy, level_faces
 from gvpipe.trajectory.basis import decode_basis
 from gvpipe.trajectory.causal_order import CausalOrder, leave_out
 from gvpipe.trajectory.coefficient_coding import decode_vectors
@@ -35,6 +35,7 @@ class PcaReader:
     def __init__(self, bitstream: Bitstream) -> None:
         self._header = Header.of(bitstream)
         self._mesh, self._bitstream = read_mesh(bitstream), bitstream
+        keep_hierarchy(bitstream.budget, self._mesh.n_points, len(self._mesh.point_faces))
         self._hierarchy = build_hierarchy(self._mesh.point_faces, self._mesh.n_points)
         self._still = read_still(bitstream, self._mesh)
         self._causal = leave_out(causal_order(self._hierarchy, self._header.predictor), self._still.flags)
@@ -92,9 +93,10 @@ class PcaReader:
             step = self._header.steps[s]
             n_frames = self._bounds[s + 1] - self._bounds[s]
             name = f"basis.{s}"
-            basis = decode_basis(self._bitstream.section(name), n_frames, self._still.n_moving, step, name)
+            budget = self._bitstream.budget
+            basis = decode_basis(self._bitstream.section(name), n_frames, self._still.n_moving, step, name, budget=budget)
+            given = self._still.given(basis, budget)
             name = f"coefficients.{s}"
-            given = self._still.given(basis)
             if given is not None and self._header.predictor == "lsp":
                 given = np.ascontiguousarray(given[:, ::-1])
             coefficients = decode_vectors(

@@ -35,6 +35,7 @@ from gvcodecs.pdct.local_frames import local_frames
 from gvcodecs.pdct.momentum import Momentum
 from gvcodecs.pdct.seed_coding import decode_seeds, encode_seeds
 from gvpipe.arrays import Float32, Float64, Int64
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.container.segments import HUGE, TINY
 from gvpipe.entropy.integers import decode_integers, encode_integers
@@ -43,6 +44,9 @@ from gvpipe.mesh.lattice import Lattice
 
 HEAD = struct.Struct("<6d")
 MAX_CLUSTERS = 1024
+BYTES_PER_POINT, SECONDS_PER_POINT = 160, 0.4e-6  # of a frame
+BYTES_PER_NUMBER = 64  # of seeds
+SECONDS_PER_FRAME = 0.6e-3
 LARGEST = float(np.finfo(np.float32).max)
 RIDGE = 1e-6  # of the affine fit
 LAMBDA = 0.14  # squared steps that a bit is worth; 0.1155 by theory at a high rate
@@ -81,12 +85,16 @@ def encode_clip(frames: Float32, surface: BaseFrame, quantiser: DeltaQuantiser, 
     )
 
 
-def decode_clip(data: bytes, n_frames: int, surface: BaseFrame, name: str) -> Float32:
+def decode_clip(data: bytes, n_frames: int, surface: BaseFrame, name: str, budget: Budget = UNLIMITED) -> Float32:
     """Mirror of `encode_clip`: ``(n_frames, V, 3) float32``, model units; vertices that are not in the traversal are left at 0.
 
     Raises:
         CorruptFile: the clip does not decode to that many frames.
+        OverBudget: so many frames take more than the file may.
     """
+    n_points = n_frames * len(surface.base)
+    what = f"{name!r}, {n_frames} frames of {len(surface.base)} points,"
+    budget.ask(what, BYTES_PER_POINT * n_points, SECONDS_PER_FRAME * n_frames + SECONDS_PER_POINT * n_points)
     cursor = Cursor(data, name)
     *origin, seed_step, step, fineness = cursor.struct(HEAD)
     wrong = not all(abs(v) < HUGE for v in origin) or not all(TINY < v < HUGE for v in (seed_step, step))
@@ -95,6 +103,8 @@ def decode_clip(data: bytes, n_frames: int, surface: BaseFrame, name: str) -> Fl
     lattice = Lattice((origin[0], origin[1], origin[2]), seed_step)
     n_vertices = len(surface.base)
     n_seeds = cursor.varint(min(MAX_CLUSTERS, n_vertices), "the number of clusters")
+    n_numbers = 9 * n_seeds * n_frames
+    budget.ask(what, BYTES_PER_POINT * n_points + BYTES_PER_NUMBER * n_numbers)
     if n_seeds < 1:
         raise cursor.corrupt("there is no cluster")
     blocks = [cursor.block() for _ in range(3)]

@@ -22,8 +22,8 @@ from gvcodecs.pdct.dictionary import BaseFrame
 from gvpipe.connectivity.base_mesh import BaseMesh
 from gvpipe.connectivity.welded_mesh import WeldedMesh
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.segments import HUGE, read_segments
-from gvpipe.errors import CorruptFile
+from gvpipe.container.lattice_field import read_lattice
+from gvpipe.container.segments import read_segments
 from gvpipe.mesh.lattice import Lattice
 
 VERSION_POINTS = 2  # vertices that share a trajectory are one point; sections `still` and `holds`
@@ -49,15 +49,7 @@ class Header:
     @classmethod
     def of(cls, bitstream: Bitstream) -> Header:
         """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
-        return cls(read_segments(bitstream, MAX_CLIPS, "clips"), check_lattice(bitstream.header.get("base")))
-
-
-def check_lattice(values: Any) -> Lattice:
-    """Return the lattice that ``values``, an origin and a step, name; raises `CorruptFile` for anything else."""
-    is_list = isinstance(values, list) and len(values) == 4
-    if not is_list or not all(isinstance(v, int | float) and abs(v) < HUGE for v in values) or not values[3] > 0:
-        raise CorruptFile(f"header: base is {values!r}; an origin and a step above 0 are needed")
-    return Lattice((values[0], values[1], values[2]), values[3])
+        return cls(read_segments(bitstream, MAX_CLIPS, "clips"), read_lattice(bitstream.fields))
 
 
 def surface_of(mesh: BaseMesh, lattice: Lattice) -> BaseFrame:

@@ -15,6 +15,8 @@ from gvpipe.connectivity.welded_mesh import read_points
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 
+BYTES_PER_POINT, SECONDS_PER_POINT = 200, 1e-6  # of the base frame, its traversal, still points
+
 
 class PdctReader:
     """Frames of a ``pdct`` bitstream.
@@ -35,6 +37,8 @@ class PdctReader:
             self._faces, self._point, surface = mesh.faces, mesh.point, surface_of_points(mesh, header.base)
         self._still = decode_still(bitstream.section(SECTION), surface) if SECTION in bitstream.sections else None
         self._surface = surface if self._still is None else surface.without(self._still.points)
+        n_points = len(surface.base)
+        bitstream.budget.keep(f"{n_points} points", BYTES_PER_POINT * n_points, SECONDS_PER_POINT * n_points)
         self._bounds = segment_starts(bitstream.n_frames, header.clips)
         self._clip: tuple[int, Float32] = (-1, np.zeros((0, 0, 3), np.float32))
 
@@ -72,5 +76,5 @@ class PdctReader:
         if self._clip[0] != c:
             name = f"clip.{c}"
             n_frames = self._bounds[c + 1] - self._bounds[c]
-            self._clip = (c, decode_clip(self._bitstream.section(name), n_frames, self._surface, name))
+            self._clip = (c, decode_clip(self._bitstream.section(name), n_frames, self._surface, name, self._bitstream.budget))
         return self._clip[1]

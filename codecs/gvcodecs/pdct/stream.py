@@ -21,9 +21,11 @@ import numpy as np
 from gvcodecs.pdct.clip import decode_clip
 from gvcodecs.pdct.dictionary import BaseFrame
 from gvcodecs.pdct.encoder import Pdct, diagonal_of
-from gvcodecs.pdct.header import check_lattice, surface_of
+from gvcodecs.pdct.header import surface_of
 from gvpipe.arrays import Float32, Floats, Int32, Integers
 from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base
+from gvpipe.container.json_object import JsonObject
+from gvpipe.container.lattice_field import read_lattice
 from gvpipe.container.segments import MAX_SEGMENT
 from gvpipe.errors import CorruptFile, InputError, NewerVersion, NotGeometryVideo, TruncatedFile
 from gvpipe.mesh.lattice import Lattice
@@ -174,14 +176,14 @@ class StreamReader:
         version, n_vertices, n_triangles, bytes_order, bytes_mesh, fps, *base = HEAD.unpack_from(self._buffer, len(MAGIC))
         if version > VERSION:
             raise NewerVersion(f"the stream has version {version}, this gvpipe reads up to {VERSION}; upgrade gvpipe")
-        lattice = check_lattice(base)
+        lattice = read_lattice(JsonObject({"base": base}, "head"))
         if not 0 < fps <= 100_000:
             raise CorruptFile(f"the stream has {fps} frames per second; get it again from its source")
         if len(self._buffer) < start + bytes_mesh + bytes_order:
             return False
         mesh = bytes(self._buffer[start : start + bytes_mesh])
         order = bytes(self._buffer[start + bytes_mesh : start + bytes_mesh + bytes_order])
-        decoded = decode_base(mesh, order)
+        decoded = decode_base(mesh, order, n_vertices, n_triangles)
         if (len(decoded.points), len(decoded.faces)) != (n_vertices, n_triangles):
             raise CorruptFile("the mesh has other vertices and triangles than the head says; get the stream again")
         del self._buffer[: start + bytes_mesh + bytes_order]

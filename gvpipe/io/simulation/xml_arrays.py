@@ -26,6 +26,7 @@ TYPES = {
     "Float32": "f4", "Float64": "f8",
 }  # fmt: skip
 HEADER_TYPES = {"UInt32": "u4", "UInt64": "u8"}
+MAX_DICTIONARY = 1 << 28  # bytes that LZMA may take, whatever a block says
 COMPRESSORS = {"": "", "vtkZLibDataCompressor": "zlib", "vtkLZMADataCompressor": "lzma"}
 
 
@@ -165,8 +166,8 @@ def _inflate(packed: bytes, most: int, compressor: str) -> bytes:
     try:
         if compressor == "zlib":
             return zlib.decompressobj().decompress(packed, most)
-        return lzma.LZMADecompressor().decompress(packed, most)
-    except (zlib.error, lzma.LZMAError) as exc:
+        return lzma.LZMADecompressor(memlimit=MAX_DICTIONARY).decompress(packed, most)
+    except (zlib.error, lzma.LZMAError, EOFError, MemoryError) as exc:
         raise ValueError(f"its compressed data are damaged ({exc})") from exc
 
 

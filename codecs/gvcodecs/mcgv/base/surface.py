@@ -17,7 +17,7 @@ from gvpipe.arrays import Float32, Float64, Int32, Int64
 from gvpipe.connectivity.base_mesh import read_base
 from gvpipe.connectivity.welded_mesh import read_points
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import CorruptFile, corrupt
 from gvpipe.trajectory.still_vertices import decode_flags
 
 STILL = "still"  # section: which points never move
@@ -62,12 +62,20 @@ class DecodedBase:
             positions[:, still] = self.rest[still]
 
 
+def _place(lattice: Int32, header: Header) -> Float64:
+    """Base positions ``(n, 3)`` of lattice points; raises `CorruptFile` if one is larger than float32 can hold."""
+    placed = header.base.points_at(lattice)
+    if not np.abs(placed).max(initial=0) <= np.finfo(np.float32).max:
+        raise corrupt("header: its base frame is larger than float32 can hold")
+    return placed
+
+
 def read_surface(bitstream: Bitstream, header: Header) -> DecodedBase:
     """Decode the sections ``mesh``, ``order`` and ``still``; raises `CorruptFile`."""
     if bitstream.version < 3:
         base = read_base(bitstream)
         points, point, members = weld_vertices(base.points, base.faces, base.visits)
-        own, placed = np.arange(len(base.points)), header.base.points_at(base.points)
+        own, placed = np.arange(len(base.points)), _place(base.points, header)
         order = np.argsort(base.visits)
         rest = placed.astype(np.float32)
         return DecodedBase(base.faces, rest, own, own, base.points, placed, point, members, points, order)
@@ -78,7 +86,7 @@ def read_surface(bitstream: Bitstream, header: Header) -> DecodedBase:
     if not len(moves):
         raise CorruptFile("section 'still' is corrupt: one point at least has samples; get the file again from its source")
     slot = np.cumsum(~still) - 1
-    placed = header.base.points_at(mesh.lattice)
+    placed = _place(mesh.lattice, header)
     vertices = np.flatnonzero(~still[mesh.point])
     own = np.arange(len(moves))
     return DecodedBase(

@@ -20,6 +20,8 @@ from gvpipe.arrays import Array, Float32, Float64, Int32
 from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
 
+BYTES_PER_NUMBER, SECONDS_PER_NUMBER = 64, 0.1e-6  # of transforms
+
 
 def code_affine(start: Start, clusters: Int32, step: float, report: Progress) -> CodedMotion:
     """Fit and code the transforms of every segment, for clusters ``(P,)`` and a quantisation step, model units."""
@@ -76,6 +78,9 @@ class AffineMotion:
         s = locate(self._bounds, frame)
         if self._segment[0] != s:
             name, n_frames = f"transforms.{s}", self._bounds[s + 1] - self._bounds[s]
+            n_values = 12 * n_frames * self._header.clusters
+            what = f"section {name!r}, {self._header.clusters} transforms in {n_frames} frames,"
+            self._bitstream.budget.ask(what, BYTES_PER_NUMBER * n_values, SECONDS_PER_NUMBER * n_values)
             lattice = decode_transforms(self._bitstream.section(name), n_frames, self._header.clusters, name)
             self._segment = (s, dequantise(lattice, self._rest, self._header.transform_step))
         sites = Sites(self._samples.vertices, self._samples.pixels(samples.shape[1]), self._residuals)

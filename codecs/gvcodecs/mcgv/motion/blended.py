@@ -21,7 +21,15 @@ from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.trajectory.sparse_rows import multiply
 
+BYTES_PER_POINT, SECONDS_PER_POINT = 400, 1e-6
 CHUNK = 16  # frames whose transforms are made at a time
+
+
+def keep_blend(bitstream: Bitstream, surface: DecodedBase, header: Header) -> None:
+    """Check that a file may take the memory and work of its skinning weights; raises `OverBudget`."""
+    n_points, n_transforms = len(surface.members), CHUNK * 12 * header.clusters
+    what = f"a blend of {header.clusters} clusters for {n_points} points"
+    bitstream.budget.keep(what, BYTES_PER_POINT * n_points + 24 * n_transforms, SECONDS_PER_POINT * n_points)
 
 
 def code_blended(start: Start, fitted: Fitted, report: Progress) -> CodedMotion:
@@ -65,6 +73,7 @@ class BlendedMotion:
         first: Trajectories | None = None,
     ) -> None:
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
+        keep_blend(bitstream, surface, header)
         weights = decode_weights(bitstream.section("weights"), surface.points.neighbours, header.clusters)
         self._blend = Blend(surface.base[surface.members], weights, header.clusters)
         self._samples = Samples(surface, layout)
@@ -101,7 +110,8 @@ class BlendedMotion:
 def decode_transforms(bitstream: Bitstream, header: Header, s: int, n_frames: int) -> Trajectories:
     """The transforms of segment s; raises `CorruptFile`."""
     name = f"transforms.{s}"
-    return decode_trajectories(bitstream.section(name), header.clusters, n_frames, header.transform_step, name)
+    section, budget = bitstream.section(name), bitstream.budget
+    return decode_trajectories(section, header.clusters, n_frames, header.transform_step, name, budget)
 
 
 def _columns(frames: Float64) -> Float64:

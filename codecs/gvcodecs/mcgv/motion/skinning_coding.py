@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Float64
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.trajectory.basis import (
     Basis,
@@ -59,11 +60,13 @@ def encode_trajectories(rows: Float64, step: float) -> tuple[bytes, Trajectories
     return varint(len(head)) + head + data, Trajectories(basis, decoded)
 
 
-def decode_trajectories(data: bytes, n_clusters: int, n_frames: int, step: float, name: str) -> Trajectories:
-    """Mirror of `encode_trajectories`; raises `CorruptFile` if the bytes are not what it writes."""
+def decode_trajectories(
+    data: bytes, n_clusters: int, n_frames: int, step: float, name: str, budget: Budget = UNLIMITED
+) -> Trajectories:
+    """Mirror of `encode_trajectories`; raises `CorruptFile`, or `OverBudget` if they take more than the file may."""
     cursor = Cursor(data, name)
     head = cursor.take(cursor.varint(cursor.left, "a length"))
-    basis = decode_basis(head, n_frames, 4 * n_clusters, step, name)
+    basis = decode_basis(head, n_frames, 4 * n_clusters, step, name, budget=budget)
     coefficients = decode_coefficients(cursor.rest(), n_clusters, basis.vectors.shape[1], step, name)
     return Trajectories(basis, coefficients)
 

@@ -31,6 +31,7 @@ from scipy import sparse
 from gvcodecs.mcgv.motion.skinning import BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import decode_coefficients, encode_coefficients
 from gvpipe.arrays import Float64, Int64
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import InputError
@@ -79,7 +80,13 @@ def encode_segment(trajectories: Float64, fit: BlendFit, largest: float, error: 
 
 
 def decode_segment(
-    cursor: Cursor, samples: Float64, step: float, matrix: sparse.csr_array, point: Int64, n_frames: int
+    cursor: Cursor,
+    samples: Float64,
+    step: float,
+    matrix: sparse.csr_array,
+    point: Int64,
+    n_frames: int,
+    budget: Budget = UNLIMITED,
 ) -> tuple[Basis, Float64]:
     """Mirror of `encode_segment`: the basis, and the vertices' coefficients ``(R, V)``, model units.
 
@@ -89,6 +96,7 @@ def decode_segment(
         step: D, model units.
         matrix: ``(P, 4K)`` of the blend; point: ``(V,)`` the point of each vertex.
         n_frames: of the segment.
+        budget: of the file.
 
     Raises:
         CorruptFile: the section is not what the encoder writes.
@@ -96,7 +104,7 @@ def decode_segment(
     n_components, n_vertices = samples.shape
     head = cursor.block()
     rows = cursor.block()
-    basis = decode_basis(head, n_frames, n_vertices, step, cursor.name)
+    basis = decode_basis(head, n_frames, n_vertices, step, cursor.name, budget=budget)
     if basis.vectors.shape[1] != n_components:
         raise cursor.corrupt(f"{basis.vectors.shape[1]} components where the header says {n_components}")
     transforms = decode_coefficients(rows, matrix.shape[1] // 4, n_components, step, cursor.name)

@@ -67,6 +67,7 @@ export class McgvReader {
    * @param {number} frame
    * @param {Uint8Array} levels (S, 3) of the picture's `samples`
    * @param {Float32Array} positions (V, 3) filled, model units
+   * @throws {GeometryVideoError} one of them is not finite
    */
   rebuild(frame, levels, positions) {
     const { predicted, placed } = this;
@@ -76,6 +77,11 @@ export class McgvReader {
     for (const moves of this.outliers) moves.apply(frame, placed);
     this.surface.spread(placed, positions);
     for (const moves of this.corrections) moves.apply(frame, positions);
+    let sum = 0; // finite numbers of 32 bits have a finite sum in 64
+    for (let i = 0; i < positions.length; i++) sum += positions[i];
+    if (!Number.isFinite(sum)) {
+      throw new GeometryVideoError("corrupt", `frame ${frame} does not decode to finite positions; ${AGAIN}`);
+    }
   }
 
   /**

@@ -1,0 +1,203 @@
+"""Small files that ask for a lot, behind valid checksums: they are refused before they have cost much.
+
+Memory and processor time are measured in one process of its own, which has read an ordinary file of each codec before.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import subprocess
+import sys
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from folders import GOLDEN
+from odd_headers import payload_of
+
+import gvpipe
+from gvpipe.budget import BYTES_PER_BYTE, LEAST_BYTES, LEAST_SECONDS, SECONDS_PER_BYTE, Budget
+from gvpipe.connectivity.topology_only import HEADER as MESH
+from gvpipe.container import mp4
+from gvpipe.container.bitstream import Bitstream, unpack_payload
+from gvpipe.container.cursor import pack_block, varint
+from gvpipe.corrections.displacements import decode_group
+from gvpipe.entropy.integers import encode_integers
+from gvpipe.errors import CorruptFile, OverBudget
+from gvpipe.fields.head import Head
+from gvpipe.fields.mesh import FieldMesh
+from gvpipe.fields.reader import FieldReader
+from gvpipe.media.video import PROFILES, VideoReader
+
+WARM = ("laplacian-2-still", "mcgv-3-jpeg", "mcgv-4-rigid", "pca-2-still", "pdct-2-seams")
+ZERO = encode_integers(np.zeros(1, np.int64))  # however many zeros
+MEASURE = """
+import json, os, sys, time
+import gvpipe
+def peak():
+    lines = open("/proc/self/status").read() if os.path.exists("/proc/self/status") else ""
+    return 1024 * int(lines.split("VmHWM:")[1].split()[0]) if "VmHWM" in lines else 0
+def measure(path):
+    if os.path.exists("/proc/self/clear_refs"):
+        open("/proc/self/clear_refs", "w").write("5")
+    before, started, error = peak(), time.process_time(), ""
+    try:
+        gvpipe.open(path)[0]
+    except gvpipe.GvpipeError as exc:
+        error = type(exc).__name__ + ": " + str(exc)
+    return [error, peak() - before, time.process_time() - started]
+n_warm = int(sys.argv[1])
+for path in sys.argv[2 : 2 + n_warm]:
+    measure(path)
+print(json.dumps([measure(path) for path in sys.argv[2 + n_warm :]]))
+"""
+
+
+def changed(name: str, **values: Any) -> Bitstream:
+    """A golden file with other sections, counts or settings."""
+    whole = mp4.read_file(GOLDEN / f"{name}.mp4")
+    sections = {**whole.sections, **values.pop("sections", {})}
+    header = {**whole.header, **values.pop("header", {})}
+    return dataclasses.replace(whole, sections=sections, header=header, **values)
+
+
+def huge_pictures() -> Bitstream:
+    """JPEG images of 32000 x 32000."""
+    whole = changed("mcgv-3-jpeg")
+    video, at = bytearray(whole.video), 0
+    while (at := video.find(b"\xff\xc0\x00\x0b", at + 1)) >= 0:
+        video[at + 5 : at + 9] = (32000).to_bytes(2, "big") * 2
+    return dataclasses.replace(whole, video=bytes(video))
+
+
+def deflated_triangles() -> Bitstream:
+    n = 5 << 20
+    mesh = MESH.pack(0, 0, len(loose := zlib.compress(bytes(12 * n), 9)), len(ZERO), n, 3) + loose + ZERO + ZERO
+    return changed("pca-1-kalman", sections={"mesh": mesh, "order": b""}, n_vertices=3, n_triangles=n)
+
+
+def vertices_alone() -> Bitstream:
+    mesh = MESH.pack(0, 0, 0, len(ZERO), 0, 1 << 24) + ZERO
+    return changed("pca-1-kalman", sections={"mesh": mesh, "order": b""}, n_vertices=1 << 24, n_triangles=0)
+
+
+def free_values() -> Bitstream:
+    basis = varint(1 << 14) + pack_block(ZERO) + bytes(40)
+    return changed("pca-1-kalman", sections={"basis.0": basis}, n_frames=6000, header={"segments": 1, "steps": [0.1]})
+
+
+def long_clip() -> Bitstream:
+    return changed("pdct-1", n_frames=100_000, header={"clips": 1})
+
+
+def long_transforms() -> Bitstream:
+    whole = changed("mcgv-4-rigid", n_frames=1 << 24, header={"segments": 1})
+    return dataclasses.replace(whole, sections={name: data for name, data in whole.sections.items() if name != "holds"})
+
+
+def many_runs(n: int = 1 << 24) -> Bitstream:
+    return changed("pca-2-still", n_frames=n, sections={"holds": varint(n) + ZERO})
+
+
+def deflated_list() -> Bitstream:
+    text = b'{"version": 1, "parts": [' + b"{}," * (16 << 20) + b"{}]}"
+    return changed("pca-1-kalman", sections={"asset": zlib.compress(text, 9)})
+
+
+def many_samples(video: bytes) -> bytes:
+    """2**24 samples of one byte."""
+    at = video.find(b"stsz") + 8
+    return video[:at] + (1).to_bytes(4, "big") + (1 << 24).to_bytes(4, "big") + video[at + 8 :]
+
+
+BOMBS: dict[str, tuple[Callable[[], Bitstream], str]] = {
+    "pictures": (huge_pictures, "CorruptFile: .*32000x32000"),
+    "deflated triangles": (deflated_triangles, "OverBudget: .*5242880 triangles"),
+    "vertices alone": (vertices_alone, "OverBudget: .*16777216 vertices"),
+    "free values": (free_values, "OverBudget: .*16384 trajectories"),
+    "a long clip": (long_clip, "OverBudget: .*100000 frames"),
+    "long transforms": (long_transforms, "OverBudget: .*16777216 frames"),
+    "many runs": (many_runs, "OverBudget: .*16777216 distinct frames"),
+    "a deflated list": (deflated_list, "OverBudget: .*section 'asset'"),
+}
+TABLES = {"many samples": many_samples}
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, str, int, float]]:
+    """Of each bomb its file, the error, bytes of memory and seconds of processor time."""
+    folder = tmp_path_factory.mktemp("bombs")
+    paths = {}
+    for name, (build, _) in BOMBS.items():
+        mp4.write_file(build(), folder / f"{name}.mp4")
+        paths[name] = folder / f"{name}.mp4"
+    for name, change in TABLES.items():
+        paths[name] = folder / f"{name}.mp4"
+        paths[name].write_bytes(change((GOLDEN / "mcgv-4-h264.mp4").read_bytes()))
+    warm = [str(GOLDEN / f"{name}.mp4") for name in WARM]
+    command = [sys.executable, "-c", MEASURE, str(len(warm)), *warm, *map(str, paths.values())]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    return {name: (paths[name], *result) for name, result in zip(paths, json.loads(printed), strict=True)}
+
+
+@pytest.mark.parametrize("name", [*BOMBS, *TABLES])
+def test_a_bomb_is_refused_cheaply(name: str, measured: dict[str, tuple[Path, str, int, float]]) -> None:
+    path, error, memory, seconds = measured[name]
+    n_bytes = path.stat().st_size
+    assert memory <= max(LEAST_BYTES, BYTES_PER_BYTE * n_bytes), f"{memory / 1e6:.0f} MB for {n_bytes} bytes: {error}"
+    assert seconds <= max(LEAST_SECONDS, SECONDS_PER_BYTE * n_bytes), f"{seconds:.1f} s for {n_bytes} bytes: {error}"
+    wanted = BOMBS[name][1] if name in BOMBS else "CorruptFile: .*table"
+    assert re.match(wanted, error), error
+    if error.startswith("OverBudget"):
+        assert "--unlimited" in error and path.name in error
+
+
+def test_a_limit_can_be_lifted(tmp_path: Path) -> None:
+    mp4.write_file(many_runs(1 << 20), tmp_path / "a.mp4")
+    with pytest.raises(OverBudget):
+        gvpipe.open(tmp_path / "a.mp4")
+    with pytest.raises(CorruptFile, match="1048576 frames in 3 segments"):  # its runs were decoded
+        gvpipe.open(tmp_path / "a.mp4", unlimited=True)
+
+
+def test_groups_of_displacements_have_a_limit() -> None:
+    n = 1 << 20
+    group = varint(1) + pack_block(ZERO) + pack_block(encode_integers(np.array([n - 1]))) + 3 * pack_block(ZERO)
+    with pytest.raises(OverBudget, match="1048576 displacements"):
+        decode_group(group, n >> 4, 16, "corrections", Budget(1000))
+
+
+def test_segments_of_fields_have_a_limit() -> None:
+    mesh = FieldMesh(np.array([[0, 1, 2]], np.int32), 3)
+    n_frames = 100_000
+    segment = bytes(2) + b"\1" + bytes(64) + np.float64(1).tobytes() + bytes(5)
+    section = Head(np.dtype("f4"), 55, n_frames).pack([segment])
+    with pytest.raises(OverBudget, match="100000 frames of 3 rows"):
+        FieldReader(section, n_frames, mesh, "heat", budget=Budget(1000)).read(0, 1)
+
+
+def test_pictures_have_a_limit() -> None:
+    with pytest.raises(OverBudget, match="16000x16000"):
+        VideoReader(mp4.read_file(GOLDEN / "mcgv-4-h264.mp4").video, PROFILES["h264-8"], 16000, 16000, Budget(1000))
+
+
+def test_what_is_kept_counts_with_what_is_asked_for() -> None:
+    budget = Budget(0)
+    budget.keep("a mesh", memory=LEAST_BYTES / 2, seconds=1.5)
+    budget.ask("a frame", memory=LEAST_BYTES / 2, seconds=0.5)
+    for more in ({"memory": LEAST_BYTES / 2 + 1}, {"seconds": 0.6}):
+        with pytest.raises(OverBudget, match="a frame takes about"):
+            budget.ask("a frame", **more)
+    assert Budget(1 << 20).memory == BYTES_PER_BYTE << 20 and Budget(1 << 20).seconds == SECONDS_PER_BYTE * (1 << 20)
+
+
+@pytest.mark.parametrize("name", ["\x1b[31m", "Mesh", "mesh 0", "[red]", "m\0sh", "\xff"])
+def test_sections_have_plain_names(name: str) -> None:
+    with pytest.raises(CorruptFile, match="a section's name is not of a to z") as caught:
+        unpack_payload(payload_of("{}", {name: b""}))
+    assert name not in str(caught.value)
