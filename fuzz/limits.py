@@ -16,7 +16,7 @@ from fuzz.parts import BrokenPromise, Target
 from fuzz.results import check_text
 
 LEAST_SECONDS, SECONDS_PER_BYTE = 2.0, 20e-6  # of processor time, for a file
-LEAST_MEMORY, MEMORY_PER_BYTE = 64 << 20, 2000  # bytes
+MEMORY_PER_BYTE = 2000  # bytes, above what any file may cost
 PEAK = re.compile(rb"VmHWM:\s+(\d+) kB")
 RESIDENT = re.compile(rb"VmRSS:\s+(\d+) kB")
 
@@ -46,7 +46,7 @@ def judge(target: Target, path: Path, size: int) -> Verdict:
         verdict = _parse(target, path)
     if verdict.kind not in (ACCEPTED, REFUSED):
         return verdict
-    allowed = max(LEAST_MEMORY, MEMORY_PER_BYTE * size)
+    allowed = max(target.memory, MEMORY_PER_BYTE * size)
     if cost.memory > allowed:
         return Verdict(
             LARGE, target.name, f"{cost.memory >> 20} MB for {size} bytes; {allowed >> 20} MB are allowed ({verdict.detail})"

@@ -17,6 +17,7 @@ from gvpipe.errors import InputError
 MESH = "mesh.obj"  # what a point cache belongs to
 CACHES = (".pc2", ".mdd", ".npy")
 MOST_VALUES = 1 << 22
+MEMORY = 1 << 30  # bytes; no budget is promised for mesh files, and libraries allocate before they look
 INSIDE = "|"  # between a file's name and the name of what it holds
 GLTF_JSON = 0x4E4F534A  # kind of a chunk
 TEXTS = (b"ply\n", b"v ", b"#", b"solid", b"OFF", b"<?xml", b"<", b"FORMAT", b"; FBX", b"{")
@@ -32,6 +33,7 @@ def mesh_targets(seeds: dict[str, tuple[Seed, ...]]) -> list[Target]:
             join_files,
             parse_mesh,
             (InputError,),
+            MEMORY,
         )
         for name, group in seeds.items()
     ]

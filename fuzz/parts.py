@@ -37,6 +37,7 @@ class Target:
         join: parts to files by name, in one folder; the parser is given the first.
         parse: reads a file, and everything in it. Raises what a user would see.
         refusal: the only exceptions that it may raise.
+        memory: bytes that any file may cost, however small.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Target:
     join: Callable[[Parts], dict[str, bytes]]
     parse: Callable[[Path], None]
     refusal: tuple[type[Exception], ...]
+    memory: int = 64 << 20
 
     def case(self, run_seed: int, number: int) -> tuple[Seed, Parts]:
         """The seed and the parts of case ``number``; the first cases are the seeds themselves."""
