@@ -115,7 +115,8 @@ def test_positions_are_within_the_bound(pair: tuple[MeshSequence, MeshSequence],
         if name.endswith(".glb"):
             theirs = _back(theirs, source)
         used = ours[np.unique(source.faces)]
-        assert cKDTree(theirs).query(used)[0].max() <= bound and cKDTree(ours).query(theirs)[0].max() <= bound
+        for given, searched in ((used, theirs), (theirs, ours)):
+            assert float(np.max(cKDTree(searched).query(given)[0])) <= bound
 
 
 def _back(points: Any, source: MeshSequence) -> Any:
