@@ -63,6 +63,8 @@ class HdfFile:
             if isinstance(link, self._h5py.ExternalLink):
                 raise ValueError(f"{path!r} is a link to another file, which is not followed")
             at = at.get(name)
+            if at is not None and at.file != self.file:  # a soft link to an external one
+                raise ValueError(f"{path!r} is a link to another file, which is not followed")
         return at
 
     def dataset(self, path: str) -> Any:
