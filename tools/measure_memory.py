@@ -2,8 +2,8 @@
 
     python tools/measure_memory.py abc usdc [--codec pca] [--frames 2000] [--side 100] [--noise 0.001]
 
-For each format: a waving sheet is written, ``gvpipe encode`` runs on it in a process of its own, and the largest resident memory
-of that process is read from ``/proc`` (VmHWM; Linux alone), that of the largest process that it starts beside.
+For each format: a waving sheet is written, ``gvpipe encode`` runs on it in a process of its own, and the largest resident
+memory of that process is read from ``/proc`` (VmHWM; Linux alone), that of the largest process that it starts beside.
 
 Status 1: an encode fails, or its process takes more than a gigabyte (1e9 bytes).
 """
@@ -23,7 +23,11 @@ import gvpipe
 from gvpipe.arrays import Float32
 
 MOST = 1e9  # bytes
-WAVES = ((0.05, 1.0, 0.3, 0.11), (0.03, -0.7, 1.1, 0.07), (0.02, 2.1, 1.7, 0.19))  # height, turns per side (x, y), radians a frame
+WAVES = (
+    (0.05, 1.0, 0.3, 0.11),
+    (0.03, -0.7, 1.1, 0.07),
+    (0.02, 2.1, 1.7, 0.19),
+)  # height, turns per side (x, y), radians a frame
 PAUSE = 0.1  # seconds between looks at the processes
 
 
@@ -56,7 +60,9 @@ def main() -> int:
     parser.add_argument("--codec", default="mcgv", help="[default: mcgv]")
     parser.add_argument("--frames", type=int, default=2000, help="[default: 2000]")
     parser.add_argument("--side", type=int, default=100, help="vertices of a side of the sheet [default: 100]")
-    parser.add_argument("--noise", type=float, default=0.0, help="standard deviation of heights, sides of the sheet [default: 0]")
+    parser.add_argument(
+        "--noise", type=float, default=0.0, help="standard deviation of heights, sides of the sheet [default: 0]"
+    )
     given = parser.parse_args()
     is_large = False
     with tempfile.TemporaryDirectory() as place:
@@ -65,14 +71,14 @@ def main() -> int:
             source, video = folder / f"sheet.{suffix}", folder / f"sheet-{suffix}.mp4"
             gvpipe.write(sheet(given.frames, given.side, given.noise), source)
             started = time.monotonic()
-            status, own, other = peaks([sys.executable, "-m", "gvpipe", "encode", str(source), str(video), "--codec", given.codec])
+            status, own, other = peaks(
+                [sys.executable, "-m", "gvpipe", "encode", str(source), str(video), "--codec", given.codec]
+            )
             is_large |= status != 0 or own > MOST
             size = source.stat().st_size / 1e6
-            print(
-                f".{suffix} ({size:.0f} MB), {given.codec}: {own / 1e6:.0f} MB, largest process beside it {other / 1e6:.0f} MB, "
-                f"{time.monotonic() - started:.0f} s, status {status}",
-                flush=True,
-            )
+            taken = time.monotonic() - started
+            most = f"{own / 1e6:.0f} MB, largest process beside it {other / 1e6:.0f} MB"
+            print(f".{suffix} ({size:.0f} MB), {given.codec}: {most}, {taken:.0f} s, status {status}", flush=True)
     return int(is_large)
 
 

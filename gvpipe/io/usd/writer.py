@@ -102,7 +102,12 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str) -
     names = primvar_names({**attributes, **normals.fields})
     usual = {name: one for name, one in names.items() if one not in ("st", "normals", "displayColor")}
     own = {name: one for name, one in usual.items() if not (name.startswith("uv") and one == f"st{name[2:]}")}
-    said = [*normals.notes, *shadow_note(shadowed(sequence), "USD"), *renamed_note(own.items(), "USD"), *unit_note(sequence, "USD")]
+    said = [
+        *normals.notes,
+        *shadow_note(shadowed(sequence), "USD"),
+        *renamed_note(own.items(), "USD"),
+        *unit_note(sequence, "USD"),
+    ]
     drawn = [_define(stage, where, mesh, sequence, materials) for where, mesh in zip(paths, meshes, strict=True)]
     for each, mesh in zip(drawn, meshes, strict=True):
         said.extend(write_primvars(each, mesh, attributes, names))

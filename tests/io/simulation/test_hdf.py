@@ -114,7 +114,12 @@ def test_xdmf_names_files_beside_it(tmp_path: Path) -> None:
 def test_links_are_not_followed(tmp_path: Path) -> None:
     """Neither to other files, nor virtual datasets; and a dataset of any size costs no memory."""
     gvpipe.io.write(sequence_of_quads(), tmp_path / "good.vtkhdf")
-    for kind, message in (("link", "another file"), ("soft", "another file"), ("virtual", "other files"), ("huge", "cannot hold")):
+    for kind, message in (
+        ("link", "another file"),
+        ("soft", "another file"),
+        ("virtual", "other files"),
+        ("huge", "cannot hold"),
+    ):
         path = tmp_path / f"{kind}.vtkhdf"
         path.write_bytes((tmp_path / "good.vtkhdf").read_bytes())
         with h5py.File(path, "a") as file:
