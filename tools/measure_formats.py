@@ -285,7 +285,6 @@ FILES: list[tuple[str, str, Callable[[Path], None]]] = [
     ("abc/cubes_hi/cubes-hi.abc", "alembic3d", by_alembic),
     ("abc/testUsdAbcIsConstant/testUsdAbcIsConstant.abc", "alembic3d", by_alembic),
     ("fbx/bunny_walk_fbx/bunny_walk.fbx", "ufbx", by_ufbx),
-    ("fbx/maya_dq_weights/maya_dq_weights_7500_binary.fbx", "ufbx", by_ufbx),
     ("objseq/cesium_man_obj", "trimesh", by_trimesh),
     ("plyseq/fox_run_ply", "trimesh", by_trimesh),
     ("sim/can_vtkhdf/can-vtu.hdf", "h5py", by_h5py),
