@@ -74,4 +74,4 @@ def test_versions_and_predictions_must_fit() -> None:
         with pytest.raises(FormatError):
             open_reader(wrong).read(0, 1)
     with pytest.raises(NewerVersion):
-        open_reader(dataclasses.replace(chosen, version=5))
+        open_reader(dataclasses.replace(chosen, version=6))
