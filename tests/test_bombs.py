@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from folders import GOLDEN
 from odd_headers import payload_of
+from sequences import grid
 
 import gvpipe
 from gvcodecs.laplacian.extended_laplacian import thin_hubs
@@ -34,9 +35,11 @@ from gvpipe.container.cursor import pack_block, varint
 from gvpipe.corrections.displacements import decode_group
 from gvpipe.entropy.integers import encode_integers
 from gvpipe.errors import CorruptFile, OverBudget
+from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.head import Head
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.reader import FieldReader
+from gvpipe.fields.values import FieldBound
 from gvpipe.media.video import PROFILES, VideoReader
 
 WARM = ("laplacian-2-still", "mcgv-3-jpeg", "mcgv-4-rigid", "pca-2-still", "pdct-2-seams")
@@ -215,6 +218,18 @@ def test_segments_of_fields_have_a_limit() -> None:
     section = Head(np.dtype("f4"), 55, n_frames).pack([segment])
     with pytest.raises(OverBudget, match="100000 frames of 3 rows"):
         FieldReader(section, n_frames, mesh, "heat", budget=Budget(1000)).read(0, 1)
+
+
+@pytest.mark.parametrize("kind", ["constant", "ramp"])
+def test_fields_that_take_no_bytes_are_read_within_the_budget(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gvpipe.budget.LEAST_BYTES", 1 << 20)
+    mesh, n_frames = FieldMesh(grid(12)[1], 144), 500
+    slope = np.linspace(0, 1, n_frames, dtype=np.float32) if kind == "ramp" else np.zeros(n_frames, np.float32)
+    values = np.broadcast_to(20 + slope[:, None, None], (n_frames, 144, 1))
+    section = encode_field(lambda start, stop: values[start:stop], n_frames, mesh, FieldBound(0.01))
+    budget = Budget(len(section))
+    assert 53 * values.size > budget.memory  # in one segment it would be too much
+    assert np.abs(FieldReader(section, n_frames, mesh, "heat", budget=budget).read(0, n_frames) - values).max() <= 0.01
 
 
 def test_pictures_have_a_limit() -> None:
