@@ -73,7 +73,7 @@ def test_all_golden_files_decode_to_the_same_bits_on_all_machines() -> None:
     for machine, settings in MACHINES.items():
         compiled_anew = "NUMBA_CPU_NAME" in settings
         some = [path for path in files if path.stem in FEW or not compiled_anew]
-        if compiled_anew:  # numba's own cache is of this machine's code; a folder beside it keeps the other from run to run
+        if compiled_anew:  # kept from run to run, apart from this machine's code
             settings = {**settings, "NUMBA_CACHE_DIR": str(ROOT / "build" / "same_bits")}
         wanted = [line for line, path in zip(expected, files, strict=True) if path in some]
         assert digests(some, settings) == wanted, machine
