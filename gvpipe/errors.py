@@ -85,6 +85,9 @@ class TopologyChange(InputError):
         super().__init__(message)
         self.frame = frame
 
+    def __reduce__(self) -> tuple[type[TopologyChange], tuple[str, int]]:
+        return type(self), (str(self), self.frame)
+
     @classmethod
     def at(cls, what: str, frame: int, start: int = 0) -> TopologyChange:
         """The error for what changes at a frame, of an input that is read from ``start`` on."""

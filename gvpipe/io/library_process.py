@@ -1,7 +1,7 @@
 """A process of its own for a library that damaged files can crash: the reader runs there, and frames come from there.
 
-A request is a name and arguments, an answer ``(state, result)``; both are pickles. States are ``done``, ``refused`` with the text
-of an error, and ``changed`` with that of a `TopologyChange` and its frame. The process ends with its input.
+A request is a name and arguments, an answer ``(state, result)``; both are pickles. The state is ``done``, ``refused`` with an
+error's text, or ``changed`` with the text and the frame of a `TopologyChange`. The process ends with its input.
 """
 
 from __future__ import annotations

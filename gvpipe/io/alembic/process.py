@@ -5,6 +5,7 @@ The worker (`gvpipe.io.alembic.worker`) reads the archive; positions and fields 
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,8 @@ from gvpipe.asset.field import Field
 from gvpipe.asset.material import Material
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
+from gvpipe.errors import InputError
+from gvpipe.io.alembic.archive import EXTRA
 from gvpipe.io.library_process import LibraryProcess
 from gvpipe.io.options import ReadOptions
 from gvpipe.sequence import MeshSequence
@@ -78,6 +81,8 @@ class _FieldFrames:
 
 def read_alembic(path: Path, options: ReadOptions) -> MeshSequence:
     """Read an archive as `gvpipe.io.alembic.reader.read_archive` does, which says what is raised."""
+    if importlib.util.find_spec("alembic3d") is None:
+        raise InputError(f"{path}: {EXTRA}")
     process = LibraryProcess(path, WORKER, "Alembic", DIED)
     held: Described = process.prepare("open", str(path), options)
     fields = {
