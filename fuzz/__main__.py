@@ -12,7 +12,8 @@ import click
 
 from fuzz.limits import BAD
 from fuzz.seeds import FOLDER
-from fuzz.session import KINDS, Options, Session
+from fuzz.session import KINDS, Session
+from fuzz.targets import Options
 from fuzz.worker import memory_folder
 
 

@@ -69,7 +69,7 @@ def main() -> None:
     ):  # some modules load when a file needs them
         from fuzz.limits import BAD
         from fuzz.seeds import FOLDER
-        from fuzz.session import Options, load_targets
+        from fuzz.targets import Options, load_targets
         from fuzz.worker import run_case
 
         (target,) = load_targets(Options(0, targets=(name,), seeds=str(FOLDER)))

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from fuzz.limits import ACCEPTED, BAD, BROKEN, CRASHED, HUNG, LARGE, REFUSED, SLOW, Verdict
-from fuzz.parts import Target
 from fuzz.reduction import reduce_finding
+from fuzz.targets import Options, load_targets
 from fuzz.worker import ACCEPTED as N_ACCEPTED
 from fuzz.worker import BUSY, CASE, STARTED, Finding, Job, run_worker
 from fuzz.worker import REFUSED as N_REFUSED
@@ -27,43 +27,6 @@ SAVE_SECONDS = 20.0  # between counts that are written
 REDUCE_SECONDS = 60.0  # of the clock, to make one finding small
 REDUCED = 12  # findings that are made small
 START_SECONDS = 900.0  # of the clock, for sound files when kernels are compiled
-
-
-@dataclass(frozen=True)
-class Options:
-    """What is run.
-
-    Args:
-        seconds: of the clock, without those in which kernels are compiled and loaded.
-        cases: of each target, instead of a time; 0: as many as there is time for.
-        seed: of the random numbers.
-        targets: names of parsers; none: all.
-        kind: ``video`` (Python's parsers of geometry videos), ``mesh``, ``web`` (the player's); "": all.
-        workers: processes.
-        seeds: folder of the seed files.
-        found: folder for cases that fail.
-        folder: where a worker writes its case.
-        more: a folder of further mesh files, as seeds.
-        first: number of the first case of each target.
-        indices: whether kernels refuse indices out of bounds and negative ones.
-        longest: seconds of processor time after which a case counts as hung.
-        loader: what makes the targets.
-    """
-
-    seconds: float
-    cases: int = 0
-    seed: int = 1
-    targets: tuple[str, ...] = ()
-    kind: str = ""
-    workers: int = 2
-    seeds: str = ""
-    found: str = ""
-    folder: str = ""
-    more: str = ""
-    first: int = 0
-    indices: bool = False
-    longest: int = 20
-    loader: Callable[[Options], list[Target]] | None = None
 
 
 @dataclass
@@ -84,28 +47,6 @@ class _Worker:
     shared: Any
     folder: str
     job: Job | None = None
-
-
-def load_targets(options: Options) -> list[Target]:
-    """The parsers that are asked for, with their seeds."""
-    if options.loader is not None:
-        return options.loader(options)
-    from fuzz.browser import browser_targets
-    from fuzz.mesh_files import mesh_targets
-    from fuzz.seeds import load_seeds
-    from fuzz.videos import video_targets
-
-    if options.indices:
-        from fuzz.strict_indices import refuse_bad_indices
-
-        refuse_bad_indices()
-    videos, meshes = load_seeds(Path(options.seeds), Path(options.more) if options.more else None)
-    kinds = {"video": video_targets(videos), "mesh": mesh_targets(meshes), "web": browser_targets(videos)}
-    targets = [target for kind, group in kinds.items() if options.kind in ("", kind) for target in group]
-    unknown = set(options.targets) - {target.name for target in targets}
-    if unknown:
-        raise KeyError(f"no target {', '.join(sorted(unknown))}; there are {', '.join(target.name for target in targets)}")
-    return [target for target in targets if not options.targets or target.name in options.targets]
 
 
 class Session:

@@ -47,7 +47,7 @@ class Finding:
 
 def run_worker(connection: Connection, shared: SynchronizedArray[Any], options: Any) -> None:
     """Take jobs until there is none; send each `Finding`, and ``None`` after each job."""
-    from fuzz.session import load_targets
+    from fuzz.targets import load_targets
 
     warnings.simplefilter("ignore")
     os.environ["GVPIPE_LOG"] = ""

@@ -22,7 +22,8 @@ from fuzz.mesh_files import join_files, mesh_targets, split_files
 from fuzz.mutation import mutate_bytes, mutate_json, mutate_text
 from fuzz.parts import Seed
 from fuzz.reduction import reduce_parts
-from fuzz.session import Options, Session
+from fuzz.session import Session
+from fuzz.targets import Options
 from fuzz.videos import FILE, VIDEO, join_video, split_video, video_targets
 from fuzz.worker import write_files
 from gvpipe.sequence import MeshSequence
