@@ -30,7 +30,7 @@ from gvpipe.notes import DEFAULT_FPS
 from gvpipe.sequence import MeshSequence
 
 
-def read_alembic(path: Path, options: ReadOptions) -> MeshSequence:
+def read_archive(path: Path, options: ReadOptions) -> MeshSequence:
     """Read the meshes of an Alembic archive, in the file's units, with the transforms above them.
 
     Args:
@@ -43,10 +43,10 @@ def read_alembic(path: Path, options: ReadOptions) -> MeshSequence:
     """
     archive = open_archive(path)
     with reading(path, "Alembic"):
-        return _read_archive(archive, path, options)
+        return _read_meshes(archive, path, options)
 
 
-def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequence:
+def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> MeshSequence:
     where = str(path)
     nodes, others = find_meshes(archive)
     motions = [motion for motion in map(AlembicMotion, nodes) if motion.n_vertices]
@@ -78,7 +78,7 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
     joined = join(meshes, where)
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
     sampled = [sampled_of(motion.node.schema, mesh, start) for motion, mesh in zip(motions, meshes, strict=True)]
-    fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times)
+    fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times, where)
     moves = any(changing_normals(motion.node.schema) for motion in motions)
     unruled = first_normals_note(moves, attributes, joined.faces, frames[0:1][0])
     misfits = misfit_note("parameters", [*(names for _, names in read), torn])
