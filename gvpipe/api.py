@@ -195,6 +195,8 @@ def read_runs(
     clip: str | None = None,
     mesh: StrPath | None = None,
     frames: tuple[int, int | None] | None = None,
+    *,
+    unlimited: bool = False,
 ) -> list[Run]:
     """Read an input whose vertices or triangles may change, as one sequence for each run of frames where they do not.
 
@@ -205,7 +207,7 @@ def read_runs(
     """
     from gvpipe.io.runs import find_runs
 
-    return find_runs(lambda span: read(path, fps, clip, mesh, span), frames)
+    return find_runs(lambda span: read(path, fps, clip, mesh, span, unlimited=unlimited), frames)
 
 
 def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> list[str]:

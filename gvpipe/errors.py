@@ -21,14 +21,53 @@ or value, the limit and what to do about it.
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 REMEDY = "get the file again from its source"
+LONGEST = 800  # characters of a message
+LONGEST_QUOTE = 60  # characters of a value that a message quotes
+UNSHOWN = ("Cc", "Cs", "Zl", "Zp")  # Unicode's categories of what no terminal should be sent
+CUT = " ... "
+
+
+def printable(text: str, longest: int = LONGEST) -> str:
+    """Return a text as one line that any terminal shows: control characters escaped, its middle left out where it is long.
+
+    Examples:
+        >>> printable("two\\nlines and a bell\\a")
+        'two lines and a bell\\\\x07'
+    """
+    if not text.isprintable():
+        text = "".join(map(_shown, text))
+    if len(text) <= longest:
+        return text
+    half = (longest - len(CUT)) // 2
+    return text[:half] + CUT + text[-half:]
+
+
+def _shown(character: str) -> str:
+    if unicodedata.category(character) not in UNSHOWN:
+        return character
+    return " " if character.isspace() else character.encode("unicode_escape").decode("ascii")
+
+
+def quote(value: object) -> str:
+    """Return a value of a file for a message: as Python writes it, cut at `LONGEST_QUOTE` characters.
+
+    Examples:
+        >>> quote("mcgv")
+        "'mcgv'"
+    """
+    return repr(value)[:LONGEST_QUOTE]
 
 
 class GvpipeError(Exception):
-    """Base of all errors raised on purpose; its text is one line, fit to be shown to a user."""
+    """Base of all errors raised on purpose; its text is one line, fit to be shown to a user (`printable`)."""
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(printable(message))
 
 
 class InputError(GvpipeError, ValueError):
@@ -45,6 +84,9 @@ class TopologyChange(InputError):
     def __init__(self, message: str, frame: int) -> None:
         super().__init__(message)
         self.frame = frame
+
+    def __reduce__(self) -> tuple[type[TopologyChange], tuple[str, int]]:
+        return type(self), (str(self), self.frame)
 
     @classmethod
     def at(cls, what: str, frame: int, start: int = 0) -> TopologyChange:

@@ -26,7 +26,7 @@ from gvpipe.coarse_asset import add_asset
 from gvpipe.codec import GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file
-from gvpipe.errors import InputError, in_file
+from gvpipe.errors import InputError, in_file, printable
 from gvpipe.frame_cache import FrameCache
 from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence, describe, numbers_of
@@ -125,7 +125,7 @@ class Player:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a user should know of the file, a line each."""
-        return self._asset.notes
+        return tuple(map(printable, self._asset.notes))
 
     @property
     def fps(self) -> float:

@@ -16,7 +16,7 @@ from gvpipe.arguments import did_you_mean
 from gvpipe.codec import Codec, Encoded, FrameReader, Memo, Progress, check_name
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.corrections.bound import correct
-from gvpipe.errors import NewerVersion, SettingError
+from gvpipe.errors import NewerVersion, SettingError, quote
 from gvpipe.repeated_frames import RepeatedFramesReader, add_repeated_frames, find_repeated_frames, read_repeated_frames
 from gvpipe.sequence import MeshSequence
 
@@ -66,7 +66,7 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
         CorruptFile: its sections are not what that codec writes.
     """
     if bitstream.codec not in _entries():
-        raise NewerVersion(f"it was made by codec {bitstream.codec!r}, which this gvpipe does not have; upgrade gvpipe")
+        raise NewerVersion(f"it was made by codec {quote(bitstream.codec)}, which this gvpipe does not have; upgrade gvpipe")
     codec = codec_class(bitstream.codec)
     if bitstream.version > codec.version:
         raise NewerVersion(

@@ -25,7 +25,7 @@ from gvpipe.asset.material import Image, Material, check_materials
 from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part, check_parts
 from gvpipe.asset.polygons import as_polygons
-from gvpipe.errors import InputError
+from gvpipe.errors import InputError, printable
 from gvpipe.frame_views import Narrowed, Permuted, Shifted, Span, Watched
 from gvpipe.notes import ASSUMED_FPS, show_origin
 from gvpipe.origin import as_origin, choose_origin, narrow, rounding
@@ -111,6 +111,7 @@ class MeshSequence:
             self._narrow_lazily(given)
         check_number(self.fps, "fps")
         object.__setattr__(self, "fps", float(self.fps))
+        object.__setattr__(self, "notes", tuple(map(printable, self.notes)))
         shape = tuple(self.positions.shape)
         if len(shape) != 3 or shape[2] != 3 or shape[0] < 1 or shape[1] < 1:
             raise InputError(f"{self.name}: positions have shape {shape}; (frames >= 1, vertices >= 1, 3) is needed")

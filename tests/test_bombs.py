@@ -187,6 +187,16 @@ def test_a_limit_can_be_lifted(tmp_path: Path) -> None:
         gvpipe.open(tmp_path / "a.mp4")
     with pytest.raises(CorruptFile, match="1048576 frames in 3 segments"):  # its runs were decoded
         gvpipe.open(tmp_path / "a.mp4", unlimited=True)
+    with pytest.raises(CorruptFile, match="1048576 frames"):
+        gvpipe.api.read_runs(tmp_path / "a.mp4", unlimited=True)
+
+
+@pytest.mark.parametrize("command", [("convert", "out.npz"), ("encode", "out.mp4")])
+def test_a_limit_can_be_lifted_where_files_are_split(run: Callable[..., Any], tmp_path: Path, command: tuple[str, str]) -> None:
+    mp4.write_file(many_runs(1 << 20), tmp_path / "a.mp4")
+    given = (command[0], tmp_path / "a.mp4", tmp_path / command[1], "--split")
+    assert "--unlimited" in run(*given).err
+    assert "1048576 frames in 3 segments" in run(*given, "--unlimited").err
 
 
 def test_a_limit_of_factors_can_be_lifted(tmp_path: Path) -> None:

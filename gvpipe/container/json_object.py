@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from gvpipe.budget import UNLIMITED, Budget
-from gvpipe.errors import CorruptFile, corrupt_section
+from gvpipe.errors import CorruptFile, corrupt_section, quote
 
 MAX_TEXT = 1 << 16  # characters
 BYTES_PER_CHARACTER = 32  # of parsed JSON, at most: "{}," is an object of 64 bytes and its place in a list
@@ -111,8 +111,7 @@ class JsonObject:
 
     def wrong(self, key: str, needed: str) -> CorruptFile:
         """Return the error of a field that is not what is needed."""
-        value = repr(self._values.get(key))
-        return self.corrupt(f"{key!r} is {value[:60]}; {needed} is needed")
+        return self.corrupt(f"{key!r} is {quote(self._values.get(key))}; {needed} is needed")
 
     def corrupt(self, what: str) -> CorruptFile:
         """Return the error that says ``what`` is wrong in this section."""

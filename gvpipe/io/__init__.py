@@ -13,7 +13,7 @@ from pathlib import Path
 
 from gvpipe.errors import InputError
 from gvpipe.io.cut_pictures import cut_notes
-from gvpipe.io.damage import check_file
+from gvpipe.io.damage import check_file, reading
 from gvpipe.io.export import write_frames
 from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames import read_frames
@@ -74,7 +74,8 @@ def _read(
     # a pattern of frames may end in .glb, too
     if reader is not None and (os.path.isfile(path) or (suffix not in FRAME_FORMATS and not os.path.isdir(path))):
         check_file(Path(path))
-        sequence = reader(Path(path), ReadOptions(fps, clip, mesh, frames))
+        with reading(Path(path), ""):
+            sequence = reader(Path(path), ReadOptions(fps, clip, mesh, frames))
         if sequence is not None:
             return sequence if suffix in (*SIMULATIONS, *SCENES) else _span(sequence, frames)
     return read_frames(path, fps, frames)

@@ -12,8 +12,10 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
+
 from gvpipe.arguments import did_you_mean
-from gvpipe.errors import InputError, TopologyChange
+from gvpipe.errors import InputError, TopologyChange, printable
 
 AGAIN, FRAME_AGAIN = "export it again", "export this frame again"
 WHOLE = "it may be cut short, so export it again"
@@ -23,7 +25,7 @@ LISTED = 12  # names in a message
 
 @contextmanager
 def reading(path: Path, kind: str, at: str = "", remedy: str = AGAIN) -> Iterator[None]:
-    """Turn what is raised inside into `InputError`.
+    """Turn what is raised inside into `InputError`; odd numbers, such as NaN for an index, make no warnings.
 
     Args:
         path: of the file, for the message.
@@ -32,9 +34,10 @@ def reading(path: Path, kind: str, at: str = "", remedy: str = AGAIN) -> Iterato
         remedy: what the user can do.
     """
     try:
-        yield
+        with np.errstate(all="ignore"):  # readers check what they made of the numbers
+            yield
     except InputError as exc:
-        if path.name in str(exc) or isinstance(exc, TopologyChange):
+        if printable(path.name) in str(exc) or isinstance(exc, TopologyChange):
             raise
         raise InputError(f"{path}: {exc}") from exc
     except Exception as exc:

@@ -17,6 +17,7 @@ import numpy as np
 from gvpipe.arrays import Array, Int64
 from gvpipe.asset.attribute import Attribute, guess_kind
 from gvpipe.asset.field import Field
+from gvpipe.io.damage import FRAME_AGAIN, reading
 from gvpipe.io.frame_files import FrameFiles
 from gvpipe.io.mesh import FrameValues, Mesh
 from gvpipe.io.own_normals import entries_of, own_rule
@@ -52,7 +53,8 @@ def split_columns(frames: FrameFiles) -> Columns:
     Raises:
         InputError: a file cannot be read, or lacks what the first one has.
     """
-    given = {name: make() for name, make in frames.first.animated.items()}
+    with reading(frames.paths[0], "", remedy=FRAME_AGAIN):
+        given = {name: make() for name, make in frames.first.animated.items()}
     given = {name: one._replace(values=_narrow(one.values)) for name, one in given.items()}
     statics = {name: _static(frames.first, name, one) for name, one in given.items() if not _has_holes(one.values)}
     n_frames = len(frames.paths)
@@ -62,7 +64,9 @@ def split_columns(frames: FrameFiles) -> Columns:
         frames.keep(name, given[name].values, 1)
     meshes = [frames.load(frame) for frame in samples] if given else []
     settled = {
-        name for name in statics if given[name].kind == "normal" and _are_own(frames, meshes, statics[name], given[name])
+        name
+        for name in statics
+        if given[name].kind == "normal" and _are_own(frames, meshes, samples, statics[name], given[name])
     }
     found = {name for name in set(statics) - settled if _differs(frames, meshes, samples, name, given[name])}
     _keep(frames, found, given, 1)
@@ -115,14 +119,16 @@ def _differs(frames: FrameFiles, meshes: list[Mesh], numbers: list[int], name: s
     return any(not np.array_equal(frames.values(mesh, name, number, one.values), one.values) for mesh, number in pairs)
 
 
-def _are_own(frames: FrameFiles, meshes: list[Mesh], normals: Attribute, one: FrameValues) -> bool:
+def _are_own(frames: FrameFiles, meshes: list[Mesh], numbers: list[int], normals: Attribute, one: FrameValues) -> bool:
     """Whether one rule gives the normals of the first mesh and of all others."""
     faces = frames.first.faces
     entries, corners = entries_of(normals, faces)
     rows: Int64 = corners if one.domain == "corner" else faces.reshape(-1)[corners].astype(np.int64)
-    rules = set()
-    for mesh in (frames.first, *meshes):
-        rules.add(own_rule(np.asarray(mesh.animated["normal"]().values)[rows], mesh.positions, faces, entries))
+    pairs = [
+        (frames.first, one.values),
+        *((mesh, frames.values(mesh, "normal", n, one.values)) for mesh, n in zip(meshes, numbers, strict=True)),
+    ]
+    rules = {own_rule(values[rows], mesh.positions, faces, entries) for mesh, values in pairs}
     return None not in rules
 
 

@@ -88,7 +88,8 @@ class FrameFiles:
     def values(self, mesh: Mesh, name: str, frame: int, first: Array) -> Array:
         """Numbers beside a frame's positions, of the shape and type of the first file's; raises `InputError`."""
         made = mesh.animated.get(name)
-        values = first[:0] if made is None else np.asarray(made().values)
+        with reading(self.paths[frame], "", repr(name), remedy=FRAME_AGAIN):
+            values = first[:0] if made is None else np.asarray(made().values)
         if values.shape != first.shape:
             raise InputError(
                 f"{self.paths[frame].name} has {f'{name!r} {values.shape}' if values.size else f'no {name!r}'}, "

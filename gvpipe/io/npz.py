@@ -6,11 +6,13 @@ the time of writing. It holds everything that a sequence has; `gvpipe.io.npz_ass
 
 from __future__ import annotations
 
+import warnings
 import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
 from gvpipe.arrays import Array
@@ -66,6 +68,8 @@ def read_npz(path: Path, fps: float | None = None) -> MeshSequence:
             raise InputError(f"{path} has no array {key!r} (it holds {held}); 'vertices' and 'faces' are needed")
     vertices, faces = _as_vertices(arrays["vertices"], path), arrays["faces"]
     is_assumed = fps is None and "fps" not in arrays and len(vertices) > 1
+    if not faces.size:
+        raise InputError(f"{path}: 'faces' has no triangle; a mesh with triangles is needed")
     asset: dict[str, Any] = {}
     odd: tuple[str, ...] = ()
     if faces.ndim == 2 and faces.shape[1] == 3 and faces.dtype.kind in "iu":  # else the sequence refuses them
@@ -97,9 +101,19 @@ def _load(path: Path) -> tuple[dict[str, NDArray[Any]], list[str], list[str]]:
         with np.load(file, allow_pickle=False) as archive:
             if len(set(archive.files)) < len(archive.files):
                 raise InputError(f"{path} has two members of one name; {WRITE_AGAIN}")
-            arrays = {key: archive[key] for key in archive.files if is_known(key)}
+            arrays = {key: _array(archive, key) for key in archive.files if is_known(key)}
             fields = [key.removeprefix(FIELD) for key in archive.files if key.startswith(FIELD) and key != FIELD]
             return arrays, fields, list(archive.files)
+
+
+def _array(archive: NpzFile, key: str) -> NDArray[Any]:
+    """A member; NumPy gives the bytes of one that is no array. Raises `ValueError`."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of arrays that Python 2 wrote
+        values = archive[key]
+    if not isinstance(values, np.ndarray):
+        raise ValueError(f"its member {key!r} is no array")
+    return values
 
 
 def _fields(

@@ -8,6 +8,7 @@ fastest, is turned on its way there.
 from __future__ import annotations
 
 import tempfile
+import warnings
 import weakref
 import zipfile
 from collections.abc import Iterator
@@ -125,4 +126,6 @@ def _read_header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]
     """Shape, whether in Fortran order, and type of a ``.npy`` file; raises `ValueError`."""
     version = np.lib.format.read_magic(file)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    return read(file)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of arrays that Python 2 wrote
+        return read(file)

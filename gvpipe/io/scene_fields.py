@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from gvpipe.arrays import Array
 from gvpipe.asset.field import Field
 from gvpipe.errors import InputError
+from gvpipe.io.damage import reading
 from gvpipe.io.scene_mesh import Fans
 
 
@@ -29,12 +31,15 @@ class Sampled:
 
 
 class FieldFrames:
-    """Values ``(F, R)`` or ``(F, R, C)`` of one name on all meshes, evaluated when sliced; 0 where it is missing."""
+    """Values ``(F, R)`` or ``(F, R, C)`` of one name on all meshes, evaluated when sliced; 0 where it is missing.
+
+    Slicing raises `InputError` with the name of the file, ``where``.
+    """
 
     def __init__(
-        self, name: str, found: Sequence[Sampled | None], sizes: Sequence[int], fans: Sequence[Fans], times: Array
+        self, name: str, found: Sequence[Sampled | None], sizes: Sequence[int], fans: Sequence[Fans], times: Array, where: str
     ) -> None:
-        self._name, self._found, self._fans, self._times = name, found, fans, times
+        self._name, self._found, self._fans, self._times, self._where = name, found, fans, times, where
         present = next(each for each in found if each is not None)
         first = present.at(float(times[0]))
         self._is_polygon = present.domain == "polygon"
@@ -50,7 +55,8 @@ class FieldFrames:
             start = 0
             for sampled, size, fans in zip(self._found, self._sizes, self._fans, strict=True):
                 if sampled is not None:
-                    block[i, start : start + size] = self._values(sampled, frame, size, fans)
+                    with reading(Path(self._where), "", f"field {self._name!r} in frame {frame}"):
+                        block[i, start : start + size] = self._values(sampled, frame, size, fans)
                 start += size
         return block
 
@@ -63,7 +69,7 @@ class FieldFrames:
 
 
 def join_fields(
-    found: Sequence[dict[str, Sampled]], sizes: Sequence[int], fans: Sequence[Fans], times: Array
+    found: Sequence[dict[str, Sampled]], sizes: Sequence[int], fans: Sequence[Fans], times: Array, where: str
 ) -> tuple[dict[str, Field], list[str]]:
     """Return the fields by name, and the names of those whose meshes disagree.
 
@@ -72,6 +78,7 @@ def join_fields(
         sizes: vertices of each mesh.
         fans: triangles of each mesh.
         times: of the frames.
+        where: the file, for messages.
     """
     fields: dict[str, Field] = {}
     left: list[str] = []
@@ -81,7 +88,7 @@ def join_fields(
             left.append(name)
             continue
         kind, domain = next((each.kind, each.domain) for each in own if each is not None)
-        frames = FieldFrames(name, own, sizes, fans, times)
+        frames = FieldFrames(name, own, sizes, fans, times, where)
         if len(frames.shape) == 2:
             kind = "" if kind != "label" else kind
         fields[name] = Field(frames, "triangle" if domain == "polygon" else "vertex", kind, name=name)

@@ -39,6 +39,7 @@ NEGLIGIBLE = 0.01  # part of the error that all components left out may add
 ROUNDING = 1e-13  # of the total energy: eigenvalues below are noise
 MAX_COMPONENTS = 1 << 14
 BYTES_PER_VALUE, SECONDS_PER_VALUE = 40, 0.3e-6  # of a basis or of coefficients: residuals, contexts, numbers, a copy
+BYTES_PER_ROW = 520  # of a basis, a coordinate of a frame: its causal neighbours, while they are found
 MAX_SCALE = 8 * 64  # scales run from 2**-64 to 2**64 steps
 PER_OCTAVE = 8
 ROOTS = np.array([math.isqrt(math.isqrt(math.isqrt(1 << (8 * 60 + i)))) / 2**60 for i in range(PER_OCTAVE)])  # 2 ** (i / 8)
@@ -228,7 +229,8 @@ def decode_basis(
     n_components = cursor.varint(min(MAX_COMPONENTS, n_axes * n_frames), "the number of components")
     n_values = (n_points + n_axes * n_frames) * (n_components + 1)
     what = f"section {name!r}, {n_components} trajectories over {n_frames} frames for {n_points} points,"
-    budget.ask(what, BYTES_PER_VALUE * n_values, SECONDS_PER_VALUE * n_values)
+    memory = BYTES_PER_VALUE * n_values + BYTES_PER_ROW * n_axes * n_frames
+    budget.ask(what, memory, SECONDS_PER_VALUE * n_values)
     head = cursor.block()
     levels = np.cumsum(decode_integers(head, n_components, name=name))
     if (np.abs(levels) > MAX_SCALE).any():

@@ -132,3 +132,13 @@ def test_missing_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         io.read(tmp_path / "a.abc")
     with pytest.raises(InputError, match=r"pip install 'gvpipe\[alembic\]'"):
         io.write(scene(), tmp_path / "b.abc")
+
+
+def test_library_that_dies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A damaged archive may crash the library, in a process of its own."""
+    (tmp_path / "dying.py").write_text("import os\nos.abort()\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr("gvpipe.io.alembic.process.WORKER", "dying")
+    io.write(scene(), tmp_path / "a.abc")
+    with pytest.raises(InputError, match=r"a\.abc cannot be read as Alembic: Alembic's library died of it; export it again"):
+        io.read(tmp_path / "a.abc")

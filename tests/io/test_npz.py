@@ -70,6 +70,7 @@ BAD_ARCHIVES = {
     "text": ({**OK, "vertices": np.full((1, 3, 3), "a")}, "'vertices' has shape (1, 3, 3) and type <U1"),
     "objects": ({**OK, "vertices": np.full((1, 3, 3), None)}, "cannot be read as .npz: Object arrays"),
     "faces": ({**OK, "faces": FACES[:, :2]}, "faces have shape (3, 2)"),
+    "no triangle": ({**OK, "faces": FACES[:0]}, "'faces' has no triangle; a mesh with triangles is needed"),
     "index": ({**OK, "faces": FACES + 1}, "vertex indices must lie in 0..2"),
     "fps": ({**OK, "fps": np.arange(3)}, "'fps' has shape (3,)"),
     "fps 0": ({**OK, "fps": 0}, "fps is 0"),
@@ -282,3 +283,11 @@ def test_damaged_lzma(tmp_path: Path) -> None:
     (tmp_path / "b.npz").write_bytes(data)
     with pytest.raises(InputError, match=r"b\.npz cannot be read as \.npz: "):
         io.read(tmp_path / "b.npz")
+
+
+def test_member_that_is_no_array(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", vertices=np.zeros((1, 3, 3)), faces=np.array([[0, 1, 2]]))
+    with zipfile.ZipFile(tmp_path / "a.npz", "a") as archive:
+        archive.writestr("fps.npy", b"30")
+    with pytest.raises(InputError, match=r"a\.npz cannot be read as \.npz: its member 'fps' is no array; write it again"):
+        io.read(tmp_path / "a.npz")

@@ -17,6 +17,7 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError, TopologyChange
 from gvpipe.io.alembic.archive import Node, find_meshes, open_archive, sample_of
 from gvpipe.io.alembic.motion import AlembicMotion, around
+from gvpipe.io.alembic.numbers import as_integers
 from gvpipe.io.alembic.params import changing_normals, layers_of, sampled_of
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
@@ -29,7 +30,7 @@ from gvpipe.notes import DEFAULT_FPS
 from gvpipe.sequence import MeshSequence
 
 
-def read_alembic(path: Path, options: ReadOptions) -> MeshSequence:
+def read_archive(path: Path, options: ReadOptions) -> MeshSequence:
     """Read the meshes of an Alembic archive, in the file's units, with the transforms above them.
 
     Args:
@@ -42,10 +43,10 @@ def read_alembic(path: Path, options: ReadOptions) -> MeshSequence:
     """
     archive = open_archive(path)
     with reading(path, "Alembic"):
-        return _read_archive(archive, path, options)
+        return _read_meshes(archive, path, options)
 
 
-def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequence:
+def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> MeshSequence:
     where = str(path)
     nodes, others = find_meshes(archive)
     motions = [motion for motion in map(AlembicMotion, nodes) if motion.n_vertices]
@@ -77,7 +78,7 @@ def _read_archive(archive: Any, path: Path, options: ReadOptions) -> MeshSequenc
     joined = join(meshes, where)
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
     sampled = [sampled_of(motion.node.schema, mesh, start) for motion, mesh in zip(motions, meshes, strict=True)]
-    fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times)
+    fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times, where)
     moves = any(changing_normals(motion.node.schema) for motion in motions)
     unruled = first_normals_note(moves, attributes, joined.faces, frames[0:1][0])
     misfits = misfit_note("parameters", [*(names for _, names in read), torn])
@@ -134,7 +135,7 @@ def _polygons(node: Node, times: Float64, where: str, start: int) -> tuple[Int64
 
 
 def _integers(held: Any, number: int) -> Int64:
-    return np.array(sample_of(held, number), np.int64).reshape(-1)
+    return as_integers(sample_of(held, number))
 
 
 def _face_sets(schema: Any, n_polygons: int) -> tuple[Int64, list[str]]:
@@ -145,7 +146,7 @@ def _face_sets(schema: Any, n_polygons: int) -> tuple[Int64, list[str]]:
     sets: list[tuple[Int64, str]] = []
     for name in map(str, schema.getFaceSetNames()):
         held = schema.getFaceSet(name)  # it must outlive its schema
-        indices = np.array(held.getSchema().getValue().getFaces(), np.int64).reshape(-1)
+        indices = as_integers(held.getSchema().getValue().getFaces())
         indices = indices[(indices >= 0) & (indices < n_polygons)]
         sets.append((indices, name))
     groups = np.zeros(n_polygons, np.int64)

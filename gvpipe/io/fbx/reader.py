@@ -11,7 +11,8 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
 from gvpipe.io.damage import reading, unknown_name
 from gvpipe.io.fbx.evaluator import Described, Take
-from gvpipe.io.fbx.process import FbxProcess
+from gvpipe.io.fbx.process import fbx_process
+from gvpipe.io.library_process import LibraryProcess
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_frames import SceneFrames, frame_times
 from gvpipe.io.scene_layers import join_layers
@@ -25,7 +26,7 @@ EXPERIMENTAL = "FBX is read by ufbx, whose Python package is experimental"
 class _Poses:
     """Positions of all meshes at the time that was asked for last."""
 
-    def __init__(self, process: FbxProcess) -> None:
+    def __init__(self, process: LibraryProcess) -> None:
         self._process = process
         self._time: float | None = None
         self._now: list[Array] = []
@@ -64,11 +65,11 @@ def read_fbx(path: Path, options: ReadOptions) -> MeshSequence:
 
 def _read_fbx(path: Path, options: ReadOptions) -> MeshSequence:
     where = str(path)
-    process = FbxProcess(path)
+    process = fbx_process(path)
     takes: list[Take] = process.ask("takes")
     take, take_notes = _take(takes, options.clip)
     if take is not None:
-        process.ask("choose", takes.index(take))
+        process.prepare("choose", takes.index(take))
     held: Described = process.ask("describe", take.start if take else 0.0)
     if not held.meshes:
         raise InputError(f"{where} has no polygon mesh; a mesh with triangles is needed")
@@ -103,7 +104,7 @@ def _read_fbx(path: Path, options: ReadOptions) -> MeshSequence:
 
 def read_takes(path: Path) -> list[Take]:
     """The takes of a file; raises `InputError`."""
-    takes: list[Take] = FbxProcess(path).ask("takes")
+    takes: list[Take] = fbx_process(path).ask("takes")
     return takes
 
 

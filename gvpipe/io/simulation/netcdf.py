@@ -42,7 +42,7 @@ def open_netcdf(path: Path) -> NetCdf:
         head = file.read(8)
     if head == SIGNATURE:
         return Hdf4(open_hdf(path))
-    if head[:3] != b"CDF":
+    if head[:3] != b"CDF" or len(head) < 4:
         raise InputError(f"{path} is not a netCDF file; export it again")
     if head[3] not in (1, 2):
         raise InputError(f"{path} is netCDF of kind {head[3]}, which is not read; convert it with: nccopy -k netCDF-4")

@@ -1,6 +1,6 @@
 /** An object of section `asset`: members read by name and checked, with a default for those that may be left out. */
 
-import { corrupt } from "../format/errors.js";
+import { corrupt, quote } from "../format/errors.js";
 
 export class AssetEntry {
   /** @param {object} given JSON value @param {string} where for messages */
@@ -52,8 +52,7 @@ export class AssetEntry {
   }
 
   #wrong(what, value) {
-    const shown = JSON.stringify(value)?.slice(0, 60);
-    return corrupt("asset", `${this.where}: ${what} is ${shown}`);
+    return corrupt("asset", `${this.where}: ${what} is ${quote(value)}`);
   }
 }
 

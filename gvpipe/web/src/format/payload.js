@@ -12,7 +12,7 @@ import { Budget } from "./budget.js";
 import { CONTAINER_VERSION, newerContainer } from "./boxes.js";
 import { crc32 } from "./checksum.js";
 import { Cursor } from "./cursor.js";
-import { AGAIN, GeometryVideoError, corrupt } from "./errors.js";
+import { AGAIN, GeometryVideoError, corrupt, quote } from "./errors.js";
 import { inflate } from "./inflate.js";
 
 const LIMITS = { version: [1, 1 << 16], frames: [1, MAX_FRAMES], vertices: [1, MAX_VERTICES], triangles: [0, 1 << 29] };
@@ -107,7 +107,7 @@ async function readHeader(sections) {
 export function checkNumber(object, key, low, high) {
   const value = object[key];
   if (typeof value !== "number" || !(value >= low && value <= high)) {
-    throw new GeometryVideoError("corrupt", `header: '${key}' is ${value}; a number in ${low}..${high} is needed; ${AGAIN}`);
+    throw new GeometryVideoError("corrupt", `header: '${key}' is ${quote(value)}; a number in ${low}..${high} is needed; ${AGAIN}`);
   }
   return value;
 }
@@ -115,7 +115,7 @@ export function checkNumber(object, key, low, high) {
 /** Throw unless `object[key]` is an integer in low..high. */
 export function checkInteger(object, key, low, high) {
   if (!Number.isInteger(checkNumber(object, key, low, high))) {
-    throw new GeometryVideoError("corrupt", `header: '${key}' is ${object[key]}; an integer is needed; ${AGAIN}`);
+    throw new GeometryVideoError("corrupt", `header: '${key}' is ${quote(object[key])}; an integer is needed; ${AGAIN}`);
   }
   return object[key];
 }

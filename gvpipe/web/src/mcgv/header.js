@@ -12,7 +12,7 @@ import {
   SEGMENTS_TINY as TINY,
   VIDEO_MAX_SIDE as MAX_SIDE,
 } from "../constants.js";
-import { GeometryVideoError, corrupt } from "../format/errors.js";
+import { GeometryVideoError, corrupt, quote } from "../format/errors.js";
 import { checkInteger, checkNumber } from "../format/payload.js";
 
 export { VERSION, PROFILE };
@@ -22,12 +22,12 @@ export const CODEC = "mcgv";
 /** Throw unless the payload is of this codec, in a version that it can read. */
 export function checkCodec(header) {
   if (header.codec !== CODEC) {
-    throw new GeometryVideoError("unsupported", `it was coded by '${header.codec}'; gvpipe export-html converts it`);
+    throw new GeometryVideoError("unsupported", `it was coded by ${quote(header.codec)}; gvpipe export-html converts it`);
   }
   if (header.version > VERSION) {
     throw new GeometryVideoError(
       "newer",
-      `version ${header.version} of codec ${CODEC}, this player has ${VERSION}; a newer player is needed`,
+      `version ${quote(header.version)} of codec ${CODEC}, this player has ${VERSION}; a newer player is needed`,
     );
   }
 }
@@ -54,11 +54,11 @@ export function readHeader(header) {
   }
   if ("pictures" in settings) return withoutPictures(header);
   if (settings.profile !== PROFILE) {
-    throw new GeometryVideoError("unsupported", `its profile is '${settings.profile}'; gvpipe export-html converts it`);
+    throw new GeometryVideoError("unsupported", `its profile is ${quote(settings.profile)}; gvpipe export-html converts it`);
   }
   const [prediction, placement] = header.version === 1 ? ["affine", "charts"] : [settings.prediction, settings.placement];
-  if (!PREDICTIONS.includes(prediction)) throw corrupt("header", `prediction is ${JSON.stringify(prediction)}`);
-  if (!PLACEMENTS.includes(placement)) throw corrupt("header", `placement is ${JSON.stringify(placement)}`);
+  if (!PREDICTIONS.includes(prediction)) throw corrupt("header", `prediction is ${quote(prediction)}`);
+  if (!PLACEMENTS.includes(placement)) throw corrupt("header", `placement is ${quote(placement)}`);
   const result = {
     prediction,
     placement,
@@ -71,7 +71,7 @@ export function readHeader(header) {
     pictures: true,
   };
   if (result.outliers && (settings.outliers !== true || header.version === 1)) {
-    throw corrupt("header", `outliers is ${JSON.stringify(settings.outliers)}`);
+    throw corrupt("header", `outliers is ${quote(settings.outliers)}`);
   }
   if (result.width % result.block || result.height % result.block) {
     throw corrupt("header", `planes of ${result.width}x${result.height} are not whole blocks of ${result.block}`);
@@ -86,7 +86,7 @@ function readMotion(header) {
   const settings = header.settings;
   const base = settings.base;
   if (!Array.isArray(base) || base.length !== 4 || !base.every((v) => Math.abs(v) < HUGE) || !(base[3] > 0)) {
-    throw corrupt("header", `base is ${JSON.stringify(base)}`);
+    throw corrupt("header", `base is ${quote(base)}`);
   }
   return {
     clusters: checkInteger(settings, "clusters", 1, MAX_CLUSTERS),
@@ -101,7 +101,7 @@ function withoutPictures(header) {
   const settings = header.settings;
   const alien = [...OF_PICTURES, "outliers"].filter((key) => key in settings);
   if (settings.pictures !== false || header.version < 4 || alien.length || settings.prediction !== "blended") {
-    throw corrupt("header", `pictures is ${JSON.stringify(settings.pictures)} beside ${JSON.stringify(alien)}`);
+    throw corrupt("header", `pictures is ${quote(settings.pictures)} beside ${quote(alien)}`);
   }
   return { prediction: "blended", ...readMotion(header), residualStep: 1, outliers: false, pictures: false };
 }
