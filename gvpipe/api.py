@@ -31,6 +31,7 @@ from gvpipe.rendering.poster import poster_of
 from gvpipe.sequence import MeshSequence
 
 COSTLY_VERTEX = 400  # bytes of memory, with its triangles: less than any codec takes
+SLOW_VERTEX = 20e-6  # seconds: less than `laplacian` takes where others take memory
 VIDEO_SUFFIXES = (".mp4", ".m4v")
 
 if TYPE_CHECKING:
@@ -194,6 +195,8 @@ def read_runs(
     clip: str | None = None,
     mesh: StrPath | None = None,
     frames: tuple[int, int | None] | None = None,
+    *,
+    unlimited: bool = False,
 ) -> list[Run]:
     """Read an input whose vertices or triangles may change, as one sequence for each run of frames where they do not.
 
@@ -204,7 +207,7 @@ def read_runs(
     """
     from gvpipe.io.runs import find_runs
 
-    return find_runs(lambda span: read(path, fps, clip, mesh, span), frames)
+    return find_runs(lambda span: read(path, fps, clip, mesh, span, unlimited=unlimited), frames)
 
 
 def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> list[str]:
@@ -555,7 +558,8 @@ def _notes(sequence: MeshSequence, target: Target | None, left_out: Sequence[str
 
 def _refusal(path: StrPath, bitstream: Bitstream, size: int) -> list[str]:
     """A note if the file that was written is refused without ``unlimited``; looked at where vertices are many for its size."""
-    if COSTLY_VERTEX * bitstream.n_vertices < Budget(size).memory:
+    budget, n_vertices = Budget(size), bitstream.n_vertices
+    if COSTLY_VERTEX * n_vertices < budget.memory and SLOW_VERTEX * n_vertices < budget.seconds:
         return []
     try:
         Player(path)[0]

@@ -55,6 +55,11 @@ class Budget:
         """Bytes that may still be asked for."""
         return max(0.0, self.memory - self._kept_memory)
 
+    @property
+    def seconds_left(self) -> float:
+        """Seconds of work that may still be asked for."""
+        return max(0.0, self.seconds - self._kept_seconds)
+
     def ask(self, what: str, memory: float = 0, seconds: float = 0) -> None:
         """Check that there is room for a step, beside what is kept.
 

@@ -62,8 +62,11 @@ def rounding(positions: NDArray[np.generic], narrowed: Float32, origin: Float64)
     """By how much, along an axis, ``narrowed`` differs at most from the positions ``(F, V, 3)`` that it was made of."""
     if positions.dtype.kind == "f" and positions.dtype.itemsize <= 4:
         return 0.0
-    pairs = zip(_blocks(positions), _blocks(narrowed), strict=True)
-    return max((float(np.abs(block.astype(np.float64) - origin - short).max(initial=0)) for block, short in pairs), default=0.0)
+    largest = 0.0
+    for block, short in zip(_blocks(positions), _blocks(narrowed), strict=True):
+        difference = np.subtract(block - origin if origin.any() else block, short, dtype=np.float64)
+        largest = max(largest, float(difference.max(initial=0)), -float(difference.min(initial=0)))
+    return largest
 
 
 def as_origin(values: object, name: str) -> Float64:

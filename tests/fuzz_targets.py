@@ -9,7 +9,7 @@ import numpy as np
 
 from fuzz.mutation import mutate_bytes
 from fuzz.parts import BrokenPromise, Parts, Seed, Target
-from fuzz.session import Options
+from fuzz.targets import Options
 
 KINDS = {b"C": "crashed", b"B": "broken", b"L": "large", b"H": "hung", b"D": "crashed", b"M": "broken"}
 OFTEN = [0.25, 0.25, 0.15, 0.05, 0.1, 0.2]

@@ -243,7 +243,7 @@ def test_verbose(run: Run, video: Path, walk: Path, tmp_path: Path) -> None:
 
 
 def test_unexpected_errors(run: Run, video: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(path: str) -> None:
+    def fail(path: str, **_: object) -> None:
         raise ZeroDivisionError("of\nall")
 
     monkeypatch.setattr("gvpipe.api.info", fail)

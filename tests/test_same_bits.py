@@ -42,6 +42,7 @@ for path in sys.argv[1:]:
             digest.update(segment.positions(0, 1))
     print(digest.hexdigest(), os.path.basename(path))
 """
+FEW = ("laplacian-2-still", "mcgv-4-klt", "mcgv-4-rigid", "pca-2-still", "pdct-2-asset")  # all codecs, quick to compile for
 MACHINES = {
     "Haswell": {"OPENBLAS_CORETYPE": "Haswell"},
     "SkylakeX": {"OPENBLAS_CORETYPE": "SkylakeX"},
@@ -70,4 +71,9 @@ def test_all_golden_files_decode_to_the_same_bits_on_all_machines() -> None:
     expected = digests(files, {})
     assert len(set(expected)) == len(files)
     for machine, settings in MACHINES.items():
-        assert digests(files, settings) == expected, machine
+        compiled_anew = "NUMBA_CPU_NAME" in settings
+        some = [path for path in files if path.stem in FEW or not compiled_anew]
+        if compiled_anew:  # kept from run to run, apart from this machine's code
+            settings = {**settings, "NUMBA_CACHE_DIR": str(ROOT / "build" / "same_bits")}
+        wanted = [line for line, path in zip(expected, files, strict=True) if path in some]
+        assert digests(some, settings) == wanted, machine

@@ -186,7 +186,7 @@ def encode(
         wanted: dict[str, Any] = {**targets, "textures": textures}
         wanted |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
         if split:
-            runs = api.read_runs(source, **given)
+            runs = api.read_runs(source, **given, unlimited=unlimited)
             written = write_runs(runs, target, lambda run, own: api.encode(run.sequence, own, chosen, progress, **wanted))
         else:
             report = api.encode(source, path, chosen, progress, **given, **wanted, unlimited=unlimited)

@@ -62,7 +62,7 @@ def convert(
     if split:
         if lod or start is not None or stop is not None or target == PIPE:
             raise click.UsageError("--split goes with --frames, and not with --start, --stop, --lod or an OUTPUT of -")
-        options = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames)}
+        options = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames), "unlimited": unlimited}
         _convert_split(source, target, options, parts, out)
         return
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:

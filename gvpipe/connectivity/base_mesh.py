@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Array, Int32
+from gvpipe.budget import Budget
 from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor
@@ -94,19 +95,18 @@ def decode_base(mesh: bytes, order: bytes, n_vertices: int = MAX_VERTICES, n_tri
 
 def read_base(bitstream: Bitstream) -> BaseMesh:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
-    keep_mesh(bitstream)
+    keep_mesh(bitstream.budget, bitstream.n_vertices, bitstream.n_triangles)
     base = decode_base(bitstream.section("mesh"), bitstream.section("order"), bitstream.n_vertices, bitstream.n_triangles)
     bitstream.check_size(len(base.points), len(base.faces))
     return base
 
 
-def keep_mesh(bitstream: Bitstream) -> None:
+def keep_mesh(budget: Budget, n_vertices: int, n_triangles: int) -> None:
     """Check that a file may take the memory and work of a mesh of its size; raises `OverBudget`."""
-    n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
     what = f"a mesh of {n_vertices} vertices and {n_triangles} triangles"
-    bitstream.budget.ask(what, PEAK_PER_VERTEX * n_vertices + PEAK_PER_TRIANGLE * n_triangles)
+    budget.ask(what, PEAK_PER_VERTEX * n_vertices + PEAK_PER_TRIANGLE * n_triangles)
     seconds = SECONDS_PER_VERTEX * n_vertices + SECONDS_PER_TRIANGLE * n_triangles
-    bitstream.budget.keep(what, KEPT_PER_VERTEX * n_vertices + KEPT_PER_TRIANGLE * n_triangles, seconds)
+    budget.keep(what, KEPT_PER_VERTEX * n_vertices + KEPT_PER_TRIANGLE * n_triangles, seconds)
 
 
 def _encode_draco(points: Array, faces: Array) -> bytes:

@@ -111,7 +111,7 @@ def decode_triangles(draco: bytes, merges: bytes, loose: bytes, n_loose: int) ->
 def read_mesh(bitstream: Bitstream) -> Topology:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
     n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
-    keep_mesh(bitstream)
+    keep_mesh(bitstream.budget, bitstream.n_vertices, bitstream.n_triangles)
     mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"), n_vertices, n_triangles)
     bitstream.check_size(len(mesh.points), len(mesh.faces))
     return mesh

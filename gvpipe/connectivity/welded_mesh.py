@@ -127,7 +127,7 @@ def _decode_mesh(mesh: bytes, adaptive: bool, n_vertices: int, n_triangles: int)
 def read_points(bitstream: Bitstream, across: bool = False, adaptive: bool = False) -> WeldedMesh:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
     n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
-    keep_mesh(bitstream)
+    keep_mesh(bitstream.budget, bitstream.n_vertices, bitstream.n_triangles)
     sections = bitstream.section("mesh"), bitstream.section("order")
     mesh = decode_points(*sections, across, adaptive, n_vertices, n_triangles)
     bitstream.check_size(len(mesh.point), len(mesh.faces))

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from gvpipe.arrays import Array
+from gvpipe.budget import Budget
 from gvpipe.errors import InputError
 from gvpipe.fields.derived import Motion, Positions, Span
 from gvpipe.fields.head import Head, longest_segment
 from gvpipe.fields.mesh import FieldMesh
-from gvpipe.fields.segment import MODES, Place
+from gvpipe.fields.segment import MODES, Place, cost
 from gvpipe.fields.segment_encoder import encode_segment
 from gvpipe.fields.values import MAX_COMPONENTS, FieldBound, check_finite, narrow
 
 Read = Callable[[int, int], Array]
 Progress = Callable[[float], None]
+
+SHARE = 0.5  # of the budget of a file of the section's size, that a segment may take; the rest is the mesh's
 
 
 def encode_field(
@@ -44,7 +48,8 @@ def encode_field(
         True
 
     Args:
-        read: ``read(start, stop)`` returns frames ``(stop - start, R, C)``; asked for each segment once, in order.
+        read: ``read(start, stop)`` returns frames ``(stop - start, R, C)``; asked for each segment in order, and again from the
+            start where segments become shorter.
         n_frames: F, at least 1.
         mesh: the R rows.
         bound: on every value.
@@ -54,6 +59,8 @@ def encode_field(
         holes: whether NaN is kept, instead of refused.
         modes: of `gvpipe.fields.segment.MODES`; the smallest is chosen for each segment.
         progress: called with the share that is done.
+
+    Where values take few bytes, segments become shorter: a reader decodes one within the budget of a small file.
 
     Raises:
         InputError: frames of a wrong shape or type, NaN or infinity.
@@ -65,26 +72,39 @@ def encode_field(
     if not 0 < n_components <= MAX_COMPONENTS:
         raise InputError(f"field {name!r} has {n_components} components; 1 to {MAX_COMPONENTS} are possible")
     head = Head(first.dtype, n_components, longest_segment(mesh.n_rows, n_components))
-    bounds = head.bounds(n_frames)
     motion = None if positions is None else Motion(positions, n_frames, mesh)
-    segments, least = [], (math.inf, 0)
-    for start, stop in pairwise(bounds):
-        values = narrow(_checked(read(start, stop), (start, stop), mesh, name))
-        if values.dtype != first.dtype or values.shape[2] != n_components:
-            raise InputError(
-                f"field {name!r}: frames {start} to {stop - 1} have {values.shape[2]} components of type {values.dtype}, "
-                f"the first has {n_components} of type {first.dtype}; make them alike"
-            )
-        missing = check_finite(values, start, name, holes)
-        span = None
-        if motion is not None:
-            least = min(least, _smallest_frame(values, start))
-            span = Span(motion, start, stop, tuple(sorted({0, least[1]})))
-        place = Place(mesh.causal, name, span)
-        segments.append(encode_segment(values, missing, bound, place, modes))
-        if progress is not None:
-            progress(stop / n_frames)
-    return head.pack(segments)
+    while True:
+        segments, least = [], (math.inf, 0)
+        for start, stop in pairwise(head.bounds(n_frames)):
+            values = narrow(_checked(read(start, stop), (start, stop), mesh, name))
+            if values.dtype != first.dtype or values.shape[2] != n_components:
+                raise InputError(
+                    f"field {name!r}: frames {start} to {stop - 1} have {values.shape[2]} components of type {values.dtype}, "
+                    f"the first has {n_components} of type {first.dtype}; make them alike"
+                )
+            missing = check_finite(values, start, name, holes)
+            span = None
+            if motion is not None:
+                least = min(least, _smallest_frame(values, start))
+                span = Span(motion, start, stop, tuple(sorted({0, least[1]})))
+            place = Place(mesh.causal, name, span)
+            segments.append(encode_segment(values, missing, bound, place, modes))
+            if progress is not None:
+                progress(stop / n_frames)
+        section = head.pack(segments)
+        longest = _affordable(head, n_frames, mesh.n_rows, len(section))
+        if longest >= min(head.longest, n_frames):
+            return section
+        head = replace(head, longest=longest)
+
+
+def _affordable(head: Head, n_frames: int, n_rows: int, n_bytes: int) -> int:
+    """Frames of a segment that a reader decodes within the budget of a file of ``n_bytes``."""
+    longest, budget = min(head.longest, n_frames), Budget(n_bytes)
+    n_values = longest * n_rows * head.components
+    memory, seconds = cost(n_values, n_values, n_values, head.dtype)
+    part = SHARE / max(memory / budget.memory, seconds / budget.seconds, SHARE)
+    return max(1, int(longest * part))
 
 
 def _smallest_frame(values: Array, start: int) -> tuple[float, int]:

@@ -68,6 +68,19 @@ class Place:
     budget: Budget = UNLIMITED
 
 
+def cost(n_values: int, n_distinct: int, n_coded: int, dtype: np.dtype[np.generic]) -> tuple[float, float]:
+    """Bytes of memory and seconds of work that decoding a segment takes.
+
+    Args:
+        n_values: of all frames.
+        n_distinct: of the distinct frames.
+        n_coded: of these, in components that are not constant.
+        dtype: of the values.
+    """
+    memory = dtype.itemsize * n_values + (dtype.itemsize + 1) * n_distinct + BYTES_PER_VALUE * n_coded
+    return memory, SECONDS_PER_VALUE * n_coded
+
+
 def decode_segment(data: bytes, shape: tuple[int, ...], dtype: np.dtype[np.generic], place: Place) -> Array:
     """Mirror of `gvpipe.fields.segment_encoder.encode_segment`.
 
@@ -100,9 +113,8 @@ def decode_segment(data: bytes, shape: tuple[int, ...], dtype: np.dtype[np.gener
     if mode >= len(MODES) or (flags > 1).any():
         raise cursor.corrupt(f"its mode is {mode}, its flags {flags.tolist()}")
     constant = flags > 0
-    n_coded = (int(frames[-1]) + 1) * n_rows * int((~constant).sum())
-    memory = dtype.itemsize * n_values + (dtype.itemsize + 1) * (int(frames[-1]) + 1) * n_rows * n_components
-    place.budget.ask(what, memory + BYTES_PER_VALUE * n_coded, SECONDS_PER_VALUE * n_coded)
+    n_distinct = (int(frames[-1]) + 1) * n_rows
+    place.budget.ask(what, *cost(n_values, n_distinct * n_components, n_distinct * int((~constant).sum()), dtype))
     result = np.zeros((int(frames[-1]) + 1, n_rows, n_components), dtype)
     if n_rows:
         result[:, :, constant] = cursor.array(dtype.str, int(constant.sum()))

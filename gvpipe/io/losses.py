@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from gvpipe.asset.metadata import NO_METADATA
 from gvpipe.notes import not_held
@@ -42,9 +42,9 @@ def shadow_note(names: Sequence[str], format_name: str) -> tuple[str, ...]:
     return (f"{format_name} has one value of a name; the fields {', '.join(names)} stand for the attributes",) if names else ()
 
 
-def renamed_note(names: Mapping[str, str], format_name: str) -> tuple[str, ...]:
-    """Of names that a format does not allow, or gives a meaning of its own; by the old one the new one."""
-    changed = [f"{old!r} is {new!r}" for old, new in names.items() if old != new]
+def renamed_note(names: Iterable[tuple[str, str]], format_name: str) -> tuple[str, ...]:
+    """Of names that a format does not allow, has already, or gives a meaning of its own: pairs of the old and the new one."""
+    changed = [f"{old!r} is {new!r}" for old, new in dict.fromkeys(names) if old != new]
     more = f" and {len(changed) - LISTED} more" if len(changed) > LISTED else ""
     return (f"names were changed for {format_name}: {', '.join(changed[:LISTED])}{more}",) if changed else ()
 

@@ -68,6 +68,8 @@ def read_npz(path: Path, fps: float | None = None) -> MeshSequence:
             raise InputError(f"{path} has no array {key!r} (it holds {held}); 'vertices' and 'faces' are needed")
     vertices, faces = _as_vertices(arrays["vertices"], path), arrays["faces"]
     is_assumed = fps is None and "fps" not in arrays and len(vertices) > 1
+    if not faces.size:
+        raise InputError(f"{path}: 'faces' has no triangle; a mesh with triangles is needed")
     asset: dict[str, Any] = {}
     odd: tuple[str, ...] = ()
     if faces.ndim == 2 and faces.shape[1] == 3 and faces.dtype.kind in "iu":  # else the sequence refuses them

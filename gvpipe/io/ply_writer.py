@@ -108,7 +108,7 @@ def _name_notes(sequence: MeshSequence, columns: dict[str, _Column]) -> tuple[st
     stems = {name: one.properties[0] for name, one in columns.items() if one.properties[0] not in COLOR_NAMES}
     stems = {name: stem if len(columns[name].properties) == 1 else stem.removesuffix("_0") for name, stem in stems.items()}
     twice = [name for name in shadowed(sequence) if name in columns]
-    return (*shadow_note(twice, "PLY"), *renamed_note(stems, "PLY"))
+    return (*shadow_note(twice, "PLY"), *renamed_note(stems.items(), "PLY"))
 
 
 def _kind(dtype: np.dtype[Any]) -> str:

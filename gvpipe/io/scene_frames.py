@@ -62,6 +62,7 @@ class SceneFrames:
         files: Collection[str] = (),
     ) -> None:
         self._motions, self.times, self._where, self._unit, self._start = tuple(motions), times, where, unit, start
+        self._path = Path(where)
         self._files, self._n_read = files, 0  # bytes of frames since their pages were given back
         self._starts = np.cumsum([0, *(motion.n_vertices for motion in motions)])
         self._lock = ForkLock()  # neither library says that its Python objects may be shared by threads
@@ -112,7 +113,7 @@ class SceneFrames:
         return result
 
     def _checked(self, motion: Motion, time: float, moment: str, frame: int) -> Array:
-        with reading(Path(self._where), "", f"mesh {motion.name!r} at {moment}"):
+        with reading(self._path, "", f"mesh {motion.name!r} at {moment}"):
             positions = motion.at(time)
         if len(positions) != motion.n_vertices:
             what = f"mesh {motion.name!r} has {len(positions)} vertices at {moment}, {motion.n_vertices} at first"

@@ -43,7 +43,7 @@ def write_vtkhdf(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
         _write_steps(root, sequence, content)
         _write_frames(root, sequence, content)
     names = {name: _safe(name) for name in (*content.attributes, *content.fields)}
-    return (*content.notes, *renamed_note(names, "VTKHDF"))
+    return (*content.notes, *renamed_note(names.items(), "VTKHDF"))
 
 
 def _write_polygons(root: Any, content: PolyContent) -> None:

@@ -68,6 +68,14 @@ def test_names_of_parts(tmp_path: Path) -> None:
     assert [part.name for part in read.parts] == ["left_arm", "1 leg"] and "a_b" in read.fields
 
 
+@pytest.mark.parametrize(("name", "label"), [("a.usda", "USD"), ("a.abc", "Alembic")])
+def test_parts_of_one_name(tmp_path: Path, name: str, label: str) -> None:
+    parts = (Part("arm", (0, 3), (0, 1), parent="body"), Part("arm", (3, 6), (1, 2), parent="body"))
+    read, notes = write(scene(parts=parts), tmp_path / name)
+    assert notes.count(f"names were changed for {label}: 'arm' is 'arm_1'") == 1
+    assert len(read.parts) == 2
+
+
 def test_names_that_ply_does_not_have(tmp_path: Path) -> None:
     fields = {"x": Field(MOVING), "von mises": Field(MOVING)}
     read, notes = write(scene(fields=fields), tmp_path / "out" / "%d.ply")

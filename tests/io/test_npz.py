@@ -70,6 +70,7 @@ BAD_ARCHIVES = {
     "text": ({**OK, "vertices": np.full((1, 3, 3), "a")}, "'vertices' has shape (1, 3, 3) and type <U1"),
     "objects": ({**OK, "vertices": np.full((1, 3, 3), None)}, "cannot be read as .npz: Object arrays"),
     "faces": ({**OK, "faces": FACES[:, :2]}, "faces have shape (3, 2)"),
+    "no triangle": ({**OK, "faces": FACES[:0]}, "'faces' has no triangle; a mesh with triangles is needed"),
     "index": ({**OK, "faces": FACES + 1}, "vertex indices must lie in 0..2"),
     "fps": ({**OK, "fps": np.arange(3)}, "'fps' has shape (3,)"),
     "fps 0": ({**OK, "fps": 0}, "fps is 0"),

@@ -15,6 +15,7 @@ from gvcodecs.laplacian.laplace_operators import laplacian
 from gvcodecs.laplacian.mesh_scale import fineness
 from gvcodecs.laplacian.normal_equations import count_fill, most_products
 from gvpipe.arrays import Bool, Float64, Int32
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy
 from gvpipe.mesh.topology import adjacency, components, unique_edges
 from gvpipe.trajectory.causal_order import CausalOrder
@@ -69,7 +70,13 @@ def is_factorable(point_faces: Int32, n_points: int) -> bool:
     return count_fill(operator, limit).products <= limit
 
 
-def build_domain(surface: Surface, average: Float64 | None, coding: CoefficientCoding, is_still: Bool | None = None) -> Domain:
+def build_domain(
+    surface: Surface,
+    average: Float64 | None,
+    coding: CoefficientCoding,
+    is_still: Bool | None = None,
+    budget: Budget = UNLIMITED,
+) -> Domain:
     """Set up the coding of coefficients.
 
     Args:
@@ -77,6 +84,10 @@ def build_domain(surface: Surface, average: Float64 | None, coding: CoefficientC
         average: ``(P, 3)`` decoded, in mean edge lengths, if there is one.
         coding: of coefficients.
         is_still: ``(P,)`` the points whose coefficients are given; none if None.
+        budget: of the file.
+
+    Raises:
+        TooMuchFill, OverBudget, Singular: of `gvcodecs.laplacian.normal_equations.NormalEquations`.
     """
     n_points = len(surface.hierarchy.order)
     points = np.zeros((n_points, 3)) if average is None else average
@@ -92,7 +103,7 @@ def build_domain(surface: Surface, average: Float64 | None, coding: CoefficientC
     has_deltas &= ~is_still
     scale = np.ones(n_points) if average is None else fineness(average, surface.edges, coding.edge_power)
     operator = scale_rows(thin_hubs(laplacian(points, surface.faces, coding.operator)), scale * has_deltas)
-    system = ExtendedLaplacian(operator, anchors.points, 1 / coding.anchor_ratio, anchors.is_free)
+    system = ExtendedLaplacian(operator, anchors.points, 1 / coding.anchor_ratio, anchors.is_free, budget)
     order, blocks, limits = delta_order(coding.delta_prediction, surface.hierarchy, traversal, has_deltas)
     causal = delta_causal_order(coding.delta_prediction, order, blocks, limits, surface.neighbours, system.deltas(points))
     return Domain(anchors, order, causal, system)

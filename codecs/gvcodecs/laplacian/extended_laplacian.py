@@ -20,6 +20,7 @@ from scipy import sparse
 
 from gvcodecs.laplacian.normal_equations import NormalEquations
 from gvpipe.arrays import Bool, Float64, Int32
+from gvpipe.budget import UNLIMITED, Budget
 
 MAX_NEIGHBOURS = 64  # of a row
 FITTING_STEPS = 2  # of conjugate gradients: a third saves under 1 % of the bytes, and costs two solutions
@@ -66,17 +67,25 @@ class ExtendedLaplacian:
     anchors: ``(A,)`` points, at least one in each component of the operator's graph, and all points of empty rows.
     weight: of an anchor's row, beside 1 for a delta's.
     is_free: ``(A,)`` the anchors whose values the encoder may choose; all if None.
+    budget: of the file.
 
     Raises:
-        TooMuchFill, Singular: of `NormalEquations`.
+        TooMuchFill, OverBudget, Singular: of `NormalEquations`.
     """
 
-    def __init__(self, operator: sparse.csr_array, anchors: Int32, weight: float, is_free: Bool | None = None) -> None:
+    def __init__(
+        self,
+        operator: sparse.csr_array,
+        anchors: Int32,
+        weight: float,
+        is_free: Bool | None = None,
+        budget: Budget = UNLIMITED,
+    ) -> None:
         self._n_points, self._anchors, self._weight = operator.shape[0], anchors, weight
         self._is_free = np.ones(len(anchors), bool) if is_free is None else is_free
         held = np.zeros(operator.shape[0])
         held[anchors] = weight * weight
-        self.equations = NormalEquations(operator, held)
+        self.equations = NormalEquations(operator, held, budget)
 
     def deltas(self, coefficients: Float64) -> Float64:
         """Deltas ``(P, R)`` of ``coefficients (P, R)``."""

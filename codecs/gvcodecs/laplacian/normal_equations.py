@@ -2,7 +2,8 @@
 
 The order of elimination follows from the triangles in integers (`elimination_kernels`), and with it the size of the factor. On
 surfaces it grows as P log P entries, and the work as P sqrt(P): 70 entries and 4200 products a point for 10,000 points, 130 and
-22,000 for 100,000. On triangles that connect points at random it grows as P^2 and P^3. So work is limited before it begins.
+22,000 for 100,000. On triangles that connect points at random it grows as P^2 and P^3. So work is counted before it begins: it
+has a limit, and a file's budget has to have room for it.
 
 Factors are plain arrays, sums run in one order (`factor_kernels`): the solution has the same bits on every machine.
 """
@@ -15,7 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Float64, Int32, Int64
-from gvpipe.errors import FormatError
+from gvpipe.budget import ALLOW, UNLIMITED, Budget
+from gvpipe.errors import OverBudget
 from gvpipe.trajectory.sparse_rows import as_rows
 
 if TYPE_CHECKING:
@@ -28,6 +30,10 @@ COLUMNS = 32  # solved at once: more do not fit the cache
 FREE_PRODUCTS = 1 << 27  # that any system may take
 PRODUCTS = 512  # that P points may take beside, times P sqrt(P): 7 times what a square grid of 100,000 points needs
 NO_LIMIT = 1 << 62
+BYTES_PER_PAIR, SECONDS_PER_PAIR = 20, 15e-9  # of points that a row couples
+BYTES_PER_ENTRY, SECONDS_PER_ENTRY = 12, 20e-9  # of a factor
+SECONDS_PER_PRODUCT = 1.4e-9
+SECONDS_PER_SOLVED = 0.5e-9  # of an entry, times columns
 
 
 class Fill(NamedTuple):
@@ -42,7 +48,7 @@ class Fill(NamedTuple):
     products: int
 
 
-class TooMuchFill(FormatError):
+class TooMuchFill(OverBudget):
     """A factor would take more products than its number of points allows."""
 
 
@@ -69,28 +75,43 @@ class NormalEquations:
     Args:
         operator: ``(P, P)`` L, by rows, columns ascending.
         held: ``(P,)`` added to the diagonal.
+        budget: of the file; without a limit, factors may take whatever they take.
 
     Raises:
         TooMuchFill: the factor takes more than `most_products`.
+        OverBudget: it takes more than the file may.
         Singular: an unknown is held by nothing.
     """
 
-    def __init__(self, operator: sparse.csr_array, held: Float64) -> None:
+    def __init__(self, operator: sparse.csr_array, held: Float64, budget: Budget = UNLIMITED) -> None:
         from gvcodecs.laplacian.factor_kernels import factor_pattern, factorise
         from gvcodecs.laplacian.operator_kernels import normal_matrix, transpose
 
-        self._rows = as_rows(operator)
+        self._rows, self._budget = as_rows(operator), budget
+        n_pairs, what = int(np.square(np.diff(operator.indptr).astype(np.int64)).sum()), f"factoring over {len(held)} points"
+        budget.ask(what, BYTES_PER_PAIR * n_pairs, SECONDS_PER_PAIR * n_pairs)
         transposed = transpose(self._rows)
-        self._order, columns, self.fill = _eliminate(self._rows, transposed, most_products(len(held)))
-        if self.fill.products > most_products(len(held)):
-            limit = f"{len(held)} points may take {most_products(len(held))} products"
-            raise TooMuchFill(f"its triangles couple points at random: factoring takes too long, {limit}; encode it as pca")
+        limit = most_products(len(held)) if budget.is_limited else NO_LIMIT
+        self._order, columns, self.fill = _eliminate(self._rows, transposed, limit)
+        if self.fill.products > limit:
+            most = f"{len(held)} points may take {limit} products"
+            raise TooMuchFill(
+                f"its triangles couple points at random: factoring takes too long, {most}; encode it as pca, or {ALLOW}"
+            )
+        work = SECONDS_PER_PAIR * n_pairs + SECONDS_PER_ENTRY * self.fill.entries + SECONDS_PER_PRODUCT * self.fill.products
+        budget.ask(what, BYTES_PER_PAIR * n_pairs + BYTES_PER_ENTRY * self.fill.entries)
+        budget.keep(what, BYTES_PER_ENTRY * self.fill.entries, work)
         matrix = normal_matrix(self._rows, transposed, held, self._order, len(columns) // 2)
         pattern = factor_pattern(matrix.starts, matrix.rows, self.fill.entries)
         factors, at = factorise(matrix, *pattern)
         if at >= 0:
             raise Singular(f"no equation holds point {self._order[at]}")
         self._factors: Factors = factors
+
+    def ask_to_solve(self, n_columns: int) -> None:
+        """Check that the file may take the work of so many solutions; raises `OverBudget`."""
+        seconds = SECONDS_PER_SOLVED * n_columns * (self.fill.entries + len(self._order))
+        self._budget.ask(f"{n_columns} solutions over {len(self._order)} points", seconds=seconds)
 
     def multiply(self, vectors: Float64) -> Float64:
         """The operator times ``vectors (P, R)``."""

@@ -18,6 +18,7 @@ from gvpipe.connectivity.topology_only import read_mesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import corrupt_section
+from gvpipe.mesh.hierarchy import keep_hierarchy
 from gvpipe.trajectory.basis import decode_basis
 from gvpipe.trajectory.reconstruction import Segment, read_frames
 from gvpipe.trajectory.still_points import read_still
@@ -28,13 +29,14 @@ class LaplacianReader:
 
     Raises:
         CorruptFile: a section does not hold what it must.
-        TooMuchFill: the triangles make factoring take too long.
+        OverBudget: mesh or factors take more than the file may; `TooMuchFill` where the triangles connect points at random.
     """
 
     def __init__(self, bitstream: Bitstream) -> None:
         self._header = Header.of(bitstream)
         self._mesh, self._bitstream = read_mesh(bitstream), bitstream
         self._still = read_still(bitstream, self._mesh)
+        keep_hierarchy(bitstream.budget, self._mesh.n_points, len(self._mesh.point_faces))
         surface = build_surface(self._mesh.point_faces, self._mesh.n_points)
         try:
             self._domain = self._build_domain(surface)
@@ -69,7 +71,7 @@ class LaplacianReader:
         average = None
         if self._header.coding.needs_average:
             average = decode_average(self._bitstream.section(NAME), surface, self._header.coding)
-        return build_domain(surface, average, self._header.coding, self._still.flags)
+        return build_domain(surface, average, self._header.coding, self._still.flags, self._bitstream.budget)
 
     def _decode(self, s: int) -> Segment:
         if self._kept is None or self._kept[0] != s:
@@ -87,6 +89,7 @@ class LaplacianReader:
             anchors, deltas = (section(name) for name in names)
             n_components, given = basis.vectors.shape[1], self._still.given(basis, self._bitstream.budget)
             domain, coding = self._domain, self._header.coding
+            domain.system.equations.ask_to_solve(n_components)
             coefficients = decode_coefficients(anchors, deltas, n_components, step, domain, coding, names, given)
             self._kept = s, Segment(basis, np.ascontiguousarray(coefficients.T))
         return self._kept[1]

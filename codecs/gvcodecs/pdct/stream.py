@@ -22,8 +22,10 @@ from gvcodecs.pdct.clip import decode_clip
 from gvcodecs.pdct.dictionary import BaseFrame
 from gvcodecs.pdct.encoder import Pdct, diagonal_of
 from gvcodecs.pdct.header import surface_of
+from gvcodecs.pdct.reader import BYTES_PER_POINT, SECONDS_PER_POINT
 from gvpipe.arrays import Float32, Floats, Int32, Integers
-from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base
+from gvpipe.budget import Budget
+from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base, keep_mesh
 from gvpipe.container.json_object import JsonObject
 from gvpipe.container.lattice_field import read_lattice
 from gvpipe.container.segments import MAX_SEGMENT
@@ -128,9 +130,15 @@ class StreamReader:
     """Frames of a stream whose bytes come in pieces of any size.
 
     `feed` the bytes, and iterate over what it returns: the frames that have become complete, ``(V, 3) float32``, model units.
+
+    The bytes that have come so far limit what the mesh and each clip may cost (`gvpipe.budget`).
+
+    Args:
+        unlimited: let them take whatever memory and work they ask for.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, unlimited: bool = False) -> None:
+        self._is_unlimited, self._n_bytes = unlimited, 0
         self._buffer = bytearray()
         self._mesh: BaseMesh | None = None
         self._surface: BaseFrame | None = None
@@ -150,8 +158,10 @@ class StreamReader:
             NotGeometryVideo: the stream does not start as one.
             NewerVersion: this gvpipe is too old for it.
             CorruptFile: a checksum differs or a part does not decode.
+            OverBudget: the mesh or a clip takes more than so many bytes may.
         """
         self._buffer += data
+        self._n_bytes += len(data)
         if self._surface is None and not self._read_head():
             return
         while not self.is_finished:
@@ -167,6 +177,13 @@ class StreamReader:
         if not self.is_finished:
             raise TruncatedFile(f"the stream ends within clip {self._clips}; get it again from its source")
 
+    def _budget(self, n_vertices: int, n_triangles: int) -> Budget:
+        """What the bytes so far may cost, and the mesh takes of it."""
+        budget = Budget(None if self._is_unlimited else self._n_bytes)
+        keep_mesh(budget, n_vertices, n_triangles)
+        budget.keep(f"{n_vertices} points", BYTES_PER_POINT * n_vertices, SECONDS_PER_POINT * n_vertices)
+        return budget
+
     def _read_head(self) -> bool:
         if self._buffer[: len(MAGIC)] != MAGIC[: len(self._buffer)]:
             raise NotGeometryVideo("the stream does not start as a pdct stream; check its source")
@@ -181,6 +198,7 @@ class StreamReader:
             raise CorruptFile(f"the stream has {fps} frames per second; get it again from its source")
         if len(self._buffer) < start + bytes_mesh + bytes_order:
             return False
+        self._budget(n_vertices, n_triangles)
         mesh = bytes(self._buffer[start : start + bytes_mesh])
         order = bytes(self._buffer[start + bytes_mesh : start + bytes_mesh + bytes_order])
         decoded = decode_base(mesh, order, n_vertices, n_triangles)
@@ -192,7 +210,7 @@ class StreamReader:
 
     def _read_clip(self) -> Float32 | None:
         """The next clip's frames ``(n, V, 3)``, none at the end mark, None if the clip is not complete."""
-        assert self._surface is not None
+        assert self._surface is not None and self._mesh is not None
         if self._buffer[: len(END)] == END:
             self.is_finished = True
             del self._buffer[: len(END)]
@@ -209,4 +227,5 @@ class StreamReader:
             raise CorruptFile(f"clip {self._clips} of the stream has a wrong checksum; get it again from its source")
         del self._buffer[: CLIP.size + size]
         self._clips += 1
-        return decode_clip(data, n_frames, self._surface, f"clip.{self._clips - 1}")
+        budget = self._budget(len(self._surface.base), len(self._mesh.faces))
+        return decode_clip(data, n_frames, self._surface, f"clip.{self._clips - 1}", budget)

@@ -12,6 +12,7 @@ import numpy as np
 
 from gvpipe.arrays import Array, Float64
 from gvpipe.io.alembic.archive import Node, sample_of
+from gvpipe.io.alembic.numbers import as_matrix
 
 CLOSE = 1e-6  # seconds within which a time is a sample's
 
@@ -24,6 +25,7 @@ class AlembicMotion:
         self.name = node.path
         self._positions = node.schema.getPositionsProperty()
         self.moves = self._positions.getNumSamples() > 1 or any(parent.schema.getNumSamples() > 1 for parent in node.parents)
+        self._world: Float64 | None = None  # of transforms that stand still
         self.n_vertices = len(_sample(self._positions, 0)) if self._positions.getNumSamples() else 0
 
     def count(self, time: float) -> int:
@@ -52,16 +54,20 @@ class AlembicMotion:
 
     def world(self, time: float) -> Float64:
         """``(4, 4)`` from the mesh's space into the world's, applied to rows."""
+        if self._world is not None:
+            return self._world
         total = np.eye(4)
         for parent in self.node.parents:
             low, high, part = around(parent.schema, time)
             first = sample_of(parent.schema, low)
-            matrix = np.array(first.getMatrix(), np.float64)
+            matrix = as_matrix(first.getMatrix())
             if part:
-                matrix += part * (np.array(sample_of(parent.schema, high).getMatrix(), np.float64) - matrix)
+                matrix += part * (as_matrix(sample_of(parent.schema, high).getMatrix()) - matrix)
             total = total @ matrix
             if not first.getInheritsXforms():
                 break
+        if all(parent.schema.getNumSamples() < 2 for parent in self.node.parents):
+            self._world = total
         return np.asarray(total)
 
 

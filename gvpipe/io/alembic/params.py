@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gvpipe.arrays import Array, Float64
+from gvpipe.io.alembic.numbers import as_integers, as_numbers
 from gvpipe.io.scene_fields import Sampled
 from gvpipe.io.scene_mesh import Layer, SceneMesh
 
@@ -95,7 +96,7 @@ class Values:
     def __call__(self, time: float) -> Array:
         from alembic3d import Abc
 
-        values = np.array(self._param.getExpandedValue(Abc.ISampleSelector(float(time))).getVals())
+        values = as_numbers(self._param.getExpandedValue(Abc.ISampleSelector(float(time))).getVals())
         return values if self._width == 1 else values.reshape(len(values), -1)
 
 
@@ -126,13 +127,13 @@ def _layer(name: str, kind: str, param: Any, polygons: SceneMesh, time: float) -
     from alembic3d import Abc
 
     value = param.getIndexedValue(Abc.ISampleSelector(time))
-    values = np.array(value.getVals())
+    values = as_numbers(value.getVals())
     values = values.reshape(len(values), -1)
     if not values.size or (values.dtype.kind == "f" and not np.isfinite(values).all()):
         return None
     if values.dtype.kind == "f":
         values = values.astype(np.float32)
-    indices = np.array(value.getIndices(), np.int64) if param.isIndexed() else None
+    indices = as_integers(value.getIndices()) if param.isIndexed() else None
     if indices is not None and (not indices.size or indices.min() < 0 or indices.max() >= len(values)):
         return None
     domain = SCOPES[str(param.getScope()).rsplit(".", 1)[-1]]

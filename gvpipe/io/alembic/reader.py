@@ -17,6 +17,7 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError, TopologyChange
 from gvpipe.io.alembic.archive import Node, find_meshes, open_archive, sample_of
 from gvpipe.io.alembic.motion import AlembicMotion, around
+from gvpipe.io.alembic.numbers import as_integers
 from gvpipe.io.alembic.params import changing_normals, layers_of, sampled_of
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
@@ -134,7 +135,7 @@ def _polygons(node: Node, times: Float64, where: str, start: int) -> tuple[Int64
 
 
 def _integers(held: Any, number: int) -> Int64:
-    return np.array(sample_of(held, number), np.int64).reshape(-1)
+    return as_integers(sample_of(held, number))
 
 
 def _face_sets(schema: Any, n_polygons: int) -> tuple[Int64, list[str]]:
@@ -145,7 +146,7 @@ def _face_sets(schema: Any, n_polygons: int) -> tuple[Int64, list[str]]:
     sets: list[tuple[Int64, str]] = []
     for name in map(str, schema.getFaceSetNames()):
         held = schema.getFaceSet(name)  # it must outlive its schema
-        indices = np.array(held.getSchema().getValue().getFaces(), np.int64).reshape(-1)
+        indices = as_integers(held.getSchema().getValue().getFaces())
         indices = indices[(indices >= 0) & (indices < n_polygons)]
         sets.append((indices, name))
     groups = np.zeros(n_polygons, np.int64)

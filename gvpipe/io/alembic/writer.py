@@ -41,13 +41,15 @@ def write_alembic(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     normals = SceneNormals(sequence, "Alembic")
     try:
         with atomic_path(path) as temporary:
-            _write_archive(sequence, meshes, normals, str(temporary))  # the library closes the file when its objects are gone
+            # the library closes the file when its objects are gone
+            taken = _write_archive(sequence, meshes, normals, str(temporary))
     except RuntimeError as exc:
         raise OutputError(f"cannot write {path}: {reason_of(exc)}; check the folder and the disk") from exc
-    return (*normals.notes, *_notes(sequence, meshes), *_name_notes(sequence))
+    return (*normals.notes, *_notes(sequence, meshes), *_name_notes(sequence, taken))
 
 
-def _write_archive(sequence: MeshSequence, meshes: list[ExportMesh], normals: SceneNormals, path: str) -> None:
+def _write_archive(sequence: MeshSequence, meshes: list[ExportMesh], normals: SceneNormals, path: str) -> list[tuple[str, str]]:
+    """Write the file; return the old and the new names of nodes whose names were taken."""
     from alembic3d import Abc, AbcCoreAbstract
 
     archive = Abc.CreateArchiveWithInfo(path, float(sequence.fps), "gvpipe", sequence.metadata.source or sequence.name)
@@ -68,6 +70,7 @@ def _write_archive(sequence: MeshSequence, meshes: list[ExportMesh], normals: Sc
             block = field.read(first, min(first + step, len(field)))
             for writer in writers:
                 writer.write_field(name, field.kind, field.domain, block)
+    return tree.renamed
 
 
 class Tree:
@@ -76,6 +79,7 @@ class Tree:
     def __init__(self, top: Any) -> None:
         self._made: dict[tuple[str, ...], Any] = {(): top}
         self._taken: dict[tuple[str, ...], set[str]] = {}
+        self.renamed: list[tuple[str, str]] = []  # names of nodes, old and new
 
     def parent(self, path: str) -> Any:
         """The transform of a path, made with those above it."""
@@ -102,6 +106,7 @@ class Tree:
         while free in taken:
             free, number = f"{name}_{number}", number + 1
         taken.add(free)
+        self.renamed += [(name, free)] if name and free != name else []
         return free
 
 
@@ -178,12 +183,15 @@ class MeshWriter:
             faces.getSchema().set(AbcGeom.OFaceSetSchemaSample(filled(imath.IntArray, np.arange(first, stop, dtype=np.int32))))
 
 
-def _name_notes(sequence: MeshSequence) -> tuple[str, ...]:
-    """What was done to names and units: Alembic has neither units nor names with a slash, and one thing of a name."""
+def _name_notes(sequence: MeshSequence, taken: list[tuple[str, str]]) -> tuple[str, ...]:
+    """What was done to names and units: Alembic has neither units nor names with a slash, and one thing of a name.
+
+    ``taken`` has the old and the new names of nodes whose names others had.
+    """
     names = (*sequence.attributes, *sequence.fields, *(part.name for part in sequence.parts))
-    changed = {name: name.replace("/", "_") for name in (*names, *(each.name for each in sequence.materials))}
+    changed = [(name, name.replace("/", "_")) for name in (*names, *(each.name for each in sequence.materials))]
     twice = shadow_note(shadowed(sequence), "Alembic")
-    return (*twice, *renamed_note(changed, "Alembic"), *unit_note(sequence, "Alembic"))
+    return (*twice, *renamed_note([*changed, *taken], "Alembic"), *unit_note(sequence, "Alembic"))
 
 
 def _notes(sequence: MeshSequence, meshes: list[ExportMesh]) -> tuple[str, ...]:

@@ -119,11 +119,21 @@ def _load(ufbx: Any, path: Path) -> Any:
         named = cache.relative_filename or cache.filename
         try:
             side_file(path, named, "geometry cache")
-            if not Path(cache.filename).resolve().is_relative_to(path.parent.resolve()):
-                raise ValueError(f"its geometry cache {named!r} lies outside the file's folder; move it beside the file")
+            _check_place(path, Path(cache.filename))
         except ValueError as exc:
             raise InputError(f"{path}: {exc}") from exc
     return hold(ufbx.load_file(str(path), **settings, load_external_files=True)) if caches else scene
+
+
+def _check_place(path: Path, cache: Path) -> None:
+    """Raise `ValueError` if a cache, or a file of Maya's samples that it stands for, lies outside the folder of ``path``.
+
+    The library reads samples from files that have the name of Maya's .xml, and more after it.
+    """
+    samples = [each for each in cache.parent.glob("*.mc*") if each.name.startswith(cache.stem)] if cache.parent.is_dir() else []
+    for file in (cache, *samples):
+        if not file.resolve().is_relative_to(path.parent.resolve()):
+            raise ValueError(f"its geometry cache {file.name!r} lies outside the file's folder; move it beside the file")
 
 
 def _with_mesh(nodes: list[Any]) -> tuple[list[int], int]:

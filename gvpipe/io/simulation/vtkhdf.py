@@ -50,6 +50,7 @@ class VtkHdfSteps:
 
     def __init__(self, file: HdfFile) -> None:
         self._file = file
+        self._tables: dict[str, Int64 | None] = {}  # whole arrays of sizes and offsets
         if file.find(ROOT) is None:
             raise ValueError("it has no group VTKHDF, so it is another kind of HDF5 file")
         self.kind = file.attribute(ROOT, "Type")
@@ -80,31 +81,41 @@ class VtkHdfSteps:
         )
 
     def _sizes(self, name: str) -> Int64:
-        sizes = self._file.read(f"{ROOT}/{name}").astype(np.int64).reshape(-1)
-        if sizes.min(initial=0) < 0:
-            raise ValueError(f"{name!r} holds {int(sizes.min())}")
-        return sizes
+        held = self._tables.get(name)
+        if held is None:
+            held = self._file.read(f"{ROOT}/{name}").astype(np.int64).reshape(-1)
+            if held.min(initial=0) < 0:
+                raise ValueError(f"{name!r} holds {int(held.min())}")
+            self._tables[name] = held
+        return held
 
     def _parts(self, step: int) -> tuple[int, int]:
         n_parts = len(self._points_of_part)
         if not self._is_temporal:
             return 0, n_parts
         first = self._offset("PartOffsets", step, 0)
-        counts = f"{ROOT}/Steps/NumberOfParts"
-        count = 1 if self._file.find(counts) is None else int(self._file.read(counts, step, step + 1)[0])
+        count = self._offset("NumberOfParts", step, 1)
         if not 0 <= first <= first + count <= n_parts:
             raise ValueError(f"step {step} has parts {first} to {first + count} of {n_parts}")
         return first, first + count
 
     def _offset(self, name: str, step: int, default: int, column: int = 0) -> int:
         """Where a step's rows start."""
-        path = f"{ROOT}/Steps/{name}"
-        if not self._is_temporal or self._file.find(path) is None:
+        table = self._offsets(name) if self._is_temporal else None
+        if table is None:
             return default
-        row = self._file.read(path, step, step + 1).reshape(-1)
-        if column >= len(row):
-            raise ValueError(f"{name!r} has {len(row)} columns; column {column} is needed")
-        return int(row[column])
+        if column >= table.shape[1]:
+            raise ValueError(f"{name!r} has {table.shape[1]} columns; column {column} is needed")
+        return int(table[step, column])
+
+    def _offsets(self, name: str) -> Int64 | None:
+        """The offsets of all steps, a row each; None: the file has none of that name."""
+        path = f"{ROOT}/Steps/{name}"
+        if path not in self._tables:
+            is_there = self._file.find(path) is not None
+            read = self._file.read(path, 0, self.n_steps).astype(np.int64) if is_there else None
+            self._tables[path] = None if read is None else read.reshape(self.n_steps, -1)
+        return self._tables[path]
 
     def _points(self, start: int, count: int) -> Floats:
         points = self._file.read(f"{ROOT}/Points", start, start + count)

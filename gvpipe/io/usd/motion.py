@@ -93,6 +93,8 @@ class UsdMotion:
         self.moves = self.moves or any(part.TransformMightBeTimeVarying() for part in self._ancestors())
         topology = (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr())
         self._topology = [each for each in topology if each.ValueMightBeTimeVarying()]
+        self._is_deformed = self._points.ValueMightBeTimeVarying() or bool(self._query)
+        self._rest: Float64 | None = None  # points that never change in the mesh's own space
         self.n_vertices = len(self._points.Get(start) or ())
 
     def samples(self) -> Iterable[float]:
@@ -110,10 +112,15 @@ class UsdMotion:
         Raises:
             ValueError: it has no points then, or skinning failed.
         """
-        points = self._points.Get(time)
-        if points is None:
-            raise ValueError("it has no points")
-        return self._place(self._deform(points, time), time)
+        if self._rest is None:
+            points = self._points.Get(time)
+            if points is None:
+                raise ValueError("it has no points")
+            exact = self._deform(points, time)
+            self._rest = None if self._is_deformed else exact
+        else:
+            exact = self._rest
+        return self._place(exact, time)
 
     def linear(self, time: float) -> Float64:
         """How its directions turn: ``(3, 3)``, or ``(n, 3, 3)`` where each vertex has its own; rows are the images of x, y, z.

@@ -102,7 +102,12 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str) -
     names = primvar_names({**attributes, **normals.fields})
     usual = {name: one for name, one in names.items() if one not in ("st", "normals", "displayColor")}
     own = {name: one for name, one in usual.items() if not (name.startswith("uv") and one == f"st{name[2:]}")}
-    said = [*normals.notes, *shadow_note(shadowed(sequence), "USD"), *renamed_note(own, "USD"), *unit_note(sequence, "USD")]
+    said = [
+        *normals.notes,
+        *shadow_note(shadowed(sequence), "USD"),
+        *renamed_note(own.items(), "USD"),
+        *unit_note(sequence, "USD"),
+    ]
     drawn = [_define(stage, where, mesh, sequence, materials) for where, mesh in zip(paths, meshes, strict=True)]
     for each, mesh in zip(drawn, meshes, strict=True):
         said.extend(write_primvars(each, mesh, attributes, names))
@@ -110,13 +115,8 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str) -
     for field_name, field in normals.fields.items():
         write_field(names[field_name], field, list(zip(drawn, meshes, strict=True)), start)
     stage.GetRootLayer().Save()
-    shown = {_full(mesh): where.rpartition("/")[2] for where, mesh in zip(paths, meshes, strict=True)}
-    parts = {old.rpartition("/")[2]: new for old, new in shown.items() if old.rpartition("/")[2] != new}
+    parts = [(mesh.name, where.rpartition("/")[2]) for where, mesh in zip(paths, meshes, strict=True)]
     return (*dict.fromkeys(said), *renamed_note(parts, "USD"), *_notes(sequence, meshes))
-
-
-def _full(mesh: ExportMesh) -> str:
-    return f"{mesh.parent}/{mesh.name}"
 
 
 def _new_stage(path: Path) -> Any:

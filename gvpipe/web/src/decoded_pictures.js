@@ -18,11 +18,12 @@ export class DecodedPictures {
   /**
    * @param {Uint8Array} file @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated
    * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
+   * @param {number} [checksum] `track_crc32` of the header
    * @returns {Promise<DecodedPictures>} its first group decoded
    * @throws {GeometryVideoError} kind "unsupported": this browser's WebCodecs cannot decode it
    */
-  static async open(file, fps, repeated, size, samples) {
-    const track = readTrack(file);
+  static async open(file, fps, repeated, size, samples, checksum) {
+    const track = readTrack(file, checksum);
     const found = track.groups.reduce((sum, group) => sum + group.length, 0);
     if (found !== repeated.distinct) {
       throw new GeometryVideoError("corrupt", `its video has ${found} pictures in place of ${repeated.distinct}; ${AGAIN}`);

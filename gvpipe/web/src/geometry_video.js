@@ -39,7 +39,7 @@ export class GeometryVideo {
       const { fps } = payload.header;
       const open = () =>
         reader.samples
-          ? openPictures(file, fps, repeated, reader.pictureSize, reader.samples)
+          ? openPictures(file, fps, repeated, reader.pictureSize, reader.samples, payload.header.container.track_crc32)
           : DecodedPictures.without(fps, repeated, reader.zeroLevels);
       pictures = await open();
       const video = new GeometryVideo(payload.header, file.length, repeated, reader, pictures);

@@ -10,12 +10,13 @@ import { VideoPictures } from "./video_pictures.js";
  * @param {Uint8Array} file @param {number} fps
  * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated which picture each frame shows
  * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
+ * @param {number} [checksum] of the decoder's configuration and of which pictures are key frames; older files have none
  * @returns {Promise<DecodedPictures|VideoPictures>} with `levels()`, `seek`, `play`, `pause` and `close`
  */
-export async function openPictures(file, fps, repeated, size, samples) {
+export async function openPictures(file, fps, repeated, size, samples, checksum) {
   if (typeof VideoDecoder === "function") {
     try {
-      return await DecodedPictures.open(file, fps, repeated, size, samples);
+      return await DecodedPictures.open(file, fps, repeated, size, samples, checksum);
     } catch (error) {
       if (!(error instanceof GeometryVideoError) || error.kind !== "unsupported") throw error;
     }

@@ -5,6 +5,7 @@
  * edit lists and offsets of composition times do not matter.
  */
 
+import { crc32 } from "./format/checksum.js";
 import { AGAIN, GeometryVideoError } from "./format/errors.js";
 
 const CONTAINERS = ["moov", "trak", "mdia", "minf", "stbl"];
@@ -21,24 +22,28 @@ const VISUAL_ENTRY = 78; // bytes of a visual sample entry before its boxes
  * @property {Sample[][]} groups of pictures, which decode alone, in the order of decoding
  *
  * @param {Uint8Array} file a whole MP4 file
+ * @param {number} [checksum] `track_crc32` of the header: over `description`, then one byte for each sample, 1 for a key frame
  * @returns {Track}
  * @throws {GeometryVideoError} its tables do not fit each other
  */
-export function readTrack(file) {
+export function readTrack(file, checksum) {
   try {
-    return parseTrack(new Tables(file));
+    return parseTrack(new Tables(file), checksum);
   } catch (error) {
     if (error instanceof RangeError || error instanceof TypeError) throw broken("its tables end too early");
     throw error;
   }
 }
 
-function parseTrack(tables) {
+function parseTrack(tables, checksum) {
   const { codec, description } = tables.configuration();
   const sizes = tables.sizes();
   const places = tables.places(sizes);
   const numbers = ranks(tables.times(sizes.length));
   const keys = tables.keys(sizes.length);
+  if (checksum !== undefined && checksum !== crc32(Uint8Array.from(sizes, (_, i) => Number(keys.has(i))), crc32(description))) {
+    throw broken("the description of its video is damaged");
+  }
   const groups = [];
   for (let i = 0; i < sizes.length; i++) {
     if (keys.has(i)) groups.push([]);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import runpy
+import struct
 import tracemalloc
 
 import numpy as np
@@ -12,7 +13,8 @@ from folders import SAMPLES
 from sequences import awkward, waving
 
 from gvcodecs.pdct import Pdct, StreamEncoder, StreamReader
-from gvpipe.errors import CorruptFile, FormatError, InputError, NotGeometryVideo, TruncatedFile
+from gvcodecs.pdct.stream import CLIP, HEAD, MAGIC
+from gvpipe.errors import CorruptFile, FormatError, InputError, NotGeometryVideo, OverBudget, TruncatedFile
 
 
 @pytest.mark.parametrize("packet", [1, 700, 1 << 20])
@@ -117,3 +119,19 @@ def test_the_sample_runs(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     monkeypatch.setattr("sys.argv", ["stream.py", str(script.with_name("cloth.npz")), "40"])
     runpy.run_path(str(script), run_name="__main__")
     assert "110 frames" in capsys.readouterr().out
+
+
+def test_small_streams_that_ask_for_a_lot_are_refused() -> None:
+    data = bytearray(coded_stream(waving(6, 8), segment=8))
+    *counts, _ = HEAD.unpack_from(data, len(MAGIC))
+    at = len(MAGIC) + HEAD.size + counts[3] + counts[4]
+    _, checksum, size = CLIP.unpack_from(data, at)
+    long = data.copy()
+    CLIP.pack_into(long, at, 100_000, checksum, size)
+    with pytest.raises(OverBudget, match="100000 frames of 36 points"):
+        list(StreamReader().feed(bytes(long)))
+    struct.pack_into("<I", data, len(MAGIC) + 2, 1 << 27)
+    with pytest.raises(OverBudget, match="134217728 vertices"):
+        list(StreamReader().feed(bytes(data)))
+    with pytest.raises(CorruptFile):  # its mesh was decoded
+        list(StreamReader(unlimited=True).feed(bytes(data)))

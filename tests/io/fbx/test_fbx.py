@@ -73,6 +73,18 @@ def test_geometry_caches_lie_beside_the_file(tmp_path: Path, name: str, words: s
         gvpipe.io.read(tmp_path / "in" / "a.fbx")
 
 
+def test_links_in_place_of_samples_are_not_followed(tmp_path: Path) -> None:
+    """The .xml lies beside the file, the samples of Maya's cache do not."""
+    folder = tmp_path / "in"
+    folder.mkdir()
+    write_mc(tmp_path / "c.mc", SLIDING)
+    (tmp_path / "c.xml").rename(folder / "c.xml")
+    (folder / "c.mc").symlink_to(tmp_path / "c.mc")
+    (folder / "a.fbx").write_text(with_cache("c.xml", 2, "quad"))
+    with pytest.raises(InputError, match=r"a\.fbx .*: its geometry cache 'c\.mc' lies outside the file's folder"):
+        gvpipe.io.read(folder / "a.fbx")
+
+
 def test_damaged_cache(tmp_path: Path) -> None:
     (tmp_path / "c.pc2").write_bytes(b"POINTCACHE2\0" + b"x" * 50)
     (tmp_path / "a.fbx").write_text(with_cache("c.pc2"))

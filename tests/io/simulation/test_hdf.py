@@ -114,13 +114,21 @@ def test_xdmf_names_files_beside_it(tmp_path: Path) -> None:
 def test_links_are_not_followed(tmp_path: Path) -> None:
     """Neither to other files, nor virtual datasets; and a dataset of any size costs no memory."""
     gvpipe.io.write(sequence_of_quads(), tmp_path / "good.vtkhdf")
-    for kind, message in (("link", "another file"), ("virtual", "other files"), ("huge", "cannot hold")):
+    for kind, message in (
+        ("link", "another file"),
+        ("soft", "another file"),
+        ("virtual", "other files"),
+        ("huge", "cannot hold"),
+    ):
         path = tmp_path / f"{kind}.vtkhdf"
         path.write_bytes((tmp_path / "good.vtkhdf").read_bytes())
         with h5py.File(path, "a") as file:
             del file["VTKHDF/Points"]
             if kind == "link":
                 file["VTKHDF/Points"] = h5py.ExternalLink("good.vtkhdf", "VTKHDF/Points")
+            elif kind == "soft":
+                file["elsewhere"] = h5py.ExternalLink("good.vtkhdf", "VTKHDF/Points")
+                file["VTKHDF/Points"] = h5py.SoftLink("/elsewhere")
             elif kind == "virtual":
                 layout = h5py.VirtualLayout((21, 3), "f4")
                 layout[:] = h5py.VirtualSource(str(tmp_path / "good.vtkhdf"), "VTKHDF/Points", (21, 3))

@@ -27,6 +27,7 @@ import { readImages, readMaterials } from "./materials.js";
 
 const MAX_PARTS = 2 ** 22;
 const MAX_COMPONENTS = 64;
+const PER_CHARACTER = 32; // bytes of memory, of JSON
 const HUGE = 3.5e38; // above float32's largest number
 export const KINDS = ["uv", "normal", "tangent", "color", "scalar", "vector", "label"];
 export const DOMAINS = ["vertex", "corner", "triangle", "part"];
@@ -55,7 +56,7 @@ export const NO_ASSET = {
  */
 export async function readAsset(payload, video, positions) {
   if (!payload.sections.has(SECTION)) return NO_ASSET;
-  const list = new AssetEntry(await readJson(payload.section(SECTION)), "the list");
+  const list = new AssetEntry(await readJson(payload.section(SECTION), payload.budget), "the list");
   if (list.integer("version", undefined, 1, 2 ** 31) > VERSION) {
     return { ...NO_ASSET, notes: ["what the file has beside positions is not shown: a newer gvpipe wrote it"] };
   }
@@ -73,8 +74,9 @@ export async function readAsset(payload, video, positions) {
   return { indices, parts, attributes, fields, materials, images, polygons, metadata, notes, close };
 }
 
-async function readJson(data) {
-  const text = await inflate(data, MAX_BYTES, (what) => corrupt(SECTION, what));
+async function readJson(data, budget) {
+  const most = Math.min(MAX_BYTES, Math.floor(budget.left / PER_CHARACTER));
+  const text = await inflate(data, most, (what) => corrupt(SECTION, what));
   try {
     return JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(text));
   } catch {

@@ -23,13 +23,14 @@ import { decodeIntegers } from "./integers.js";
 
 /**
  * @param {Uint8Array} stream
+ * @param {{vertices: number, triangles: number}} most of the header
  * @returns {Promise<{points: Int32Array, faces: Uint32Array}>} (P, 3) lattice units, and (T, 3) triangles over them, flat
  */
-export async function decodeAdaptiveMesh(stream) {
+export async function decodeAdaptiveMesh(stream, most) {
   const cursor = new Cursor(stream, "mesh");
-  const nPoints = cursor.varint(MAX_POINTS, "the number of points");
+  const nPoints = cursor.varint(Math.min(MAX_POINTS, most.vertices), "the number of points");
   const [draco, merges, loose] = [cursor.block(), cursor.block(), cursor.block()];
-  const nLoose = cursor.varint(MAX_PER_BYTE * stream.length, "the number of loose triangles");
+  const nLoose = cursor.varint(Math.min(MAX_PER_BYTE * stream.length, most.triangles), "the number of loose triangles");
   const carried = draco.length ? await decodeDracoTriangles(draco) : { nVertices: 0, faces: new Uint32Array(0) };
   const merged = smallestFirst(merge(carried, merges));
   const others = await decodeTable(loose, nLoose);

@@ -20,10 +20,11 @@ const MAX_COORDINATE = 2 ** 25; // squared distances between lattice points stay
  * @property {Int32Array} visits (V) vertex v is the codec's vertex visits[v]
  *
  * @param {Uint8Array} mesh @param {Uint8Array} order sections
+ * @param {{vertices: number, triangles: number}} most of the header
  * @returns {Promise<BaseMesh>}
  */
-export async function decodeBase(mesh, order) {
-  const { points, faces } = await decodeMesh(mesh);
+export async function decodeBase(mesh, order, most) {
+  const { points, faces } = await decodeMesh(mesh, most);
   const n = points.length / 3;
   const visits = Int32Array.from({ length: n }, (_, v) => v);
   if (order.length === 0) return { points, faces, visits };
@@ -37,9 +38,12 @@ export async function decodeBase(mesh, order) {
   return { points: moved, faces: faces.map((vertex) => rank[vertex]), visits };
 }
 
-async function decodeMesh(mesh) {
+async function decodeMesh(mesh, most) {
   const cursor = new Cursor(mesh, "mesh");
   const [bytesDraco, looseVertices, looseFaces, bytesVertices] = [cursor.u32(), cursor.u32(), cursor.u32(), cursor.u32()];
+  if (looseVertices > most.vertices || looseFaces > most.triangles) {
+    throw cursor.corrupt(`${looseVertices} loose vertices and ${looseFaces} loose triangles, more than the header says`);
+  }
   const draco = cursor.take(bytesDraco);
   const carried = bytesDraco ? merge(await decodeDraco(draco)) : { points: [], faces: [] };
   const points = join(Int32Array, carried.points, await decodeTable(cursor.take(bytesVertices), looseVertices));

@@ -11,6 +11,8 @@ import { temporalOrder } from "./temporal_neighbours.js";
 import { decodeIntegers } from "./integers.js";
 import { MAX_VALUES, decodeVectors } from "./coefficient_coding.js";
 
+const PER_VALUE = 40; // bytes, of a basis or of coefficients
+
 /** 2 ** (i / PER_OCTAVE), rounded correctly: browsers' own powers need not be. */
 const ROOTS = [1, 1.0905077326652577, 1.189207115002721, 1.2968395546510096, 1.4142135623730951, 1.5422108254079407, 1.681792830507429, 1.8340080864093424];
 
@@ -24,11 +26,14 @@ const ROOTS = [1, 1.0905077326652577, 1.189207115002721, 1.2968395546510096, 1.4
  * @param {number} step quantisation step, model units
  * @param {string} name of the section, for messages
  * @param {number} axes A, coordinates of a frame
+ * @param {import("./budget.js").Budget|null} budget of the file; null: no limit
  * @returns {Basis}
  */
-export function decodeBasis(data, frames, points, step, name, axes = 3) {
+export function decodeBasis(data, frames, points, step, name, axes = 3, budget = null) {
   const cursor = new Cursor(data, name);
   const components = cursor.varint(Math.min(MAX_COMPONENTS, axes * frames), "the number of components");
+  const values = (points + axes * frames) * (components + 1);
+  budget?.ask(`section '${name}', ${components} trajectories over ${frames} frames`, PER_VALUE * values);
   const levels = decodeIntegers(cursor.take(cursor.varint(cursor.left, "a length")), components, null, name);
   const scales = [Math.sqrt(points)];
   let level = 0;

@@ -14,6 +14,7 @@ const TAG = /gvpipe (\d{1,9}) ([0-9a-f]{32})/;
 /**
  * @typedef {object} Container
  * @property {Uint8Array} payload
+ * @property {number} bytes of the file
  * @property {string} id the content id of the tag, "" if the file has none
  * @property {number} videoChecksum CRC-32 over the samples: gvpipe's files hold nothing else in their `mdat` boxes
  *
@@ -40,7 +41,8 @@ export function readContainer(file) {
   for (const box of boxes) {
     if (box.kind === "mdat") videoChecksum = crc32(file.subarray(box.start, box.end), videoChecksum);
   }
-  return { payload: file.subarray(payloads[0].start + 16, payloads[0].end), id: tag ? tag[2] : "", videoChecksum };
+  const payload = file.subarray(payloads[0].start + 16, payloads[0].end);
+  return { payload, bytes: file.length, id: tag ? tag[2] : "", videoChecksum };
 }
 
 export function newerContainer(version) {

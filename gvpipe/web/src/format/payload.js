@@ -8,6 +8,7 @@ import {
   BITSTREAM_MAX_SECTIONS as MAX_SECTIONS,
   BITSTREAM_MAX_VERTICES as MAX_VERTICES,
 } from "../constants.js";
+import { Budget } from "./budget.js";
 import { CONTAINER_VERSION, newerContainer } from "./boxes.js";
 import { crc32 } from "./checksum.js";
 import { Cursor } from "./cursor.js";
@@ -16,11 +17,12 @@ import { inflate } from "./inflate.js";
 
 const LIMITS = { version: [1, 1 << 16], frames: [1, MAX_FRAMES], vertices: [1, MAX_VERTICES], triangles: [0, 1 << 29] };
 
-/** A geometry video's header and sections. */
+/** A geometry video's header and sections, and what reading them may cost. */
 export class Payload {
-  constructor(header, sections) {
+  constructor(header, sections, budget) {
     this.header = header;
     this.sections = sections;
+    this.budget = budget;
   }
 
   /** @returns {Uint8Array} */
@@ -43,7 +45,9 @@ export async function readPayload(container) {
   if (checksum !== container.videoChecksum) {
     throw new GeometryVideoError("corrupt", `its video is damaged, or was re-encoded; ${AGAIN}`);
   }
-  return new Payload(header, sections);
+  const budget = new Budget(container.bytes);
+  budget.keepMesh(header);
+  return new Payload(header, sections, budget);
 }
 
 function readTable(cursor) {

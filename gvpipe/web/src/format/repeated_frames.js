@@ -8,6 +8,8 @@ import { Cursor } from "./cursor.js";
 import { decodeIntegers } from "./integers.js";
 import { Payload } from "./payload.js";
 
+const PER_RUN = 80; // bytes
+
 export class RepeatedFrames {
   /**
    * @param {number} frames F
@@ -33,8 +35,8 @@ export class RepeatedFrames {
   }
 
   /** The payload as the codec knows it: of the distinct frames. */
-  distinctPayload({ header, sections }) {
-    return new Payload({ ...header, frames: this.distinct }, sections);
+  distinctPayload({ header, sections, budget }) {
+    return new Payload({ ...header, frames: this.distinct }, sections, budget);
   }
 }
 
@@ -43,10 +45,11 @@ export class RepeatedFrames {
  * @returns {RepeatedFrames}
  * @throws {GeometryVideoError} the runs are not those of the header's number of frames
  */
-export function readRepeatedFrames({ header: { frames }, sections }) {
+export function readRepeatedFrames({ header: { frames }, sections, budget }) {
   if (!sections.has(SECTION)) return new RepeatedFrames(frames);
   const cursor = new Cursor(sections.get(SECTION), SECTION);
   const distinct = cursor.varint(frames, "the number of distinct frames");
+  budget.keep(`${distinct} distinct frames`, PER_RUN * distinct);
   const repeats = decodeIntegers(cursor.rest(), distinct, null, SECTION); // run lengths less 1
   const starts = new Uint32Array(distinct);
   let end = 0;

@@ -21,7 +21,7 @@ export class BlendedMotion {
     this.point = point;
     this.moved = new Float64Array(own.length); // (P, 3) of the frame last asked for
     this.segments = new Segments(payload.header.frames, header.segments, (name, frames) =>
-      new Trajectories(payload.section(name), header.clusters, frames, header.transformStep, name),
+      new Trajectories(payload.section(name), header.clusters, frames, header.transformStep, name, payload.budget),
     );
   }
 

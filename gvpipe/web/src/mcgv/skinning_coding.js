@@ -10,10 +10,11 @@ export class Trajectories {
    * @param {number} clusters K @param {number} frames of the segment
    * @param {number} step quantisation step, model units
    * @param {string} name of the section, for messages
+   * @param {import("../format/budget.js").Budget} budget of the file
    */
-  constructor(data, clusters, frames, step, name) {
+  constructor(data, clusters, frames, step, name, budget) {
     const cursor = new Cursor(data, name);
-    this.basis = decodeBasis(cursor.take(cursor.varint(cursor.left, "a length")), frames, 4 * clusters, step, name);
+    this.basis = decodeBasis(cursor.block(), frames, 4 * clusters, step, name, 3, budget);
     /** (4K, R) flat. */
     this.coefficients = decodeVectors(cursor.rest(), this.basis.components, step, independentOrder(4 * clusters), name);
     this.n = 4 * clusters;

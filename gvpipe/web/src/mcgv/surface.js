@@ -73,7 +73,7 @@ export async function readSurface(payload, header) {
 
 /** Files before version 3: every vertex is a slot. */
 async function readVertices(payload) {
-  const { points: lattice, faces, visits } = await decodeBase(payload.section("mesh"), payload.section("order"));
+  const { points: lattice, faces, visits } = await decodeBase(payload.section("mesh"), payload.section("order"), payload.header);
   checkCounts(payload.header, visits.length, faces);
   const welded = weldVertices(lattice, faces, visits);
   return { faces, basePoints: lattice, slot: Int32Array.from(visits.keys()), lattice, visits, ...welded };
@@ -85,6 +85,7 @@ async function readPoints(payload) {
     payload.section("order"),
     payload.header.version > 3,
     payload.header.version > 4,
+    payload.header,
   );
   checkCounts(payload.header, point.length, faces);
   const n = lattice.length / 3;
