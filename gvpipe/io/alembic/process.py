@@ -66,6 +66,11 @@ class _Frames:
         block, self.rounding = self._process.ask("frames", start, stop)
         return block
 
+    def at(self, time: float) -> Float64:
+        """Positions ``(V, 3)`` at any second, with the origin; raises `InputError`."""
+        result: Float64 = self._process.ask("at", time)
+        return result
+
 
 class _FieldFrames:
     """Values of a field, read by the other process when sliced."""

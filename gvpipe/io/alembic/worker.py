@@ -21,7 +21,12 @@ class Scene:
 
     def answer(self, name: str, arguments: tuple[Any, ...]) -> Any:
         """The result of a request."""
-        methods: dict[str, Callable[..., Any]] = {"open": self._open, "frames": self._frames, "field": self._field}
+        methods: dict[str, Callable[..., Any]] = {
+            "open": self._open,
+            "frames": self._frames,
+            "at": self._at,
+            "field": self._field,
+        }
         return methods[name](*arguments)
 
     def _open(self, where: str, options: ReadOptions) -> Described:
@@ -48,6 +53,11 @@ class Scene:
     def _frames(self, start: int, stop: int) -> Any:
         assert self._sequence is not None  # it was opened first
         return self._sequence.positions[start:stop], self._sequence.rounding
+
+    def _at(self, time: float) -> Any:
+        assert self._sequence is not None  # it was opened first
+        frames: Any = self._sequence.positions
+        return frames.at(time)
 
     def _field(self, name: str, start: int, stop: int) -> Any:
         assert self._sequence is not None  # it was opened first
