@@ -31,7 +31,7 @@ def test_fields_that_fail_when_they_are_sliced() -> None:
         return np.zeros(4 if time else 3)
 
     none = np.zeros(0, np.int64)
-    fans = Fans(none, none, none, none)
+    fans = Fans(none, none, none, (0,))
     frames = FieldFrames("heat", [Sampled(at, "scalar", "vertex")], [3], [fans], np.arange(3.0), "a.usdc")
     assert frames[0:1].shape == (1, 3)
     with pytest.raises(InputError, match=r"a\.usdc: field heat has 4 values in frame 1; 3 are needed"):
