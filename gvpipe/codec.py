@@ -129,8 +129,8 @@ class Codec(Protocol):
     """A codec's settings, and what it does with them.
 
     A class attribute ``holds = True``, after the section of that name, says that the codec never sees repeated frames: run
-    lengths around it code them (`gvpipe.repeated_frames`). Its ``version`` then knows of them. A class attribute
-    ``same_bits = False`` says that machines may decode slightly different positions.
+    lengths around it code them (`gvpipe.repeated_frames`). Its ``version`` then knows of them; ``holds_version`` names an older
+    one that does, too. A class attribute ``same_bits = False`` says that machines may decode slightly different positions.
     """
 
     id: ClassVar[str]

@@ -104,7 +104,8 @@ def encode_sequence(
     if holds is None:
         return codec.encode(sequence, progress, memo)
     encoded = codec.encode(holds.distinct(sequence), progress, memo)
-    return Encoded(add_repeated_frames(encoded.bitstream, holds, codec.version), encoded.permutation)
+    version = max(encoded.bitstream.version, getattr(codec, "holds_version", codec.version))
+    return Encoded(add_repeated_frames(encoded.bitstream, holds, version), encoded.permutation)
 
 
 @functools.cache

@@ -53,7 +53,7 @@ def test_closing_a_player_ends_its_threads_and_dropping_it_frees_it(name: str) -
     try:
         video = play(GOLDEN / f"{name}.mp4")
         video.close()
-        assert own_threads() == before
+        assert set(own_threads()) <= set(before)
         assert len(video[0]) == video.shape[1]  # it stays usable
         video.close()
         kept: list[weakref.ref[Any]] = [

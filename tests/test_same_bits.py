@@ -42,7 +42,7 @@ for path in sys.argv[1:]:
             digest.update(segment.positions(0, 1))
     print(digest.hexdigest(), os.path.basename(path))
 """
-FEW = ("laplacian-2-still", "mcgv-4-klt", "mcgv-4-rigid", "pca-2-still", "pdct-2-asset")  # all codecs, quick to compile for
+FEW = ("laplacian-2-still", "mcgv-4-rigid", "pca-2-still", "pdct-2-still")  # all codecs, quick to compile for
 MACHINES = {
     "Haswell": {"OPENBLAS_CORETYPE": "Haswell"},
     "SkylakeX": {"OPENBLAS_CORETYPE": "SkylakeX"},

@@ -135,7 +135,7 @@ def test_info(run: Run, video: Path, sequence: MeshSequence) -> None:
     assert {name: values["sections"][name] for name in held} == {name: len(data) for name, data in held.items()}
     assert 0 < values["sections"]["container"] < 4000
     shape = (values["frames"], values["vertices"], values["triangles"], values["fps"], values["codec"], values["version"])
-    assert shape == (11, 72, 128, 25.0, "mcgv", 4)
+    assert shape == (11, 72, 128, 25.0, "mcgv", 5)
     first = gvpipe.open(video)[0].astype(float)
     assert values["bounding_box"] == {"min": first.min(0).tolist(), "max": first.max(0).tolist()}
     text = run("info", video).out

@@ -142,3 +142,18 @@ def test_library_that_dies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     io.write(scene(), tmp_path / "a.abc")
     with pytest.raises(InputError, match=r"a\.abc cannot be read as Alembic: Alembic's library died of it; export it again"):
         io.read(tmp_path / "a.abc")
+
+
+def test_arrays_of_the_library() -> None:
+    """Those without a buffer, which are read in other ways, have the numbers that NumPy takes from them one by one."""
+    imath = pytest.importorskip("imath")
+    from gvpipe.io.alembic.numbers import as_integers, as_matrix, as_numbers
+    from gvpipe.io.alembic.param_writer import filled
+
+    large = filled(imath.UnsignedIntArray, np.array([0, 1, 2**31, 2**32 - 1, 77]))
+    assert np.array_equal(as_integers(large), np.array(large)) and len(as_integers(imath.UnsignedIntArray(0))) == 0
+    for kind, width in ((imath.C3fArray, 3), (imath.C4fArray, 4)):
+        colors = filled(kind, np.arange(2 * width, dtype=np.float32).reshape(2, width))
+        assert np.array_equal(as_numbers(colors), np.array(colors).reshape(2, width))
+    matrix = imath.M44d(*map(float, range(16)))
+    assert np.array_equal(as_matrix(matrix), np.arange(16).reshape(4, 4))

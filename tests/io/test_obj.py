@@ -83,7 +83,7 @@ def test_obj_relative_indices_are_never_taken_from_the_first_frame(tmp_path: Pat
 
 
 BAD_OBJ = {
-    "empty": ("", "it has no vertices"),
+    "empty": ("", "is empty"),
     "prose": ("this is a text\nfor people\n", "it has no vertices"),
     "no faces": (SQUARE, "it has no faces"),
     "letters": ("v a b c\nf 1 1 1\n", "cannot be read as OBJ"),

@@ -41,9 +41,9 @@ def test_clip_and_rate_are_chosen(tmp_path: Path) -> None:
     read = gvpipe.read(path, fps=8, clip="up")
     assert read.shape[0] == 5 and read.fps == 8 and read.metadata.start_time == 0.5
     assert read.read(0, 5)[:, 0, 1].tolist() == [0, 0, 0, 0, 3]
-    with pytest.raises(InputError, match="a.glb: it has no clip 'ap'; there are: 'go', 'up'; did you mean 'up'"):
+    with pytest.raises(InputError, match="a.glb: it has no clip 'ap'; there are: 'go', 'up'"):
         gvpipe.read(path, clip="ap")
-    with pytest.raises(InputError, match="it has no animation, so no clip 'go'"):
+    with pytest.raises(InputError, match="it has no clip 'go'; it has none"):
         gvpipe.read(square_file().write(tmp_path / "still.glb"), clip="go")
     np.savez(tmp_path / "a.npz", vertices=CORNERS[None], faces=TWO.reshape(2, 3))
     with pytest.raises(InputError, match="has no clips"):
