@@ -78,6 +78,7 @@ def test_command_line(run: Run, sheet: Path, tmp_path: Path) -> None:
     assert run("bench", sheet, "--codecs", "mp3").status == 1
 
 
+@pytest.mark.slow
 def test_one_codec_with_several_settings(sheet: Path) -> None:
     made = sweep.run([str(sheet)], ["pca", "pca:segment=4"], [50.0])
     assert [(curve.codec, curve.settings["segment"] == 4) for curve in made.curves] == [("pca", False), ("pca:segment=4", True)]

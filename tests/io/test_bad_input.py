@@ -61,6 +61,10 @@ def refused(path: Path, *words: str) -> Iterator[None]:
     assert [word for word in words if word not in message] == [], message
 
 
+# each reading of these starts a process
+MANY_TIMES = [pytest.param(each, marks=pytest.mark.slow) if each in (".abc", ".fbx") else each for each in SUFFIXES]
+
+
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_as_it_should_be(copied: Any, suffix: str) -> None:
     sequence = read_all(copied(suffix))
@@ -80,7 +84,7 @@ def test_empty_and_pipes(copied: Any, suffix: str) -> None:
             read_all(path)
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", MANY_TIMES)
 def test_cut(copied: Any, suffix: str) -> None:
     path = copied(suffix)
     if suffix == ".obj":  # any whole lines are a mesh, so its last lines are left out
@@ -92,7 +96,7 @@ def test_cut(copied: Any, suffix: str) -> None:
             read_all(path)
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", MANY_TIMES)
 def test_another_format_under_the_name(copied: Any, suffix: str) -> None:
     path = copied(suffix)
     for data in OTHERS:

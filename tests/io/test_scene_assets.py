@@ -24,6 +24,7 @@ REFUSED = {  # a part of the message
 }
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (DATA / "assets" / "MANIFEST.csv").is_file(), reason="no ../shared/data")
 @pytest.mark.parametrize("kind", ["usd", "abc", "pointcache"])
 def test_files_agree_with_their_references(kind: str) -> None:

@@ -69,6 +69,7 @@ def test_the_smallest_is_chosen(target: dict[str, Any], tmp_path: Path, monkeypa
         assert report.codec in tried and len(tried) >= (2 if sample < 30 else 1)
 
 
+@pytest.mark.slow
 def test_for_bits_the_smallest_error_is_chosen(tmp_path: Path) -> None:
     sequence = waving(16, 30)
     report = gvpipe.encode(sequence, tmp_path / "auto.mp4", "auto", target_bpvf=5.0)
@@ -99,6 +100,7 @@ def test_purposes_have_their_candidates() -> None:
     assert {codec.quality for codec in candidates_for("stream", quality=40)} == {40}
 
 
+@pytest.mark.slow
 def test_files_serve_their_purpose(run: Run, tmp_path: Path) -> None:
     sequence = waving(10, 40)
     gvpipe.write(sequence, tmp_path / "w.npz")
@@ -134,6 +136,7 @@ def test_what_does_not_serve_is_refused(run: Run, tmp_path: Path) -> None:
     assert not (tmp_path / "w.mp4").exists()
 
 
+@pytest.mark.slow
 def test_codecs_that_cannot_are_passed_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Three need more bits even at quality 0, in the estimate and in the whole."""
     published, jpeg = (codec_class("mcgv")(prediction="affine", image=image) for image in ("h264", "jpeg"))
@@ -149,6 +152,7 @@ def test_codecs_that_cannot_are_passed_over(tmp_path: Path, monkeypatch: pytest.
         choose_codec([published], waving(16, 12), Target("bpvf", 10.0))
 
 
+@pytest.mark.slow
 def test_settings_are_those_that_all_have(run: Run, tmp_path: Path) -> None:
     gvpipe.write(waving(10, 8), tmp_path / "w.npz")
     ended = run("encode", tmp_path / "w.npz", tmp_path / "w.mp4", "--codec", "auto", "--set", "clusters=3")

@@ -86,6 +86,7 @@ def test_conversion_is_measured(settings: dict[str, Any], kind: str, tmp_path: P
     assert gvpipe.open(tmp_path / "inside.mp4").bitstream.header["profile"] == "h264-8"
 
 
+@pytest.mark.slow
 def test_conversion_adds_little(tmp_path: Path) -> None:
     """To a file at default quality; vertices that coincide do so in the page too."""
     sequence = gvpipe.read(SAMPLES / "creature.npz").part(0, 30)

@@ -138,6 +138,7 @@ def test_info_tells_of_frames_not_of_pictures(tmp_path: Path) -> None:
     assert VideoReader(bitstream.video, *_shape(bitstream.header)).n_frames == pictures
 
 
+@pytest.mark.slow
 def test_klt_is_smaller_at_equal_error(tmp_path: Path) -> None:
     sequence = waving(24, 60)
 
