@@ -62,7 +62,10 @@ def refused(path: Path, *words: str) -> Iterator[None]:
 
 
 # each reading of these starts a process
-MANY_TIMES = [pytest.param(each, marks=pytest.mark.slow) if each in (".abc", ".fbx") else each for each in SUFFIXES]
+MANY_TIMES = [
+    pytest.param(*each.values, marks=[*each.marks, pytest.mark.slow] if each.values[0] in (".abc", ".fbx") else each.marks)
+    for each in SUFFIXES
+]
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
