@@ -24,7 +24,7 @@ FILES: dict[str, dict[str, Any]] = {  # several groups of pictures, with B-frame
     "affine": {"prediction": "affine", "preset": "slow", "gop": 8, "clusters": 3, "quality": 90},
     "blended": {"prediction": "blended", "preset": "slow", "gop": 32},
     "plain": {"prediction": "affine", "preset": "ultrafast", "gop": 4, "clusters": 3},
-    "held": {"prediction": "blended", "preset": "slow", "gop": 5},
+    "held": {"prediction": "blended", "preset": "slow", "gop": 5, "quality": 90},  # at 75 it needs no pictures
 }
 LENGTHS = {"held": [2] * 13 + [14]}  # frames that each picture is shown for, 1 if not given
 DECODERS = {"webcodecs": "", "video": "delete window.VideoDecoder;"}
