@@ -42,13 +42,17 @@ INTS, LONGS, FLOATS, BYTES, FLAGS = (
 )  # element type and dimensions of an array
 TRIANGLES, ROWS, NUMBERS, SCALAR = "int32[2]", "float64[2]", "int64[2]", "int64"
 CAUSAL = ("gvpipe.trajectory.causal_order.CausalOrder", [INTS, INTS, INTS, FLOATS, FLOATS, INTS, INTS, "bool"])
+HIERARCHY = ("gvpipe.mesh.hierarchy_kernels.Hierarchy", [INTS] * 6)
+INPUTS = ("gvpipe.trajectory.contexts.ContextInputs", [LONGS] * 8)
+STREAM = ("gvpipe.entropy.block_kernels.BlockStream", ["uint64[1]", "uint32[1]", "uint64[2]", LONGS])
+VECTORS = ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS])
 MIXING = (
     "gvpipe.entropy.decision_kernels.Mixing",
     [NUMBERS, "uint8[2]", NUMBERS, LONGS, LONGS, LONGS, LONGS],
 )
 KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and NamedTuples of both
-    "gvpipe.mesh.decimation.decimate": [TRIANGLES, SCALAR, SCALAR],
-    "gvpipe.mesh.traversal.traverse": [TRIANGLES, INTS, SCALAR],
+    "gvpipe.mesh.hierarchy_kernels.build_order": [TRIANGLES, SCALAR, SCALAR],
+    "gvpipe.mesh.hierarchy_kernels.triangles_left": [TRIANGLES, SCALAR, SCALAR],
     "gvpipe.fields.dual_kernels.find_dual": [TRIANGLES, SCALAR],
     "gvpipe.fields.residual_kernels.decode_rows": [
         ("gvpipe.fields.residual_kernels.Residuals", [NUMBERS, SCALAR, FLAGS, CAUSAL]),
@@ -67,9 +71,15 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
         SCALAR,
         SCALAR,
     ],
-    "gvpipe.trajectory.prediction_kernels.predict_kalman": [
-        ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS]),
-    ],
+    "gvpipe.trajectory.causal_kernels.keep_ranks": [CAUSAL, FLAGS],
+    "gvpipe.trajectory.context_kernels.decode_residuals": [NUMBERS, INPUTS, STREAM, LONGS, SCALAR, SCALAR],
+    "gvpipe.trajectory.prediction_kernels.predict_kalman": [VECTORS, SCALAR, SCALAR],
+    "gvpipe.trajectory.prediction_kernels.predict_lsp": [VECTORS, SCALAR, SCALAR],
+    "gvpipe.trajectory.prediction_kernels.predict_navg": [VECTORS, SCALAR, SCALAR],
+    "gvpipe.trajectory.prediction_kernels.predict_rbf": [VECTORS, SCALAR, SCALAR, "float64"],
+    "gvpipe.trajectory.spatial_kernels.weigh_hierarchy": [HIERARCHY, "bool"],
+    "gvpipe.trajectory.spatial_kernels.weigh_traversal": [TRIANGLES, SCALAR],
+    "gvpipe.trajectory.still_kernels.fit_still": [ROWS, FLOATS, ROWS],
     "gvpipe.trajectory.product_kernels.weighted_sums": [ROWS, ROWS],
 }
 

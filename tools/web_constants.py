@@ -1,6 +1,7 @@
 """The constants that the web player shares with Python: python tools/web_constants.py writes gvpipe/web/src/constants.js.
 
 A constant has the name of its module and its own: ``REACH`` of `gvpipe.connectivity.vertex_order` is ``VERTEX_ORDER_REACH``.
+The name of codec ``pca`` comes before.
 `tests/web/test_export.py` compares the file with what this script makes.
 """
 
@@ -28,7 +29,7 @@ SHARED = {
     "gvpipe.connectivity.welded_mesh": "ADAPTIVE_MESH ADAPTIVE_ORDER",
     "gvpipe.container.bitstream": "MAGIC VERSION MAX_SECTIONS MAX_NAME MAX_HEADER MAX_FRAMES MAX_VERTICES",
     "gvpipe.container.mp4": "BOX_UUID MAX_BOXES",
-    "gvpipe.container.segments": "TINY HUGE LARGEST_STEP MAX_SEGMENT",
+    "gvpipe.container.segments": "TINY HUGE SMALLEST_STEP LARGEST_STEP MAX_SEGMENT",
     "gvpipe.corrections.displacements": "MAX_POSITIONS NEAR",
     "gvpipe.entropy.block_coder": "PARAMETRIC",
     "gvpipe.entropy.decision_kernels": "ONE_BITS AHEAD RATE RATE_BITS PLACE RANGE",
@@ -47,15 +48,16 @@ SHARED = {
     "gvpipe.fields.segment": "EXACT TRAJECTORIES DERIVED",
     "gvpipe.fields.values": "MAX_COMPONENTS",
     "gvpipe.media.video": "MAX_SIDE",
-    "gvpipe.mesh.hierarchy": "MAX_WAVES",
+    "gvpipe.mesh.hierarchy": "MAX_WAVES PEAK_PER_VERTEX PEAK_PER_TRIANGLE KEPT_PER_VERTEX KEPT_PER_TRIANGLE SECONDS_PER_VERTEX "
+    "SECONDS_PER_TRIANGLE",
     "gvpipe.rasterizer.colormaps": "MAGMA VIRIDIS",
     "gvpipe.repeated_frames": "SECTION",
-    "gvpipe.trajectory.basis": "MAX_COMPONENTS MAX_SCALE PER_OCTAVE LEAST_OUTSIDE",
-    "gvpipe.trajectory.coefficient_coding": "LARGEST MAX_VALUES",
-    "gvpipe.trajectory.contexts": "SHORT LONG ONE PER_OCTAVE MAX_LEVEL FLOOR_SPAN FLOOR_NEAR POWERS POWER_ONE LOWEST HIGHEST "
-    "N_CONTEXTS N_NEAR",
-    "gvpipe.trajectory.prediction_kernels": "DOUBT",
-    "gvpipe.trajectory.spatial_neighbours": "OVERSHOOT RING_VARIANCE FAR_VARIANCE SURE LEAST",
+    "gvpipe.trajectory.basis": "MAX_COMPONENTS MAX_SCALE PER_OCTAVE LEAST_OUTSIDE BYTES_PER_VALUE SECONDS_PER_VALUE "
+    "BYTES_PER_ROW",
+    "gvpipe.trajectory.coefficient_coding": "MAX_VALUES",
+    "gvpipe.trajectory.contexts": "PER_OCTAVE MAX_LEVEL N_CONTEXTS",
+    "gvpipe.trajectory.prediction": "PREDICTORS",
+    "gvpipe.trajectory.still_points": "SECTION BYTES_PER_STILL SECONDS_PER_STILL SECONDS_PER_PRODUCT",
     "gvpipe.trajectory.temporal_neighbours": "MAX_NEIGHBOURS VARIANCE MIN_BLOCK CUBIC LINEAR OFFSETS",
     "gvcodecs.mcgv.base.surface": "STILL",
     "gvcodecs.mcgv.browser": "VERSION PROFILE",
@@ -67,6 +69,7 @@ SHARED = {
     "gvcodecs.mcgv.motion.skinning": "INFLUENCES TOTAL FLAT LEAST_ENERGY",
     "gvcodecs.mcgv.motion.weight_coding": "COUNT_CONTEXTS",
     "gvcodecs.mcgv.motion.weight_kernels": "MAX_NEIGHBOURS",
+    "gvcodecs.pca.header": "MAX_SEGMENTS VERSION_STILL",
 }
 
 
@@ -75,7 +78,9 @@ def make() -> str:
     lines = ["// Made by tools/web_constants.py from gvpipe's Python modules; edit those, and run it again."]
     for module, names in SHARED.items():
         loaded = import_module(module)
-        prefix = module.rpartition(".")[2].upper()
+        package, _, prefix = module.upper().rpartition(".")
+        if package == "GVCODECS.PCA":
+            prefix = f"PCA_{prefix}"
         lines += ["", f"// {module}"]
         lines += [f"export const {prefix}_{name} = {_literal(getattr(loaded, name))};" for name in names.split()]
     return "\n".join(lines) + "\n"

@@ -108,10 +108,12 @@ class BlockDecoder:
 
     def check(self, status: int) -> None:
         """Raise `CorruptFile` if a kernel's status is an error."""
-        from gvpipe.entropy.block_kernels import NO_TABLE
+        from gvpipe.entropy.block_kernels import NO_TABLE, OUT_OF_RANGE
 
         if status == NO_TABLE:
             raise self._cursor.corrupt("a context is used that has no table")
+        if status == OUT_OF_RANGE:
+            raise self._cursor.corrupt("a residual is out of range")
         if status:
             raise self._cursor.corrupt("its range-coded data do not decode")
 

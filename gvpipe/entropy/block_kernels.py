@@ -11,7 +11,7 @@ from gvpipe.compiled import compiled
 from gvpipe.entropy.range_decoder import decode_bits, decode_symbol
 from gvpipe.entropy.tokens import CHUNK, DIRECT
 
-NO_TABLE, NO_DATA, OUT_OF_RANGE = 1, 2, 3  # what can be wrong; the last one in `gvpipe.entropy.serial_kernels`
+NO_TABLE, NO_DATA, OUT_OF_RANGE = 1, 2, 3  # what can be wrong; the last one is for callers to find
 
 
 class BlockStream(NamedTuple):

@@ -25,12 +25,11 @@ from gvpipe.arrays import Float64
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import InputError, corrupt_section
+from gvpipe.errors import InputError
 from gvpipe.trajectory.causal_order import CausalOrder
-from gvpipe.trajectory.contexts import MAX_LEVEL, N_CONTEXTS, ONE, context_inputs, level_bounds
+from gvpipe.trajectory.contexts import LARGEST, MAX_LEVEL, N_CONTEXTS, ONE, context_inputs, level_bounds
 from gvpipe.trajectory.prediction import predict_vectors
 
-LARGEST = 1 << 36  # magnitude of a residual, in steps; sums of its forecasts stay below 2**58
 MAX_VALUES = 1 << 27  # of a section: vectors times components
 
 
@@ -50,8 +49,8 @@ def encode_vectors(
         causal: the order of the vectors.
         predictor: one of `gvpipe.trajectory.prediction.PREDICTORS`.
         beta: exponent of the radial function (rbf).
-        given: ``(n, R)`` decoded vectors that ``causal`` leaves out (`gvpipe.trajectory.causal_order.leave_out`); contexts take
-            their residuals for 0.
+        given: ``(n, R)`` decoded vectors that ``causal`` leaves out (`gvpipe.trajectory.causal_selection.leave_out`); contexts
+            take their residuals for 0.
 
     Raises:
         InputError: a value is too large for the step.
@@ -112,10 +111,8 @@ def decode_vectors(
     residuals = np.zeros((int(causal.blocks[wanted]), n_components), np.int64)
     decoded = np.zeros((len(causal.order), n_components)) if given is None else given.copy()
     inputs = context_inputs(causal, len(decoded), levels, wanted)
-    coder.check(decode_residuals(residuals, inputs, coder.stream))
+    coder.check(decode_residuals(residuals, inputs, coder.stream, inputs.usual.copy(), 0, wanted))
     if n_blocks is None:
         coder.end()
-    if np.abs(residuals).max(initial=0) >= LARGEST:
-        raise corrupt_section(name, "a residual is out of range")
     predict_vectors(causal, step, residuals, decoded, None, predictor, beta)
     return decoded

@@ -9,11 +9,12 @@ import numpy as np
 
 from gvpipe.arrays import Int64
 from gvpipe.compiled import compiled
-from gvpipe.entropy.block_kernels import BlockStream, take_block
+from gvpipe.entropy.block_kernels import OUT_OF_RANGE, BlockStream, take_block
 from gvpipe.trajectory.contexts import (
     FLOOR_NEAR,
     FLOOR_SPAN,
     HIGHEST,
+    LARGEST,
     LONG,
     LOWEST,
     N_NEAR,
@@ -110,16 +111,29 @@ def find_all_contexts(residuals: Int64, inputs: ContextInputs) -> Int64:
 
 
 @compiled
-def decode_residuals(residuals: Int64, inputs: ContextInputs, stream: BlockStream) -> int:
-    """Fill ``residuals (m, R)``, by rank, block by block and component by component; return what `take_block` does."""
-    before = inputs.usual.copy()
-    for b in range(len(inputs.blocks) - 1):
+def decode_residuals(
+    residuals: Int64, inputs: ContextInputs, stream: BlockStream, before: Int64, first_block: int, end_block: int
+) -> int:
+    """Fill ``residuals (m, R)``, by rank, block by block and component by component.
+
+    Args:
+        residuals, inputs, stream: all blocks up to ``first_block`` are decoded.
+        before: ``(R,)`` mean magnitudes of the block before, in 1 / ONE; of the first block ``inputs.usual``. It changes.
+        first_block, end_block: which blocks to decode.
+
+    Returns:
+        0, or what is wrong: as of `take_block`, or OUT_OF_RANGE.
+    """
+    for b in range(first_block, end_block):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
         for c in range(residuals.shape[1]):
             contexts = _find_contexts(first, end, c, residuals, inputs, before)
             values, status = take_block(stream, contexts)
             if status:
                 return status
-            residuals[first:end, c] = values
+            for i in range(len(values)):
+                if abs(values[i]) >= LARGEST:
+                    return OUT_OF_RANGE
+                residuals[first + i, c] = values[i]
         _mean_magnitudes(residuals, first, end, before)
     return 0

@@ -16,6 +16,7 @@ LONG = (16, 14, 13, 12, 11, 10, 9, 8, 7, 6, 6, 5, 5, 4, 4, 3)
 ONE = 64  # fixed point of magnitudes
 PER_OCTAVE = 16  # of integer logarithms
 MAX_LEVEL = 160
+LARGEST = 1 << 36  # magnitude of a residual, in steps; sums of its forecasts stay below 2**58
 FLOOR_SPAN, FLOOR_NEAR = 128, 16  # added to sums of magnitudes: what nothing is taken for
 POWERS = (12, 4, 4, 8, 7)  # of the component's mean, the block before, the neighbours, the short and the long span
 POWER_ONE = 20

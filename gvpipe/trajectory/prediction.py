@@ -43,6 +43,6 @@ def predict_vectors(
 
     coding = prediction_kernels.VectorCoding(causal, step, residuals, decoded, np.zeros((0, 0)) if target is None else target)
     if predictor == "rbf":
-        prediction_kernels.predict_rbf(coding, beta)
+        prediction_kernels.predict_rbf(coding, 0, len(residuals), beta)
     else:
-        getattr(prediction_kernels, f"predict_{predictor}")(coding)
+        getattr(prediction_kernels, f"predict_{predictor}")(coding, 0, len(residuals))

@@ -1,6 +1,7 @@
 """Kernels of `gvpipe.trajectory.prediction`: for each predictor one loop over vectors and components, to code and to decode.
 
-All take a `VectorCoding` and fill ``decoded``, and ``residuals`` where there is a target.
+All take a `VectorCoding`, and for vectors ``begin`` to ``end`` of the order fill ``decoded``, and ``residuals`` where there is
+a target. Those before ``begin`` are done.
 """
 
 from __future__ import annotations
@@ -56,10 +57,10 @@ class LeastSquares(NamedTuple):
 
 
 @compiled
-def predict_navg(coding: VectorCoding) -> None:
+def predict_navg(coding: VectorCoding, begin: int, end: int) -> None:
     """Predict by the prior weights."""
     causal, decoded = coding.causal, coding.decoded
-    for i in range(len(coding.residuals)):
+    for i in range(begin, end):
         first, n = causal.starts[i], _count_neighbours(coding, i)
         for c in range(decoded.shape[1]):
             guess = 0.0
@@ -69,14 +70,14 @@ def predict_navg(coding: VectorCoding) -> None:
 
 
 @compiled
-def predict_kalman(coding: VectorCoding) -> None:
+def predict_kalman(coding: VectorCoding, begin: int, end: int) -> None:
     """Predict by weights that each decoded component updates."""
     causal, decoded = coding.causal, coding.decoded
     most = _most_neighbours(coding)
     weights, values, direction = np.zeros(most), np.zeros(most), np.zeros(most)
     covariance = np.zeros((most, most))
     noise = coding.step * coding.step
-    for i in range(len(coding.residuals)):
+    for i in range(begin, end):
         first = causal.starts[i]
         n = causal.starts[i + 1] - first
         total = 0.0
@@ -111,15 +112,15 @@ def predict_kalman(coding: VectorCoding) -> None:
 
 
 @compiled
-def predict_lsp(coding: VectorCoding) -> None:
+def predict_lsp(coding: VectorCoding, begin: int, end: int) -> None:
     """Predict by least squares over the components decoded so far."""
     fit = _least_squares(_most_neighbours(coding))
-    for i in range(len(coding.residuals)):
+    for i in range(begin, end):
         _predict_vector_lsp(coding, i, fit)
 
 
 @compiled
-def predict_rbf(coding: VectorCoding, beta: float) -> None:
+def predict_rbf(coding: VectorCoding, begin: int, end: int, beta: float) -> None:
     """Predict by interpolation with radial functions, where a vector has a ring of two at least; else as `predict_lsp`."""
     causal, decoded = coding.causal, coding.decoded
     most = _most_neighbours(coding)
@@ -128,7 +129,7 @@ def predict_rbf(coding: VectorCoding, beta: float) -> None:
     squared, to_vector = np.zeros((most, most)), np.zeros(most)  # squared distances between neighbours, and to the vector
     matrix = np.zeros((most, most))
     nugget = NUGGET * coding.step**beta
-    for i in range(len(coding.residuals)):
+    for i in range(begin, end):
         first, n = causal.starts[i], causal.ring_sizes[i]
         if n < 2:
             _predict_vector_lsp(coding, i, fit)

@@ -25,7 +25,7 @@ from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.segments import LARGEST_STEP, SMALLEST_STEP
 from gvpipe.errors import corrupt_section
 from gvpipe.sequence import MeshSequence
-from gvpipe.trajectory.basis import LEAST, RIDGE, Basis
+from gvpipe.trajectory.basis import Basis
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.coded_points import CodedConnectivity
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_vectors, encode_vectors
@@ -67,6 +67,8 @@ class StillPoints:
             CorruptFile: more than `most_components`.
             OverBudget: their trajectories take more than the file may.
         """
+        from gvpipe.trajectory.still_kernels import fit_still
+
         if not self.flags.any():
             return None
         n_still, n_coordinates = len(self.flags) - self.n_moving, len(basis.mean)
@@ -77,7 +79,8 @@ class StillPoints:
             size = f"{basis.vectors.shape[1]} components of {len(self.flags)} points"
             raise corrupt_section(SECTION, f"{size}")
         result = np.zeros((len(self.flags), basis.vectors.shape[1]))
-        result[self.flags] = _fit_still(self.positions[self.flags].astype(np.float64), basis)
+        positions = self.positions[self.flags].astype(np.float64)
+        result[self.flags] = fit_still(positions, basis.mean.copy(), np.ascontiguousarray(basis.vectors))
         return result
 
     def join(self, moving: Float64, given: Float64 | None) -> Float64:
@@ -157,29 +160,6 @@ def _still_order(flags: Bool, point_faces: Int32) -> CausalOrder:
     number = np.cumsum(flags) - 1
     between = point_faces[flags[point_faces].all(axis=1)]
     return traversal_order(number[between].astype(np.int32), int(flags.sum()))
-
-
-def _fit_still(positions: Float64, basis: Basis) -> Float64:
-    """Coefficients ``(S, R)`` as `gvpipe.trajectory.basis.fit_coefficients` finds them for points that stay at ``positions``.
-
-    The fit is linear in a position, so that three axes and the mean are solved for, with the same bits on every machine.
-    """
-    from gvpipe.trajectory.product_kernels import solve_definite, weighted_sums
-
-    vectors = np.ascontiguousarray(basis.vectors)  # (3n, R)
-    n_frames, n_components = len(vectors) // 3, vectors.shape[1]
-    if not n_components:
-        return np.zeros((len(positions), 0))
-    axes = np.tile(np.eye(3), n_frames)  # (3, 3n)
-    centre = weighted_sums(axes, np.ascontiguousarray(basis.mean[:, None]))[:, 0] / n_frames
-    right = np.vstack([axes, basis.mean - np.tile(centre, n_frames)])
-    solved = np.ascontiguousarray(weighted_sums(right, vectors).T)  # (R, 4)
-    gram = weighted_sums(np.ascontiguousarray(vectors.T), vectors)
-    gram[np.diag_indices(n_components)] *= 1 + RIDGE
-    gram[np.diag_indices(n_components)] += LEAST
-    solve_definite(gram, solved)
-    fitted = weighted_sums(positions - centre, np.ascontiguousarray(solved[:, :3].T))
-    return np.asarray(fitted - solved[:, 3])
 
 
 def _round(flags: Bool, indices: Float64, step: float, origin: Float32) -> StillPoints:

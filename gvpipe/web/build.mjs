@@ -14,7 +14,15 @@ const common = {
   charset: "utf8",
   legalComments: "none", // the notice holds them
 };
-const worker = await build({ ...common, entryPoints: ["src/fields/worker.js"], format: "iife", write: false, define: { WORKER_SOURCE: '""' } });
+const worker = await build({
+  ...common,
+  entryPoints: ["src/worker.js"],
+  format: "iife",
+  write: false,
+  define: { WORKER_SOURCE: '""' },
+  loader: { ".wasm": "empty" }, // the page sends it
+  external: ["node:fs", "fs", "path"],
+});
 
 await build({
   ...common,

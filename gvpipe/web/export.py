@@ -1,6 +1,6 @@
 """A geometry video and its player as one HTML file that needs no network.
 
-What: page = ``page.html`` with the player's bundle inline and the MP4 file as base64 text, so that it opens from a disk.
+What: page = ``page.html`` with the player's bundle, deflated, and the MP4 file, both as base64 text, so that it opens from a disk.
 Why: browsers load no modules and fetch no files for a page that is itself a file.
 
 A codec knows which of its files browsers play (`gvpipe.registry.browser_obstacle`). Any other file is decoded and encoded anew
@@ -12,6 +12,7 @@ from __future__ import annotations
 import base64
 import html
 import os
+import zlib
 from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -131,11 +132,16 @@ def _write_page(name: str, data: bytes, target: Path, up: str) -> ExportReport:
     values = {
         "TITLE": html.escape(Path(name).stem),
         "UP": up,
-        "PLAYER": (shipped / "bundle" / "player.js").read_text("utf-8"),
-        "VIDEO": base64.b64encode(data).decode("ascii"),
+        "NOTICE": (shipped / "LICENSES" / "NOTICE.txt").read_text("utf-8").strip(),
+        "PLAYER": _base64(zlib.compress((shipped / "bundle" / "player.js").read_bytes(), 9)),
+        "VIDEO": _base64(data),
     }
     parts = page.split("$$")  # text, name, text, name, ..., text
     text = "".join(values[part] if i % 2 else part for i, part in enumerate(parts)).encode()
     with unnamed_path(target) as temporary:
         temporary.write_bytes(text)
     return ExportReport(len(text), len(data))
+
+
+def _base64(data: bytes) -> str:
+    return base64.b64encode(data).decode("ascii")

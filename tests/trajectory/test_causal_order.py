@@ -6,7 +6,7 @@ import numpy as np
 from sequences import grid
 from tubes import surface_of
 
-from gvpipe.trajectory.causal_order import select_vectors
+from gvpipe.trajectory.causal_selection import select_vectors
 
 
 def test_selected_rows_know_what_they_knew() -> None:

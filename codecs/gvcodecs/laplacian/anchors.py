@@ -14,12 +14,16 @@ Source: Sorkine, Cohen-Or and Toledo, "High-pass quantization for mesh encoding"
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gvpipe.arrays import Bool, Int32, Integers
-from gvpipe.mesh.hierarchy import Hierarchy
-from gvpipe.trajectory.causal_order import CausalOrder, leave_out, select_vectors
+from gvpipe.trajectory.causal_order import CausalOrder
+from gvpipe.trajectory.causal_selection import leave_out, select_vectors
+
+if TYPE_CHECKING:
+    from gvpipe.mesh.hierarchy_kernels import Hierarchy
 
 ANCHOR_CHOICES = ("hierarchy", "walk")
 SMALL = 4  # points of components that are all anchors

@@ -16,12 +16,16 @@ Source: Vasa, Marras, Hormann and Brunnett 2014, section 7. Departures: a ridge 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy import sparse
 
 from gvpipe.arrays import Bool, Float64, Int32
-from gvpipe.mesh.hierarchy import Hierarchy
 from gvpipe.trajectory.causal_order import CausalOrder
+
+if TYPE_CHECKING:
+    from gvpipe.mesh.hierarchy_kernels import Hierarchy
 
 DELTA_PREDICTIONS = ("kalman", "rigid", "none")
 N_CAUSAL = {"kalman": 20, "rigid": 15, "none": 0}  # causal neighbours, at most; 15 is the paper's k

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
@@ -16,10 +17,13 @@ from gvcodecs.laplacian.mesh_scale import fineness
 from gvcodecs.laplacian.normal_equations import count_fill, most_products
 from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.budget import UNLIMITED, Budget
-from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy
+from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.mesh.topology import adjacency, components, unique_edges
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.spatial_neighbours import hierarchy_order
+
+if TYPE_CHECKING:
+    from gvpipe.mesh.hierarchy_kernels import Hierarchy
 
 
 @dataclass(frozen=True)

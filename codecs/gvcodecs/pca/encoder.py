@@ -26,7 +26,8 @@ from gvpipe.container.segments import MAX_SEGMENT, cut
 from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import MAX_COMPONENTS, Reduced, reduce_trajectories
-from gvpipe.trajectory.causal_order import CausalOrder, leave_out
+from gvpipe.trajectory.causal_order import CausalOrder
+from gvpipe.trajectory.causal_selection import leave_out
 from gvpipe.trajectory.coded_points import code_connectivity, read_trajectories
 from gvpipe.trajectory.coefficient_coding import encode_vectors
 from gvpipe.trajectory.prediction import PREDICTORS
@@ -99,3 +100,8 @@ class Pca(BaseCodec):
     def reader(cls, bitstream: Bitstream) -> FrameReader:
         """Open a ``pca`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         return PcaReader(bitstream)
+
+    @classmethod
+    def browser_obstacle(cls, bitstream: Bitstream) -> str:
+        """What keeps browsers from playing a bitstream of this codec: nothing."""
+        return ""

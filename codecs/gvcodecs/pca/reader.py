@@ -5,6 +5,8 @@ The first frame of a segment costs its whole decoding; each after that one produ
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from gvcodecs.pca.header import Header
@@ -13,13 +15,17 @@ from gvpipe.connectivity.topology_only import read_mesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import InputError
-from gvpipe.mesh.hierarchy import Hierarchy, build_hierarchy, keep_hierarchy, level_faces
+from gvpipe.mesh.hierarchy import build_hierarchy, keep_hierarchy, level_faces
 from gvpipe.trajectory.basis import decode_basis
-from gvpipe.trajectory.causal_order import CausalOrder, leave_out
+from gvpipe.trajectory.causal_order import CausalOrder
+from gvpipe.trajectory.causal_selection import leave_out
 from gvpipe.trajectory.coefficient_coding import decode_vectors
 from gvpipe.trajectory.reconstruction import Segment, read_frames
-from gvpipe.trajectory.spatial_neighbours import OVERSHOOT, hierarchy_order
+from gvpipe.trajectory.spatial_neighbours import hierarchy_order
 from gvpipe.trajectory.still_points import read_still
+
+if TYPE_CHECKING:
+    from gvpipe.mesh.hierarchy_kernels import Hierarchy
 
 
 class PcaReader:
@@ -131,4 +137,4 @@ class PcaReader:
 
 def causal_order(hierarchy: Hierarchy, predictor: str) -> CausalOrder:
     """The order of a mesh's points in encoder and decoder."""
-    return hierarchy_order(hierarchy, OVERSHOOT if predictor == "kalman" else 0.0)
+    return hierarchy_order(hierarchy, predictor == "kalman")

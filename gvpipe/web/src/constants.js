@@ -76,6 +76,7 @@ export const MP4_MAX_BOXES = 65536;
 // gvpipe.container.segments
 export const SEGMENTS_TINY = 1e-60;
 export const SEGMENTS_HUGE = 1e+39;
+export const SEGMENTS_SMALLEST_STEP = 3.6734198463196485e-40;
 export const SEGMENTS_LARGEST_STEP = 6.80564733841877e+38;
 export const SEGMENTS_MAX_SEGMENT = 100000;
 
@@ -168,6 +169,12 @@ export const VIDEO_MAX_SIDE = 16384;
 
 // gvpipe.mesh.hierarchy
 export const HIERARCHY_MAX_WAVES = 64;
+export const HIERARCHY_PEAK_PER_VERTEX = 120;
+export const HIERARCHY_PEAK_PER_TRIANGLE = 230;
+export const HIERARCHY_KEPT_PER_VERTEX = 60;
+export const HIERARCHY_KEPT_PER_TRIANGLE = 180;
+export const HIERARCHY_SECONDS_PER_VERTEX = 1e-06;
+export const HIERARCHY_SECONDS_PER_TRIANGLE = 2e-06;
 
 // gvpipe.rasterizer.colormaps
 export const COLORMAPS_MAGMA = "\n000004 030311 0a0822 130d33 1d1146 28115a 36106a 430f76 50127c 5d177f 691c81 762181 822681 8f2a81 9c2e7f a9327d b63779 c33b75\ncf4170 db486a e65163 ee5c5e f5695c f9785d fb8761 fd9668 fea571 feb47b fec387 fed194 fde0a2 fceeb0 fcfdbf\n";
@@ -181,35 +188,26 @@ export const BASIS_MAX_COMPONENTS = 16384;
 export const BASIS_MAX_SCALE = 512;
 export const BASIS_PER_OCTAVE = 8;
 export const BASIS_LEAST_OUTSIDE = 0.2;
+export const BASIS_BYTES_PER_VALUE = 40;
+export const BASIS_SECONDS_PER_VALUE = 3e-07;
+export const BASIS_BYTES_PER_ROW = 520;
 
 // gvpipe.trajectory.coefficient_coding
-export const COEFFICIENT_CODING_LARGEST = 68719476736;
 export const COEFFICIENT_CODING_MAX_VALUES = 134217728;
 
 // gvpipe.trajectory.contexts
-export const CONTEXTS_SHORT = [16, 10, 6, 4];
-export const CONTEXTS_LONG = [16, 14, 13, 12, 11, 10, 9, 8, 7, 6, 6, 5, 5, 4, 4, 3];
-export const CONTEXTS_ONE = 64;
 export const CONTEXTS_PER_OCTAVE = 16;
 export const CONTEXTS_MAX_LEVEL = 160;
-export const CONTEXTS_FLOOR_SPAN = 128;
-export const CONTEXTS_FLOOR_NEAR = 16;
-export const CONTEXTS_POWERS = [12, 4, 4, 8, 7];
-export const CONTEXTS_POWER_ONE = 20;
-export const CONTEXTS_LOWEST = -10;
-export const CONTEXTS_HIGHEST = 16;
 export const CONTEXTS_N_CONTEXTS = 27;
-export const CONTEXTS_N_NEAR = 6;
 
-// gvpipe.trajectory.prediction_kernels
-export const PREDICTION_KERNELS_DOUBT = 0.0001;
+// gvpipe.trajectory.prediction
+export const PREDICTION_PREDICTORS = ["navg", "lsp", "rbf", "kalman"];
 
-// gvpipe.trajectory.spatial_neighbours
-export const SPATIAL_NEIGHBOURS_OVERSHOOT = 0.2;
-export const SPATIAL_NEIGHBOURS_RING_VARIANCE = 0.3;
-export const SPATIAL_NEIGHBOURS_FAR_VARIANCE = 0.1;
-export const SPATIAL_NEIGHBOURS_SURE = 512;
-export const SPATIAL_NEIGHBOURS_LEAST = 0.05;
+// gvpipe.trajectory.still_points
+export const STILL_POINTS_SECTION = "still";
+export const STILL_POINTS_BYTES_PER_STILL = 240;
+export const STILL_POINTS_SECONDS_PER_STILL = 1e-06;
+export const STILL_POINTS_SECONDS_PER_PRODUCT = 1e-09;
 
 // gvpipe.trajectory.temporal_neighbours
 export const TEMPORAL_NEIGHBOURS_MAX_NEIGHBOURS = 6;
@@ -260,3 +258,7 @@ export const WEIGHT_CODING_COUNT_CONTEXTS = 4;
 
 // gvcodecs.mcgv.motion.weight_kernels
 export const WEIGHT_KERNELS_MAX_NEIGHBOURS = 8;
+
+// gvcodecs.pca.header
+export const PCA_HEADER_MAX_SEGMENTS = 2000;
+export const PCA_HEADER_VERSION_STILL = 2;

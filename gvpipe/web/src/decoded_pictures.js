@@ -29,7 +29,19 @@ export class DecodedPictures {
       throw new GeometryVideoError("corrupt", `its video has ${found} pictures in place of ${repeated.distinct}; ${AGAIN}`);
     }
     const groupBytes = (samples.length * repeated.distinct) / track.groups.length;
-    const pictures = new DecodedPictures(track.groups, groupBytes, fps, repeated, new GroupDecoder(track, size, samples));
+    return DecodedPictures.of(track.groups, groupBytes, fps, repeated, new GroupDecoder(track, size, samples));
+  }
+
+  /**
+   * The same clock for anything that a decoder gives for pictures.
+   *
+   * @param {{picture: number}[][]} groups in order @param {number} groupBytes of what is kept of a group, about
+   * @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated
+   * @param {{decode: (group: object[], give: (picture: number, shown: object) => void) => Promise<void>, close: () => void}} decoder
+   * @returns {Promise<DecodedPictures>}
+   */
+  static async of(groups, groupBytes, fps, repeated, decoder) {
+    const pictures = new DecodedPictures(groups, groupBytes, fps, repeated, decoder);
     try {
       await pictures.seek(0);
     } catch (error) {
@@ -48,9 +60,7 @@ export class DecodedPictures {
   static async without(fps, repeated, levels) {
     const group = Array.from({ length: repeated.distinct }, (_, picture) => ({ picture }));
     const decode = async (samples, add) => samples.forEach(({ picture }) => add(picture, levels));
-    const pictures = new DecodedPictures([group], 0, fps, repeated, { decode, close() {} });
-    await pictures.seek(0);
-    return pictures;
+    return DecodedPictures.of([group], 0, fps, repeated, { decode, close() {} });
   }
 
   constructor(groups, groupBytes, fps, repeated, decoder) {

@@ -7,14 +7,11 @@
  */
 
 import { NO_ASSET, readAsset } from "./asset/asset.js";
-import { DecodedPictures } from "./decoded_pictures.js";
+import { openCodec } from "./codecs.js";
 import { readContainer } from "./format/boxes.js";
 import { GeometryVideoError } from "./format/errors.js";
 import { readRepeatedFrames } from "./format/repeated_frames.js";
 import { readPayload } from "./format/payload.js";
-import { checkCodec } from "./mcgv/header.js";
-import { McgvReader } from "./mcgv/reader.js";
-import { openPictures } from "./pictures.js";
 
 export { GeometryVideoError };
 
@@ -22,32 +19,27 @@ const FROM_DISK = "pages opened from a disk may not fetch; open it from a web se
 
 export class GeometryVideo {
   /**
-   * Load a geometry video of codec `mcgv` in its web profile, as `gvpipe encode` writes it.
+   * Load a geometry video of codec `pca`, or of codec `mcgv` in its web profile, as `gvpipe encode` writes it.
    *
    * @param {string|URL|Blob|ArrayBuffer|Uint8Array} source an address, or the file itself
+   * @param {{level?: number}} [options] a level of detail above 0 is a coarser mesh, without attributes and fields
    * @returns {Promise<GeometryVideo>}
    * @throws {GeometryVideoError} it cannot be fetched, it is no geometry video, it is damaged, or not one for browsers
    */
-  static async load(source) {
+  static async load(source, { level = 0 } = {}) {
     const file = await fetchBytes(source);
-    let pictures = null;
+    let [pictures, reader] = [null, null];
     try {
       const payload = await readPayload(readContainer(file));
-      checkCodec(payload.header);
       const repeated = readRepeatedFrames(payload);
-      const reader = await McgvReader.open(repeated.distinctPayload(payload));
-      const { fps } = payload.header;
-      const open = () =>
-        reader.samples
-          ? openPictures(file, fps, repeated, reader.pictureSize, reader.samples, payload.header.container.track_crc32)
-          : DecodedPictures.without(fps, repeated, reader.zeroLevels);
-      pictures = await open();
+      reader = await openCodec(file, payload, repeated, level);
+      pictures = await reader.openPictures();
       const video = new GeometryVideo(payload.header, file.length, repeated, reader, pictures);
-      video.#openBeside = open;
-      video.#takeAsset(await readAsset(payload, video, (k) => video.#positionsBeside(k)));
+      if (level === 0) video.#takeAsset(await readAsset(payload, video, (k) => video.#positionsBeside(k)));
       return video;
     } catch (error) {
       pictures?.close();
+      reader?.close();
       if (!(error instanceof RangeError)) throw error; // an array that the browser cannot give
       throw new GeometryVideoError("unsupported", "it needs more memory than this browser has for a page");
     }
@@ -57,24 +49,25 @@ export class GeometryVideo {
   #reader;
   #pictures;
   #queue = Promise.resolve();
-  #openBeside; // opens pictures of their own for fields that follow from positions
-  #beside = null; // a promise of them
+  #beside = null; // a promise of pictures of their own, for fields that follow from positions
   #queueBeside = Promise.resolve();
   #closeAsset;
 
   constructor(header, byteLength, repeated, reader, pictures) {
     this.frameCount = header.frames;
     this.fps = header.fps;
-    this.vertexCount = header.vertices;
-    this.triangleCount = header.triangles;
+    this.vertexCount = reader.vertexCount;
+    this.triangleCount = reader.faces.length / 3;
     /** Of the whole file. */
     this.byteLength = byteLength;
     /** `Uint32Array` (T, 3): triangles, counter-clockwise. */
     this.indices = reader.faces;
-    /** `Int32Array` (V, 3): the first frame on the file's lattice; vertices with equal rows are one point of the surface. */
+    /** Vertices of each level of detail, the whole mesh first. */
+    this.levels = reader.levels;
+    /** `Int32Array` (V, 3): the first frame on the file's lattice, if it has one; vertices with equal rows are one point of the surface. */
     this.basePoints = reader.basePoints;
     /** `{min, max}`: the box that the motion stays in, model units. */
-    this.bounds = reader.bounds();
+    this.bounds = reader.bounds;
     this.#takeAsset(NO_ASSET);
     this.#repeated = repeated;
     this.#reader = reader;
@@ -135,6 +128,7 @@ export class GeometryVideo {
     this.#pictures.close();
     this.#beside?.then((pictures) => pictures.close()).catch(() => {});
     this.#closeAsset();
+    this.#reader.close();
   }
 
   #takeAsset(asset) {
@@ -158,7 +152,7 @@ export class GeometryVideo {
 
   /** The positions of frame k by pictures of their own, so that what plays goes on. */
   #positionsBeside(k) {
-    this.#beside ??= this.#openBeside();
+    this.#beside ??= this.#reader.openPictures();
     const result = this.#queueBeside.then(async () => {
       const pictures = await this.#beside;
       await pictures.seek(k);

@@ -1,6 +1,7 @@
 /** Segments of a mesh's fields, decoded by kernels: in a worker, or on the page where there is none. */
 
 import { corrupt } from "../format/errors.js";
+import { placed } from "../trajectory/causal_order.js";
 import { Kernels } from "../wasm/kernels.js";
 import { rowOrder } from "./mesh.js";
 import { decodeSegment } from "./segment.js";
@@ -39,12 +40,3 @@ export class FieldDecoder {
     return rowOrder(await Kernels.open(this.code), this.faces, this.vertexCount, domain);
   }
 }
-
-/** An order in the memory of kernels: the members of Python's `CausalOrder`. */
-function placed(kernels, { order, starts, neighbours, weights, variances, ringSizes }) {
-  const ints = (values) => kernels.array("int32", [values.length], values);
-  const floats = (values) => kernels.array("float64", [values.length], values);
-  const blocks = ints([0, order.length]);
-  return [ints(order), ints(starts), ints(neighbours), floats(weights), floats(variances), ints(ringSizes), blocks, true];
-}
-

@@ -14,7 +14,7 @@ export class FieldHost {
    * @param {(frame: number) => Promise<Float32Array>} positions (V, 3) decoded
    */
   constructor(code, faces, vertexCount, positions) {
-    this.mesh = { code, faces, vertexCount };
+    this.mesh = { task: "fields", code, faces, vertexCount };
     this.positions = positions;
   }
 

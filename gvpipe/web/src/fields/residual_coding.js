@@ -11,10 +11,9 @@ import {
   RESIDUAL_KERNELS_N_MIXERS as N_MIXERS,
 } from "../constants.js";
 import { corrupt } from "../format/errors.js";
+import { inBlocks } from "../trajectory/coefficient_coding.js";
 import { SQUASH, STRETCH } from "./logistic_tables.js";
 
-const LEAST_ROWS = 16; // of a call
-const BLOCK_TIME = 20; // ms that a call takes, about
 const SEEN = 250; // last uses of a slot that count
 const N_SLOTS = N_FINE * N_COARSE * NODES;
 
@@ -40,22 +39,6 @@ export function decodeResiduals(kernels, causal, data, [columns, frames], name, 
   if (!isWhole || kernels.view(state)[PLACE] < data.length) throw corrupt(name, "its residuals do not decode");
   for (const array of [bytes, state, ...forecast, ...mixing]) kernels.free(array);
   return values;
-}
-
-/**
- * Call a kernel for some ranks of R at a time. Browsers compile it well while it runs, and take that for the next call.
- *
- * @param {number} rows @param {(first: number, end: number) => boolean} call false ends it @returns {boolean}
- */
-export function inBlocks(rows, call) {
-  let size = LEAST_ROWS;
-  for (let first = 0, end = 0; first < rows; first = end) {
-    end = Math.min(first + size, rows);
-    const started = performance.now();
-    if (!call(first, end)) return false;
-    if (performance.now() - started < BLOCK_TIME / 2) size *= 2;
-  }
-  return true;
 }
 
 /** Mirrors `start_decoder` of `gvpipe.entropy.decision_kernels`. */

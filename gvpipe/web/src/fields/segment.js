@@ -15,7 +15,8 @@ import { Cursor } from "../format/cursor.js";
 import { decodeIntegers } from "../format/integers.js";
 import { derivedValues, takeDerivation } from "./derived.js";
 import { decodeHoles } from "./holes.js";
-import { decodeResiduals, inBlocks } from "./residual_coding.js";
+import { inBlocks } from "../trajectory/coefficient_coding.js";
+import { decodeResiduals } from "./residual_coding.js";
 import { decodeTrajectories } from "./trajectories.js";
 import { bytesOf, newValues, rounding, valuesOf } from "./values.js";
 

@@ -1,8 +1,9 @@
 /** Values of a field from principal trajectories. Mirrors `gvpipe.fields.trajectories`. */
 
 import { SEGMENTS_LARGEST_STEP as LARGEST_STEP } from "../constants.js";
-import { decodeBasis } from "../format/basis.js";
+import { decodeBasis } from "../trajectory/basis.js";
 import { Cursor } from "../format/cursor.js";
+import { inBlocks } from "../trajectory/coefficient_coding.js";
 import { decodeResiduals } from "./residual_coding.js";
 
 /**
@@ -14,7 +15,7 @@ export function decodeTrajectories(data, [frames, components], { kernels, causal
   const step = cursor.f64();
   if (!(step > 0 && step <= LARGEST_STEP)) throw cursor.corrupt(`a step of coefficients is ${step}`);
   const rows = causal[0].shape[0];
-  const basis = decodeBasis(cursor.block(), frames, rows, step, name, components);
+  const basis = decodeBasis(kernels, cursor.block(), frames, rows, step, name, components);
   const count = basis.components;
   const coefficients = decodeCoefficients(cursor.block(), count, step, { kernels, causal, name });
   const size = frames * components;
@@ -43,6 +44,7 @@ function decodeCoefficients(data, count, step, { kernels, causal, name }) {
   const [order, from, to] = [kernels.view(causal[0]), kernels.view(residuals), kernels.view(ranked)];
   order.forEach((row, rank) => to.set(from.subarray(row * count, (row + 1) * count), rank * count));
   const decoded = kernels.array("float64", [rows, count]);
-  kernels.call("predict_kalman", ...causal, step, ranked, decoded, kernels.array("float64", [0, 0]));
+  const coding = [...causal, step, ranked, decoded, kernels.array("float64", [0, 0])];
+  inBlocks(rows, (first, end) => kernels.call("predict_kalman", ...coding, first, end));
   return decoded;
 }

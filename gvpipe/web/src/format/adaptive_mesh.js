@@ -15,11 +15,9 @@ import {
   POSITION_KERNELS_N_CONTEXTS as N_CONTEXTS,
   POSITION_KERNELS_N_GROUPS as N_GROUPS,
 } from "../constants.js";
-import { decodeTable } from "./base_mesh.js";
 import { Cursor } from "./cursor.js";
 import { NumberDecoder, mixHash } from "./decisions.js";
-import { decodeDracoTriangles } from "./draco.js";
-import { decodeIntegers } from "./integers.js";
+import { decodeTriangles } from "./topology_only.js";
 
 /**
  * @param {Uint8Array} stream
@@ -31,46 +29,8 @@ export async function decodeAdaptiveMesh(stream, most) {
   const nPoints = cursor.varint(Math.min(MAX_POINTS, most.vertices), "the number of points");
   const [draco, merges, loose] = [cursor.block(), cursor.block(), cursor.block()];
   const nLoose = cursor.varint(Math.min(MAX_PER_BYTE * stream.length, most.triangles), "the number of loose triangles");
-  const carried = draco.length ? await decodeDracoTriangles(draco) : { nVertices: 0, faces: new Uint32Array(0) };
-  const merged = smallestFirst(merge(carried, merges));
-  const others = await decodeTable(loose, nLoose);
-  const faces = new Uint32Array(merged.length + others.length);
-  faces.set(merged);
-  faces.set(others, merged.length);
-  if (faces.some((point) => point >= nPoints)) throw cursor.corrupt("a triangle names a point that does not exist");
+  const faces = await decodeTriangles(draco, merges, loose, nLoose, nPoints);
   return { points: decodePositions(cursor, faces, nPoints), faces };
-}
-
-/** Draco's triangles over points: vertices that it split are one point again. */
-function merge({ nVertices, faces }, merges) {
-  if (!merges.length) return faces;
-  const cursor = new Cursor(merges, "mesh");
-  const n = cursor.varint(nVertices, "the number of merges");
-  const values = decodeIntegers(cursor.rest(), 2 * n, null, "mesh");
-  const standsFor = new Int32Array(nVertices).fill(-1);
-  for (let i = 0, again = -1; i < n; i++) {
-    again += values[i] + 1;
-    const other = again - values[n + i];
-    if (values[i] < 0 || again >= nVertices || other < 0 || other >= again || standsFor[other] >= 0) {
-      throw cursor.corrupt("a merge names a vertex that does not exist");
-    }
-    standsFor[again] = other;
-  }
-  const number = new Int32Array(nVertices);
-  for (let v = 0, count = 0; v < nVertices; v++) number[v] = standsFor[v] < 0 ? count++ : number[standsFor[v]];
-  return faces.map((vertex) => number[vertex]);
-}
-
-/** Rotate each triangle so that its smallest index leads; winding stays. */
-export function smallestFirst(faces) {
-  const turned = new Uint32Array(faces.length);
-  for (let i = 0; i < faces.length; i += 3) {
-    const [a, b, c] = [faces[i], faces[i + 1], faces[i + 2]];
-    if (a <= b && a <= c) turned.set([a, b, c], i);
-    else if (b <= c) turned.set([b, c, a], i);
-    else turned.set([c, a, b], i);
-  }
-  return turned;
 }
 
 function decodePositions(cursor, faces, n) {

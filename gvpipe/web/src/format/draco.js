@@ -8,7 +8,16 @@ import createDraco from "draco3d/draco_decoder_nodejs.js";
 import wasmBinary from "draco3d/draco_decoder.wasm";
 import { corrupt } from "./errors.js";
 
+/** Draco's WebAssembly; a worker has none of its own. */
+export const dracoBinary = wasmBinary;
+
+let binary = wasmBinary;
 let draco = null;
+
+/** Decode by these bytes. @param {Uint8Array} bytes */
+export function useDraco(bytes) {
+  binary = bytes;
+}
 
 /**
  * @param {Uint8Array} stream
@@ -30,7 +39,7 @@ export function decodeDracoTriangles(stream) {
 
 async function decodeMesh(stream, read) {
   checkHeader(stream);
-  draco ??= createDraco({ wasmBinary });
+  draco ??= createDraco({ wasmBinary: binary });
   const module = await draco;
   const decoder = new module.Decoder();
   const mesh = new module.Mesh();

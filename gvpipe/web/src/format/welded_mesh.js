@@ -4,10 +4,11 @@
  */
 
 import { WELDED_MESH_ADAPTIVE_MESH as ADAPTIVE_MESH, WELDED_MESH_ADAPTIVE_ORDER as ADAPTIVE_ORDER } from "../constants.js";
-import { decodeAdaptiveMesh, smallestFirst } from "./adaptive_mesh.js";
+import { decodeAdaptiveMesh } from "./adaptive_mesh.js";
 import { decodeBase } from "./base_mesh.js";
 import { decodeCopies } from "./seams.js";
 import { Cursor } from "./cursor.js";
+import { smallestFirst } from "./topology_only.js";
 
 /**
  * @typedef {object} PointMesh

@@ -12,16 +12,16 @@ export class BlendedMotion {
   /**
    * @param {import("../format/payload.js").Payload} payload
    * @param {import("./header.js").Header} header
-   * @param {import("./surface.js").Surface} surface of the base frame
+   * @param {import("./surface.js").Surface} surface of the base frame @param {import("../wasm/kernels.js").Kernels} kernels
    */
-  constructor(payload, header, { base, point, members, points }) {
+  constructor(payload, header, { base, point, members, points }, kernels) {
     const weights = decodeWeights(payload.section("weights"), points.causalNeighbours(), header.clusters);
     const own = Float64Array.from({ length: 3 * members.length }, (_, i) => base[3 * members[Math.floor(i / 3)] + (i % 3)]);
     this.blend = new Blend(own, weights, header.clusters);
     this.point = point;
     this.moved = new Float64Array(own.length); // (P, 3) of the frame last asked for
     this.segments = new Segments(payload.header.frames, header.segments, (name, frames) =>
-      new Trajectories(payload.section(name), header.clusters, frames, header.transformStep, name, payload.budget),
+      new Trajectories(kernels.fresh(), payload.section(name), header.clusters, frames, header.transformStep, name, payload.budget),
     );
   }
 

@@ -19,19 +19,6 @@ export { VERSION, PROFILE };
 
 export const CODEC = "mcgv";
 
-/** Throw unless the payload is of this codec, in a version that it can read. */
-export function checkCodec(header) {
-  if (header.codec !== CODEC) {
-    throw new GeometryVideoError("unsupported", `it was coded by ${quote(header.codec)}; gvpipe export-html converts it`);
-  }
-  if (header.version > VERSION) {
-    throw new GeometryVideoError(
-      "newer",
-      `version ${quote(header.version)} of codec ${CODEC}, this player has ${VERSION}; a newer player is needed`,
-    );
-  }
-}
-
 /**
  * @typedef {object} Header
  * @property {"blended"|"affine"} prediction how the clusters move the slots

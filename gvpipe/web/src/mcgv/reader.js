@@ -5,6 +5,7 @@
 
 import { AGAIN, GeometryVideoError, corrupt } from "../format/errors.js";
 import { Displacements } from "../format/displacements.js";
+import { Kernels } from "../wasm/kernels.js";
 import { AffineMotion } from "./affine.js";
 import { BlendedMotion } from "./blended.js";
 import { decodeCharts } from "./chart_coding.js";
@@ -17,16 +18,16 @@ import { readSurface } from "./surface.js";
 const ZERO = 128; // the level of a zero residual
 
 export class McgvReader {
-  /** @param {import("../format/payload.js").Payload} payload @returns {Promise<McgvReader>} */
-  static async open(payload) {
+  /** @param {import("../format/payload.js").Payload} payload @param {Uint8Array} code of kernels @returns {Promise<McgvReader>} */
+  static async open(payload, code) {
     const header = readHeader(payload.header);
-    return new McgvReader(payload, header, await readSurface(payload, header));
+    return new McgvReader(payload, header, await readSurface(payload, header), await Kernels.open(code));
   }
 
-  constructor(payload, header, surface) {
+  constructor(payload, header, surface, kernels) {
     this.header = header;
     this.surface = surface;
-    const { pixels, motion } = decodeMotion(payload, header, surface);
+    const { pixels, motion } = decodeMotion(payload, header, surface, kernels);
     this.motion = motion;
     if (header.outliers !== payload.sections.has("outliers")) {
       throw new GeometryVideoError("corrupt", `its header and its section 'outliers' do not fit; ${AGAIN}`);
@@ -101,15 +102,15 @@ export class McgvReader {
 }
 
 /** The slots' pixels, and how they move: clusters or pixels, whichever follows from the other, come second. */
-function decodeMotion(payload, header, surface) {
+function decodeMotion(payload, header, surface, kernels) {
   const { lattice, visits, nSlots } = surface;
-  if (!header.pictures) return { pixels: null, motion: new BlendedMotion(payload, header, surface) };
+  if (!header.pictures) return { pixels: null, motion: new BlendedMotion(payload, header, surface, kernels) };
   const { width, height } = header;
   if (width * height < nSlots) throw corrupt("header", `planes of ${width}x${height} do not hold ${nSlots} samples`);
   const charts = header.placement === "charts" ? decodePixels(payload.section("pixels"), visits, header) : null;
   if (header.prediction === "blended") {
     const pixels = charts ?? placePoints(payload, header, surface);
-    return { pixels, motion: new BlendedMotion(payload, header, surface) };
+    return { pixels, motion: new BlendedMotion(payload, header, surface, kernels) };
   }
   const data = payload.section("clusters");
   const clusters = charts ? decodeClusters(data, charts, header) : decodeSlotClusters(data, visits, header);

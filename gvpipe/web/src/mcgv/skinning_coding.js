@@ -1,22 +1,25 @@
 /** A blend's transforms over a segment. Mirrors `gvcodecs.mcgv.motion.skinning_coding`; `docs/format.md`, section 5. */
 
 import { Cursor } from "../format/cursor.js";
-import { decodeVectors } from "../format/coefficient_coding.js";
-import { decodeBasis } from "../format/basis.js";
+import { decodeBasis } from "../trajectory/basis.js";
+import { independentOrder, placed } from "../trajectory/causal_order.js";
+import { decodeVectors } from "../trajectory/coefficient_coding.js";
 
 export class Trajectories {
   /**
+   * @param {import("../wasm/kernels.js").Kernels} kernels whose memory is for this alone
    * @param {Uint8Array} data section `transforms.s`
    * @param {number} clusters K @param {number} frames of the segment
    * @param {number} step quantisation step, model units
    * @param {string} name of the section, for messages
    * @param {import("../format/budget.js").Budget} budget of the file
    */
-  constructor(data, clusters, frames, step, name, budget) {
+  constructor(kernels, data, clusters, frames, step, name, budget) {
     const cursor = new Cursor(data, name);
-    this.basis = decodeBasis(cursor.block(), frames, 4 * clusters, step, name, 3, budget);
+    this.basis = decodeBasis(kernels, cursor.block(), frames, 4 * clusters, step, name, 3, budget);
     /** (4K, R) flat. */
-    this.coefficients = decodeVectors(cursor.rest(), this.basis.components, step, independentOrder(4 * clusters), name);
+    const order = placed(kernels, independentOrder(4 * clusters));
+    this.coefficients = kernels.view(decodeVectors(kernels, order, cursor.rest(), this.basis.components, step, name)).slice();
     this.n = 4 * clusters;
   }
 
@@ -43,10 +46,4 @@ export class Trajectories {
     }
     return rows;
   }
-}
-
-/** The causal order of vectors that come by number, none predicted from another. */
-function independentOrder(n) {
-  const order = Array.from({ length: n }, (_, i) => i);
-  return { order, starts: Array(n + 1).fill(0), neighbours: [], weights: [], variances: [], ringSizes: Array(n).fill(0), blocks: [0, n] };
 }

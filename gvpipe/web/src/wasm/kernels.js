@@ -16,7 +16,9 @@ const TYPES = {
   bool: Uint8Array,
   uint8: Uint8Array,
   int32: Int32Array,
+  uint32: Uint32Array,
   int64: BigInt64Array,
+  uint64: BigUint64Array,
   float64: Float64Array,
 };
 const DONE = [0, -2]; // statuses of calls that went well: with a result, and without one
@@ -26,23 +28,39 @@ const SMALL = 1 << 20; // bytes; below, sizes are powers of two
 const ALIGNMENT = 64;
 const RESULT = 1024; // bytes; a tuple of ten arrays takes fewer
 
-/** An array in the memory of kernels: C order. @typedef {{type: string, shape: number[], pointer: number}} KernelArray */
+const modules = new WeakMap(); // bytes -> promise of what they compile to: instances share machine code
+
+/**
+ * An array in the memory of kernels: C order. What a call returned has an owner, 0 if that is one of its arguments.
+ * @typedef {{type: string, shape: number[], pointer: number, owner?: number}} KernelArray
+ */
 
 /** Kernels with a memory of their own, which is freed as a whole: with this object. */
 export class Kernels {
   /** @param {Uint8Array} bytes of `kernels.wasm` @returns {Promise<Kernels>} */
   static async open(bytes) {
-    const kernels = new Kernels();
-    const { instance } = await WebAssembly.instantiate(bytes, { env: kernels.#imports() });
-    kernels.#exports = instance.exports;
-    kernels.#end = align(instance.exports.__heap_base.value);
-    return kernels;
+    if (!modules.has(bytes)) modules.set(bytes, WebAssembly.compile(bytes));
+    return new Kernels(await modules.get(bytes));
   }
+
+  #module;
 
   #exports;
   #end; // of what was ever allocated
   #result; // where results are written
   #free = new Map(); // bytes -> pointers of blocks of that size
+
+  /** @param {WebAssembly.Module} module */
+  constructor(module) {
+    this.#module = module;
+    this.#exports = new WebAssembly.Instance(module, { env: this.#imports() }).exports;
+    this.#end = align(this.#exports.__heap_base.value);
+  }
+
+  /** The same kernels with another memory. */
+  fresh() {
+    return new Kernels(this.#module);
+  }
 
   /**
    * An array of `values`, or of zeros.
@@ -56,7 +74,7 @@ export class Kernels {
     const pointer = this.#allocate(count * TYPES[type].BYTES_PER_ELEMENT);
     const array = { type, shape, pointer };
     if (values) this.view(array).set(values);
-    else if (pointer < used) this.view(array).fill(type === "int64" ? 0n : 0);
+    else if (pointer < used) new Uint8Array(this.#exports.memory.buffer, pointer, count * TYPES[type].BYTES_PER_ELEMENT).fill(0);
     return array;
   }
 
@@ -70,9 +88,20 @@ export class Kernels {
     return new Int32Array(this.#exports.memory.buffer, pointer, shape.reduce((a, b) => a * b, 2));
   }
 
-  /** Give the memory of an array that `array` made back. */
-  free({ type, shape, pointer }) {
-    this.#release(pointer, shape.reduce((a, b) => a * b, TYPES[type].BYTES_PER_ELEMENT));
+  /** An array of int64 of `values` below 2^31, and not below 0. */
+  whole(values) {
+    const array = this.array("int64", [values.length]);
+    const words = this.words(array);
+    for (let i = 0; i < values.length; i++) words[2 * i] = values[i];
+    return array;
+  }
+
+  /** Give the memory of arrays back, those that calls returned among them. @param {...(KernelArray|number|boolean)} given */
+  free(...given) {
+    for (const { type, shape, pointer, owner } of given) {
+      if (owner > 0) this.#release(owner, this.#sizeOf(owner));
+      else if (owner === undefined && shape) this.#release(pointer, shape.reduce((a, b) => a * b, TYPES[type].BYTES_PER_ELEMENT));
+    }
   }
 
   /**
@@ -97,7 +126,7 @@ export class Kernels {
       const [element, dimensions] = type.split(/[[\]]/);
       if (dimensions === undefined) return element === "bool" ? memory.getUint8(at) : Number(memory.getBigInt64(at, true));
       const shape = Array.from({ length: Number(dimensions) }, (_, i) => Number(memory.getBigInt64(at + 32 + 8 * i, true)));
-      const array = { type: element, shape, pointer: memory.getUint32(at + 24, true) };
+      const array = { type: element, shape, pointer: memory.getUint32(at + 24, true), owner: memory.getUint32(at, true) };
       at += 32 + 16 * shape.length;
       return array;
     });
@@ -115,9 +144,9 @@ export class Kernels {
         return block;
       },
       NRT_MemInfo_call_dtor: (block) => {
-        const bytes = Number(new DataView(this.#exports.memory.buffer).getBigInt64(block + 24, true));
-        this.#release(block, bytes + HEADER);
+        this.#release(block, this.#sizeOf(block));
       },
+      pow: Math.pow,
       __multi3: (result, a, _, b) => {
         const product = BigInt.asIntN(64, a) * BigInt.asIntN(64, b); // sizes of arrays: 64 bits each, sign-extended
         const memory = new DataView(this.#exports.memory.buffer, result, 16);
@@ -125,6 +154,11 @@ export class Kernels {
         memory.setBigInt64(8, BigInt.asIntN(64, product >> 64n), true);
       },
     };
+  }
+
+  /** Bytes of a block that a kernel allocated. */
+  #sizeOf(block) {
+    return Number(new DataView(this.#exports.memory.buffer).getBigInt64(block + 24, true)) + HEADER;
   }
 
   /** @throws {RangeError} there is no more memory */

@@ -16,10 +16,10 @@ const BEFORE = new Map([[-1, 1]]);
 
 /**
  * @param {number} frames F @param {number} axes A: three of positions
- * @returns {import("./prediction.js").CausalOrder} of A F vectors; vector A f + a is axis a of frame f
+ * @returns {import("./causal_order.js").CausalOrder} of A F vectors; vector A f + a is axis a of frame f
  */
 export function temporalOrder(frames, axes) {
-  const causal = { order: [], starts: [0], neighbours: [], weights: [], variances: [], ringSizes: [], blocks: [0] };
+  const causal = { order: [], starts: [0], neighbours: [], weights: [], variances: [], ringSizes: [], blocks: [0], affine: false };
   const isDone = new Uint8Array(frames);
   const add = (frame, step) => {
     const offsets = OFFSETS.filter((o) => isDone[frame + o * step]).slice(0, MAX_NEIGHBOURS);

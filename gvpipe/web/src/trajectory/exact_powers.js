@@ -1,9 +1,9 @@
 /** Powers of two with fractional exponents, rounded down, exactly: what integer logarithms compare with. */
 
 const FRACTIONS = 16; // of an octave
-const OCTAVES = 58;
+const OCTAVES = 62;
 
-/** @returns {bigint[]} 2 ** (i / 16) rounded down, i below 16 * 58 */
+/** @returns {bigint[]} 2 ** (i / 16) rounded down, i below 16 * 62 */
 export function powersOfTwo() {
   const top = Array.from({ length: FRACTIONS }, (_, i) => {
     let root = 1n << BigInt(FRACTIONS * OCTAVES + i);

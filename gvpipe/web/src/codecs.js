@@ -1,0 +1,84 @@
+/** Files of all codecs that a page plays, behind one interface. */
+
+import { DecodedPictures } from "./decoded_pictures.js";
+import { GeometryVideoError, quote } from "./format/errors.js";
+import { readableVersion } from "./frames/frame_decoder.js";
+import { FrameHost, FrameSource } from "./frames/frame_host.js";
+import { CODEC as MCGV, VERSION as MCGV_VERSION } from "./mcgv/header.js";
+import { McgvReader } from "./mcgv/reader.js";
+import { openPictures } from "./pictures.js";
+import code from "./wasm/kernels.wasm";
+
+const BYTES_PER_VERTEX = 12; // of a frame
+
+/**
+ * @typedef {object} Playable
+ * @property {Uint32Array} faces (T, 3) flat @property {Int32Array} basePoints (V, 3) flat: equal rows are one point of the surface
+ * @property {{min: number[], max: number[]}} bounds of the motion, model units
+ * @property {number} vertexCount V @property {number[]} levels vertices of each level of detail
+ * @property {() => Promise<DecodedPictures>} openPictures a clock, and what it shows for each distinct frame
+ * @property {(frame: number, shown: Uint8Array|Float32Array, positions: Float32Array) => void} rebuild fills positions (V, 3) of a
+ *   distinct frame from what the clock shows
+ * @property {() => void} close
+ *
+ * @param {Uint8Array} file @param {import("./format/payload.js").Payload} payload
+ * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {number} level of detail
+ * @returns {Promise<Playable>}
+ * @throws {GeometryVideoError} it is damaged, or this player or browser cannot read it
+ */
+export async function openCodec(file, payload, repeated, level) {
+  const { codec, version } = payload.header;
+  const newest = codec === MCGV ? MCGV_VERSION : readableVersion(codec);
+  if (!newest) throw new GeometryVideoError("unsupported", `it was coded by ${quote(codec)}; gvpipe export-html converts it`);
+  if (version > newest) {
+    const found = `version ${quote(version)} of codec ${codec}`;
+    throw new GeometryVideoError("newer", `${found}, this player has ${newest}; a newer player is needed`);
+  }
+  if (!WebAssembly.validate(code)) {
+    throw new GeometryVideoError("unsupported", "this browser has no WebAssembly with SIMD; a newer one is needed");
+  }
+  const distinct = repeated.distinctPayload(payload);
+  return codec === MCGV ? openMcgv(file, payload.header, distinct, repeated, level) : openFrames(payload.header, distinct, repeated, level);
+}
+
+async function openMcgv(file, { fps, vertices, container }, distinct, repeated, level) {
+  if (level) throw new GeometryVideoError("unsupported", `level ${level}: there are levels 0..0`);
+  const reader = await McgvReader.open(distinct, code);
+  return {
+    faces: reader.faces,
+    basePoints: reader.basePoints,
+    bounds: reader.bounds(),
+    vertexCount: vertices,
+    levels: [vertices],
+    openPictures: () =>
+      reader.samples
+        ? openPictures(file, fps, repeated, reader.pictureSize, reader.samples, container.track_crc32)
+        : DecodedPictures.without(fps, repeated, reader.zeroLevels),
+    rebuild: (frame, levels, positions) => reader.rebuild(frame, levels, positions),
+    close() {},
+  };
+}
+
+async function openFrames({ fps }, distinct, repeated, level) {
+  const host = new FrameHost(distinct, code, level);
+  try {
+    const { faces, points, levels, bounds } = await host.describe();
+    const basePoints = new Int32Array(3 * points.length);
+    points.forEach((point, v) => (basePoints[3 * v] = point));
+    const frames = Array.from({ length: repeated.distinct }, (_, picture) => [{ picture }]);
+    const size = BYTES_PER_VERTEX * points.length;
+    return {
+      faces,
+      basePoints,
+      bounds,
+      vertexCount: points.length,
+      levels,
+      openPictures: () => DecodedPictures.of(frames, size, fps, repeated, new FrameSource(host, repeated.distinct)),
+      rebuild: (frame, shown, positions) => positions.set(shown),
+      close: () => host.close(),
+    };
+  } catch (error) {
+    host.close();
+    throw error;
+  }
+}

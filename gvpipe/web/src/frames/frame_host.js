@@ -1,0 +1,122 @@
+/**
+ * Where frames of codecs without pictures are decoded: in a worker, so that the page goes on; on the page itself where it may have
+ * none (as in Node). The worker asks for sections when it needs them.
+ */
+
+import { dracoBinary } from "../format/draco.js";
+import { GeometryVideoError } from "../format/errors.js";
+import { FrameDecoder } from "./frame_decoder.js";
+
+const AHEAD = 3; // frames
+
+export class FrameHost {
+  #payload;
+  #worker = null;
+  #decoder = null; // in place of a worker
+  #jobs = new Map(); // number -> what is not answered yet
+  #count = 0;
+  #setUp;
+
+  /**
+   * @param {import("../format/payload.js").Payload} payload of the distinct frames
+   * @param {Uint8Array} code of kernels @param {number} level of detail
+   */
+  constructor(payload, code, level) {
+    this.#payload = payload;
+    const { header, sections, budget } = payload;
+    this.#setUp = { task: "frames", header, names: [...sections.keys()], bytes: budget.bytes, code, level, draco: dracoBinary };
+    try {
+      const address = URL.createObjectURL(new Blob([WORKER_SOURCE], { type: "text/javascript" }));
+      this.#worker = new Worker(address);
+      this.#worker.onmessage = ({ data }) => this.#take(data);
+      this.#worker.onerror = () => this.#goOnHere(); // pages may forbid workers
+      this.#worker.postMessage(this.#setUp);
+    } catch {
+      this.#goOnHere();
+    }
+  }
+
+  /** What `FrameDecoder.describe` gives. */
+  describe() {
+    return this.#ask({ method: "describe", given: [] });
+  }
+
+  /** Distinct frames `start` to `stop`. @returns {Promise<Float32Array>} (stop - start, V, 3), model units */
+  read(start, stop) {
+    return this.#ask({ method: "read", given: [start, stop] });
+  }
+
+  close() {
+    this.#worker?.terminate();
+    this.#jobs.clear();
+  }
+
+  #ask(job) {
+    if (this.#decoder) return this.#run(job);
+    return new Promise((resolve, reject) => {
+      const number = this.#count++;
+      this.#jobs.set(number, { job, resolve, reject });
+      this.#worker.postMessage({ number, ...job });
+    });
+  }
+
+  async #run({ method, given }) {
+    const decoder = await this.#decoder;
+    return decoder[method](...given);
+  }
+
+  #goOnHere() {
+    this.#worker?.terminate();
+    this.#worker = null;
+    this.#decoder = FrameDecoder.open(this.#payload, this.#setUp.code, this.#setUp.level);
+    this.#decoder.catch(() => {}); // reported by what is asked
+    for (const { job, resolve, reject } of this.#jobs.values()) this.#run(job).then(resolve, reject);
+    this.#jobs.clear();
+  }
+
+  /** An answer, or a request for a section. */
+  async #take({ number, wanted, result, error }) {
+    if (wanted !== undefined) {
+      const data = await Promise.resolve(this.#payload.section(wanted)).catch((failure) => failure);
+      if (data instanceof Error) this.#worker?.postMessage({ wanted, error: { kind: data.kind ?? "load", message: data.message } });
+      else this.#worker?.postMessage({ wanted, data: data.slice() });
+      return;
+    }
+    const job = this.#jobs.get(number);
+    this.#jobs.delete(number);
+    if (error) job?.reject(new GeometryVideoError(error.kind, error.message));
+    else job?.resolve(result);
+  }
+}
+
+/** The clock's decoder: one frame at a time; of frames in a row, some are asked for before their turn, so that the worker never waits. */
+export class FrameSource {
+  #host;
+  #frameCount;
+  #asked = new Map(); // frame -> promise
+  #before = -1;
+
+  /** @param {FrameHost} host @param {number} frameCount D distinct frames */
+  constructor(host, frameCount) {
+    this.#host = host;
+    this.#frameCount = frameCount;
+  }
+
+  /** As `GroupDecoder.decode`, with positions (V, 3) in place of levels. */
+  async decode([{ picture }], give) {
+    const isNext = picture === this.#before + 1;
+    this.#before = picture;
+    const found = this.#asked.get(picture) ?? this.#host.read(picture, picture + 1);
+    const ahead = isNext ? AHEAD : 0;
+    for (const frame of this.#asked.keys()) if (frame <= picture || frame > picture + ahead) this.#asked.delete(frame);
+    for (let frame = picture + 1; frame <= Math.min(picture + ahead, this.#frameCount - 1); frame++) {
+      if (this.#asked.has(frame)) continue;
+      const promise = this.#host.read(frame, frame + 1);
+      promise.catch(() => {}); // reported when its turn comes
+      this.#asked.set(frame, promise);
+    }
+    give(picture, await found);
+  }
+
+  close() {}
+}

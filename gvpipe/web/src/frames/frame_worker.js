@@ -1,0 +1,27 @@
+/** The other end of `FrameHost`: decodes in a worker. */
+
+import { useDraco } from "../format/draco.js";
+import { known } from "../fields/field_host.js";
+import { FrameDecoder } from "./frame_decoder.js";
+import { RemotePayload } from "./remote_payload.js";
+
+/** @returns {(message: object) => void} what takes the messages after the first */
+export function serveFrames({ header, names, bytes, code, level, draco }) {
+  useDraco(draco);
+  const payload = new RemotePayload(header, names, bytes);
+  const decoder = FrameDecoder.open(payload, code, level);
+  decoder.catch(() => {}); // reported by what is asked
+  return async ({ number, method, given, ...answer }) => {
+    if (number === undefined) {
+      payload.take(answer);
+      return;
+    }
+    try {
+      const result = await (await decoder)[method](...given);
+      self.postMessage({ number, result }, result.buffer ? [result.buffer] : []);
+    } catch (error) {
+      const { kind = "unsupported", message } = known(error, "mesh");
+      self.postMessage({ number, error: { kind, message } });
+    }
+  };
+}

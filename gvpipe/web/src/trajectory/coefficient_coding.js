@@ -1,0 +1,106 @@
+/**
+ * Vectors of coefficients from bytes, by Python's kernels: residuals in contexts of their expected magnitude, then prediction. Mirrors
+ * `gvpipe.trajectory.coefficient_coding.decode_vectors`; `docs/format.md`, section 6.
+ */
+
+import {
+  COEFFICIENT_CODING_MAX_VALUES as MAX_VALUES,
+  CONTEXTS_MAX_LEVEL as MAX_LEVEL,
+  CONTEXTS_N_CONTEXTS as N_CONTEXTS,
+  CONTEXTS_PER_OCTAVE as PER_OCTAVE,
+} from "../constants.js";
+import { BlockStream } from "../format/block_stream.js";
+import { Cursor } from "../format/cursor.js";
+import { decodeIntegers } from "../format/integers.js";
+import { powersOfTwo } from "./exact_powers.js";
+
+export { MAX_VALUES };
+
+const MOST_LOGS = 2 ** 14; // numbers whose logarithms are looked up
+const LEAST_VECTORS = 16; // of a call
+const BLOCK_TIME = 20; // ms that a call takes, about
+
+let tables = null; // made when first needed
+
+/**
+ * @param {import("../wasm/kernels.js").Kernels} kernels
+ * @param {(import("../wasm/kernels.js").KernelArray|boolean)[]} causal the order, as kernels take it
+ * @param {Uint8Array} data @param {number} components R @param {number} step quantisation step
+ * @param {string} name of the section, for messages
+ * @param {{predictor?: string, beta?: number, given?: import("../wasm/kernels.js").KernelArray|null, blocks?: number|null}} [how]
+ *   `given` (n, R) has decoded vectors that `causal` leaves out, and is filled; `blocks` are decoded alone
+ * @returns {import("../wasm/kernels.js").KernelArray} (n, R) float64, by vector
+ * @throws {GeometryVideoError} the bytes are not as gvpipe writes them
+ */
+export function decodeVectors(kernels, causal, data, components, step, name, { predictor = "kalman", beta = 0, given = null, blocks = null } = {}) {
+  const cursor = new Cursor(data, name);
+  const [order, , , , , , bounds] = causal;
+  const n = order.shape[0];
+  if (n * components > MAX_VALUES) throw cursor.corrupt(`${n} vectors of ${components} components`);
+  tables ??= makeTables();
+  const levels = decodeIntegers(cursor.block(), components, null, name);
+  const usual = new BigInt64Array(components); // mean magnitudes
+  for (let c = 0, level = 0; c < components; c++) {
+    level += levels[c];
+    if (level < 0 || level > MAX_LEVEL) throw cursor.corrupt("a magnitude level is out of range");
+    usual[c] = tables.levels[level];
+  }
+  const stream = new BlockStream(kernels, cursor.rest(), N_CONTEXTS, name);
+  const wanted = blocks ?? bounds.shape[0] - 1;
+  const decoded = given ?? kernels.array("float64", [n, components]);
+  const inputs = contextInputs(kernels, causal, decoded.shape[0], usual, wanted);
+  const residuals = kernels.array("int64", [kernels.view(bounds)[wanted], components]);
+  const before = kernels.array("int64", [components], usual);
+  for (let b = 0; b < wanted; b++) stream.check(kernels.call("decode_residuals", residuals, ...inputs, ...stream.arrays, before, b, b + 1)[0]);
+  if (blocks === null) stream.end();
+  const target = kernels.array("float64", [0, 0]);
+  const coding = [...causal, step, residuals, decoded, target];
+  const last = predictor === "rbf" ? [beta] : [];
+  inBlocks(residuals.shape[0], (first, end) => kernels.call(`predict_${predictor}`, ...coding, first, end, ...last));
+  kernels.free(...inputs, ...stream.arrays, before, residuals, target);
+  return decoded;
+}
+
+/**
+ * Call a kernel for some ranks of n at a time. Browsers compile it well while it runs, and take that for the next call.
+ *
+ * @param {number} n @param {(first: number, end: number) => unknown} call false ends it @returns {boolean}
+ */
+export function inBlocks(n, call) {
+  let size = LEAST_VECTORS;
+  for (let first = 0, end = 0; first < n; first = end) {
+    end = Math.min(first + size, n);
+    const started = performance.now();
+    if (call(first, end) === false) return false;
+    if (performance.now() - started < BLOCK_TIME / 2) size *= 2;
+  }
+  return true;
+}
+
+/** The members of Python's `ContextInputs`. */
+function contextInputs(kernels, [order, starts, neighbours, , , ringSizes, blocks], n, usual, wanted) {
+  const ranks = new Int32Array(n).fill(order.shape[0]); // given vectors: behind all blocks
+  kernels.view(order).forEach((vector, rank) => (ranks[vector] = rank));
+  const whole = (array, end) => kernels.whole(kernels.view(array).slice(0, end));
+  return [
+    whole(blocks, wanted + 1),
+    kernels.whole(ranks),
+    whole(starts),
+    whole(neighbours),
+    whole(ringSizes),
+    kernels.array("int64", [usual.length], usual),
+    kernels.array("int64", [tables.roots.length], tables.roots),
+    kernels.array("int64", [MOST_LOGS], tables.logs),
+  ];
+}
+
+/** Mirrors the tables of `gvpipe.trajectory.contexts`. */
+function makeTables() {
+  const roots = BigInt64Array.from(powersOfTwo());
+  const logs = new BigInt64Array(MOST_LOGS);
+  for (let value = 0, i = 0; value < MOST_LOGS; value++) {
+    while (roots[i + 1] <= BigInt(64 * value + 1)) i++;
+    logs[value] = BigInt(i - 6 * PER_OCTAVE);
+  }
+  return { roots, logs, levels: Array.from({ length: MAX_LEVEL + 1 }, (_, level) => roots[4 * level]) };
+}

@@ -1,0 +1,127 @@
+"""Frames of codecs without pictures, by the player in Node: Python's positions, bit for bit, at every level of detail."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from folders import DATA, GOLDEN, SAMPLES
+from pages import BUNDLE
+from sequences import awkward, held, patched, waving
+
+import gvpipe
+from gvpipe.container.mp4 import read_file, write_file
+from gvpipe.sequence import MeshSequence
+
+pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no node")
+REAL = ("samba", "chicken", "cow", "kaykit_spin", "fox_run")
+MOST = 6  # frames that are compared of a file
+
+
+def load(jobs: Sequence[dict[str, Any]], folder: Path) -> list[dict[str, Any]]:
+    """What `run_frames.mjs` makes of the jobs, triangles and frames as arrays."""
+    (folder / "jobs.json").write_text(json.dumps(jobs))
+    script = Path(__file__).with_name("run_frames.mjs")
+    done = subprocess.run(["node", script, BUNDLE / "geometry-video.js", folder], capture_output=True, text=True, cwd=folder)
+    assert done.returncode == 0, done.stderr[-2000:]
+    data = (folder / "frames.bin").read_bytes()
+    results: list[dict[str, Any]] = json.loads((folder / "results.json").read_text())
+    for each in results:
+        if "error" not in each:
+            first, last = each["indices"]
+            each["indices"] = np.frombuffer(data[first:last], "<u4").reshape(-1, 3)
+            each["frames"] = [np.frombuffer(data[a:b], "<f4").reshape(-1, 3) for a, b in each["frames"]]
+    return results
+
+
+def check(paths: Sequence[Path], folder: Path) -> None:
+    """Triangles and positions of every level are Python's."""
+    jobs = []
+    for path in paths:
+        with gvpipe.open(path) as video:
+            chosen = np.random.default_rng(3).permutation(len(video))[:MOST].tolist()
+            jobs += [{"path": str(path), "level": level, "frames": chosen} for level in range(len(video.levels))]
+    for job, found in zip(jobs, load(jobs, folder), strict=True):
+        where = f"{Path(job['path']).name}, level {job['level']}"
+        assert "error" not in found, f"{where}: {found['error']}"
+        with gvpipe.open(job["path"]) as video:
+            shown = video.level(job["level"])
+            assert found["levels"] == video.levels, where
+            assert np.array_equal(found["indices"], shown.faces), where
+            for k, positions in zip(job["frames"], found["frames"], strict=True):
+                assert np.array_equal(positions, shown.read(k, k + 1)[0]), f"{where}, frame {k}"
+            low, high = found["bounds"]["min"], found["bounds"]["max"]
+            inside = (shown.read(0, 1)[0] >= low) & (shown.read(0, 1)[0] <= high)
+            assert inside.all(), where
+
+
+def encoded(sequence: MeshSequence, path: Path, **settings: Any) -> Path:
+    gvpipe.encode(sequence, path, **{"codec": "pca", **settings})
+    return path
+
+
+def test_golden_files(tmp_path: Path) -> None:
+    check(sorted(GOLDEN.glob("pca-*.mp4")), tmp_path)
+
+
+def test_seams_repeated_frames_segments_and_corrections(tmp_path: Path) -> None:
+    check(
+        [
+            encoded(patched(), tmp_path / "seams.mp4"),
+            encoded(patched(still=0.5), tmp_path / "still.mp4", reorder=True, segment=5, predictor="lsp"),
+            encoded(patched(still=1.0), tmp_path / "rest.mp4"),
+            encoded(held(waving(10, 12), [2, *[1] * 10, 7]), tmp_path / "held.mp4"),
+            encoded(waving(14, 30), tmp_path / "segments.mp4", segment=11, max_error=0.001),
+        ],
+        tmp_path,
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("predictor", ["kalman", "navg", "lsp", "rbf"])
+def test_awkward_inputs(predictor: str, tmp_path: Path) -> None:
+    check([encoded(each, tmp_path / f"{name}.mp4", predictor=predictor) for name, each in awkward().items()], tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sample", ["creature", "flag"])
+def test_samples(sample: str, tmp_path: Path) -> None:
+    gvpipe.encode(SAMPLES / f"{sample}.npz", tmp_path / "x.mp4", "pca")
+    check([tmp_path / "x.mp4"], tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not DATA.exists(), reason="no ../shared/data")
+@pytest.mark.parametrize("name", REAL)
+def test_real_sequences(name: str, tmp_path: Path) -> None:
+    gvpipe.encode(DATA / f"{name}.npz", tmp_path / "x.mp4", "pca")
+    check([tmp_path / "x.mp4"], tmp_path)
+
+
+def test_damage_is_told_in_a_line(tmp_path: Path) -> None:
+    """Each section cut, changed or missing: an error, or frames that are finite."""
+    bitstream = read_file(encoded(patched(still=0.5), tmp_path / "a.mp4"))
+    jobs = []
+    for name, data in bitstream.sections.items():
+        for kind, changed in {"cut": data[:-3], "changed": data[:9] + bytes(len(data) - 9), "empty": b""}.items():
+            path = tmp_path / f"{name}-{kind}.mp4"
+            write_file(dataclasses.replace(bitstream, sections={**bitstream.sections, name: changed}), path)
+            jobs.append({"path": str(path), "level": 0, "frames": [0]})
+    wrong = {"predictor": "x", "beta": 7, "steps": [0.0], "segments": 99}
+    for key, value in wrong.items():
+        write_file(dataclasses.replace(bitstream, header={**bitstream.header, key: value}), tmp_path / f"{key}.mp4")
+        jobs.append({"path": str(tmp_path / f"{key}.mp4"), "level": 0, "frames": [0]})
+    jobs.append({"path": str(tmp_path / "a.mp4"), "level": 9, "frames": [0]})
+    found = load(jobs, tmp_path)
+    errors = [each["error"] for each in found if "error" in each]
+    assert len(errors) >= 0.7 * len(jobs)
+    assert all(error.startswith(("corrupt: ", "unsupported: ")) and "\n" not in error for error in errors), errors
+    assert errors[-1] == "unsupported: level 9: there are levels 0..1"
+    assert all(np.isfinite(each["frames"]).all() for each in found if "frames" in each)
