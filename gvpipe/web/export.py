@@ -1,6 +1,6 @@
 """A geometry video and its player as one HTML file that needs no network.
 
-What: page = ``page.html`` with the player's bundle, deflated, and the MP4 file, both as base64 text, so that it opens from a disk.
+What: page = ``page.html`` with the player's bundle (deflated) and the MP4 file as base64 text, so that it opens from a disk.
 Why: browsers load no modules and fetch no files for a page that is itself a file.
 
 A codec knows which of its files browsers play (`gvpipe.registry.browser_obstacle`). Any other file is decoded and encoded anew

@@ -24,6 +24,7 @@ FILES: dict[str, dict[str, Any]] = {  # several groups of pictures, with B-frame
     "affine": {"prediction": "affine", "preset": "slow", "gop": 8, "clusters": 3, "quality": 90},
     "blended": {"prediction": "blended", "preset": "slow", "gop": 32},
     "plain": {"prediction": "affine", "preset": "ultrafast", "gop": 4, "clusters": 3},
+    "pca": {"codec": "pca"},
     "held": {"prediction": "blended", "preset": "slow", "gop": 5, "quality": 90},  # at 75 it needs no pictures
 }
 LENGTHS = {"held": [2] * 13 + [14]}  # frames that each picture is shown for, 1 if not given
@@ -71,8 +72,8 @@ def player(driver: Any, site: tuple[Path, str]) -> Callable[..., Any]:
     return lambda body, *arguments: pages.run(driver, find + body, *arguments)
 
 
-def _skip_inexact(name: str, decoder: str) -> None:
-    if (name, decoder) == ("webkit", "video"):
+def _skip_inexact(name: str, decoder: str, kind: str) -> None:
+    if (name, decoder) == ("webkit", "video") and kind != "pca":
         pytest.skip("refused; see test_an_inexact_video_is_refused")
 
 
@@ -81,14 +82,15 @@ def test_an_inexact_video_is_refused(name: str, module: Callable[..., Any]) -> N
     load = "const video = await GeometryVideo.load(args[0]); return (await video.frame(0)).length"
     body = f"{DECODERS['video']} return (async () => {{ {load} }})().catch((error) => error.kind)"
     for kind in FILES:
-        assert module(body, f"{kind}.mp4") == ("unsupported" if name == "webkit" else 3 * 144)
+        has_pictures = kind != "pca"
+        assert module(body, f"{kind}.mp4") == ("unsupported" if name == "webkit" and has_pictures else 3 * 144)
 
 
 @pytest.mark.parametrize("decoder", DECODERS)
 @pytest.mark.parametrize("kind", FILES)
 def test_positions_are_exact(kind: str, decoder: str, name: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     """Frames at random equal Python's and the other browsers', bit by bit."""
-    _skip_inexact(name, decoder)
+    _skip_inexact(name, decoder, kind)
     with gvpipe.open(site[0] / f"{kind}.mp4") as video:
         order = [*np.random.default_rng(3).permutation(len(video)).tolist(), 0, len(video) - 1]
         found = module(DECODERS[decoder] + pages.FRAMES, f"{kind}.mp4", order)["frames"]
@@ -119,13 +121,13 @@ LOOPS = f"""{pages.TEXT} const video = await GeometryVideo.load(args[0]);
     return {{ frames, wrong, seconds }};"""
 
 
-@pytest.mark.parametrize("kind", ["affine", "held"])
+@pytest.mark.parametrize("kind", ["affine", "pca", "held"])
 @pytest.mark.parametrize("decoder", DECODERS)
 def test_two_whole_loops(
     decoder: str, kind: str, name: str, module: Callable[..., Any], record_property: Callable[[str, object], None]
 ) -> None:
     """Each frame shown in two loops has that frame's positions, bit by bit; none comes twice in a loop."""
-    _skip_inexact(name, decoder)
+    _skip_inexact(name, decoder, kind)
     result = module(DECODERS[decoder] + LOOPS, f"{kind}.mp4")
     frames = result["frames"]
     (turn,) = np.flatnonzero(np.diff(frames) < 0) + 1
@@ -140,7 +142,7 @@ def test_two_whole_loops(
     assert rate > 4  # on a busy machine; idle, all of them
 
 
-@pytest.mark.parametrize("kind", ["affine", "held"])
+@pytest.mark.parametrize("kind", ["affine", "pca", "held"])
 def test_seeks_in_the_player(kind: str, player: Callable[..., Any]) -> None:
     """Of seeks in a row the last counts; after a pause, the picture is the frame that the player names."""
     shown = player(
@@ -158,9 +160,10 @@ def test_seeks_in_the_player(kind: str, player: Callable[..., Any]) -> None:
     assert shown[0] == 9 and shown[1] >= 14 and shown[2] == min(39, shown[1] + 1)
 
 
-def test_exported_page_plays_from_a_disk(driver: Any, site: tuple[Path, str], tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", ["affine", "pca"])
+def test_exported_page_plays_from_a_disk(kind: str, driver: Any, site: tuple[Path, str], tmp_path: Path) -> None:
     """Two loops, nothing asked for, nothing left behind."""
-    gvpipe.export_html(site[0] / "affine.mp4", tmp_path / "page.html")
+    gvpipe.export_html(site[0] / f"{kind}.mp4", tmp_path / "page.html")
     driver.get((tmp_path / "page.html").as_uri())
     turns, kept = pages.run(
         driver,
