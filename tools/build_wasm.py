@@ -50,9 +50,22 @@ MIXING = (
     "gvpipe.entropy.decision_kernels.Mixing",
     [NUMBERS, "uint8[2]", NUMBERS, LONGS, LONGS, LONGS, LONGS],
 )
+ENTRIES = ("gvpipe.mesh.entry_kernels.EntryOrder", [LONGS, LONGS, NUMBERS])
+LISTS = ("gvpipe.connectivity.visit_kernels.NeighbourLists", [LONGS, LONGS])
+VISITS = ("gvpipe.connectivity.visit_kernels.CodedVisits", [LONGS] * 3)
+SEAMS = ("gvpipe.connectivity.seam_corners.SeamCorners", [LONGS] * 4)
+WORDS = ["uint64[1]", "uint32[1]"]  # a range decoder's state and its words
 KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and NamedTuples of both
     "gvpipe.mesh.hierarchy_kernels.build_order": [TRIANGLES, SCALAR, SCALAR],
     "gvpipe.mesh.hierarchy_kernels.triangles_left": [TRIANGLES, SCALAR, SCALAR],
+    "gvpipe.mesh.entry_kernels.order_by_corners": [TRIANGLES, LONGS, SCALAR],
+    "gvpipe.mesh.entry_kernels.order_by_edges": [LONGS],
+    "gvpipe.connectivity.visit_kernels.decode_ranks": [*WORDS, "uint64[1]", VISITS],
+    "gvpipe.connectivity.visit_kernels.sort_neighbours": [NUMBERS, NUMBERS, NUMBERS],
+    "gvpipe.connectivity.visit_kernels.traverse_visits": [LISTS, SCALAR, VISITS, "bool"],
+    "gvpipe.connectivity.order_kernels.code_visits": [LISTS, LONGS, SCALAR, MIXING, LONGS, BYTES, "bool", LONGS],
+    "gvpipe.connectivity.position_kernels.code_positions": [ENTRIES, MIXING, LONGS, BYTES, "bool", NUMBERS],
+    "gvpipe.connectivity.edge_seam_kernels.visit_corners": [SEAMS, LONGS, LONGS, LONGS, SCALAR],
     "gvpipe.fields.dual_kernels.find_dual": [TRIANGLES, SCALAR],
     "gvpipe.fields.residual_kernels.decode_rows": [
         ("gvpipe.fields.residual_kernels.Residuals", [NUMBERS, SCALAR, FLAGS, CAUSAL]),

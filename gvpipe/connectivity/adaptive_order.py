@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gvpipe.arrays import Array, Int64
-from gvpipe.connectivity.vertex_order import REACH, NeighbourLists, neighbour_lists
+from gvpipe.connectivity.vertex_order import REACH, neighbour_lists
 from gvpipe.errors import corrupt_section
 
 if TYPE_CHECKING:
+    from gvpipe.connectivity.visit_kernels import NeighbourLists
     from gvpipe.entropy.decision_kernels import Mixing
 
 MAX_VERTICES = 1 << 16  # larger meshes take too long

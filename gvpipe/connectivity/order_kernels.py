@@ -17,7 +17,7 @@ import numpy as np
 
 from gvpipe.arrays import Bool, Int64, UInt8
 from gvpipe.compiled import compiled
-from gvpipe.connectivity.vertex_order import NeighbourLists
+from gvpipe.connectivity.visit_kernels import NeighbourLists
 from gvpipe.entropy.decision_kernels import Mixing, put, take
 from gvpipe.entropy.number_kernels import code_number, mix_hash
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64, UInt32, UInt64
+from gvpipe.arrays import Float64, Int64, UInt32, UInt64
 from gvpipe.compiled import compiled
 
 PRECISION = 24
@@ -37,16 +37,20 @@ def may_be_exhausted(state: UInt64, words: UInt32) -> bool:
 
 
 def edges_of(table: Int64) -> UInt64:
-    """``(n + 1,)`` edges of constriction's ``Categorical(table / sum, perfect=False)``: every symbol gets one share of 2**24,
-    the rest is dealt out in proportion, rounded down at the edges.
+    """`edges_of_weights` of frequencies, which constriction is given as shares of their sum."""
+    return edges_of_weights(table.astype(np.float64) / float(table.sum())) if len(table) else np.zeros(1, np.uint64)
+
+
+def edges_of_weights(weights: Float64) -> UInt64:
+    """``(n + 1,)`` edges of constriction's ``Categorical(weights, perfect=False)``: every symbol gets one share of 2**24, the
+    rest is dealt out in proportion, rounded down at the edges.
 
     Sums in order, one quotient and one product per edge in doubles: the same on every machine.
     """
-    if not len(table):
-        return np.zeros(1, np.uint64)
-    before = np.concatenate([[0.0], np.cumsum(table.astype(np.float64) / float(table.sum()))])
-    edges = np.zeros(len(table) + 1, np.uint64)
-    edges[:] = np.floor(before * ((TOTAL - len(table)) / before[-1])) + np.arange(len(edges))
+    before = np.concatenate([[0.0], np.cumsum(weights)])
+    edges = np.zeros(len(weights) + 1, np.uint64)
+    if before[-1] > 0:
+        edges[:] = np.floor(before * ((TOTAL - len(weights)) / before[-1])) + np.arange(len(edges))
     edges[-1] = TOTAL
     return edges
 
@@ -75,6 +79,20 @@ def decode_bits(state: UInt64, words: UInt32, width: int) -> int | np.int64:
     share = np.uint64(PRECISION - width)
     value = np.int64(quantile >> share)  # signed as the -1 is: numba makes floats of both kinds together
     _advance(state, words, scale, np.uint64(value) << share, ONE << share)
+    return value
+
+
+@compiled
+def decode_uniform(state: UInt64, words: UInt32, size: int) -> int | np.int64:
+    """The next of ``size`` values, 1..2**24, all alike, as constriction's ``Uniform``; -1 as for `decode_symbol`."""
+    scale = state[1] >> SHIFT
+    quantile = state[0] // scale
+    if quantile >= np.uint64(TOTAL):
+        return -1
+    share = np.uint64(TOTAL // size)
+    value = np.int64(min(quantile // share, np.uint64(size - 1)))
+    left = np.uint64(value) * share
+    _advance(state, words, scale, left, share if value < size - 1 else np.uint64(TOTAL) - left)
     return value
 
 

@@ -122,7 +122,7 @@ def test_a_conversion_takes_few_encodes(tmp_path: Path, monkeypatch: pytest.Monk
 def test_command_says_what_it_did(run: Run, video: Path, tmp_path: Path) -> None:
     gvpipe.encode(waving(8, 6), tmp_path / "other.mp4", "laplacian")
     plain = run("export-html", video, tmp_path / "a.html")
-    assert plain.status == 0 and plain.err == "" and "MB" in plain.out
+    assert plain.status == 0 and plain.err == "" and "kB" in plain.out
     converted = run("export-html", tmp_path / "other.mp4", tmp_path / "b.html")
     assert converted.status == 0
     assert re.search(

@@ -66,6 +66,20 @@ def test_kernels_equal_numba_on_trajectories(name: str, tmp_path: Path) -> None:
 
 
 @NODE
+@pytest.mark.parametrize("name", ["mcgv-5-seams", "pdct-2-seams"])
+def test_kernels_equal_numba_on_meshes(name: str, tmp_path: Path) -> None:
+    """Seams, vertex orders, adaptive positions."""
+    with recorded() as calls, gvpipe.open(GOLDEN / f"{name}.mp4") as video:
+        assert np.isfinite(video[0]).all()
+    used = {each for each, *_ in calls}
+    if name.startswith("mcgv"):
+        assert used >= {"order_by_corners", "code_positions", "visit_corners", "code_visits"}
+    else:
+        assert used >= {"decode_ranks", "sort_neighbours", "traverse_visits"}
+    compare(calls, tmp_path)
+
+
+@NODE
 def test_kernels_equal_numba_on_a_sample(tmp_path: Path) -> None:
     gvpipe.encode(SAMPLES / "flag.npz", tmp_path / "flag.mp4", preset="fast")
     with recorded() as calls, gvpipe.open(tmp_path / "flag.mp4") as video:

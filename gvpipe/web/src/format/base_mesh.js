@@ -11,24 +11,23 @@ import { inflate } from "./inflate.js";
 import { previousEqual } from "./points.js";
 import { decodeOrder } from "./vertex_order.js";
 
-const MAX_COORDINATE = 2 ** 25; // squared distances between lattice points stay exact in doubles; gvpipe writes up to 2^22
-
 /**
  * @typedef {object} BaseMesh
  * @property {Int32Array} points (V, 3) lattice units, flat
  * @property {Uint32Array} faces (T, 3) flat
  * @property {Int32Array} visits (V) vertex v is the codec's vertex visits[v]
  *
+ * @param {import("../wasm/kernels.js").Kernels} kernels
  * @param {Uint8Array} mesh @param {Uint8Array} order sections
  * @param {{vertices: number, triangles: number}} most of the header
  * @returns {Promise<BaseMesh>}
  */
-export async function decodeBase(mesh, order, most) {
+export async function decodeBase(kernels, mesh, order, most) {
   const { points, faces } = await decodeMesh(mesh, most);
   const n = points.length / 3;
   const visits = Int32Array.from({ length: n }, (_, v) => v);
   if (order.length === 0) return { points, faces, visits };
-  decodeOrder(order, points, faces, visits);
+  decodeOrder(kernels, order, points, faces, visits);
   const moved = new Int32Array(3 * n);
   const rank = new Int32Array(n); // the user's vertex of each of the codec's
   for (let v = 0; v < n; v++) {
@@ -50,7 +49,7 @@ async function decodeMesh(mesh, most) {
   const faces = join(Uint32Array, carried.faces, await decodeTable(cursor.rest(), looseFaces));
   const n = points.length / 3;
   if (n > MAX_VERTICES) throw cursor.corrupt(`${n} vertices, at most ${MAX_VERTICES}`);
-  if (points.some((c) => c < 0 || c >= MAX_COORDINATE)) throw cursor.corrupt("lattice coordinate out of range");
+  if (points.some((c) => c < 0)) throw cursor.corrupt("lattice coordinate out of range");
   if (faces.some((vertex) => vertex >= n)) throw cursor.corrupt("a triangle names a vertex that does not exist");
   return { points, faces };
 }

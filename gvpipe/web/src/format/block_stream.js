@@ -7,15 +7,12 @@ import { BLOCK_CODER_PARAMETRIC as PARAMETRIC } from "../constants.js";
 import { Cursor } from "./cursor.js";
 import { MAX_TOKENS, TABLE_TOTAL, normalised } from "./integers.js";
 import { N_RATIOS, magnitudeTable } from "./parametric_tables.js";
-import { categoricalEdges } from "./range_decoder.js";
+import { WordStream, categoricalEdges } from "./word_stream.js";
 
 const PROBLEMS = ["", "a context is used that has no table", "its range-coded data do not decode", "a residual is out of range"]; // by status
-const UNTOUCHED = 2n ** 64n - 1n; // the range before anything is read
 
 export class BlockStream {
-  #kernels;
   #cursor;
-  #state;
   #words;
 
   /**
@@ -28,18 +25,14 @@ export class BlockStream {
     const tables = Array.from({ length: nContexts }, () => readEdges(cursor));
     const width = Math.max(1, ...tables.map((edges) => edges.length));
     if (cursor.left % 4) throw cursor.corrupt("its words are not whole");
-    const words = cursor.words(cursor.left / 4);
     const edges = kernels.array("uint64", [nContexts, width]);
     const halves = kernels.words(edges);
     tables.forEach((own, context) => own.forEach((edge, i) => (halves[2 * (context * width + i)] = edge)));
     const sizes = kernels.whole(tables.map((own) => Math.max(0, own.length - 1)));
-    const first = (BigInt(words[0] ?? 0) << 32n) | BigInt(words[1] ?? 0);
-    this.#kernels = kernels;
     this.#cursor = cursor;
-    this.#state = kernels.array("uint64", [3], [first, UNTOUCHED, BigInt(Math.min(2, words.length))]);
-    this.#words = words.length;
+    this.#words = new WordStream(kernels, cursor.words(cursor.left / 4));
     /** The members of Python's `BlockStream`. */
-    this.arrays = [this.#state, kernels.array("uint32", [words.length], words), edges, sizes];
+    this.arrays = [...this.#words.arrays, edges, sizes];
   }
 
   /** Throw if a kernel's status is an error. */
@@ -49,9 +42,7 @@ export class BlockStream {
 
   /** Throw if a word is left. */
   end() {
-    const [difference, extent, place] = this.#kernels.view(this.#state);
-    const isOver = Number(place) === this.#words && (extent === UNTOUCHED || difference < 2n ** 33n - 1n);
-    if (!isOver) throw this.#cursor.corrupt("range-coded data are left over");
+    if (!this.#words.isAtEnd) throw this.#cursor.corrupt("range-coded data are left over");
   }
 }
 

@@ -7,7 +7,8 @@ import {
   TOKENS_TABLE_TOTAL as TABLE_TOTAL,
 } from "../constants.js";
 import { Cursor } from "./cursor.js";
-import { RangeDecoder, categoricalEdges } from "./range_decoder.js";
+import { RangeDecoder } from "./range_decoder.js";
+import { categoricalEdges } from "./word_stream.js";
 
 export { DIRECT, MAX_TOKENS, TABLE_TOTAL };
 

@@ -110,24 +110,6 @@ export class RangeDecoder {
   }
 }
 
-/**
- * The edges of constriction's `Categorical(weights, perfect=False)`: every symbol gets one share of 2^24, the rest is dealt out
- * in proportion, rounded down at the edges. Sums, one quotient and one product per edge in doubles: the same on every machine.
- */
-export function categoricalEdges(weights) {
-  let sum = 0;
-  for (const weight of weights) sum += weight;
-  const scale = (TOTAL - weights.length) / sum;
-  const edges = new Float64Array(weights.length + 1);
-  let before = 0;
-  weights.forEach((weight, i) => {
-    edges[i] = Math.floor(before * scale) + i;
-    before += weight;
-  });
-  edges[weights.length] = TOTAL;
-  return edges;
-}
-
 /** The last of symbols 0..top whose left edge does not lie beyond a quantile. */
 function search(edges, top, quantile) {
   let first = 0;

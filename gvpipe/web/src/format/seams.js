@@ -11,6 +11,7 @@ import { decodeSeams } from "./edge_seams.js";
 import { decodeOrder } from "./vertex_order.js";
 
 /**
+ * @param {import("../wasm/kernels.js").Kernels} kernels
  * @param {Uint8Array} counts @param {Uint8Array} copies parts of section `mesh`
  * @param {Uint8Array} order section
  * @param {Uint32Array} pointFaces (T, 3) triangles over points, smallest point first, flat
@@ -18,21 +19,21 @@ import { decodeOrder } from "./vertex_order.js";
  * @param {boolean} adaptive whether the order is that of `adaptive_order.js`
  * @returns {{faces: Uint32Array, point: Int32Array}} triangles (T, 3) over vertices, flat, and the point of each vertex (V)
  */
-export function decodeCopies(counts, copies, order, pointFaces, nPoints, across, adaptive) {
-  const { faces, point } = decodeCorners(counts, copies, pointFaces, nPoints, across);
+export function decodeCopies(kernels, counts, copies, order, pointFaces, nPoints, across, adaptive) {
+  const { faces, point } = decodeCorners(kernels, counts, copies, pointFaces, nPoints, across);
   if (order.length === 0) return { faces, point };
   const n = point.length;
   const lattice = new Int32Array(3 * n); // for the walk: equal where points are
   for (let v = 0; v < n; v++) lattice[3 * v] = point[v];
   const visits = new Int32Array(n);
-  (adaptive ? decodeAdaptiveOrder : decodeOrder)(order, lattice, faces, visits);
+  (adaptive ? decodeAdaptiveOrder : decodeOrder)(kernels, order, lattice, faces, visits);
   const rank = new Int32Array(n); // the user's vertex of each of the codec's
   visits.forEach((visit, v) => (rank[visit] = v));
   return { faces: faces.map((vertex) => rank[vertex]), point: visits.map((visit) => point[visit]) };
 }
 
 /** The same in the codec's order: the vertices of point 0, then those of point 1, and so on. */
-function decodeCorners(countsData, data, pointFaces, nPoints, across) {
+function decodeCorners(kernels, countsData, data, pointFaces, nPoints, across) {
   const counts = decodeIntegers(countsData, nPoints, null, "mesh").map((others) => others + 1);
   const starts = new Float64Array(nPoints + 1); // first vertex of each point, and V
   for (let p = 0; p < nPoints; p++) {
@@ -40,7 +41,7 @@ function decodeCorners(countsData, data, pointFaces, nPoints, across) {
     if (counts[p] < 1 || starts[p + 1] > MAX_VERTICES) throw corrupt("mesh", "a number of copies is out of range");
   }
   const where = sharedCorners(pointFaces, counts);
-  const copies = across ? decodeSeams(data, pointFaces, counts, where) : decodeDifferences(data, pointFaces, counts, where);
+  const copies = across ? decodeSeams(kernels, data, pointFaces, counts, where) : decodeDifferences(data, pointFaces, counts, where);
   const faces = pointFaces.map((p, corner) => starts[p] + copies[corner]);
   const point = new Int32Array(starts[nPoints]);
   for (let p = 0; p < nPoints; p++) point.fill(p, starts[p], starts[p + 1]);

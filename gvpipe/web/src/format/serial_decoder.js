@@ -7,7 +7,8 @@ import { TOKENS_CHUNK as CHUNK, TOKENS_DIRECT as DIRECT } from "../constants.js"
 import { Cursor } from "./cursor.js";
 import { MAX_TOKENS, TABLE_TOTAL, normalised, unfold } from "./integers.js";
 import { N_RATIOS, magnitudeTable } from "./parametric_tables.js";
-import { RangeDecoder, categoricalEdges } from "./range_decoder.js";
+import { RangeDecoder } from "./range_decoder.js";
+import { categoricalEdges } from "./word_stream.js";
 
 export class SerialDecoder {
   #cursor;

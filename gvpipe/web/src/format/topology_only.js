@@ -13,12 +13,13 @@ import { decodeCopies } from "./seams.js";
  * @property {Uint32Array} faces (T, 3) over V vertices, flat @property {Int32Array} point (V) the point of each vertex
  * @property {Uint32Array} pointFaces (T, 3) the same triangles over points, flat @property {number} pointCount P
  *
+ * @param {import("../wasm/kernels.js").Kernels} kernels
  * @param {Uint8Array} mesh @param {Uint8Array} order sections
  * @param {{vertices: number, triangles: number}} header what it must be
  * @returns {Promise<Topology>}
  * @throws {GeometryVideoError} the sections do not hold what the header says
  */
-export async function decodeTopology(mesh, order, { vertices, triangles }) {
+export async function decodeTopology(kernels, mesh, order, { vertices, triangles }) {
   const cursor = new Cursor(mesh, "mesh");
   const [draco, merges, loose, counts, nLoose, pointCount] = Array.from({ length: 6 }, () => cursor.u32());
   if (pointCount > Math.min(MAX_VERTICES, vertices) || nLoose > Math.min(triangles, MAX_PER_BYTE * mesh.length)) {
@@ -26,7 +27,7 @@ export async function decodeTopology(mesh, order, { vertices, triangles }) {
   }
   const parts = [draco, merges, loose].map((length) => cursor.take(length));
   const pointFaces = await decodeTriangles(...parts, nLoose, pointCount);
-  const { faces, point } = decodeCopies(cursor.take(counts), cursor.rest(), order, pointFaces, pointCount, false, false);
+  const { faces, point } = decodeCopies(kernels, cursor.take(counts), cursor.rest(), order, pointFaces, pointCount, false, false);
   if (point.length !== vertices || faces.length !== 3 * triangles) {
     const found = `${point.length} vertices and ${faces.length / 3} triangles`;
     throw new GeometryVideoError("corrupt", `the mesh has ${found}, the header says ${vertices} and ${triangles}; ${AGAIN}`);

@@ -17,20 +17,21 @@ import { smallestFirst } from "./topology_only.js";
  * @property {Int32Array} lattice (P, 3) positions of the points, lattice units, flat
  * @property {Uint32Array} pointFaces (T, 3) the triangles over points, flat
  *
+ * @param {import("../wasm/kernels.js").Kernels} kernels
  * @param {Uint8Array} mesh @param {Uint8Array} order sections
  * @param {boolean} across whether seams are coded across edges (`seams.js`)
  * @param {boolean} adaptive whether the stream is the adaptive one (section 5.9)
  * @param {{vertices: number, triangles: number}} most of the header
  * @returns {Promise<PointMesh>}
  */
-export async function decodePoints(mesh, order, across, adaptive, most) {
+export async function decodePoints(kernels, mesh, order, across, adaptive, most) {
   const cursor = new Cursor(mesh, "mesh");
   const flags = adaptive ? cursor.u8() : 0;
   if (flags > ADAPTIVE_MESH + ADAPTIVE_ORDER) throw cursor.corrupt(`flags ${flags} are unknown`);
   const stream = cursor.take(cursor.varint(cursor.left, "a length"));
-  const base = flags & ADAPTIVE_MESH ? await decodeAdaptiveMesh(stream, most) : await decodeBase(stream, new Uint8Array(0), most);
+  const base = flags & ADAPTIVE_MESH ? await decodeAdaptiveMesh(kernels, stream, most) : await decodeBase(kernels, stream, new Uint8Array(0), most);
   const pointFaces = smallestFirst(base.faces);
   const counts = cursor.take(cursor.varint(cursor.left, "a length"));
-  const { faces, point } = decodeCopies(counts, cursor.rest(), order, pointFaces, base.points.length / 3, across, Boolean(flags & ADAPTIVE_ORDER));
+  const { faces, point } = decodeCopies(kernels, counts, cursor.rest(), order, pointFaces, base.points.length / 3, across, Boolean(flags & ADAPTIVE_ORDER));
   return { faces, point, lattice: base.points, pointFaces };
 }

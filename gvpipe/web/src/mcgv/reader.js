@@ -21,7 +21,8 @@ export class McgvReader {
   /** @param {import("../format/payload.js").Payload} payload @param {Uint8Array} code of kernels @returns {Promise<McgvReader>} */
   static async open(payload, code) {
     const header = readHeader(payload.header);
-    return new McgvReader(payload, header, await readSurface(payload, header), await Kernels.open(code));
+    const kernels = await Kernels.open(code);
+    return new McgvReader(payload, header, await readSurface(payload, header, kernels), kernels);
   }
 
   constructor(payload, header, surface, kernels) {

@@ -63,24 +63,25 @@ export class Surface {
 
 /**
  * @param {import("../format/payload.js").Payload} payload
- * @param {import("./header.js").Header} header
+ * @param {import("./header.js").Header} header @param {import("../wasm/kernels.js").Kernels} kernels
  * @returns {Promise<Surface>}
  */
-export async function readSurface(payload, header) {
-  const parts = payload.header.version < 3 ? await readVertices(payload) : await readPoints(payload);
+export async function readSurface(payload, header, kernels) {
+  const parts = payload.header.version < 3 ? await readVertices(payload, kernels) : await readPoints(payload, kernels);
   return new Surface(parts, header);
 }
 
 /** Files before version 3: every vertex is a slot. */
-async function readVertices(payload) {
-  const { points: lattice, faces, visits } = await decodeBase(payload.section("mesh"), payload.section("order"), payload.header);
+async function readVertices(payload, kernels) {
+  const { points: lattice, faces, visits } = await decodeBase(kernels, payload.section("mesh"), payload.section("order"), payload.header);
   checkCounts(payload.header, visits.length, faces);
   const welded = weldVertices(lattice, faces, visits);
   return { faces, basePoints: lattice, slot: Int32Array.from(visits.keys()), lattice, visits, ...welded };
 }
 
-async function readPoints(payload) {
+async function readPoints(payload, kernels) {
   const { faces, point, lattice, pointFaces } = await decodePoints(
+    kernels,
     payload.section("mesh"),
     payload.section("order"),
     payload.header.version > 3,

@@ -44,7 +44,7 @@ export class PcaReader {
   static async open(payload, kernels) {
     const header = readHeader(payload.header);
     const order = await payload.section("order");
-    const topology = await decodeTopology(await payload.section("mesh"), order, payload.header);
+    const topology = await decodeTopology(kernels, await payload.section("mesh"), order, payload.header);
     const still = payload.sections.has(STILL) ? await payload.section(STILL) : null;
     return new PcaReader(payload, header, kernels, topology, still);
   }

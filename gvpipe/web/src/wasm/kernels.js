@@ -89,8 +89,8 @@ export class Kernels {
   }
 
   /** An array of int64 of `values` below 2^31, and not below 0. */
-  whole(values) {
-    const array = this.array("int64", [values.length]);
+  whole(values, shape = [values.length]) {
+    const array = this.array("int64", shape);
     const words = this.words(array);
     for (let i = 0; i < values.length; i++) words[2 * i] = values[i];
     return array;
@@ -145,6 +145,14 @@ export class Kernels {
       },
       NRT_MemInfo_call_dtor: (block) => {
         this.#release(block, this.#sizeOf(block));
+      },
+      numba_attempt_nocopy_reshape: (_, __, ___, dimensions, shape, strides, itemBytes) => {
+        const memory = new DataView(this.#exports.memory.buffer);
+        for (let axis = Number(dimensions) - 1, bytes = itemBytes; axis >= 0; axis--) {
+          memory.setBigInt64(strides + 8 * axis, bytes, true); // arrays are in C order
+          bytes *= memory.getBigInt64(shape + 8 * axis, true);
+        }
+        return 1;
       },
       pow: Math.pow,
       __multi3: (result, a, _, b) => {

@@ -1,0 +1,211 @@
+"""Kernels of `gvpipe.connectivity.vertex_order`: ranks from range-coded words, lists of neighbours, and the search itself."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gvpipe.arrays import Int64, UInt32, UInt64
+from gvpipe.compiled import compiled
+from gvpipe.connectivity.visit_symbols import ESCAPE, EXACT_RANKS
+from gvpipe.entropy.range_decoder import decode_symbol, decode_uniform
+
+SHORT_LIST = 64  # neighbours that are sorted by insertion
+
+
+class NeighbourLists(NamedTuple):
+    """The vertices that a search reaches from each vertex.
+
+    Args:
+        starts: ``(V + 1,)`` int64 bounds of each vertex' neighbours in ``neighbours``.
+        neighbours: ``(E,)`` int64, nearest first: along triangle edges, and vertices at one point.
+    """
+
+    starts: Int64
+    neighbours: Int64
+
+
+class CodedVisits(NamedTuple):
+    """An order of vertices and how it is coded, int64; a traversal fills one from the other.
+
+    Args:
+        ranks: ``(V,)`` in the search from the vertex before; -1: not found.
+        jumps: ``(V,)`` where the rank is -1, the index among the vertices left.
+        visits: ``(V,)`` vertices in the codec's numbers.
+    """
+
+    ranks: Int64
+    jumps: Int64
+    visits: Int64
+
+
+@compiled
+def decode_ranks(state: UInt64, words: UInt32, edges: UInt64, coded: CodedVisits) -> bool:
+    """Fill ranks and jumps; False where the words are not what an encoder writes.
+
+    Args:
+        state, words: of `gvpipe.entropy.range_decoder`.
+        edges: of the symbols' table.
+        coded: of V vertices.
+    """
+    ranks, jumps = coded.ranks, coded.jumps
+    n_vertices = len(ranks)
+    for v in range(n_vertices):
+        ranks[v] = decode_symbol(state, words, edges)
+        if ranks[v] < 0:
+            return False
+    for v in range(n_vertices):
+        symbol, low = ranks[v], 0
+        above = max(symbol - EXACT_RANKS, 0)
+        size = n_vertices - v if symbol == ESCAPE else 1 if symbol < EXACT_RANKS else 4 << (above // 2)
+        if size > 1:
+            low = int(decode_uniform(state, words, size))
+            if low < 0:
+                return False
+        if symbol == ESCAPE:
+            ranks[v], jumps[v] = -1, low
+        elif symbol >= EXACT_RANKS:
+            ranks[v] = ((2 + (above & 1)) << (2 + above // 2)) + low
+    return True
+
+
+@compiled
+def sort_neighbours(points: Int64, faces: Int64, twins: Int64) -> NeighbourLists:
+    """What a search reaches from each vertex: sorted by squared distance, then by number; nobody twice.
+
+    Args:
+        points: ``(V, 3)`` lattice units.
+        faces: ``(T, 3)`` triangles.
+        twins: ``(n, 2)`` pairs of vertices at one point.
+    """
+    n_vertices = len(points)
+    starts = np.zeros(n_vertices + 1, np.int64)
+    for t in range(len(faces)):
+        for k in range(3):
+            starts[faces[t, k] + 1] += 2
+    for t in range(len(twins)):
+        starts[twins[t, 0] + 1] += 1
+        starts[twins[t, 1] + 1] += 1
+    for v in range(n_vertices):
+        starts[v + 1] += starts[v]
+    neighbours = np.empty(starts[-1], np.int64)
+    end = starts[:-1].copy()
+    for t in range(len(faces)):
+        for k in range(3):
+            here = faces[t, k]
+            neighbours[end[here]] = faces[t, (k + 1) % 3]
+            neighbours[end[here] + 1] = faces[t, (k + 2) % 3]
+            end[here] += 2
+    for t in range(len(twins)):
+        for k in range(2):
+            neighbours[end[twins[t, k]]] = twins[t, 1 - k]
+            end[twins[t, k]] += 1
+    kept = 0
+    distance = np.empty(SHORT_LIST, np.int64)
+    for v in range(n_vertices):
+        own = neighbours[starts[v] : end[v]]
+        n = len(own)
+        if n <= SHORT_LIST:  # insertion sort: no allocation
+            for i in range(n):
+                y = own[i]
+                dx, dy, dz = points[y, 0] - points[v, 0], points[y, 1] - points[v, 1], points[y, 2] - points[v, 2]
+                d = dx * dx + dy * dy + dz * dz  # may wrap round beyond 30 bits, at both ends alike
+                j = i
+                while j > 0 and (distance[j - 1] > d or (distance[j - 1] == d and own[j - 1] > y)):
+                    distance[j], own[j] = distance[j - 1], own[j - 1]
+                    j -= 1
+                distance[j], own[j] = d, y
+        else:
+            own = own[np.argsort(own, kind="mergesort")]
+            apart = np.empty(n, np.int64)
+            for i in range(n):
+                dx, dy, dz = (
+                    points[own[i], 0] - points[v, 0],
+                    points[own[i], 1] - points[v, 1],
+                    points[own[i], 2] - points[v, 2],
+                )
+                apart[i] = dx * dx + dy * dy + dz * dz
+            own = own[np.argsort(apart, kind="mergesort")]
+        starts[v] = kept
+        for i in range(n):
+            if i == 0 or own[i] != own[i - 1]:
+                neighbours[kept] = own[i]
+                kept += 1
+    starts[n_vertices] = kept
+    return NeighbourLists(starts, neighbours[:kept].copy())
+
+
+@compiled
+def traverse_visits(lists: NeighbourLists, reach: int, coded: CodedVisits, decoding: bool) -> int:
+    """Fill ranks and jumps from visits, or (decoding) visits from them; one body, so that the two cannot differ.
+
+    A search looks at ``reach`` vertices at most. Returns the number of vertices done; fewer than V means that a rank or a jump
+    points nowhere.
+    """
+    starts, neighbours = lists.starts, lists.neighbours
+    ranks, jumps, visits = coded.ranks, coded.jumps, coded.visits
+    n_vertices = len(starts) - 1
+    visited = np.zeros(n_vertices, np.bool_)
+    seen_by = np.full(n_vertices, -1, np.int64)  # the last search that saw a vertex
+    queue = np.empty(min(reach, n_vertices) + 1, np.int64)
+    left = np.arange(n_vertices)  # the vertices not visited, in the order that removals by swapping leave
+    position = np.arange(n_vertices)
+    first_left = 0
+    for v in range(n_vertices):
+        target = -1
+        if not decoding:
+            target = visits[v]
+        if decoding and ranks[v] < 0:
+            if jumps[v] >= n_vertices - v:
+                return v
+            target = left[jumps[v]]
+        else:
+            head = tail = rank = 0
+            seed = first_left
+            if v > 0:
+                queue[0] = visits[v - 1]
+                seen_by[visits[v - 1]] = v
+                tail = 1
+            found = False
+            while not found and tail < reach:
+                if head == tail:  # the component is exhausted: go on with the first vertex left in the codec's order
+                    while seed < n_vertices and seed - first_left < reach and (visited[seed] or seen_by[seed] == v):
+                        seed += 1
+                    if seed == n_vertices or seed - first_left >= reach:
+                        break
+                    begin, end = -1, 0
+                else:
+                    begin, end = starts[queue[head]], starts[queue[head] + 1]
+                for k in range(begin, end):
+                    y = seed if begin < 0 else neighbours[k]
+                    if tail == reach:
+                        break
+                    if seen_by[y] == v:
+                        continue
+                    seen_by[y] = v
+                    queue[tail] = y
+                    tail += 1
+                    if visited[y]:
+                        continue
+                    if (decoding and rank == ranks[v]) or y == target:
+                        target = y
+                        found = True
+                        break
+                    rank += 1
+                if begin >= 0:
+                    head += 1
+            if not found and decoding:
+                return v
+            if not decoding:
+                ranks[v] = rank if found else -1
+                jumps[v] = position[target]
+        visits[v] = target
+        visited[target] = True
+        hole = position[target]
+        last = left[n_vertices - 1 - v]
+        left[hole] = last
+        position[last] = hole
+        while first_left < n_vertices and visited[first_left]:
+            first_left += 1
+    return n_vertices
