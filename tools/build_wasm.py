@@ -54,6 +54,10 @@ ENTRIES = ("gvpipe.mesh.entry_kernels.EntryOrder", [LONGS, LONGS, NUMBERS])
 LISTS = ("gvpipe.connectivity.visit_kernels.NeighbourLists", [LONGS, LONGS])
 VISITS = ("gvpipe.connectivity.visit_kernels.CodedVisits", [LONGS] * 3)
 SEAMS = ("gvpipe.connectivity.seam_corners.SeamCorners", [LONGS] * 4)
+SERIAL = ("gvpipe.entropy.serial_kernels.SerialCoder", [STREAM, LONGS, LONGS, LONGS, "bool"])
+PLACED = ("gvpipe.attributes.match_kernels.Entries", [ENTRIES, LONGS, SCALAR, SCALAR])
+CORNERS = ("gvpipe.attributes.sharing_kernels.Corners", [TRIANGLES, LONGS, LONGS])
+POSITIONS = "float32[2]"
 WORDS = ["uint64[1]", "uint32[1]"]  # a range decoder's state and its words
 KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and NamedTuples of both
     "gvpipe.mesh.hierarchy_kernels.build_order": [TRIANGLES, SCALAR, SCALAR],
@@ -66,6 +70,27 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
     "gvpipe.connectivity.order_kernels.code_visits": [LISTS, LONGS, SCALAR, MIXING, LONGS, BYTES, "bool", LONGS],
     "gvpipe.connectivity.position_kernels.code_positions": [ENTRIES, MIXING, LONGS, BYTES, "bool", NUMBERS],
     "gvpipe.connectivity.edge_seam_kernels.visit_corners": [SEAMS, LONGS, LONGS, LONGS, SCALAR],
+    "gvpipe.attributes.linear_kernels.code_linear": [
+        SERIAL,
+        PLACED,
+        ("gvpipe.attributes.linear_kernels.Linear", [SCALAR, "bool", TRIANGLES, LONGS, POSITIONS]),
+        NUMBERS,
+        ROWS,
+    ],
+    "gvpipe.attributes.octahedral_kernels.corner_normals": [TRIANGLES, POSITIONS, LONGS, SCALAR],
+    "gvpipe.attributes.octahedral_kernels.code_octahedral": [
+        SERIAL,
+        PLACED,
+        ("gvpipe.attributes.octahedral_kernels.Octahedral", [SCALAR, SCALAR, ROWS]),
+        NUMBERS,
+    ],
+    "gvpipe.attributes.part_kernels.code_parts": [SERIAL, LONGS, LONGS, LONGS, SCALAR],
+    "gvpipe.attributes.polygon_kernels.code_polygons": [
+        SERIAL,
+        ("gvpipe.attributes.fan_kernels.Soup", [TRIANGLES, LONGS, LONGS]),
+        ("gvpipe.attributes.polygon_kernels.Fans", [LONGS] * 5),
+    ],
+    "gvpipe.attributes.sharing_kernels.code_sharing": [SERIAL, CORNERS, SCALAR, LONGS],
     "gvpipe.fields.dual_kernels.find_dual": [TRIANGLES, SCALAR],
     "gvpipe.fields.residual_kernels.decode_rows": [
         ("gvpipe.fields.residual_kernels.Residuals", [NUMBERS, SCALAR, FLAGS, CAUSAL]),

@@ -60,8 +60,8 @@ def code_linear(coder: SerialCoder, entries: Entries, linear: Linear, codes: Int
         entry = order.order[i]
         match = code_match(coder, entries, history, i, codes)
         if match >= 0:
-            codes[entry] = codes[match]
-            numbers[entry] = numbers[match]
+            for c in range(n_components):
+                codes[entry, c], numbers[entry, c] = codes[match, c], numbers[match, c]
         else:
             _predict(entries, linear, i, numbers, guess, side[0])
             previous, least = 0, _least_class(order, i)

@@ -45,7 +45,8 @@ def code_octahedral(coder: SerialCoder, entries: Entries, octahedral: Octahedral
         entry = order.order[i]
         match = code_match(coder, entries, history, i, codes)
         if match >= 0:
-            codes[entry] = codes[match]
+            for c in range(codes.shape[1]):
+                codes[entry, c] = codes[match, c]
             remember(entries, history, entry, True)
             continue
         _predict(entries, octahedral, i, codes, guess)

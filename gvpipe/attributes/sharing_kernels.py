@@ -162,7 +162,8 @@ def _find_fan(v: int, seed: int, mesh: Corners, entries: Int64, fan: _Fan, turne
     for i in range(size):
         k = (cut_at + i) % size
         turned.corners[i], turned.edges[i] = fan.corners[k], fan.edges[k] if k > 0 else edge
-    fan.corners[:size], fan.edges[:size] = turned.corners[:size], turned.edges[:size]
+    for i in range(size):
+        fan.corners[i], fan.edges[i] = turned.corners[i], turned.edges[i]
     return size, cuts
 
 

@@ -12,6 +12,32 @@ export const DIRECTORY_OCTAHEDRAL = 3;
 export const ENCODER_ARRANGEMENT = "arrangement";
 export const ENCODER_CODED = 1;
 
+// gvpipe.attributes.linear_kernels
+export const LINEAR_KERNELS_AFFINE = 4;
+export const LINEAR_KERNELS_PARALLELOGRAM = 2;
+
+// gvpipe.attributes.match_kernels
+export const MATCH_KERNELS_N_MATCH_CONTEXTS = 9;
+export const MATCH_KERNELS_N_RESIDUAL_CONTEXTS = 16;
+
+// gvpipe.attributes.octahedral_kernels
+export const OCTAHEDRAL_KERNELS_MEAN = 1;
+export const OCTAHEDRAL_KERNELS_PLACE = 3;
+export const OCTAHEDRAL_KERNELS_PLACE_CORRECTED = 5;
+export const OCTAHEDRAL_KERNELS_SURFACE = 2;
+
+// gvpipe.attributes.part_kernels
+export const PART_KERNELS_N_PART_CONTEXTS = 3;
+
+// gvpipe.attributes.polygon_kernels
+export const POLYGON_KERNELS_N_CONTEXTS = 32;
+
+// gvpipe.attributes.sharing_kernels
+export const SHARING_KERNELS_N_CONTEXTS = 12;
+
+// gvpipe.attributes.value_coding
+export const VALUE_CODING_MAX_SHIFT = 32;
+
 // gvpipe.connectivity.adaptive_mesh
 export const ADAPTIVE_MESH_MAX_POINTS = 8192;
 
@@ -110,7 +136,6 @@ export const SERIES_MAX_CLASS = 63;
 export const TOKENS_DIRECT = 16;
 export const TOKENS_TABLE_TOTAL = 4096;
 export const TOKENS_MAX_TOKENS = 88;
-export const TOKENS_CHUNK = 16;
 
 // gvpipe.errors
 export const ERRORS_REMEDY = "get the file again from its source";

@@ -21,6 +21,7 @@ import { inflate } from "../format/inflate.js";
 import { CodedField } from "../fields/coded_field.js";
 import { FieldHost } from "../fields/field_host.js";
 import { TYPES } from "../fields/head.js";
+import { Kernels } from "../wasm/kernels.js";
 import code from "../wasm/kernels.wasm";
 import { AssetEntry } from "./asset_entry.js";
 import { readImages, readMaterials } from "./materials.js";
@@ -63,9 +64,10 @@ export async function readAsset(payload, video, positions) {
   const images = readImages(list.list("images", MAX_ITEMS), payload);
   const materials = readMaterials(list.list("materials", MAX_ITEMS), images.length);
   const notes = [];
-  const { parts, indices, polygons } = readParts(list, payload, video, materials.length);
+  const kernels = await Kernels.open(code);
+  const { parts, indices, polygons } = readParts(kernels, list, payload, video, materials.length);
   const first = list.flag("geometry", false) ? await video.frame(0) : null;
-  const attributes = readAttributes(list, payload, new Surface(indices, video.vertexCount, first, parts.length), notes);
+  const attributes = readAttributes(list, payload, new Surface(kernels, indices, video.vertexCount, first, parts.length), notes);
   const host = new FieldHost(code, Int32Array.from(indices), video.vertexCount, positions);
   const { frameCount, vertexCount, triangleCount } = video;
   const fields = readFields(list, payload, { frameCount, vertexCount, triangleCount, host }, notes);
@@ -84,7 +86,7 @@ async function readJson(data, budget) {
   }
 }
 
-function readParts(list, payload, { indices: decoded, vertexCount }, nMaterials) {
+function readParts(kernels, list, payload, { indices: decoded, vertexCount }, nMaterials) {
   const parts = list.list("parts", MAX_PARTS).map((given, number) => {
     const entry = new AssetEntry(given, `part ${number}`);
     const [start, stop] = entry.numbers("vertices", 2, undefined, 0, vertexCount);
@@ -93,7 +95,7 @@ function readParts(list, payload, { indices: decoded, vertexCount }, nMaterials)
     return { name: entry.text("name", ""), vertices: [start, stop], triangles: [0, 0], material, parent: entry.text("parent", "") };
   });
   const data = payload.sections.get(ARRANGEMENT) ?? new Uint8Array(0);
-  const arranged = decodeArrangement(data, decoded, parts.length || 1, vertexStarts(parts, vertexCount), ARRANGEMENT);
+  const arranged = decodeArrangement(kernels, data, decoded, parts.length || 1, vertexStarts(parts, vertexCount), ARRANGEMENT);
   parts.forEach((part, number) => (part.triangles = arranged.partStarts.slice(number, number + 2)));
   return { parts, indices: arranged.faces, polygons: arranged.polygons };
 }
@@ -134,14 +136,13 @@ function readAttributes(list, payload, surface, notes) {
 function readFields(list, payload, { frameCount, vertexCount, triangleCount, host }, notes) {
   const fields = new Map();
   const names = new Set();
-  const hasKernels = WebAssembly.validate(code);
   for (const given of list.list("fields", MAX_ITEMS)) {
     const entry = new AssetEntry(given, "a field");
     const name = entry.text("name");
     if (names.has(name)) throw corrupt(SECTION, `there are two fields ${name}`);
     names.add(name);
     const coding = entry.integer("coding", undefined, 0, MAX_ITEMS);
-    const problem = obstacle(coding, given, hasKernels);
+    const problem = obstacle(coding, given);
     if (problem) {
       notes.push(`field ${name} is not shown: ${problem}`);
       continue;
@@ -166,9 +167,8 @@ function readFields(list, payload, { frameCount, vertexCount, triangleCount, hos
 }
 
 /** Why a field cannot be read; "" if it can. */
-function obstacle(coding, { kind, components }, hasKernels) {
+function obstacle(coding, { kind, components }) {
   if (coding === SURFACE) return "it follows from the surface, as the player's own normals do";
   const isKnown = coding === CODED || (coding === OCTAHEDRAL && kind === "normal" && components === 3);
-  if (!isKnown) return "a newer gvpipe wrote it";
-  return hasKernels ? "" : "this browser has no WebAssembly with SIMD; a newer one is needed";
+  return isKnown ? "" : "a newer gvpipe wrote it";
 }

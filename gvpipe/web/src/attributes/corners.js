@@ -1,32 +1,11 @@
-/** Corners of triangles: corner 3 t + k is vertex k of triangle t. Mirrors what `gvpipe.attributes` and `gvpipe.mesh.corner_lists` know of them. */
+/** Corners of triangles: corner 3 t + k is vertex k of triangle t. Mirrors what `gvpipe.mesh` knows of them. */
 
-export function nextCorner(corner) {
+function nextCorner(corner) {
   return corner % 3 < 2 ? corner + 1 : corner - 2;
 }
 
-export function previousCorner(corner) {
+function previousCorner(corner) {
   return corner % 3 > 0 ? corner - 1 : corner + 2;
-}
-
-/** The corner of the triangle of corners a and b that is neither. */
-export function thirdCorner(a, b) {
-  return 9 * Math.floor(a / 3) + 3 - a - b;
-}
-
-/**
- * The corners at each vertex, ascending, as linked lists.
- *
- * @param {ArrayLike<number>} flat (3T) vertices @param {number} nVertices
- * @returns {{head: Int32Array, after: Int32Array}} (V) first corner, (3T) next one; -1: none
- */
-export function linkCorners(flat, nVertices) {
-  const head = new Int32Array(nVertices).fill(-1);
-  const after = new Int32Array(flat.length).fill(-1);
-  for (let c = flat.length - 1; c >= 0; c--) {
-    after[c] = head[flat[c]];
-    head[flat[c]] = c;
-  }
-  return { head, after };
 }
 
 /**

@@ -1,7 +1,6 @@
 /** The entries of an attribute: what they belong to, and where they lie. Mirrors `gvpipe.attributes.entry_layout`. */
 
 import { oppositeCorners } from "./corners.js";
-import { orderByCorners, orderByEdges } from "./entry_order.js";
 
 export class EntryLayout {
   /**
@@ -26,14 +25,23 @@ export class EntryLayout {
     return Uint32Array.from(surface.faces, (_, c) => (domain === "triangle" ? Math.floor(c / 3) : 0));
   }
 
-  /** Their `EntryOrder`, and `places` (N): a number for each, equal at one place. */
-  entries() {
+  /**
+   * A number for each entry, equal at one place (N), and their order, the members of Python's `EntryOrder` in the memory of `kernels`.
+   *
+   * @returns {{places: Uint32Array, order: import("../wasm/kernels.js").KernelArray[]}}
+   */
+  entries(kernels) {
     const { domain, surface, corners, nEntries } = this;
     const places = Uint32Array.from({ length: nEntries }, (_, i) => i);
-    if (domain === "part") return { order: places, starts: new Int32Array(nEntries + 1), gates: new Int32Array(0), places };
-    if (domain === "triangle") return { ...orderByEdges(surface.opposite), places };
-    if (domain === "vertex") return { ...orderByCorners(surface.faces, surface.opposite, nEntries), places: surface.places };
+    if (domain === "part") {
+      return { places, order: [kernels.whole(places), kernels.array("int64", [nEntries + 1]), kernels.array("int64", [0, 4])] };
+    }
+    if (domain === "triangle") return { places, order: kernels.call("order_by_edges", kernels.whole(surface.opposite)) };
+    const flat = corners ?? surface.faces;
+    const opposite = kernels.whole(corners ? oppositeCorners(corners) : surface.opposite);
+    const order = kernels.call("order_by_corners", kernels.array("int32", [flat.length / 3, 3], flat), opposite, nEntries);
+    if (!corners) return { places: surface.places, order };
     corners.forEach((entry, c) => (places[entry] = surface.places[surface.faces[c]]));
-    return { ...orderByCorners(corners, oppositeCorners(corners), nEntries), places };
+    return { places, order };
   }
 }

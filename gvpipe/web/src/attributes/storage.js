@@ -1,7 +1,6 @@
 /** Values of an attribute from the integers that are coded. Mirrors `gvpipe.attributes.storage`. */
 
 import { decodeIntegers } from "../format/integers.js";
-import { floatOf } from "./linear.js";
 
 export const [INTEGERS, FLOATS, STEPS, DIRECTIONS, TANGENTS, RANKS] = [0, 1, 2, 3, 4, 5];
 const TYPES = [
@@ -15,6 +14,8 @@ const TYPES = [
   { name: "int64", array: Float64Array, low: -(2 ** 63), high: 2 ** 63 }, // as doubles: exact up to 2^53
   { name: "uint64", array: Float64Array, low: 0, high: 2 ** 64 },
 ];
+const word = new Float32Array(1);
+const bits = new Int32Array(word.buffer);
 const MAX_COMPONENTS = 64;
 const MAX_N = 2 ** 20; // of the octahedral lattice
 const MAX_STEP = Number.MAX_VALUE;
@@ -111,4 +112,10 @@ function readTable(cursor, most) {
   }
   if (table.at(-1) >= 2n ** 63n) throw cursor.corrupt("distinct values are out of range");
   return table.map(Number);
+}
+
+/** The float32 of an ordered code, whose bits ascend as values do; NaN and infinities where the bits are theirs. */
+function floatOf(code) {
+  bits[0] = code >= 0 ? code : -(code + 1) - 2 ** 31;
+  return word[0];
 }

@@ -8,12 +8,14 @@ export class Surface {
   #opposite = null;
 
   /**
+   * @param {import("../wasm/kernels.js").Kernels} kernels
    * @param {Uint32Array} faces (3T) vertices, in their final order
    * @param {number} nVertices
    * @param {Float32Array|null} positions (V, 3) of frame 0; null where attributes are predicted without geometry
    * @param {number} nParts
    */
-  constructor(faces, nVertices, positions, nParts) {
+  constructor(kernels, faces, nVertices, positions, nParts) {
+    this.kernels = kernels;
     this.faces = faces;
     this.nVertices = nVertices;
     this.positions = positions;
@@ -46,7 +48,7 @@ export class Surface {
     const count = welded.reduce((most, vertex) => Math.max(most, vertex + 1), 0);
     const own = new Float32Array(3 * count);
     for (let c = faces.length - 1; c >= 0; c--) own.set(positions.subarray(3 * faces[c], 3 * faces[c] + 3), 3 * welded[c]);
-    return new Surface(welded, count, own, this.nParts);
+    return new Surface(this.kernels, welded, count, own, this.nParts);
   }
 
   /** (3T) `oppositeCorners` of the faces. */

@@ -1,14 +1,14 @@
 /** The order and rotation of triangles that a codec does not keep: parts, polygons. Mirrors `gvpipe.attributes.triangle_order`. */
 
+import { PART_KERNELS_N_PART_CONTEXTS as N_PART_CONTEXTS, POLYGON_KERNELS_N_CONTEXTS as N_POLYGON_CONTEXTS } from "../constants.js";
 import { Cursor } from "../format/cursor.js";
-import { SerialDecoder } from "../format/serial_decoder.js";
+import { SerialStream } from "../format/serial_stream.js";
 import { oppositeCorners } from "./corners.js";
-import { N_POLYGON_CONTEXTS, PolygonDecoder } from "./polygons.js";
 
 const [PARTS, POLYGONS] = [1, 2]; // flags
-const N_PART_CONTEXTS = 3;
 
 /**
+ * @param {import("../wasm/kernels.js").Kernels} kernels
  * @param {Uint8Array} data section `arrangement`; empty: there is nothing to say
  * @param {Uint32Array} decoded (3T) the codec's triangles
  * @param {number} nParts
@@ -17,16 +17,16 @@ const N_PART_CONTEXTS = 3;
  * @returns {{faces: Uint32Array, partStarts: number[], polygons: Int32Array|null}} (3T) triangles part after part, (nParts + 1) first
  *   triangle of each part, (P) corners of each polygon
  */
-export function decodeArrangement(data, decoded, nParts, vertexStarts, name) {
+export function decodeArrangement(kernels, data, decoded, nParts, vertexStarts, name) {
   const cursor = new Cursor(data, name);
   const flags = data.length ? cursor.u8() : 0;
   if (flags > (PARTS | POLYGONS) || (data.length && !flags)) throw cursor.corrupt("unknown flags");
   const ranges = vertexStarts && partRanges(decoded, vertexStarts);
   let parts = ranges ?? new Int32Array(decoded.length / 3);
   if (parts.some((part) => part >= nParts)) throw cursor.corrupt("a vertex has no part");
-  if (flags & PARTS) parts = decodeParts(cursor.block(), decoded, ranges, nParts, name);
+  if (flags & PARTS) parts = decodeParts(kernels, cursor.block(), decoded, ranges, nParts, name);
   const { order, starts } = groupByPart(parts, nParts);
-  const polygons = flags & POLYGONS ? decodePolygons(cursor.rest(), decoded, order, parts, name) : null;
+  const polygons = flags & POLYGONS ? decodePolygons(kernels, cursor.rest(), decoded, order, parts, name) : null;
   cursor.end();
   const faces = new Uint32Array(decoded.length);
   for (let t = 0; t < order.length; t++) {
@@ -52,25 +52,13 @@ function partRanges(decoded, vertexStarts) {
   return parts;
 }
 
-function decodeParts(data, decoded, ranges, nParts, name) {
-  const coder = new SerialDecoder(data, N_PART_CONTEXTS, name);
-  const opposite = oppositeCorners(decoded);
-  const parts = new Int32Array(decoded.length / 3);
-  let last = 0;
-  for (let t = 0; t < parts.length; t++) {
-    let [guess, context] = [last, 0];
-    if (ranges) {
-      [guess, context] = [ranges[t], 1];
-    } else {
-      const earlier = [0, 1, 2].map((k) => opposite[3 * t + k]).find((corner) => corner >= 0 && corner < 3 * t);
-      if (earlier !== undefined) [guess, context] = [parts[Math.floor(earlier / 3)], 2];
-    }
-    last = guess + coder.value(context);
-    if (!(last >= 0 && last < nParts)) throw coder.corrupt(`a triangle belongs to part ${last} of ${nParts}`);
-    parts[t] = last;
-  }
-  coder.end();
-  return parts;
+function decodeParts(kernels, data, decoded, ranges, nParts, name) {
+  const own = kernels.fresh();
+  const stream = new SerialStream(own, data, N_PART_CONTEXTS, name);
+  const parts = own.array("int64", [decoded.length / 3]);
+  own.call("code_parts", ...stream.arrays, own.whole(oppositeCorners(decoded)), own.whole(ranges ?? []), parts, nParts);
+  stream.end();
+  return Int32Array.from(own.numbers(parts));
 }
 
 /** Triangles in order of their parts, each part's in the order given; and the first of each part, then T. */
@@ -84,12 +72,16 @@ function groupByPart(parts, nParts) {
   return { order, starts };
 }
 
-function decodePolygons(data, decoded, order, parts, name) {
-  const coder = new SerialDecoder(data, N_POLYGON_CONTEXTS, name);
+/** Triangles in their final order, the corner with which each begins, and the corners of polygons. */
+function decodePolygons(kernels, data, decoded, order, parts, name) {
+  const own = kernels.fresh();
+  const stream = new SerialStream(own, data, N_POLYGON_CONTEXTS, name);
   const flat = new Uint32Array(decoded.length);
   order.forEach((from, t) => flat.set(decoded.subarray(3 * from, 3 * from + 3), 3 * t));
-  const decoder = new PolygonDecoder(coder, flat, oppositeCorners(flat), order.map((t) => parts[t]));
-  const sizes = decoder.decode();
-  coder.end();
-  return { sizes, triangles: decoder.triangles, apexes: decoder.apexes };
+  const soup = [own.array("int32", [order.length, 3], flat), own.whole(oppositeCorners(flat)), own.whole(order.map((t) => parts[t]))];
+  const fans = Array.from({ length: 5 }, () => own.array("int64", [0])); // an encoder's
+  const result = own.call("code_polygons", ...stream.arrays, ...soup, ...fans);
+  stream.end();
+  const [triangles, apexes, sizes] = result.map((array) => own.numbers(array));
+  return { triangles, apexes, sizes };
 }

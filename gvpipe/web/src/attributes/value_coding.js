@@ -1,14 +1,21 @@
-/** Codes of entries from their bytes. Mirrors `gvpipe.attributes.value_coding`. */
+/** Codes of entries from their bytes, by Python's kernels. Mirrors `gvpipe.attributes.value_coding`. */
 
-import { SerialDecoder } from "../format/serial_decoder.js";
+import {
+  LINEAR_KERNELS_AFFINE as AFFINE,
+  LINEAR_KERNELS_PARALLELOGRAM as PARALLELOGRAM,
+  MATCH_KERNELS_N_MATCH_CONTEXTS as N_MATCH_CONTEXTS,
+  MATCH_KERNELS_N_RESIDUAL_CONTEXTS as N_RESIDUAL_CONTEXTS,
+  OCTAHEDRAL_KERNELS_MEAN as MEAN,
+  OCTAHEDRAL_KERNELS_PLACE as PLACE,
+  OCTAHEDRAL_KERNELS_PLACE_CORRECTED as PLACE_CORRECTED,
+  OCTAHEDRAL_KERNELS_SURFACE as SURFACE,
+  VALUE_CODING_MAX_SHIFT as MAX_SHIFT,
+} from "../constants.js";
+import { SerialStream } from "../format/serial_stream.js";
 import { oppositeCorners } from "./corners.js";
-import { countContexts } from "./history.js";
-import { AFFINE, LinearDecoder, PARALLELOGRAM } from "./linear.js";
-import { MEAN, OctahedralDecoder, PLACE, PLACE_CORRECTED, SURFACE, cornerNormals } from "./octahedral.js";
 import { DIRECTIONS, FLOATS, TANGENTS } from "./storage.js";
 
 const MAX_FLAGS = 3;
-const MAX_SHIFT = 32;
 
 /**
  * @param {import("../format/cursor.js").Cursor} cursor read to its end
@@ -23,9 +30,10 @@ export function decodeCodes(cursor, storage, layout) {
   }
   let codes = new Float64Array(0);
   if (layout.nEntries * storage.components) {
-    const coder = new SerialDecoder(cursor.rest(), countContexts(flags), cursor.name);
-    codes = decodeBy({ method, flags, shift }, coder, storage, layout);
-    coder.end();
+    const kernels = layout.surface.kernels.fresh();
+    const stream = new SerialStream(kernels, cursor.rest(), N_RESIDUAL_CONTEXTS + (flags ? N_MATCH_CONTEXTS : 0), cursor.name);
+    codes = kernels.numbers(decodeBy(kernels, stream, { method, flags, shift }, storage, layout));
+    stream.end();
   }
   cursor.end();
   return codes;
@@ -38,24 +46,37 @@ function lastMethod({ id, components }, { domain, surface }) {
   return hasShape && components === 2 && domain !== "triangle" ? AFFINE : PARALLELOGRAM;
 }
 
-function decodeBy(how, coder, { id, n, components }, layout) {
-  const entries = layout.entries();
-  const { surface } = layout;
+/** (N, C) as kernels have them. */
+function decodeBy(kernels, stream, { method, flags, shift }, { id, n, components }, layout) {
+  const { surface, nEntries, owners } = layout;
+  const { places, order } = layout.entries(kernels);
+  const entries = [...order, kernels.whole(places), flags, shift];
+  const codes = kernels.array("int64", [nEntries, components]);
+  const triangles = kernels.array("int32", [surface.faces.length / 3, 3], surface.faces);
+  const rows = surface.positions ? surface.nVertices : 0;
+  const positions = kernels.array("float32", [rows, 3], surface.positions);
   if (id === DIRECTIONS || id === TANGENTS) {
-    const normals = how.method >= SURFACE ? surfaceNormals(layout, entries.places, [PLACE, PLACE_CORRECTED].includes(how.method)) : null;
-    return new OctahedralDecoder(coder, entries, how, { n, width: components }, normals).decode();
+    const normals = surfaceNormals(kernels, method, triangles, positions, owners, places);
+    kernels.call("code_octahedral", ...stream.arrays, ...entries, method, n, normals, codes);
+    return codes;
   }
-  const opposite = how.method === AFFINE ? oppositeCorners(layout.owners) : null;
-  return new LinearDecoder(coder, entries, how, { isFloat: id === FLOATS, components }, surface, opposite).decode();
+  const opposite = kernels.whole(method === AFFINE ? oppositeCorners(owners) : []);
+  const numbers = kernels.array("float64", [nEntries, components]);
+  kernels.call("code_linear", ...stream.arrays, ...entries, method, id === FLOATS, triangles, opposite, positions, codes, numbers);
+  return codes;
 }
 
-/** (N, 3) of the surface at each entry, or at its place. */
-function surfaceNormals({ surface, owners }, places, isByPlace) {
-  const { faces, positions } = surface;
-  if (!isByPlace) return cornerNormals(faces, positions, (c) => owners[c], places.length);
+/** (N, 3) of the surface at each entry, or at its place; none for methods without. */
+function surfaceNormals(kernels, method, triangles, positions, owners, places) {
+  if (method < SURFACE) return kernels.array("float64", [0, 3]);
+  if (method !== PLACE && method !== PLACE_CORRECTED) {
+    return kernels.call("corner_normals", triangles, positions, kernels.whole(owners), places.length)[0];
+  }
   const nPlaces = places.reduce((most, place) => Math.max(most, place + 1), 0);
-  const sums = cornerNormals(faces, positions, (c) => places[owners[c]], nPlaces);
+  const own = kernels.whole(owners.map((entry) => places[entry]));
+  const [sums] = kernels.call("corner_normals", triangles, positions, own, nPlaces);
+  const found = kernels.view(sums).slice();
   const normals = new Float64Array(3 * places.length);
-  places.forEach((place, entry) => normals.set(sums.subarray(3 * place, 3 * place + 3), 3 * entry));
-  return normals;
+  places.forEach((place, entry) => normals.set(found.subarray(3 * place, 3 * place + 3), 3 * entry));
+  return kernels.array("float64", [places.length, 3], normals);
 }

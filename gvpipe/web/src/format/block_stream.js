@@ -9,7 +9,8 @@ import { MAX_TOKENS, TABLE_TOTAL, normalised } from "./integers.js";
 import { N_RATIOS, magnitudeTable } from "./parametric_tables.js";
 import { WordStream, categoricalEdges } from "./word_stream.js";
 
-const PROBLEMS = ["", "a context is used that has no table", "its range-coded data do not decode", "a residual is out of range"]; // by status
+/** What is wrong, by a kernel's status. */
+export const PROBLEMS = ["", "a context is used that has no table", "its range-coded data do not decode", "a value is out of range"];
 
 export class BlockStream {
   #cursor;
@@ -23,16 +24,11 @@ export class BlockStream {
     const cursor = new Cursor(data, name);
     if (cursor.varint(nContexts, "the context count") !== nContexts) throw cursor.corrupt("its context count does not fit its content");
     const tables = Array.from({ length: nContexts }, () => readEdges(cursor));
-    const width = Math.max(1, ...tables.map((edges) => edges.length));
     if (cursor.left % 4) throw cursor.corrupt("its words are not whole");
-    const edges = kernels.array("uint64", [nContexts, width]);
-    const halves = kernels.words(edges);
-    tables.forEach((own, context) => own.forEach((edge, i) => (halves[2 * (context * width + i)] = edge)));
-    const sizes = kernels.whole(tables.map((own) => Math.max(0, own.length - 1)));
     this.#cursor = cursor;
     this.#words = new WordStream(kernels, cursor.words(cursor.left / 4));
     /** The members of Python's `BlockStream`. */
-    this.arrays = [...this.#words.arrays, edges, sizes];
+    this.arrays = [...this.#words.arrays, ...placeTables(kernels, tables)];
   }
 
   /** Throw if a kernel's status is an error. */
@@ -44,6 +40,15 @@ export class BlockStream {
   end() {
     if (!this.#words.isAtEnd) throw this.#cursor.corrupt("range-coded data are left over");
   }
+}
+
+/** Edges of tables (C, N + 1), and how many symbols each has (C), as kernels take them. */
+export function placeTables(kernels, tables) {
+  const width = Math.max(1, ...tables.map((edges) => edges.length));
+  const edges = kernels.array("uint64", [tables.length, width]);
+  const halves = kernels.words(edges);
+  tables.forEach((own, context) => own.forEach((edge, i) => (halves[2 * (context * width + i)] = edge)));
+  return [edges, kernels.whole(tables.map((own) => Math.max(0, own.length - 1)))];
 }
 
 /** Edges of a context's symbols; [] where it is empty. */

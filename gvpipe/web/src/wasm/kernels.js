@@ -19,6 +19,7 @@ const TYPES = {
   uint32: Uint32Array,
   int64: BigInt64Array,
   uint64: BigUint64Array,
+  float32: Float32Array,
   float64: Float64Array,
 };
 const DONE = [0, -2]; // statuses of calls that went well: with a result, and without one
@@ -88,12 +89,21 @@ export class Kernels {
     return new Int32Array(this.#exports.memory.buffer, pointer, shape.reduce((a, b) => a * b, 2));
   }
 
-  /** An array of int64 of `values` below 2^31, and not below 0. */
+  /** An array of int64 of `values` of 32 bits, with a sign. */
   whole(values, shape = [values.length]) {
     const array = this.array("int64", shape);
     const words = this.words(array);
-    for (let i = 0; i < values.length; i++) words[2 * i] = values[i];
+    for (let i = 0; i < values.length; i++) {
+      words[2 * i] = values[i];
+      if (values[i] < 0) words[2 * i + 1] = -1;
+    }
     return array;
+  }
+
+  /** Mirror of `whole`, of values whose doubles are exact. @returns {Float64Array} */
+  numbers(array) {
+    const words = this.words(array);
+    return Float64Array.from({ length: words.length / 2 }, (_, i) => words[2 * i + 1] * 2 ** 32 + (words[2 * i] >>> 0));
   }
 
   /** Give the memory of arrays back, those that calls returned among them. @param {...(KernelArray|number|boolean)} given */
