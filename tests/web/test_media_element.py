@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import browsers
 import pages
 import pytest
+from folders import DOCS, ROOT
 from sequences import waving
 
 pytestmark = pytest.mark.slow
@@ -181,3 +186,33 @@ def test_attributes_and_rates(player: Callable[..., Any]) -> None:
     assert 0.2 < result["seconds"] < 1  # a quarter on an idle machine
     assert result["log"] == ["play", "pause", "ended", "play", "pause"]
     assert result["still"] == [True, True]
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The documentation's site."""
+    if find_spec("mkdocs") is None:
+        pytest.skip("no mkdocs; pip install -e '.[docs]'")
+    folder = tmp_path_factory.mktemp("built") / "site"
+    command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", str(folder)]
+    subprocess.run(command, cwd=ROOT, check=True, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"})
+    return folder
+
+
+def test_the_live_page(built: Path, driver: Any) -> None:
+    with browsers.served(built) as address:
+        driver.get(f"{address}/web/")
+        shown = pages.run(
+            driver,
+            """const element = document.querySelector("geometry-video");
+            const line = document.querySelector("#state");
+            const until = async (test) => { while (!test()) await new Promise((resolve) => setTimeout(resolve, 50)) };
+            await until(() => element.readyState === 4);
+            await element.play();
+            await until(() => element.currentTime > 0.2);
+            element.pause();
+            return [element.video.vertexCount, element.video.frameCount, line.textContent];""",
+        )
+    assert shown[:2] == [2668, 102]
+    assert shown[2].startswith("event pause") and "paused true" in shown[2]
+    assert f"{(DOCS / 'creature.mp4').stat().st_size / 1e3:.1f} kB" in (DOCS / "web.md").read_text("utf-8")

@@ -23,12 +23,12 @@ export class GeometryVideoLoader extends Loader {
   load(url, onLoad, onProgress, onError = console.error) {
     const address = this.manager.resolveURL(this.path + url);
     this.manager.itemStart(address);
+    const failed = (error) => {
+      onError(error);
+      this.manager.itemError(address);
+    };
     this.parseAsync(address)
-      .then(onLoad)
-      .catch((error) => {
-        onError(error);
-        this.manager.itemError(address);
-      })
+      .then(onLoad, failed)
       .finally(() => this.manager.itemEnd(address));
   }
 
