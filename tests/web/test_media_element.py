@@ -61,7 +61,7 @@ def player(driver: Any, site: tuple[Path, str]) -> Callable[..., Any]:
 
 
 def test_loading(player: Callable[..., Any]) -> None:
-    before, loaded, log, after = player(
+    before, loaded, log, reload, after = player(
         """const state = () => [element.readyState, element.duration, element.currentTime, element.paused, element.ended,
           element.seeking, element.muted, ranges(element.buffered), ranges(element.seekable), element.currentSrc];
         const before = state();
@@ -71,12 +71,22 @@ def test_loading(player: Callable[..., Any]) -> None:
         const kept = log.splice(0);
         element.src = "nothing.mp4";
         await on("error");
-        return [before, loaded, kept, [element.error.kind, element.readyState, element.paused, ...log]];"""
+        const kind = await element.play().catch((error) => error.kind);
+        const end = log.splice(0);
+        element.load("x.mp4");
+        const late = element.play().catch((error) => error.name);
+        element.load("x.mp4");
+        const played = element.play();
+        const reload = [await late, await played ?? null, element.paused];
+        element.load("nothing.mp4");
+        await on("error");
+        return [before, loaded, kept, reload, [element.error.kind, kind, element.readyState, element.paused, ...end]];"""
     )
     assert before == [0, None, 0, True, False, False, True, [], [], ""]  # NaN, as JSON
     assert loaded == [4, 1, 0, True, False, False, True, [[0, 1]], [[0, 1]], "x.mp4"]
     assert log == ["loadstart", "durationchange", "loadedmetadata", "loadeddata", "canplay", "canplaythrough", "ready"]
-    assert after == ["load", 0, True, "emptied", "loadstart", "error"]
+    assert reload == ["AbortError", None, False]
+    assert after == ["load", "load", 0, True, "emptied", "loadstart", "error"]
 
 
 def test_playing_to_the_end(player: Callable[..., Any]) -> None:

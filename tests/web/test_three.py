@@ -199,11 +199,13 @@ def test_what_cannot_be_loaded(page: Run, folder: Path) -> None:
         }
         const mesh = await load("x.mp4");
         const rate = (() => { try { mesh.playbackRate = 99 } catch (error) { return error.name } })();
+        const delta = (() => { try { mesh.update() } catch (error) { return error.message } })();
         mesh.dispose();
         mesh.dispose();
         await mesh.play();
-        return [kinds, log, rate, mesh.paused];"""
+        await mesh.seek(3);
+        return [kinds, log, rate, delta, mesh.paused];"""
     )
     assert found[0] == [[True, "load"], [True, "not-geometry-video"]]
     assert found[1] == ["./nothing.mp4", "./text.mp4"]
-    assert found[2:] == ["NotSupportedError", True]
+    assert found[2:] == ["NotSupportedError", "delta is undefined; a number of seconds is needed", True]

@@ -8,6 +8,18 @@ const ROUNDING = 1e-4; // of a frame: k / fps * fps may be a little less than k
 export const SLOWEST = 0.0625; // what browsers play
 export const FASTEST = 16;
 
+/** A rate that browsers play. @throws {DOMException} it is another one */
+export function checkRate(rate) {
+  if (rate >= SLOWEST && rate <= FASTEST) return rate;
+  throw new DOMException(`playbackRate is ${rate}; ${SLOWEST} to ${FASTEST} are possible`, "NotSupportedError");
+}
+
+/** Seconds, as a number. @throws {TypeError} it is none */
+export function checkSeconds(value, name) {
+  if (Number.isFinite(Number(value))) return Number(value);
+  throw new TypeError(`${name} is ${value}; a number of seconds is needed`);
+}
+
 export class Playback {
   #video;
   #on;
@@ -50,7 +62,7 @@ export class Playback {
   }
 
   set currentTime(seconds) {
-    this.#request(Math.floor(Number(seconds) * this.#video.fps + ROUNDING));
+    this.#request(Math.floor(checkSeconds(seconds, "currentTime") * this.#video.fps + ROUNDING));
   }
 
   /** The frame shown, or the one that is sought. */
@@ -78,10 +90,7 @@ export class Playback {
   }
 
   set playbackRate(rate) {
-    if (this.#rate === rate) return;
-    if (!(rate >= SLOWEST && rate <= FASTEST)) {
-      throw new DOMException(`playbackRate is ${rate}; ${SLOWEST} to ${FASTEST} are possible`, "NotSupportedError");
-    }
+    if (this.#rate === checkRate(rate)) return;
     this.#rate = rate;
     this.#on.tell("ratechange");
     this.#playAnew();
@@ -116,6 +125,7 @@ export class Playback {
   }
 
   #request(k) {
+    if (this.#isClosed) return Promise.resolve();
     this.ended = false;
     this.#aim = this.#wanted = Math.max(0, Math.min(this.#video.frameCount - 1, k || 0));
     this.#seeking ??= this.#seekWanted();

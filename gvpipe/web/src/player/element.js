@@ -9,7 +9,7 @@
  */
 
 import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
-import { FASTEST, SLOWEST } from "../playback.js";
+import { FASTEST, SLOWEST, checkRate, checkSeconds } from "../playback.js";
 import { COLORMAPS } from "../three/colormaps.js";
 import { Bar, nextSpeed } from "./bar.js";
 import { embedded } from "./embedded.js";
@@ -145,10 +145,7 @@ export class GeometryVideoElement extends HTMLElement {
   }
 
   set playbackRate(rate) {
-    if (!(rate >= SLOWEST && rate <= FASTEST)) {
-      throw new DOMException(`playbackRate is ${rate}; ${SLOWEST} to ${FASTEST} are possible`, "NotSupportedError");
-    }
-    this.setAttribute("speed", rate);
+    this.setAttribute("speed", checkRate(rate));
   }
 
   /** Always true: there is no sound. To set it changes nothing, so that scripts for `<video>` run. */
@@ -169,9 +166,8 @@ export class GeometryVideoElement extends HTMLElement {
   }
 
   set currentTime(seconds) {
-    if (!Number.isFinite(Number(seconds))) throw new TypeError(`currentTime is ${seconds}; a number of seconds is needed`);
     if (this.#mesh) this.#mesh.currentTime = seconds;
-    else this.#startTime = Number(seconds);
+    else this.#startTime = checkSeconds(seconds, "currentTime");
   }
 
   /** Seconds; NaN while nothing is loaded. */
@@ -291,9 +287,16 @@ export class GeometryVideoElement extends HTMLElement {
     this.hide(this.#hidden);
   }
 
-  /** Play on from the frame shown, from the start if that is the last; a promise that it plays. While a file loads, it waits. */
+  /**
+   * Play on from the frame shown, from the start if that is the last; a promise that it plays. While a file loads, it waits.
+   *
+   * @throws {GeometryVideoError|DOMException} the file cannot be played; another file was asked for meanwhile
+   */
   async play() {
-    if (!this.#mesh && this.#loaded) await this.#loaded;
+    const loaded = this.#loaded;
+    if (!this.#mesh) await loaded;
+    if (this.error) throw this.error;
+    if (loaded !== this.#loaded) throw new DOMException("another file was asked for", "AbortError");
     await this.#mesh?.play();
   }
 

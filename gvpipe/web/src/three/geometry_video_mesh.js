@@ -19,7 +19,7 @@ import {
   Sphere,
   Vector3,
 } from "three";
-import { Playback } from "../playback.js";
+import { Playback, checkSeconds } from "../playback.js";
 import { FieldColours, fieldMaterial, linearTable, rangeOf } from "./field_colours.js";
 import { makeMaterial, plainMaterial } from "./materials.js";
 import { Normals, groupCorners, groupVertices } from "./normals.js";
@@ -107,7 +107,7 @@ export class GeometryVideoMesh extends Mesh {
 
   /** Go on by so many seconds: what plays shows the frame that is due, once it is decoded. @param {number} delta */
   update(delta) {
-    this.#now += 1000 * delta;
+    this.#now += 1000 * checkSeconds(delta, "delta");
     const tick = this.#tick;
     this.#tick = null;
     tick?.(this.#now);
