@@ -95,7 +95,6 @@ export class GeometryVideoMesh extends Mesh {
     this.#build(false);
     if (video.triangleCount) this.#openSurface();
     else this.#openPoints();
-    this.#update();
     const on = {
       show: (shown, k) => this.#show(shown, k),
       prepare: (k) => this.#wanted.field?.load(k),
