@@ -14,6 +14,7 @@ from another file is noticed::
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 import struct
 from collections.abc import Callable, Iterable
@@ -28,7 +29,7 @@ from gvpipe.container.bitstream import VERSION, Bitstream, pack_header, pack_pay
 from gvpipe.container.boxes import BOX, LARGE, uuid_head
 from gvpipe.container.sample_tables import check_tables
 from gvpipe.container.segments import SegmentParts
-from gvpipe.container.sources import FileSource, Source
+from gvpipe.container.sources import FileSource, is_url
 from gvpipe.container.stream_layout import VERSION as STREAM_VERSION
 from gvpipe.container.stream_layout import find_index, pack_stream, read_stream
 from gvpipe.container.track import TAG_PREFIX, inspect, remux, remux_fragments
@@ -82,18 +83,21 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False) -> Bitstrea
     """Read and check the bitstream of an MP4 file; in the stream layout, its sections and pictures are read later.
 
     Args:
-        path: of the file.
+        path: of the file, or its address (``https://...``).
         unlimited: let it take whatever memory and work it asks for; by default its size limits both (`gvpipe.budget`).
 
     Raises:
         InputError: there is no such file, or it cannot be read.
         NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile, OverBudget: see `gvpipe.errors`.
     """
+    if is_url(path):
+        return _read_url(str(path), unlimited)
     path = Path(path)
     try:
         source = FileSource(path)
         with open(path, "rb") as file:
-            return _read_source(source, file, Budget(None if unlimited else source.size))
+            budget, index = Budget(None if unlimited else source.size), find_index(source)
+            return _read(file, source.size, budget) if index is None else read_stream(source, index, budget)
     except FormatError as exc:
         raise type(exc)(f"{path}: {exc}") from exc
     except IsADirectoryError as exc:
@@ -141,9 +145,20 @@ def _pack(bitstream: Bitstream, parts: SegmentParts | None) -> Iterable[bytes]:
     return remux(bitstream.video, f"{VERSION} {identity}"), uuid_head(BOX_UUID, len(payload)), payload
 
 
-def _read_source(source: Source, file: IO[bytes], budget: Budget) -> Bitstream:
-    index = find_index(source)
-    return _read(file, source.size, budget) if index is None else read_stream(source, index, budget)
+def _read_url(url: str, unlimited: bool) -> Bitstream:
+    """As `read_file`; the budget is that of the bytes that have come so far, since a server may claim any size."""
+    from gvpipe.container.http_source import HttpSource  # urllib takes as long to load as all the rest
+
+    budget = Budget(None if unlimited else 0)
+    try:
+        source = HttpSource(url, budget.grow)
+        index = find_index(source)
+        if index is not None:
+            return read_stream(source, index, budget)
+        data = source.read_all()
+        return _read(io.BytesIO(data), len(data), budget)
+    except FormatError as exc:
+        raise type(exc)(f"{url}: {exc}") from exc
 
 
 def _read(file: IO[bytes], size: int, budget: Budget) -> Bitstream:

@@ -7,6 +7,13 @@ from typing import Protocol
 
 from gvpipe.errors import FormatError, InputError, TruncatedFile
 
+SCHEMES = ("http://", "https://")
+
+
+def is_url(path: object) -> bool:
+    """Whether a path is the address of a file on a web server."""
+    return isinstance(path, str) and path.lower().startswith(SCHEMES)
+
 
 class Source(Protocol):
     """Bytes of one file that does not change."""

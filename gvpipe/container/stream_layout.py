@@ -42,6 +42,7 @@ PLACE = struct.Struct("<QIQ")
 COUNT = struct.Struct("<I")
 FRAGMENT = np.dtype([("offset", "<u8"), ("moof", "<u4"), ("mdat", "<u4"), ("pictures", "<u4"), ("crc", "<u4")])
 WHOLE = struct.Struct("<QII")
+MAX_INDEX = 1 << 25  # bytes: a fragment for every 16 pictures, sections, a header
 
 
 @dataclass(frozen=True)
@@ -160,6 +161,8 @@ def read_stream(source: Source, index: Box, budget: Budget) -> Bitstream:
 
 
 def _read_index(source: Source, index: Box) -> tuple[dict[str, _Place], np.ndarray, bytes]:
+    if index.stop - index.content > MAX_INDEX:
+        raise corrupt(f"its index has {index.stop - index.content} bytes; {MAX_INDEX} at most are allowed")
     data = source.read(index.content, index.stop - index.content)
     if data[: len(MAGIC)] != MAGIC:
         raise corrupt("the index does not start with gvpipe's magic")
