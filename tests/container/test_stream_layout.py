@@ -21,8 +21,8 @@ from gvpipe.container.stream_layout import FRAGMENT, INDEX_UUID, find_index
 from gvpipe.errors import CorruptFile, FormatError, InputError, NewerVersion, StrippedFile, TruncatedFile
 from gvpipe.registry import segment_parts
 
-FILES = ("mcgv-5-h264", "mcgv-4-jpeg", "mcgv-4-klt-10", "mcgv-4-outliers", "mcgv-5-rigid", "pca-2-still", "pca-1-kalman")
-FILES += ("laplacian-1", "laplacian-2-still", "pdct-2-asset", "pdct-2-still")
+FILES = ["mcgv-5-h264", "mcgv-4-jpeg", "mcgv-4-klt-10", "mcgv-4-outliers", "mcgv-5-rigid", "pca-2-still", "pca-1-kalman"]
+FILES += ["laplacian-1", "laplacian-2-still", "pdct-2-asset", "pdct-2-still"]
 SEGMENTED: dict[str, dict[str, Any]] = {
     "mcgv": {"segment": 20, "gop": 16},
     "mcgv klt": {"segment": 20, "transform": "klt"},
@@ -92,7 +92,7 @@ def test_repeated_frames_and_corrections(tmp_path: Path) -> None:
     sequence = held(waving(6, 24), [1, 3] * 12)
     report = gvpipe.encode(sequence, tmp_path / "a.mp4", "pca", stream=True, max_error="0.2%", segment=8)
     assert report.bytes == (tmp_path / "a.mp4").stat().st_size
-    assert gvpipe.compare(sequence, gvpipe.read(tmp_path / "a.mp4")).max_diag <= 0.002
+    assert (gvpipe.compare(sequence, gvpipe.read(tmp_path / "a.mp4")).max_diag or 1) <= 0.002
 
 
 def test_a_size_that_is_asked_for_is_that_of_the_plain_layout(tmp_path: Path) -> None:
@@ -168,7 +168,7 @@ def with_index(path: Path, change: Any) -> bytes:
     data = bytearray(path.read_bytes())
     box = find_index(FileSource(path))
     assert box is not None
-    header = zlib_header(data, box.content)
+    header = zlib_header(bytes(data), box.content)
     packed = data[box.content : header - 4]
     changed = change(bytearray(packed))
     assert len(changed) == len(packed)
