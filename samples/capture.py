@@ -138,9 +138,8 @@ def main() -> None:
     gvpipe.encode(make_capture(2 * SEGMENT), warm, codec, segment=SEGMENT, stream=True)
     report = gvpipe.encode(make_capture(n_frames), path, codec, segment=SEGMENT, stream=True)
     used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(
-        f"{report.frames} frames, {report.vertices} vertices, codec {report.codec}: {report.bytes} bytes, {report.bpvf:.3f} bpvf"
-    )
+    made = f"{report.frames} frames, {report.vertices} vertices, codec {report.codec}"
+    print(f"{made}: {report.bytes} bytes, {report.bpvf:.3f} bits per vertex and frame")
     print(f"encoded in {report.seconds['encode']:.0f} s, {used:.0f} MB at most")
     measure(path, warm)
     warm.unlink()

@@ -26,7 +26,7 @@ import numpy as np
 
 from gvpipe.budget import Budget
 from gvpipe.container.bitstream import CHECKSUM, HEADER, MAGIC, MAX_NAME, MAX_SECTIONS, NAME, PREFIX, Bitstream, read_header
-from gvpipe.container.boxes import LONGEST_HEAD, Box, read_box, uuid_head
+from gvpipe.container.boxes import BOX, LONGEST_HEAD, Box, read_box, uuid_head
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.fragments import Fragment, count_pictures, split_fragments
 from gvpipe.container.sample_tables import check_no_samples
@@ -203,7 +203,13 @@ def _read_index(source: Source, index: Box) -> tuple[dict[str, _Place], np.ndarr
 
 
 def _check_places(places: Mapping[str, _Place], fragments: np.ndarray, start: int, stop: int) -> None:
-    """Sections and fragments lie between two bytes of the file, and no two overlap; so what they claim is there."""
+    """Sections and fragments lie between two bytes of the file, and no two overlap; a picture has a byte at least.
+
+    So what they claim is there, and pictures are no more than bytes.
+    """
+    n_bytes = fragments["mdat"].astype(np.int64) - BOX.size
+    if (fragments["pictures"] > n_bytes).any() or not fragments["pictures"].all():
+        raise corrupt("the index claims more pictures than there are bytes, or none")
     offsets = np.array([*(place.offset for place in places.values()), *fragments["offset"].tolist()], np.uint64)
     lengths = [place.length for place in places.values()]
     pairs = fragments["moof"].astype(np.int64) + fragments["mdat"]
@@ -264,7 +270,7 @@ class StoredFragments:
     @property
     def n_bytes(self) -> int:
         """Bytes of all pictures."""
-        return int(self._table["mdat"].sum(dtype=np.int64)) - 8 * len(self._table)
+        return int(self._table["mdat"].sum(dtype=np.int64)) - BOX.size * len(self._table)
 
     def read(self, number: int) -> bytes:
         """Return the boxes of a fragment; raises `CorruptFile` if they are not those that the index describes."""
