@@ -91,6 +91,13 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
         ("gvpipe.attributes.polygon_kernels.Fans", [LONGS] * 5),
     ],
     "gvpipe.attributes.sharing_kernels.code_sharing": [SERIAL, CORNERS, SCALAR, LONGS],
+    "gvcodecs.mcgv.motion.weight_kernels.fill_weights": [
+        ("gvcodecs.mcgv.base.causal_neighbours.CausalNeighbours", [LONGS, LONGS]),
+        SCALAR,
+        ("gvcodecs.mcgv.motion.weight_kernels.WeightNumbers", [LONGS] * 3),
+        ("gvcodecs.mcgv.motion.weight_kernels.Listed", [LONGS] * 3),
+        ("gvcodecs.mcgv.motion.skinning.Weights", ["int32[2]", "int32[2]"]),
+    ],
     "gvpipe.fields.dual_kernels.find_dual": [TRIANGLES, SCALAR],
     "gvpipe.fields.residual_kernels.decode_rows": [
         ("gvpipe.fields.residual_kernels.Residuals", [NUMBERS, SCALAR, FLAGS, CAUSAL]),

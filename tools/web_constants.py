@@ -38,6 +38,7 @@ SHARED = {
     "gvpipe.container.bitstream": "MAGIC VERSION MAX_SECTIONS MAX_NAME MAX_HEADER MAX_FRAMES MAX_VERTICES",
     "gvpipe.container.mp4": "BOX_UUID MAX_BOXES",
     "gvpipe.container.segments": "TINY HUGE SMALLEST_STEP LARGEST_STEP MAX_SEGMENT",
+    "gvpipe.container.stream_layout": "VERSION INDEX_UUID",
     "gvpipe.corrections.displacements": "MAX_POSITIONS NEAR",
     "gvpipe.entropy.block_coder": "PARAMETRIC",
     "gvpipe.entropy.decision_kernels": "ONE_BITS AHEAD PLACE RANGE",
@@ -76,7 +77,7 @@ SHARED = {
     "gvcodecs.mcgv.layout.kd_tree": "COMMON FRAME MOMENT_BITS SPREAD MAX_COORDINATE",
     "gvcodecs.mcgv.motion.skinning": "INFLUENCES TOTAL FLAT LEAST_ENERGY",
     "gvcodecs.mcgv.motion.weight_coding": "COUNT_CONTEXTS",
-    "gvcodecs.mcgv.motion.weight_kernels": "MAX_NEIGHBOURS",
+    "gvcodecs.mcgv.motion.weight_kernels": "MAX_LISTED",
     "gvcodecs.pca.header": "MAX_SEGMENTS VERSION_STILL",
 }
 

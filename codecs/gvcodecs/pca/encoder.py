@@ -22,7 +22,7 @@ from gvcodecs.pca.header import MAX_SEGMENTS, VERSION_STILL, Header
 from gvcodecs.pca.reader import PcaReader, causal_order
 from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.segments import MAX_SEGMENT, cut
+from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_parts
 from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import MAX_COMPONENTS, Reduced, reduce_trajectories
@@ -105,3 +105,8 @@ class Pca(BaseCodec):
     def browser_obstacle(cls, bitstream: Bitstream) -> str:
         """What keeps browsers from playing a bitstream of this codec: nothing."""
         return ""
+
+    @classmethod
+    def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
+        """What each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
+        return numbered_parts(("basis", "coefficients"), Header.of(bitstream).segments)

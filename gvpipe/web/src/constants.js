@@ -94,6 +94,10 @@ export const SEGMENTS_SMALLEST_STEP = 3.6734198463196485e-40;
 export const SEGMENTS_LARGEST_STEP = 6.80564733841877e+38;
 export const SEGMENTS_MAX_SEGMENT = 100000;
 
+// gvpipe.container.stream_layout
+export const STREAM_LAYOUT_VERSION = 2;
+export const STREAM_LAYOUT_INDEX_UUID = [60, 10, 126, 53, 143, 13, 74, 134, 155, 14, 31, 91, 143, 31, 111, 82];
+
 // gvpipe.corrections.displacements
 export const DISPLACEMENTS_MAX_POSITIONS = 1048576;
 export const DISPLACEMENTS_NEAR = 3;
@@ -263,7 +267,7 @@ export const SKINNING_LEAST_ENERGY = 1e-09;
 export const WEIGHT_CODING_COUNT_CONTEXTS = 4;
 
 // gvcodecs.mcgv.motion.weight_kernels
-export const WEIGHT_KERNELS_MAX_NEIGHBOURS = 8;
+export const WEIGHT_KERNELS_MAX_LISTED = 32;
 
 // gvcodecs.pca.header
 export const PCA_HEADER_MAX_SEGMENTS = 2000;

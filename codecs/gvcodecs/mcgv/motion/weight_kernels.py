@@ -186,11 +186,11 @@ def restore(causal: CausalNeighbours, n_clusters: int, numbers: WeightNumbers) -
     """
     shape = (len(numbers.counts), INFLUENCES)
     weights = Weights(np.zeros(shape, np.int32), np.zeros(shape, np.int32))
-    return weights, _restore(causal, n_clusters, numbers, new_list(), weights)
+    return weights, fill_weights(causal, n_clusters, numbers, new_list(), weights)
 
 
 @compiled
-def _restore(causal: CausalNeighbours, n_clusters: int, numbers: WeightNumbers, listed: Listed, weights: Weights) -> int:
+def fill_weights(causal: CausalNeighbours, n_clusters: int, numbers: WeightNumbers, listed: Listed, weights: Weights) -> int:
     """Fill ``weights``; return the first point that is corrupt, or -1."""
     clusters, parts = weights.clusters, weights.weights
     ranks, expected = np.zeros(INFLUENCES, np.int64), np.zeros(INFLUENCES, np.int64)

@@ -15,7 +15,7 @@ export class BlendedMotion {
    * @param {import("./surface.js").Surface} surface of the base frame @param {import("../wasm/kernels.js").Kernels} kernels
    */
   constructor(payload, header, { base, point, members, points }, kernels) {
-    const weights = decodeWeights(payload.section("weights"), points.causalNeighbours(), header.clusters);
+    const weights = decodeWeights(kernels, payload.section("weights"), points.causalNeighbours(), header.clusters);
     const own = Float64Array.from({ length: 3 * members.length }, (_, i) => base[3 * members[Math.floor(i / 3)] + (i % 3)]);
     this.blend = new Blend(own, weights, header.clusters);
     this.point = point;

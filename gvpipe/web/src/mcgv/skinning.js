@@ -5,8 +5,12 @@
  * `C_k = L_k^T T_k`, where L_k is the Cholesky factor of the energy that the cluster's rows cause.
  */
 
-import { SKINNING_FLAT as FLAT, SKINNING_LEAST_ENERGY as LEAST_ENERGY } from "../constants.js";
-import { INFLUENCES, TOTAL } from "./weight_kernels.js";
+import {
+  SKINNING_FLAT as FLAT,
+  SKINNING_INFLUENCES as INFLUENCES,
+  SKINNING_LEAST_ENERGY as LEAST_ENERGY,
+  SKINNING_TOTAL as TOTAL,
+} from "../constants.js";
 
 export class Blend {
   /**

@@ -1,21 +1,25 @@
 /** The clusters that points follow. Mirrors `gvcodecs.mcgv.motion.weight_coding.decode_weights`; `docs/format.md`, section 5. */
 
-import { WEIGHT_CODING_COUNT_CONTEXTS as COUNT_CONTEXTS } from "../constants.js";
+import {
+  SKINNING_INFLUENCES as INFLUENCES,
+  SKINNING_TOTAL as TOTAL,
+  WEIGHT_CODING_COUNT_CONTEXTS as COUNT_CONTEXTS,
+  WEIGHT_KERNELS_MAX_LISTED as MAX_LISTED,
+} from "../constants.js";
 import { Cursor } from "../format/cursor.js";
 import { decodeIntegers } from "../format/integers.js";
-import { INFLUENCES, TOTAL, restore } from "./weight_kernels.js";
 
 /**
  * @typedef {object} Weights
- * @property {Uint16Array} clusters (P, 4) flat, 0..K-1; 0 where unused
- * @property {Uint8Array} weights (P, 4) flat, in 1 / TOTAL, used ones first; each row's sum is TOTAL
+ * @property {Int32Array} clusters (P, 4) flat, 0..K-1; 0 where unused
+ * @property {Int32Array} weights (P, 4) flat, in 1 / TOTAL, used ones first; each row's sum is TOTAL
  *
- * @param {Uint8Array} data section `weights`
+ * @param {import("../wasm/kernels.js").Kernels} kernels @param {Uint8Array} data section `weights`
  * @param {{starts: Int32Array, neighbours: Int32Array}} causal of the points
  * @param {number} nClusters K
  * @returns {Weights}
  */
-export function decodeWeights(data, causal, nClusters) {
+export function decodeWeights(kernels, data, causal, nClusters) {
   const cursor = new Cursor(data, "weights");
   const n = causal.starts.length - 1;
   const context = (p) => Math.min(causal.starts[p + 1] - causal.starts[p], COUNT_CONTEXTS - 1);
@@ -29,10 +33,14 @@ export function decodeWeights(data, causal, nClusters) {
   if (gaps.some((gap) => gap < 0 || gap >= nClusters) || changes.some((change) => Math.abs(change) >= TOTAL)) {
     throw cursor.corrupt("a rank or a weight is out of range");
   }
-  const weights = { clusters: new Uint16Array(INFLUENCES * n), weights: new Uint8Array(INFLUENCES * n) };
-  const wrong = restore(causal, nClusters, { counts, gaps, changes }, weights);
+  const own = kernels.fresh();
+  const numbers = [causal.starts, causal.neighbours, counts, gaps, changes].map((values) => own.whole(values));
+  const listed = [MAX_LISTED, MAX_LISTED, INFLUENCES].map((size) => own.array("int64", [size]));
+  const weights = [0, 1].map(() => own.array("int32", [n, INFLUENCES]));
+  const [wrong] = own.call("fill_weights", ...numbers.slice(0, 2), nClusters, ...numbers.slice(2), ...listed, ...weights);
   if (wrong >= 0) throw cursor.corrupt(`the weights of point ${wrong} make no sense`);
-  return weights;
+  const [clusters, parts] = weights.map((array) => own.view(array).slice());
+  return { clusters, weights: parts };
 }
 
 /** Places of the points' own clusters, one point after the other, less the `last` ones of each. */

@@ -16,6 +16,7 @@ export const SIGNATURES = {
   code_parts: {"given": ["uint64[1]", "uint32[1]", "uint64[2]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "bool", "int64[1]", "int64[1]", "int64[1]", "int64"], "returned": []},
   code_polygons: {"given": ["uint64[1]", "uint32[1]", "uint64[2]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "bool", "int32[2]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]"], "returned": ["int64[1]", "int64[1]", "int64[1]"]},
   code_sharing: {"given": ["uint64[1]", "uint32[1]", "uint64[2]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "bool", "int32[2]", "int64[1]", "int64[1]", "int64", "int64[1]"], "returned": ["int64"]},
+  fill_weights: {"given": ["int64[1]", "int64[1]", "int64", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int32[2]", "int32[2]"], "returned": ["int64"]},
   find_dual: {"given": ["int32[2]", "int64"], "returned": ["int32[2]"]},
   decode_rows: {"given": ["int64[2]", "int64", "bool[1]", "int32[1]", "int32[1]", "int32[1]", "float64[1]", "float64[1]", "int32[1]", "int32[1]", "bool", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[2]", "uint8[2]", "int64[2]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "uint8[1]", "int64", "int64"], "returned": ["bool"]},
   predict_rows: {"given": ["int32[1]", "int32[1]", "int32[1]", "float64[1]", "float64[1]", "int32[1]", "int32[1]", "bool", "int64", "bool[1]", "int64", "float64", "int64[2]", "float64[2]", "float64[2]", "float64[3]", "int64", "int64"], "returned": []},
