@@ -120,6 +120,7 @@ def cli() -> None:
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
 @click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.mp4, ...")
 @click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp.")
+@click.option("--stream", is_flag=True, help="Write the stream layout: it plays over HTTP while it loads.")
 @unlimited_option
 @output_options
 def encode(
@@ -143,6 +144,7 @@ def encode(
     frames: str | None,
     split: bool,
     textures: str | None,
+    stream: bool,
     unlimited: bool,
     out: Output,
 ) -> None:
@@ -183,7 +185,7 @@ def encode(
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
         given: dict[str, Any] = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames)}
-        wanted: dict[str, Any] = {**targets, "textures": textures}
+        wanted: dict[str, Any] = {**targets, "textures": textures, "stream": stream}
         wanted |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
         if split:
             runs = api.read_runs(source, **given, unlimited=unlimited)
@@ -278,6 +280,27 @@ def decode(
 
 
 @cli.command()
+@click.argument("source", metavar="FILE.mp4")
+@click.argument("target", metavar="OUTPUT.mp4")
+@click.option("--layout", type=click.Choice(["stream", "plain"]), help="Of OUTPUT. [default: the one that FILE has not]")
+@unlimited_option
+@output_options
+def restream(source: str, target: str, layout: str | None, unlimited: bool, out: Output) -> None:
+    """Change the layout of a geometry video, without loss, to the one that plays over HTTP while it loads, or back.
+
+    FILE may be an address (https://...), or - for standard input. OUTPUT - is standard output.
+    """
+    from gvpipe import api
+
+    with source_path(source) as given, target_path(target, ".mp4") as path, out.progress():
+        done = api.restream(given, path, layout, unlimited=unlimited)
+    out = out.carrying(target)
+    out.json({"output": shown(target, STDOUT), **done.to_json()})
+    sizes = f"{_size(done.bytes_before)} -> {_size(done.bytes)}"
+    out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({done.layout} layout, {sizes})")
+
+
+@cli.command()
 @click.argument("source", metavar="FILE")
 @click.option("--clip", metavar="NAME", help="The animation to look at, of a file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
@@ -297,7 +320,8 @@ def info(source: str, clip: str | None, mesh: str | None, frames: str | None, un
             raise click.UsageError("--clip, --mesh and --frames are for sources; a geometry video is shown whole")
         found = api.info(path, unlimited=unlimited)
     out.json(found.to_json())
-    out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}")
+    layout = ", stream layout" if found.layout == "stream" else ""
+    out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}{layout}")
     for line in shape_lines(found):
         out.text(line)
     if len(found.levels) > 1:
