@@ -29,6 +29,7 @@ TYPES = {
     "line3": 21, "triangle6": 22, "quad8": 23, "tetra10": 24, "hexahedron20": 25, "wedge15": 26, "pyramid13": 27, "quad9": 28,
     "hexahedron27": 29, "quad6": 30, "wedge12": 31, "wedge18": 32, "hexahedron24": 33, "triangle7": 34, "line4": 35,
 }  # fmt: skip
+UNMATCHED = "unmatched data"  # what NumPy 2.4 says of text behind the last number, as in Gmsh files with numbers per point
 INCLUDE = re.compile(rb"^\s*\*include", re.IGNORECASE | re.MULTILINE)  # Abaqus: the name of any file
 
 
@@ -50,6 +51,12 @@ def load_by_meshio(path: Path) -> Dataset:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of NumPy, about how meshio calls it
             mesh: Any = meshio.read(path)
+    except ValueError as exc:
+        if UNMATCHED not in str(exc):
+            raise
+        raise ValueError(
+            f"{exc}; it is cut short, or text that meshio {meshio.__version__} does not read: save it as binary"
+        ) from exc
     except SystemExit as exc:  # none of the readers for this extension takes it
         raise ValueError("meshio does not know it") from exc
     strange = sorted({block.type for block in mesh.cells} - set(TYPES))

@@ -58,6 +58,15 @@ def test_damage(tmp_path: Path, suffix: str, data: bytes, capsys: pytest.Capture
     assert "\n" not in str(raised.value) and capsys.readouterr() == ("", "")
 
 
+def test_text_that_meshio_may_not_read(tmp_path: Path) -> None:
+    """meshio 5.3.5 and NumPy 2.4 do not read numbers per point of Gmsh's text."""
+    meshio.write(tmp_path / "a.msh", boxes(), file_format="gmsh", binary=False)
+    try:
+        assert len(gvpipe.io.read(tmp_path / "a.msh").faces) == 20
+    except InputError as exc:
+        assert "save it as binary" in str(exc)
+
+
 def test_includes_are_not_followed(tmp_path: Path) -> None:
     (tmp_path / "a.inp").write_text("*NODE\n1, 0, 0, 0\n*Include, input=../b.inp\n")
     with pytest.raises(InputError, match=r"a\.inp .* it includes other files, which are not followed"):
