@@ -407,6 +407,9 @@ def render(
     field_range: tuple[float, float] | str | None = None,
     parts: str | Sequence[str] = (),
     plain: bool = False,
+    clip: str | None = None,
+    mesh: StrPath | None = None,
+    frames: tuple[int, int | None] | None = None,
     progress: Progress | None = None,
     unlimited: bool = False,
 ) -> list[str]:
@@ -417,7 +420,7 @@ def render(
     Args:
         source: a sequence, or what `gvpipe.read` takes.
         path: the file to write; an older one is replaced once the new one is complete.
-        frame: the only frame to paint, negative from the end; by default the first for a PNG, all for a film.
+        frame: the only frame to paint, of ``frames``, negative from the end; by default the first for a PNG, all for a film.
         size: pixels, one number for a square or ``(width, height)``; even for MP4.
         view: ``"three-quarter"``, ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``, ``"bottom"`` or
             ``(azimuth, elevation)`` in degrees.
@@ -433,6 +436,7 @@ def render(
         field_range: the values at the ends of the colours; ``"symmetric"``: about 0. By default the range of the frames drawn.
         parts: the name of the part to paint, or several; none: all.
         plain: paint the shape alone, without materials and colours.
+        clip, mesh, frames: of the source, as for `read`.
         progress: called with ``"render"`` and the part that is done.
         unlimited: as for `read`.
 
@@ -466,7 +470,10 @@ def render(
         if given is not None and _is_among(path, given):
             raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
     reference = error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of, unlimited=unlimited)
-    sequence = source if isinstance(source, MeshSequence) else read(source, unlimited=unlimited)
+    if isinstance(source, MeshSequence):
+        sequence = source if frames is None else source.part(*frame_range(source, *frames))
+    else:
+        sequence = read(source, None, clip, mesh, frames, unlimited=unlimited)
     return list(write_pictures(sequence, target, options, reference, progress))
 
 

@@ -30,6 +30,7 @@ for (const name of args[0]) {
 return outcomes;"""
 
 
+BUFFERED = "return window.video.buffered"
 JUMP = """const video = await GeometryVideo.load(args[0]);
 window.video = video;
 return [...(await video.frame(args[1]))];"""
@@ -52,6 +53,8 @@ def test_parts_are_fetched_when_they_are_asked_for(module: Callable[..., Any], l
         found = module(JUMP, url, 170)
         assert np.array_equal(np.array(found, np.float32).reshape(-1, 3), video[170])
         assert served.n_sent < len(served.data) / 2
+        first, last = module(BUFFERED)
+        assert first[0] == 0 and first[1] < 1.5 and last[0] <= 170 / video.fps < last[1] < len(video) / video.fps + 1e-6
         visited = [199, 16, 40, 0, 100]
         result = module(FRAMES, url, visited)
         for k, text in zip(visited, result["frames"], strict=True):

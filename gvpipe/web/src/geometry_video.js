@@ -48,6 +48,7 @@ export class GeometryVideo {
       };
       pictures = await open();
       const video = new GeometryVideo(payload.header, file?.length ?? parts.size, repeated, reader, pictures);
+      video.#isInParts = !file;
       video.#openBeside = open;
       video.#takeAsset(await readAsset(payload, video, (k) => video.#positionsBeside(k)));
       return video;
@@ -61,6 +62,7 @@ export class GeometryVideo {
   #repeated;
   #reader;
   #pictures;
+  #isInParts = false; // fetched when it is needed
   #queue = Promise.resolve();
   #openBeside; // opens pictures of their own for fields that follow from positions
   #beside = null; // a promise of them
@@ -89,6 +91,13 @@ export class GeometryVideo {
   /** Seconds. */
   get duration() {
     return this.frameCount / this.fps;
+  }
+
+  /** Seconds that play without a wait for the file: a list of `[start, end]`. */
+  get buffered() {
+    if (!this.#isInParts) return [[0, this.duration]];
+    const timeOf = (picture) => this.#repeated.frameOf(picture) / this.fps;
+    return this.#pictures.spans().map(([first, stop]) => [timeOf(first), timeOf(stop)]);
   }
 
   /** Bits of the file per second of playing. */
@@ -120,13 +129,14 @@ export class GeometryVideo {
    * Play on from the frame last shown. The clock leads: a page too slow for every frame gets those that are due.
    *
    * @param {(positions: Float32Array, k: number) => void} show called for each frame; the array is used again for the next
-   * @param {{rate?: number, loop?: boolean, ended?: () => void, failed?: (error: Error) => void}} [options] `rate` 1 is the
-   *   video's own speed; `failed` is called if a frame later on cannot be decoded
+   * @param {{rate?: number, loop?: boolean, ended?: () => void, failed?: (error: Error) => void,
+   *   nextTick?: (tick: (now: number) => void) => void}} [options] `rate` 1 is the video's own speed; `failed` is called if a
+   *   frame later on cannot be decoded; `nextTick` is a clock in place of the page's: it calls `tick` at its next step, with ms
    */
-  async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {} } = {}) {
+  async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {}, nextTick } = {}) {
     await this.#queue;
     const positions = new Float32Array(3 * this.vertexCount);
-    const on = { show: (k) => show(this.#read(k, positions), k), ended, failed };
+    const on = { show: (k) => show(this.#read(k, positions), k), ended, failed, nextTick };
     await this.#pictures.play(on, rate, loop);
   }
 
