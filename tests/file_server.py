@@ -82,7 +82,7 @@ def answer(handler: http.server.BaseHTTPRequestHandler, served: Served) -> None:
     start, stop = 0, size
     if wanted and served.ranges:
         first, last = wanted.removeprefix("bytes=").split("-")
-        start, stop = int(first), min(int(last) + 1, size)
+        start, stop = int(first), min(int(last or size) + 1, size)
         if start >= size:
             handler.send_error(416)
             return

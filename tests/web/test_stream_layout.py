@@ -70,6 +70,17 @@ def test_a_server_without_range_sends_the_whole_file(module: Callable[..., Any],
         assert len(served.sent) == 1
 
 
+def test_the_plain_layout_is_fetched_once(module: Callable[..., Any], long: Path, tmp_path: Path) -> None:
+    gvpipe.restream(long, tmp_path / "plain.mp4")
+    small = tmp_path / "small.mp4"
+    gvpipe.encode(waving(6, 40), small, preset="ultrafast", gop=16, segment=20, stream=True)
+    for path, answers in ((tmp_path / "plain.mp4", 2), (small, 1)):
+        with gvpipe.open(path) as video, serving(path.read_bytes()) as (url, served):
+            found = module(JUMP, url, 30)
+            assert np.array_equal(np.array(found, np.float32).reshape(-1, 3), video[30])
+            assert served.n_sent == len(served.data) and len(served.sent) == answers
+
+
 @pytest.mark.parametrize(
     ("change", "kind", "words"),
     [
@@ -102,7 +113,9 @@ def test_what_goes_wrong_later_is_one_error(
 
 def test_motion_without_pictures_comes_in_parts(module: Callable[..., Any], tmp_path: Path) -> None:
     path = tmp_path / "a.mp4"
-    gvpipe.encode(rigid(40, 120), path, stream=True, segment=10, quality=95)
+    noise = np.random.default_rng(1).random((2 * 40 * 40, 8), np.float32)  # so that it exceeds the first request
+    sequence = dataclasses.replace(rigid(40, 120), attributes={"noise": noise})
+    gvpipe.encode(sequence, path, stream=True, segment=10, quality=95, attributes={"noise": "exact"})
     with gvpipe.open(path) as video, serving(path.read_bytes()) as (url, served):
         assert video.bitstream.header["pictures"] is False
         found = module(JUMP, url, 115)

@@ -18,23 +18,21 @@ const PARTIAL = 206;
 export class StreamFile {
   /**
    * @param {string|URL} url
-   * @returns {Promise<StreamFile|Uint8Array|null>} the whole file where the server knows no Range; null where it is to be
-   *   fetched whole: a plain layout, fields, or nothing that belongs to segments
+   * @returns {Promise<StreamFile|Uint8Array|null>} the whole file where the server knows no Range, and of a plain layout, of
+   *   fields, or where nothing belongs to segments; null where the server refuses
    * @throws {GeometryVideoError} the index is damaged
    */
   static async open(url) {
     const response = await fetch(url, { headers: { Range: `bytes=0-${FIRST - 1}` } });
     if (!response.ok) return null;
     const start = new Uint8Array(await response.arrayBuffer());
-    if (response.status !== PARTIAL) return start;
+    if (response.status !== PARTIAL || start.length < FIRST) return start;
     const box = findIndex(start);
-    if (!box) return null;
+    if (!box) return fetchRest(url, start);
     const file = new StreamFile(url, start.length);
-    const rest = box.end > start.length ? await file.#fetch(start.length, box.end - start.length) : new Uint8Array(0);
-    const data = new Uint8Array(start.length + rest.length);
-    data.set(start);
-    data.set(rest, start.length);
-    return (await file.#begin(data, box)) ? file : null;
+    const more = Math.max(0, box.end - start.length);
+    const data = more ? join(start, await file.#fetch(start.length, more)) : start;
+    return (await file.#begin(data, box)) ? file : fetchRest(url, data);
   }
 
   constructor(url, received) {
@@ -130,4 +128,17 @@ export class StreamFile {
     this.received += length;
     return data;
   }
+}
+
+/** All of a file whose start is here; null if the server refuses. */
+async function fetchRest(url, start) {
+  const response = await fetch(url, { headers: { Range: `bytes=${start.length}-` } });
+  return response.status === PARTIAL ? join(start, new Uint8Array(await response.arrayBuffer())) : null;
+}
+
+function join(start, rest) {
+  const data = new Uint8Array(start.length + rest.length);
+  data.set(start);
+  data.set(rest, start.length);
+  return data;
 }
