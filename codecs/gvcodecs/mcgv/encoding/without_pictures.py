@@ -46,8 +46,10 @@ def omit_pictures(
         target_error: root mean square over vertices, model units.
         band: least and most part of it that is close enough.
     """
-    alone = trials.alone
-    idle = trials.are_pictures_idle(step) and alone(step).error <= target_error
+    alone, idle = trials.alone, trials.are_pictures_idle(step)
+    if idle and alone(step).error > target_error:  # pictures of this step would not mend it, a better blend may
+        alone = _fit_anew(alone, step, target_error**2 / alone(step).error)
+        idle = alone(step).error <= target_error
     if not idle and not _are_pictures_dear(trials, step, target_error):
         return None
     trial = find_step(alone, step, target_error, band, SLOPE, MAX_ROUNDS)
@@ -114,11 +116,15 @@ def _fit_again(
     trials: StepTrials, trial: StepTrial, target_error: float, band: tuple[float, float]
 ) -> tuple[StepTrials, StepTrial]:
     """The blend, or another one, fitted on the base frame and for the step that were found, if the file is smaller."""
-    start = dataclasses.replace(trials.candidate.start, step=trial.step)
-    fitted, _ = fit_skinning(trials.job, start, target_error)
-    others = StepTrials(trials.job, Candidate(start, fitted))
+    others = _fit_anew(trials, trial.step, target_error)
     other = find_step(others, trial.step, target_error, band, SLOPE, MAX_ROUNDS)
     return (others, other) if other.error <= target_error and cost(other) < cost(trial) else (trials, trial)
+
+
+def _fit_anew(trials: StepTrials, step: float, target_error: float) -> StepTrials:
+    """Trials of another blend on the same base frame, fitted from a step on for a target error, model units."""
+    start = dataclasses.replace(trials.candidate.start, step=step)
+    return StepTrials(trials.job, Candidate(start, fit_skinning(trials.job, start, target_error)[0]))
 
 
 def _count_transform_bytes(bitstream: Bitstream) -> int:
