@@ -9,6 +9,7 @@ from pathlib import Path
 
 import gvpipe.io
 from fuzz.hdf import HDF, mutate_hdf
+from fuzz.library_processes import fork_library_processes
 from fuzz.mutation import Change, Rng, mutate_bytes, mutate_json, mutate_text
 from fuzz.parts import Parts, Seed, Target
 from fuzz.results import check_asset, check_faces, check_positions
@@ -25,6 +26,7 @@ TEXTS = (b"ply\n", b"v ", b"#", b"solid", b"OFF", b"<?xml", b"<", b"FORMAT", b";
 
 def mesh_targets(seeds: dict[str, tuple[Seed, ...]]) -> list[Target]:
     """The parsers of mesh files, by format; seeds by format, each with its files as parts, the main one first."""
+    fork_library_processes()
     return [
         Target(
             name,
