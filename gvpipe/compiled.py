@@ -12,11 +12,12 @@ level INFO, which is silent unless someone listens. The command line does.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import logging
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar, cast
 
 import numba
@@ -39,7 +40,8 @@ class TolerantCache(FunctionCache):  # type: ignore[misc]  # numba has no types
 
     - An index pickles the classes of arguments. It raises an error once such a class has moved, as an upgrade may do.
     - A damaged file raises an error.
-    - Two processes that compile at once number their files alike, so an index may name the code of other types.
+    - Two processes that compile at once number their files alike, so an index may name the code of other types, or lose an
+      entry. Here they save in turn where the system can lock a folder.
     - A folder may be read-only, a disk full.
     - numba asks for the age of the kernel's own file alone. Here the files of what it calls count, too.
     """
@@ -64,7 +66,9 @@ class TolerantCache(FunctionCache):  # type: ignore[misc]  # numba has no types
     def save_overload(self, sig: Any, data: Any) -> None:
         """Store a compile result, if the folder takes it."""
         try:
-            super().save_overload(sig, data)
+            self._impl.locator.ensure_cache_path()
+            with _alone_in(self.cache_path):
+                super().save_overload(sig, data)
         except OSError:
             self.disable()
 
@@ -73,6 +77,23 @@ class TolerantCache(FunctionCache):  # type: ignore[misc]  # numba has no types
             self.flush()
         except OSError:
             self.disable()
+
+
+@contextlib.contextmanager
+def _alone_in(folder: str) -> Iterator[None]:
+    """Keep other processes that save there waiting; where the system cannot, keep none."""
+    if sys.platform == "win32":
+        yield
+        return
+    import fcntl
+
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):  # of file systems without locks
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def compiled(function: Function) -> Function:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from folders import ROOT, SAMPLES
+from folders import SAMPLES
 from hypothesis import settings
 
 import gvpipe
@@ -21,9 +20,6 @@ from gvpipe.sequence import MeshSequence
 # the same examples in every run, however busy the machine; --hypothesis-profile=default draws others
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
-if worker := os.environ.get("PYTEST_XDIST_WORKER"):
-    # workers that fill one cache together replace each other's entries, and compile more often
-    os.environ["NUMBA_CACHE_DIR"] = str(ROOT / ".pytest_cache" / f"numba-{worker}")
 # settings that cost little, for tests of anything but coding
 FAST: dict[str, Any] = {"preset": "ultrafast", "clusters": 3, "gop": 4}
 

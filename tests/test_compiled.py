@@ -7,6 +7,7 @@ import importlib.util
 import logging
 import os
 import sys
+import threading
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -121,6 +122,23 @@ def test_a_folder_that_takes_no_file(kernels: Any) -> None:
     index.mkdir()  # opening it raises an OSError, whoever asks
     assert kernel(3) == 6
     index.rmdir()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such locks")
+def test_processes_save_in_turn(kernels: Any) -> None:
+    import fcntl
+
+    assert kernels().total(kernels().Pair(1.0, 2.0)) == 3.0  # the folder is there
+    kernel = kernels().double
+    descriptor = os.open(kernel.stats.cache_path, os.O_RDONLY)
+    fcntl.flock(descriptor, fcntl.LOCK_EX)  # as another process that saves
+    thread = threading.Thread(target=kernel, args=(2,))
+    thread.start()
+    thread.join(1)
+    assert thread.is_alive() and files(kernel, "nbi") == []
+    os.close(descriptor)
+    thread.join(20)
+    assert len(files(kernel, "nbi")) == len(files(kernel, "nbc")) == 1
 
 
 def test_functions_without_a_file() -> None:

@@ -10,6 +10,7 @@ import weakref
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from asset_scene import scene
 from folders import GOLDEN
@@ -20,7 +21,7 @@ import gvpipe
 FILES = sorted(path for path in GOLDEN.glob("*.mp4"))
 CYCLES = int(os.environ.get("GVPIPE_SOAK", "2000"))  # of the soak test, over all files
 WARM_UP = 3  # rounds before memory is measured: caches fill
-FLAT = 12 << 20  # bytes by which memory may differ
+FLAT = 4 << 20  # bytes that memory may grow by in the second half: 4 KB a player of 2,000
 
 
 def play(path: Path) -> gvpipe.Player:
@@ -97,7 +98,10 @@ def test_fields_outlive_their_player(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is read from /proc")
 def test_memory_threads_and_descriptors_stay_flat_over_thousands_of_players() -> None:
-    """Every golden file is opened, played and closed in turn, every other player in a thread that then ends."""
+    """Every golden file is opened, played and closed in turn, every other player in a thread that then ends.
+
+    At first memory grows: threads that allocate at once have arenas of their own, which stay.
+    """
 
     def run(i: int) -> None:
         video = play(FILES[i % len(FILES)])
@@ -107,7 +111,7 @@ def test_memory_threads_and_descriptors_stay_flat_over_thousands_of_players() ->
     for i in range(WARM_UP * len(FILES)):
         run(i)
     gc.collect()
-    threads, descriptors, first = own_threads(), len(os.listdir("/proc/self/fd")), resident()
+    threads, descriptors = own_threads(), len(os.listdir("/proc/self/fd"))
     sizes = []
     for i in range(CYCLES):
         if i % 2:
@@ -117,9 +121,11 @@ def test_memory_threads_and_descriptors_stay_flat_over_thousands_of_players() ->
         else:
             run(i)
         if i % 100 == 99:
-            sizes.append(resident() - first)
+            sizes.append(resident())
     gc.collect()
     assert len(own_threads()) <= len(threads) + 2  # those of the last players may still be ending
     assert len(os.listdir("/proc/self/fd")) <= descriptors + 2
-    assert min(sizes[len(sizes) // 2 :]) < FLAT, sizes
-    print(f"{CYCLES} players: {sizes[-1] >> 10} KB more than after {WARM_UP * len(FILES)}")
+    quarter = len(sizes) // 4
+    grown = int(np.median(sizes[-quarter:]) - np.median(sizes[quarter : 2 * quarter]))
+    assert grown < FLAT, sizes
+    print(f"{CYCLES} players: {grown >> 10} KB more in the last quarter than in the second")
