@@ -85,7 +85,7 @@ def _samples() -> dict[str, MeshSequence]:
     ball = gvpipe.read(ROOT / "samples" / "ball_frames").part(0, N_FRAMES)
     held = np.repeat(np.asarray(ball.positions[: N_FRAMES // 2]), 2, axis=0)
     return {
-        "flag": MeshSequence(np.asarray(flag.positions[:N_FRAMES, :N_VERTICES]), faces, flag.fps),
+        "flag": MeshSequence(np.asarray(flag.positions[:N_FRAMES])[:, :N_VERTICES], faces, flag.fps),
         "ball": MeshSequence(held, ball.faces, ball.fps),
     }
 
