@@ -26,6 +26,9 @@ from gvcodecs.laplacian.extended_laplacian import thin_hubs
 from gvcodecs.laplacian.laplace_operators import laplacian
 from gvcodecs.laplacian.normal_equations import NO_LIMIT, NormalEquations, count_fill, most_products
 from gvpipe.arrays import Int32
+from gvpipe.asset_coding.directory import CODED
+from gvpipe.attributes.attribute_coding import encode_attribute
+from gvpipe.attributes.surface import Surface
 from gvpipe.budget import BYTES_PER_BYTE, LEAST_BYTES, LEAST_SECONDS, SECONDS_PER_BYTE, Budget
 from gvpipe.connectivity.topology_only import HEADER as MESH
 from gvpipe.connectivity.topology_only import encode_mesh
@@ -132,6 +135,22 @@ def deflated_list() -> Bitstream:
     return changed("pca-1-kalman", sections={"asset": zlib.compress(text, 9)})
 
 
+def wide_attribute(n: int) -> Bitstream:
+    """An attribute of 64 components, all zeros, where the list has one."""
+    faces = np.array([[0, 1, 2]], np.int32)
+    coded, _ = encode_mesh(faces, np.arange(n), reorder=True)
+    listed = {"name": "a", "kind": "scalar", "domain": "vertex", "components": 1, "dtype": "uint8", "bound": 0, "coding": CODED}
+    asset = {"version": 1, "geometry": False, "metadata": {}, "attributes": [{**listed, "section": "attribute.0"}]}
+    empty: dict[str, list[object]] = {"parts": [], "fields": [], "materials": [], "images": []}
+    sections = {
+        "mesh": coded.mesh,
+        "order": coded.order,
+        "asset": zlib.compress(json.dumps({**asset, **empty}).encode()),
+        "attribute.0": encode_attribute(np.zeros((10, 64), np.uint8), None, Surface(faces, 10), domain="vertex", kind="scalar"),
+    }
+    return changed("pca-1-kalman", sections=sections, n_vertices=n, n_triangles=1)
+
+
 def many_samples(video: bytes) -> bytes:
     """2**24 samples of one byte."""
     at = video.find(b"stsz") + 8
@@ -219,6 +238,14 @@ def test_groups_of_displacements_have_a_limit() -> None:
     group = varint(1) + pack_block(ZERO) + pack_block(encode_integers(np.array([n - 1]))) + 3 * pack_block(ZERO)
     with pytest.raises(OverBudget, match="1048576 displacements"):
         decode_group(group, n >> 4, 16, "corrections", Budget(1000))
+
+
+def test_attributes_have_as_many_components_as_are_listed(tmp_path: Path) -> None:
+    """75,000 vertices fit the budget with one component; 64 took 124 MB of a file of 2 kB."""
+    mp4.write_file(wide_attribute(75_000), tmp_path / "a.mp4")
+    video = gvpipe.open(tmp_path / "a.mp4")
+    with pytest.raises(CorruptFile, match="64 components; section 'asset' lists 1"):
+        video.attributes["a"]
 
 
 def test_segments_of_fields_have_a_limit() -> None:
