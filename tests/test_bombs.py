@@ -44,6 +44,7 @@ from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.reader import FieldReader
 from gvpipe.fields.values import FieldBound
 from gvpipe.media.video import PROFILES, VideoReader
+from gvpipe.sequence import MeshSequence
 
 WARM = ("laplacian-2-still", "mcgv-3-jpeg", "mcgv-4-rigid", "pca-2-still", "pdct-2-seams")
 ZERO = encode_integers(np.zeros(1, np.int64))  # however many zeros
@@ -267,6 +268,19 @@ def test_fields_that_take_no_bytes_are_read_within_the_budget(kind: str, monkeyp
     budget = Budget(len(section))
     assert 53 * values.size > budget.memory  # in one segment it would be too much
     assert np.abs(FieldReader(section, n_frames, mesh, "heat", budget=budget).read(0, n_frames) - values).max() <= 0.01
+
+
+def test_a_file_whose_attributes_are_refused_gets_a_note(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gvpipe.budget.LEAST_BYTES", 2 << 20)
+    monkeypatch.setattr("gvpipe.budget.BYTES_PER_BYTE", 0)
+    positions, faces = grid(30)
+    wide = MeshSequence(np.stack([positions, positions + 1]), faces, 24, attributes={"wide": np.zeros((900, 40), np.uint8)})
+    assert not gvpipe.encode(dataclasses.replace(wide, attributes={}), tmp_path / "a.mp4", "pca").notes
+    (note,) = gvpipe.encode(wide, tmp_path / "a.mp4", "pca").notes
+    assert "needs --unlimited (attribute 'wide' takes" in note
+    with pytest.raises(OverBudget):
+        gvpipe.open(tmp_path / "a.mp4").attributes["wide"]
+    assert gvpipe.open(tmp_path / "a.mp4", unlimited=True).attributes["wide"].shape == (900, 40)
 
 
 def test_pictures_have_a_limit() -> None:
