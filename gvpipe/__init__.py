@@ -15,7 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gvpipe.api import Info, Report, decode, encode, info, open, read, render, write
+    from gvpipe.api import Info, Report, Restreamed, decode, encode, info, open, read, render, restream, write
     from gvpipe.asset.attribute import Attribute
     from gvpipe.asset.field import Field
     from gvpipe.asset.material import Image, Material, Texture
@@ -47,6 +47,7 @@ __all__ = [
     "Player",
     "Renderer",
     "Report",
+    "Restreamed",
     "Texture",
     "compare",
     "decode",
@@ -56,11 +57,12 @@ __all__ = [
     "open",
     "read",
     "render",
+    "restream",
     "write",
 ]
 
 _HOMES = {
-    "gvpipe.api": ("Info", "Report", "decode", "encode", "info", "open", "read", "render", "write"),
+    "gvpipe.api": ("Info", "Report", "Restreamed", "decode", "encode", "info", "open", "read", "render", "restream", "write"),
     "gvpipe.asset.attribute": ("Attribute",),
     "gvpipe.asset.field": ("Field",),
     "gvpipe.asset.material": ("Image", "Material", "Texture"),

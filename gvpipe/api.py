@@ -17,9 +17,10 @@ from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.budget import Budget
 from gvpipe.codec import Codec, Encoded, Progress
-from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.mp4 import bytes_by_part, write_file
-from gvpipe.errors import InputError, OutputError, OverBudget, SettingError
+from gvpipe.container.bitstream import PLAIN, STREAM, Bitstream
+from gvpipe.container.mp4 import bytes_by_part, read_file, write_file
+from gvpipe.container.sources import is_url
+from gvpipe.errors import InputError, OutputError, OverBudget, SettingError, in_file
 from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
@@ -27,7 +28,7 @@ from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
 from gvpipe.rate_control.search import meet
 from gvpipe.rate_control.targets import Target, parse_bound
 from gvpipe.rate_control.trials import Trial
-from gvpipe.registry import encode_sequence, make_codec
+from gvpipe.registry import encode_sequence, make_codec, segment_parts
 from gvpipe.rendering.poster import poster_of
 from gvpipe.sequence import MeshSequence
 
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
 Source = StrPath | Sequence[StrPath]
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
 ASSET = ("attributes", "fields", "textures", "clip", "mesh", "frames", "unlimited")
-KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", *ASSET)  # of `encode`
+KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", "stream", *ASSET)  # of `encode`
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,7 @@ class Info:
         sections: bytes of every part of the file, which add up to ``bytes``.
         levels: vertex counts of the levels of detail, the mesh itself first.
         settings: the bitstream's header.
+        layout: ``plain`` or ``stream`` (`restream`).
         origin: to add to positions, model units.
         parts: name, ranges of vertices and triangles, name of the material, parent.
         attributes: name, kind, domain, components, type, unit, bound (degrees for normals) and bytes of each.
@@ -114,6 +116,7 @@ class Info:
     sections: dict[str, int]
     levels: list[int]
     settings: dict[str, Any]
+    layout: str
     origin: list[float]
     parts: list[dict[str, Any]]
     attributes: list[dict[str, Any]]
@@ -126,6 +129,24 @@ class Info:
 
     def to_json(self) -> dict[str, Any]:
         """The information as JSON values."""
+        return dataclasses.asdict(self)
+
+
+@dataclass(frozen=True)
+class Restreamed:
+    """What `restream` did.
+
+    Args:
+        layout: of the file that it wrote: ``plain`` or ``stream``.
+        bytes_before, bytes: of the source and of the file.
+    """
+
+    layout: str
+    bytes_before: int
+    bytes: int
+
+    def to_json(self) -> dict[str, Any]:
+        """The same as JSON values."""
         return dataclasses.asdict(self)
 
 
@@ -181,7 +202,7 @@ def read(
             return read_sequence(path, fps, clip, mesh, frames)
         path = path[0]
     one = check_path(path, "what gvpipe.read is given", "a list of frame files or ")
-    if Path(one).suffix.lower() not in VIDEO_SUFFIXES:
+    if Path(one).suffix.lower() not in VIDEO_SUFFIXES and not is_url(one):
         return read_sequence(one, fps, clip, mesh, frames)
     if clip is not None:
         raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
@@ -248,6 +269,7 @@ def encode(
     clip: str | None = None,
     mesh: StrPath | None = None,
     frames: tuple[int, int | None] | None = None,
+    stream: bool = False,
     unlimited: bool = False,
     **settings: Any,
 ) -> Report:
@@ -275,6 +297,7 @@ def encode(
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
         clip, mesh, frames, unlimited: as for `read`.
+        stream: write the stream layout, which plays over HTTP while it loads (`restream`).
 
     Raises:
         InputError: the source, a setting or the path cannot be used, or no quality meets the target.
@@ -287,13 +310,15 @@ def encode(
     targets = {"target_rmse": target_rmse, "target_kg": target_kg, "target_bpvf": target_bpvf, "max_error": max_error}
     if sum(value is not None for value in targets.values()) > 1:
         raise SettingError(f"more than one target is given; choose one of {', '.join(targets)}")
+    if stream and target_bpvf is not None:
+        raise SettingError("target_bpvf counts the plain layout; encode without stream, then change the layout by restream")
     given = _candidates(codec, settings, purpose)
     clock = _StageClock(progress)
     sequence = _open_source(source, path, fps, {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited})
     target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
     asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
     coded = _code(sequence, given, target, asset, clock)
-    size, bitstream = _write(sequence, coded, path, clock)
+    size, bitstream = _write(sequence, coded, path, clock, stream)
     clock("", 1.0)
     return Report(
         codec=coded.codec.id,
@@ -333,6 +358,33 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
     return dataclasses.replace(whole, positions=positions, fields=fields)
 
 
+def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlimited: bool = False) -> Restreamed:
+    """Change the layout of a geometry video, without loss: sections and pictures stay as they are, to the bit.
+
+    The *stream* layout has an index first, then each segment's sections beside its pictures. It plays over HTTP while it
+    loads, and a jump costs one segment. The *plain* layout is a little smaller.
+
+    Args:
+        source: a geometry video, or its address.
+        path: of the file to write.
+        layout: ``"stream"`` or ``"plain"``; None: the one that the source has not.
+        unlimited: as for `open`.
+
+    Raises:
+        InputError: no such file, or no such layout.
+        FormatError: not a geometry video, or a damaged one.
+        OutputError: the file cannot be written; no part of it is left.
+    """
+    if layout not in (None, PLAIN, STREAM):
+        raise InputError(f"layout is {layout!r}; {PLAIN} or {STREAM} is needed")
+    _check_output(path)
+    bitstream = read_file(check_path(source, "the geometry video"), unlimited)
+    with in_file(os.fspath(source)):
+        chosen = layout or (PLAIN if bitstream.layout == STREAM else STREAM)
+        size = write_file(bitstream, path, parts=segment_parts(bitstream) if chosen == STREAM else None)
+    return Restreamed(chosen, bitstream.n_bytes, size)
+
+
 def open(path: StrPath, *, unlimited: bool = False) -> Player:
     """Open a geometry video for random access; see `Player`; raises TypeError for what is no path."""
     return Player(path, unlimited=unlimited)
@@ -357,6 +409,9 @@ def render(
     field_range: tuple[float, float] | str | None = None,
     parts: str | Sequence[str] = (),
     plain: bool = False,
+    clip: str | None = None,
+    mesh: StrPath | None = None,
+    frames: tuple[int, int | None] | None = None,
     progress: Progress | None = None,
     unlimited: bool = False,
 ) -> list[str]:
@@ -367,7 +422,7 @@ def render(
     Args:
         source: a sequence, or what `gvpipe.read` takes.
         path: the file to write; an older one is replaced once the new one is complete.
-        frame: the only frame to paint, negative from the end; by default the first for a PNG, all for a film.
+        frame: the only frame to paint, of ``frames``, negative from the end; by default the first for a PNG, all for a film.
         size: pixels, one number for a square or ``(width, height)``; even for MP4.
         view: ``"three-quarter"``, ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``, ``"bottom"`` or
             ``(azimuth, elevation)`` in degrees.
@@ -383,6 +438,7 @@ def render(
         field_range: the values at the ends of the colours; ``"symmetric"``: about 0. By default the range of the frames drawn.
         parts: the name of the part to paint, or several; none: all.
         plain: paint the shape alone, without materials and colours.
+        clip, mesh, frames: of the source, as for `read`.
         progress: called with ``"render"`` and the part that is done.
         unlimited: as for `read`.
 
@@ -416,7 +472,10 @@ def render(
         if given is not None and _is_among(path, given):
             raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
     reference = error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of, unlimited=unlimited)
-    sequence = source if isinstance(source, MeshSequence) else read(source, unlimited=unlimited)
+    if isinstance(source, MeshSequence):
+        sequence = source if frames is None else source.part(*frame_range(source, *frames))
+    else:
+        sequence = read(source, None, clip, mesh, frames, unlimited=unlimited)
     return list(write_pictures(sequence, target, options, reference, progress))
 
 
@@ -430,10 +489,11 @@ def info(path: StrPath, *, unlimited: bool = False) -> Info:
     player = Player(path, unlimited=unlimited)
     bitstream = player.bitstream
     first = player[0]
-    size = os.path.getsize(path)
+    size = bitstream.n_bytes
     return Info(
         codec=bitstream.codec,
         version=bitstream.version,
+        layout=bitstream.layout,
         vertices=bitstream.n_vertices,
         triangles=bitstream.n_triangles,
         frames=bitstream.n_frames,
@@ -539,7 +599,7 @@ def _code(
     return _Coded(trial.codec, encoded, check, choice.tried, choice.reason)
 
 
-def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progress) -> tuple[int, Bitstream]:
+def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progress, stream: bool) -> tuple[int, Bitstream]:
     """Write the file with its poster and origin; return its bytes and what it holds."""
     progress("write", 0.0)
     bitstream = coded.encoded.bitstream
@@ -547,7 +607,7 @@ def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progr
         bitstream = dataclasses.replace(bitstream, video=poster_of(sequence))
     x, y, z = sequence.origin.tolist()
     bitstream = dataclasses.replace(bitstream, origin=(x, y, z))
-    return write_file(bitstream, path, coded.check), bitstream
+    return write_file(bitstream, path, coded.check, segment_parts(bitstream) if stream else None), bitstream
 
 
 def _notes(sequence: MeshSequence, target: Target | None, left_out: Sequence[str]) -> list[str]:

@@ -45,6 +45,14 @@ class Budget:
         self._kept_memory, self._kept_seconds = 0.0, 0.0
         self._lock = threading.Lock()
 
+    def grow(self, n_bytes: int) -> None:
+        """Allow what a file of ``n_bytes`` may take, for a file that comes by and by; never less than before."""
+        if self.n_bytes is not None and n_bytes > self.n_bytes:
+            with self._lock:
+                self.n_bytes = n_bytes
+                self.memory = max(LEAST_BYTES, BYTES_PER_BYTE * n_bytes)
+                self.seconds = max(LEAST_SECONDS, SECONDS_PER_BYTE * n_bytes)
+
     @property
     def is_limited(self) -> bool:
         """Whether anything is ever refused."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import operator
 import os
 from collections.abc import Iterator, Mapping
@@ -26,6 +25,7 @@ from gvpipe.coarse_asset import add_asset
 from gvpipe.codec import GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file
+from gvpipe.container.sources import is_url
 from gvpipe.errors import InputError, in_file, printable
 from gvpipe.frame_cache import FrameCache
 from gvpipe.registry import open_reader
@@ -43,7 +43,7 @@ class Player:
     in a row, forwards or backwards, are decoded ahead on another thread. ``video[a:b]`` gives ``(b - a, V, 3)``.
 
     Args:
-        path: of the file.
+        path: of the file, or its address (``https://...``): of a file in the stream layout, what is asked for is fetched.
         unlimited: let it take whatever memory and work it asks for; by default its size limits both (`gvpipe.budget`).
 
     Raises:
@@ -55,7 +55,8 @@ class Player:
     def __init__(self, path: str | os.PathLike[str], *, unlimited: bool = False) -> None:
         check_path(path, "the geometry video")
         self.path = os.fspath(path)
-        self._absolute = os.path.abspath(self.path)  # another process may have another working directory
+        # another process may have another working directory
+        self._absolute = self.path if is_url(self.path) else os.path.abspath(self.path)
         self._unlimited = unlimited
         self.bitstream: Bitstream = read_file(path, unlimited)
         with in_file(self.path):
@@ -215,10 +216,8 @@ class Player:
         numbers = numbers_of(sequence)
         if len(self.levels) > 1:
             numbers["levels of detail"] = ", ".join(map(str, self.levels))
-        with contextlib.suppress(OSError):  # the file may be gone: what was read of it stays usable
-            size = os.path.getsize(self.path)
-            n_samples = self.bitstream.n_vertices * len(self)
-            numbers["size"] = f"{size} bytes, {8 * size / n_samples:.3f} bits per vertex and frame"
+        size, n_samples = self.bitstream.n_bytes, self.bitstream.n_vertices * len(self)
+        numbers["size"] = f"{size} bytes, {8 * size / n_samples:.3f} bits per vertex and frame"
         numbers["codec"] = f"{self.bitstream.codec} version {self.bitstream.version}"
         return card(self.path, numbers, sequence)
 

@@ -15,12 +15,14 @@ from typing import Any
 from gvpipe.arguments import did_you_mean
 from gvpipe.codec import Codec, Encoded, FrameReader, Memo, Progress, check_name
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import SegmentParts
 from gvpipe.corrections.bound import correct
 from gvpipe.errors import NewerVersion, SettingError, quote
 from gvpipe.repeated_frames import RepeatedFramesReader, add_repeated_frames, find_repeated_frames, read_repeated_frames
 from gvpipe.sequence import MeshSequence
 
 GROUP = "gvpipe.codecs"
+FIELDS = "field."  # how names of their sections begin (`gvpipe.asset_coding`)
 
 
 def codec_ids() -> list[str]:
@@ -89,6 +91,23 @@ def browser_obstacle(bitstream: Bitstream) -> str:
     """
     ask = getattr(codec_class(bitstream.codec), "browser_obstacle", None)
     return str(ask(bitstream)) if ask else bitstream.codec
+
+
+def segment_parts(bitstream: Bitstream) -> SegmentParts:
+    """Return what each segment has of a bitstream; of fields, which positions do not need, that they may come late.
+
+    Codecs answer by a class method of this name; of others, segments have nothing of their own.
+
+    Raises:
+        SettingError: no codec of that id is installed.
+        CorruptFile: the header is not what that codec writes.
+    """
+    codec = codec_class(bitstream.codec)
+    holds = read_repeated_frames(bitstream) if _is_held(codec) else None
+    distinct = bitstream if holds is None else dataclasses.replace(bitstream, n_frames=holds.n_distinct)
+    ask = getattr(codec, "segment_parts", None)
+    parts: SegmentParts = ask(distinct) if ask else SegmentParts()
+    return dataclasses.replace(parts, late=tuple(name for name in bitstream.sections if name.startswith(FIELDS)))
 
 
 def encode_sequence(

@@ -53,17 +53,19 @@ class SourceInfo:
         return dataclasses.asdict(self)
 
 
-def source_info(path: StrPath, clip: str | None = None, mesh: StrPath | None = None) -> SourceInfo:
-    """Return what gvpipe reads of a source; only frame 0 is evaluated.
+def source_info(
+    path: StrPath, clip: str | None = None, mesh: StrPath | None = None, frames: tuple[int, int | None] | None = None
+) -> SourceInfo:
+    """Return what gvpipe reads of a source; only the first of the frames is evaluated.
 
     Args:
-        path, clip, mesh: as of `gvpipe.read`.
+        path, clip, mesh, frames: as of `gvpipe.read`.
 
     Raises:
         InputError: it cannot be read.
     """
     name = os.fspath(path)
-    sequence = read(name, None, clip, mesh)
+    sequence = read(name, None, clip, mesh, frames)
     first = sequence[0]
     clips = list_clips(name)
     things = Things(sequence.parts, sequence.polygons, sequence.materials, sequence.images, sequence.metadata)

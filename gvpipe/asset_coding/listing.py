@@ -36,7 +36,7 @@ def _listed(things: Iterable[Listed], bitstream: Bitstream) -> list[dict[str, An
             "type": each.dtype,
             "unit": each.unit,
             "bound": each.bound,
-            "bytes": len(bitstream.sections.get(each.section, b"")),
+            "bytes": bitstream.section_sizes.get(each.section, 0),
         }
         for each in things
     ]

@@ -120,6 +120,7 @@ def cli() -> None:
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
 @click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.mp4, ...")
 @click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp.")
+@click.option("--stream", is_flag=True, help="Write the stream layout: it plays over HTTP while it loads.")
 @unlimited_option
 @output_options
 def encode(
@@ -143,6 +144,7 @@ def encode(
     frames: str | None,
     split: bool,
     textures: str | None,
+    stream: bool,
     unlimited: bool,
     out: Output,
 ) -> None:
@@ -183,7 +185,7 @@ def encode(
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
         given: dict[str, Any] = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames)}
-        wanted: dict[str, Any] = {**targets, "textures": textures}
+        wanted: dict[str, Any] = {**targets, "textures": textures, "stream": stream}
         wanted |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
         if split:
             runs = api.read_runs(source, **given, unlimited=unlimited)
@@ -278,25 +280,48 @@ def decode(
 
 
 @cli.command()
+@click.argument("source", metavar="FILE.mp4")
+@click.argument("target", metavar="OUTPUT.mp4")
+@click.option("--layout", type=click.Choice(["stream", "plain"]), help="Of OUTPUT. [default: the one that FILE has not]")
+@unlimited_option
+@output_options
+def restream(source: str, target: str, layout: str | None, unlimited: bool, out: Output) -> None:
+    """Change the layout of a geometry video, without loss, to the one that plays over HTTP while it loads, or back.
+
+    FILE may be an address (https://...), or - for standard input. OUTPUT - is standard output.
+    """
+    from gvpipe import api
+
+    with source_path(source) as given, target_path(target, ".mp4") as path, out.progress():
+        done = api.restream(given, path, layout, unlimited=unlimited)
+    out = out.carrying(target)
+    out.json({"output": shown(target, STDOUT), **done.to_json()})
+    sizes = f"{_size(done.bytes_before)} -> {_size(done.bytes)}"
+    out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({done.layout} layout, {sizes})")
+
+
+@cli.command()
 @click.argument("source", metavar="FILE")
 @click.option("--clip", metavar="NAME", help="The animation to look at, of a file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
+@click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
 @unlimited_option
 @output_options
-def info(source: str, clip: str | None, mesh: str | None, unlimited: bool, out: Output) -> None:
+def info(source: str, clip: str | None, mesh: str | None, frames: str | None, unlimited: bool, out: Output) -> None:
     """Tell what a geometry video (- for standard input) holds and where its bytes go, or what is read of any other input."""
     from gvpipe import api
     from gvpipe.cli.asset_lines import asset_lines, shape_lines
 
     with source_path(source) as path, out.progress():
         if not is_video(path):
-            _source_info(source, path, clip, mesh, out)
+            _source_info(source, path, (clip, mesh, frames), out)
             return
-        if clip is not None or mesh is not None:
-            raise click.UsageError("--clip and --mesh are for sources; a geometry video has neither")
+        if clip is not None or mesh is not None or frames is not None:
+            raise click.UsageError("--clip, --mesh and --frames are for sources; a geometry video is shown whole")
         found = api.info(path, unlimited=unlimited)
     out.json(found.to_json())
-    out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}")
+    layout = ", stream layout" if found.layout == "stream" else ""
+    out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}{layout}")
     for line in shape_lines(found):
         out.text(line)
     if len(found.levels) > 1:
@@ -309,12 +334,14 @@ def info(source: str, clip: str | None, mesh: str | None, unlimited: bool, out: 
     _print_sections(out, found.sections, found.vertices * found.frames)
 
 
-def _source_info(source: str, path: str, clip: str | None, mesh: str | None, out: Output) -> None:
-    """Print what is read of an input that is no geometry video."""
+def _source_info(source: str, path: str, given: tuple[str | None, str | None, str | None], out: Output) -> None:
+    """Print what is read of an input that is no geometry video; ``given`` are --clip, --mesh and --frames."""
     from gvpipe.cli.asset_lines import asset_lines, shape_lines, time_lines
+    from gvpipe.cli.choices import parse_frames
     from gvpipe.source_info import source_info
 
-    found = source_info(path, clip, mesh)
+    clip, mesh, frames = given
+    found = source_info(path, clip, mesh, parse_frames(frames))
     out.json(found.to_json())
     out.text(shown(source, STDIN) + ("" if found.bytes is None else f": {_size(found.bytes)}"))
     for line in [*shape_lines(found), *asset_lines(found), *time_lines(found)]:
@@ -428,20 +455,24 @@ def play(source: str, up: str | None, unlimited: bool, out: Output) -> None:
 @click.option("--range", "limits", metavar="A,B", help="Ends of the colours, or symmetric. [default: the range drawn]")
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Paint this part only; repeat for more.")
 @click.option("--plain", "--no-textures", "plain", is_flag=True, help="Leave out materials, textures and colours.")
+@click.option("--clip", metavar="NAME", help="The animation to paint, of a file that has several. [default: the first]")
+@click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
+@click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
 @unlimited_option
 @output_options
-def render(source: str, target: str, size: str, limits: str | None, out: Output, **options: Any) -> None:
+def render(source: str, target: str, size: str, limits: str | None, frames: str | None, out: Output, **options: Any) -> None:
     """Paint a geometry video or a sequence as a picture or a film; needs no display and no GPU."""
     from gvpipe import api
+    from gvpipe.cli.choices import parse_frames
     from gvpipe.rendering.field_map import parse_range
     from gvpipe.rendering.films import parse_size
 
     if options["error_max"] is not None and not options["error_of"]:
         raise click.UsageError("--error-max ends the colours of errors; give --error-of too", click.get_current_context())
     pixels = parse_size(size)
-    field_range = None if limits is None else parse_range(limits)
+    options |= {"frames": parse_frames(frames), "field_range": None if limits is None else parse_range(limits)}
     with source_path(source) as path, out.progress() as progress:
-        notes = api.render(path, target, size=pixels, field_range=field_range, progress=progress, **options)
+        notes = api.render(path, target, size=pixels, progress=progress, **options)
     for note in notes:
         out.note(note)
     n_bytes = os.path.getsize(target)

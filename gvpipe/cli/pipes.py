@@ -13,6 +13,7 @@ import sys
 from collections.abc import Iterator
 
 from gvpipe.atomic import output_error, temporary_folder
+from gvpipe.container.sources import is_url
 from gvpipe.errors import GvpipeError, InputError, OutputError
 
 PIPE = "-"
@@ -68,7 +69,9 @@ def shown(name: str, pipe: str) -> str:
 
 
 def is_video(path: str) -> bool:
-    """Whether a path is that of an MP4 file, by its name or its first bytes; it need not be there."""
+    """Whether a path is that of an MP4 file, by its name or its first bytes, or an address; it need not be there."""
+    if is_url(path):
+        return True
     if path.lower().endswith(VIDEO_SUFFIXES) or not os.path.isfile(path):
         return path.lower().endswith(VIDEO_SUFFIXES)
     try:

@@ -17,13 +17,16 @@ import re
 import struct
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.json_object import JsonObject, unpack_json
 from gvpipe.errors import CorruptFile, NewerVersion, TruncatedFile, corrupt, corrupt_section
+
+if TYPE_CHECKING:
+    from gvpipe.media.video import Fragments
 
 MAGIC = b"gvpipe\r\n"
 VERSION = 1
@@ -42,6 +45,7 @@ MAX_FRAMES = 1 << 24
 MAX_VERTICES = 1 << 28
 
 
+PLAIN, STREAM = "plain", "stream"  # layouts of files
 NO_ORIGIN = (0.0, 0.0, 0.0)
 MAX_ORIGIN = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]  # of its coordinates' magnitudes: float32's largest number
 
@@ -62,6 +66,8 @@ class Bitstream:
         origin: what to add to positions, model units (`gvpipe.origin`); the same for every codec.
         video: an MP4 file whose one track holds the codec's images; empty for codecs that have none, whose files show a
             poster (`gvpipe.rendering.poster`) instead.
+        fragments: in place of ``video``, of a file in the stream layout (`gvpipe.container.stream_layout`).
+        n_bytes: of the file that it was read from, 0 if it was not.
         budget: what its readers may take (`gvpipe.budget`).
     """
 
@@ -75,7 +81,25 @@ class Bitstream:
     sections: Mapping[str, bytes] = field(default_factory=dict)
     video: bytes = b""
     origin: tuple[float, float, float] = NO_ORIGIN
+    fragments: Fragments | None = field(default=None, compare=False, repr=False)
+    n_bytes: int = field(default=0, compare=False)
     budget: Budget = field(default=UNLIMITED, compare=False, repr=False)
+
+    @property
+    def layout(self) -> str:
+        """Of its file: ``plain``, or ``stream``."""
+        return STREAM if self.fragments is not None else PLAIN
+
+    @property
+    def pictures(self) -> bytes | Fragments:
+        """The video, whole or in fragments."""
+        return self.video if self.fragments is None else self.fragments
+
+    @property
+    def section_sizes(self) -> dict[str, int]:
+        """Bytes of every section; reads none of them."""
+        sizes: dict[str, int] | None = getattr(self.sections, "sizes", None)
+        return {name: len(data) for name, data in self.sections.items()} if sizes is None else sizes
 
     def section(self, name: str) -> bytes:
         """Return a section's bytes; raises `CorruptFile` if there is none of that name."""
@@ -97,8 +121,8 @@ class Bitstream:
         return JsonObject(self.header, HEADER)
 
 
-def pack_payload(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
-    """Return the payload of everything but the video; ``extra`` is the container's own part of the header."""
+def pack_header(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
+    """Return the section ``header``; ``extra`` is the container's own part of it."""
     header = {
         "codec": bitstream.codec,
         "version": bitstream.version,
@@ -110,8 +134,12 @@ def pack_payload(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
         "container": dict(extra),
         "settings": dict(bitstream.header),
     }
-    text = json.dumps(header, separators=(",", ":"), allow_nan=False)
-    sections = {HEADER: zlib.compress(text.encode(), 9), **bitstream.sections}
+    return zlib.compress(json.dumps(header, separators=(",", ":"), allow_nan=False).encode(), 9)
+
+
+def pack_payload(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
+    """Return the payload of everything but the video; ``extra`` is the container's own part of the header."""
+    sections = {HEADER: pack_header(bitstream, extra), **bitstream.sections}
     head = [MAGIC, PREFIX.pack(VERSION, len(sections))]
     for name, data in sections.items():
         encoded = name.encode()
@@ -157,7 +185,11 @@ def unpack_payload(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstrea
         raise cursor.corrupt("its checksum does not match")
     if not all(NAME.fullmatch(name) for name, _, _ in entries):
         raise cursor.corrupt("a section's name is not of a to z, 0 to 9 and dots")
-    return _read_header(_read_sections(cursor, entries), budget)
+    sections = _read_sections(cursor, entries)
+    if HEADER not in sections:
+        raise corrupt(f"section {HEADER!r} is missing")
+    bitstream, container = read_header(sections.pop(HEADER), budget)
+    return replace(bitstream, sections=sections), container
 
 
 def _read_sections(cursor: Cursor, entries: list[tuple[bytes, int, int]]) -> dict[str, bytes]:
@@ -177,10 +209,9 @@ def _read_sections(cursor: Cursor, entries: list[tuple[bytes, int, int]]) -> dic
     return sections
 
 
-def _read_header(sections: dict[str, bytes], budget: Budget) -> tuple[Bitstream, JsonObject]:
-    if HEADER not in sections:
-        raise corrupt(f"section {HEADER!r} is missing")
-    header = unpack_json(sections.pop(HEADER), HEADER, MAX_HEADER, budget)
+def read_header(section: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstream, JsonObject]:
+    """Mirror of `pack_header`: a bitstream without sections, and the container's part; raises `CorruptFile`, `OverBudget`."""
+    header = unpack_json(section, HEADER, MAX_HEADER, budget)
     x, y, z = header.numbers("origin", 3, -MAX_ORIGIN, MAX_ORIGIN, NO_ORIGIN)
     bitstream = Bitstream(
         codec=header.text("codec"),
@@ -190,7 +221,6 @@ def _read_header(sections: dict[str, bytes], budget: Budget) -> tuple[Bitstream,
         n_triangles=header.integer("triangles", 0, 2 * MAX_VERTICES),
         fps=header.number("fps", SLOWEST, FASTEST),
         header=header.object("settings").plain,
-        sections=sections,
         origin=(x, y, z),
         budget=budget,
     )

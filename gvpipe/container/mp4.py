@@ -17,78 +17,87 @@ import hashlib
 import io
 import os
 import struct
-import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 from uuid import UUID
 
 from gvpipe.atomic import unnamed_path
-from gvpipe.budget import UNLIMITED, Budget
-from gvpipe.container.bitstream import VERSION, Bitstream, pack_payload, unpack_payload
+from gvpipe.budget import Budget
+from gvpipe.container.bitstream import VERSION, Bitstream, pack_header, pack_payload, unpack_payload
+from gvpipe.container.boxes import BOX, LARGE, uuid_head
 from gvpipe.container.sample_tables import check_tables
+from gvpipe.container.segments import SegmentParts
+from gvpipe.container.sources import FileSource, is_url
+from gvpipe.container.stream_layout import VERSION as STREAM_VERSION
+from gvpipe.container.stream_layout import find_index, pack_stream, read_stream
+from gvpipe.container.track import TAG_PREFIX, inspect, remux, remux_fragments
 from gvpipe.errors import REMEDY, FormatError, InputError, NewerVersion, NotGeometryVideo, StrippedFile, TruncatedFile, corrupt
-from gvpipe.media.picture_limits import picture_limits
 
 BOX_UUID = UUID("6a1f0c52-3d7b-4e0e-9c55-67e4f0a7d1b9")
-TAG = "comment"
-TAG_PREFIX = "gvpipe "
-BOX = struct.Struct(">I4s")
-LARGE = struct.Struct(">Q")
 ENCODE_FIRST = "encode the sequence first: gvpipe encode INPUT OUTPUT.mp4"
 MAX_BOXES = 1 << 16
 MAX_CRC = (1 << 32) - 1
 PLAYED = (b"ftyp", b"moov", b"mdat", b"free", b"skip", b"wide", b"uuid")  # boxes that may come before the payload
 
 
-def write_file(bitstream: Bitstream, path: str | os.PathLike[str], check: Callable[[Bitstream], None] | None = None) -> int:
+def write_file(
+    bitstream: Bitstream,
+    path: str | os.PathLike[str],
+    check: Callable[[Bitstream], None] | None = None,
+    parts: SegmentParts | None = None,
+) -> int:
     """Write ``bitstream`` as an MP4 file, all of it or nothing, and return its size in bytes.
 
     Args:
         bitstream: with its video.
         path: of the file.
         check: looks at what the finished file holds, before it takes its name; if it raises, nothing is left.
+        parts: what each segment has, for the stream layout; None: the plain layout.
 
     Raises:
         OutputError: the file cannot be written; an older file of that name is left as it was.
     """
-    video, box = _pack(bitstream)
+    size = 0
     with unnamed_path(path) as temporary:
         with open(temporary, "wb") as file:
-            file.write(video)
-            file.write(box)
+            for part in _pack(bitstream, parts):
+                size += file.write(part)
         if check is not None:
             check(read_file(temporary, unlimited=True))
-    return len(video) + len(box)
+    return size
 
 
-def file_bytes(bitstream: Bitstream) -> bytes:
+def file_bytes(bitstream: Bitstream, parts: SegmentParts | None = None) -> bytes:
     """The file that `write_file` would write."""
-    return b"".join(_pack(bitstream))
+    return b"".join(_pack(bitstream, parts))
 
 
-def file_size(bitstream: Bitstream) -> int:
+def file_size(bitstream: Bitstream, parts: SegmentParts | None = None) -> int:
     """Bytes of the file that `write_file` would write."""
-    return sum(map(len, _pack(bitstream)))
+    return sum(map(len, _pack(bitstream, parts)))
 
 
 def read_file(path: str | os.PathLike[str], unlimited: bool = False) -> Bitstream:
-    """Read and check the bitstream of an MP4 file.
+    """Read and check the bitstream of an MP4 file; in the stream layout, its sections and pictures are read later.
 
     Args:
-        path: of the file.
+        path: of the file, or its address (``https://...``).
         unlimited: let it take whatever memory and work it asks for; by default its size limits both (`gvpipe.budget`).
 
     Raises:
         InputError: there is no such file, or it cannot be read.
         NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile, OverBudget: see `gvpipe.errors`.
     """
+    if is_url(path):
+        return _read_url(str(path), unlimited)
     path = Path(path)
     try:
+        source = FileSource(path)
         with open(path, "rb") as file:
-            size = os.fstat(file.fileno()).st_size
-            return _read(file, size, Budget(None if unlimited else size))
+            budget, index = Budget(None if unlimited else source.size), find_index(source)
+            return _read(file, source.size, budget) if index is None else read_stream(source, index, budget)
     except FormatError as exc:
         raise type(exc)(f"{path}: {exc}") from exc
     except IsADirectoryError as exc:
@@ -101,17 +110,55 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False) -> Bitstrea
 
 def bytes_by_part(bitstream: Bitstream, size: int) -> dict[str, int]:
     """Bytes of the codec's sections, of the video's samples and of everything else in a file of ``size`` bytes."""
-    parts = {name: len(data) for name, data in bitstream.sections.items()}
-    parts["video"] = _inspect(bitstream.video, bitstream.budget).n_bytes
+    parts = dict(bitstream.section_sizes)
+    fragments = bitstream.fragments
+    parts["video"] = inspect(bitstream.video, bitstream.budget).n_bytes if fragments is None else fragments.n_bytes
     return {**parts, "container": size - sum(parts.values())}
 
 
-def _pack(bitstream: Bitstream) -> tuple[bytes, bytes]:
-    """The two parts of a file: the video with its tag, the box with the payload."""
+def load(bitstream: Bitstream) -> Bitstream:
+    """The bitstream with all of its sections and its video in memory, checked as those of a file of the plain layout are.
+
+    Raises:
+        CorruptFile: sections or pictures are not those that the header describes.
+    """
+    fragments = bitstream.fragments
+    if fragments is None:
+        return bitstream
+    video = b"".join([fragments.head, *(fragments.read(number) for number in range(len(fragments.counts)))])
+    loaded = replace(bitstream, sections=dict(bitstream.sections), video=video, fragments=None)
+    if f"{TAG_PREFIX}{STREAM_VERSION} {_content_id(loaded)}".encode() not in fragments.head:
+        raise corrupt("its geometry belongs to another file")
+    return loaded
+
+
+def _pack(bitstream: Bitstream, parts: SegmentParts | None) -> Iterable[bytes]:
+    """A file in parts: in the plain layout the video with its tag, the head of the box, the payload."""
+    bitstream = load(bitstream)
     identity = _content_id(bitstream)
-    track = _inspect(bitstream.video)
-    checksums = {"video_crc32": track.checksum, "track_crc32": track.configuration}
-    return _remux(bitstream.video, f"{VERSION} {identity}"), _box(pack_payload(bitstream, {"id": identity, **checksums}))
+    track = inspect(bitstream.video)
+    extra = {"id": identity, "video_crc32": track.checksum, "track_crc32": track.configuration}
+    if parts is not None:
+        video = remux_fragments(bitstream.video, f"{STREAM_VERSION} {identity}")
+        return pack_stream(video, pack_header(bitstream, extra), bitstream.sections, parts)
+    payload = pack_payload(bitstream, extra)
+    return remux(bitstream.video, f"{VERSION} {identity}"), uuid_head(BOX_UUID, len(payload)), payload
+
+
+def _read_url(url: str, unlimited: bool) -> Bitstream:
+    """As `read_file`; the budget is that of the bytes that have come so far, since a server may claim any size."""
+    from gvpipe.container.http_source import HttpSource  # urllib takes as long to load as all the rest
+
+    budget = Budget(None if unlimited else 0)
+    try:
+        source = HttpSource(url, budget.grow)
+        index = find_index(source)
+        if index is not None:
+            return read_stream(source, index, budget)
+        data = source.read_all()
+        return _read(io.BytesIO(data), len(data), budget)
+    except FormatError as exc:
+        raise type(exc)(f"{url}: {exc}") from exc
 
 
 def _read(file: IO[bytes], size: int, budget: Budget) -> Bitstream:
@@ -123,11 +170,11 @@ def _read(file: IO[bytes], size: int, budget: Budget) -> Bitstream:
     file.seek(0)
     video = file.read(layout.video_end)
     check_tables(video[slice(*layout.moov)], layout.video_end)
-    track = _inspect(video, budget)
+    track = inspect(video, budget)
     tag = track.tag
     version = tag.partition(" ")[0]
-    if version.isascii() and version.isdecimal() and len(version) < 10 and int(version) > VERSION:
-        raise NewerVersion(f"container version {version}, this gvpipe reads up to {VERSION}; upgrade gvpipe")
+    if version.isascii() and version.isdecimal() and len(version) < 10 and int(version) > STREAM_VERSION:
+        raise NewerVersion(f"container version {version}, this gvpipe reads up to {STREAM_VERSION}; upgrade gvpipe")
     file.seek(layout.payload[0])
     bitstream, container = unpack_payload(file.read(layout.payload[1] - layout.payload[0]), budget)
     identity = _content_id(bitstream)
@@ -137,7 +184,7 @@ def _read(file: IO[bytes], size: int, budget: Budget) -> Bitstream:
         raise corrupt("its video is damaged, or was re-encoded")
     if container.integer("track_crc32", 0, MAX_CRC, track.configuration) != track.configuration:
         raise corrupt("the description of its video is damaged")
-    return replace(bitstream, video=video)
+    return replace(bitstream, video=video, n_bytes=size)
 
 
 def _is_tagged(file: IO[bytes], layout: _Layout) -> bool:
@@ -204,83 +251,8 @@ def _find_payload(file: IO[bytes], size: int) -> _Layout:
     return _Layout(found[0], moov, found[1])
 
 
-def _box(payload: bytes) -> bytes:
-    size = BOX.size + 16 + len(payload)
-    if size < 1 << 32:
-        return BOX.pack(size, b"uuid") + BOX_UUID.bytes + payload
-    return BOX.pack(1, b"uuid") + LARGE.pack(size + LARGE.size) + BOX_UUID.bytes + payload
-
-
 def _content_id(bitstream: Bitstream) -> str:
     digest = hashlib.sha256()
     for name, data in bitstream.sections.items():
         digest.update(name.encode() + b"\0" + struct.pack("<Q", len(data)) + data)
     return digest.hexdigest()[:32]
-
-
-def _remux(video: bytes, tag: str) -> bytes:
-    """Copy the video's one track, unchanged, into a file that carries the tag and whose index comes first.
-
-    In memory, where the video is already: a file that PyAV writes itself stays open, and its disk space taken, if the
-    last write to it fails. What no player needs is left out: bit rates, the handler's name, the edit list where each picture
-    is shown in the order of coding.
-    """
-    import av
-
-    options = {"movflags": "+faststart+use_metadata_tags", "fflags": "+bitexact", "write_btrt": "0", "empty_hdlr_name": "1"}
-    result = io.BytesIO()
-
-    def reopen(name: str, flags: int, more: dict[str, str]) -> IO[bytes]:
-        return io.BytesIO(result.getvalue())  # FFmpeg reads the file again to move the index to the front
-
-    with av.open(io.BytesIO(video), "r", format="mp4") as source:
-        track = source.streams.video[0]
-        packets = [packet for packet in source.demux(track) if packet.size]
-        if all(packet.pts == packet.dts for packet in packets):
-            options["use_editlist"] = "0"
-        with av.open(result, "w", format="mp4", options=options, io_open=reopen) as target:
-            target.metadata[TAG] = TAG_PREFIX + tag
-            copy = target.add_stream_from_template(track)
-            for packet in packets:
-                packet.stream = copy
-                target.mux(packet)
-    return result.getvalue()
-
-
-@dataclass(frozen=True)
-class _Track:
-    """What an MP4 file's tag says and its video tracks hold.
-
-    Args:
-        tag: gvpipe's tag, "" if there is none.
-        checksum: CRC-32 of the samples; n_bytes: their size.
-        configuration: CRC-32 of what decoders are set up with (the content of ``avcC``), then of one byte for each sample: 1 if
-            it is a key frame.
-    """
-
-    tag: str
-    checksum: int
-    n_bytes: int
-    configuration: int
-
-
-def _inspect(video: bytes, budget: Budget = UNLIMITED) -> _Track:
-    import av
-
-    checksum = n_bytes = configuration = 0
-    try:
-        with av.open(io.BytesIO(video), "r", format="mp4", stream_options=picture_limits(budget)) as container:
-            comment = str(container.metadata.get(TAG, "")).strip()
-            tag = comment.removeprefix(TAG_PREFIX) if comment.startswith(TAG_PREFIX) else ""
-            tracks: list[Any] = list(container.streams.video)
-            for track in tracks:
-                context = track.codec_context
-                configuration = zlib.crc32((context.extradata if context else None) or b"", configuration)
-            for packet in container.demux(tracks) if tracks else ():
-                checksum = zlib.crc32(bytes(packet), checksum)
-                n_bytes += packet.size
-                if packet.size:
-                    configuration = zlib.crc32(bytes([packet.is_keyframe]), configuration)
-    except (av.FFmpegError, UnicodeDecodeError, ValueError) as exc:
-        raise corrupt(f"its video cannot be read ({exc})") from exc
-    return _Track(tag, checksum, n_bytes, configuration)

@@ -37,6 +37,25 @@ def check_tables(moov: bytes, n_bytes: int) -> None:
             _check_entries(kind, table, size, n_samples)
 
 
+def check_no_samples(moov: bytes) -> None:
+    """Raise `CorruptFile` unless the tables in the ``moov`` box of a video in fragments are empty.
+
+    It holds one extension box, and a few edits at most.
+    """
+    for kind in (*UNUSED, b"sbgp"):
+        if kind in moov and kind != b"mvex":
+            raise _wrong(kind, "such boxes are not used")
+    for kind in (b"trak", b"stsz", b"mvex", b"trex"):
+        if moov.count(kind) != 1:
+            raise _wrong(kind, "there is not one of it")
+    for table in _find(moov, b"stsz", 4):
+        if _count_samples(table, 0):
+            raise _wrong(b"stsz", "pictures are in fragments alone")
+    for kind, size in ENTRY_BYTES.items():
+        for table in _find(moov, kind, 4):
+            _check_entries(kind, table, size, 0)
+
+
 def _count_samples(table: bytes, n_bytes: int) -> int:
     if len(table) < SIZES.size:
         raise _wrong(b"stsz", "it is cut short")

@@ -6,12 +6,40 @@ against the number of frames.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
 
 MAX_SEGMENT = 100_000  # frames
 SMALLEST_STEP, LARGEST_STEP = 2.0**-131, 2.0**129  # model units; no step of a float32 model lies beyond
 TINY, HUGE = 1e-60, 1e39  # open limits, model units, of numbers that were never limited more closely; old files may use them
+
+
+@dataclass(frozen=True)
+class SegmentParts:
+    """What each segment has of a bitstream, for a layout that keeps it together (`gvpipe.container.stream_layout`).
+
+    Args:
+        sections: names, by segment.
+        pictures: the first picture of each segment; empty where pictures are no part of segments.
+        late: names of sections that positions do not need.
+    """
+
+    sections: tuple[tuple[str, ...], ...] = ()
+    pictures: tuple[int, ...] = ()
+    late: tuple[str, ...] = ()
+
+
+def numbered_parts(names: Sequence[str], segments: int, pictures: Sequence[int] = ()) -> SegmentParts:
+    """The parts of segments whose sections have their number behind a dot.
+
+    Examples:
+        >>> numbered_parts(("basis", "deltas"), 2).sections
+        (('basis.0', 'deltas.0'), ('basis.1', 'deltas.1'))
+    """
+    return SegmentParts(tuple(tuple(f"{name}.{s}" for name in names) for s in range(segments)), tuple(pictures))
 
 
 def count_segments(n_frames: int, most: int) -> int:

@@ -5,17 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from gvpipe.io.gltf import GltfLoader, encode_glb
+from gvpipe.io.late import late
 from gvpipe.io.mesh import EncoderMaker, Loader
-from gvpipe.io.obj import ObjLoader
-from gvpipe.io.obj_writer import encode_obj
-from gvpipe.io.off import OffLoader
-from gvpipe.io.off_writer import encode_off
-from gvpipe.io.ply import PlyLoader
-from gvpipe.io.ply_writer import encode_ply
-from gvpipe.io.simulation.frame_loader import STEP_LOADERS
-from gvpipe.io.simulation.vtp_writer import encode_vtp
-from gvpipe.io.stl import StlLoader, encode_stl
 
 
 @dataclass(frozen=True)
@@ -31,14 +22,19 @@ class FrameFormat:
     encoder: EncoderMaker | None = None
 
 
+VTK_XML = (".vtp", ".vtu", ".vts", ".vtr", ".vti", ".pvtp", ".pvtu")
+STEPS = (".vtk", *VTK_XML)  # of simulations
+
 FRAME_FORMATS = {
-    ".obj": FrameFormat(ObjLoader, encode_obj),
-    ".ply": FrameFormat(PlyLoader, encode_ply),
-    ".stl": FrameFormat(StlLoader, encode_stl),
-    ".off": FrameFormat(OffLoader, encode_off),
-    ".glb": FrameFormat(GltfLoader, encode_glb),
-    ".gltf": FrameFormat(GltfLoader),
-    **{suffix: FrameFormat(loader, encode_vtp if suffix == ".vtp" else None) for suffix, loader in STEP_LOADERS.items()},
+    ".obj": FrameFormat(late("obj", "ObjLoader"), late("obj_writer", "encode_obj")),
+    ".ply": FrameFormat(late("ply", "PlyLoader"), late("ply_writer", "encode_ply")),
+    ".stl": FrameFormat(late("stl", "StlLoader"), late("stl", "encode_stl")),
+    ".off": FrameFormat(late("off", "OffLoader"), late("off_writer", "encode_off")),
+    ".glb": FrameFormat(late("gltf", "GltfLoader"), late("gltf", "encode_glb")),
+    ".gltf": FrameFormat(late("gltf", "GltfLoader")),
+    ".vtk": FrameFormat(late("simulation.frame_loader", "legacy_loader")),
+    **dict.fromkeys(VTK_XML, FrameFormat(late("simulation.frame_loader", "xml_loader"))),
+    ".vtp": FrameFormat(late("simulation.frame_loader", "xml_loader"), late("simulation.vtp_writer", "encode_vtp")),
 }
 
 

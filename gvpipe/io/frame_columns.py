@@ -20,10 +20,9 @@ from gvpipe.asset.field import Field
 from gvpipe.io.damage import FRAME_AGAIN, reading
 from gvpipe.io.frame_files import FrameFiles
 from gvpipe.io.mesh import FrameValues, Mesh
-from gvpipe.io.own_normals import entries_of, own_rule
+from gvpipe.io.own_normals import FIRST_NORMALS, entries_of, own_rule
 
 SAMPLES = 3  # files that are compared with the first before all are
-FIRST_NORMALS = "normals change from frame to frame, and not as those of the surface; the first frame's were kept"
 
 
 @dataclass(frozen=True)

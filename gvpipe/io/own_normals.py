@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from gvpipe.arrays import Array, Int32, Int64
+from gvpipe.arrays import Array, Float32, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.attributes.surface_normals import find_rule
 from gvpipe.io.sharing import shared_by_vertex
 from gvpipe.mesh.unique_rows import row_ids
 
+FIRST_NORMALS = "normals change from frame to frame, and not as those of the surface; the first frame's were kept"
 TOLERANCE = 1.0  # degrees: normals this near to a rule's are the surface's own
 
 
@@ -33,3 +36,13 @@ def entries_of(normals: Attribute, faces: Int32) -> tuple[Int64, Int64]:
         corners, _ = row_ids(np.stack([corners, own.astype(np.int64)], axis=1))
     _, first, entries = np.unique(corners, return_index=True, return_inverse=True)
     return entries.reshape(-1), first
+
+
+def first_normals_note(moves: bool, attributes: Mapping[str, Attribute], faces: Int32, positions: Float32) -> tuple[str, ...]:
+    """What to say of a file's normals, if they change (``moves``) and do not follow from the surface in the first frame."""
+    normals = attributes.get("normal")
+    if not moves or normals is None or normals.domain not in ("vertex", "corner"):
+        return ()
+    entries, corners = entries_of(normals, faces)
+    rows = corners if normals.domain == "corner" else faces.reshape(-1)[corners]
+    return () if own_rule(np.asarray(normals)[rows], positions, faces, entries) else (FIRST_NORMALS,)

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Int32, Int64
+from gvpipe.arrays import Array, Float32, Int64
 from gvpipe.asset.attribute import Attribute
-from gvpipe.io.frame_columns import FIRST_NORMALS
 from gvpipe.io.frame_normals import FrameNormals, frame_normals, turned_note
-from gvpipe.io.own_normals import entries_of, own_rule
 from gvpipe.io.scene_export import ExportMesh
 from gvpipe.io.scene_mesh import Layer
 from gvpipe.sequence import MeshSequence
@@ -47,13 +43,3 @@ class SceneNormals:
             return None
         used, places = np.unique(self._frames.indices[mesh.source], return_inverse=True)
         return used, places.reshape(-1).astype(np.int64)
-
-
-def first_normals_note(moves: bool, attributes: Mapping[str, Attribute], faces: Int32, positions: Float32) -> tuple[str, ...]:
-    """What to say of a file's normals, if they change (``moves``) and do not follow from the surface in the first frame."""
-    normals = attributes.get("normal")
-    if not moves or normals is None or normals.domain not in ("vertex", "corner"):
-        return ()
-    entries, corners = entries_of(normals, faces)
-    rows = corners if normals.domain == "corner" else faces.reshape(-1)[corners]
-    return () if own_rule(np.asarray(normals)[rows], positions, faces, entries) else (FIRST_NORMALS,)

@@ -14,10 +14,10 @@ import numpy as np
 from gvpipe.arrays import Float64
 from gvpipe.errors import InputError
 from gvpipe.io.damage import reading
+from gvpipe.io.formats import STEPS
 from gvpipe.io.frame_columns import split_columns
 from gvpipe.io.frame_files import FrameFiles
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.simulation.frame_loader import STEP_LOADERS
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.times import time_steps
 from gvpipe.io.simulation.xml_root import parse_xml
@@ -55,10 +55,8 @@ def read_listed(files: list[Path], times: Float64, path: Path, options: ReadOpti
         start: number of the first file in the list.
     """
     suffixes = {file.suffix.lower() for file in files}
-    if len(suffixes) > 1 or not suffixes <= set(STEP_LOADERS):
-        raise InputError(
-            f"{path} lists {', '.join(sorted(suffixes))} files; files of one of {', '.join(STEP_LOADERS)} are needed"
-        )
+    if len(suffixes) > 1 or not suffixes <= set(STEPS):
+        raise InputError(f"{path} lists {', '.join(sorted(suffixes))} files; files of one of {', '.join(STEPS)} are needed")
     frames = FrameFiles(files, start)
     first, columns = frames.first, split_columns(frames)
     timing = time_steps(times, len(files), options.fps)

@@ -18,12 +18,13 @@ from __future__ import annotations
 import io
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +62,7 @@ X264 = {
 X264["8x8dct"] = 1  # makes the profile High with every preset, ultrafast too
 
 Plane = UInt8 | NDArray[np.uint16]
+Demuxed = tuple[list[Any], bytes | None]  # packets (`av.Packet`), and what the decoder is set up with
 
 
 @dataclass(frozen=True)
@@ -205,11 +207,32 @@ class VideoWriter:
         return picture
 
 
+class Fragments(Protocol):
+    """A video whose pictures are read in fragments, each of which begins with a key frame.
+
+    Args:
+        head: the boxes ``ftyp`` and ``moov``.
+        counts: pictures of each fragment.
+    """
+
+    head: bytes
+    counts: list[int]
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of all pictures."""
+        ...
+
+    def read(self, number: int) -> bytes:
+        """Return the boxes ``moof`` and ``mdat`` of a fragment; raises `FormatError`."""
+        ...
+
+
 class VideoReader:
     """Random access to the planes of a video; decodes no more than the group of pictures that a frame lies in.
 
     Args:
-        data: an MP4 file.
+        data: an MP4 file, or its fragments, of which each is read with the groups in it.
         profile: that it was written with.
         width, height: of a plane.
         budget: of the file.
@@ -219,14 +242,18 @@ class VideoReader:
         OverBudget: here or later: pictures take more than the file may.
     """
 
-    def __init__(self, data: bytes, profile: Profile, width: int, height: int, budget: Budget = UNLIMITED) -> None:
+    def __init__(self, data: bytes | Fragments, profile: Profile, width: int, height: int, budget: Budget = UNLIMITED) -> None:
         self.profile, self.shape, self._budget = profile, (height, width), budget
         budget.ask(f"a picture of {width}x{height}", BYTES_PER_PIXEL * width * height)
-        self._packets, self._extradata = _demux(data, profile, width, height, budget)
-        starts = [i for i, packet in enumerate(self._packets) if packet.is_keyframe]
-        if not starts or starts[0] != 0:
-            raise corrupt("the video does not start with a key frame")
-        self._groups = list(zip(starts, [*starts[1:], len(self._packets)], strict=True))
+
+        def demux(video: bytes) -> Demuxed:
+            return _demux(video, profile, width, height, budget)
+
+        if isinstance(data, bytes):
+            self._packets: _WholePackets | _FragmentPackets = _WholePackets(demux(data))
+        else:
+            self._packets = _FragmentPackets(data, demux, is_alone=profile.codec == "mjpeg")
+        self._groups = self._packets.groups
         self._cached: tuple[int, list[Plane]] = (-1, [])
         self._pool = ThreadPoolExecutor(AHEAD)
         renew_after_fork(self)
@@ -238,7 +265,7 @@ class VideoReader:
     @property
     def n_frames(self) -> int:
         """Frames in the track."""
-        return len(self._packets)
+        return self._groups[-1][1] if self._groups else 0
 
     def group(self, frame: int) -> tuple[int, int]:
         """``(first, last + 1)`` of the group of pictures that a frame lies in."""
@@ -281,12 +308,12 @@ class VideoReader:
         number, planes = self._cached
         if number != group:
             first, last = self._groups[group]
-            packets = self._packets[first:last]
-            self._ask_for(len(packets))
+            self._ask_for(last - first)
+            packets, extradata = self._packets.read(first, last)
             if self.profile.codec == "mjpeg":
                 planes = [decode_jpeg(bytes(packet), *self.shape) for packet in packets]
             else:
-                planes = self._decode_h264(packets)
+                planes = self._decode_h264(packets, extradata)
             self._cached = (group, planes)
         return planes
 
@@ -297,11 +324,11 @@ class VideoReader:
         what = f"a group of {n_pictures} pictures of {self.shape[1]}x{self.shape[0]}"
         self._budget.ask(what, size, SECONDS_PER_PIXEL * pixels)
 
-    def _decode_h264(self, packets: list[av.Packet[Any]]) -> list[Plane]:
+    def _decode_h264(self, packets: list[av.Packet[Any]], extradata: bytes | None) -> list[Plane]:
         import av
 
         decoder = av.CodecContext.create("h264", "r")
-        decoder.extradata = self._extradata
+        decoder.extradata = extradata
         decoder.thread_count = 1
         height, width = self.shape
         decoder.options = {"max_pixels": str(2 * width * height + SPARE_PIXELS)}  # whatever the packets say
@@ -322,6 +349,53 @@ class VideoReader:
         plane = picture.planes[0]
         rows = np.frombuffer(plane, self.profile.dtype).reshape(-1, plane.line_size // self.profile.dtype.itemsize)
         return rows[:height]  # the decoder's own memory: a copy costs half as much as decoding
+
+
+class _WholePackets:
+    """The packets of a whole video, and its groups of pictures, ``(first, last + 1)``."""
+
+    def __init__(self, demuxed: Demuxed) -> None:
+        self._packets, self._extradata = demuxed
+        starts = [i for i, packet in enumerate(self._packets) if packet.is_keyframe]
+        if not starts or starts[0] != 0:
+            raise corrupt("the video does not start with a key frame")
+        self.groups = list(zip(starts, [*starts[1:], len(self._packets)], strict=True))
+
+    def read(self, first: int, last: int) -> Demuxed:
+        """The packets of a group, and what the decoder is set up with."""
+        return self._packets[first:last], self._extradata
+
+
+class _FragmentPackets:
+    """The packets of a video in fragments, of which the last is kept: a fragment is a group of pictures.
+
+    Args:
+        fragments: of the video.
+        demux: takes a video apart.
+        is_alone: whether every picture decodes alone, and so is a group.
+    """
+
+    def __init__(self, fragments: Fragments, demux: Callable[[bytes], Demuxed], is_alone: bool) -> None:
+        self._fragments, self._demux = fragments, demux
+        self._starts = np.concatenate([[0], np.cumsum(fragments.counts)]).tolist()
+        starts = list(range(self._starts[-1] + 1)) if is_alone else self._starts
+        if len(starts) < 2:
+            raise corrupt("the video has no pictures")
+        self.groups: list[tuple[int, int]] = list(pairwise(starts))
+        self._last: tuple[int, Demuxed] = (-1, ([], None))
+
+    def read(self, first: int, last: int) -> Demuxed:
+        """The packets of a group, and what the decoder is set up with; raises `FormatError`."""
+        number = bisect_right(self._starts, first) - 1
+        kept, demuxed = self._last  # once: other threads read too
+        if kept != number:
+            demuxed = self._demux(self._fragments.head + self._fragments.read(number))
+            if len(demuxed[0]) != self._fragments.counts[number] or not demuxed[0][0].is_keyframe:
+                count = self._fragments.counts[number]
+                raise corrupt(f"fragment {number} of the video is not of {count} pictures from a key frame on")
+            self._last = number, demuxed
+        start = self._starts[number]
+        return demuxed[0][first - start : last - start], demuxed[1]
 
 
 class PlainPackets:
@@ -366,7 +440,7 @@ def x264_options(quality: int, gop: int, preset: str, b_frames: int = B_FRAMES) 
     return {"preset": preset, "x264-params": ":".join(f"{key}={value}" for key, value in settings.items())}
 
 
-def _demux(data: bytes, profile: Profile, width: int, height: int, budget: Budget) -> tuple[list[av.Packet[Any]], bytes | None]:
+def _demux(data: bytes, profile: Profile, width: int, height: int, budget: Budget) -> Demuxed:
     import av
 
     try:

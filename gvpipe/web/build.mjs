@@ -1,6 +1,7 @@
 // Builds the bundles in bundle/, or in the folder given: node build.mjs [FOLDER]
+// Builds the modules of the package, which leave three.js outside, in dist/: node build.mjs --package
 import { build } from "esbuild";
-import { readFileSync } from "node:fs";
+import { copyFileSync, readFileSync, readdirSync, rmSync } from "node:fs";
 import { fileURLToPath } from "node:url";
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
@@ -16,13 +17,32 @@ const common = {
 };
 const worker = await build({ ...common, entryPoints: ["src/fields/worker.js"], format: "iife", write: false, define: { WORKER_SOURCE: '""' } });
 
-await build({
+const pages = {
   ...common,
-  entryPoints: { "geometry-video": "src/geometry_video.js", player: "src/player.js" },
-  outdir: process.argv[2] ?? "bundle",
   format: "esm",
   define: { WORKER_SOURCE: JSON.stringify(worker.outputFiles[0].text) }, // pages from a disk may load no second file
   banner: { js: `/*!\n${notice}\n*/` },
   loader: { ".wasm": "binary", ".css": "text" },
-  external: ["node:fs", "fs", "path"], // asked for by Draco's wrapper in Node alone
-});
+};
+const outside = ["node:fs", "fs", "path"]; // asked for by Draco's wrapper in Node alone
+
+const buildBundles = (outdir) =>
+  build({ ...pages, entryPoints: { "geometry-video": "src/geometry_video.js", player: "src/player.js" }, outdir, external: outside });
+
+async function buildPackage() {
+  rmSync(here("dist"), { recursive: true, force: true });
+  await buildBundles("dist");
+  await build({
+    ...pages,
+    entryPoints: { "geometry-video": "src/geometry_video.js", three: "src/three.js", element: "src/player.js" },
+    outdir: "dist",
+    splitting: true, // what entries share is there once
+    chunkNames: "shared-[hash]",
+    minify: false, // by those who bundle it
+    external: [...outside, "three", "three/*"],
+  });
+  for (const name of readdirSync(here("types"))) copyFileSync(here(`types/${name}`), here(`dist/${name}`));
+  copyFileSync(here("../../LICENSE"), here("LICENSE"));
+}
+
+await (process.argv[2] === "--package" ? buildPackage() : buildBundles(process.argv[2] ?? "bundle"));

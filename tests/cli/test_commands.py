@@ -19,6 +19,7 @@ import av
 import cv2
 import numpy as np
 import pytest
+from file_server import serving
 
 import gvpipe
 from gvpipe.errors import CorruptFile, FormatError, NotGeometryVideo, StrippedFile, TruncatedFile
@@ -637,3 +638,33 @@ def test_opens_as_an_ordinary_video(video_bytes: bytes) -> None:
         assert (stream.frames, stream.average_rate, int(context.color_range)) == (11, Fraction(25), 1)
         assert container.duration == 11 * 1_000_000 // 25
         assert sum(1 for _ in container.decode(video=0)) == 11
+
+
+def test_restream_goes_both_ways(run: Run, video: Path, tmp_path: Path) -> None:
+    stream, back = tmp_path / "stream.mp4", tmp_path / "back.mp4"
+    ended = run("restream", video, stream)
+    assert ended.status == 0 and "stream layout" in ended.out and ended.out.count("\n") == 1
+    values = one_object(run("restream", stream, back, "--json").out)
+    size, before = video.stat().st_size, stream.stat().st_size
+    assert values == {"output": str(back), "layout": "plain", "bytes_before": before, "bytes": size}
+    assert back.read_bytes() == video.read_bytes()
+    assert one_object(run("info", stream, "--json").out)["layout"] == "stream"
+    assert run("info", stream).out.splitlines()[0].endswith(", stream layout")
+    assert run("restream", stream, tmp_path / "again.mp4", "--layout", "stream").status == 0
+    assert (tmp_path / "again.mp4").read_bytes() == stream.read_bytes()
+    assert_refused(run, tmp_path, ("restream", tmp_path / "no.mp4", back), ("no such file",))
+    assert_refused(run, tmp_path, ("restream", video, tmp_path / "x.npz"), ("end its name in .mp4",))
+
+
+def test_encode_stream_and_read_from_a_server(run: Run, npz: Path, tmp_path: Path) -> None:
+    target = tmp_path / "stream.mp4"
+    assert run("encode", npz, target, *FAST, "--stream").status == 0
+    with serving(target.read_bytes()) as (url, served):
+        assert one_object(run("info", url, "--json").out)["layout"] == "stream"
+        assert run("decode", url, tmp_path / "a.npz").status == 0
+        assert run("decode", target, tmp_path / "b.npz").status == 0
+        a, b = gvpipe.read(tmp_path / "a.npz"), gvpipe.read(tmp_path / "b.npz")
+        assert np.array_equal(a[:], b[:])
+        served.status = 404
+        assert_refused(run, tmp_path, ("info", url), (url, "404"))
+    assert_refused(run, tmp_path, ("encode", npz, tmp_path / "x.mp4", "--stream", "--target-bpvf", "9"), ("restream",))

@@ -86,6 +86,28 @@ def test_a_point_cache_needs_its_mesh(run: Run, sequence: MeshSequence, tmp_path
     assert run("info", tmp_path / "a.pc2").status == 1
     values = json.loads(run("info", tmp_path / "a.pc2", "--mesh", tmp_path / "base.obj", "--json").out)
     assert (values["frames"], values["triangles"]) == (11, 128)
+    picture = ["render", tmp_path / "a.pc2", tmp_path / "a.png", "--size", 32]
+    assert run(*picture).status == 1
+    assert run(*picture, "--mesh", tmp_path / "base.obj", "--frames", "5:", "--frame", 5).status == 0
+    assert run(*picture, "--mesh", tmp_path / "base.obj", "--frames", "5:", "--frame", 6).status == 1
+
+
+def test_some_frames_where_the_topology_changes(run: Run, sequence: MeshSequence, tmp_path: Path) -> None:
+    gvpipe.write(sequence.part(0, 2), tmp_path / "walk" / "%02d.obj")
+    gvpipe.write(scene(3), tmp_path / "walk" / "%02d.obj", start=2)
+    ended = run("render", tmp_path / "walk", tmp_path / "a.gif", "--size", 32)
+    assert ended.status == 1 and "--frames 0:2 or --frames 2:" in ended.err and ended.err.count("\n") == 1
+    for span, frames, vertices in (("0:2", 2, 72), ("2:", 3, 98)):
+        values = json.loads(run("info", tmp_path / "walk", "--frames", span, "--json").out)
+        assert (values["frames"], values["vertices"]) == (frames, vertices)
+        assert run("render", tmp_path / "walk", tmp_path / "a.png", "--size", 32, "--frames", span).status == 0
+
+
+def test_a_clip_is_painted(run: Run, tmp_path: Path) -> None:
+    two_clips(tmp_path / "a.glb")
+    assert run("render", tmp_path / "a.glb", tmp_path / "a.png", "--clip", "Run", "--frame", 60, "--size", 32).status == 0
+    ended = run("render", tmp_path / "a.glb", tmp_path / "a.png", "--clip", "Rum")
+    assert ended.status == 1 and "there are: 'Walk', 'Run'" in ended.err
 
 
 @pytest.mark.parametrize(
@@ -99,4 +121,4 @@ def test_what_cannot_be_read(run: Run, tmp_path: Path, name: str, data: bytes) -
 
 
 def test_a_video_has_no_clips(run: Run, video: Path) -> None:
-    assert run("info", video, "--clip", "Run").status == 2
+    assert run("info", video, "--clip", "Run").status == run("info", video, "--frames", "0:1").status == 2

@@ -7,6 +7,8 @@ import os
 import sys
 import tempfile
 import zipfile
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from mesh_files import FACES, FRAME_SUFFIXES, POSITIONS, fast, grid, same_bits
 
 from gvpipe import io
 from gvpipe.errors import InputError, OutputError
+from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.turned_normals import TurnedNormals
 from gvpipe.sequence import MeshSequence
 
@@ -159,11 +162,22 @@ def test_output_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert os.listdir(tmp_path) == ["file"]
 
 
-def test_trimesh_loads_only_when_needed() -> None:
+def test_formats_load_only_when_needed() -> None:
+    """A process that runs a library starts fast: other formats, SciPy and compiled loops stay out."""
     import subprocess
 
-    code = "import sys, gvpipe.io; sys.exit('trimesh' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    heavy = {"numba", "scipy", "trimesh", "gvpipe.io.gltf", "gvpipe.io.obj", "urllib.request"}
+    code = f"import sys, gvpipe.io.alembic.worker, gvpipe.io.fbx.worker; sys.exit(str({heavy} & set(sys.modules) or ''))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False).stderr.strip() == ""
+
+
+def test_names_that_load_late_exist() -> None:
+    frames = [each for entry in FRAME_FORMATS.values() for each in (entry.loader, entry.encoder)]
+    late = [each for each in (*io.READERS.values(), *io.WRITERS.values(), *frames) if isinstance(each, partial)]
+    assert len(late) > 30
+    for each in late:
+        module, name = each.args
+        assert callable(getattr(import_module(module), name))
 
 
 @pytest.mark.parametrize("suffix", ["obj", "ply", "off", "glb"])

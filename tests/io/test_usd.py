@@ -14,6 +14,7 @@ from PIL import Image as Pillow
 from scenes import FACES, assert_same, scene
 
 from gvpipe import io
+from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError, OutputError
 from gvpipe.sequence import MeshSequence
 
@@ -80,6 +81,13 @@ def test_points_are_sampled_at_each_time_code(tmp_path: Path) -> None:
     assert read[:][:, 0, 2].tolist() == [0, 2, 4]
     assert read.metadata.start_time == 1 / 24
     assert (read.parts[0].name, read.parts[0].parent) == ("m", "")
+
+
+@pytest.mark.parametrize(("start", "code"), [(0.04166661947965622, "1"), (0.5, "12"), (0.51, "12.24")])
+def test_first_time_code(tmp_path: Path, start: float, code: str) -> None:
+    """A start that float32 rounded is a whole time code again."""
+    io.write(replace(scene(), metadata=Metadata(start_time=start)), tmp_path / "a.usda")
+    assert f"startTimeCode = {code}\n" in (tmp_path / "a.usda").read_text()
 
 
 def test_other_rate(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ from gvcodecs.laplacian.reader import LaplacianReader
 from gvpipe.arrays import Int64
 from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.segments import MAX_SEGMENT, cut
+from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_parts
 from gvpipe.rate_control.step_search import NEAR, Anchor, StepTrial, find_step, first_step, step_between
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import MAX_COMPONENTS, reduce_trajectories, squared_errors
@@ -166,6 +166,11 @@ class Laplacian(BaseCodec):
     def reader(cls, bitstream: Bitstream) -> FrameReader:
         """Open a ``laplacian`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         return LaplacianReader(bitstream)
+
+    @classmethod
+    def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
+        """What each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
+        return numbered_parts(("basis", "anchors", "deltas"), Header.of(bitstream).segments)
 
 
 @dataclass(frozen=True)

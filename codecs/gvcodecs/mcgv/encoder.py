@@ -20,11 +20,12 @@ from dataclasses import dataclass
 from gvcodecs.mcgv.browser import browser_obstacle
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.target_search import encode_to_target
-from gvcodecs.mcgv.reader_choice import open_reader
+from gvcodecs.mcgv.reader_choice import open_reader, segment_parts
 from gvcodecs.mcgv.settings import Settings
 from gvpipe.blas import one_blas_thread
 from gvpipe.codec import Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import SegmentParts
 from gvpipe.sequence import MeshSequence
 
 
@@ -49,3 +50,8 @@ class Mcgv(Settings):
     def browser_obstacle(cls, bitstream: Bitstream) -> str:
         """What keeps browsers from playing a bitstream of this codec; ``""`` if they play it."""
         return browser_obstacle(bitstream)
+
+    @classmethod
+    def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
+        """What each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
+        return segment_parts(bitstream)

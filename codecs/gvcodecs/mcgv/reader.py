@@ -122,7 +122,7 @@ class McgvReader:
 def _open_video(bitstream: Bitstream, header: Header, bounds: list[int]) -> VideoReader | NoPictures:
     if not header.pictures:
         return NoPictures(bounds, header.profile.middle)
-    return VideoReader(bitstream.video, header.profile, header.width, 3 * header.height, bitstream.budget)
+    return VideoReader(bitstream.pictures, header.profile, header.width, 3 * header.height, bitstream.budget)
 
 
 def read_layout(bitstream: Bitstream, header: Header, surface: DecodedBase, groups: Integers | None = None) -> Layout:

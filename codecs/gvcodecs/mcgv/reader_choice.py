@@ -1,12 +1,16 @@
-"""The reader of an ``mcgv`` bitstream: of frames, or of trajectory images."""
+"""The reader of an ``mcgv`` bitstream, and the parts of its segments: pictures are frames, or trajectory images."""
 
 from __future__ import annotations
 
+from itertools import accumulate
+
 from gvcodecs.mcgv.header import Header
+from gvcodecs.mcgv.pictures.trajectories import count_pictures
 from gvcodecs.mcgv.reader import McgvReader
 from gvcodecs.mcgv.trajectory_reader import TrajectoryReader
 from gvpipe.codec import FrameReader
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import SegmentParts, numbered_parts, segment_starts
 
 
 def open_reader(bitstream: Bitstream) -> FrameReader:
@@ -15,3 +19,13 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
     if header.images:
         return TrajectoryReader(bitstream, header, header.images)
     return McgvReader(bitstream, header)
+
+
+def segment_parts(bitstream: Bitstream) -> SegmentParts:
+    """What each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
+    header, names = Header.of(bitstream), ("transforms", "trajectories")
+    if header.images:
+        counts = [count_pictures(n) for n in header.images.components]
+        return numbered_parts(names, header.segments, [0, *accumulate(counts[:-1])])
+    starts = segment_starts(bitstream.n_frames, header.segments)[:-1]
+    return numbered_parts(names, header.segments, starts if header.pictures else ())

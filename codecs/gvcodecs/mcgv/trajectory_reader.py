@@ -69,7 +69,7 @@ class TrajectoryReader:
         self._bounds = segment_starts(bitstream.n_frames, header.segments)
         counts = [count_pictures(n) for n in images.components]
         self._pictures = np.concatenate([[0], np.cumsum(counts)])  # first picture of every segment, and their number
-        self._video = VideoReader(bitstream.video, header.profile, header.width, PLANES * header.height, bitstream.budget)
+        self._video = VideoReader(bitstream.pictures, header.profile, header.width, PLANES * header.height, bitstream.budget)
         if self._video.n_frames != sum(counts):
             raise CorruptFile(f"the video has {self._video.n_frames} pictures, the header tells of {sum(counts)}")
         self._segment: _Segment | None = None

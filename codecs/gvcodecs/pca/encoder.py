@@ -22,7 +22,7 @@ from gvcodecs.pca.header import MAX_SEGMENTS, VERSION_STILL, Header
 from gvcodecs.pca.reader import PcaReader, causal_order
 from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.segments import MAX_SEGMENT, cut
+from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_parts
 from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import MAX_COMPONENTS, Reduced, reduce_trajectories
@@ -99,3 +99,8 @@ class Pca(BaseCodec):
     def reader(cls, bitstream: Bitstream) -> FrameReader:
         """Open a ``pca`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         return PcaReader(bitstream)
+
+    @classmethod
+    def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
+        """What each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
+        return numbered_parts(("basis", "coefficients"), Header.of(bitstream).segments)

@@ -28,7 +28,7 @@ from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.connectivity.base_mesh import EncodedMesh
 from gvpipe.connectivity.welded_mesh import WeldedMesh, encode_points
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.segments import MAX_SEGMENT, cut
+from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_parts
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of
@@ -109,6 +109,11 @@ class Pdct(BaseCodec):
     def reader(cls, bitstream: Bitstream) -> FrameReader:
         """Open a ``pdct`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
         return PdctReader(bitstream)
+
+    @classmethod
+    def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
+        """What each clip has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
+        return numbered_parts(("clip",), Header.of(bitstream).clips)
 
     def open_step(self, diagonal: float) -> float:
         """The step, model units, where only a frame's ``diagonal`` is known, as in streams."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.errors import InputError
-from gvpipe.io.damage import reading
+from gvpipe.io.damage import WHOLE, reading
 
 EXTRA = "Alembic files need the package alembic3d; install it by: pip install 'gvpipe[alembic]'"
 OGAWA, HDF5 = b"Ogawa", b"\x89HDF"
@@ -65,7 +65,7 @@ def open_archive(path: Path) -> Any:
         raise InputError(f"{path} is not an Alembic file ({begins}); export it again")
     if len(head) < 8 or head[len(OGAWA)] != CLOSED:
         raise InputError(f"{path} was not written to its end; export it again")
-    with reading(path, "Alembic"):
+    with reading(path, "Alembic", remedy=WHOLE):
         return Abc.IArchive(str(path))
 
 

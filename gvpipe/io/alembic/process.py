@@ -20,6 +20,7 @@ from gvpipe.errors import InputError
 from gvpipe.io.alembic.archive import EXTRA
 from gvpipe.io.library_process import LibraryProcess
 from gvpipe.io.options import ReadOptions
+from gvpipe.io.own_normals import first_normals_note
 from gvpipe.sequence import MeshSequence
 
 WORKER = "gvpipe.io.alembic.worker"
@@ -38,7 +39,11 @@ class FieldShape:
 
 @dataclass(frozen=True)
 class Described:
-    """A sequence without its positions and the values of its fields; see `gvpipe.MeshSequence`."""
+    """A sequence without its positions and the values of its fields; see `gvpipe.MeshSequence`.
+
+    Args:
+        moves_normals: whether the archive's normals change; the note about them needs what takes long to import.
+    """
 
     shape: tuple[int, ...]
     faces: Int32
@@ -52,6 +57,7 @@ class Described:
     materials: tuple[Material, ...]
     metadata: Metadata
     rounding: float
+    moves_normals: bool
 
 
 class _Frames:
@@ -94,14 +100,16 @@ def read_alembic(path: Path, options: ReadOptions) -> MeshSequence:
         name: Field(_FieldFrames(process, name, field), field.domain, field.kind, name=name)
         for name, field in held.fields.items()
     }
+    frames = _Frames(process, held)
+    unruled = first_normals_note(True, held.attributes, held.faces, frames[0:1][0]) if held.moves_normals else ()
     return MeshSequence(
-        _Frames(process, held),
+        frames,
         held.faces,
         held.fps,
         held.attributes,
         str(path),
         held.origin,
-        held.notes,
+        (*held.notes, *unruled),
         fields,
         held.parts,
         held.polygons,

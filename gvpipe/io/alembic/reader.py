@@ -25,13 +25,12 @@ from gvpipe.io.scene_fields import join_fields, misfit_note
 from gvpipe.io.scene_frames import SceneFrames, even_times, first_frame_of
 from gvpipe.io.scene_layers import join_layers
 from gvpipe.io.scene_mesh import SceneMesh, join
-from gvpipe.io.scene_normals import first_normals_note
 from gvpipe.notes import DEFAULT_FPS
 from gvpipe.sequence import MeshSequence
 
 
-def read_archive(path: Path, options: ReadOptions) -> MeshSequence:
-    """Read the meshes of an Alembic archive, in the file's units, with the transforms above them.
+def read_archive(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
+    """Read the meshes of an Alembic archive, in the file's units, with the transforms above them, and whether normals change.
 
     Args:
         path: an .abc of the Ogawa kind.
@@ -46,7 +45,7 @@ def read_archive(path: Path, options: ReadOptions) -> MeshSequence:
         return _read_meshes(archive, path, options)
 
 
-def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> MeshSequence:
+def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
     where = str(path)
     nodes, others = find_meshes(archive)
     motions = [motion for motion in map(AlembicMotion, nodes) if motion.n_vertices]
@@ -79,23 +78,22 @@ def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> MeshSequence
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
     sampled = [sampled_of(motion.node.schema, mesh, start) for motion, mesh in zip(motions, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times, where)
-    moves = any(changing_normals(motion.node.schema) for motion in motions)
-    unruled = first_normals_note(moves, attributes, joined.faces, frames[0:1][0])
     misfits = misfit_note("parameters", [*(names for _, names in read), torn])
-    return MeshSequence(
+    sequence = MeshSequence(
         frames,
         joined.faces,
         fps,
         attributes,
         where,
         frames.origin,
-        (*notes, *time_notes, *layer_notes, *unruled, *misfits),
+        (*notes, *time_notes, *layer_notes, *misfits),
         fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,
         materials=tuple(Material(name) for name in materials),
         metadata=_metadata(archive, path, start),
     )
+    return sequence, any(changing_normals(motion.node.schema) for motion in motions)
 
 
 def _read_mesh(motion: AlembicMotion, materials: list[str], frames: tuple[Float64, str, int]) -> tuple[SceneMesh, list[str]]:

@@ -30,7 +30,8 @@ class Scene:
         return methods[name](*arguments)
 
     def _open(self, where: str, options: ReadOptions) -> Described:
-        sequence = self._sequence = read_archive(Path(where), options)
+        sequence, moves_normals = read_archive(Path(where), options)
+        self._sequence = sequence
         fields = {
             name: FieldShape(field.values.shape, field.values.dtype, field.domain, field.kind)
             for name, field in sequence.fields.items()
@@ -48,6 +49,7 @@ class Scene:
             sequence.materials,
             sequence.metadata,
             sequence.rounding,
+            moves_normals,
         )
 
     def _frames(self, start: int, stop: int) -> Any:

@@ -4,7 +4,3 @@ It is experimental, as the Python package of ufbx is.
 
 Source: S. Raivio, ufbx (https://github.com/ufbx/ufbx), which evaluates all motion itself.
 """
-
-from gvpipe.io.fbx.reader import read_fbx, read_takes
-
-__all__ = ["read_fbx", "read_takes"]

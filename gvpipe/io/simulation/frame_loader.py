@@ -14,8 +14,6 @@ from gvpipe.io.simulation.legacy import load_legacy
 from gvpipe.io.simulation.surface import Surface, extract_surface
 from gvpipe.io.simulation.xml_grids import load_xml_grid
 
-XML_SUFFIXES = (".vtp", ".vtu", ".vts", ".vtr", ".vti", ".pvtp", ".pvtu")
-
 
 class SurfaceLoader:
     """Loads the surface of one file after the other.
@@ -53,8 +51,11 @@ def _guarded(path: Path, name: str, read: Callable[[], FrameValues]) -> FrameVal
         return read()
 
 
-STEP_LOADERS: dict[str, Callable[[], SurfaceLoader]] = {
-    ".vtk": lambda: SurfaceLoader(load_legacy),
-    **dict.fromkeys(XML_SUFFIXES, lambda: SurfaceLoader(load_xml_grid)),
-}
-"""What loads the files of one time step each, by extension."""
+def legacy_loader() -> SurfaceLoader:
+    """What loads files of legacy VTK."""
+    return SurfaceLoader(load_legacy)
+
+
+def xml_loader() -> SurfaceLoader:
+    """What loads files of VTK's XML formats."""
+    return SurfaceLoader(load_xml_grid)

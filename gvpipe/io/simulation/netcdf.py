@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from pathlib import Path
 from typing import Any, Protocol
@@ -56,9 +57,11 @@ class Classic:
         from scipy.io import netcdf_file
 
         class QuietFile(netcdf_file):
-            """A file that closes without a warning where arrays of a damaged one are still mapped."""
+            """A file that closes without a warning where arrays of a damaged one are still mapped; not while Python ends."""
 
             def close(self) -> None:
+                if sys.is_finalizing():
+                    return
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore", RuntimeWarning)
                     super().close()

@@ -27,6 +27,7 @@ from gvpipe.io.simulation.cells import (
     VOLUMES,
     Cells,
 )
+from gvpipe.mesh.unique_rows import row_ids
 from gvpipe.notes import left_out
 
 QUADRATIC_POLYGON = 36
@@ -169,14 +170,13 @@ def _from_middle(nodes: Int64, kind: int) -> Int64:
 
 
 def _occurs_once(nodes: Int64) -> Bool:
-    keys = _keys(nodes)
-    _, inverse, counts = np.unique(keys, return_inverse=True, return_counts=True)
-    return np.asarray(counts[inverse.reshape(-1)] == 1)
+    ids, _ = row_ids(np.sort(nodes, axis=1))
+    return np.asarray(np.bincount(ids)[ids] == 1)
 
 
 def _uncovered(flat: list[_Faces], solid: list[_Faces]) -> tuple[list[_Faces], int]:
     """Flat cells that are no face of a volume cell, and the number of the others."""
-    by_size = {faces.nodes.shape[1]: _keys(faces.nodes) for faces in solid}
+    by_size = {faces.nodes.shape[1]: _keys(faces.nodes) for faces in solid} if flat else {}
     kept, n_covered = [], 0
     for faces in flat:
         size = faces.nodes.shape[1]
@@ -194,8 +194,10 @@ def _keys(nodes: Int64) -> Array:
 
 def _turned_outwards(border: list[_Faces], solid: list[_Faces], points: Floats, n_cells: int) -> list[_Faces]:
     """Faces of the surface, reversed where their cell's volume is negative."""
-    volume = np.zeros(n_cells)
-    for faces in solid:
+    volume, is_outer = np.zeros(n_cells), np.zeros(n_cells, bool)
+    for faces in border:
+        is_outer[faces.cells] = True
+    for faces in (each.select(is_outer[each.cells]) for each in solid):
         corners = points[faces.nodes].astype(np.float64)  # (N, n, 3)
         middle = corners - corners.mean(axis=1, keepdims=True)
         normal = np.cross(middle, np.roll(middle, -1, axis=1)).sum(axis=1)

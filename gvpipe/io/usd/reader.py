@@ -12,11 +12,11 @@ from gvpipe.arrays import Float64
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
 from gvpipe.io.options import ReadOptions
+from gvpipe.io.own_normals import first_normals_note
 from gvpipe.io.scene_fields import join_fields, misfit_note
 from gvpipe.io.scene_frames import SceneFrames
 from gvpipe.io.scene_layers import join_layers
 from gvpipe.io.scene_mesh import SceneMesh, join
-from gvpipe.io.scene_normals import first_normals_note
 from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.meshes import find_meshes, groups_of, polygons_of
 from gvpipe.io.usd.motion import Skins, UsdMotion

@@ -28,6 +28,7 @@ from gvpipe.io.usd.stage import EXTRA
 from gvpipe.sequence import MeshSequence
 
 ROOT = "root"  # of meshes that have no common node
+CLOSE = 1e-4  # time codes: programs cut 0.9999988, which a float32 start time gives, down to 0
 
 
 def write_usd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
@@ -82,7 +83,7 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str) -
 
     stage: Any = _new_stage(path)
     about = sequence.metadata
-    start = float(np.rint(about.start_time * sequence.fps * 1e6) / 1e6)
+    start = _first_code(about.start_time, sequence.fps)
     stage.SetTimeCodesPerSecond(sequence.fps)
     stage.SetFramesPerSecond(sequence.fps)
     stage.SetStartTimeCode(start)
@@ -117,6 +118,12 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str) -
     stage.GetRootLayer().Save()
     parts = [(mesh.name, where.rpartition("/")[2]) for where, mesh in zip(paths, meshes, strict=True)]
     return (*dict.fromkeys(said), *renamed_note(parts, "USD"), *_notes(sequence, meshes))
+
+
+def _first_code(start_time: float, fps: float) -> float:
+    """The time code of a second: a whole number if it is close to one, else with six decimals."""
+    code = start_time * fps
+    return float(np.rint(code)) if abs(code - np.rint(code)) < CLOSE else float(np.rint(code * 1e6) / 1e6)
 
 
 def _new_stage(path: Path) -> Any:

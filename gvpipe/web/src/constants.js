@@ -79,6 +79,10 @@ export const SEGMENTS_HUGE = 1e+39;
 export const SEGMENTS_LARGEST_STEP = 6.80564733841877e+38;
 export const SEGMENTS_MAX_SEGMENT = 100000;
 
+// gvpipe.container.stream_layout
+export const STREAM_LAYOUT_VERSION = 2;
+export const STREAM_LAYOUT_INDEX_UUID = [60, 10, 126, 53, 143, 13, 74, 134, 155, 14, 31, 91, 143, 31, 111, 82];
+
 // gvpipe.corrections.displacements
 export const DISPLACEMENTS_MAX_POSITIONS = 1048576;
 export const DISPLACEMENTS_NEAR = 3;

@@ -14,6 +14,9 @@ const KEPT_GROUPS = 3; // at least: what is shown, what comes next, and one of b
 const AHEAD = 1; // s, decoded ahead of what plays
 const LONGEST_STEP = 1000; // ms that the clock goes on at once: a hidden page is asked for nothing
 
+/** The clock of pages: one tick before each repaint. */
+export const nextRepaint = (tick) => requestAnimationFrame(tick);
+
 export class DecodedPictures {
   /**
    * @param {Uint8Array} file @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated
@@ -84,17 +87,18 @@ export class DecodedPictures {
 
   /**
    * Play on from here, `rate` times as fast; calls `show(frame)` for each frame that is due, `ended()` at the end if it does
-   * not loop, `failed(error)` if it cannot go on.
+   * not loop, `failed(error)` if it cannot go on. `nextTick(tick)` has `tick(ms)` called at the next step of the clock.
    */
-  async play({ show, ended, failed }, rate, loop) {
+  async play({ show, ended, failed, nextTick = nextRepaint }, rate, loop) {
     const playing = (this.playing = {});
     let position = Math.max(0, this.shown); // frames since the start
-    let before = performance.now();
+    let before = null;
     this.shown = -1; // it is shown again, at once
     await this.#picture(this.repeated.distinctOf(Math.floor(position)));
     const tick = (now) => {
       if (this.playing !== playing) return;
-      const next = position + (Math.min(Math.max(0, now - before), LONGEST_STEP) * rate * this.fps) / 1000;
+      const step = Math.min(Math.max(0, now - (before ?? now)), LONGEST_STEP);
+      const next = position + (step * rate * this.fps) / 1000;
       before = now;
       const isOver = !loop && next >= this.frames;
       const frame = loop ? Math.floor(next) % this.frames : Math.min(Math.floor(next), this.frames - 1);
@@ -119,10 +123,9 @@ export class DecodedPictures {
         }
         this.#decodeAhead(this.groupOf[picture], AHEAD * this.fps * rate);
       }
-      requestAnimationFrame(tick);
+      nextTick(tick);
     };
-    before = performance.now();
-    requestAnimationFrame(tick);
+    if (this.playing === playing) nextTick(tick); // not paused since
   }
 
   /** Stop playing; the frame shown last stays. */

@@ -86,6 +86,11 @@ export class GeometryVideo {
     return this.frameCount / this.fps;
   }
 
+  /** Seconds that play without a wait for the file: a list of `[start, end]`. */
+  get buffered() {
+    return [[0, this.duration]];
+  }
+
   /** Bits of the file per second of playing. */
   get bitRate() {
     return (8 * this.byteLength) / this.duration;
@@ -115,13 +120,14 @@ export class GeometryVideo {
    * Play on from the frame last shown. The clock leads: a page too slow for every frame gets those that are due.
    *
    * @param {(positions: Float32Array, k: number) => void} show called for each frame; the array is used again for the next
-   * @param {{rate?: number, loop?: boolean, ended?: () => void, failed?: (error: Error) => void}} [options] `rate` 1 is the
-   *   video's own speed; `failed` is called if a frame later on cannot be decoded
+   * @param {{rate?: number, loop?: boolean, ended?: () => void, failed?: (error: Error) => void,
+   *   nextTick?: (tick: (now: number) => void) => void}} [options] `rate` 1 is the video's own speed; `failed` is called if a
+   *   frame later on cannot be decoded; `nextTick` is a clock in place of the page's: it calls `tick` at its next step, with ms
    */
-  async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {} } = {}) {
+  async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {}, nextTick } = {}) {
     await this.#queue;
     const positions = new Float32Array(3 * this.vertexCount);
-    const on = { show: (k) => show(this.#read(k, positions), k), ended, failed };
+    const on = { show: (k) => show(this.#read(k, positions), k), ended, failed, nextTick };
     await this.#pictures.play(on, rate, loop);
   }
 

@@ -1,12 +1,13 @@
 /**
  * The H.264 track of an MP4 file: its samples, and what a decoder must know. For `VideoDecoder`, which reads no files.
  *
- * Reads one track whose samples lie in one file, as gvpipe writes it; a picture's number is its rank by presentation time, so
+ * Reads one track whose samples lie in one file, in fragments or not, as gvpipe writes it; a picture's number is its rank by presentation time, so
  * edit lists and offsets of composition times do not matter.
  */
 
 import { crc32 } from "./format/checksum.js";
 import { AGAIN, GeometryVideoError } from "./format/errors.js";
+import { readFragmentSamples } from "./fragments.js";
 
 const CONTAINERS = ["moov", "trak", "mdia", "minf", "stbl"];
 const VISUAL_ENTRY = 78; // bytes of a visual sample entry before its boxes
@@ -37,10 +38,8 @@ export function readTrack(file, checksum) {
 
 function parseTrack(tables, checksum) {
   const { codec, description } = tables.configuration();
-  const sizes = tables.sizes();
-  const places = tables.places(sizes);
-  const numbers = ranks(tables.times(sizes.length));
-  const keys = tables.keys(sizes.length);
+  const { sizes, places, times, keys } = tables.boxes.has("mvex") ? readFragmentSamples(tables.file) : tables.samples();
+  const numbers = ranks(times);
   if (checksum !== undefined && checksum !== crc32(Uint8Array.from(sizes, (_, i) => Number(keys.has(i))), crc32(description))) {
     throw broken("the description of its video is damaged");
   }
@@ -120,6 +119,12 @@ class Tables {
       position += size;
     }
     throw broken("its decoder's configuration is missing");
+  }
+
+  /** What `readFragmentSamples` gives of a video in fragments. */
+  samples() {
+    const sizes = this.sizes();
+    return { sizes, places: this.places(sizes), times: this.times(sizes.length), keys: this.keys(sizes.length) };
   }
 
   /** Bytes of each sample. */

@@ -10,6 +10,7 @@
  * clock knows of no repeated frames (`format/repeated_frames.js`).
  */
 
+import { nextRepaint } from "./decoded_pictures.js";
 import { GeometryVideoError } from "./format/errors.js";
 import { OF_GREY } from "./levels.js";
 
@@ -37,7 +38,7 @@ export class VideoPictures {
     this.repeated = repeated;
     this.frames = repeated.frames;
     this.hasRepeats = repeated.distinct < repeated.frames;
-    /** The frame shown last, where frames repeat. */
+    /** The frame shown last, where frames are sought. */
     this.frame = 0;
     this.width = width;
     this.height = height;
@@ -137,14 +138,15 @@ export class VideoPictures {
 
   /**
    * Play on from here, `rate` times as fast; calls `show(frame)` for each frame that the browser shows while it is there to be
-   * read, `ended()` at the end if it does not loop, `failed(error)` if it cannot go on.
+   * read, `ended()` at the end if it does not loop, `failed(error)` if it cannot go on. With `nextTick`, a clock that calls
+   * `tick(ms)` at its next step, every frame that is due is sought.
    */
   async play(on, rate, loop) {
     const { video } = this;
     const playing = (this.playing = {});
     const playBySeeking = (first) =>
       this.#playBySeeking(playing, first, on, rate, loop).catch((error) => this.playing === playing && on.failed(error));
-    if (this.hasRepeats) {
+    if (this.hasRepeats || on.nextTick) {
       playBySeeking(this.frame);
       return;
     }
@@ -181,11 +183,12 @@ export class VideoPictures {
   }
 
   /** The same by seeking to whatever is due: slower, and exact where it is not known which picture of a playing video is drawn. */
-  async #playBySeeking(playing, first, { show, ended }, rate, loop) {
-    const start = performance.now() - (1000 * first) / (this.fps * rate);
+  async #playBySeeking(playing, first, { show, ended, nextTick = nextRepaint }, rate, loop) {
+    let now = await new Promise(nextTick);
+    const start = now - (1000 * first) / (this.fps * rate);
     let before = this.hasRepeats ? -1 : this.shown;
     while (this.playing === playing) {
-      const due = Math.floor(((performance.now() - start) * this.fps * rate) / 1000);
+      const due = Math.floor(((now - start) * this.fps * rate) / 1000);
       const frame = loop ? due % this.frames : Math.min(due, this.frames - 1);
       if (frame !== before) {
         const picture = this.repeated.distinctOf(frame);
@@ -202,7 +205,7 @@ export class VideoPictures {
         ended();
         return;
       }
-      await new Promise((resolve) => requestAnimationFrame(resolve));
+      now = await new Promise(nextTick);
     }
   }
 

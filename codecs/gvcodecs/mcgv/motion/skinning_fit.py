@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 from threading import Lock
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
@@ -29,11 +30,14 @@ from scipy import sparse
 from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighbours
 from gvcodecs.mcgv.motion.segmentation import SEED, local_motions
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights, homogeneous, solve_normal
-from gvcodecs.mcgv.motion.weight_coding import encode_weights, guess_prices, learn_prices
+from gvcodecs.mcgv.motion.weight_coding import Prices, encode_weights, guess_prices, learn_prices
 from gvpipe.arrays import Float64
 from gvpipe.mesh.topology import k_ring
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.gram import descending_eigenvectors, is_tall, smaller_gram
+
+if TYPE_CHECKING:
+    from gvcodecs.mcgv.motion.weight_selection import PointMotions
 
 RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`
 FRAMES = 192  # frames, evenly spaced, that fitting looks at
@@ -251,19 +255,26 @@ def _grow(trial: _Trial, n_clusters: int, patches: sparse.csr_array, draw: np.ra
 
 def _alternate(problem: _Problem, start: Fitted | _Trial, passes: int) -> Fitted:
     """Fit transforms, which a trial has already, then weights, several times over."""
-    from gvcodecs.mcgv.motion.weight_fit_kernels import Transforms
-    from gvcodecs.mcgv.motion.weight_selection import PointMotions, Ring, choose
+    from gvcodecs.mcgv.motion.weight_selection import PointMotions, Ring
 
     ring = Ring(problem.neighbours.indptr.astype(np.int64), problem.neighbours.indices.astype(np.int64))
     points = PointMotions(problem.causal, ring, problem.homogeneous, problem.motions, problem.price)
     fitted, prices = start.fitted if isinstance(start, _Trial) else start, guess_prices()
     for i in range(passes):
         transforms = start.transforms if isinstance(start, _Trial) and i == 0 else problem.solve(fitted)
-        flat = transforms.reshape(-1, transforms.shape[2])  # (K, 4, m) -> (4K, m)
-        prepared = Transforms(np.ascontiguousarray(transforms.swapaxes(1, 2)), flat @ flat.T)
-        fitted = _renumber(choose(points, prepared, prices, fitted.weights)[0])
+        fitted = _choose_weights(points, transforms, prices, fitted.weights)
         prices = learn_prices(problem.causal, fitted.weights)
     return fitted
+
+
+def _choose_weights(points: PointMotions, transforms: Float64, prices: Prices, weights: Weights) -> Fitted:
+    """Weights for ``transforms (K, 4, m)``, given those before; what the transforms are prepared into ends here."""
+    from gvcodecs.mcgv.motion.weight_fit_kernels import Transforms
+    from gvcodecs.mcgv.motion.weight_selection import choose
+
+    flat = transforms.reshape(-1, transforms.shape[2])  # (K, 4, m) -> (4K, m)
+    prepared = Transforms(np.ascontiguousarray(transforms.swapaxes(1, 2)), flat @ flat.T)
+    return _renumber(choose(points, prepared, prices, weights)[0])
 
 
 class Clustering:

@@ -3,9 +3,16 @@
  * Mirrors `gvpipe.container.mp4`; `docs/format.md`, section 1. The video itself is the browser's affair.
  */
 
-import { BITSTREAM_VERSION as CONTAINER_VERSION, MP4_BOX_UUID as UUID, MP4_MAX_BOXES as MAX_BOXES } from "../constants.js";
+import {
+  BITSTREAM_VERSION as CONTAINER_VERSION,
+  MP4_BOX_UUID as UUID,
+  MP4_MAX_BOXES as MAX_BOXES,
+  STREAM_LAYOUT_INDEX_UUID as INDEX_UUID,
+  STREAM_LAYOUT_VERSION as STREAM_VERSION,
+} from "../constants.js";
 import { crc32 } from "./checksum.js";
 import { AGAIN, GeometryVideoError } from "./errors.js";
+import { readStream } from "./stream_layout.js";
 
 export { CONTAINER_VERSION };
 
@@ -13,7 +20,8 @@ const TAG = /gvpipe (\d{1,9}) ([0-9a-f]{32})/;
 
 /**
  * @typedef {object} Container
- * @property {Uint8Array} payload
+ * @property {Uint8Array} [payload] of the plain layout
+ * @property {Map<string, Uint8Array>} [sections] of the stream layout
  * @property {number} bytes of the file
  * @property {string} id the content id of the tag, "" if the file has none
  * @property {number} videoChecksum CRC-32 over the samples: gvpipe's files hold nothing else in their `mdat` boxes
@@ -23,7 +31,8 @@ const TAG = /gvpipe (\d{1,9}) ([0-9a-f]{32})/;
  */
 export function readContainer(file) {
   const boxes = listBoxes(file);
-  const payloads = boxes.filter((box) => box.kind === "uuid" && UUID.every((byte, i) => file[box.start + i] === byte));
+  const having = (uuid) => boxes.filter((box) => box.kind === "uuid" && uuid.every((byte, i) => file[box.start + i] === byte));
+  const [payloads, indices] = [having(UUID), having(INDEX_UUID)];
   for (const kind of ["moov", "mdat"]) {
     if (!boxes.some((box) => box.kind === kind)) {
       throw new GeometryVideoError("truncated", `its ${kind} box is missing; ${AGAIN}`);
@@ -31,12 +40,16 @@ export function readContainer(file) {
   }
   const moov = boxes.find((box) => box.kind === "moov");
   const tag = TAG.exec(new TextDecoder("latin1").decode(file.subarray(moov.start, moov.end)));
+  if (tag && Number(tag[1]) > STREAM_VERSION) throw newerContainer(tag[1]);
+  if (indices.length === 1 && boxes[2] === indices[0]) {
+    const index = { start: indices[0].start + INDEX_UUID.length, end: indices[0].end };
+    return { ...readStream(file, index), bytes: file.length, id: tag ? tag[2] : "" };
+  }
   if (payloads.length === 0) {
     if (tag) throw new GeometryVideoError("stripped", `its geometry was stripped, as remuxing or re-encoding does; ${AGAIN}`);
     throw new GeometryVideoError("not-geometry-video", "an MP4 file, but not one that gvpipe wrote");
   }
   if (payloads.length > 1) throw new GeometryVideoError("corrupt", `it holds two geometries; ${AGAIN}`);
-  if (tag && Number(tag[1]) > CONTAINER_VERSION) throw newerContainer(tag[1]);
   let videoChecksum = 0;
   for (const box of boxes) {
     if (box.kind === "mdat") videoChecksum = crc32(file.subarray(box.start, box.end), videoChecksum);
@@ -48,7 +61,7 @@ export function readContainer(file) {
 export function newerContainer(version) {
   return new GeometryVideoError(
     "newer",
-    `container version ${version}, this player reads up to ${CONTAINER_VERSION}; a newer player is needed`,
+    `container version ${version}, this player reads up to ${STREAM_VERSION}; a newer player is needed`,
   );
 }
 

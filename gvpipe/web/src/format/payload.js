@@ -35,8 +35,7 @@ export class Payload {
 
 /** @param {import("./boxes.js").Container} container @returns {Promise<Payload>} */
 export async function readPayload(container) {
-  const cursor = new Cursor(container.payload, "table");
-  const sections = readSections(cursor, readTable(cursor));
+  const sections = container.sections ?? readPayloadSections(container.payload);
   const header = await readHeader(sections);
   const { id, video_crc32: checksum } = header.container;
   if (container.id && container.id !== id) {
@@ -48,6 +47,11 @@ export async function readPayload(container) {
   const budget = new Budget(container.bytes);
   budget.keepMesh(header);
   return new Payload(header, sections, budget);
+}
+
+function readPayloadSections(payload) {
+  const cursor = new Cursor(payload, "table");
+  return readSections(cursor, readTable(cursor));
 }
 
 function readTable(cursor) {

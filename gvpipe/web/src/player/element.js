@@ -4,19 +4,22 @@
  * Attributes: `src` (an address, or `#id` of an element in the page that holds the file as base64 text), `autoplay` (not for
  * those who prefer reduced motion), `loop`, `wireframe`, `follow` (the camera goes with the mesh), `speed` (1 is the video's
  * own), `up` ("y", or "z"), `field` (the name of one that is shown in colours), `colormap`, `range` ("low,high" of the colours).
- * Events: `ready`, `frame` (detail: the frame's number), `ended`, `error` (detail: a `GeometryVideoError`).
+ * Properties, methods and events are those of `HTMLMediaElement` where it has them. Events of its own: `ready`, `frame` (detail:
+ * the frame's number); `error` has a `GeometryVideoError` as its detail.
  */
 
 import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
+import { FASTEST, SLOWEST, checkRate, checkSeconds } from "../playback.js";
+import { COLORMAPS } from "../three/colormaps.js";
 import { Bar, nextSpeed } from "./bar.js";
 import { embedded } from "./embedded.js";
-import { COLORMAPS } from "./colormaps.js";
 import { actionOf } from "./keys.js";
 import { Legend } from "./legend.js";
 import { isFullscreen, save, toggleFullscreen } from "./outside.js";
 import { Panel } from "./panel.js";
 import { Stage } from "./stage.js";
 import style from "./style.css";
+import { TimeRanges } from "./time_ranges.js";
 
 const LABEL = "Animated mesh; shift and arrow keys turn it, + and - zoom";
 const MARKUP = `<style>${style}</style>
@@ -26,9 +29,11 @@ const MARKUP = `<style>${style}</style>
     <div class="panel"></div>
     <div class="message" role="status"></div>
   </div>
-  <div class="bar" role="group" aria-label="Playback"></div>`;
+  <div class="bar" part="bar" role="group" aria-label="Playback"></div>`;
 const TURN = Math.PI / 18; // by one press of a key
 const ZOOM = 1.15;
+const READY = { nothing: 0, metadata: 1, enough: 4 }; // `readyState`, as in HTMLMediaElement
+const MEDIA_EVENTS = ["play", "playing", "pause", "seeking", "seeked", "timeupdate", "ended", "ratechange"];
 
 export class GeometryVideoElement extends HTMLElement {
   static observedAttributes = ["src", "loop", "wireframe", "follow", "speed", "field", "colormap", "range"];
@@ -39,18 +44,20 @@ export class GeometryVideoElement extends HTMLElement {
   #legend;
   #message;
   #loading = 0; // counts loads, so that a late one does not replace its successor
-  #positions = null;
-  #wanted = null; // the frame that is to be sought next
-  #aim = 0; // the frame that was wanted last
-  #seeking = null;
+  #loaded = null; // promise, while a file is loaded
+  #startTime = 0; // s, set before a file is there
   #resume = false; // whether to play on when the slider is let go
-  #field = null; // that is shown
+  #showing = null; // counts changes of the field
   #hidden = new Set(); // names of parts
 
   /** The `GeometryVideo` that is shown, or null. */
   video = null;
-  currentFrame = 0;
-  paused = true;
+  /** The error that ended loading or playing, or null. */
+  error = null;
+  /** What is loaded: an address, or "" for a file itself. */
+  currentSrc = "";
+  /** 0: nothing, 1: metadata, 4: it can play. */
+  readyState = READY.nothing;
 
   constructor() {
     super();
@@ -92,8 +99,15 @@ export class GeometryVideoElement extends HTMLElement {
     if (name === "wireframe") this.#stage?.setWireframe(value !== null);
     if (name === "follow") this.#stage?.setFollowing(value !== null);
     if (name === "speed") this.#bar.setSpeed(this.speed);
-    if (["field", "colormap", "range"].includes(name) && before !== value && this.video) this.#showField();
-    if ((name === "loop" || name === "speed") && !this.paused) this.play(); // with the new value
+    if (["field", "colormap", "range"].includes(name) && before !== value && this.#mesh) this.#showField();
+    if (name === "loop" && this.#mesh) this.#mesh.loop = this.loop;
+    if (name === "speed" && this.#mesh) this.#mesh.playbackRate = this.speed;
+    else if (name === "speed" && before !== value) this.#tell("ratechange");
+  }
+
+  /** The `GeometryVideoMesh` that is shown, or null. */
+  get #mesh() {
+    return this.video && this.#stage?.mesh;
   }
 
   get src() {
@@ -104,9 +118,82 @@ export class GeometryVideoElement extends HTMLElement {
     this.setAttribute("src", source);
   }
 
+  get autoplay() {
+    return this.hasAttribute("autoplay");
+  }
+
+  set autoplay(wanted) {
+    this.toggleAttribute("autoplay", Boolean(wanted));
+  }
+
+  get loop() {
+    return this.hasAttribute("loop");
+  }
+
+  set loop(wanted) {
+    this.toggleAttribute("loop", Boolean(wanted));
+  }
+
   get speed() {
     const speed = Number(this.getAttribute("speed") ?? 1);
-    return speed >= 0.0625 && speed <= 16 ? speed : 1; // what browsers play
+    return speed >= SLOWEST && speed <= FASTEST ? speed : 1; // what browsers play
+  }
+
+  /** `speed`, under its name in `HTMLMediaElement`. */
+  get playbackRate() {
+    return this.speed;
+  }
+
+  set playbackRate(rate) {
+    this.setAttribute("speed", checkRate(rate));
+  }
+
+  /** Always true: there is no sound. To set it changes nothing, so that scripts for `<video>` run. */
+  get muted() {
+    return true;
+  }
+
+  set muted(_) {}
+
+  /** The frame shown. */
+  get currentFrame() {
+    return this.#mesh?.currentFrame ?? 0;
+  }
+
+  /** Seconds: where the frame shown begins, or the one that is sought; `duration` once it has ended. */
+  get currentTime() {
+    return this.#mesh?.currentTime ?? this.#startTime;
+  }
+
+  set currentTime(seconds) {
+    if (this.#mesh) this.#mesh.currentTime = seconds;
+    else this.#startTime = checkSeconds(seconds, "currentTime");
+  }
+
+  /** Seconds; NaN while nothing is loaded. */
+  get duration() {
+    return this.video?.duration ?? NaN;
+  }
+
+  get paused() {
+    return this.#mesh?.paused ?? true;
+  }
+
+  get ended() {
+    return this.#mesh?.ended ?? false;
+  }
+
+  get seeking() {
+    return this.#mesh?.seeking ?? false;
+  }
+
+  /** What plays without a wait for the file. */
+  get buffered() {
+    return new TimeRanges(this.video?.buffered ?? []);
+  }
+
+  get seekable() {
+    return new TimeRanges(this.video ? [[0, this.duration]] : []);
   }
 
   /** The colour map of fields, one of `COLORMAPS`. */
@@ -139,114 +226,104 @@ export class GeometryVideoElement extends HTMLElement {
     return this.video ? Array.from(this.#stage.projection) : null;
   }
 
-  /** Load and show a file: an address, `#id`, or the file itself. Errors are shown in the element. */
-  async load(source) {
+  /** Load and show a file: an address, `#id`, or the file itself; without one, `src` anew. Errors are shown in the element. */
+  load(source = this.src) {
     this.#unload();
+    this.currentSrc = typeof source === "string" || source instanceof URL ? String(source) : "";
+    const loaded = this.#load(source);
+    this.#loaded = loaded;
+    return loaded;
+  }
+
+  async #load(source) {
     const loading = this.#loading;
     this.#say("Loading …");
+    this.#tell("loadstart");
     let video = null;
     try {
       video = await GeometryVideo.load(typeof source === "string" && source[0] === "#" ? embedded(source) : source);
       if (loading !== this.#loading) return video.close();
-      const positions = await video.frame(0);
-      if (loading !== this.#loading) return video.close();
       this.#stage ??= openStage(this.shadowRoot.querySelector("canvas"));
-      await this.#stage.setMesh(video, positions, this.getAttribute("up") ?? (video.metadata.up_axis === "z" ? "z" : "y"));
+      await this.#stage.setMesh(video, this.getAttribute("up") ?? (video.metadata.up_axis === "z" ? "z" : "y"));
       if (loading !== this.#loading) return video.close();
-      this.#positions = positions;
     } catch (error) {
       video?.close();
       if (loading === this.#loading) this.#fail(error);
       return undefined;
     }
     this.video = video;
-    this.#stage.setWireframe(this.hasAttribute("wireframe"));
-    this.#stage.setFollowing(this.hasAttribute("follow"));
     this.#say("");
-    const { model } = this.#stage;
-    model.onError = (error) => this.#fail(error);
-    this.#bar.setVideo(this.video);
-    this.#bar.setNotes([...this.video.notes, ...model.notes]);
-    this.#panel.setVideo(this.video, model.parts.names);
-    this.hide(this.#hidden);
+    this.#openMesh();
     await this.#showField();
     if (loading !== this.#loading) return undefined;
     this.#bar.setEnabled(true);
-    this.#show(0);
-    this.dispatchEvent(new CustomEvent("ready"));
-    if (this.hasAttribute("autoplay") && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.play();
+    this.#setReady(READY.metadata, "durationchange", "loadedmetadata");
+    this.#bar.setFrame(0);
+    this.#tell("frame", 0);
+    this.#setReady(READY.enough, "loadeddata", "progress", "canplay", "canplaythrough", "ready");
+    if (loading !== this.#loading) return undefined; // a listener has loaded another
+    if (this.#startTime) this.#mesh.currentTime = this.#startTime;
+    this.#startTime = 0;
+    if (this.autoplay && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.play();
     return undefined;
   }
 
-  /** Play on from the frame shown; from the start if that is the last. */
+  #openMesh() {
+    const { mesh } = this.#stage;
+    this.#stage.setWireframe(this.hasAttribute("wireframe"));
+    this.#stage.setFollowing(this.hasAttribute("follow"));
+    mesh.loop = this.loop;
+    mesh.playbackRate = this.speed;
+    for (const name of MEDIA_EVENTS) mesh.addEventListener(name, () => this.#tell(name));
+    for (const name of ["play", "pause"]) mesh.addEventListener(name, () => this.#bar.setPlaying(!mesh.paused));
+    mesh.addEventListener("frame", ({ frame }) => {
+      this.#bar.setFrame(frame);
+      this.#tell("frame", frame);
+    });
+    mesh.addEventListener("error", ({ error }) => this.#fail(error));
+    this.#bar.setVideo(this.video);
+    this.#bar.setNotes(mesh.notes);
+    this.#panel.setVideo(this.video, mesh.partNames);
+    this.hide(this.#hidden);
+  }
+
+  /**
+   * Play on from the frame shown, from the start if that is the last; a promise that it plays. While a file loads, it waits.
+   *
+   * @throws {GeometryVideoError|DOMException} the file cannot be played; another file was asked for meanwhile
+   */
   async play() {
-    const { video } = this;
-    if (!video) return;
-    try {
-      if (this.paused && this.currentFrame === video.frameCount - 1) await this.seek(0);
-      this.#setPaused(false);
-      const show = (positions, frame) => {
-        this.#stage.setPositions(positions, frame);
-        this.#show(frame);
-      };
-      const ended = () => {
-        this.#setPaused(true);
-        this.dispatchEvent(new CustomEvent("ended"));
-      };
-      const failed = (error) => video === this.video && this.#fail(error);
-      await video.play(show, { rate: this.speed, loop: this.hasAttribute("loop"), ended, failed });
-    } catch (error) {
-      if (error.name === "AbortError") return; // paused before the browser had begun
-      if (error.name === "NotAllowedError") this.#setPaused(true);
-      else if (video === this.video) this.#fail(error);
-    }
+    const loaded = this.#loaded;
+    if (!this.#mesh) await loaded;
+    if (this.error) throw this.error;
+    if (loaded !== this.#loaded) throw new DOMException("another file was asked for", "AbortError");
+    await this.#mesh?.play();
   }
 
   pause() {
-    this.video?.pause();
-    this.#setPaused(true);
+    this.#mesh?.pause();
   }
 
   /** Show a frame, and pause. Of many calls in a row the last counts. */
   seek(frame) {
-    if (!this.video) return Promise.resolve();
-    this.#setPaused(true);
-    this.#aim = this.#wanted = Math.max(0, Math.min(this.video.frameCount - 1, Math.round(frame)));
-    this.#seeking ??= this.#seekWanted().finally(() => (this.#seeking = null));
-    return this.#seeking;
-  }
-
-  async #seekWanted() {
-    while (this.#wanted !== null) {
-      const [video, frame] = [this.video, this.#wanted];
-      this.#wanted = null;
-      try {
-        await Promise.all([video.frame(frame, this.#positions), this.#field?.load(frame)]);
-        if (video !== this.video) return;
-        this.#stage.setPositions(this.#positions, frame);
-        this.#show(frame);
-      } catch (error) {
-        if (video === this.video) this.#fail(error);
-        return;
-      }
-    }
+    return this.#mesh?.seek(frame) ?? Promise.resolve();
   }
 
   /** Show the field of attribute `field`, if the video has it, or else the materials. */
   async #showField() {
     const { video } = this;
+    const showing = (this.#showing = {});
     const field = video.fields.get(this.getAttribute("field")) ?? null;
-    this.#field = field;
     this.#say(field ? `Decoding ${field.name} …` : "");
+    let range;
     try {
-      await field?.load(this.currentFrame);
+      range = await this.#stage.showField(field && field.name, { colormap: this.colormap, range: this.range });
     } catch (error) {
       if (video === this.video) this.#fail(error);
       return;
     }
-    if (video !== this.video || field !== this.#field || !this.#stage?.model) return;
+    if (showing !== this.#showing || !this.#mesh) return;
     this.#say("");
-    const range = this.#stage.setField(field, this.colormap, this.range);
     const hasMap = field !== null && field.kind !== "color";
     this.#panel.setField(field?.name ?? "", this.colormap, hasMap);
     if (hasMap) this.#legend.show(field, this.colormap, range);
@@ -255,7 +332,7 @@ export class GeometryVideoElement extends HTMLElement {
 
   /** Steps in a row add up, however fast they come. */
   #step(by) {
-    this.seek((this.#seeking ? this.#aim : this.currentFrame) + by);
+    this.seek(this.#mesh.soughtFrame + by);
   }
 
   #scrub(frame, done) {
@@ -308,22 +385,21 @@ export class GeometryVideoElement extends HTMLElement {
     this.#act(action);
   }
 
-  #show(frame) {
-    this.currentFrame = frame;
-    this.#bar.setFrame(frame);
-    this.dispatchEvent(new CustomEvent("frame", { detail: frame }));
+  #setReady(state, ...events) {
+    this.readyState = state;
+    for (const event of events) this.#tell(event);
   }
 
-  #setPaused(paused) {
-    this.paused = paused;
-    this.#bar.setPlaying(!paused);
+  #tell(event, detail = null) {
+    this.dispatchEvent(new CustomEvent(event, { detail }));
   }
 
   #fail(error) {
     this.#unload();
     const known = error instanceof GeometryVideoError;
     this.#say(known ? `Cannot play this file: ${error.message}.` : `The player failed: ${error.message}`, "alert");
-    this.dispatchEvent(new CustomEvent("error", { detail: error }));
+    this.error = error;
+    this.#tell("error", error);
   }
 
   #say(text, role = "status") {
@@ -332,19 +408,22 @@ export class GeometryVideoElement extends HTMLElement {
   }
 
   #unload() {
+    const wasLoaded = this.video !== null;
     this.#loading++;
+    this.#loaded = null;
+    this.#showing = null;
     this.video?.close();
     this.video = null;
-    this.#wanted = null;
+    this.error = null;
+    this.readyState = READY.nothing;
     this.#resume = false;
-    this.currentFrame = 0;
     this.#stage?.clear();
-    this.#field = null;
     this.#legend.hide();
     this.#panel.clear();
     this.#bar.setNotes([]);
     this.#bar.setEnabled(false);
-    this.#setPaused(true);
+    this.#bar.setPlaying(false);
+    if (wasLoaded) this.#tell("emptied");
   }
 }
 

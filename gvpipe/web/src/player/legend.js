@@ -1,6 +1,6 @@
 /** What the colours of a field mean: its name and unit, the colour map, and values along it. */
 
-import { cssGradient } from "./colormaps.js";
+import { cssGradient } from "../three/colormaps.js";
 
 const TICKS = 3;
 

@@ -1,6 +1,6 @@
 /** Menus over the picture: the field that is shown and its colour map, and the parts that are. They are there if there is a choice. */
 
-import { COLORMAPS } from "./colormaps.js";
+import { COLORMAPS } from "../three/colormaps.js";
 
 const MANY = 12; // parts from which on they can be searched
 const MOST_LISTED = 200;

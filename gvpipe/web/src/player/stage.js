@@ -11,9 +11,9 @@ import {
   Vector3,
   WebGLRenderer,
 } from "three";
-import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { RoomEnvironment } from "three/examples/jsm/environments/RoomEnvironment.js";
-import { Model } from "./model.js";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { RoomEnvironment } from "three/addons/environments/RoomEnvironment.js";
+import { GeometryVideoMesh } from "../three/geometry_video_mesh.js";
 
 const FIELD_OF_VIEW = 35; // degrees, of the shorter side
 const MARGIN = 1.06; // around what is framed
@@ -45,15 +45,15 @@ export class Stage {
     this.controls.addEventListener("start", () => (this.isFramed = false));
     this.isFollowing = false; // whether the camera goes where the mesh goes
     this.isFramed = false; // whether the view is still the first one, which follows the picture's shape
-    this.model = null;
+    this.mesh = null;
     this.turn = 0; // counts meshes, so that a late one does not replace its successor
     this.pending = 0;
     this.observer = new ResizeObserver(() => this.#resize());
     this.observer.observe(canvas);
   }
 
-  /** Take a video's mesh; `positions (V, 3)` are its first frame. `up` is the axis, "y" or "z", that stands upright. */
-  async setMesh(video, positions, up) {
+  /** Show a video's mesh, in `this.mesh`, until another one is set. `up` is the axis, "y" or "z", that stands upright. */
+  async setMesh(video, up) {
     this.clear();
     const { min, max } = video.bounds;
     this.centre = min.map((low, axis) => (low + max[axis]) / 2);
@@ -62,25 +62,20 @@ export class Stage {
     const { centre, scale, hasGpu } = this;
     const anisotropy = hasGpu ? Math.min(MAX_ANISOTROPY, this.renderer.capabilities.getMaxAnisotropy()) : 1;
     const turn = ++this.turn;
-    const model = await Model.open(video, positions, { centre, scale, hasGpu, anisotropy, environment: () => this.#environment() });
-    if (turn !== this.turn) return model.dispose(); // another mesh has come meanwhile, or the stage is closed
-    this.model = model;
-    model.onChange = () => this.requestRender();
+    const environment = () => this.#environment();
+    const mesh = await GeometryVideoMesh.create(video, { centre, scale, gloss: hasGpu, anisotropy, environment, ownClock: true });
+    if (turn !== this.turn) return mesh.dispose(); // another mesh has come meanwhile, or the stage is closed
+    this.mesh = mesh;
+    mesh.addEventListener("frame", () => this.#frameShown());
+    mesh.addEventListener("change", () => this.requestRender());
     const all = Uint32Array.from({ length: video.vertexCount }, (_, v) => v);
     this.used = video.triangleCount ? Uint32Array.from(new Set(video.indices)) : all; // which vertices are drawn
     this.middle = new Vector3();
-    this.scene.add(model.group);
+    this.scene.add(mesh);
     this.camera.up.set(0, up === "z" ? 0 : 1, up === "z" ? 1 : 0);
     this.#resize();
     this.resetView();
     return undefined;
-  }
-
-  /** Show `positions (V, 3)`, model units, of frame k. */
-  setPositions(positions, k) {
-    this.model.setPositions(positions, k);
-    if (this.isFollowing) this.#follow(this.#findMiddle());
-    this.requestRender();
   }
 
   /** (4, 4) by columns: from model units to clip space. */
@@ -92,20 +87,20 @@ export class Stage {
   }
 
   setWireframe(visible) {
-    this.model?.setWireframe(visible);
+    this.mesh?.setWireframe(visible);
     this.requestRender();
   }
 
-  /** Show a field in colours; null: the materials. @returns {[number, number]} low and high of the colours */
-  setField(field, colormap, range) {
-    const shown = this.model.setField(field, colormap, range);
+  /** Show a field in colours (`GeometryVideoMesh.showField`). */
+  async showField(name, options) {
+    const range = await this.mesh.showField(name, options);
     this.requestRender();
-    return shown;
+    return range;
   }
 
   /** Hide the parts of these names. @param {Set<string>} names */
   setHidden(names) {
-    this.model.setHidden(names);
+    this.mesh.hide(names);
     this.requestRender();
   }
 
@@ -113,7 +108,7 @@ export class Stage {
   setFollowing(isFollowing) {
     if (this.isFollowing === isFollowing) return;
     this.isFollowing = isFollowing;
-    if (this.model) this.resetView();
+    if (this.mesh) this.resetView();
   }
 
   /** Look from the front at the whole motion, or at the mesh that is followed. */
@@ -164,11 +159,11 @@ export class Stage {
   }
 
   clear() {
-    if (this.model) {
-      this.scene.remove(this.model.group);
-      this.model.dispose();
+    if (this.mesh) {
+      this.scene.remove(this.mesh);
+      this.mesh.dispose();
     }
-    this.model = null;
+    this.mesh = null;
     this.isFramed = false;
     this.requestRender();
   }
@@ -196,7 +191,7 @@ export class Stage {
 
   /** The mean of the vertices drawn, in the scene. */
   #findMiddle() {
-    const array = this.model.points;
+    const array = this.mesh.framePositions;
     const sum = [0, 0, 0];
     for (const v of this.used) for (let axis = 0; axis < 3; axis++) sum[axis] += array[3 * v + axis];
     return new Vector3(...sum).divideScalar(this.used.length || 1);
@@ -204,7 +199,7 @@ export class Stage {
 
   /** How far the mesh reaches from a point, along each axis, with room to move. */
   #findReach(point) {
-    const array = this.model.points;
+    const array = this.mesh.framePositions;
     const reach = [0, 0, 0];
     for (const v of this.used) {
       for (let axis = 0; axis < 3; axis++) {
@@ -212,6 +207,11 @@ export class Stage {
       }
     }
     return reach.map((value) => FOLLOWING_ROOM * value);
+  }
+
+  #frameShown() {
+    if (this.isFollowing) this.#follow(this.#findMiddle());
+    this.requestRender();
   }
 
   #follow(middle) {

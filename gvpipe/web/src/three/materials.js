@@ -14,11 +14,11 @@ export function plainMaterial(hasColours) {
  * @param {object} given of the video (`asset/materials.js`)
  * @param {import("./textures.js").Textures} textures
  * @param {Map<string, number>} channels uv sets by name
- * @param {{hasColours: boolean, hasGpu: boolean}} scene whether vertex colours multiply its base colour; without a GPU gloss is left out
+ * @param {{hasColours: boolean, gloss: boolean}} scene whether vertex colours multiply its base colour; whether it has gloss
  * @returns {MeshBasicMaterial|MeshLambertMaterial|MeshStandardMaterial}
  */
-export function makeMaterial(given, textures, channels, { hasColours, hasGpu }) {
-  const Lit = hasGpu ? MeshStandardMaterial : MeshLambertMaterial;
+export function makeMaterial(given, textures, channels, { hasColours, gloss }) {
+  const Lit = gloss ? MeshStandardMaterial : MeshLambertMaterial;
   const material = given.unlit ? new MeshBasicMaterial(OFFSET) : new Lit(OFFSET);
   const [red, green, blue, alpha] = given.base_color.map((factor) => Math.min(1, Math.max(0, factor)));
   material.name = given.name;

@@ -1,0 +1,196 @@
+/**
+ * Playing a video as `HTMLMediaElement` does, for whatever shows positions: the element and the mesh of three.js share it.
+ *
+ * Times are seconds. A frame's time is where it begins; the time is the duration once playing has ended.
+ */
+
+const ROUNDING = 1e-4; // of a frame: k / fps * fps may be a little less than k
+export const SLOWEST = 0.0625; // what browsers play
+export const FASTEST = 16;
+
+/** A rate that browsers play. @throws {DOMException} it is another one */
+export function checkRate(rate) {
+  if (rate >= SLOWEST && rate <= FASTEST) return rate;
+  throw new DOMException(`playbackRate is ${rate}; ${SLOWEST} to ${FASTEST} are possible`, "NotSupportedError");
+}
+
+/** Seconds, as a number. @throws {TypeError} it is none */
+export function checkSeconds(value, name) {
+  if (Number.isFinite(Number(value))) return Number(value);
+  throw new TypeError(`${name} is ${value}; a number of seconds is needed`);
+}
+
+export class Playback {
+  #video;
+  #on;
+  #nextTick;
+  #positions;
+  #wanted = null; // the frame that is to be sought next
+  #aim = 0; // the frame that was wanted last
+  #seeking = null; // promise
+  #rate = 1;
+  #loops = false;
+  #isClosed = false;
+
+  /** The frame shown. */
+  currentFrame = 0;
+  paused = true;
+  /** Whether it played to the end, and was not sought since. */
+  ended = false;
+
+  /**
+   * @param {import("./geometry_video.js").GeometryVideo} video
+   * @param {{show: (positions: Float32Array, k: number) => void, prepare: (k: number) => Promise<void>, tell: (event: string) => void,
+   *   fail: (error: Error) => void}} on `prepare` loads what is shown beside positions of a frame that is sought; `tell` is given
+   *   names of `HTMLMediaElement`'s events
+   * @param {(tick: (now: number) => void) => void} [nextTick] of `GeometryVideo.play`
+   */
+  constructor(video, on, nextTick) {
+    this.#video = video;
+    this.#on = on;
+    this.#nextTick = nextTick;
+    this.#positions = new Float32Array(3 * video.vertexCount);
+  }
+
+  get duration() {
+    return this.#video.duration;
+  }
+
+  /** To set it shows the frame of that time; what plays goes on there. */
+  get currentTime() {
+    return this.ended ? this.duration : this.aim / this.#video.fps;
+  }
+
+  set currentTime(seconds) {
+    this.#request(Math.floor(checkSeconds(seconds, "currentTime") * this.#video.fps + ROUNDING));
+  }
+
+  /** The frame shown, or the one that is sought. */
+  get aim() {
+    return this.#seeking ? this.#aim : this.currentFrame;
+  }
+
+  get seeking() {
+    return this.#seeking !== null;
+  }
+
+  get loop() {
+    return this.#loops;
+  }
+
+  set loop(loops) {
+    if (this.#loops === loops) return;
+    this.#loops = loops;
+    this.#playAnew();
+  }
+
+  /** 1 is the video's own. */
+  get playbackRate() {
+    return this.#rate;
+  }
+
+  set playbackRate(rate) {
+    if (this.#rate === checkRate(rate)) return;
+    this.#rate = rate;
+    this.#on.tell("ratechange");
+    this.#playAnew();
+  }
+
+  /** Play on from the frame shown; from the start if that is the last. */
+  async play() {
+    if (!this.paused || this.#isClosed) return;
+    this.paused = false;
+    this.#on.tell("play");
+    if (this.aim === this.#video.frameCount - 1) this.#request(0);
+    await (this.#seeking ?? this.#start());
+  }
+
+  pause() {
+    this.#video.pause();
+    if (this.paused) return;
+    this.paused = true;
+    this.#on.tell("pause");
+  }
+
+  /** Show frame k, and pause. Of many calls in a row the last counts. */
+  seek(k) {
+    this.pause();
+    return this.#request(Math.round(k));
+  }
+
+  close() {
+    this.#isClosed = true;
+    this.paused = true;
+    this.#wanted = null;
+  }
+
+  #request(k) {
+    if (this.#isClosed) return Promise.resolve();
+    this.ended = false;
+    this.#aim = this.#wanted = Math.max(0, Math.min(this.#video.frameCount - 1, k || 0));
+    this.#seeking ??= this.#seekWanted();
+    this.#on.tell("seeking");
+    return this.#seeking;
+  }
+
+  async #seekWanted() {
+    try {
+      while (this.#wanted !== null) {
+        const k = this.#wanted;
+        this.#wanted = null;
+        await Promise.all([this.#video.frame(k, this.#positions), this.#on.prepare(k)]);
+        if (this.#isClosed) return;
+        this.#show(this.#positions, k);
+      }
+    } catch (error) {
+      this.#fail(error);
+      return;
+    } finally {
+      this.#seeking = null;
+    }
+    this.#on.tell("seeked");
+    if (!this.paused) await this.#start();
+  }
+
+  /** With a new rate or `loop`. */
+  #playAnew() {
+    if (!this.paused && !this.#seeking) this.#start();
+  }
+
+  async #start() {
+    const on = {
+      rate: this.#rate,
+      loop: this.#loops,
+      ended: () => this.#end(),
+      failed: (error) => this.#fail(error),
+      nextTick: this.#nextTick,
+    };
+    try {
+      await this.#video.play((positions, k) => this.#show(positions, k), on);
+      if (this.paused) this.#video.pause(); // since
+      else this.#on.tell("playing");
+    } catch (error) {
+      if (error.name === "AbortError") return; // paused before the browser had begun
+      if (error.name === "NotAllowedError") this.pause();
+      else this.#fail(error);
+    }
+  }
+
+  #show(positions, k) {
+    this.currentFrame = k;
+    this.#on.show(positions, k);
+    this.#on.tell("timeupdate");
+  }
+
+  #end() {
+    this.paused = true;
+    this.ended = true;
+    for (const event of ["timeupdate", "pause", "ended"]) this.#on.tell(event);
+  }
+
+  #fail(error) {
+    if (this.#isClosed) return;
+    this.paused = true;
+    this.#on.fail(error);
+  }
+}

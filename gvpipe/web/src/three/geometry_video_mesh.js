@@ -1,0 +1,399 @@
+/**
+ * A geometry video as a mesh of three.js: its geometry frame by frame, its materials, the parts and the field that are shown.
+ *
+ *     const mesh = await new GeometryVideoLoader().loadAsync("walk.mp4");
+ *     scene.add(mesh);
+ *     mesh.play();
+ *     renderer.setAnimationLoop(() => { mesh.update(clock.getDelta()); renderer.render(scene, camera) });
+ */
+
+import {
+  Box3,
+  BufferAttribute,
+  BufferGeometry,
+  DynamicDrawUsage,
+  Mesh,
+  MeshBasicMaterial,
+  Points,
+  PointsMaterial,
+  Sphere,
+  Vector3,
+} from "three";
+import { Playback, checkSeconds } from "../playback.js";
+import { FieldColours, fieldMaterial, linearTable, rangeOf } from "./field_colours.js";
+import { makeMaterial, plainMaterial } from "./materials.js";
+import { Normals, groupCorners, groupVertices } from "./normals.js";
+import { PartIndex } from "./part_index.js";
+import { cornerEntries, splitVertices } from "./render_vertices.js";
+import { Textures } from "./textures.js";
+import { colourAttribute, colourArray, uvArray, uvChannels } from "./vertex_attributes.js";
+
+const PIXELS = 3; // of a point's side, where there are no triangles
+
+export class GeometryVideoMesh extends Mesh {
+  /**
+   * The mesh of a video; the video is closed with it.
+   *
+   * @param {import("../geometry_video.js").GeometryVideo} video
+   * @param {object} [options]
+   * @param {[number, number, number]} [options.centre] in model units, the origin of the geometry
+   * @param {number} [options.scale] of the geometry; 1: model units
+   * @param {boolean} [options.gloss] false: materials without it, for renderers that run on the processor
+   * @param {number} [options.anisotropy] of textures
+   * @param {() => import("three").Texture|null} [options.environment] what metal reflects; null: the scene's
+   * @param {boolean} [options.ownClock] true: it plays by the page's clock, without `update`
+   * @returns {Promise<GeometryVideoMesh>}
+   */
+  static async create(video, { centre = [0, 0, 0], scale = 1, gloss = true, anisotropy = 1, environment = () => null, ownClock = false } = {}) {
+    const shown = new Set();
+    for (const material of video.materials) {
+      for (const value of Object.values(material)) if (value?.uv !== undefined) shown.add(value.image);
+    }
+    const positions = await video.frame(0);
+    const textures = await Textures.open(video.images, shown, anisotropy);
+    return new GeometryVideoMesh(video, positions, textures, { centre, scale, gloss, environment, ownClock });
+  }
+
+  #view;
+  #textures;
+  #playback;
+  #now = 0; // ms of `update`'s clock
+  #tick = null; // what waits for its next step
+  #groups = null; // (3T) corners that share a normal
+  #normals = null;
+  #render = null; // RenderVertices
+  #isByTriangle = false; // whether no vertex is shared by two triangles: for fields per triangle
+  #parts;
+  #channels; // uv sets by name
+  #colours; // attribute, or null
+  #materials = [];
+  #field = null; // FieldColours
+  #wanted = { field: null }; // shown, or to be shown once it is loaded
+  #fieldRange = [0, 0];
+  #drawn = this; // what the materials are of: the mesh, or points
+  #wires = null;
+
+  /** Made by `create`. */
+  constructor(video, positions, textures, view) {
+    super(undefined, []);
+    this.type = "GeometryVideoMesh";
+    /** The `GeometryVideo`. */
+    this.video = video;
+    this.#view = view;
+    this.#textures = textures;
+    /** `Float32Array` (V, 3): the frame shown, in the geometry's units. */
+    this.framePositions = new Float32Array(positions.length);
+    this.#place(positions);
+    this.#parts = new PartIndex(video.parts, video.triangleCount);
+    this.#colours = colourAttribute(video.attributes);
+    const { channels, notes } = uvChannels(video.materials, video.attributes);
+    this.#channels = channels;
+    /** What is not shown as it should be, a line each. */
+    this.notes = [...video.notes, ...notes, ...textures.notes];
+    this.frustumCulled = false; // the box of the motion may be a little small
+    if (video.triangleCount) this.#groupNormals();
+    this.#build(false);
+    if (video.triangleCount) this.#openSurface();
+    else this.#openPoints();
+    const on = {
+      show: (shown, k) => this.#show(shown, k),
+      prepare: (k) => this.#wanted.field?.load(k),
+      tell: (type) => this.dispatchEvent({ type }),
+      fail: (error) => this.dispatchEvent({ type: "error", error }),
+    };
+    this.#playback = new Playback(video, on, view.ownClock ? undefined : (tick) => (this.#tick = tick));
+  }
+
+  /** Go on by so many seconds: what plays shows the frame that is due, once it is decoded. @param {number} delta */
+  update(delta) {
+    this.#now += 1000 * checkSeconds(delta, "delta");
+    const tick = this.#tick;
+    this.#tick = null;
+    tick?.(this.#now);
+  }
+
+  /** Play on from the frame shown, from the start if that is the last; a promise that it plays. */
+  play() {
+    return this.#playback.play();
+  }
+
+  pause() {
+    this.#playback.pause();
+  }
+
+  /** Show frame k, and pause; a promise that it is shown. Of many calls in a row the last counts. */
+  seek(k) {
+    return this.#playback.seek(k);
+  }
+
+  /** The frame shown. */
+  get currentFrame() {
+    return this.#playback?.currentFrame ?? 0;
+  }
+
+  /** The frame shown, or the one that is sought. */
+  get soughtFrame() {
+    return this.#playback.aim;
+  }
+
+  /** Seconds; to set it shows the frame of that time, and what plays goes on there. */
+  get currentTime() {
+    return this.#playback.currentTime;
+  }
+
+  set currentTime(seconds) {
+    this.#playback.currentTime = seconds;
+  }
+
+  /** Seconds. */
+  get duration() {
+    return this.video.duration;
+  }
+
+  get paused() {
+    return this.#playback.paused;
+  }
+
+  get ended() {
+    return this.#playback.ended;
+  }
+
+  get seeking() {
+    return this.#playback.seeking;
+  }
+
+  get loop() {
+    return this.#playback.loop;
+  }
+
+  set loop(loops) {
+    this.#playback.loop = loops;
+  }
+
+  /** 0.0625 to 16; 1 is the video's own. */
+  get playbackRate() {
+    return this.#playback.playbackRate;
+  }
+
+  set playbackRate(rate) {
+    this.#playback.playbackRate = rate;
+  }
+
+  /** Names of the parts, in order, each once. */
+  get partNames() {
+    return this.#parts.names;
+  }
+
+  /** Hide the parts of these names, and show all others. @param {Iterable<string>} names */
+  hide(names) {
+    this.#parts.hide(new Set(names));
+    if (this.video.triangleCount) this.#parts.fill(this.geometry, this.#render.index);
+  }
+
+  setWireframe(visible) {
+    if (visible && !this.#wires && this.video.triangleCount) this.#openWires();
+    if (this.#wires) this.#wires.visible = visible;
+  }
+
+  /**
+   * Show a field in colours, in place of the materials.
+   *
+   * @param {string|null} name of a field of the video; null: the materials
+   * @param {{colormap?: string, range?: [number, number]|null}} [options] `range`: values of the first and the last colour; null:
+   *   the field's own
+   * @returns {Promise<[number, number]|null>} that range; null if another call came since
+   */
+  async showField(name, { colormap = "viridis", range = null } = {}) {
+    const field = name === null ? null : this.video.fields.get(name);
+    if (field === undefined) throw new RangeError(`there is no field '${name}'; fields: ${[...this.video.fields.keys()].join(", ") || "none"}`);
+    const wanted = (this.#wanted = { field });
+    await field?.load(this.currentFrame);
+    if (wanted !== this.#wanted) return null;
+    return this.#setField(field, colormap, range);
+  }
+
+  /** A mesh that shares geometry and materials, and so moves with this one. */
+  clone(recursive = true) {
+    return new Mesh().copy(this, recursive);
+  }
+
+  /** Free the video, and what the GPU has of it. */
+  dispose() {
+    this.#wanted = { field: null };
+    this.#playback.close();
+    this.#tick = null;
+    this.#closeField();
+    for (const material of [this.#materials, this.#wires?.material].flat()) material?.dispose();
+    this.#textures.dispose();
+    this.geometry.dispose();
+    this.video.close();
+  }
+
+  #show(positions, k) {
+    this.#place(positions);
+    this.#update();
+    this.#updateField(k);
+    this.dispatchEvent({ type: "frame", frame: k });
+  }
+
+  #setField(field, colormap, range) {
+    this.#closeField();
+    if (!field) {
+      this.#drawn.material = this.#materials;
+      return [0, 0];
+    }
+    const isByTriangle = field.domain === "triangle";
+    if (isByTriangle && !this.#isByTriangle) this.#build(true);
+    const { vertices, corners } = this.#render;
+    const rows = isByTriangle ? corners.map((c) => (c / 3) | 0) : vertices;
+    const isPoints = !this.video.triangleCount;
+    this.#field = new FieldColours(field, rows, isPoints ? linearTable(colormap) : null);
+    this.#fieldRange = range ?? rangeOf(field, colormap);
+    this.geometry.setAttribute(this.#field.name, this.#field.attribute);
+    if (isPoints) this.#drawn.material = pointsMaterial(0xffffff, true);
+    else this.#drawn.material = fieldMaterial(colormap, this.#field.isColour);
+    this.#updateField(this.currentFrame);
+    return this.#fieldRange;
+  }
+
+  #place(positions) {
+    const { framePositions: points } = this;
+    const { centre, scale } = this.#view;
+    for (let i = 0; i < points.length; i += 3) {
+      points[i] = (positions[i] - centre[0]) * scale;
+      points[i + 1] = (positions[i + 1] - centre[1]) * scale;
+      points[i + 2] = (positions[i + 2] - centre[2]) * scale;
+    }
+  }
+
+  #groupNormals() {
+    const { indices, basePoints, attributes, parts } = this.video;
+    const normal = attributes.get("normal");
+    if (normal?.kind === "normal" && normal.components === 3) {
+      this.#groups = groupCorners(indices, basePoints, cornerEntries(normal, indices, parts), normal.values);
+    } else {
+      const groups = groupVertices(indices, basePoints, this.framePositions);
+      this.#groups = indices.map((vertex) => groups[vertex]);
+    }
+  }
+
+  /** Split vertices as attributes need it, and make the geometry. */
+  #build(isByTriangle) {
+    const { indices, vertexCount, attributes, parts } = this.video;
+    const used = [...[...this.#channels.keys()].map((name) => attributes.get(name)), this.#colours].filter(Boolean);
+    const entries = new Map(used.map((attribute) => [attribute, cornerEntries(attribute, indices, parts)]));
+    const tables = used.filter(({ domain }) => domain !== "vertex").map((attribute) => entries.get(attribute));
+    const normal = attributes.get("normal");
+    if (normal && normal.domain !== "vertex" && this.#groups) tables.push(this.#groups);
+    if (isByTriangle) tables.push(Uint32Array.from(indices, (_, c) => (c / 3) | 0));
+    this.#isByTriangle = isByTriangle;
+    this.#render = splitVertices(indices, vertexCount, tables);
+    const { index, corners, vertices } = this.#render;
+    this.geometry?.dispose();
+    this.geometry = new BufferGeometry();
+    const dynamic = (array) => new BufferAttribute(array, 3).setUsage(DynamicDrawUsage);
+    this.geometry.setAttribute("position", dynamic(this.#render.isSplit ? new Float32Array(3 * vertices.length) : this.framePositions));
+    if (this.#groups) {
+      this.geometry.setAttribute("normal", dynamic(new Float32Array(3 * vertices.length)));
+      this.#normals = new Normals(indices, this.#groups, corners.map((c) => this.#groups[c]));
+      this.geometry.setIndex(new BufferAttribute(new Uint32Array(index.length), 1));
+      this.#parts.fill(this.geometry, index);
+    }
+    const rowsOf = (attribute) => entryOf(attribute, entries.get(attribute), this.#render);
+    for (const [name, channel] of this.#channels) {
+      const array = uvArray(attributes.get(name), rowsOf(attributes.get(name)));
+      this.geometry.setAttribute(channel ? `uv${channel}` : "uv", new BufferAttribute(array, 2));
+    }
+    if (this.#colours) {
+      this.geometry.setAttribute("color", new BufferAttribute(colourArray(this.#colours, rowsOf(this.#colours), !this.video.materials.length), 4));
+    }
+    this.#setBounds();
+    for (const object of [this.#drawn, this.#wires]) if (object) object.geometry = this.geometry;
+    this.#update();
+  }
+
+  /** The box that the whole motion stays in. */
+  #setBounds() {
+    const { centre, scale } = this.#view;
+    const { min, max } = this.video.bounds;
+    const [low, high] = [min, max].map((corner) => new Vector3(...corner.map((value, axis) => (value - centre[axis]) * scale)));
+    this.geometry.boundingBox = new Box3(low, high);
+    this.geometry.boundingSphere = this.geometry.boundingBox.getBoundingSphere(new Sphere());
+  }
+
+  #openSurface() {
+    const { materials } = this.video;
+    const hasColours = Boolean(this.#colours);
+    const scene = { hasColours, gloss: this.#view.gloss };
+    this.#materials = this.#parts.materials.map((number) =>
+      number === null ? plainMaterial(hasColours) : makeMaterial(materials[number], this.#textures, this.#channels, scene),
+    );
+    for (const material of this.#materials) if (material.metalness > 0) material.envMap = this.#view.environment();
+    this.material = this.#materials;
+  }
+
+  #openWires() {
+    const material = new MeshBasicMaterial({ color: 0x1d2a38, wireframe: true, transparent: true, opacity: 0.35 });
+    this.#wires = Object.assign(new Mesh(this.geometry, material), { frustumCulled: false, raycast() {} });
+    this.add(this.#wires);
+  }
+
+  /** Without triangles the mesh itself draws nothing: it has no material. */
+  #openPoints() {
+    this.#materials = pointsMaterial(this.#colours ? 0xffffff : 0x6f8296, Boolean(this.#colours));
+    this.#drawn = Object.assign(new Points(this.geometry, this.#materials), { frustumCulled: false });
+    this.add(this.#drawn);
+  }
+
+  /** The frame's positions and normals go to the GPU. */
+  #update() {
+    const { position, normal } = this.geometry.attributes;
+    const { framePositions: points } = this;
+    const { vertices, isSplit } = this.#render;
+    if (isSplit) {
+      const { array } = position;
+      for (let r = 0; r < vertices.length; r++) {
+        array[3 * r] = points[3 * vertices[r]];
+        array[3 * r + 1] = points[3 * vertices[r] + 1];
+        array[3 * r + 2] = points[3 * vertices[r] + 2];
+      }
+    }
+    position.needsUpdate = true;
+    if (!this.#normals) return;
+    this.#normals.compute(points, normal.array);
+    normal.needsUpdate = true;
+  }
+
+  #updateField(k) {
+    const colours = this.#field;
+    if (!colours || colours.update(k, this.#fieldRange)) return;
+    colours.field.load(k).then(
+      () => {
+        if (this.#field !== colours || this.currentFrame !== k) return; // another one is shown by now
+        colours.update(k, this.#fieldRange);
+        this.dispatchEvent({ type: "change" });
+      },
+      (error) => this.#field === colours && this.dispatchEvent({ type: "error", error }),
+    );
+  }
+
+  #closeField() {
+    if (!this.#field) return;
+    this.#drawn.material.map?.dispose();
+    this.#drawn.material.dispose();
+    const { name } = this.#field;
+    this.geometry.deleteAttribute(name);
+    this.#field = null;
+    if (this.#isByTriangle || (name === "color" && this.#colours)) this.#build(false); // as it was before the field
+  }
+}
+
+/** Which value of an attribute each render vertex has. */
+function entryOf({ domain, indices }, entries, { corners, vertices }) {
+  if (domain !== "vertex") return corners.map((c) => entries[c]);
+  return indices ? vertices.map((v) => indices[v]) : vertices; // of vertices without a triangle, too
+}
+
+function pointsMaterial(color, vertexColors) {
+  return new PointsMaterial({ color, size: PIXELS, sizeAttenuation: false, vertexColors });
+}

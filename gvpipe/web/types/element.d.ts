@@ -1,0 +1,79 @@
+/** The element `<geometry-video>`; to import this defines it. */
+
+import type { GeometryVideo, Source } from "./geometry-video.js";
+
+export * from "./geometry-video.js";
+
+export interface GeometryVideoElementEventMap extends HTMLElementEventMap {
+  /** All is there to play. */
+  ready: CustomEvent<null>;
+  /** The number of the frame that is shown. */
+  frame: CustomEvent<number>;
+  /** `detail` is a `GeometryVideoError` if the file is at fault. */
+  error: CustomEvent<Error> & ErrorEvent;
+}
+
+/** Stretches of time, in seconds. */
+export interface TimeRangesLike {
+  readonly length: number;
+  start(index: number): number;
+  end(index: number): number;
+}
+
+/** Members are as in `HTMLMediaElement` where it has them. */
+export class GeometryVideoElement extends HTMLElement {
+  constructor();
+  /** An address, or `#id` of an element that holds the file as base64 text. */
+  src: string;
+  readonly currentSrc: string;
+  autoplay: boolean;
+  loop: boolean;
+  /** Always true: there is no sound. */
+  muted: boolean;
+  /** 0.0625 to 16; attribute `speed`. */
+  playbackRate: number;
+  readonly speed: number;
+  /** Seconds: where the frame shown begins, or the one that is sought. To set it keeps what plays playing. */
+  currentTime: number;
+  /** Seconds; NaN while nothing is loaded. */
+  readonly duration: number;
+  readonly paused: boolean;
+  readonly ended: boolean;
+  readonly seeking: boolean;
+  readonly buffered: TimeRangesLike;
+  readonly seekable: TimeRangesLike;
+  /** 0: nothing is there, 1: metadata, 4: all. */
+  readonly readyState: number;
+  readonly error: Error | null;
+  /** While a file loads, it waits for it. */
+  play(): Promise<void>;
+  pause(): void;
+  load(source?: Source): Promise<void>;
+
+  readonly video: GeometryVideo | null;
+  readonly currentFrame: number;
+  /** Shows frame k, and pauses. Of many calls in a row the last counts. */
+  seek(k: number): Promise<void>;
+  readonly colormap: string;
+  readonly range: [number, number] | null;
+  readonly hiddenParts: Set<string>;
+  /** Hides the parts of these names, and shows all others. */
+  hide(names: Iterable<string>): void;
+  /** (4, 4) by columns: from model units to clip space. */
+  readonly projection: number[] | null;
+  /** The picture as a PNG file. */
+  still(): Promise<Blob | null>;
+
+  addEventListener<K extends keyof GeometryVideoElementEventMap>(
+    type: K,
+    listener: (this: GeometryVideoElement, event: GeometryVideoElementEventMap[K]) => unknown,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+  addEventListener(type: string, listener: EventListenerOrEventListenerObject, options?: boolean | AddEventListenerOptions): void;
+}
+
+declare global {
+  interface HTMLElementTagNameMap {
+    "geometry-video": GeometryVideoElement;
+  }
+}

@@ -1,0 +1,157 @@
+/** A geometry video: its mesh, and the positions of any frame. */
+
+export type Source = string | URL | Blob | ArrayBuffer | Uint8Array;
+export type Domain = "vertex" | "corner" | "triangle" | "part";
+export type Kind = "uv" | "normal" | "tangent" | "color" | "scalar" | "vector" | "label";
+export type Values =
+  | Float32Array
+  | Float64Array
+  | Int8Array
+  | Uint8Array
+  | Int16Array
+  | Uint16Array
+  | Int32Array
+  | Uint32Array;
+
+export type ErrorKind = "load" | "not-geometry-video" | "newer" | "stripped" | "truncated" | "corrupt" | "unsupported";
+
+/** What the player raises on purpose; `message` is one line for users. */
+export class GeometryVideoError extends Error {
+  constructor(kind: ErrorKind, message: string);
+  readonly kind: ErrorKind;
+}
+
+export interface PlayOptions {
+  /** 1 is the video's own speed. */
+  rate?: number;
+  loop?: boolean;
+  /** Called at the end, if it does not loop. */
+  ended?: () => void;
+  /** Called if a frame later on cannot be decoded. */
+  failed?: (error: Error) => void;
+  /** A clock in place of the page's: it calls `tick` once, at its next step, with milliseconds. */
+  nextTick?: (tick: (now: number) => void) => void;
+}
+
+/** A named mesh of the video: ranges `[start, stop]` of its vertices and triangles. */
+export interface Part {
+  readonly name: string;
+  readonly vertices: [number, number];
+  readonly triangles: [number, number];
+  /** Index into `materials`. */
+  readonly material: number | null;
+  readonly parent: string;
+}
+
+/** Numbers that stay the same in every frame. */
+export interface Attribute {
+  readonly name: string;
+  readonly domain: Domain;
+  readonly kind: Kind;
+  readonly components: number;
+  readonly unit: string;
+  /** As numpy names it, such as `float32`. */
+  readonly type: string;
+  /** Rows of `components`. */
+  readonly values: Values;
+  /** The row of each corner, vertex, triangle or part; null: its own. */
+  readonly indices: Uint32Array | null;
+  /** What colours of this type count as 1. */
+  readonly fullScale: number;
+}
+
+/** Numbers that change from frame to frame. */
+export interface Field {
+  readonly name: string;
+  readonly domain: "vertex" | "triangle";
+  readonly kind: Kind;
+  readonly components: number;
+  readonly unit: string;
+  readonly type: string;
+  readonly frameCount: number;
+  readonly rowCount: number;
+  /** Largest difference of a value from the source's; degrees of normals. */
+  readonly bound: number;
+  /** Low and high of all components; null if all are holes. */
+  readonly range: [number, number] | null;
+  /** Rows of `components` in frame k, NaN for holes. */
+  frame(k: number): Promise<Values>;
+}
+
+export interface Texture {
+  /** Index into `images`. */
+  readonly image: number;
+  /** Name of the attribute with its coordinates. */
+  readonly uv: string;
+  readonly scale: number;
+  readonly wrap: ["repeat" | "mirror" | "clamp", "repeat" | "mirror" | "clamp"];
+  readonly filter: "linear" | "nearest";
+  readonly offset: [number, number];
+  readonly rotation: number;
+  readonly tiling: [number, number];
+}
+
+export interface Material {
+  readonly name: string;
+  readonly base_color: [number, number, number, number];
+  readonly metallic: number;
+  readonly roughness: number;
+  readonly emissive: [number, number, number];
+  readonly alpha_mode: "opaque" | "mask" | "blend";
+  readonly alpha_cutoff: number;
+  readonly double_sided: boolean;
+  readonly unlit: boolean;
+  readonly base_color_texture: Texture | null;
+  readonly metallic_roughness_texture: Texture | null;
+  readonly normal_texture: Texture | null;
+  readonly occlusion_texture: Texture | null;
+  readonly emissive_texture: Texture | null;
+}
+
+export interface Image {
+  readonly name: string;
+  readonly mediaType: string;
+  readonly data: Uint8Array;
+}
+
+export class GeometryVideo {
+  private constructor();
+  /** Rejects with a `GeometryVideoError` if it cannot be fetched, or is no geometry video that browsers play. */
+  static load(source: Source): Promise<GeometryVideo>;
+  readonly frameCount: number;
+  /** Frames per second. */
+  readonly fps: number;
+  readonly vertexCount: number;
+  readonly triangleCount: number;
+  /** Bytes of the file. */
+  readonly byteLength: number;
+  /** Seconds. */
+  readonly duration: number;
+  /** Seconds that play without a wait for the file: `[start, end]` of each stretch. */
+  readonly buffered: [number, number][];
+  /** Bits per second. */
+  readonly bitRate: number;
+  /** (T, 3): vertices of triangles, counter-clockwise. */
+  readonly indices: Uint32Array;
+  /** (V, 3): frame 0 on the file's lattice; vertices with equal rows are one point of the surface. */
+  readonly basePoints: Int32Array;
+  /** The box that the motion stays in, model units. */
+  readonly bounds: { min: [number, number, number]; max: [number, number, number] };
+  readonly parts: Part[];
+  readonly attributes: Map<string, Attribute>;
+  readonly fields: Map<string, Field>;
+  readonly materials: Material[];
+  readonly images: Image[];
+  /** Corners of each polygon; null if all are triangles. */
+  readonly polygons: Int32Array | null;
+  readonly metadata: Record<string, unknown>;
+  /** What of the file is not read, a line each. */
+  readonly notes: string[];
+  /** (V, 3) of frame k, model units, in `positions` if it is given. It ends `play`. Calls that overlap are answered in turn. */
+  frame(k: number, positions?: Float32Array): Promise<Float32Array>;
+  /** Plays on from the frame last shown. `show` gets (V, 3) in an array that is used again for the next frame. */
+  play(show: (positions: Float32Array, k: number) => void, options?: PlayOptions): Promise<void>;
+  pause(): void;
+  /** Frees it; it is of no use afterwards. */
+  close(): void;
+}

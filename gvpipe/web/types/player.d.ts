@@ -1,0 +1,3 @@
+/** The element with three.js inside. */
+
+export * from "./element.js";

@@ -1,0 +1,92 @@
+/** Geometry videos in scenes of three.js. */
+
+import type { BufferGeometry, Loader, LoadingManager, Material as ThreeMaterial, Mesh, Object3DEventMap, Texture as ThreeTexture } from "three";
+import type { GeometryVideo, Source } from "./geometry-video.js";
+
+export * from "./geometry-video.js";
+
+export interface GeometryVideoMeshOptions {
+  /** In model units, the origin of the geometry. [0, 0, 0] if not given. */
+  centre?: [number, number, number];
+  /** Of the geometry; 1: model units. */
+  scale?: number;
+  /** false: Lambert materials in place of standard ones, for renderers that run on the processor. */
+  gloss?: boolean;
+  /** Of textures. */
+  anisotropy?: number;
+  /** What metal reflects; null: the scene's environment. */
+  environment?: () => ThreeTexture | null;
+  /** true: it plays by the page's clock, without `update`. */
+  ownClock?: boolean;
+}
+
+export interface GeometryVideoMeshEvents extends Object3DEventMap {
+  play: {};
+  playing: {};
+  pause: {};
+  seeking: {};
+  seeked: {};
+  timeupdate: {};
+  ended: {};
+  ratechange: {};
+  /** A frame is shown. */
+  frame: { frame: number };
+  /** Late values of a field have come: the scene is to be drawn anew. */
+  change: {};
+  error: { error: Error };
+}
+
+/** A video as a mesh: its geometry follows what plays. Vertices are split where attributes need it. */
+export class GeometryVideoMesh extends Mesh<BufferGeometry, ThreeMaterial | ThreeMaterial[], GeometryVideoMeshEvents> {
+  private constructor();
+  /** The video is closed with the mesh. */
+  static create(video: GeometryVideo, options?: GeometryVideoMeshOptions): Promise<GeometryVideoMesh>;
+  readonly video: GeometryVideo;
+  /** (V, 3): the frame shown, in the geometry's units. */
+  readonly framePositions: Float32Array;
+  /** What is not shown as it should be, a line each. */
+  readonly notes: string[];
+  /** Goes on by so many seconds: what plays shows the frame that is due, once it is decoded. */
+  update(delta: number): void;
+  /** Plays on from the frame shown, from the start if that is the last. */
+  play(): Promise<void>;
+  pause(): void;
+  /** Shows frame k, and pauses. Of many calls in a row the last counts. */
+  seek(k: number): Promise<void>;
+  readonly currentFrame: number;
+  /** The frame shown, or the one that is sought. */
+  readonly soughtFrame: number;
+  /** Seconds. To set it shows the frame of that time; what plays goes on there. */
+  currentTime: number;
+  readonly duration: number;
+  readonly paused: boolean;
+  readonly ended: boolean;
+  readonly seeking: boolean;
+  loop: boolean;
+  /** 0.0625 to 16; 1 is the video's own. */
+  playbackRate: number;
+  readonly partNames: string[];
+  /** Hides the parts of these names, and shows all others. */
+  hide(names: Iterable<string>): void;
+  setWireframe(visible: boolean): void;
+  /** Shows a field in colours; null: the materials. A promise of the range; null if another call came since. */
+  showField(
+    name: string | null,
+    options?: { colormap?: "viridis" | "magma" | "coolwarm" | "gray"; range?: [number, number] | null },
+  ): Promise<[number, number] | null>;
+  /** Frees the video, and what the GPU has of it. */
+  dispose(): void;
+}
+
+export class GeometryVideoLoader extends Loader<GeometryVideoMesh> {
+  constructor(manager?: LoadingManager);
+  options: GeometryVideoMeshOptions;
+  setOptions(options: GeometryVideoMeshOptions): this;
+  load(
+    url: string,
+    onLoad: (mesh: GeometryVideoMesh) => void,
+    onProgress?: (event: ProgressEvent) => void,
+    onError?: (error: unknown) => void,
+  ): void;
+  parseAsync(source: Source): Promise<GeometryVideoMesh>;
+}

@@ -1,0 +1,96 @@
+"""A web server on this machine for one file: it counts bytes, and misbehaves as told."""
+
+from __future__ import annotations
+
+import contextlib
+import http.server
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+CHUNK = 1 << 14
+
+
+@dataclass
+class Served:
+    """What the server does.
+
+    Args:
+        data: the file.
+        ranges: whether it knows Range.
+        has_length: whether it sends the length of a whole file.
+        status: an answer in place of the file; 0: the file.
+        cut: bytes after which answers end early; 0: they do not.
+        etag: of the file.
+        rate: bits per second; 0: as fast as it can.
+        sent: ``(offset, bytes)`` of each answer.
+    """
+
+    data: bytes
+    ranges: bool = True
+    has_length: bool = True
+    status: int = 0
+    cut: int = 0
+    etag: str = '"1"'
+    rate: float = 0.0
+    sent: list[tuple[int, int]] = field(default_factory=list)
+
+    @property
+    def n_sent(self) -> int:
+        """Bytes that were sent so far."""
+        return sum(length for _, length in self.sent)
+
+
+@contextlib.contextmanager
+def serving(data: bytes) -> Iterator[tuple[str, Served]]:
+    """The address of a file on a server that runs for as long as the block, and what it does."""
+    served = Served(data)
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def log_message(self, *_: object) -> None:
+            """Print nothing."""
+
+        def do_GET(self) -> None:
+            answer(self, served)
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}/a.mp4", served
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+def answer(handler: http.server.BaseHTTPRequestHandler, served: Served) -> None:
+    """Send the file, the part of it that is asked for, or an error."""
+    wanted, size = handler.headers.get("Range"), len(served.data)
+    if served.status:
+        handler.send_error(served.status)
+        return
+    start, stop = 0, size
+    if wanted and served.ranges:
+        first, last = wanted.removeprefix("bytes=").split("-")
+        start, stop = int(first), min(int(last) + 1, size)
+        if start >= size:
+            handler.send_error(416)
+            return
+        handler.send_response(206)
+        handler.send_header("Content-Range", f"bytes {start}-{stop - 1}/{size}")
+    else:
+        handler.send_response(200)
+    if served.has_length:
+        handler.send_header("Content-Length", str(stop - start))
+    handler.send_header("ETag", served.etag)
+    handler.end_headers()
+    if served.cut:
+        stop = min(stop, start + served.cut)
+    served.sent.append((start, stop - start))
+    with contextlib.suppress(OSError):
+        for at in range(start, stop, CHUNK):
+            part = served.data[at : min(at + CHUNK, stop)]
+            handler.wfile.write(part)
+            if served.rate:
+                time.sleep(8 * len(part) / served.rate)
