@@ -15,6 +15,7 @@ import numpy as np
 import gvpipe
 from fuzz.mesh_files import CACHES, MESH
 from fuzz.parts import Parts, Seed
+from fuzz.streams import split_stream
 from fuzz.videos import split_video
 from gvpipe.sequence import MeshSequence
 
@@ -43,8 +44,10 @@ PROFILES: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-def load_seeds(folder: Path, more: Path | None = None) -> tuple[tuple[Seed, ...], dict[str, tuple[Seed, ...]]]:
-    """Geometry videos, and files of meshes by format.
+def load_seeds(
+    folder: Path, more: Path | None = None
+) -> tuple[tuple[Seed, ...], tuple[Seed, ...], dict[str, tuple[Seed, ...]]]:
+    """Geometry videos in the plain layout, in the stream layout, and files of meshes by format.
 
     Args:
         folder: of seeds that were made before; what is missing there is made.
@@ -54,6 +57,7 @@ def load_seeds(folder: Path, more: Path | None = None) -> tuple[tuple[Seed, ...]
         make_seeds(folder)
     videos = [*sorted((TESTS / "golden").glob("*.mp4")), *sorted((folder / "videos").glob("*.mp4"))]
     seeds = tuple(Seed(path.stem, split_video(path.read_bytes())) for path in videos)
+    streams = tuple(Seed(path.stem, split_stream(path.read_bytes())) for path in sorted((folder / "streams").glob("*.mp4")))
     formats: dict[str, tuple[Seed, ...]] = {}
     for group in sorted((folder / "meshes").iterdir()):
         formats[group.name] = tuple(Seed(case.name, _files(case)) for case in sorted(group.iterdir()))
@@ -61,7 +65,7 @@ def load_seeds(folder: Path, more: Path | None = None) -> tuple[tuple[Seed, ...]
         kind = path.suffix[1:].lower()
         if kind in formats and path.is_file() and path.stat().st_size <= LARGEST:
             formats[kind] = (*formats[kind], Seed(path.name, {f"a{path.suffix.lower()}": path.read_bytes()}))
-    return seeds, formats
+    return seeds, streams, formats
 
 
 def make_seeds(folder: Path) -> None:
@@ -74,6 +78,9 @@ def make_seeds(folder: Path) -> None:
         for name in ("mcgv", "pca", "mcgv-affine"):
             codec, settings = PROFILES[name]
             gvpipe.encode(sequence, folder / "videos" / f"{sample}-{name}.mp4", codec, **settings)
+    (folder / "streams").mkdir(exist_ok=True)
+    for path in sorted((folder / "videos").glob("*.mp4")):
+        gvpipe.restream(path, folder / "streams" / path.name, "stream")
     _make_meshes(folder / "meshes")
     (folder / "done").write_text("")
 
