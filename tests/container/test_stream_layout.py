@@ -15,7 +15,8 @@ from folders import GOLDEN
 from sequences import held, waving
 
 import gvpipe
-from fuzz.streams import FILE, join_stream, split_stream
+from fuzz.streams import join_stream, split_stream
+from fuzz.videos import FILE
 from gvpipe.container import mp4
 from gvpipe.container.fragments import count_pictures, split_fragments
 from gvpipe.container.sources import FileSource
