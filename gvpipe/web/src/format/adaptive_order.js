@@ -65,7 +65,8 @@ function findContexts({ lists: { starts, neighbours }, lattice, visits, visited,
     const y = neighbours[k];
     if (visited[y]) continue;
     if (count < LOOKED_AT) {
-      const isShared = v > 1 && neighbours.subarray(starts[y], starts[y + 1]).includes(visits[v - 2]);
+      const last = v > 1 ? visits[v - 2] : -1; // its list, not that of y: hubs would be searched again and again
+      const isShared = last >= 0 && neighbours.subarray(starts[last], starts[last + 1]).includes(y);
       shared = 2 * shared + (isShared ? 1 : 0);
       crowded = 4 * crowded + Math.min(around[y], 3);
       twins = 2 * twins + (lattice[3 * y] === lattice[3 * before] ? 1 : 0);
