@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,7 @@ from fuzz.worker import memory_folder
 def main(as_json: bool, **given: object) -> None:
     """Run mutated files through every parser; exit status 1 if any went wrong."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # workers are ended, and counts are kept
     folder = Path(memory_folder() or FOLDER.with_name("cases"), f"gvpipe-fuzz-{os.getpid()}")
     session = Session(Options(**given, folder=str(folder)), lambda line: click.echo(line, err=True))  # type: ignore[arg-type]
     session.run()

@@ -9,7 +9,7 @@ import numpy as np
 
 from fuzz.mutation import mutate_bytes
 
-HOLDERS = {b"moov", b"trak", b"mdia", b"minf", b"stbl", b"edts", b"dinf", b"udta"}
+HOLDERS = {b"moov", b"trak", b"mdia", b"minf", b"stbl", b"edts", b"dinf", b"udta", b"mvex", b"moof", b"traf"}
 CHUNKS = (b"stco", b"co64")
 
 

@@ -10,6 +10,7 @@ import { inflateSync } from "node:zlib";
 
 const MOST_VALUES = 2 ** 22; // coordinates that are read of a file
 const UUID = Buffer.from("6a1f0c523d7b4e0e9c5567e4f0a7d1b9", "hex");
+const INDEX_UUID = Buffer.from("3c0a7e358f0d4a869b0e1f5b8f1f6f52", "hex"); // of the stream layout
 const { process } = globalThis;
 let size = [0, 0];
 
@@ -58,13 +59,13 @@ const { GeometryVideo, GeometryVideoError } = await import(pathToFileURL(process
 /** Of a picture, as the header has it; [16, 16] where it has none. */
 function pictureSize(file) {
   try {
-    const at = file.lastIndexOf(UUID) + 28; // behind the magic, the version and the count
-    const name = at + 1 + file[at];
-    const count = file.readUInt16LE(at - 2);
-    let table = at;
+    const isStream = file.includes(INDEX_UUID);
+    const at = (isStream ? file.indexOf(INDEX_UUID) : file.lastIndexOf(UUID)) + 28; // behind the magic, the version and the count
+    const name = at + 1 + file[at]; // of the first section, the header
     const length = Number(file.readBigUInt64LE(name));
-    for (let i = 0; i < count; i++) table += 1 + file[table] + 12;
-    const { width, height } = JSON.parse(inflateSync(file.subarray(table + 4, table + 4 + length))).settings;
+    let start = isStream ? Number(file.readBigUInt64LE(name + 12)) : at + 4;
+    if (!isStream) for (let i = file.readUInt16LE(at - 2), row = at; i > 0; i--, row += 1 + file[row] + 12) start += 1 + file[row] + 12;
+    const { width, height } = JSON.parse(inflateSync(file.subarray(start, start + length))).settings;
     return width * height <= 2 ** 24 ? [width, 3 * height] : [16, 16];
   } catch {
     return [16, 16];

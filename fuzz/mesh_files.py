@@ -9,6 +9,7 @@ from pathlib import Path
 
 import gvpipe.io
 from fuzz.hdf import HDF, mutate_hdf
+from fuzz.library_processes import fork_library_processes
 from fuzz.mutation import Change, Rng, mutate_bytes, mutate_json, mutate_text
 from fuzz.parts import Parts, Seed, Target
 from fuzz.results import check_asset, check_faces, check_positions
@@ -18,6 +19,7 @@ MESH = "mesh.obj"  # what a point cache belongs to
 CACHES = (".pc2", ".mdd", ".npy")
 MOST_VALUES = 1 << 22
 MEMORY = 1 << 30  # bytes; no budget is promised for mesh files, and libraries allocate before they look
+USD_MEMORY = 4 << 30  # OpenUSD fills an array of the length that a damaged file says before it finds the end of the file
 INSIDE = "|"  # between a file's name and the name of what it holds
 GLTF_JSON = 0x4E4F534A  # kind of a chunk
 TEXTS = (b"ply\n", b"v ", b"#", b"solid", b"OFF", b"<?xml", b"<", b"FORMAT", b"; FBX", b"{")
@@ -25,6 +27,7 @@ TEXTS = (b"ply\n", b"v ", b"#", b"solid", b"OFF", b"<?xml", b"<", b"FORMAT", b";
 
 def mesh_targets(seeds: dict[str, tuple[Seed, ...]]) -> list[Target]:
     """The parsers of mesh files, by format; seeds by format, each with its files as parts, the main one first."""
+    fork_library_processes()
     return [
         Target(
             name,
@@ -33,7 +36,7 @@ def mesh_targets(seeds: dict[str, tuple[Seed, ...]]) -> list[Target]:
             join_files,
             parse_mesh,
             (InputError,),
-            MEMORY,
+            USD_MEMORY if name.startswith("usd") else MEMORY,
         )
         for name, group in seeds.items()
     ]

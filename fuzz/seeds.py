@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import numpy as np
 import gvpipe
 from fuzz.mesh_files import CACHES, MESH
 from fuzz.parts import Parts, Seed
+from fuzz.streams import split_stream
 from fuzz.videos import split_video
 from gvpipe.sequence import MeshSequence
 
@@ -21,7 +23,8 @@ ROOT = Path(__file__).resolve().parent.parent
 TESTS = ROOT / "tests"
 FOLDER = ROOT / "build" / "fuzz" / "seeds"
 LARGEST = 60_000  # bytes of a seed: larger ones take too long a case
-N_FRAMES = 8  # of samples
+N_FRAMES = 6  # of samples
+N_VERTICES = 120  # of the flag, whose first ones are taken
 FAST = {"preset": "ultrafast", "gop": 4, "clusters": 3}
 PROFILES: dict[str, tuple[str, dict[str, Any]]] = {
     "mcgv": ("mcgv", FAST),
@@ -41,8 +44,10 @@ PROFILES: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-def load_seeds(folder: Path, more: Path | None = None) -> tuple[tuple[Seed, ...], dict[str, tuple[Seed, ...]]]:
-    """Geometry videos, and files of meshes by format.
+def load_seeds(
+    folder: Path, more: Path | None = None
+) -> tuple[tuple[Seed, ...], tuple[Seed, ...], dict[str, tuple[Seed, ...]]]:
+    """Geometry videos in the plain layout, in the stream layout, and files of meshes by format.
 
     Args:
         folder: of seeds that were made before; what is missing there is made.
@@ -52,6 +57,7 @@ def load_seeds(folder: Path, more: Path | None = None) -> tuple[tuple[Seed, ...]
         make_seeds(folder)
     videos = [*sorted((TESTS / "golden").glob("*.mp4")), *sorted((folder / "videos").glob("*.mp4"))]
     seeds = tuple(Seed(path.stem, split_video(path.read_bytes())) for path in videos)
+    streams = tuple(Seed(path.stem, split_stream(path.read_bytes())) for path in sorted((folder / "streams").glob("*.mp4")))
     formats: dict[str, tuple[Seed, ...]] = {}
     for group in sorted((folder / "meshes").iterdir()):
         formats[group.name] = tuple(Seed(case.name, _files(case)) for case in sorted(group.iterdir()))
@@ -59,7 +65,7 @@ def load_seeds(folder: Path, more: Path | None = None) -> tuple[tuple[Seed, ...]
         kind = path.suffix[1:].lower()
         if kind in formats and path.is_file() and path.stat().st_size <= LARGEST:
             formats[kind] = (*formats[kind], Seed(path.name, {f"a{path.suffix.lower()}": path.read_bytes()}))
-    return seeds, formats
+    return seeds, streams, formats
 
 
 def make_seeds(folder: Path) -> None:
@@ -68,21 +74,37 @@ def make_seeds(folder: Path) -> None:
     for sample, sequence in _samples().items():
         for name, (codec, settings) in PROFILES.items():
             gvpipe.encode(sequence, folder / "videos" / f"{sample}-{name}.mp4", codec, **settings)
-    scene = _of_tests("asset_scene.py").scene()
-    for name in ("mcgv", "pca", "mcgv-affine"):
-        codec, settings = PROFILES[name]
-        gvpipe.encode(scene, folder / "videos" / f"scene-{name}.mp4", codec, **settings)
+    for sample, sequence in _scenes().items():
+        for name in ("mcgv", "pca", "mcgv-affine"):
+            codec, settings = PROFILES[name]
+            gvpipe.encode(sequence, folder / "videos" / f"{sample}-{name}.mp4", codec, **settings)
+    (folder / "streams").mkdir(exist_ok=True)
+    for path in sorted((folder / "videos").glob("*.mp4")):
+        gvpipe.restream(path, folder / "streams" / path.name, "stream")
     _make_meshes(folder / "meshes")
     (folder / "done").write_text("")
 
 
 def _samples() -> dict[str, MeshSequence]:
-    """A few frames of two samples; of the first, every second frame is held."""
+    """A few frames of two samples, one of them cut small; of the other, every second frame is held."""
     flag = gvpipe.read(ROOT / "samples" / "flag.npz")
-    ball = gvpipe.read(ROOT / "samples" / "ball_frames")
-    whole = ball.part(0, N_FRAMES)
-    held = np.repeat(np.asarray(whole.positions[: N_FRAMES // 2]), 2, axis=0)
-    return {"flag": flag.part(0, N_FRAMES), "ball": MeshSequence(held, whole.faces, whole.fps)}
+    faces = flag.faces[(flag.faces < N_VERTICES).all(axis=1)]
+    ball = gvpipe.read(ROOT / "samples" / "ball_frames").part(0, N_FRAMES)
+    held = np.repeat(np.asarray(ball.positions[: N_FRAMES // 2]), 2, axis=0)
+    return {
+        "flag": MeshSequence(np.asarray(flag.positions[:N_FRAMES])[:, :N_VERTICES], faces, flag.fps),
+        "ball": MeshSequence(held, ball.faces, ball.fps),
+    }
+
+
+def _scenes() -> dict[str, MeshSequence]:
+    """A scene with all that files hold, and its parts alone, whose cases take less time."""
+    scene: MeshSequence = _of_tests("asset_scene.py").scene(N_FRAMES)
+    return {
+        "scene": scene,
+        "layers": replace(scene, fields={}),
+        "fields": MeshSequence(scene.positions, scene.faces, scene.fps, fields=scene.fields),
+    }
 
 
 def _make_meshes(folder: Path) -> None:

@@ -53,14 +53,19 @@ def load_targets(options: Options) -> list[Target]:
     from fuzz.browser import browser_targets
     from fuzz.mesh_files import mesh_targets
     from fuzz.seeds import load_seeds
+    from fuzz.streams import stream_target
     from fuzz.videos import video_targets
 
     if options.indices:
         from fuzz.strict_indices import refuse_bad_indices
 
         refuse_bad_indices()
-    videos, meshes = load_seeds(Path(options.seeds), Path(options.more) if options.more else None)
-    kinds = {"video": video_targets(videos), "mesh": mesh_targets(meshes), "web": browser_targets(videos)}
+    videos, streams, meshes = load_seeds(Path(options.seeds), Path(options.more) if options.more else None)
+    kinds = {
+        "video": [*video_targets(videos), stream_target(streams)],
+        "mesh": mesh_targets(meshes),
+        "web": browser_targets(videos, streams),
+    }
     targets = [target for kind, group in kinds.items() if options.kind in ("", kind) for target in group]
     unknown = set(options.targets) - {target.name for target in targets}
     if unknown:

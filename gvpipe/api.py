@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from gvpipe import notes
 from gvpipe.arguments import StrPath, check_path, show
+from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.budget import Budget
 from gvpipe.codec import Codec, Encoded, Progress
@@ -32,6 +33,7 @@ from gvpipe.rendering.poster import poster_of
 from gvpipe.sequence import MeshSequence
 
 COSTLY_VERTEX = 400  # bytes of memory, with its triangles: less than any codec takes
+COSTLY_ATTRIBUTES = 4000  # bytes of memory, of a vertex with attributes of 40 components in all
 SLOW_VERTEX = 20e-6  # seconds: less than `laplacian` takes where others take memory
 VIDEO_SUFFIXES = (".mp4", ".m4v")
 
@@ -619,10 +621,12 @@ def _notes(sequence: MeshSequence, target: Target | None, left_out: Sequence[str
 def _refusal(path: StrPath, bitstream: Bitstream, size: int) -> list[str]:
     """A note if the file that was written is refused without ``unlimited``; looked at where vertices are many for its size."""
     budget, n_vertices = Budget(size), bitstream.n_vertices
-    if COSTLY_VERTEX * n_vertices < budget.memory and SLOW_VERTEX * n_vertices < budget.seconds:
+    costly = COSTLY_ATTRIBUTES if ASSET_SECTION in bitstream.sections else COSTLY_VERTEX
+    if costly * n_vertices < budget.memory and SLOW_VERTEX * n_vertices < budget.seconds:
         return []
     try:
-        Player(path)[0]
+        with Player(path) as video:
+            _ = video[0], [*video.attributes.values()], [field[0:1] for field in video.fields.values()]
     except OverBudget as exc:
         return [notes.over_budget(str(exc).partition(": ")[2].partition(";")[0])]
     return []

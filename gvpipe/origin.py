@@ -64,7 +64,8 @@ def rounding(positions: NDArray[np.generic], narrowed: Float32, origin: Float64)
         return 0.0
     largest = 0.0
     for block, short in zip(_blocks(positions), _blocks(narrowed), strict=True):
-        difference = np.subtract(block - origin if origin.any() else block, short, dtype=np.float64)
+        with np.errstate(invalid="ignore"):  # of infinities, which the caller refuses
+            difference = np.subtract(block - origin if origin.any() else block, short, dtype=np.float64)
         largest = max(largest, float(difference.max(initial=0)), -float(difference.min(initial=0)))
     return largest
 

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import zlib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,9 @@ from gvcodecs.laplacian.extended_laplacian import thin_hubs
 from gvcodecs.laplacian.laplace_operators import laplacian
 from gvcodecs.laplacian.normal_equations import NO_LIMIT, NormalEquations, count_fill, most_products
 from gvpipe.arrays import Int32
+from gvpipe.asset_coding.directory import CODED
+from gvpipe.attributes.attribute_coding import encode_attribute
+from gvpipe.attributes.surface import Surface
 from gvpipe.budget import BYTES_PER_BYTE, LEAST_BYTES, LEAST_SECONDS, SECONDS_PER_BYTE, Budget
 from gvpipe.connectivity.topology_only import HEADER as MESH
 from gvpipe.connectivity.topology_only import encode_mesh
@@ -41,6 +45,7 @@ from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.reader import FieldReader
 from gvpipe.fields.values import FieldBound
 from gvpipe.media.video import PROFILES, VideoReader
+from gvpipe.sequence import MeshSequence
 
 WARM = ("laplacian-2-still", "mcgv-3-jpeg", "mcgv-4-rigid", "pca-2-still", "pdct-2-seams")
 ZERO = encode_integers(np.zeros(1, np.int64))  # however many zeros
@@ -80,13 +85,13 @@ def random_triangles(n_points: int) -> Int32:
     return np.asarray(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
 
 
-def much_fill() -> Bitstream:
+def much_fill(name: str) -> Bitstream:
     """A Laplacian whose factor has 14 million entries, and takes 23,000 million products."""
     faces, n = random_triangles(6000), 6000
     coded, mesh = encode_mesh(faces, np.arange(n), reorder=True)
     sections = {"mesh": coded.mesh, "order": coded.order}
     counts = {"n_vertices": len(mesh.points), "n_triangles": len(mesh.faces)}
-    return changed("laplacian-1-tutte", sections=sections, **counts)
+    return changed(name, sections=sections, **counts)
 
 
 def huge_pictures() -> Bitstream:
@@ -132,6 +137,22 @@ def deflated_list() -> Bitstream:
     return changed("pca-1-kalman", sections={"asset": zlib.compress(text, 9)})
 
 
+def wide_attribute(n: int) -> Bitstream:
+    """An attribute of 64 components, all zeros, where the list has one."""
+    faces = np.array([[0, 1, 2]], np.int32)
+    coded, _ = encode_mesh(faces, np.arange(n), reorder=True)
+    listed = {"name": "a", "kind": "scalar", "domain": "vertex", "components": 1, "dtype": "uint8", "bound": 0, "coding": CODED}
+    asset = {"version": 1, "geometry": False, "metadata": {}, "attributes": [{**listed, "section": "attribute.0"}]}
+    empty: dict[str, list[object]] = {"parts": [], "fields": [], "materials": [], "images": []}
+    sections = {
+        "mesh": coded.mesh,
+        "order": coded.order,
+        "asset": zlib.compress(json.dumps({**asset, **empty}).encode()),
+        "attribute.0": encode_attribute(np.zeros((10, 64), np.uint8), None, Surface(faces, 10), domain="vertex", kind="scalar"),
+    }
+    return changed("pca-1-kalman", sections=sections, n_vertices=n, n_triangles=1)
+
+
 def many_samples(video: bytes) -> bytes:
     """2**24 samples of one byte."""
     at = video.find(b"stsz") + 8
@@ -143,7 +164,8 @@ BOMBS: dict[str, tuple[Callable[[], Bitstream], str]] = {
     "deflated triangles": (deflated_triangles, "OverBudget: .*5242880 triangles"),
     "vertices alone": (vertices_alone, "OverBudget: .*16777216 vertices"),
     "free values": (free_values, "OverBudget: .*16384 trajectories"),
-    "much fill": (much_fill, "TooMuchFill: .*points at random"),
+    "much fill": (partial(much_fill, "laplacian-1-tutte"), "TooMuchFill: .*points at random"),
+    "much fill of the average": (partial(much_fill, "laplacian-1"), "TooMuchFill: .*points at random"),
     "a long clip": (long_clip, "OverBudget: .*100000 frames"),
     "long transforms": (long_transforms, "OverBudget: .*16777216 frames"),
     "many runs": (many_runs, "OverBudget: .*16777216 distinct frames"),
@@ -221,6 +243,14 @@ def test_groups_of_displacements_have_a_limit() -> None:
         decode_group(group, n >> 4, 16, "corrections", Budget(1000))
 
 
+def test_attributes_have_as_many_components_as_are_listed(tmp_path: Path) -> None:
+    """75,000 vertices fit the budget with one component; 64 took 124 MB of a file of 2 kB."""
+    mp4.write_file(wide_attribute(75_000), tmp_path / "a.mp4")
+    video = gvpipe.open(tmp_path / "a.mp4")
+    with pytest.raises(CorruptFile, match="64 components; section 'asset' lists 1"):
+        video.attributes["a"]
+
+
 def test_segments_of_fields_have_a_limit() -> None:
     mesh = FieldMesh(np.array([[0, 1, 2]], np.int32), 3)
     n_frames = 100_000
@@ -240,6 +270,19 @@ def test_fields_that_take_no_bytes_are_read_within_the_budget(kind: str, monkeyp
     budget = Budget(len(section))
     assert 53 * values.size > budget.memory  # in one segment it would be too much
     assert np.abs(FieldReader(section, n_frames, mesh, "heat", budget=budget).read(0, n_frames) - values).max() <= 0.01
+
+
+def test_a_file_whose_attributes_are_refused_gets_a_note(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gvpipe.budget.LEAST_BYTES", 2 << 20)
+    monkeypatch.setattr("gvpipe.budget.BYTES_PER_BYTE", 0)
+    positions, faces = grid(30)
+    wide = MeshSequence(np.stack([positions, positions + 1]), faces, 24, attributes={"wide": np.zeros((900, 40), np.uint8)})
+    assert not gvpipe.encode(dataclasses.replace(wide, attributes={}), tmp_path / "a.mp4", "pca").notes
+    (note,) = gvpipe.encode(wide, tmp_path / "a.mp4", "pca").notes
+    assert "needs --unlimited (attribute 'wide' takes" in note
+    with pytest.raises(OverBudget):
+        gvpipe.open(tmp_path / "a.mp4").attributes["wide"]
+    assert gvpipe.open(tmp_path / "a.mp4", unlimited=True).attributes["wide"].shape == (900, 40)
 
 
 def test_pictures_have_a_limit() -> None:

@@ -23,6 +23,7 @@ from fuzz.mutation import mutate_bytes, mutate_json, mutate_text
 from fuzz.parts import Seed
 from fuzz.reduction import reduce_parts
 from fuzz.session import Session
+from fuzz.streams import split_stream, stream_target
 from fuzz.targets import Options
 from fuzz.videos import FILE, VIDEO, join_video, split_video, video_targets
 from fuzz.worker import write_files
@@ -39,6 +40,17 @@ def test_a_video_put_together_is_the_same(path: Path, tmp_path: Path) -> None:
     assert split_video(again.read_bytes()) == parts
     assert np.array_equal(gvpipe.open(again)[:], gvpipe.open(path)[:])
     assert b"".join(box.pack() for box in parse_boxes(parts[VIDEO])) == parts[VIDEO]
+
+
+def test_a_stream_put_together_is_the_same(tmp_path: Path) -> None:
+    gvpipe.restream(STILL, tmp_path / "a.mp4", "stream")
+    seed = Seed("still", split_stream((tmp_path / "a.mp4").read_bytes()))
+    target = stream_target((seed,))
+    again = write_files(target.join(seed.parts), tmp_path / "case")
+    assert split_stream(again.read_bytes()) == seed.parts
+    assert np.array_equal(gvpipe.open(again)[:], gvpipe.open(STILL)[:])
+    verdicts = [judge(target, write_files(target.join(target.case(1, k)[1]), tmp_path / "case"), 10**4) for k in range(1, 30)]
+    assert {verdict.kind for verdict in verdicts} == {ACCEPTED, REFUSED}, verdicts
 
 
 def test_cases_repeat_and_checksums_hold(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ import gvpipe
 from gvpipe.container import mp4
 from gvpipe.container.bitstream import Bitstream, pack_payload, unpack_payload
 from gvpipe.errors import CorruptFile, InputError
-from gvpipe.origin import LOSS, choose_origin, narrow
+from gvpipe.origin import LOSS, choose_origin, narrow, rounding
 from gvpipe.registry import codec_ids
 from gvpipe.rendering.error_map import ErrorMap
 from gvpipe.sequence import MeshSequence
@@ -59,6 +59,12 @@ def test_shape_survives_in_memory() -> None:
     assert np.abs(far.read(3, 5) + far.origin - positions()[3:5]).max() < 2e-7
     assert np.array_equal(far.read_absolute(0, 40), positions())
     assert np.abs(far.read_exact(0, 40) + far.origin - positions()).max() < 2e-9
+
+
+def test_infinite_positions_are_rounded_in_silence() -> None:
+    """Readers refuse them afterwards, in one line; a warning of NumPy would be a second."""
+    exact = np.array([[[np.inf, 0.1, 1e300]]])
+    assert rounding(exact, narrow(exact, np.zeros(3)), np.zeros(3)) >= 0
 
 
 def test_the_origin_is_round_and_only_where_it_matters() -> None:

@@ -185,6 +185,7 @@ class AssetReader:
             listed.section,
             domain=listed.domain,
             references=[each for each in references if each is not None],
+            n_components=listed.components,
         )
         try:
             made = Attribute(values, listed.domain, listed.kind, indices, listed.unit, f"attribute {listed.name!r}")

@@ -61,7 +61,7 @@ def encode_attribute(
 
 
 def decode_attribute(
-    data: bytes, surface: Surface, name: str, *, domain: str, references: Sequence[Int32] = ()
+    data: bytes, surface: Surface, name: str, *, domain: str, references: Sequence[Int32] = (), n_components: int | None = None
 ) -> tuple[Array, Int32 | None]:
     """Mirror of `encode_attribute`.
 
@@ -70,6 +70,7 @@ def decode_attribute(
         surface: the same mesh, with the same positions.
         name: of the section, for messages.
         domain, references: as given to the encoder.
+        n_components: C that is wanted; None: any.
 
     Returns:
         values ``(N, C)``, one for each vertex, triangle, part or entry, and the entries ``(3T,)`` of the corners or None.
@@ -79,10 +80,10 @@ def decode_attribute(
     """
     cursor = Cursor(data, name)
     if domain == "vertex" and cursor.varint(WELDED, "the layout") == WELDED:
-        return _decode_welded(cursor, surface), None
+        return _decode_welded(cursor, surface, n_components), None
     corners = decode_sharing(Cursor(cursor.block(), name), surface, references) if domain == "corner" else None
     layout = EntryLayout(domain, surface, corners)
-    storage = stores.read_storage(cursor, layout.n_entries)
+    storage = stores.read_storage(cursor, layout.n_entries, n_components)
     codes = decode_codes(cursor, storage, layout)
     return stores.restore(storage, codes, cursor), corners
 
@@ -106,14 +107,14 @@ def encode_welded(storage: Storage, codes: Int64, surface: Surface) -> bytes:
     return bytes([WELDED]) + pack_block(sharing) + stores.pack_storage(storage) + encode_codes(storage, own, layout)
 
 
-def _decode_welded(cursor: Cursor, surface: Surface) -> Array:
+def _decode_welded(cursor: Cursor, surface: Surface, n_components: int | None) -> Array:
     """Mirror of `encode_welded`: the values of vertices."""
     if not may_weld(surface):
         raise cursor.corrupt("an attribute is welded where vertices cannot be")
     welded = surface.welded()
     sharing = Cursor(cursor.block(), cursor.name)
     corners = decode_sharing(sharing, welded, [entries_of(surface.faces.ravel(), welded)])
-    storage = stores.read_storage(cursor, surface.n_vertices)
+    storage = stores.read_storage(cursor, surface.n_vertices, n_components)
     codes = decode_codes(cursor, storage, EntryLayout("corner", welded, corners))
     return stores.restore(storage, codes[vertex_rows(surface, corners)], cursor)
 

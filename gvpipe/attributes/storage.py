@@ -151,8 +151,8 @@ def pack_storage(storage: Storage) -> bytes:
     return head
 
 
-def read_storage(cursor: Cursor, n_entries: int) -> Storage:
-    """Mirror of `pack_storage`; raises `CorruptFile`."""
+def read_storage(cursor: Cursor, n_entries: int, wanted: int | None = None) -> Storage:
+    """Mirror of `pack_storage`; raises `CorruptFile`, also where there are not as many components as ``wanted``."""
     number, type_number = cursor.take(2)
     if number > RANKS or type_number >= len(TYPES):
         raise cursor.corrupt("an attribute has an unknown storage")
@@ -160,6 +160,8 @@ def read_storage(cursor: Cursor, n_entries: int) -> Storage:
     if (dtype.kind == "f") != (number not in (INTEGERS, RANKS)):
         raise cursor.corrupt(f"an attribute of {dtype} is stored as what it is not")
     n_components = cursor.varint(MAX_COMPONENTS, "the number of components")
+    if wanted is not None and n_components != wanted:
+        raise cursor.corrupt(f"an attribute has {n_components} components; section 'asset' lists {wanted}")
     if number in (DIRECTIONS, TANGENTS) and n_components != number - DIRECTIONS + 3:
         raise cursor.corrupt(f"directions have {n_components} components")
     if number == STEPS:

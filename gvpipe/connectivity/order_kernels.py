@@ -158,9 +158,10 @@ def _find_contexts(
                 continue
             if count < LOOKED_AT:
                 is_shared = 0
-                if v > 1:
-                    for j in range(lists.starts[y], lists.starts[y + 1]):
-                        if lists.neighbours[j] == visits[v - 2]:
+                if v > 1:  # its list, not that of y: each vertex is the last but one once, so that hubs cost nothing
+                    last = visits[v - 2]
+                    for j in range(lists.starts[last], lists.starts[last + 1]):
+                        if lists.neighbours[j] == y:
                             is_shared = 1
                             break
                 shared = 2 * shared + is_shared

@@ -153,7 +153,7 @@ def read_stream(source: Source, index: Box, budget: Budget) -> Bitstream:
     check_no_samples(moov)
     sections = StoredSections(source, places)
     bitstream, container = read_header(sections[HEADER], budget)
-    if f"{TAG_PREFIX}{VERSION} {container.text('id')}".encode() not in moov:
+    if f"{TAG_PREFIX}{VERSION} {container.text('id')}".encode("utf-8", "replace") not in moov:  # JSON may hold any text
         raise corrupt("its geometry belongs to another file")
     codec_sections = StoredSections(source, {name: place for name, place in places.items() if name != HEADER})
     stored = StoredFragments(source, head, fragments)

@@ -68,14 +68,7 @@ class LibraryProcess:
             return self._exchange(name, arguments)
 
     def _start(self) -> None:
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", self._module, os.fspath(self._path.absolute())],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            env=environment,
-        )
+        self._process = start_process(self._module, self._path.absolute())
         self._finalizer = weakref.finalize(self, _end, self._process)
 
     def _exchange(self, name: str, arguments: tuple[Any, ...]) -> Any:
@@ -96,6 +89,17 @@ class LibraryProcess:
                 raise InputError(said)
             raise unreadable(self._path, self._kind, said)
         return result
+
+
+def start_process(module: str, path: Path) -> subprocess.Popen[bytes]:
+    """A new Python that runs a module, with a path as its argument and pipes for requests and answers."""
+    return subprocess.Popen(
+        [sys.executable, "-m", module, os.fspath(path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

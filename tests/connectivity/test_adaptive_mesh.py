@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -88,3 +90,17 @@ def test_no_byte_does_harm(place: int, change: int) -> None:
         return
     assert decoded.min() >= 0
     assert not len(triangles) or triangles.max() < len(decoded)
+
+
+def test_hubs_take_no_longer_than_other_vertices() -> None:
+    """Three vertices that are neighbours of all others: their lists are not searched for each vertex."""
+    n = 12_000
+    rim = np.arange(n - 4)
+    hubs = np.concatenate([np.stack([rim, rim + 1, np.full_like(rim, n - 3 + k)], axis=1) for k in range(3)])
+    strip = np.concatenate([np.stack([rim, rim + 1, rim + 2 + k], axis=1) for k in range(3)])
+    seconds = []
+    for faces in (strip, hubs, strip, hubs):
+        started = time.process_time()
+        encode_adaptive_order(np.arange(n), np.arange(n), np.minimum(faces, n - 1))
+        seconds.append(time.process_time() - started)
+    assert min(seconds[1::2]) < 4 * min(seconds[::2]), seconds

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 import zlib
 from pathlib import Path
@@ -14,6 +15,8 @@ from folders import GOLDEN
 from sequences import held, waving
 
 import gvpipe
+from fuzz.streams import join_stream, split_stream
+from fuzz.videos import FILE
 from gvpipe.container import mp4
 from gvpipe.container.fragments import count_pictures, split_fragments
 from gvpipe.container.sources import FileSource
@@ -217,6 +220,16 @@ def test_an_index_that_lies_is_refused(tmp_path: Path) -> None:
     path.write_bytes(with_index(stream, poke(fragments + 16, "<I", 7)))  # pictures
     with pytest.raises(CorruptFile, match="not what its index describes|in place of"):
         gvpipe.open(path)[0]
+
+
+def test_a_content_id_of_any_text_is_refused(tmp_path: Path) -> None:
+    _, stream = streamed("pca-2-still", tmp_path)
+    parts = split_stream(stream.read_bytes())
+    header = json.loads(parts["header"])
+    header["container"]["id"] = "\ud800"
+    stream.write_bytes(join_stream({**parts, "header": json.dumps(header).encode()})[FILE])
+    with pytest.raises(CorruptFile, match="belongs to another file"):
+        gvpipe.open(stream)
 
 
 def test_fragments_claim_no_more_pictures_than_bytes(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from gvcodecs.laplacian.domain import Surface, build_domain
 from gvcodecs.laplacian.header import CoefficientCoding
 from gvcodecs.laplacian.mesh_scale import edge_lengths
 from gvpipe.arrays import Float64
+from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.errors import corrupt_section
 
@@ -38,12 +39,19 @@ def encode_average(points: Float64, surface: Surface, coding: CoefficientCoding)
     return data, decode_average(data, surface, coding)
 
 
-def decode_average(data: bytes, surface: Surface, coding: CoefficientCoding) -> Float64:
-    """Mirror of `encode_average`; raises `CorruptFile` if the bytes are not what it writes."""
+def decode_average(data: bytes, surface: Surface, coding: CoefficientCoding, budget: Budget = UNLIMITED) -> Float64:
+    """Mirror of `encode_average`.
+
+    Raises:
+        CorruptFile: the bytes are not what it writes.
+        TooMuchFill, OverBudget, Singular: of `gvcodecs.laplacian.normal_equations.NormalEquations`.
+    """
     own = _own_coding(coding)
     cursor = Cursor(data, NAME)
     anchors = cursor.block()
-    domain = build_domain(surface, None, own)
+    with budget.releasing():
+        domain = build_domain(surface, None, own, budget=budget)
+        domain.system.equations.ask_to_solve(3)
     points = decode_coefficients(anchors, cursor.rest(), 3, coding.average_step, domain, own, (NAME, NAME))
     if not np.abs(points).max(initial=0) < FARTHEST:
         raise corrupt_section(NAME, "a position is out of range")

@@ -70,7 +70,7 @@ class LaplacianReader:
     def _build_domain(self, surface: Surface) -> Domain:
         average = None
         if self._header.coding.needs_average:
-            average = decode_average(self._bitstream.section(NAME), surface, self._header.coding)
+            average = decode_average(self._bitstream.section(NAME), surface, self._header.coding, self._bitstream.budget)
         return build_domain(surface, average, self._header.coding, self._still.flags, self._bitstream.budget)
 
     def _decode(self, s: int) -> Segment:

@@ -21,12 +21,13 @@ const BYTES_PER_VERTEX = 12; // of a frame
  *   distinct frame from what the clock shows
  * @property {() => void} close
  *
- * @param {Uint8Array} file @param {import("./format/payload.js").Payload} payload
+ * @param {Uint8Array|import("./format/stream_file.js").StreamFile} source the file, or its parts
+ * @param {import("./format/payload.js").Payload} payload
  * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {number} level of detail
  * @returns {Promise<Playable>}
  * @throws {GeometryVideoError} it is damaged, or this player or browser cannot read it
  */
-export async function openCodec(file, payload, repeated, level) {
+export async function openCodec(source, payload, repeated, level) {
   const { codec, version } = payload.header;
   const newest = codec === MCGV ? MCGV_VERSION : readableVersion(codec);
   if (!newest) throw new GeometryVideoError("unsupported", `it was coded by ${quote(codec)}; gvpipe export-html converts it`);
@@ -38,22 +39,28 @@ export async function openCodec(file, payload, repeated, level) {
     throw new GeometryVideoError("unsupported", "this browser has no WebAssembly with SIMD; a newer one is needed");
   }
   const distinct = repeated.distinctPayload(payload);
-  return codec === MCGV ? openMcgv(file, payload.header, distinct, repeated, level) : openFrames(payload.header, distinct, repeated, level);
+  return codec === MCGV ? openMcgv(source, payload.header, distinct, repeated, level) : openFrames(payload.header, distinct, repeated, level);
 }
 
-async function openMcgv(file, { fps, vertices, container }, distinct, repeated, level) {
+async function openMcgv(source, { fps, vertices, container }, distinct, repeated, level) {
   if (level) throw new GeometryVideoError("unsupported", `level ${level}: there are levels 0..0`);
   const reader = await McgvReader.open(distinct, code);
+  const file = source instanceof Uint8Array ? source : null;
+  const load = async (first, last) => file ?? Promise.all(reader.sectionsOf(first, last).map((name) => source.load(name)));
   return {
     faces: reader.faces,
     basePoints: reader.basePoints,
-    bounds: reader.bounds(),
     vertexCount: vertices,
     levels: [vertices],
-    openPictures: () =>
-      reader.samples
-        ? openPictures(file, fps, repeated, reader.pictureSize, reader.samples, container.track_crc32)
-        : DecodedPictures.without(fps, repeated, reader.zeroLevels),
+    /** Once pictures are open: of a file in parts, sections come with them. */
+    get bounds() {
+      return reader.bounds();
+    },
+    openPictures() {
+      if (!reader.samples) return DecodedPictures.without(fps, repeated, reader.zeroLevels, reader.segmentStarts, load);
+      if (!file) return DecodedPictures.inParts(source, fps, repeated, reader.pictureSize, reader.samples, load);
+      return openPictures(file, fps, repeated, reader.pictureSize, reader.samples, container.track_crc32);
+    },
     rebuild: (frame, levels, positions) => reader.rebuild(frame, levels, positions),
     close() {},
   };

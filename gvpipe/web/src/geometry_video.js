@@ -12,6 +12,7 @@ import { readContainer } from "./format/boxes.js";
 import { GeometryVideoError } from "./format/errors.js";
 import { readRepeatedFrames } from "./format/repeated_frames.js";
 import { readPayload } from "./format/payload.js";
+import { StreamFile } from "./format/stream_file.js";
 
 export { GeometryVideoError };
 
@@ -27,14 +28,16 @@ export class GeometryVideo {
    * @throws {GeometryVideoError} it cannot be fetched, it is no geometry video, it is damaged, or not one for browsers
    */
   static async load(source, { level = 0 } = {}) {
-    const file = await fetchBytes(source);
+    const parts = await openParts(source);
+    const file = parts instanceof StreamFile ? null : (parts ?? (await fetchBytes(source)));
     let [pictures, reader] = [null, null];
     try {
-      const payload = await readPayload(readContainer(file));
+      const payload = await readPayload(file ? readContainer(file) : parts.container);
       const repeated = readRepeatedFrames(payload);
-      reader = await openCodec(file, payload, repeated, level);
+      reader = await openCodec(file ?? parts, payload, repeated, level);
       pictures = await reader.openPictures();
-      const video = new GeometryVideo(payload.header, file.length, repeated, reader, pictures);
+      const video = new GeometryVideo(payload.header, file?.length ?? parts.size, repeated, reader, pictures);
+      video.#isInParts = !file;
       if (level === 0) video.#takeAsset(await readAsset(payload, video, (k) => video.#positionsBeside(k)));
       return video;
     } catch (error) {
@@ -48,6 +51,7 @@ export class GeometryVideo {
   #repeated;
   #reader;
   #pictures;
+  #isInParts = false; // fetched when it is needed
   #queue = Promise.resolve();
   #beside = null; // a promise of pictures of their own, for fields that follow from positions
   #queueBeside = Promise.resolve();
@@ -81,7 +85,9 @@ export class GeometryVideo {
 
   /** Seconds that play without a wait for the file: a list of `[start, end]`. */
   get buffered() {
-    return [[0, this.duration]];
+    if (!this.#isInParts) return [[0, this.duration]];
+    const timeOf = (picture) => this.#repeated.frameOf(picture) / this.fps;
+    return this.#pictures.spans().map(([first, stop]) => [timeOf(first), timeOf(stop)]);
   }
 
   /** Bits of the file per second of playing. */
@@ -173,6 +179,18 @@ export class GeometryVideo {
   #read(k, positions) {
     this.#reader.rebuild(this.#repeated.distinctOf(k), this.#pictures.levels(), positions);
     return positions;
+  }
+}
+
+/** The file in parts, where it is on a web server and in the stream layout; else null, or all of it where it has come. */
+async function openParts(source) {
+  if (!(typeof source === "string" || source instanceof URL) || typeof VideoDecoder !== "function") return null;
+  if (!/^https?:$/.test(new URL(source, location.href).protocol)) return null;
+  try {
+    return await StreamFile.open(source);
+  } catch (error) {
+    if (error instanceof GeometryVideoError) throw error;
+    return null; // `fetchBytes` says what is wrong
   }
 }
 
