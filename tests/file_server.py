@@ -54,6 +54,15 @@ def serving(data: bytes) -> Iterator[tuple[str, Served]]:
         def do_GET(self) -> None:
             answer(self, served)
 
+        def do_OPTIONS(self) -> None:
+            self.send_response(204)  # browsers may ask before they send a Range to another server
+            self.send_header("Access-Control-Allow-Headers", "Range")
+            self.end_headers()
+
+        def end_headers(self) -> None:
+            self.send_header("Access-Control-Allow-Origin", "*")
+            super().end_headers()
+
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
     thread.start()
@@ -73,7 +82,7 @@ def answer(handler: http.server.BaseHTTPRequestHandler, served: Served) -> None:
     start, stop = 0, size
     if wanted and served.ranges:
         first, last = wanted.removeprefix("bytes=").split("-")
-        start, stop = int(first), min(int(last) + 1, size)
+        start, stop = int(first), min(int(last or size) + 1, size)
         if start >= size:
             handler.send_error(416)
             return

@@ -177,9 +177,6 @@ def gltf_distance(path: Path, reference: Path, sequence: MeshSequence) -> float:
     """The largest over all clips of a reference."""
     with np.load(reference) as archive:
         held = dict(archive)
-    if "positions_4_influences" in held:  # of a reader that takes four influences alone, in the file's own pose
-        kept = held["clips"] >= 0
-        held |= {name: held[name][kept] for name in ("clips", "times", "positions")}
     return max(one.distance for one in compare_gltf(path, held, sequence))
 
 

@@ -48,6 +48,9 @@ def compare_gltf(path: Path, reference: dict[str, Array], sequence: MeshSequence
 
     References have a block of vertices per primitive, so blocks that parts share are repeated.
     """
+    if "positions_4_influences" in reference:  # the file's own pose is of a reader that takes four influences alone
+        kept = reference["clips"] >= 0
+        reference = reference | {name: reference[name][kept] for name in ("clips", "times", "positions")}
     numbers = [int(number) for number in np.unique(reference["clips"]) if number >= 0]
     names = dict(zip(numbers, map(str, reference["clip_names"]), strict=True))
     for number in np.unique(reference["clips"]):

@@ -29,7 +29,7 @@ SHARED = {
     "gvpipe.container.bitstream": "MAGIC VERSION MAX_SECTIONS MAX_NAME MAX_HEADER MAX_FRAMES MAX_VERTICES",
     "gvpipe.container.mp4": "BOX_UUID MAX_BOXES",
     "gvpipe.container.segments": "TINY HUGE LARGEST_STEP MAX_SEGMENT",
-    "gvpipe.container.stream_layout": "VERSION INDEX_UUID",
+    "gvpipe.container.stream_layout": "VERSION INDEX_UUID MAX_INDEX",
     "gvpipe.corrections.displacements": "MAX_POSITIONS NEAR",
     "gvpipe.entropy.block_coder": "PARAMETRIC",
     "gvpipe.entropy.decision_kernels": "ONE_BITS AHEAD RATE RATE_BITS PLACE RANGE",

@@ -23,6 +23,7 @@ from gvpipe.errors import InputError
 from gvpipe.io.formats import FRAME_FORMATS, format_names
 from gvpipe.io.numbering import is_number, name_parts, natural_key, shape, signed_rows, stem_parts, varying
 from gvpipe.io.pattern import Pattern, match_pattern
+from gvpipe.io.scene_formats import SCENE_SUFFIXES
 
 GLOB_CHARACTERS = "*?["
 LISTED = 3  # gaps, series and names spelt out in a message before it says "and more"
@@ -102,7 +103,8 @@ def _of_one_format(files: Sequence[Path], path: str) -> list[Path]:
             held = "the folder is empty"
         elif len(files) == 1 and files[0] != Path(path):
             held = f"{files[0].name} is not a mesh"
-        raise InputError(f"{path}: {held}; frames may be {format_names()}")
+        scenes = "" if os.path.isdir(path) else f"; scenes {', '.join(SCENE_SUFFIXES)}"
+        raise InputError(f"{path}: {held}; frames may be {format_names()}{scenes}")
     if len(counts) > 1:
         listed = " and ".join(f"{count} {suffix}" for suffix, count in sorted(counts.items()))
         folder = path if os.path.isdir(path) else str(meshes[0].parent)

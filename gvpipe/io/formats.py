@@ -23,7 +23,10 @@ class FrameFormat:
 
 
 VTK_XML = (".vtp", ".vtu", ".vts", ".vtr", ".vti", ".pvtp", ".pvtu")
-STEPS = (".vtk", *VTK_XML)  # of simulations
+STEPS = (".vtk", *VTK_XML)  # of simulations, that lists with times may name
+BY_MESHIO = (
+    ".msh", ".inp", ".bdf", ".fem", ".nas", ".mesh", ".meshb", ".su2", ".avs", ".vol", ".f3grid", ".mdpa", ".tec",
+)  # fmt: skip
 
 FRAME_FORMATS = {
     ".obj": FrameFormat(late("obj", "ObjLoader"), late("obj_writer", "encode_obj")),
@@ -35,6 +38,7 @@ FRAME_FORMATS = {
     ".vtk": FrameFormat(late("simulation.frame_loader", "legacy_loader")),
     **dict.fromkeys(VTK_XML, FrameFormat(late("simulation.frame_loader", "xml_loader"))),
     ".vtp": FrameFormat(late("simulation.frame_loader", "xml_loader"), late("simulation.vtp_writer", "encode_vtp")),
+    **dict.fromkeys(BY_MESHIO, FrameFormat(late("simulation.frame_loader", "meshio_loader"))),
 }
 
 

@@ -26,6 +26,7 @@ SIMULATIONS: dict[str, SceneReader] = {
 }
 OPENVAT = ".openvat"
 HAVE_CLIPS = (*GLTF, ".fbx")
+SCENE_SUFFIXES = (".npz", *SCENES, ".fbx", *SIMULATIONS, ".pc2", ".mdd", ".npy")  # that are no frames
 
 WRITERS: dict[str, SceneWriter] = {
     ".npz": late("npz", "write_npz"),

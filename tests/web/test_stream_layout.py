@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,8 +11,9 @@ from typing import Any
 import browsers
 import numpy as np
 import pytest
-from pages import check_frames, flipped
-from sequences import held, waving
+from file_server import serving
+from pages import FRAMES, check_frames, flipped, points
+from sequences import held, rigid, waving
 
 import gvpipe
 
@@ -25,6 +28,103 @@ for (const name of args[0]) {
     (error) => (error instanceof GeometryVideoError ? [error.kind, error.message] : ["other", String(error.stack)])));
 }
 return outcomes;"""
+
+
+BUFFERED = "return window.video.buffered"
+JUMP = """const video = await GeometryVideo.load(args[0]);
+window.video = video;
+return [...(await video.frame(args[1]))];"""
+AGAIN = """return window.video.frame(args[0]).then((frame) => ["loaded", [...frame]],
+  (error) => [error instanceof GeometryVideoError ? error.kind : "other", String(error.message)]);"""
+
+
+@pytest.fixture(scope="module")
+def long(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of ten segments, too large for the first request."""
+    path = tmp_path_factory.mktemp("long") / "long.mp4"
+    settings: dict[str, Any] = {"preset": "ultrafast", "gop": 16, "segment": 20, "clusters": 2, "quality": 80}
+    gvpipe.encode(waving(40, 200), path, stream=True, **settings)
+    assert path.stat().st_size > 3 << 16
+    return path
+
+
+def test_parts_are_fetched_when_they_are_asked_for(module: Callable[..., Any], long: Path) -> None:
+    with gvpipe.open(long) as video, serving(long.read_bytes()) as (url, served):
+        found = module(JUMP, url, 170)
+        assert np.array_equal(np.array(found, np.float32).reshape(-1, 3), video[170])
+        assert served.n_sent < len(served.data) / 2
+        first, last = module(BUFFERED)
+        assert first[0] == 0 and first[1] < 1.5 and last[0] <= 170 / video.fps < last[1] < len(video) / video.fps + 1e-6
+        visited = [199, 16, 40, 0, 100]
+        result = module(FRAMES, url, visited)
+        for k, text in zip(visited, result["frames"], strict=True):
+            assert np.array_equal(points(text), video[k]), f"frame {k}"
+        assert result["byteLength"] == long.stat().st_size
+
+
+def test_a_server_without_range_sends_the_whole_file(module: Callable[..., Any], long: Path) -> None:
+    with gvpipe.open(long) as video, serving(long.read_bytes()) as (url, served):
+        served.ranges = False
+        found = module(JUMP, url, 170)
+        assert np.array_equal(np.array(found, np.float32).reshape(-1, 3), video[170])
+        assert len(served.sent) == 1
+
+
+def test_the_plain_layout_is_fetched_once(module: Callable[..., Any], long: Path, tmp_path: Path) -> None:
+    gvpipe.restream(long, tmp_path / "plain.mp4")
+    small = tmp_path / "small.mp4"
+    gvpipe.encode(waving(6, 40), small, preset="ultrafast", gop=16, segment=20, stream=True)
+    for path, answers in ((tmp_path / "plain.mp4", 2), (small, 1)):
+        with gvpipe.open(path) as video, serving(path.read_bytes()) as (url, served):
+            found = module(JUMP, url, 30)
+            assert np.array_equal(np.array(found, np.float32).reshape(-1, 3), video[30])
+            assert served.n_sent == len(served.data) and len(served.sent) == answers
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "words"),
+    [
+        ({"status": 404}, "load", "status 404"),
+        ({"status": 416}, "load", "status 416"),
+        ({"ranges": False}, "load", "status 200"),
+        ({"data": b"x" * 1_000_000}, "corrupt", "damaged|checksum"),
+        ({"data": b"x" * 10}, "load", "status 416"),
+        ({"cut": 10}, "load", "cannot be fetched"),
+    ],
+)
+def test_what_goes_wrong_later_is_one_error(
+    change: dict[str, object], kind: str, words: str, module: Callable[..., Any], long: Path
+) -> None:
+    with gvpipe.open(long) as video, serving(long.read_bytes()) as (url, served):
+        module(JUMP, url, 0)
+        before = dataclasses.replace(served)
+        for name, value in change.items():
+            setattr(served, name, value)
+        found, message = module(AGAIN, 190)
+        assert found == kind and re.search(words, message) and "\n" not in message, (found, message)
+        for name in change:
+            setattr(served, name, getattr(before, name))
+        found, frame = module(AGAIN, 190)
+        if kind == "corrupt":  # stays so
+            assert found == kind
+            return
+        assert found == "loaded" and np.array_equal(np.array(frame, np.float32).reshape(-1, 3), video[190])
+
+
+def test_motion_without_pictures_comes_in_parts(module: Callable[..., Any], tmp_path: Path) -> None:
+    path = tmp_path / "a.mp4"
+    noise = np.random.default_rng(1).random((2 * 40 * 40, 8), np.float32)  # so that it exceeds the first request
+    sequence = dataclasses.replace(rigid(40, 120), attributes={"noise": noise})
+    gvpipe.encode(sequence, path, stream=True, segment=10, quality=95, attributes={"noise": "exact"})
+    with gvpipe.open(path) as video, serving(path.read_bytes()) as (url, served):
+        assert video.bitstream.header["pictures"] is False
+        found = module(JUMP, url, 115)
+        assert np.array_equal(np.array(found, np.float32).reshape(-1, 3), video[115])
+        assert len(served.sent) <= 4  # the start, perhaps what all share, and two segments
+        served.status = 404
+        assert module(AGAIN, 60)[0] == "load"
+        served.status = 0
+        assert module(AGAIN, 60)[0] == "loaded"
 
 
 @pytest.mark.parametrize("variant", ["segments", "whole"])

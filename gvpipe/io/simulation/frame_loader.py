@@ -11,6 +11,7 @@ from gvpipe.io.mesh import FrameValues, Mesh
 from gvpipe.io.simulation.cells import Cells
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
 from gvpipe.io.simulation.legacy import load_legacy
+from gvpipe.io.simulation.meshio_files import load_by_meshio
 from gvpipe.io.simulation.surface import Surface, extract_surface
 from gvpipe.io.simulation.xml_grids import load_xml_grid
 
@@ -59,3 +60,8 @@ def legacy_loader() -> SurfaceLoader:
 def xml_loader() -> SurfaceLoader:
     """What loads files of VTK's XML formats."""
     return SurfaceLoader(load_xml_grid)
+
+
+def meshio_loader() -> SurfaceLoader:
+    """What loads files that meshio reads."""
+    return SurfaceLoader(load_by_meshio)

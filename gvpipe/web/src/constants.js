@@ -82,6 +82,7 @@ export const SEGMENTS_MAX_SEGMENT = 100000;
 // gvpipe.container.stream_layout
 export const STREAM_LAYOUT_VERSION = 2;
 export const STREAM_LAYOUT_INDEX_UUID = [60, 10, 126, 53, 143, 13, 74, 134, 155, 14, 31, 91, 143, 31, 111, 82];
+export const STREAM_LAYOUT_MAX_INDEX = 33554432;
 
 // gvpipe.corrections.displacements
 export const DISPLACEMENTS_MAX_POSITIONS = 1048576;

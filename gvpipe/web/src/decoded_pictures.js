@@ -43,15 +43,53 @@ export class DecodedPictures {
   }
 
   /**
+   * The same of a file in parts: a group is a fragment, fetched when it is decoded with the sections that its frames need.
+   *
+   * @param {import("./format/stream_file.js").StreamFile} file @param {number} fps
+   * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {[number, number]} size
+   * @param {Uint32Array} samples @param {(first: number, last: number) => Promise<unknown>} load as for `without`
+   * @returns {Promise<DecodedPictures>}
+   */
+  static async inParts(file, fps, repeated, size, samples, load) {
+    if (file.pictures !== repeated.distinct) {
+      throw new GeometryVideoError("corrupt", `its video has ${file.pictures} pictures in place of ${repeated.distinct}; ${AGAIN}`);
+    }
+    const groups = file.fragments.map(({ first, pictures }, fragment) =>
+      Array.from({ length: pictures }, (_, i) => ({ picture: first + i, fragment })),
+    );
+    const inner = new GroupDecoder(file.description, size, samples);
+    const decode = async (group, give) => {
+      const [coded] = await Promise.all([file.samples(group[0].fragment), load(group[0].picture, group.at(-1).picture)]);
+      await inner.decode(coded, give);
+    };
+    const groupBytes = (samples.length * repeated.distinct) / groups.length;
+    const pictures = new DecodedPictures(groups, groupBytes, fps, repeated, { decode, close: () => inner.close() });
+    try {
+      await pictures.seek(0);
+    } catch (error) {
+      pictures.close();
+      throw error;
+    }
+    return pictures;
+  }
+
+  /**
    * The same clock for a file without pictures, whose frames all have the levels of no residual.
    *
    * @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {Uint8Array} levels
+   * @param {number[]} starts the first picture of each segment, and the number of pictures
+   * @param {(first: number, last: number) => Promise<unknown>} load has the sections here that pictures need
    * @returns {Promise<DecodedPictures>}
    */
-  static async without(fps, repeated, levels) {
-    const group = Array.from({ length: repeated.distinct }, (_, picture) => ({ picture }));
-    const decode = async (samples, add) => samples.forEach(({ picture }) => add(picture, levels));
-    const pictures = new DecodedPictures([group], 0, fps, repeated, { decode, close() {} });
+  static async without(fps, repeated, levels, starts, load) {
+    const groups = starts
+      .slice(1)
+      .map((stop, s) => Array.from({ length: stop - starts[s] }, (_, i) => ({ picture: starts[s] + i })));
+    const decode = async (samples, add) => {
+      await load(samples[0].picture, samples.at(-1).picture);
+      samples.forEach(({ picture }) => add(picture, levels));
+    };
+    const pictures = new DecodedPictures(groups, 0, fps, repeated, { decode, close() {} });
     await pictures.seek(0);
     return pictures;
   }
@@ -75,6 +113,18 @@ export class DecodedPictures {
   /** `Uint8Array` (V, 3): the levels of the frame shown. */
   levels() {
     return this.current;
+  }
+
+  /** The pictures that are decoded and kept: spans `[first, last + 1]`, ascending. */
+  spans() {
+    const done = [...this.kept].filter(([, { isDone, error }]) => isDone && !error).map(([number]) => number);
+    const spans = [];
+    for (const number of done.sort((a, b) => a - b)) {
+      const [first, stop] = [this.samples[number][0].picture, this.samples[number].at(-1).picture + 1];
+      if (spans.at(-1)?.[1] === first) spans.at(-1)[1] = stop;
+      else spans.push([first, stop]);
+    }
+    return spans;
   }
 
   /** Show a frame and wait until it is there. Pauses. */
@@ -150,9 +200,11 @@ export class DecodedPictures {
     }
   }
 
-  /** A picture's levels, when they are there. */
+  /** A picture's levels, when they are there. What could not be fetched is tried again. */
   #picture(picture) {
-    return this.#group(this.groupOf[picture]).picture(picture);
+    const group = this.groupOf[picture];
+    if (this.kept.get(group)?.error?.kind === "load") this.kept.delete(group);
+    return this.#group(group).picture(picture);
   }
 
   /** A group that is decoded, or will be. */

@@ -12,6 +12,7 @@ import { readContainer } from "./format/boxes.js";
 import { GeometryVideoError } from "./format/errors.js";
 import { readRepeatedFrames } from "./format/repeated_frames.js";
 import { readPayload } from "./format/payload.js";
+import { StreamFile } from "./format/stream_file.js";
 import { checkCodec } from "./mcgv/header.js";
 import { McgvReader } from "./mcgv/reader.js";
 import { openPictures } from "./pictures.js";
@@ -29,20 +30,25 @@ export class GeometryVideo {
    * @throws {GeometryVideoError} it cannot be fetched, it is no geometry video, it is damaged, or not one for browsers
    */
   static async load(source) {
-    const file = await fetchBytes(source);
+    const parts = await openParts(source);
+    const file = parts instanceof StreamFile ? null : (parts ?? (await fetchBytes(source)));
     let pictures = null;
     try {
-      const payload = await readPayload(readContainer(file));
+      const payload = await readPayload(file ? readContainer(file) : parts.container);
       checkCodec(payload.header);
       const repeated = readRepeatedFrames(payload);
       const reader = await McgvReader.open(repeated.distinctPayload(payload));
       const { fps } = payload.header;
-      const open = () =>
-        reader.samples
-          ? openPictures(file, fps, repeated, reader.pictureSize, reader.samples, payload.header.container.track_crc32)
-          : DecodedPictures.without(fps, repeated, reader.zeroLevels);
+      const loadParts = (first, last) => Promise.all(reader.sectionsOf(first, last).map((name) => parts.load(name)));
+      const load = file ? async () => {} : loadParts;
+      const open = () => {
+        if (!reader.samples) return DecodedPictures.without(fps, repeated, reader.zeroLevels, reader.segmentStarts, load);
+        if (!file) return DecodedPictures.inParts(parts, fps, repeated, reader.pictureSize, reader.samples, load);
+        return openPictures(file, fps, repeated, reader.pictureSize, reader.samples, payload.header.container.track_crc32);
+      };
       pictures = await open();
-      const video = new GeometryVideo(payload.header, file.length, repeated, reader, pictures);
+      const video = new GeometryVideo(payload.header, file?.length ?? parts.size, repeated, reader, pictures);
+      video.#isInParts = !file;
       video.#openBeside = open;
       video.#takeAsset(await readAsset(payload, video, (k) => video.#positionsBeside(k)));
       return video;
@@ -56,6 +62,7 @@ export class GeometryVideo {
   #repeated;
   #reader;
   #pictures;
+  #isInParts = false; // fetched when it is needed
   #queue = Promise.resolve();
   #openBeside; // opens pictures of their own for fields that follow from positions
   #beside = null; // a promise of them
@@ -88,7 +95,9 @@ export class GeometryVideo {
 
   /** Seconds that play without a wait for the file: a list of `[start, end]`. */
   get buffered() {
-    return [[0, this.duration]];
+    if (!this.#isInParts) return [[0, this.duration]];
+    const timeOf = (picture) => this.#repeated.frameOf(picture) / this.fps;
+    return this.#pictures.spans().map(([first, stop]) => [timeOf(first), timeOf(stop)]);
   }
 
   /** Bits of the file per second of playing. */
@@ -179,6 +188,18 @@ export class GeometryVideo {
   #read(k, positions) {
     this.#reader.rebuild(this.#repeated.distinctOf(k), this.#pictures.levels(), positions);
     return positions;
+  }
+}
+
+/** The file in parts, where it is on a web server and in the stream layout; else null, or all of it where it has come. */
+async function openParts(source) {
+  if (!(typeof source === "string" || source instanceof URL) || typeof VideoDecoder !== "function") return null;
+  if (!/^https?:$/.test(new URL(source, location.href).protocol)) return null;
+  try {
+    return await StreamFile.open(source);
+  } catch (error) {
+    if (error instanceof GeometryVideoError) throw error;
+    return null; // `fetchBytes` says what is wrong
   }
 }
 

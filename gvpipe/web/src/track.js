@@ -36,6 +36,16 @@ export function readTrack(file, checksum) {
   }
 }
 
+/** What a decoder is set up with, of the `ftyp` and `moov` boxes alone. @returns {{codec: string, description: Uint8Array}} */
+export function readDescription(head) {
+  try {
+    return new Tables(head).configuration();
+  } catch (error) {
+    if (error instanceof RangeError || error instanceof TypeError) throw broken("its tables end too early");
+    throw error;
+  }
+}
+
 function parseTrack(tables, checksum) {
   const { codec, description } = tables.configuration();
   const { sizes, places, times, keys } = tables.boxes.has("mvex") ? readFragmentSamples(tables.file) : tables.samples();
@@ -53,7 +63,7 @@ function parseTrack(tables, checksum) {
 }
 
 /** Of each time its place among all. */
-function ranks(times) {
+export function ranks(times) {
   const order = [...times.keys()].sort((a, b) => times[a] - times[b]);
   const result = new Uint32Array(times.length);
   order.forEach((sample, rank) => (result[sample] = rank));

@@ -44,7 +44,7 @@ def encode_to_target(job: Job) -> Encoded:
     trials, trial = _aim(job, target_error)
     anchors.append(CandidateAnchor.of(trials.candidate, trial))
     if not job.memo.is_shared and not trials.candidate.start.pictures:  # who searches a quality asks for no more than its error
-        trial = refine(trials, trial, target_error)
+        trial = refine(trials, trial)
     return trial.encoded
 
 

@@ -5,11 +5,15 @@ They take little time, so that more encodes than elsewhere are made.
 
 from __future__ import annotations
 
-from gvcodecs.mcgv.base.base_lattice import base_step
+import dataclasses
+
+from gvcodecs.mcgv.base.base_lattice import AFFINE_BITS, base_step
 from gvcodecs.mcgv.encoding.bitstream_sizes import cost, count_bytes, count_picture_bytes
-from gvcodecs.mcgv.encoding.candidate import CandidateAnchor, rebase
+from gvcodecs.mcgv.encoding.candidate import Candidate, CandidateAnchor, rebase
+from gvcodecs.mcgv.encoding.initial_skinning import fit_skinning
 from gvcodecs.mcgv.encoding.step_trials import StepTrials
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.mesh.lattice import Lattice
 from gvpipe.rate_control.step_search import SLOPE, StepTrial, find_step
 
 MAX_ROUNDS = 5  # encodes in one search
@@ -20,9 +24,10 @@ FINER_THAN = 0.95  # part of the target error that a blend alone is to leave at 
 COARSEST = 1.0, 1.3  # times the target error, lattice steps of base frames
 LARGE_BASE = 0.25  # part of the bytes that a base frame must take for the second of them to be tried
 REBASED = 1.2  # times the lattice step of a base frame, another one is tried
-FINE_PART, FINE_COST = 1 / 4, 1.1  # of the target error, and times the bytes: files that get there take it
-MAX_TRANSFORMS = 0.2  # part of the bytes that transforms may take for that to be tried: they grow by half and more
-FINE_BAND = 0.8, 1.0  # part of that error which is close enough
+PUBLISHED = 0.43  # lattice steps, root mean square, that the published mode's base frame leaves at least
+MAX_TRANSFORMS = 0.4  # part of the bytes that transforms may take for a finer error to be tried: they grow by about 3/4
+FINE_LATTICES = 1.05, 1.2, 1.35, 1.5  # times that error, lattice steps of base frames: the smallest mesh is taken
+FINE_BAND = 0.88, 1.0  # of that error, which is close enough
 
 
 def approach(trials: StepTrials, anchor: CandidateAnchor, step: float, target_error: float) -> StepTrial:
@@ -41,31 +46,41 @@ def omit_pictures(
         target_error: root mean square over vertices, model units.
         band: least and most part of it that is close enough.
     """
-    alone = trials.alone
-    idle = trials.are_pictures_idle(step) and alone(step).error <= target_error
+    alone, idle = trials.alone, trials.are_pictures_idle(step)
+    if idle and alone(step).error > target_error:  # pictures of this step would not mend it, a better blend may
+        alone = _fit_anew(alone, step, target_error**2 / alone(step).error)
+        idle = alone(step).error <= target_error
     if not idle and not _are_pictures_dear(trials, step, target_error):
         return None
     trial = find_step(alone, step, target_error, band, SLOPE, MAX_ROUNDS)
     if trial.error > target_error or (not idle and cost(trial) >= cost(trials(step))):
         return None
-    return (alone, trial) if trials.job.is_large else _choose_base(alone, trial, target_error, band)
+    return (
+        (alone, trial)
+        if trials.job.is_large
+        else _fit_again(*_choose_base(alone, trial, target_error, band), target_error, band)
+    )
 
 
-def refine(trials: StepTrials, trial: StepTrial, target_error: float) -> StepTrial:
-    """A file without pictures, or the same blend with `FINE_PART` of the target error where that costs next to nothing.
+def refine(trials: StepTrials, trial: StepTrial) -> StepTrial:
+    """A file without pictures, or the same blend with the error of the published mode's base frame where that costs less.
 
-    Parts that move rigidly are exact but for the rounding of base and transforms.
+    Parts that move rigidly are exact but for the rounding of base and transforms. The published mode leaves that error at every
+    quality, so that a default file would else be the worse one.
     """
-    n_bytes = count_bytes(trial.bitstream)
-    if _count_transform_bytes(trial.bitstream) > MAX_TRANSFORMS * n_bytes:
+    if _count_transform_bytes(trial.bitstream) > MAX_TRANSFORMS * count_bytes(trial.bitstream):
         return trial
-    target_error, most = FINE_PART * target_error, FINE_COST * n_bytes
-    step = trial.step * FINE_PART ** (1 / SLOPE)
-    finer = StepTrials(trials.job, rebase(trials.job, trials.candidate, step, target_error))
-    if count_bytes(finer(step).bitstream) > most:
+    job, candidate = trials.job, trials.candidate
+    fine_error = PUBLISHED * Lattice.over(job.sequence.read(0, 1)[0], AFFINE_BITS).step
+    if fine_error >= trial.error:
         return trial
-    fine = find_step(finer, step, target_error, FINE_BAND, SLOPE, MAX_ROUNDS)
-    return fine if fine.error <= target_error and count_bytes(fine.bitstream) <= most else trial
+    step = trial.step * (fine_error / trial.error) ** (1 / SLOPE)
+    bases = [rebase(job, candidate, step, part * fine_error) for part in FINE_LATTICES]
+    finer = StepTrials(job, min(bases, key=lambda based: len(based.start.coded.mesh)))
+    if cost(finer(step)) > cost(trial):
+        return trial
+    fine = find_step(finer, step, fine_error, FINE_BAND, SLOPE, MAX_ROUNDS)
+    return fine if fine.error <= fine_error and cost(fine) <= cost(trial) else trial
 
 
 def _are_pictures_dear(trials: StepTrials, step: float, target_error: float) -> bool:
@@ -95,6 +110,21 @@ def _choose_base(
         if other.error <= target_error and count_bytes(other.bitstream) < count_bytes(trial.bitstream):
             trials, trial = others, other
     return trials, trial
+
+
+def _fit_again(
+    trials: StepTrials, trial: StepTrial, target_error: float, band: tuple[float, float]
+) -> tuple[StepTrials, StepTrial]:
+    """The blend, or another one, fitted on the base frame and for the step that were found, if the file is smaller."""
+    others = _fit_anew(trials, trial.step, target_error)
+    other = find_step(others, trial.step, target_error, band, SLOPE, MAX_ROUNDS)
+    return (others, other) if other.error <= target_error and cost(other) < cost(trial) else (trials, trial)
+
+
+def _fit_anew(trials: StepTrials, step: float, target_error: float) -> StepTrials:
+    """Trials of another blend on the same base frame, fitted from a step on for a target error, model units."""
+    start = dataclasses.replace(trials.candidate.start, step=step)
+    return StepTrials(trials.job, Candidate(start, fit_skinning(trials.job, start, target_error)[0]))
 
 
 def _count_transform_bytes(bitstream: Bitstream) -> int:

@@ -6,10 +6,11 @@ Decomposition with Rigid Bones", 2012). A point considers the clusters that it a
 does not depend on how many there are. Weights are chosen closed loop, in the order in which they are coded, for the least of
 squared error and bits.
 
-A cluster costs twelve numbers a frame, and so should save a squared error: numbers of clusters are tried from the smallest up,
-until error and cost together fall no more. K-means is a draw of luck, and sees what is alike, not what a blend lacks. So each
-number is tried twice: by k-means, and by adding clusters to the blend before where its errors are. The best of either kind,
-weights' bits counted, goes on to the end, and the one that costs less there is kept. One number that does worse ends nothing.
+A cluster costs twelve numbers a frame, or where motion has few principal trajectories four for each of these. So it should
+save a squared error: numbers of clusters are tried from the smallest up, until error and cost together fall no more. K-means
+is a draw of luck, and sees what is alike, not what a blend lacks. So each number is tried twice: by k-means, and by adding
+clusters to the blend before where its errors are. The best of either kind, weights' bits counted, goes on to the end, and the
+one that costs less there is kept. One number that does worse ends nothing.
 """
 
 from __future__ import annotations
@@ -61,6 +62,7 @@ MOST_MOVED = 3.0  # times, the step at once
 PROMISING = 1.2  # times the cost of the best, up to which another blend goes on
 PATIENCE = 1  # numbers of clusters that may do worse than a smaller one, in a row
 CLUSTER_WORTH = 2.8  # squared steps a frame that a cluster must save
+PER_COORDINATE = 4.0  # frames that a principal coordinate counts for, if that is less than all: transforms are coded in these
 PATCH = 2  # order of the neighbourhood that an added cluster starts with
 BIT_WORTH = 0.14  # squared steps that a bit of the weights must save
 SAMPLES = 4000  # points that k-means sees
@@ -113,10 +115,9 @@ class Motions:
         shown = self.n_frames / self._scale
         left = np.cumsum(self._energies[::-1])[::-1]  # energy of each component and those after it
         n = max(1, int((left > NEGLIGIBLE * len(self.base) * 3 * shown * step**2 / 12).sum()))
-        price = step**2 * shown
-        return _Problem(
-            self.base, self._columns[:, :n].copy(), self.neighbours, BIT_WORTH * step**2 / self._scale, CLUSTER_WORTH * price
-        )
+        unit = step**2 / self._scale
+        cluster_price = CLUSTER_WORTH * min(self.n_frames, PER_COORDINATE * n) * unit
+        return _Problem(self.base, self._columns[:, :n].copy(), self.neighbours, BIT_WORTH * unit, cluster_price)
 
 
 def fit_blend(motions: Motions, step: float, n_clusters: int, target_error: float = 0.0) -> tuple[Fitted, float]:

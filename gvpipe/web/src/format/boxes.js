@@ -8,6 +8,7 @@ import {
   MP4_BOX_UUID as UUID,
   MP4_MAX_BOXES as MAX_BOXES,
   STREAM_LAYOUT_INDEX_UUID as INDEX_UUID,
+  STREAM_LAYOUT_MAX_INDEX as MAX_INDEX,
   STREAM_LAYOUT_VERSION as STREAM_VERSION,
 } from "../constants.js";
 import { crc32 } from "./checksum.js";
@@ -39,7 +40,7 @@ export function readContainer(file) {
     }
   }
   const moov = boxes.find((box) => box.kind === "moov");
-  const tag = TAG.exec(new TextDecoder("latin1").decode(file.subarray(moov.start, moov.end)));
+  const tag = readTag(file.subarray(moov.start, moov.end));
   if (tag && Number(tag[1]) > STREAM_VERSION) throw newerContainer(tag[1]);
   if (indices.length === 1 && boxes[2] === indices[0]) {
     const index = { start: indices[0].start + INDEX_UUID.length, end: indices[0].end };
@@ -56,6 +57,32 @@ export function readContainer(file) {
   }
   const payload = file.subarray(payloads[0].start + 16, payloads[0].end);
   return { payload, bytes: file.length, id: tag ? tag[2] : "", videoChecksum };
+}
+
+/** gvpipe's tag in a `moov` box: itself, its container version, its content id; null without one. */
+export function readTag(moov) {
+  return TAG.exec(new TextDecoder("latin1").decode(moov));
+}
+
+/**
+ * The content of the index, of a file of which the start is here; null if it is not of the stream layout.
+ *
+ * @param {Uint8Array} start of the file, not just of the index @returns {{start: number, end: number}|null}
+ */
+export function findIndex(start) {
+  const view = new DataView(start.buffer, start.byteOffset, start.byteLength);
+  let position = 0;
+  for (const wanted of ["ftyp", "moov", "uuid"]) {
+    if (position + 8 + INDEX_UUID.length > start.length) return null;
+    const size = view.getUint32(position);
+    const kind = String.fromCharCode(...start.subarray(position + 4, position + 8));
+    if (kind !== wanted || size < 8) return null;
+    if (kind === "uuid" && INDEX_UUID.every((byte, i) => start[position + 8 + i] === byte) && size <= MAX_INDEX) {
+      return { start: position + 8 + INDEX_UUID.length, end: position + size };
+    }
+    position += size;
+  }
+  return null;
 }
 
 export function newerContainer(version) {

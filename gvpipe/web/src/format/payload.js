@@ -41,7 +41,7 @@ export async function readPayload(container) {
   if (container.id && container.id !== id) {
     throw new GeometryVideoError("corrupt", `its geometry belongs to another file; ${AGAIN}`);
   }
-  if (checksum !== container.videoChecksum) {
+  if (checksum !== (container.videoChecksum ?? checksum)) { // a file in parts has checksums of its own for its fragments
     throw new GeometryVideoError("corrupt", `its video is damaged, or was re-encoded; ${AGAIN}`);
   }
   const budget = new Budget(container.bytes);

@@ -34,6 +34,11 @@ export class RepeatedFrames {
     return low;
   }
 
+  /** The frame that shows a distinct frame first; F for the one after the last. */
+  frameOf(distinct) {
+    return distinct < this.distinct ? (this.starts?.[distinct] ?? distinct) : this.frames;
+  }
+
   /** The payload as the codec knows it: of the distinct frames. */
   distinctPayload({ header, sections, budget }) {
     return new Payload({ ...header, frames: this.distinct }, sections, budget);

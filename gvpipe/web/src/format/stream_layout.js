@@ -1,6 +1,6 @@
 /**
  * The stream layout of a file: an index first, which names the place of every section and of every fragment of the video.
- * Mirrors `gvpipe.container.stream_layout`, but reads a whole file; `docs/format.md`, section 1.2.
+ * Mirrors `gvpipe.container.stream_layout`; `docs/format.md`, section 1.2. Parts of a file are `stream_file.js`'s.
  */
 
 import {
@@ -22,20 +22,16 @@ const BOX_HEAD = 8; // bytes of the heads of `mdat` boxes
  * @throws {GeometryVideoError} a checksum or a place does not hold
  */
 export function readStream(file, box) {
-  const cursor = new Cursor(file.subarray(box.start, box.end), "index");
-  const { entries, fragments, size, headSize, headChecksum } = readIndex(cursor);
+  const { entries, fragments, size, headSize, headChecksum } = readIndex(file.subarray(box.start, box.end));
   if (file.length < size) throw new GeometryVideoError("truncated", `it ends ${size - file.length} bytes early; ${AGAIN}`);
   if (file.length > size) {
     throw new GeometryVideoError("corrupt", `${file.length - size} stray bytes follow its last box; ${AGAIN}`);
   }
-  if (crc32(take(file, 0, headSize)) !== headChecksum) {
-    throw new GeometryVideoError("corrupt", `the description of its video is damaged; ${AGAIN}`);
-  }
+  checkHead(file, headSize, headChecksum);
   const sections = new Map();
   for (const { name, offset, length, checksum } of entries) {
     const data = take(file, offset, length);
     if (crc32(data) !== checksum) throw corrupt(name, "its checksum does not match");
-    if (sections.has(name)) throw cursor.corrupt(`section '${name}' occurs twice`);
     sections.set(name, data);
   }
   let videoChecksum = 0;
@@ -49,7 +45,18 @@ export function readStream(file, box) {
   return { sections, videoChecksum };
 }
 
-function readIndex(cursor) {
+/** The boxes `ftyp` and `moov`, at the start of a file. */
+export function checkHead(file, size, checksum) {
+  const head = take(file, 0, size);
+  if (crc32(head) !== checksum) {
+    throw new GeometryVideoError("corrupt", `the description of its video is damaged; ${AGAIN}`);
+  }
+  return head;
+}
+
+/** What the content of the index's box says. */
+export function readIndex(data) {
+  const cursor = new Cursor(data, "index");
   const start = cursor.take(Math.min(cursor.left, MAGIC.length));
   const [version, count] = [cursor.u16(), cursor.u16()];
   if (!MAGIC.every((byte, i) => start[i] === byte) || version !== VERSION || count < 1 || count > MAX_SECTIONS) {
@@ -60,13 +67,15 @@ function readIndex(cursor) {
     const length = cursor.u8();
     if (length < 1 || length > MAX_NAME) throw cursor.corrupt(`a name of ${length} bytes`);
     const name = String.fromCharCode(...cursor.take(length));
+    if (entries.some((entry) => entry.name === name)) throw cursor.corrupt(`section '${name}' occurs twice`);
     entries.push({ name, length: cursor.u64(), checksum: cursor.u32(), offset: cursor.u64() });
   }
   const fragments = [];
   for (let left = cursor.u32(); left > 0; left--) {
     const offset = cursor.u64();
-    const [moof, mdat, , checksum] = [cursor.u32(), cursor.u32(), cursor.u32(), cursor.u32()];
-    fragments.push({ offset, moof, mdat, checksum });
+    const [moof, mdat, pictures, checksum] = [cursor.u32(), cursor.u32(), cursor.u32(), cursor.u32()];
+    if (pictures < 1 || pictures > mdat) throw cursor.corrupt(`${pictures} pictures in ${mdat} bytes`);
+    fragments.push({ offset, moof, mdat, pictures, checksum });
   }
   const [size, headSize, headChecksum] = [cursor.u64(), cursor.u32(), cursor.u32()];
   const packed = cursor.data.subarray(0, cursor.position);

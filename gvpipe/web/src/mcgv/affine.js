@@ -15,8 +15,12 @@ export class AffineMotion {
   constructor(payload, header, surface, clusters) {
     this.predictor = new AffinePredictor(surface.base, clusters, header.clusters);
     const { rest } = this.predictor;
-    this.segments = new Segments(payload.header.frames, header.segments, (name, frames) =>
+    this.segments = new Segments(
+      payload.header.frames,
+      header.segments,
+      (name, frames) =>
       decodeTransforms(payload.section(name), frames, rest, header.transformStep, name),
+      payload.sections,
     );
   }
 
@@ -27,6 +31,6 @@ export class AffineMotion {
   }
 
   extend(box) {
-    for (let s = 0; s < this.segments.count; s++) this.predictor.extend(box, this.segments.get(s));
+    for (const s of this.segments.here()) this.predictor.extend(box, this.segments.get(s));
   }
 }

@@ -20,8 +20,12 @@ export class BlendedMotion {
     this.blend = new Blend(own, weights, header.clusters);
     this.point = point;
     this.moved = new Float64Array(own.length); // (P, 3) of the frame last asked for
-    this.segments = new Segments(payload.header.frames, header.segments, (name, frames) =>
+    this.segments = new Segments(
+      payload.header.frames,
+      header.segments,
+      (name, frames) =>
       new Trajectories(payload.section(name), header.clusters, frames, header.transformStep, name, payload.budget),
+      payload.sections,
     );
   }
 
@@ -36,10 +40,10 @@ export class BlendedMotion {
     }
   }
 
-  /** Looks at every frame, or at as many, evenly spaced, as `LOOKS` allows; all segments are decoded. */
+  /** Looks at every frame, or at as many, evenly spaced, as `LOOKS` allows; all segments that are here are decoded. */
   extend(box) {
     const { segments, moved } = this;
-    for (let s = 0; s < segments.count; s++) {
+    for (const s of segments.here()) {
       const { n, basis } = segments.get(s);
       const frames = segments.start(s + 1) - segments.start(s);
       const products = segments.count * (3 * n * basis.components + 8 * moved.length); // of a frame

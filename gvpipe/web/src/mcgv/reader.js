@@ -63,6 +63,17 @@ export class McgvReader {
     return [this.header.width, 3 * this.header.height];
   }
 
+  /** First frame of every segment, and their number at the end. */
+  get segmentStarts() {
+    const { segments } = this.motion;
+    return Array.from({ length: segments.count + 1 }, (_, s) => segments.start(s));
+  }
+
+  /** The names of the sections that frames `first` to `last` need beside what all share. */
+  sectionsOf(first, last) {
+    return this.motion.segments.names(first, last);
+  }
+
   /**
    * @param {number} frame
    * @param {Uint8Array} levels (S, 3) of the picture's `samples`
@@ -86,7 +97,7 @@ export class McgvReader {
 
   /**
    * The box that the whole motion stays in, but for residuals; model units. Decodes, and so checks, all transforms and
-   * moves.
+   * moves; of a file that comes in parts, those of the segments that are here.
    */
   bounds() {
     for (const moves of [...this.outliers, ...this.corrections]) moves.check();

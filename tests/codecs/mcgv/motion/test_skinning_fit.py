@@ -13,6 +13,7 @@ from gvcodecs.mcgv.motion.weight_coding import encode_weights, guess_prices
 from gvcodecs.mcgv.motion.weight_fit_kernels import Transforms
 from gvcodecs.mcgv.motion.weight_selection import PointMotions, Ring, choose
 from gvpipe.mesh.topology import adjacency
+from gvpipe.sequence import MeshSequence
 
 
 def test_choice_finds_the_weights_of_a_blend() -> None:
@@ -71,3 +72,16 @@ def test_clusters_without_points_and_flat_ones() -> None:
     line = np.column_stack([np.arange(5), np.ones(5)])
     best = line @ np.linalg.lstsq(line, motions, rcond=None)[0]
     assert np.allclose(fit.matrix @ rows, best, atol=1e-3)
+
+
+def test_a_cluster_of_simple_motion_costs_the_same_in_any_number_of_frames() -> None:
+    still = waving(16, 1)
+    base = np.asarray(still.read(0, 1)[0], np.float64)
+    neighbours = adjacency(still.faces, len(base))
+    prices = []
+    for n_frames in (40, 160):  # one trajectory
+        lift = np.sin(np.arange(n_frames) / 5)[:, None] * base[:, 0]
+        frames = base + lift[:, :, None] * (0, 0, 1)
+        sequence = MeshSequence(frames.astype(np.float32), still.faces, 30.0)
+        prices.append(Motions(sequence, base, neighbours).problem(0.01).cluster_price)
+    assert prices[0] == prices[1]

@@ -71,6 +71,8 @@ def test_rigid_parts_get_a_finer_error_than_asked_for(sequence: MeshSequence, tm
     for quality in (50, 75):
         gvpipe.encode(sequence, tmp_path / "a.mp4", quality=quality)
         assert kg(sequence, tmp_path / "a.mp4") <= 0.25 * error_of(quality)
+    gvpipe.encode(sequence, tmp_path / "b.mp4", prediction="affine")
+    assert (tmp_path / "a.mp4").stat().st_size < 0.5 * (tmp_path / "b.mp4").stat().st_size
 
 
 def test_a_target_is_met_with_no_finer_error(sequence: MeshSequence, tmp_path: Path) -> None:

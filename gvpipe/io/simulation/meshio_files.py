@@ -1,0 +1,88 @@
+"""Meshes of Gmsh, Ansys, Abaqus, Nastran, Medit, SU2, AVS-UCD, Netgen, FLAC3D, Kratos and Tecplot, by meshio.
+
+meshio's cells have VTK's order of nodes. Its HDF5 formats are left out: links in them may lead to any file.
+
+Source: N. Schlömer, meshio (https://github.com/nschloe/meshio).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import warnings
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gvpipe.arrays import Array, Floats
+from gvpipe.errors import InputError
+from gvpipe.io.simulation.cells import Cells, equal_cells, join_cells
+from gvpipe.io.simulation.dataset import DataArray, Dataset
+
+EXTRA = "it needs meshio; install it with: pip install 'gvpipe[vtk]'"
+TYPES = {
+    "vertex": 1, "line": 3, "triangle": 5, "polygon": 7, "quad": 9, "tetra": 10, "hexahedron": 12, "wedge": 13, "pyramid": 14,
+    "line3": 21, "triangle6": 22, "quad8": 23, "tetra10": 24, "hexahedron20": 25, "wedge15": 26, "pyramid13": 27, "quad9": 28,
+    "hexahedron27": 29, "quad6": 30, "wedge12": 31, "wedge18": 32, "hexahedron24": 33, "triangle7": 34, "line4": 35,
+}  # fmt: skip
+UNMATCHED = "unmatched data"  # what NumPy 2.4 says of text behind the last number, as in Gmsh files with numbers per point
+INCLUDE = re.compile(rb"^\s*\*include", re.IGNORECASE | re.MULTILINE)  # Abaqus: the name of any file
+
+
+def load_by_meshio(path: Path) -> Dataset:
+    """Load a file as one time step.
+
+    Raises:
+        InputError: meshio is missing.
+        ValueError: meshio cannot read the file, or a cell has a type that is not known.
+    """
+    try:
+        import meshio
+    except ImportError as exc:
+        raise InputError(f"{path}: {EXTRA}") from exc
+    if path.suffix.lower() == ".inp" and INCLUDE.search(path.read_bytes()):
+        raise ValueError("it includes other files, which are not followed; write it as one file")
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of NumPy, about how meshio calls it
+            mesh: Any = meshio.read(path)
+    except ValueError as exc:
+        if UNMATCHED not in str(exc):
+            raise
+        raise ValueError(
+            f"{exc}; it is cut short, or text that meshio {meshio.__version__} does not read: save it as binary"
+        ) from exc
+    except SystemExit as exc:  # none of the readers for this extension takes it
+        raise ValueError("meshio does not know it") from exc
+    strange = sorted({block.type for block in mesh.cells} - set(TYPES))
+    if strange:
+        raise ValueError(f"it has cells of type {', '.join(strange)}, which are not read")
+    return Dataset(
+        lambda: _points(mesh.points),
+        lambda: _cells(mesh.cells),
+        {name: DataArray(partial(np.asarray, values)) for name, values in mesh.point_data.items()},
+        {name: DataArray(_joined(blocks)) for name, blocks in mesh.cell_data.items()},
+    )
+
+
+def _points(points: Array) -> Floats:
+    """``(N, 3)`` of ``(N, 2)`` or ``(N, 3)``."""
+    found = np.zeros((len(points), 3), np.float64)
+    found[:, : points.shape[1]] = points
+    return found
+
+
+def _cells(blocks: list[Any]) -> Cells:
+    made = [equal_cells(TYPES[block.type], np.asarray(block.data)) for block in blocks]
+    if not made:
+        raise ValueError("it has no cells")
+    return join_cells(made, [0] * len(made))
+
+
+def _joined(blocks: list[Any]) -> Callable[[], Array]:
+    return lambda: np.concatenate([np.asarray(each) for each in blocks])

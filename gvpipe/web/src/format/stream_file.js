@@ -1,0 +1,144 @@
+/**
+ * A file in the stream layout on a web server, of which parts are fetched by HTTP Range: the index and what all segments share
+ * at first, then transforms and fragments of the video when they are asked for. `docs/format.md`, section 1.2.
+ */
+
+import { readFragmentSamples } from "../fragments.js";
+import { readDescription, ranks } from "../track.js";
+import { findIndex, readTag } from "./boxes.js";
+import { crc32 } from "./checksum.js";
+import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
+import { checkHead, readIndex } from "./stream_layout.js";
+
+const FIRST = 1 << 16; // bytes of the first request
+const OF_SEGMENTS = /^(transforms|trajectories)\.\d+$/;
+const OF_FIELDS = /^field\./;
+const PARTIAL = 206;
+
+export class StreamFile {
+  /**
+   * @param {string|URL} url
+   * @returns {Promise<StreamFile|Uint8Array|null>} the whole file where the server knows no Range, and of a plain layout, of
+   *   fields, or where nothing belongs to segments; null where the server refuses
+   * @throws {GeometryVideoError} the index is damaged
+   */
+  static async open(url) {
+    const response = await fetch(url, { headers: { Range: `bytes=0-${FIRST - 1}` } });
+    if (!response.ok) return null;
+    const start = new Uint8Array(await response.arrayBuffer());
+    if (response.status !== PARTIAL || start.length < FIRST) return start;
+    const box = findIndex(start);
+    if (!box) return fetchRest(url, start);
+    const file = new StreamFile(url, start.length);
+    const more = Math.max(0, box.end - start.length);
+    const data = more ? join(start, await file.#fetch(start.length, more)) : start;
+    return (await file.#begin(data, box)) ? file : fetchRest(url, data);
+  }
+
+  constructor(url, received) {
+    this.url = url;
+    /** Bytes that have come so far. */
+    this.received = received;
+    /** Sections that are here, by name. */
+    this.sections = new Map();
+    this.loading = new Map(); // name -> a promise of it
+  }
+
+  /** What a decoder of its pictures is set up with. @throws {GeometryVideoError} */
+  get description() {
+    return readDescription(this.head);
+  }
+
+  /** What `readContainer` gives of a whole file. */
+  get container() {
+    return { sections: this.sections, bytes: this.received, id: this.id };
+  }
+
+  async #begin(data, box) {
+    const { entries, fragments, size, headSize, headChecksum } = readIndex(data.subarray(box.start, box.end));
+    const names = entries.map(({ name }) => name);
+    if (names.some((name) => OF_FIELDS.test(name)) || !names.some((name) => OF_SEGMENTS.test(name))) return false;
+    this.head = checkHead(data, headSize, headChecksum);
+    this.id = readTag(this.head)?.[2] ?? "";
+    this.size = size;
+    this.places = new Map(entries.map((entry) => [entry.name, entry]));
+    let first = 0;
+    this.fragments = fragments.map((fragment) => ({ ...fragment, first: (first += fragment.pictures) - fragment.pictures }));
+    this.pictures = first;
+    const shared = entries.filter(({ name }) => !OF_SEGMENTS.test(name));
+    const start = Math.min(...shared.map(({ offset }) => offset));
+    const end = Math.max(...shared.map(({ offset, length }) => offset + length));
+    if (end > size) throw new GeometryVideoError("corrupt", `the index names places outside of the file; ${AGAIN}`);
+    const bytes = end <= data.length ? data.subarray(start, end) : await this.#fetch(start, end - start);
+    for (const { name, offset, length, checksum } of shared) {
+      this.#keep(name, bytes.slice(offset - start, offset - start + length), checksum);
+    }
+    return true;
+  }
+
+  /** Have a section here; nothing for names that the file has not. @throws {GeometryVideoError} */
+  load(name) {
+    if (!this.places.has(name) || this.sections.has(name)) return Promise.resolve();
+    if (!this.loading.has(name)) {
+      const { offset, length, checksum } = this.places.get(name);
+      const loaded = this.#fetch(offset, length).then((data) => this.#keep(name, data, checksum));
+      this.loading.set(name, loaded.finally(() => this.loading.delete(name)));
+    }
+    return this.loading.get(name);
+  }
+
+  /** The coded pictures of a fragment. @returns {Promise<import("../track.js").Sample[]>} @throws {GeometryVideoError} */
+  async samples(number) {
+    const { offset, moof, mdat, pictures, checksum, first } = this.fragments[number];
+    const data = await this.#fetch(offset, moof + mdat);
+    const broken = () => new GeometryVideoError("corrupt", `fragment ${number} of its video is damaged; ${AGAIN}`);
+    if (crc32(data) !== checksum) throw broken();
+    let found;
+    try {
+      found = readFragmentSamples(data);
+    } catch (error) {
+      throw error instanceof RangeError || error instanceof TypeError ? broken() : error;
+    }
+    const { sizes, places, times, keys } = found;
+    if (sizes.length !== pictures || !keys.has(0)) throw broken();
+    const order = ranks(times);
+    return sizes.map((size, i) => ({ data: data.subarray(places[i], places[i] + size), picture: first + order[i] }));
+  }
+
+  #keep(name, data, checksum) {
+    if (crc32(data) !== checksum) throw corrupt(name, "its checksum does not match");
+    this.sections.set(name, data);
+  }
+
+  async #fetch(offset, length) {
+    const wanted = `bytes ${offset} to ${offset + length - 1} of ${this.url}`;
+    let response;
+    let data;
+    try {
+      response = await fetch(this.url, { headers: { Range: `bytes=${offset}-${offset + length - 1}` } });
+      if (response.status === PARTIAL) data = new Uint8Array(await response.arrayBuffer());
+      else await response.body?.cancel(); // 200: the whole file would come
+    } catch (error) {
+      throw new GeometryVideoError("load", `${wanted} cannot be fetched: ${error.message}; try again`);
+    }
+    if (!data) throw new GeometryVideoError("load", `${wanted} cannot be fetched: status ${response.status}; load the page again`);
+    if (data.length !== length) {
+      throw new GeometryVideoError("load", `${wanted} cannot be fetched: ${data.length} bytes came; load the page again`);
+    }
+    this.received += length;
+    return data;
+  }
+}
+
+/** All of a file whose start is here; null if the server refuses. */
+async function fetchRest(url, start) {
+  const response = await fetch(url, { headers: { Range: `bytes=${start.length}-` } });
+  return response.status === PARTIAL ? join(start, new Uint8Array(await response.arrayBuffer())) : null;
+}
+
+function join(start, rest) {
+  const data = new Uint8Array(start.length + rest.length);
+  data.set(start);
+  data.set(rest, start.length);
+  return data;
+}

@@ -1,0 +1,80 @@
+"""Files that meshio reads: surfaces of volume meshes, fields, frames, and what is refused."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gvpipe.io
+from gvpipe.errors import InputError
+
+meshio: Any = pytest.importorskip("meshio")
+
+POINTS = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1, 2)], np.float64)
+HEXAHEDRA = np.array([[0, 1, 4, 3, 6, 7, 10, 9], [1, 2, 5, 4, 7, 8, 11, 10]])
+
+
+def boxes(shift: float = 0.0) -> Any:
+    """Two hexahedra side by side, with numbers per point and per cell."""
+    return meshio.Mesh(
+        POINTS + np.array([0, 0, shift]),
+        [("hexahedron", HEXAHEDRA)],
+        point_data={"heat": POINTS[:, 0] + shift},
+        cell_data={"load": [np.array([3.0, 5.0])]},
+    )
+
+
+@pytest.mark.parametrize("suffix", ["msh", "inp", "bdf", "mesh", "su2", "avs", "f3grid"])
+def test_surface(tmp_path: Path, suffix: str) -> None:
+    kind = {"file_format": "gmsh"} if suffix == "msh" else {}
+    meshio.write(tmp_path / f"a.{suffix}", meshio.Mesh(POINTS, [("hexahedron", HEXAHEDRA)]), **kind)
+    read = gvpipe.io.read(tmp_path / f"a.{suffix}")
+    assert (read.n_vertices, len(read.faces)) == (12, 20)
+    assert np.allclose(read[0] + read.origin, POINTS)
+    a, b, c = (read[0][read.faces[:, k]].astype(float) for k in range(3))
+    assert float(np.sum(np.cross(a, b) * c)) / 6 == pytest.approx(2.0)  # outwards
+
+
+def test_frames_and_fields(tmp_path: Path) -> None:
+    for frame in range(3):
+        meshio.write(tmp_path / f"a_{frame}.msh", boxes(frame / 2), file_format="gmsh")
+    read = gvpipe.io.read(str(tmp_path / "a_*.msh"))
+    assert len(read) == 3 and np.allclose(read[2] + read.origin, POINTS + np.array([0, 0, 1]))
+    assert np.allclose(np.asarray(read.fields["heat"].read(1, 2)).reshape(-1), POINTS[:, 0] + 0.5)
+    load = np.asarray(read.attributes["load"].values).reshape(-1)
+    assert read.attributes["load"].domain == "triangle" and np.unique(load).tolist() == [3.0, 5.0]
+
+
+@pytest.mark.parametrize("data", [b"hello\n", b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 9 1 9\n"])
+@pytest.mark.parametrize("suffix", ["msh", "inp", "su2", "nas", "vol"])
+def test_damage(tmp_path: Path, suffix: str, data: bytes, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / f"a.{suffix}").write_bytes(data)
+    with pytest.raises(InputError, match=rf"a\.{suffix}") as raised:
+        gvpipe.io.read(tmp_path / f"a.{suffix}")
+    assert "\n" not in str(raised.value) and capsys.readouterr() == ("", "")
+
+
+def test_text_that_meshio_may_not_read(tmp_path: Path) -> None:
+    """meshio 5.3.5 and NumPy 2.4 do not read numbers per point of Gmsh's text."""
+    meshio.write(tmp_path / "a.msh", boxes(), file_format="gmsh", binary=False)
+    try:
+        assert len(gvpipe.io.read(tmp_path / "a.msh").faces) == 20
+    except InputError as exc:
+        assert "save it as binary" in str(exc)
+
+
+def test_includes_are_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "a.inp").write_text("*NODE\n1, 0, 0, 0\n*Include, input=../b.inp\n")
+    with pytest.raises(InputError, match=r"a\.inp .* it includes other files, which are not followed"):
+        gvpipe.io.read(tmp_path / "a.inp")
+
+
+def test_missing_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.msh").write_text("x")
+    monkeypatch.setitem(sys.modules, "meshio", None)
+    with pytest.raises(InputError, match=r"pip install 'gvpipe\[vtk\]'"):
+        gvpipe.io.read(tmp_path / "a.msh")
