@@ -94,6 +94,16 @@ def much_fill(name: str) -> Bitstream:
     return changed(name, sections=sections, **counts)
 
 
+def hub() -> Bitstream:
+    """A fan of 40,000 points: the list of its middle is gone through for each of the others."""
+    n = 40_000
+    rim = np.arange(n - 2)
+    faces = np.stack([rim, rim + 1, np.full_like(rim, n - 1)], axis=1).astype(np.int32)
+    coded, _ = encode_mesh(faces, np.arange(n), reorder=True)
+    sections = {"mesh": coded.mesh, "order": coded.order}
+    return changed("laplacian-1-tutte", sections=sections, n_vertices=n, n_triangles=n - 2)
+
+
 def huge_pictures() -> Bitstream:
     """JPEG images of 32000 x 32000."""
     whole = changed("mcgv-3-jpeg")
@@ -166,6 +176,7 @@ BOMBS: dict[str, tuple[Callable[[], Bitstream], str]] = {
     "free values": (free_values, "OverBudget: .*16384 trajectories"),
     "much fill": (partial(much_fill, "laplacian-1-tutte"), "TooMuchFill: .*points at random"),
     "much fill of the average": (partial(much_fill, "laplacian-1"), "TooMuchFill: .*points at random"),
+    "a hub": (hub, "OverBudget: .*factoring over 40000 points"),
     "a long clip": (long_clip, "OverBudget: .*100000 frames"),
     "long transforms": (long_transforms, "OverBudget: .*16777216 frames"),
     "many runs": (many_runs, "OverBudget: .*16777216 distinct frames"),

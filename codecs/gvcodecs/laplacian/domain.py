@@ -14,7 +14,7 @@ from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian, scale_rows,
 from gvcodecs.laplacian.header import CoefficientCoding
 from gvcodecs.laplacian.laplace_operators import laplacian
 from gvcodecs.laplacian.mesh_scale import fineness
-from gvcodecs.laplacian.normal_equations import count_fill, most_products
+from gvcodecs.laplacian.normal_equations import STEPS, count_fill, most_products
 from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.mesh.hierarchy import build_hierarchy
@@ -68,10 +68,11 @@ def build_surface(point_faces: Int32, n_points: int) -> Surface:
 
 
 def is_factorable(point_faces: Int32, n_points: int) -> bool:
-    """Whether the least squares over a mesh stay within `most_products`, whatever the operator."""
+    """Whether the least squares over a mesh stay within `most_products` and `STEPS`, whatever the operator."""
     faces, limit = _proper(point_faces), most_products(n_points)
     operator = thin_hubs(laplacian(np.zeros((n_points, 3)), faces, "tutte"))
-    return count_fill(operator, limit).products <= limit
+    fill = count_fill(operator, limit)
+    return fill.products <= limit and fill.steps <= STEPS
 
 
 def build_domain(

@@ -54,19 +54,20 @@ class QuotientGraph(NamedTuple):
 
 
 @compiled
-def order_unknowns(starts: Int64, columns: Int32, most_products: int) -> tuple[Int32, int, int]:
-    """Return an order of elimination ``(n,)``, and the most entries (below its diagonal) and products that the factor takes.
+def order_unknowns(starts: Int64, columns: Int32, most_products: int, most_steps: int) -> tuple[Int32, int, int, int]:
+    """Return an order of elimination ``(n,)``, the most entries (below its diagonal) and products of the factor, and steps.
 
-    A search that passes the limit ends there; the order is then empty, and the numbers are those so far.
+    A search that passes a limit ends there; the order is then empty, and the numbers are those so far.
 
     Args:
         starts, columns: the matrix' pattern by rows, symmetric, with or without the diagonal.
-        most_products: the limit.
+        most_products: the limit of products.
+        most_steps: the limit of steps: lengths of the lists that the search goes through. A hub's is long, and comes often.
     """
     n = len(starts) - 1
     graph, lists, end = _open_graph(starts, columns)
     pivots = np.empty(n, np.int32)
-    n_pivots, n_left, lowest, entries, products = 0, n, 0, 0, 0
+    n_pivots, n_left, lowest, entries, products, steps = 0, n, 0, 0, 0, 0
     while n_left > 0:
         while graph.head[lowest] == NONE:
             lowest += 1
@@ -74,6 +75,10 @@ def order_unknowns(starts: Int64, columns: Int32, most_products: int) -> tuple[I
         _unlink(graph, pivot)
         lists = _with_room(lists, end, _bound_of_element(graph, lists, pivot))
         end = _make_element(graph, lists, pivot, end)
+        for k in range(graph.start[pivot], end):
+            steps += graph.size[lists[k]]
+        if steps > most_steps:
+            return np.empty(0, np.int32), entries, products, steps
         _compare_elements(graph, lists, pivot, n_pivots)
         _update_unknowns(graph, lists, pivot)
         _join_alike(graph, lists, pivot, n_pivots)
@@ -83,12 +88,12 @@ def order_unknowns(starts: Int64, columns: Int32, most_products: int) -> tuple[I
             entries += degree + k
             products += (degree + k) * (degree + k + 1) // 2
         if products > most_products:
-            return np.empty(0, np.int32), entries, products
+            return np.empty(0, np.int32), entries, products, steps
         n_left -= weight
         graph.weight[pivot] = 0
         pivots[n_pivots] = pivot
         n_pivots += 1
-    return _expand(pivots[:n_pivots], graph.parent), entries, products
+    return _expand(pivots[:n_pivots], graph.parent), entries, products, steps
 
 
 @compiled

@@ -28,11 +28,13 @@ if TYPE_CHECKING:
 
 COLUMNS = 32  # solved at once: more do not fit the cache
 FREE_PRODUCTS = 1 << 27  # that any system may take
+STEPS = 1 << 28  # of an encoder's search for an order: a second, of the two that any file may take
 PRODUCTS = 512  # that P points may take beside, times P sqrt(P): 7 times what a square grid of 100,000 points needs
 NO_LIMIT = 1 << 62
 BYTES_PER_PAIR, SECONDS_PER_PAIR = 20, 15e-9  # of points that a row couples
 BYTES_PER_ENTRY, SECONDS_PER_ENTRY = 12, 20e-9  # of a factor
 SECONDS_PER_PRODUCT = 1.4e-9
+SECONDS_PER_STEP = 4e-9  # of the search for an order
 SECONDS_PER_SOLVED = 0.5e-9  # of an entry, times columns
 
 
@@ -42,10 +44,12 @@ class Fill(NamedTuple):
     Args:
         entries: below the diagonal, of 12 bytes each.
         products: of two entries, that factoring takes.
+        steps: of the search for the order of elimination.
     """
 
     entries: int
     products: int
+    steps: int
 
 
 class TooMuchFill(OverBudget):
@@ -62,11 +66,11 @@ def most_products(n_points: int) -> int:
 
 
 def count_fill(operator: sparse.csr_array, limit: int) -> Fill:
-    """What factoring the normal equations of ``operator (P, P)`` costs; what was counted so far, if products pass the limit."""
+    """What factoring the normal equations of ``operator (P, P)`` costs; what was counted so far, if it passes a limit."""
     from gvcodecs.laplacian.operator_kernels import transpose
 
     rows = as_rows(operator)
-    return _eliminate(rows, transpose(rows), limit)[2]
+    return _eliminate(rows, transpose(rows), limit, NO_LIMIT if limit == NO_LIMIT else STEPS)[2]
 
 
 class NormalEquations:
@@ -92,12 +96,14 @@ class NormalEquations:
         budget.ask(what, BYTES_PER_PAIR * n_pairs, SECONDS_PER_PAIR * n_pairs)
         transposed = transpose(self._rows)
         limit = most_products(len(held)) if budget.is_limited else NO_LIMIT
-        self._order, columns, self.fill = _eliminate(self._rows, transposed, limit)
+        most_steps = int(budget.seconds_left / SECONDS_PER_STEP) if budget.is_limited else NO_LIMIT
+        self._order, columns, self.fill = _eliminate(self._rows, transposed, limit, most_steps)
         if self.fill.products > limit:
             most = f"{len(held)} points may take {limit} products"
             raise TooMuchFill(
                 f"its triangles couple points at random: factoring takes too long, {most}; encode it as pca, or {ALLOW}"
             )
+        budget.keep(what, seconds=SECONDS_PER_STEP * self.fill.steps)
         work = SECONDS_PER_PAIR * n_pairs + SECONDS_PER_ENTRY * self.fill.entries + SECONDS_PER_PRODUCT * self.fill.products
         budget.ask(what, BYTES_PER_PAIR * n_pairs + BYTES_PER_ENTRY * self.fill.entries)
         budget.keep(what, BYTES_PER_ENTRY * self.fill.entries, work)
@@ -137,12 +143,12 @@ class NormalEquations:
         return solved
 
 
-def _eliminate(rows: Rows, transposed: Rows, limit: int) -> tuple[Int32, Int32, Fill]:
+def _eliminate(rows: Rows, transposed: Rows, limit: int, most_steps: int) -> tuple[Int32, Int32, Fill]:
     """Order of elimination ``(P,)``, the normal matrix' columns beside its diagonal, and the factor's cost."""
     from gvcodecs.laplacian.elimination_kernels import order_unknowns
     from gvcodecs.laplacian.operator_kernels import normal_pattern
 
     starts: Int64
     starts, columns = normal_pattern(rows, transposed)
-    order, entries, products = order_unknowns(starts, columns, limit)
-    return order, columns, Fill(entries, products)
+    order, entries, products, steps = order_unknowns(starts, columns, limit, most_steps)
+    return order, columns, Fill(entries, products, steps)

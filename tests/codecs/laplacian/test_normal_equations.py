@@ -81,7 +81,7 @@ def test_what_nothing_holds_is_singular() -> None:
     operator = operator_of(tube(12, 40)[1], 480)
     with pytest.raises(Singular, match="holds point"):
         NormalEquations(sparse.csr_array((5, 5)), np.zeros(5))
-    assert NormalEquations(operator, held(operator)).fill > Fill(0, 0)
+    assert NormalEquations(operator, held(operator)).fill > Fill(0, 0, 0)
 
 
 def test_random_triangles_are_counted_refused_and_coded_without_deltas(monkeypatch: pytest.MonkeyPatch) -> None:
