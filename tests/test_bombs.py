@@ -169,6 +169,12 @@ def many_samples(video: bytes) -> bytes:
     return video[:at] + (1).to_bytes(4, "big") + (1 << 24).to_bytes(4, "big") + video[at + 8 :]
 
 
+def many_keys(video: bytes) -> bytes:
+    """2**28 names of tags, which FFmpeg would allocate pointers for."""
+    at = video.find(b"keys") + 8
+    return video[:at] + (1 << 28).to_bytes(4, "big") + video[at + 4 :]
+
+
 BOMBS: dict[str, tuple[Callable[[], Bitstream], str]] = {
     "pictures": (huge_pictures, "CorruptFile: .*32000x32000"),
     "deflated triangles": (deflated_triangles, "OverBudget: .*5242880 triangles"),
@@ -182,7 +188,7 @@ BOMBS: dict[str, tuple[Callable[[], Bitstream], str]] = {
     "many runs": (many_runs, "OverBudget: .*16777216 distinct frames"),
     "a deflated list": (deflated_list, "OverBudget: .*section 'asset'"),
 }
-TABLES = {"many samples": many_samples}
+TABLES = {"many samples": many_samples, "many keys": many_keys}
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from gvpipe.errors import CorruptFile, corrupt
 MAX_EDITS = 4  # encoders of other tools write one or two
 HEAD = struct.Struct(">I")  # entries, after version and flags
 SIZES = struct.Struct(">II")  # size of every sample or 0, samples
-ENTRY_BYTES = {b"stts": 8, b"ctts": 8, b"stsc": 12, b"stco": 4, b"co64": 8, b"stss": 4, b"elst": 12, b"sbgp": 8}
+ENTRY_BYTES = {b"stts": 8, b"ctts": 8, b"stsc": 12, b"stco": 4, b"co64": 8, b"stss": 4, b"elst": 12, b"sbgp": 8, b"keys": 8}
 RUNS = (b"stts", b"ctts")  # of samples: [32 bits] how many, and what they have in common
 UNUSED = (b"cmov", b"stz2", b"mvex", b"moof")  # compressed headers, packed sizes, fragments
 
