@@ -7,6 +7,7 @@ carries a file (``-``), results go to standard error too.
 from __future__ import annotations
 
 import contextlib
+import errno
 import functools
 import json
 import logging
@@ -130,7 +131,8 @@ def _print(text: object, beside: bool) -> None:
     except BrokenPipeError:
         raise
     except OSError as exc:
-        raise OutputError(f"cannot print the result: {exc.strerror or exc}; free some space or print elsewhere") from exc
+        remedy = "free some space or print elsewhere" if exc.errno == errno.ENOSPC else "print elsewhere"
+        raise OutputError(f"cannot print the result: {exc.strerror or exc}; {remedy}") from exc
 
 
 class _Noting(logging.Handler):
