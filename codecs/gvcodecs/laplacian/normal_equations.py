@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 
 COLUMNS = 32  # solved at once: more do not fit the cache
 FREE_PRODUCTS = 1 << 27  # that any system may take
-STEPS = 1 << 28  # of an encoder's search for an order: a second, of the two that any file may take
+STEPS = 3 << 26  # of an encoder's search for an order: a second, of the two that any file may take
 PRODUCTS = 512  # that P points may take beside, times P sqrt(P): 7 times what a square grid of 100,000 points needs
 NO_LIMIT = 1 << 62
 BYTES_PER_PAIR, SECONDS_PER_PAIR = 20, 15e-9  # of points that a row couples
 BYTES_PER_ENTRY, SECONDS_PER_ENTRY = 12, 20e-9  # of a factor
 SECONDS_PER_PRODUCT = 1.4e-9
-SECONDS_PER_STEP = 4e-9  # of the search for an order
+SECONDS_PER_STEP = 6e-9  # of the search for an order; 4 on an idle machine
 SECONDS_PER_SOLVED = 0.5e-9  # of an entry, times columns
 
 
