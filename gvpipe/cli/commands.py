@@ -120,7 +120,11 @@ def cli() -> None:
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
 @click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.mp4, ...")
 @click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp.")
-@click.option("--stream", is_flag=True, help="Write the stream layout: it plays over HTTP while it loads.")
+@click.option(
+    "--stream",
+    is_flag=True,
+    help="Write the stream layout: it plays over HTTP while it loads. --for stream chooses a codec that suits.",
+)
 @unlimited_option
 @output_options
 def encode(

@@ -21,6 +21,7 @@ from typing import Any
 from gvpipe.atomic import unnamed_path
 from gvpipe.codec import Progress
 from gvpipe.container.mp4 import file_bytes
+from gvpipe.container.sources import is_url
 from gvpipe.errors import InputError, OutputError
 from gvpipe.player import Player
 from gvpipe.quality_scale import error_of, quality_of
@@ -74,7 +75,7 @@ def export_html(
     """Write a page of one file that plays a geometry video.
 
     Args:
-        source: the geometry video, of any codec.
+        source: the geometry video, of any codec, or its address (``https://...``).
         target: the ``.html`` to write; an older file is replaced once the new one is complete.
         up: the axis that stands upright in the first view, ``y`` or ``z``; None: the file's own, else ``y``.
         quality: 0..100, of the conversion where there is one: the error that it may add (`gvpipe.quality_scale`); `QUALITY` if
@@ -99,7 +100,8 @@ def export_html(
         up = player.metadata.up_axis if player.metadata.up_axis in AXES else "y"
     obstacle = browser_obstacle(player.bitstream)
     if not obstacle:
-        return _write_page(player.path, Path(player.path).read_bytes(), target, up)
+        data = file_bytes(player.bitstream) if is_url(player.path) else Path(player.path).read_bytes()
+        return _write_page(player.path, data, target, up)
     trial = _convert(player, QUALITY if quality is None else quality, progress)
     remaining = browser_obstacle(trial.bitstream)
     if remaining:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Finished
+from file_server import serving
 from folders import ROOT, SAMPLES
 from sequences import waving
 
@@ -45,6 +46,16 @@ def test_page_holds_the_file_unchanged(video: Path, tmp_path: Path) -> None:
     assert _embedded(page) == video.read_bytes()
     assert report == gvpipe.ExportReport(page.stat().st_size, video.stat().st_size)
     assert report.bytes <= 1.35 * video.stat().st_size + PLAYER_BYTES
+
+
+@pytest.mark.parametrize("stream", [False, True])
+def test_a_page_of_a_file_on_a_web_server(stream: bool, video: Path, tmp_path: Path) -> None:
+    """It holds the file in the plain layout, which loads faster from memory."""
+    served = tmp_path / "served.mp4"
+    gvpipe.restream(video, served, "stream" if stream else "plain")
+    with serving(served.read_bytes()) as (address, _):
+        gvpipe.export_html(address, tmp_path / "a.html")
+    assert _embedded(tmp_path / "a.html") == video.read_bytes()
 
 
 def test_page_asks_for_nothing_else(video: Path, tmp_path: Path) -> None:

@@ -89,6 +89,20 @@ def test_loading(player: Callable[..., Any]) -> None:
     assert after == ["load", "load", 0, True, "emptied", "loadstart", "error"]
 
 
+def test_an_element_with_a_source_loads_once(player: Callable[..., Any]) -> None:
+    """A parser makes elements with their attributes: the source is there before the element is, and again when it is."""
+    log = player(
+        """const begun = [];
+        document.body.addEventListener("loadstart", () => begun.push("loadstart"), true);
+        document.body.insertAdjacentHTML("beforeend", "<geometry-video src='x.mp4'></geometry-video>");
+        const parsed = document.body.lastElementChild;
+        await new Promise((resolve) => parsed.addEventListener("ready", resolve, { once: true }));
+        parsed.remove();
+        return begun;"""
+    )
+    assert log == ["loadstart"]
+
+
 def test_playing_to_the_end(player: Callable[..., Any]) -> None:
     """``play`` before the file is there waits for it; the time grows to the duration."""
     times, log, end, again = player(

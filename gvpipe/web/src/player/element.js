@@ -82,7 +82,7 @@ export class GeometryVideoElement extends HTMLElement {
   }
 
   connectedCallback() {
-    if (this.hasAttribute("src") && !this.video) this.load(this.getAttribute("src"));
+    if (this.hasAttribute("src") && !this.#loaded) this.load(this.getAttribute("src"));
   }
 
   disconnectedCallback() {
