@@ -16,7 +16,7 @@ import gvpipe
 from gvpipe.atomic import unnamed_path
 from gvpipe.sequence import MeshSequence
 
-KILLS = int(os.environ.get("GVPIPE_KILLS", "100"))
+KILLS = int(os.environ.get("GVPIPE_KILLS", "40"))
 WAIT = 120  # seconds
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "O_TMPFILE"), reason="this system has no files without names")

@@ -25,7 +25,7 @@ COARSEST = 1.0, 1.3  # times the target error, lattice steps of base frames
 LARGE_BASE = 0.25  # part of the bytes that a base frame must take for the second of them to be tried
 REBASED = 1.2  # times the lattice step of a base frame, another one is tried
 PUBLISHED = 0.43  # lattice steps, root mean square, that the published mode's base frame leaves at least
-MAX_TRANSFORMS = 0.4  # part of the bytes that transforms may take for a finer error to be tried: they grow by about 3/4
+MAX_TRANSFORMS = 0.25  # part of the bytes that transforms may take for a finer error to be tried: rigid motion takes less
 FINE_LATTICES = 1.05, 1.2, 1.35, 1.5  # times that error, lattice steps of base frames: the smallest mesh is taken
 FINE_BAND = 0.88, 1.0  # of that error, which is close enough
 
