@@ -52,6 +52,10 @@ CHOSEN = {
 }
 VARIANTS = [pytest.param(*variant, id=name) for name, variant in CHOSEN.items()]
 each_codec = pytest.mark.parametrize(("codec", "settings"), VARIANTS)
+every_second = pytest.mark.parametrize(  # the others are left to the slow run
+    ("codec", "settings"),
+    [pytest.param(*v.values, id=v.id, marks=[] if i % 2 == 0 else pytest.mark.slow) for i, v in enumerate(VARIANTS)],
+)
 AWKWARD_CASES = [  # each variant meets each input in one of both orders; the other one is left to the slow run
     pytest.param(
         *variant.values,
@@ -109,10 +113,7 @@ def test_same_input_same_bytes(codec: str, settings: dict[str, Any], tmp_path: P
     assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
 
 
-@pytest.mark.parametrize(
-    ("codec", "settings"),
-    [pytest.param(*v.values, id=v.id, marks=[] if i % 2 == 0 else pytest.mark.slow) for i, v in enumerate(VARIANTS)],
-)
+@every_second
 def test_quality_is_monotone(codec: str, settings: dict[str, Any], tmp_path: Path) -> None:
     sequence = waving(16, 24)
     sizes, errors = [], []
@@ -140,7 +141,7 @@ def test_random_access_equals_full_decode(path: Path) -> None:
         video[len(video)]
 
 
-@each_codec
+@every_second
 def test_segments_decode_alone(codec: str, settings: dict[str, Any], tmp_path: Path) -> None:
     """Cut into segments, the sequence comes back as well, and a frame needs no other segment's sections."""
     sequence = waving()
@@ -154,7 +155,7 @@ def test_segments_decode_alone(codec: str, settings: dict[str, Any], tmp_path: P
     assert np.array_equal(alone.read(21, 29), gvpipe.open(tmp_path / "s.mp4")[21:29])
 
 
-@each_codec
+@every_second
 def test_lazy_frames_give_the_same_bytes(codec: str, settings: dict[str, Any], tmp_path: Path) -> None:
     class Lazy:
         def __init__(self, frames: np.ndarray) -> None:

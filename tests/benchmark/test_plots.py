@@ -15,6 +15,7 @@ from gvpipe.errors import InputError
 PEERS = "seq,codec,bpvf,kg,rmse_rel\nsheet,other,4.0,0.5,1e-3\nsheet,other,9.0,0.05,1e-4\nsheet,exact,96,0,0\n,,x,,\n"
 
 
+@pytest.mark.slow
 def test_plots_need_the_report_alone(report: BenchReport, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     (tmp_path / "peers.csv").write_text(PEERS)

@@ -56,6 +56,7 @@ def test_a_reader_that_disagrees_with_itself_is_found(sheet: Path, tmp_path: Pat
         sweep._verify(sequence, tmp_path / "a.mp4")
 
 
+@pytest.mark.slow
 def test_command_line(run: Run, sheet: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     target = tmp_path / "r.json"

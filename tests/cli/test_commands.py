@@ -540,6 +540,7 @@ def test_truncated(run: Run, video: Path, tmp_path: Path) -> None:
                 assert_refused(run, tmp_path, arguments, (str(cut_file),))
 
 
+@pytest.mark.slow
 def test_flipped_bytes(video: Path, tmp_path: Path, sequence: MeshSequence) -> None:
     """One damaged byte anywhere is noticed, or changes no vertex."""
     data = video.read_bytes()

@@ -36,7 +36,7 @@ Call = tuple[str, list[Any], list[Any], list[Any]]  # name, arguments before and
 
 
 @NODE
-@pytest.mark.parametrize("mode", MODES[:3])
+@pytest.mark.parametrize("mode", [MODES[0], *(pytest.param(mode, marks=pytest.mark.slow) for mode in MODES[1:3])])
 def test_kernels_equal_numba_on_fields(mode: str, tmp_path: Path) -> None:
     """Of vertices and of triangles, with rows that keep their values."""
     values = wave(n_components=2)
