@@ -24,6 +24,7 @@ from fuzz.worker import memory_folder
 @click.option("--seed", default=1, show_default=True, help="Seed of the random numbers: the same cases for the same seed.")
 @click.option("--first", default=0, help="Number of the first case of each parser.")
 @click.option("--target", "targets", multiple=True, help="A parser; may be given several times. All by default.")
+@click.option("--without", multiple=True, help="A parser to leave out; may be given several times.")
 @click.option("--kind", type=click.Choice(["", "video", "mesh", "web"]), default="", help="Parsers of one kind alone.")
 @click.option("--workers", default=os.cpu_count() or 1, show_default=True, help="Processes.")
 @click.option("--seeds", default=str(FOLDER), help="Folder of seed files; made when it is missing.")

@@ -18,6 +18,7 @@ class Options:
         cases: of each target, instead of a time; 0: as many as there is time for.
         seed: of the random numbers.
         targets: names of parsers; none: all.
+        without: names of parsers that are left out.
         kind: ``video`` (Python's parsers of geometry videos), ``mesh``, ``web`` (the player's); "": all.
         workers: processes.
         seeds: folder of the seed files.
@@ -34,6 +35,7 @@ class Options:
     cases: int = 0
     seed: int = 1
     targets: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
     kind: str = ""
     workers: int = 2
     seeds: str = ""
@@ -67,7 +69,8 @@ def load_targets(options: Options) -> list[Target]:
         "web": browser_targets(videos, streams),
     }
     targets = [target for kind, group in kinds.items() if options.kind in ("", kind) for target in group]
-    unknown = set(options.targets) - {target.name for target in targets}
+    unknown = {*options.targets, *options.without} - {target.name for target in targets}
     if unknown:
         raise KeyError(f"no target {', '.join(sorted(unknown))}; there are {', '.join(target.name for target in targets)}")
-    return [target for target in targets if not options.targets or target.name in options.targets]
+    wanted = set(options.targets or [target.name for target in targets]) - set(options.without)
+    return [target for target in targets if target.name in wanted]
