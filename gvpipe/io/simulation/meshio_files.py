@@ -29,7 +29,8 @@ TYPES = {
     "line3": 21, "triangle6": 22, "quad8": 23, "tetra10": 24, "hexahedron20": 25, "wedge15": 26, "pyramid13": 27, "quad9": 28,
     "hexahedron27": 29, "quad6": 30, "wedge12": 31, "wedge18": 32, "hexahedron24": 33, "triangle7": 34, "line4": 35,
 }  # fmt: skip
-UNMATCHED = "unmatched data"  # what NumPy 2.4 says of text behind the last number, as in Gmsh files with numbers per point
+# what NumPy says of text behind the last number, as in Gmsh files with numbers per point: 2.4, and older versions' result
+UNMATCHED = "unmatched data", "cannot reshape array of size"
 INCLUDE = re.compile(rb"^\s*\*include", re.IGNORECASE | re.MULTILINE)  # Abaqus: the name of any file
 
 
@@ -52,7 +53,7 @@ def load_by_meshio(path: Path) -> Dataset:
             warnings.simplefilter("ignore")  # of NumPy, about how meshio calls it
             mesh: Any = meshio.read(path)
     except ValueError as exc:
-        if UNMATCHED not in str(exc):
+        if not any(words in str(exc) for words in UNMATCHED):
             raise
         raise ValueError(
             f"{exc}; it is cut short, or text that meshio {meshio.__version__} does not read: save it as binary"
