@@ -146,6 +146,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="compare with the files that are there, and write none")
     is_check = parser.parse_args().check
+    if os.environ.get("PYTHONHASHSEED") != "0":  # numba goes through sets, whose order would change the bytes
+        sys.exit(subprocess.run([sys.executable, *sys.argv], env={**os.environ, "PYTHONHASHSEED": "0"}).returncode)
     check_versions()
     with tempfile.TemporaryDirectory() as folder:
         os.environ.update(ENVIRONMENT, NUMBA_CACHE_DIR=folder)  # before numba loads; what is cached elsewhere is optimised
