@@ -21,10 +21,10 @@ import pytest
 from folders import GOLDEN
 from odd_headers import payload_of
 from sequences import grid
+from tubes import operator_of
 
 import gvpipe
-from gvcodecs.laplacian.extended_laplacian import thin_hubs
-from gvcodecs.laplacian.laplace_operators import laplacian
+from gvcodecs.laplacian.laplace_kernels import thin_rows
 from gvcodecs.laplacian.normal_equations import NO_LIMIT, NormalEquations, count_fill, most_products
 from gvpipe.arrays import Int32
 from gvpipe.asset_coding.directory import CODED
@@ -239,7 +239,7 @@ def test_a_limit_can_be_lifted_where_files_are_split(run: Callable[..., Any], tm
 
 
 def test_a_limit_of_factors_can_be_lifted(tmp_path: Path) -> None:
-    operator = thin_hubs(laplacian(np.zeros((700, 3)), random_triangles(700), "tutte"))
+    operator = thin_rows(operator_of(np.zeros((700, 3)), random_triangles(700), "tutte"))
     n_products = count_fill(operator, NO_LIMIT).products
     assert most_products(700) > n_products
     budget = Budget(1000)

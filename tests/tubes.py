@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import sparse
 
 from gvcodecs.laplacian import Laplacian
 from gvcodecs.laplacian.domain import Surface, build_surface
 from gvcodecs.laplacian.header import CoefficientCoding
+from gvcodecs.laplacian.laplace_operators import laplacian
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.mesh.graph_kernels import link_vertices
 from gvpipe.metrics.comparison import compare
 from gvpipe.sequence import MeshSequence
+from gvpipe.trajectory.product_kernels import Rows
 
 CODING = CoefficientCoding("mean-value", "kalman", 16, "hierarchy", 0.75, 1 / 16, 1.2, 1.5)
 
@@ -40,3 +44,15 @@ def kg(sequence: MeshSequence, bitstream: Bitstream) -> float:
 def surface_of(shape: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, Surface]:
     points, faces = shape
     return points, build_surface(faces.astype(np.int32), len(points))
+
+
+def operator_of(points: np.ndarray, faces: np.ndarray, operator: str = "mean-value") -> Rows:
+    """The Laplacian of a mesh, by rows."""
+    faces = np.ascontiguousarray(faces, np.int32)
+    return laplacian(np.ascontiguousarray(points, np.float64), faces, link_vertices(faces, len(points)), operator)
+
+
+def matrix_of(rows: Rows) -> sparse.csr_array:
+    """The same matrix as SciPy has it."""
+    n = len(rows.starts) - 1
+    return sparse.csr_array((rows.values, rows.columns, rows.starts), shape=(n, n))

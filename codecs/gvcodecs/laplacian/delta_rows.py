@@ -19,75 +19,44 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.trajectory.causal_order import CausalOrder
 
 if TYPE_CHECKING:
+    from gvcodecs.laplacian.delta_kernels import DeltaOrder
+    from gvpipe.mesh.graph_kernels import Graph
     from gvpipe.mesh.hierarchy_kernels import Hierarchy
 
 DELTA_PREDICTIONS = ("kalman", "rigid", "none")
 N_CAUSAL = {"kalman": 20, "rigid": 15, "none": 0}  # causal neighbours, at most; 15 is the paper's k
-REACH = 160  # points that the search for them visits at most
-RIDGE = 0.01  # in traces of A^T A
-VARIANCE = 0.2  # prior variance of a weight
-BLOCK = 512  # vectors of the traversal that are entropy coded at once
-N_RING = 6  # causal neighbours whose magnitudes count for a vector's contexts
-TINY = 1e-30
+N_RING = {"kalman": 6, "rigid": 15, "none": 0}  # those of them whose magnitudes count for a vector's contexts
 
 
 def border_order(faces: Int32, n_points: int) -> Int32:
     """All points in the order of a traversal over ``faces (T, 3)`` that goes from triangle to triangle, breadth first."""
     from gvpipe.mesh.traversal import traverse
 
-    order: Int32 = traverse(faces, np.arange(n_points, dtype=np.int32), n_points)[0]
+    order: Int32 = traverse(faces, np.arange(n_points, dtype=np.int32), n_points).order
     return order
 
 
-def delta_order(prediction: str, hierarchy: Hierarchy, traversal: Int32, has_deltas: Bool) -> tuple[Int32, Int32, Int32]:
-    """Return points in their order ``(n,)``, bounds of blocks, and ``(n,)`` the rank below which causal neighbours are."""
-    if prediction == "kalman":
-        keep = has_deltas[hierarchy.order]
-        blocks = np.unique(np.concatenate([[0], np.cumsum(keep)])[hierarchy.blocks])
-        return hierarchy.order[keep], blocks.astype(np.int32), np.repeat(blocks[:-1], np.diff(blocks)).astype(np.int32)
-    order = traversal[has_deltas[traversal]]
-    blocks = np.unique(np.append(np.arange(0, len(order), BLOCK), len(order)))
-    return order, blocks.astype(np.int32), np.arange(len(order), dtype=np.int32)
+def delta_order(prediction: str, hierarchy: Hierarchy, traversal: Int32, has_deltas: Bool) -> DeltaOrder:
+    """Return the order of the points that have deltas, for one of `DELTA_PREDICTIONS`."""
+    from gvcodecs.laplacian.delta_kernels import order_deltas
+
+    return order_deltas(prediction == "kalman", hierarchy, traversal, has_deltas)
 
 
-def delta_causal_order(
-    prediction: str,
-    order: Int32,
-    blocks: Int32,
-    limits: Int32,
-    neighbours: sparse.csr_array,
-    differential: Float64,
-) -> CausalOrder:
-    """Return the causal order of points in ``order (n,)``, numbered by their ranks in it.
+def delta_causal_order(prediction: str, deltas: DeltaOrder, graph: Graph, differential: Float64) -> CausalOrder:
+    """Return the causal order of points, numbered by their ranks in ``deltas``.
 
     Args:
         prediction: one of `DELTA_PREDICTIONS`.
-        order, blocks, limits: as `delta_order` gives them.
-        neighbours: ``(P, P)`` adjacency.
+        deltas: as `delta_order` gives them.
+        graph: of the mesh over P points.
         differential: ``(P, 3)`` differential coordinates of the average mesh; zero without one.
     """
-    from gvcodecs.laplacian.neighbour_search import causal_around
-    from gvcodecs.laplacian.rigid_kernels import rigid_weights
+    from gvcodecs.laplacian.delta_kernels import weigh_deltas
 
-    graph = neighbours.sorted_indices()
-    starts_of, ends = graph.indptr.astype(np.int32), graph.indices.astype(np.int32)
-    starts, near = causal_around(order, limits, starts_of, ends, N_CAUSAL[prediction], REACH)
-    counts = np.diff(starts)
-    rank = np.zeros(len(differential), np.int32)
-    rank[order] = np.arange(len(order))
-    return CausalOrder(
-        order=np.arange(len(order), dtype=np.int32),
-        starts=starts,
-        neighbours=rank[near],
-        weights=rigid_weights(differential[order], differential[near], starts, RIDGE, TINY),
-        variances=np.full(len(near), VARIANCE),
-        ring_sizes=counts.astype(np.int32) if prediction == "rigid" else np.minimum(counts, N_RING).astype(np.int32),
-        blocks=blocks,
-        affine=False,
-    )
+    return weigh_deltas(deltas, graph, differential, N_CAUSAL[prediction], N_RING[prediction])

@@ -6,23 +6,22 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from gvcodecs.laplacian.anchors import Anchors, choose_anchors
 from gvcodecs.laplacian.delta_rows import border_order, delta_causal_order, delta_order
-from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian, scale_rows, thin_hubs
+from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian
 from gvcodecs.laplacian.header import CoefficientCoding
 from gvcodecs.laplacian.laplace_operators import laplacian
-from gvcodecs.laplacian.mesh_scale import fineness
 from gvcodecs.laplacian.normal_equations import STEPS, count_fill, most_products
 from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.mesh.hierarchy import build_hierarchy
-from gvpipe.mesh.topology import adjacency, components, unique_edges
+from gvpipe.mesh.topology import unique_edges
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.spatial_neighbours import hierarchy_order
 
 if TYPE_CHECKING:
+    from gvpipe.mesh.graph_kernels import Graph
     from gvpipe.mesh.hierarchy_kernels import Hierarchy
 
 
@@ -32,17 +31,20 @@ class Surface:
 
     Args:
         faces: ``(T, 3)`` triangles of three different points, over P points.
-        edges: ``(E, 2)``.
-        neighbours: ``(P, P)`` adjacency.
+        graph: of the triangles.
         hierarchy: of the points.
         causal: order of all points along the hierarchy.
     """
 
     faces: Int32
-    edges: Int32
-    neighbours: sparse.csr_array
+    graph: Graph
     hierarchy: Hierarchy
     causal: CausalOrder
+
+    @property
+    def edges(self) -> Int32:
+        """``(E, 2)`` edges, each once."""
+        return unique_edges(self.faces)
 
 
 @dataclass(frozen=True)
@@ -62,16 +64,23 @@ class Domain:
 
 def build_surface(point_faces: Int32, n_points: int) -> Surface:
     """Take in the mesh ``point_faces (T, 3)``."""
-    faces = _proper(point_faces)
+    from gvpipe.mesh.graph_kernels import link_vertices
+    from gvpipe.mesh.hierarchy_kernels import proper_triangles
+
+    faces = proper_triangles(np.ascontiguousarray(point_faces, np.int32))
     hierarchy = build_hierarchy(faces, n_points)
-    return Surface(faces, unique_edges(faces), adjacency(faces, n_points), hierarchy, hierarchy_order(hierarchy))
+    return Surface(faces, link_vertices(faces, n_points), hierarchy, hierarchy_order(hierarchy))
 
 
 def is_factorable(point_faces: Int32, n_points: int) -> bool:
     """Whether the least squares over a mesh stay within `most_products` and `STEPS`, whatever the operator."""
-    faces, limit = _proper(point_faces), most_products(n_points)
-    operator = thin_hubs(laplacian(np.zeros((n_points, 3)), faces, "tutte"))
-    fill = count_fill(operator, limit)
+    from gvcodecs.laplacian.laplace_kernels import thin_rows
+    from gvpipe.mesh.graph_kernels import link_vertices
+    from gvpipe.mesh.hierarchy_kernels import proper_triangles
+
+    faces, limit = proper_triangles(np.ascontiguousarray(point_faces, np.int32)), most_products(n_points)
+    operator = laplacian(np.zeros((n_points, 3)), faces, link_vertices(faces, n_points), "tutte")
+    fill = count_fill(thin_rows(operator), limit)
     return fill.products <= limit and fill.steps <= STEPS
 
 
@@ -94,27 +103,20 @@ def build_domain(
     Raises:
         TooMuchFill, OverBudget, Singular: of `gvcodecs.laplacian.normal_equations.NormalEquations`.
     """
-    n_points = len(surface.hierarchy.order)
+    from gvcodecs.laplacian.laplace_kernels import fineness, scale_rows, thin_rows
+    from gvpipe.mesh.graph_kernels import label_components
+
+    n_points, graph = len(surface.hierarchy.order), surface.graph
     points = np.zeros((n_points, 3)) if average is None else average
     traversal = border_order(surface.faces, n_points)
-    _, component_of = components(surface.neighbours)
-    is_still = np.zeros(n_points, bool) if is_still is None else is_still
+    component_of = label_components(graph)
     anchors = choose_anchors(
         coding.anchor_choice, coding.anchors, surface.hierarchy, surface.causal, traversal, component_of, is_still
     )
-    is_anchor = np.zeros(n_points, bool)
-    is_anchor[anchors.points] = True
-    has_deltas = (np.bincount(component_of[~is_anchor], minlength=int(component_of.max()) + 1) > 0)[component_of]
-    has_deltas &= ~is_still
-    scale = np.ones(n_points) if average is None else fineness(average, surface.edges, coding.edge_power)
-    operator = scale_rows(thin_hubs(laplacian(points, surface.faces, coding.operator)), scale * has_deltas)
+    scale = fineness(points, graph, 0.0 if average is None else coding.edge_power)
+    operator = thin_rows(laplacian(points, surface.faces, graph, coding.operator))
+    operator = scale_rows(operator, scale, anchors.has_deltas)
     system = ExtendedLaplacian(operator, anchors.points, 1 / coding.anchor_ratio, anchors.is_free, budget)
-    order, blocks, limits = delta_order(coding.delta_prediction, surface.hierarchy, traversal, has_deltas)
-    causal = delta_causal_order(coding.delta_prediction, order, blocks, limits, surface.neighbours, system.deltas(points))
-    return Domain(anchors, order, causal, system)
-
-
-def _proper(faces: Int32) -> Int32:
-    """The triangles of three different points."""
-    proper: Int32 = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
-    return proper
+    order = delta_order(coding.delta_prediction, surface.hierarchy, traversal, anchors.has_deltas)
+    causal = delta_causal_order(coding.delta_prediction, order, graph, system.deltas(points))
+    return Domain(anchors, order.points, causal, system)

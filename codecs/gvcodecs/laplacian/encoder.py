@@ -168,6 +168,11 @@ class Laplacian(BaseCodec):
         return LaplacianReader(bitstream)
 
     @classmethod
+    def browser_obstacle(cls, bitstream: Bitstream) -> str:
+        """What keeps browsers from playing a bitstream of this codec: nothing."""
+        return ""
+
+    @classmethod
     def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
         """What each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
         return numbered_parts(("basis", "anchors", "deltas"), Header.of(bitstream).segments)

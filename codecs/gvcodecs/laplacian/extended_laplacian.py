@@ -8,57 +8,27 @@ Rounding errors of deltas add up to a slow drift over the surface. The anchors' 
 deltas are rounded, so the encoder chooses those whose solution comes closest to the true coefficients, by conjugate gradients
 (`ExtendedLaplacian.fit_anchors`); the solution depends on them linearly.
 
-A row of n neighbours couples n^2 pairs of points in the normal equations. Hubs keep `MAX_NEIGHBOURS` of them, evenly spaced.
+A row of n neighbours couples n^2 pairs of points in the normal equations. Hubs keep
+`gvcodecs.laplacian.laplace_kernels.MAX_NEIGHBOURS` of them, evenly spaced.
 
 Source: Vasa, Marras, Hormann and Brunnett 2014, section 6; anchors in closed loop are a departure.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy import sparse
 
 from gvcodecs.laplacian.normal_equations import NormalEquations
 from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.budget import UNLIMITED, Budget
 
-MAX_NEIGHBOURS = 64  # of a row
+if TYPE_CHECKING:
+    from gvpipe.trajectory.product_kernels import Rows
+
 FITTING_STEPS = 2  # of conjugate gradients: a third saves under 1 % of the bytes, and costs two solutions
 TINY = 1e-300  # divides where there is nothing to fit
-
-
-def thin_hubs(operator: sparse.csr_array) -> sparse.csr_array:
-    """Leave rows with more than `MAX_NEIGHBOURS` neighbours only so many, whose shares grow to the same sum.
-
-    Args:
-        operator: ``(P, P)``, rows empty or with a diagonal entry and others that sum to its negative.
-    """
-    operator = operator.sorted_indices()
-    counts = np.diff(operator.indptr)
-    if counts.max(initial=0) <= MAX_NEIGHBOURS + 1:
-        return operator
-    row = np.repeat(np.arange(len(counts)), counts)
-    beside = operator.indices != row
-    n_beside = np.bincount(row, beside, len(counts)).astype(np.int64)
-    rank = np.cumsum(beside) - 1
-    rank = rank - np.concatenate([[0], np.cumsum(n_beside)])[row]  # place among the row's neighbours
-    n = n_beside[row]
-    kept = ~beside | (n <= MAX_NEIGHBOURS) | (rank * MAX_NEIGHBOURS // n != (rank - 1) * MAX_NEIGHBOURS // n)
-    before = np.bincount(row, np.where(beside, operator.data, 0.0), len(counts))
-    after = np.bincount(row, np.where(beside & kept, operator.data, 0.0), len(counts))
-    grown = np.where(beside, operator.data * (before / np.where(after < 0, after, 1.0))[row], operator.data)
-    data = np.where(n_beside[row] > MAX_NEIGHBOURS, grown, operator.data)
-    shape = operator.shape
-    return sparse.csr_array((data[kept], (row[kept], operator.indices[kept])), shape=shape)
-
-
-def scale_rows(operator: sparse.csr_array, scale: Float64) -> sparse.csr_array:
-    """Multiply the rows of ``operator (P, P)`` by ``scale (P,)``; rows scaled by 0 become empty."""
-    counts = np.diff(operator.indptr)
-    kept = np.repeat(scale != 0, counts)
-    starts = np.concatenate([[0], np.cumsum(np.where(scale != 0, counts, 0))])
-    data = (operator.data * np.repeat(scale, counts))[kept]
-    return sparse.csr_array((data, operator.indices[kept], starts), shape=operator.shape)
 
 
 class ExtendedLaplacian:
@@ -75,16 +45,16 @@ class ExtendedLaplacian:
 
     def __init__(
         self,
-        operator: sparse.csr_array,
+        operator: Rows,
         anchors: Int32,
         weight: float,
         is_free: Bool | None = None,
         budget: Budget = UNLIMITED,
     ) -> None:
-        self._n_points, self._anchors, self._weight = operator.shape[0], anchors, weight
+        self._n_points, self._anchors, self._squared_weight = len(operator.starts) - 1, anchors, weight * weight
         self._is_free = np.ones(len(anchors), bool) if is_free is None else is_free
-        held = np.zeros(operator.shape[0])
-        held[anchors] = weight * weight
+        held = np.zeros(self._n_points)
+        held[anchors] = self._squared_weight
         self.equations = NormalEquations(operator, held, budget)
 
     def deltas(self, coefficients: Float64) -> Float64:
@@ -100,8 +70,7 @@ class ExtendedLaplacian:
             anchored: ``(A, R)`` coefficients of the anchors.
         """
         right = self.equations.multiply_transposed(points, deltas)
-        right[self._anchors] += self._weight**2 * anchored
-        return self.equations.solve(right)
+        return self.equations.solve(self._held(right, anchored))
 
     def fit_anchors(self, points: Int32, deltas: Float64, wanted: Float64) -> Float64:
         """Return values of the anchors ``(A, R)`` whose solution, with these rounded ``deltas``, comes near ``wanted (P, R)``.
@@ -125,10 +94,15 @@ class ExtendedLaplacian:
 
     def _spread(self, anchored: Float64) -> Float64:
         """The solution ``(P, R)`` where all deltas are 0."""
-        right = np.zeros((self._n_points, anchored.shape[1]))
-        right[self._anchors] = self._weight**2 * anchored
-        return self.equations.solve(right)
+        return self.equations.solve(self._held(np.zeros((self._n_points, anchored.shape[1])), anchored))
+
+    def _held(self, right: Float64, anchored: Float64) -> Float64:
+        """Right-hand sides ``(P, R)`` with what the anchors add to them, in place."""
+        from gvcodecs.laplacian.operator_kernels import add_rows
+
+        add_rows(right, self._anchors, self._squared_weight, anchored)
+        return right
 
     def _gather(self, solution: Float64) -> Float64:
         """The transpose of `_spread`: ``(P, R)`` to ``(A, R)``."""
-        return self._weight**2 * self.equations.solve(solution)[self._anchors]
+        return self._squared_weight * self.equations.solve(solution)[self._anchors]

@@ -110,6 +110,23 @@ def factorise(matrix: Lower, bounds: Int64, found: Int32) -> tuple[Factors, int]
 
 
 @compiled
+def solve_columns(factors: Factors, order: Int32, right: Float64, solved: Float64, first: int, end: int) -> None:
+    """Fill columns ``first`` to ``end`` of solutions ``(n, R)`` for right-hand sides ``(n, R)``.
+
+    Args:
+        order: ``(n,)`` the unknown of each row of the factors.
+    """
+    part = np.empty((len(order), end - first))
+    for i in range(len(order)):
+        for c in range(end - first):
+            part[i, c] = right[order[i], first + c]
+    solve_in_place(factors, part)
+    for i in range(len(order)):
+        for c in range(end - first):
+            solved[order[i], first + c] = part[i, c]
+
+
+@compiled
 def solve_in_place(factors: Factors, right: Float64) -> None:
     """Turn right-hand sides ``(n, m)`` into solutions."""
     n = len(right)

@@ -18,11 +18,8 @@ import numpy as np
 from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.budget import ALLOW, UNLIMITED, Budget
 from gvpipe.errors import OverBudget
-from gvpipe.trajectory.sparse_rows import as_rows
 
 if TYPE_CHECKING:
-    from scipy import sparse
-
     from gvcodecs.laplacian.factor_kernels import Factors
     from gvpipe.trajectory.product_kernels import Rows
 
@@ -65,12 +62,11 @@ def most_products(n_points: int) -> int:
     return FREE_PRODUCTS + PRODUCTS * n_points * math.isqrt(n_points)
 
 
-def count_fill(operator: sparse.csr_array, limit: int) -> Fill:
+def count_fill(operator: Rows, limit: int) -> Fill:
     """What factoring the normal equations of ``operator (P, P)`` costs; what was counted so far, if it passes a limit."""
     from gvcodecs.laplacian.operator_kernels import transpose
 
-    rows = as_rows(operator)
-    return _eliminate(rows, transpose(rows), limit, NO_LIMIT if limit == NO_LIMIT else STEPS)[2]
+    return _eliminate(operator, transpose(operator), limit, NO_LIMIT if limit == NO_LIMIT else STEPS)[2]
 
 
 class NormalEquations:
@@ -87,12 +83,12 @@ class NormalEquations:
         Singular: an unknown is held by nothing.
     """
 
-    def __init__(self, operator: sparse.csr_array, held: Float64, budget: Budget = UNLIMITED) -> None:
+    def __init__(self, operator: Rows, held: Float64, budget: Budget = UNLIMITED) -> None:
         from gvcodecs.laplacian.factor_kernels import factor_pattern, factorise
         from gvcodecs.laplacian.operator_kernels import normal_matrix, transpose
 
-        self._rows, self._budget = as_rows(operator), budget
-        n_pairs, what = int(np.square(np.diff(operator.indptr).astype(np.int64)).sum()), f"factoring over {len(held)} points"
+        self._rows, self._budget = operator, budget
+        n_pairs, what = int(np.square(np.diff(operator.starts)).sum()), f"factoring over {len(held)} points"
         budget.ask(what, BYTES_PER_PAIR * n_pairs, SECONDS_PER_PAIR * n_pairs)
         transposed = transpose(self._rows)
         limit = most_products(len(held)) if budget.is_limited else NO_LIMIT
@@ -133,13 +129,12 @@ class NormalEquations:
 
     def solve(self, right: Float64) -> Float64:
         """Solutions ``(P, R)`` for right-hand sides ``(P, R)``."""
-        from gvcodecs.laplacian.factor_kernels import solve_in_place
+        from gvcodecs.laplacian.factor_kernels import solve_columns
 
+        n_columns = right.shape[1]
         solved = np.empty_like(right)
-        for first in range(0, right.shape[1], COLUMNS):
-            part = right[self._order, first : first + COLUMNS]
-            solve_in_place(self._factors, part)
-            solved[self._order, first : first + COLUMNS] = part
+        for first in range(0, n_columns, COLUMNS):
+            solve_columns(self._factors, self._order, right, solved, first, min(first + COLUMNS, n_columns))
         return solved
 
 

@@ -45,6 +45,15 @@ def multiply_transposed(operator: Rows, points: Int32, vectors: Float64) -> Floa
 
 
 @compiled
+def add_rows(matrix: Float64, rows: Int32, factor: float, added: Float64) -> None:
+    """Add ``factor`` times ``added (A, R)`` to some ``rows (A,)`` of a ``matrix (P, R)``."""
+    for i in range(len(rows)):
+        row, vector = matrix[rows[i]], added[i]
+        for c in range(len(row)):
+            row[c] += factor * vector[c]
+
+
+@compiled
 def transpose(operator: Rows) -> Rows:
     """The transpose."""
     n = len(operator.starts) - 1

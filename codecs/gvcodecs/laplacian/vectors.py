@@ -15,21 +15,3 @@ def dot(a: Float64, b: Float64) -> Float64:
 def norm(a: Float64) -> Float64:
     """Lengths ``(n,)`` of ``a (n, 3)``."""
     return np.asarray(np.sqrt(dot(a, a)))
-
-
-def add_up(values: Float64) -> float:
-    """The sum of ``values (n,)``, first to last."""
-    return float(np.bincount(np.zeros(len(values), np.intp), values, 1)[0])
-
-
-def power(values: Float64, exponent: float) -> Float64:
-    """``values (n,) ** exponent``, values positive, exponent >= 0, by square roots: `pow` differs between machines."""
-    result, root = np.ones(len(values)), values
-    for _ in range(int(exponent)):
-        result = result * values
-    fraction = exponent - int(exponent)
-    while fraction:
-        fraction, root = 2 * fraction, np.sqrt(root)
-        if fraction >= 1:
-            result, fraction = result * root, fraction - 1
-    return np.asarray(result)

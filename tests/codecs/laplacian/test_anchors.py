@@ -8,10 +8,12 @@ import numpy as np
 from sequences import grid
 from tubes import CODING
 
-from gvcodecs.laplacian.anchors import SMALL, choose_anchors
+from gvcodecs.laplacian.anchor_kernels import SMALL
+from gvcodecs.laplacian.anchors import choose_anchors
 from gvcodecs.laplacian.delta_rows import border_order
 from gvcodecs.laplacian.domain import build_domain, build_surface
-from gvpipe.mesh.topology import components
+from gvpipe.mesh.graph_kernels import label_components
+from gvpipe.mesh.topology import adjacency, components
 
 
 def test_every_component_has_an_anchor_and_small_ones_nothing_else() -> None:
@@ -23,7 +25,9 @@ def test_every_component_has_an_anchor_and_small_ones_nothing_else() -> None:
     )
     points = np.concatenate([points, rng.random((66, 3))])  # the last one is in no triangle
     surface = build_surface(faces, len(points))
-    n_components, component_of = components(surface.neighbours)
+    component_of = label_components(surface.graph)
+    n_components, theirs = components(adjacency(faces, len(points)))
+    assert np.array_equal(component_of, theirs)
     sizes = np.bincount(component_of)
     walk = border_order(surface.faces, len(points))
     for choice in ("hierarchy", "walk"):

@@ -7,13 +7,14 @@ import dataclasses
 import numpy as np
 import pytest
 from scipy import sparse
-from tubes import CODING, kg, surface_of, tube
+from tubes import CODING, kg, matrix_of, operator_of, surface_of, tube
 
 from gvcodecs.laplacian import Laplacian
 from gvcodecs.laplacian.domain import build_domain
-from gvcodecs.laplacian.extended_laplacian import MAX_NEIGHBOURS, ExtendedLaplacian, thin_hubs
-from gvcodecs.laplacian.laplace_operators import laplacian
+from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian
+from gvcodecs.laplacian.laplace_kernels import MAX_NEIGHBOURS, thin_rows
 from gvpipe.sequence import MeshSequence
+from gvpipe.trajectory.sparse_rows import as_rows
 
 
 @pytest.mark.parametrize("operator", ["mean-value", "cotangent", "tutte"])
@@ -29,7 +30,7 @@ def test_exact_deltas_and_anchors_give_the_coefficients_back(operator: str) -> N
 def test_a_solution_is_the_least_squares_one() -> None:
     rng = np.random.default_rng(0)
     operator = sparse.csr_array(np.eye(6) - np.roll(np.eye(6), 1, axis=1))
-    system = ExtendedLaplacian(operator, np.array([0, 3], np.int32), 2.0)
+    system = ExtendedLaplacian(as_rows(operator), np.array([0, 3], np.int32), 2.0)
     deltas, anchored = rng.standard_normal((6, 2)), rng.standard_normal((2, 2))
     extended = np.concatenate([operator.toarray(), 2 * np.eye(6)[[0, 3]]])
     expected = np.linalg.lstsq(extended, np.concatenate([deltas, 2 * anchored]), rcond=None)[0]
@@ -64,8 +65,8 @@ def test_hubs_keep_few_neighbours_and_their_sum() -> None:
     faces = np.stack([np.zeros(n - 1, int), spokes, np.roll(spokes, -1)], axis=1).astype(np.int32)
     angle = 2 * np.pi * spokes / (n - 1)
     points = np.concatenate([np.zeros((1, 3)), np.stack([np.cos(angle), np.sin(angle), np.sin(9 * angle)], axis=1)])
-    whole = laplacian(points, faces)
-    thin = thin_hubs(whole)
+    rows = operator_of(points, faces)
+    whole, thin = matrix_of(rows), matrix_of(thin_rows(rows))
     assert np.diff(thin.indptr)[0] == MAX_NEIGHBOURS + 1
     assert np.abs(thin.sum(axis=1)).max() < 1e-12
     assert abs(thin - whole)[1:].max() == 0

@@ -8,12 +8,11 @@ import time
 import numpy as np
 import pytest
 from scipy import sparse
-from tubes import tube
+from tubes import matrix_of, operator_of, tube
 
 import gvcodecs.laplacian.domain as domain
 from gvcodecs.laplacian import Laplacian
-from gvcodecs.laplacian.extended_laplacian import thin_hubs
-from gvcodecs.laplacian.laplace_operators import laplacian
+from gvcodecs.laplacian.laplace_kernels import thin_rows
 from gvcodecs.laplacian.normal_equations import (
     NO_LIMIT,
     Fill,
@@ -26,6 +25,8 @@ from gvcodecs.laplacian.normal_equations import (
 from gvpipe.arrays import Float64, Int32
 from gvpipe.budget import Budget
 from gvpipe.sequence import MeshSequence
+from gvpipe.trajectory.product_kernels import Rows
+from gvpipe.trajectory.sparse_rows import as_rows
 
 
 def random_mesh(n_points: int) -> Int32:
@@ -34,13 +35,14 @@ def random_mesh(n_points: int) -> Int32:
     return np.asarray(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
 
 
-def operator_of(faces: Int32, n_points: int) -> sparse.csr_array:
-    return thin_hubs(laplacian(np.zeros((n_points, 3)), faces, "tutte"))
+def tutte_of(faces: Int32, n_points: int) -> Rows:
+    return thin_rows(operator_of(np.zeros((n_points, 3)), faces, "tutte"))
 
 
-def held(operator: sparse.csr_array) -> Float64:
+def held(operator: Rows) -> Float64:
     """What holds every 16th point, and those without a row."""
-    return np.where((np.arange(operator.shape[0]) % 16 == 0) | (np.diff(operator.indptr) == 0), 1.0, 0.0)
+    n_entries = np.diff(operator.starts)
+    return np.where((np.arange(len(n_entries)) % 16 == 0) | (n_entries == 0), 1.0, 0.0)
 
 
 @pytest.mark.parametrize("kind", ["tube", "random", "hub", "loose"])
@@ -51,15 +53,16 @@ def test_solutions_are_those_of_a_dense_solver_and_the_count_of_fill_bounds_the_
         "hub": (np.stack([0 * np.arange(99), np.arange(1, 100), np.arange(2, 101)], axis=1).astype(np.int32), 101),
         "loose": (np.zeros((0, 3), np.int32), 40),
     }[kind]
-    operator = operator_of(faces, n)
+    operator = tutte_of(faces, n)
+    matrix = matrix_of(operator)
     weights = held(operator)
     equations = NormalEquations(operator, weights)
     right = np.random.default_rng(1).standard_normal((n, 40))
-    dense = (operator.T @ operator).toarray() + np.diag(weights)
+    dense = (matrix.T @ matrix).toarray() + np.diag(weights)
     assert np.allclose(equations.solve(right), np.linalg.solve(dense, right), rtol=1e-7, atol=1e-7)
-    assert np.allclose(equations.multiply(right), operator @ right)
+    assert np.allclose(equations.multiply(right), matrix @ right)
     some = np.arange(0, n, 3, dtype=np.int32)
-    assert np.allclose(equations.multiply_transposed(some, right[some]), operator[some].T @ right[some])
+    assert np.allclose(equations.multiply_transposed(some, right[some]), matrix[some].T @ right[some])
     entries = len(equations._factors.rows)
     assert 0.99 * equations.fill.entries <= entries <= equations.fill.entries
     assert count_fill(operator, NO_LIMIT) == equations.fill
@@ -69,8 +72,9 @@ def test_the_order_of_elimination_fills_a_surface_no_more_than_scipys() -> None:
     n = 60
     i = np.arange(n * n).reshape(n, n)
     quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
-    operator = operator_of(np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]).astype(np.int32), n * n)
-    normal = sparse.csc_array(operator.T @ operator + sparse.diags_array(held(operator)))
+    operator = tutte_of(np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]).astype(np.int32), n * n)
+    matrix = matrix_of(operator)
+    normal = sparse.csc_array(matrix.T @ matrix + sparse.diags_array(held(operator)))
     theirs = sparse.linalg.splu(normal, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     fill = count_fill(operator, NO_LIMIT)
     assert fill.entries < 1.1 * theirs.L.nnz
@@ -78,9 +82,9 @@ def test_the_order_of_elimination_fills_a_surface_no_more_than_scipys() -> None:
 
 
 def test_what_nothing_holds_is_singular() -> None:
-    operator = operator_of(tube(12, 40)[1], 480)
+    operator = tutte_of(tube(12, 40)[1], 480)
     with pytest.raises(Singular, match="holds point"):
-        NormalEquations(sparse.csr_array((5, 5)), np.zeros(5))
+        NormalEquations(as_rows(sparse.csr_array((5, 5))), np.zeros(5))
     assert NormalEquations(operator, held(operator)).fill > Fill(0, 0, 0)
 
 
@@ -88,7 +92,7 @@ def test_random_triangles_are_counted_refused_and_coded_without_deltas(monkeypat
     """6,000 such points made factors of 18 million entries: two minutes to encode."""
     n = 6000
     faces = random_mesh(n)
-    operator = operator_of(faces, n)
+    operator = tutte_of(faces, n)
     fill = count_fill(operator, most_products(n))
     assert fill.products > most_products(n)
     with pytest.raises(TooMuchFill, match="encode it as pca"):
