@@ -58,10 +58,19 @@ SERIAL = ("gvpipe.entropy.serial_kernels.SerialCoder", [STREAM, LONGS, LONGS, LO
 PLACED = ("gvpipe.attributes.match_kernels.Entries", [ENTRIES, LONGS, SCALAR, SCALAR])
 CORNERS = ("gvpipe.attributes.sharing_kernels.Corners", [TRIANGLES, LONGS, LONGS])
 POSITIONS = "float32[2]"
+GRAPH = ("gvpipe.mesh.graph_kernels.Graph", [LONGS, INTS])
+SPARSE = ("gvpipe.trajectory.product_kernels.Rows", [LONGS, INTS, FLOATS])
+LOWER = ("gvcodecs.laplacian.operator_kernels.Lower", [LONGS, INTS, FLOATS, FLOATS])
+FACTORS = ("gvcodecs.laplacian.factor_kernels.Factors", [LONGS, INTS, FLOATS, FLOATS])
+DELTAS = ("gvcodecs.laplacian.delta_kernels.DeltaOrder", [INTS] * 3)
 WORDS = ["uint64[1]", "uint32[1]"]  # a range decoder's state and its words
 KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and NamedTuples of both
     "gvpipe.mesh.hierarchy_kernels.build_order": [TRIANGLES, SCALAR, SCALAR],
+    "gvpipe.mesh.graph_kernels.label_components": [GRAPH],
+    "gvpipe.mesh.graph_kernels.link_vertices": [TRIANGLES, SCALAR],
+    "gvpipe.mesh.hierarchy_kernels.proper_triangles": [TRIANGLES],
     "gvpipe.mesh.hierarchy_kernels.triangles_left": [TRIANGLES, SCALAR, SCALAR],
+    "gvpipe.mesh.traversal.traverse": [TRIANGLES, INTS, SCALAR],
     "gvpipe.mesh.entry_kernels.order_by_corners": [TRIANGLES, LONGS, SCALAR],
     "gvpipe.mesh.entry_kernels.order_by_edges": [LONGS],
     "gvpipe.connectivity.visit_kernels.decode_ranks": [*WORDS, "uint64[1]", VISITS],
@@ -98,6 +107,22 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
         ("gvcodecs.mcgv.motion.weight_kernels.Listed", [LONGS] * 3),
         ("gvcodecs.mcgv.motion.skinning.Weights", ["int32[2]", "int32[2]"]),
     ],
+    "gvcodecs.laplacian.anchor_kernels.select_anchors": [SCALAR, "bool", HIERARCHY, CAUSAL, INTS, INTS, FLAGS],
+    "gvcodecs.laplacian.delta_kernels.order_deltas": ["bool", HIERARCHY, INTS, FLAGS],
+    "gvcodecs.laplacian.delta_kernels.weigh_deltas": [DELTAS, GRAPH, ROWS, SCALAR, SCALAR],
+    "gvcodecs.laplacian.elimination_kernels.order_unknowns": [LONGS, INTS, SCALAR, SCALAR],
+    "gvcodecs.laplacian.factor_kernels.factor_pattern": [LONGS, INTS, SCALAR],
+    "gvcodecs.laplacian.factor_kernels.factorise": [LOWER, LONGS, INTS],
+    "gvcodecs.laplacian.factor_kernels.solve_columns": [FACTORS, INTS, ROWS, ROWS, SCALAR, SCALAR],
+    "gvcodecs.laplacian.laplace_kernels.fineness": [ROWS, GRAPH, "float64"],
+    "gvcodecs.laplacian.laplace_kernels.laplace_rows": [ROWS, TRIANGLES, GRAPH, SCALAR],
+    "gvcodecs.laplacian.laplace_kernels.scale_rows": [SPARSE, FLOATS, FLAGS],
+    "gvcodecs.laplacian.laplace_kernels.thin_rows": [SPARSE],
+    "gvcodecs.laplacian.operator_kernels.add_rows": [ROWS, INTS, "float64", ROWS],
+    "gvcodecs.laplacian.operator_kernels.multiply_transposed": [SPARSE, INTS, ROWS],
+    "gvcodecs.laplacian.operator_kernels.normal_matrix": [SPARSE, SPARSE, FLOATS, INTS, SCALAR],
+    "gvcodecs.laplacian.operator_kernels.normal_pattern": [SPARSE, SPARSE],
+    "gvcodecs.laplacian.operator_kernels.transpose": [SPARSE],
     "gvpipe.fields.dual_kernels.find_dual": [TRIANGLES, SCALAR],
     "gvpipe.fields.residual_kernels.decode_rows": [
         ("gvpipe.fields.residual_kernels.Residuals", [NUMBERS, SCALAR, FLAGS, CAUSAL]),
@@ -125,6 +150,7 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
     "gvpipe.trajectory.spatial_kernels.weigh_hierarchy": [HIERARCHY, "bool"],
     "gvpipe.trajectory.spatial_kernels.weigh_traversal": [TRIANGLES, SCALAR],
     "gvpipe.trajectory.still_kernels.fit_still": [ROWS, FLOATS, ROWS],
+    "gvpipe.trajectory.product_kernels.multiply": [SPARSE, ROWS],
     "gvpipe.trajectory.product_kernels.weighted_sums": [ROWS, ROWS],
 }
 

@@ -1,7 +1,7 @@
 """The constants that the web player shares with Python: python tools/web_constants.py writes gvpipe/web/src/constants.js.
 
 A constant has the name of its module and its own: ``REACH`` of `gvpipe.connectivity.vertex_order` is ``VERTEX_ORDER_REACH``.
-The name of codec ``pca`` comes before.
+The names of codecs without pictures come before.
 `tests/web/test_export.py` compares the file with what this script makes.
 """
 
@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 from uuid import UUID
 
+PREFIXED = ("GVCODECS.LAPLACIAN", "GVCODECS.PCA")
 TARGET = Path(__file__).parents[1] / "gvpipe" / "web" / "src" / "constants.js"
 SHARED = {
     "gvpipe.asset_coding.directory": "SECTION VERSION MOST MAX_BYTES SURFACE OCTAHEDRAL",
@@ -68,6 +69,13 @@ SHARED = {
     "gvpipe.trajectory.prediction": "PREDICTORS",
     "gvpipe.trajectory.still_points": "SECTION BYTES_PER_STILL SECONDS_PER_STILL SECONDS_PER_PRODUCT",
     "gvpipe.trajectory.temporal_neighbours": "MAX_NEIGHBOURS VARIANCE MIN_BLOCK CUBIC LINEAR OFFSETS",
+    "gvcodecs.laplacian.average_coding": "NAME SPACING FARTHEST",
+    "gvcodecs.laplacian.anchors": "ANCHOR_CHOICES",
+    "gvcodecs.laplacian.delta_rows": "DELTA_PREDICTIONS N_CAUSAL N_RING",
+    "gvcodecs.laplacian.header": "MAX_SEGMENTS VERSION_STILL MAX_SPACING LEAST_RATIO MOST_RATIO FINEST COARSEST MOST_POWER",
+    "gvcodecs.laplacian.laplace_operators": "OPERATORS",
+    "gvcodecs.laplacian.normal_equations": "COLUMNS FREE_PRODUCTS PRODUCTS BYTES_PER_PAIR SECONDS_PER_PAIR BYTES_PER_ENTRY "
+    "SECONDS_PER_ENTRY SECONDS_PER_PRODUCT SECONDS_PER_STEP SECONDS_PER_SOLVED",
     "gvcodecs.mcgv.base.surface": "STILL",
     "gvcodecs.mcgv.browser": "VERSION PROFILE",
     "gvcodecs.mcgv.header": "OF_PICTURES PREDICTIONS PLACEMENTS MAX_CLUSTERS MAX_SEGMENTS",
@@ -88,8 +96,8 @@ def make() -> str:
     for module, names in SHARED.items():
         loaded = import_module(module)
         package, _, prefix = module.upper().rpartition(".")
-        if package == "GVCODECS.PCA":
-            prefix = f"PCA_{prefix}"
+        if package in PREFIXED:
+            prefix = f"{package.rpartition('.')[2]}_{prefix}"
         lines += ["", f"// {module}"]
         lines += [f"export const {prefix}_{name} = {_literal(getattr(loaded, name))};" for name in names.split()]
     return "\n".join(lines) + "\n"

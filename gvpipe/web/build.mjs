@@ -3,6 +3,7 @@
 import { build } from "esbuild";
 import { copyFileSync, readFileSync, readdirSync, rmSync } from "node:fs";
 import { fileURLToPath } from "node:url";
+import { zlibSync } from "three/examples/jsm/libs/fflate.module.js";
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
 const notice = readFileSync(here("LICENSES/NOTICE.txt"), "utf8").trim();
@@ -25,12 +26,21 @@ const worker = await build({
   external: ["node:fs", "fs", "path"],
 });
 
+/** WebAssembly as a zlib stream: the same bytes by every version of Node, since its own deflate differs. */
+const deflated = {
+  name: "deflated",
+  setup({ onLoad }) {
+    onLoad({ filter: /\.wasm$/ }, ({ path }) => ({ contents: zlibSync(readFileSync(path), { level: 9 }), loader: "binary" }));
+  },
+};
+
 const pages = {
   ...common,
   format: "esm",
   define: { WORKER_SOURCE: JSON.stringify(worker.outputFiles[0].text) }, // pages from a disk may load no second file
   banner: { js: `/*!\n${notice}\n*/` },
-  loader: { ".wasm": "binary", ".css": "text" },
+  loader: { ".css": "text" },
+  plugins: [deflated],
 };
 const outside = ["node:fs", "fs", "path"]; // asked for by Draco's wrapper in Node alone
 

@@ -119,7 +119,10 @@ def test_files_serve_their_purpose(run: Run, tmp_path: Path) -> None:
 def test_what_does_not_serve_is_refused(run: Run, tmp_path: Path) -> None:
     gvpipe.write(waving(8, 6), tmp_path / "w.npz")
     wrong = {
-        ("web", "--codec=laplacian"): "browsers do not play codec laplacian; for web leave the codec out, or take mcgv or pca",
+        (
+            "web",
+            "--codec=pdct",
+        ): "browsers do not play codec pdct; for web leave the codec out, or take mcgv",
         ("web", "--codec=mcgv", "--set=transform=klt"): "mcgv with transform klt; for web take transform none",
         ("web", "--set=image=jpeg"): "mcgv with image jpeg; for web take image h264",
         ("web", "--set=profile=precise"): "for web take profile web",

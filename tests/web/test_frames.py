@@ -24,6 +24,11 @@ from gvpipe.sequence import MeshSequence
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no node")
 REAL = ("samba", "chicken", "cow", "kaykit_spin", "fox_run")
+WRONG: dict[str, dict[str, Any]] = {  # values of header fields
+    "laplacian": {"operator": "x", "anchors": 0, "edge_power": 3, "anchor_choice": [], "steps": [0.0], "segments": 99},
+    "pca": {"predictor": "x", "beta": 7, "steps": [0.0], "segments": 99},
+}
+WALK = {"codec": "laplacian", "delta_prediction": "rigid", "anchor_choice": "walk", "anchors": 40}
 MOST = 6  # frames that are compared of a file
 
 
@@ -73,7 +78,7 @@ def encoded(sequence: MeshSequence, path: Path, **settings: Any) -> Path:
 
 
 def test_golden_files(tmp_path: Path) -> None:
-    check(sorted(GOLDEN.glob("pca-*.mp4")), tmp_path)
+    check(sorted([*GOLDEN.glob("laplacian-*.mp4"), *GOLDEN.glob("pca-*.mp4")]), tmp_path)
 
 
 def test_seams_repeated_frames_segments_and_corrections(tmp_path: Path) -> None:
@@ -87,6 +92,40 @@ def test_seams_repeated_frames_segments_and_corrections(tmp_path: Path) -> None:
         ],
         tmp_path,
     )
+
+
+def test_laplacians(tmp_path: Path) -> None:
+    """Operators, predictions and anchors; hubs, still points, seams, repeated frames, segments and corrections."""
+    check(
+        [
+            encoded(patched(still=0.5), tmp_path / "still.mp4", codec="laplacian", reorder=True, segment=5),
+            encoded(patched(still=1.0), tmp_path / "rest.mp4", codec="laplacian"),
+            encoded(held(waving(10, 12), [2, *[1] * 10, 7]), tmp_path / "held.mp4", **WALK),
+            encoded(waving(14, 30), tmp_path / "segments.mp4", codec="laplacian", segment=11, max_error=0.001, edge_power=1.3),
+            encoded(wheel(), tmp_path / "hub.mp4", codec="laplacian", operator="cotangent", anchor_ratio=1.37),
+            encoded(
+                awkward()["loose soup"], tmp_path / "soup.mp4", codec="laplacian", operator="tutte", delta_prediction="none"
+            ),
+        ],
+        tmp_path,
+    )
+
+
+def wheel() -> MeshSequence:
+    """A hub with 150 neighbours, more than rows keep."""
+    spokes = np.arange(1, 151)
+    angle = 2 * np.pi * spokes / 150
+    rim = np.stack([np.cos(angle), np.sin(angle), np.sin(9 * angle)], axis=1)
+    points = np.concatenate([np.zeros((1, 3)), rim]).astype(np.float32)
+    faces = np.stack([np.zeros(150, int), spokes, np.roll(spokes, -1)], axis=1).astype(np.int32)
+    return MeshSequence(np.stack([points, points * np.float32(1.1), points + np.float32(0.2) * points[:, :1]]), faces)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("operator", ["mean-value", "cotangent", "tutte"])
+def test_laplacians_of_awkward_inputs(operator: str, tmp_path: Path) -> None:
+    files = {f"{name}.mp4": each for name, each in awkward().items()}
+    check([encoded(each, tmp_path / name, codec="laplacian", operator=operator) for name, each in files.items()], tmp_path)
 
 
 @pytest.mark.slow
@@ -104,22 +143,22 @@ def test_samples(sample: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not DATA.exists(), reason="no ../shared/data")
-@pytest.mark.parametrize("name", REAL)
-def test_real_sequences(name: str, tmp_path: Path) -> None:
-    gvpipe.encode(DATA / f"{name}.npz", tmp_path / "x.mp4", "pca")
+@pytest.mark.parametrize(("codec", "name"), [*(("pca", name) for name in REAL), ("laplacian", "samba"), ("laplacian", "cow")])
+def test_real_sequences(codec: str, name: str, tmp_path: Path) -> None:
+    gvpipe.encode(DATA / f"{name}.npz", tmp_path / "x.mp4", codec)
     check([tmp_path / "x.mp4"], tmp_path)
 
 
-def test_damage_is_told_in_a_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("codec", "wrong"), WRONG.items())
+def test_damage_is_told_in_a_line(codec: str, wrong: dict[str, Any], tmp_path: Path) -> None:
     """Each section cut, changed or missing: an error, or frames that are finite."""
-    bitstream = read_file(encoded(patched(still=0.5), tmp_path / "a.mp4"))
+    bitstream = read_file(encoded(patched(still=0.5), tmp_path / "a.mp4", codec=codec))
     jobs = []
     for name, data in bitstream.sections.items():
         for kind, changed in {"cut": data[:-3], "changed": data[:9] + bytes(len(data) - 9), "empty": b""}.items():
             path = tmp_path / f"{name}-{kind}.mp4"
             write_file(dataclasses.replace(bitstream, sections={**bitstream.sections, name: changed}), path)
             jobs.append({"path": str(path), "level": 0, "frames": [0]})
-    wrong = {"predictor": "x", "beta": 7, "steps": [0.0], "segments": 99}
     for key, value in wrong.items():
         write_file(dataclasses.replace(bitstream, header={**bitstream.header, key: value}), tmp_path / f"{key}.mp4")
         jobs.append({"path": str(tmp_path / f"{key}.mp4"), "level": 0, "frames": [0]})
@@ -128,5 +167,5 @@ def test_damage_is_told_in_a_line(tmp_path: Path) -> None:
     errors = [each["error"] for each in found if "error" in each]
     assert len(errors) >= 0.7 * len(jobs)
     assert all(error.startswith(("corrupt: ", "unsupported: ")) and "\n" not in error for error in errors), errors
-    assert errors[-1] == "unsupported: level 9: there are levels 0..1"
+    assert errors[-1] == f"unsupported: level 9: there are levels 0..{1 if codec == 'pca' else 0}"
     assert all(np.isfinite(each["frames"]).all() for each in found if "frames" in each)

@@ -1,15 +1,18 @@
 /** Files of all codecs that a page plays, behind one interface. */
 
 import { DecodedPictures } from "./decoded_pictures.js";
+import { loadDraco } from "./format/draco.js";
 import { GeometryVideoError, quote } from "./format/errors.js";
 import { readableVersion } from "./frames/frame_decoder.js";
 import { FrameHost, FrameSource } from "./frames/frame_host.js";
 import { CODEC as MCGV, VERSION as MCGV_VERSION } from "./mcgv/header.js";
 import { McgvReader } from "./mcgv/reader.js";
 import { openPictures } from "./pictures.js";
-import code from "./wasm/kernels.wasm";
+import { kernelCode } from "./wasm/code.js";
 
 const BYTES_PER_VERTEX = 12; // of a frame
+
+let code = null; // of kernels, unpacked when first needed
 
 /**
  * @typedef {object} Playable
@@ -35,6 +38,7 @@ export async function openCodec(source, payload, repeated, level) {
     const found = `version ${quote(version)} of codec ${codec}`;
     throw new GeometryVideoError("newer", `${found}, this player has ${newest}; a newer player is needed`);
   }
+  [code] = await Promise.all([kernelCode(), loadDraco()]);
   if (!WebAssembly.validate(code)) {
     throw new GeometryVideoError("unsupported", "this browser has no WebAssembly with SIMD; a newer one is needed");
   }

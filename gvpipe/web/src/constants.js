@@ -228,6 +228,44 @@ export const TEMPORAL_NEIGHBOURS_CUBIC = new Map([[-3, -0.0625], [-1, 0.5625], [
 export const TEMPORAL_NEIGHBOURS_LINEAR = new Map([[-1, 0.5], [1, 0.5]]);
 export const TEMPORAL_NEIGHBOURS_OFFSETS = [-1, 1, -3, 3, -2, -5, 5, -4];
 
+// gvcodecs.laplacian.average_coding
+export const LAPLACIAN_AVERAGE_CODING_NAME = "average";
+export const LAPLACIAN_AVERAGE_CODING_SPACING = 256;
+export const LAPLACIAN_AVERAGE_CODING_FARTHEST = 1000000000.0;
+
+// gvcodecs.laplacian.anchors
+export const LAPLACIAN_ANCHORS_ANCHOR_CHOICES = ["hierarchy", "walk"];
+
+// gvcodecs.laplacian.delta_rows
+export const LAPLACIAN_DELTA_ROWS_DELTA_PREDICTIONS = ["kalman", "rigid", "none"];
+export const LAPLACIAN_DELTA_ROWS_N_CAUSAL = new Map([["kalman", 20], ["rigid", 15], ["none", 0]]);
+export const LAPLACIAN_DELTA_ROWS_N_RING = new Map([["kalman", 6], ["rigid", 15], ["none", 0]]);
+
+// gvcodecs.laplacian.header
+export const LAPLACIAN_HEADER_MAX_SEGMENTS = 1300;
+export const LAPLACIAN_HEADER_VERSION_STILL = 2;
+export const LAPLACIAN_HEADER_MAX_SPACING = 1048576;
+export const LAPLACIAN_HEADER_LEAST_RATIO = 0.0009765625;
+export const LAPLACIAN_HEADER_MOST_RATIO = 1024.0;
+export const LAPLACIAN_HEADER_FINEST = 9.5367431640625e-07;
+export const LAPLACIAN_HEADER_COARSEST = 1.0;
+export const LAPLACIAN_HEADER_MOST_POWER = 2.0;
+
+// gvcodecs.laplacian.laplace_operators
+export const LAPLACIAN_LAPLACE_OPERATORS_OPERATORS = ["mean-value", "cotangent", "tutte"];
+
+// gvcodecs.laplacian.normal_equations
+export const LAPLACIAN_NORMAL_EQUATIONS_COLUMNS = 32;
+export const LAPLACIAN_NORMAL_EQUATIONS_FREE_PRODUCTS = 134217728;
+export const LAPLACIAN_NORMAL_EQUATIONS_PRODUCTS = 512;
+export const LAPLACIAN_NORMAL_EQUATIONS_BYTES_PER_PAIR = 20;
+export const LAPLACIAN_NORMAL_EQUATIONS_SECONDS_PER_PAIR = 1.5e-08;
+export const LAPLACIAN_NORMAL_EQUATIONS_BYTES_PER_ENTRY = 12;
+export const LAPLACIAN_NORMAL_EQUATIONS_SECONDS_PER_ENTRY = 2e-08;
+export const LAPLACIAN_NORMAL_EQUATIONS_SECONDS_PER_PRODUCT = 1.4e-09;
+export const LAPLACIAN_NORMAL_EQUATIONS_SECONDS_PER_STEP = 6e-09;
+export const LAPLACIAN_NORMAL_EQUATIONS_SECONDS_PER_SOLVED = 5e-10;
+
 // gvcodecs.mcgv.base.surface
 export const SURFACE_STILL = "still";
 

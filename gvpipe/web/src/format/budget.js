@@ -28,6 +28,21 @@ export class Budget {
     return this.memory - this.#kept;
   }
 
+  /** Seconds of work that may still be asked for. */
+  get secondsLeft() {
+    return Math.max(0, this.seconds - this.#keptSeconds);
+  }
+
+  /** Bytes that are kept. */
+  get kept() {
+    return this.#kept;
+  }
+
+  /** Let go of what was kept since; work stays done. @param {number} kept before */
+  release(kept) {
+    this.#kept = kept;
+  }
+
   /**
    * @param {string} what @param {number} memory bytes @param {number} [seconds] of work
    * @throws {GeometryVideoError} there is no room for them

@@ -5,18 +5,23 @@
 
 import { BASE_MESH_DRACO_PREFIX as PREFIX, BASE_MESH_MAX_PER_BYTE as MAX_PER_BYTE } from "../constants.js";
 import createDraco from "draco3d/draco_decoder_nodejs.js";
-import wasmBinary from "draco3d/draco_decoder.wasm";
+import packed from "draco3d/draco_decoder.wasm";
+import { unpack } from "../wasm/code.js";
 import { corrupt } from "./errors.js";
 
-/** Draco's WebAssembly; a worker has none of its own. */
-export const dracoBinary = wasmBinary;
+/** Draco's WebAssembly, once it is loaded; a worker has none of its own. */
+export let dracoBinary = null;
 
-let binary = wasmBinary;
 let draco = null;
+
+/** Unpack Draco's WebAssembly, where that is not done. */
+export async function loadDraco() {
+  dracoBinary ??= await unpack(packed);
+}
 
 /** Decode by these bytes. @param {Uint8Array} bytes */
 export function useDraco(bytes) {
-  binary = bytes;
+  dracoBinary = bytes;
 }
 
 /**
@@ -39,7 +44,8 @@ export function decodeDracoTriangles(stream) {
 
 async function decodeMesh(stream, read) {
   checkHeader(stream);
-  draco ??= createDraco({ wasmBinary: binary });
+  await loadDraco();
+  draco ??= createDraco({ wasmBinary: dracoBinary });
   const module = await draco;
   const decoder = new module.Decoder();
   const mesh = new module.Mesh();

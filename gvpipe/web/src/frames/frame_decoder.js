@@ -2,6 +2,7 @@
 
 import { Displacements } from "../format/displacements.js";
 import { GeometryVideoError, corrupt } from "../format/errors.js";
+import { LaplacianReader, VERSION as LAPLACIAN_VERSION } from "../laplacian/reader.js";
 import { PcaReader, VERSION as PCA_VERSION } from "../pca/reader.js";
 import { Kernels } from "../wasm/kernels.js";
 
@@ -9,7 +10,10 @@ const LOOKS = 16; // frames that a look at the motion takes
 const CORRECTIONS = "corrections";
 
 /** Readers by codec: `open(payload, kernels)` gives `faces`, `points`, `levels`, `levelFaces`, `segmentStart` and `read`. */
-const READERS = { pca: { version: PCA_VERSION, reader: PcaReader } };
+const READERS = {
+  laplacian: { version: LAPLACIAN_VERSION, reader: LaplacianReader },
+  pca: { version: PCA_VERSION, reader: PcaReader },
+};
 
 /** The highest version of a codec that is read here; 0: none. */
 export function readableVersion(codec) {

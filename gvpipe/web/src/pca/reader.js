@@ -3,19 +3,12 @@
  * Frames are distinct ones here (`format/repeated_frames.js`).
  */
 
-import {
-  HIERARCHY_KEPT_PER_TRIANGLE as KEPT_PER_TRIANGLE,
-  HIERARCHY_KEPT_PER_VERTEX as KEPT_PER_VERTEX,
-  HIERARCHY_MAX_WAVES as MAX_WAVES,
-  HIERARCHY_PEAK_PER_TRIANGLE as PEAK_PER_TRIANGLE,
-  HIERARCHY_PEAK_PER_VERTEX as PEAK_PER_VERTEX,
-  HIERARCHY_SECONDS_PER_TRIANGLE as SECONDS_PER_TRIANGLE,
-  HIERARCHY_SECONDS_PER_VERTEX as SECONDS_PER_VERTEX,
-} from "../constants.js";
+import { HIERARCHY_MAX_WAVES as MAX_WAVES } from "../constants.js";
 import { decodeTopology } from "../format/topology_only.js";
 import { decodeBasis } from "../trajectory/basis.js";
 import { placed, taken } from "../trajectory/causal_order.js";
 import { decodeVectors } from "../trajectory/coefficient_coding.js";
+import { keepHierarchy } from "../trajectory/hierarchy_budget.js";
 import { Segment } from "../trajectory/segment.js";
 import { SECTION as STILL, readStill } from "../trajectory/still_points.js";
 import { VERSION, readHeader } from "./header.js";
@@ -143,16 +136,10 @@ export class PcaReader {
   }
 
   /** Coefficients of the still points, in the order of transmission. */
-  #given(kernels, { components, columns }, isReversed) {
-    if (!this.#still.count) return null;
-    const rows = columns.length / (components + 1);
-    const [mean, vectors] = [kernels.array("float64", [rows]), kernels.array("float64", [rows, components])];
-    const [ofMean, ofVectors] = [kernels.view(mean), kernels.view(vectors)];
-    for (let row = 0; row < rows; row++) {
-      ofMean[row] = columns[row * (components + 1)];
-      ofVectors.set(columns.subarray(row * (components + 1) + 1, (row + 1) * (components + 1)), row * components);
-    }
-    const given = this.#still.given(kernels, mean, vectors, this.#payload.budget);
+  #given(kernels, basis, isReversed) {
+    const given = this.#still.givenOf(kernels, basis, this.#payload.budget);
+    if (!given) return null;
+    const { components } = basis;
     const values = kernels.view(given);
     for (let i = 0; isReversed && i < values.length; i += components) values.subarray(i, i + components).reverse();
     return given;
@@ -178,11 +165,4 @@ export class PcaReader {
     const keep = Uint8Array.from(this.#kernels.view(causal[0]), (point) => 1 - flags[point]);
     return this.#kernels.call("keep_ranks", ...causal, this.#kernels.array("bool", [keep.length], keep));
   }
-}
-
-function keepHierarchy(budget, vertices, triangles) {
-  const what = `a hierarchy of ${vertices} vertices and ${triangles} triangles`;
-  budget.ask(what, PEAK_PER_VERTEX * vertices + PEAK_PER_TRIANGLE * triangles);
-  const seconds = SECONDS_PER_VERTEX * vertices + SECONDS_PER_TRIANGLE * triangles;
-  budget.keep(what, KEPT_PER_VERTEX * vertices + KEPT_PER_TRIANGLE * triangles, seconds);
 }

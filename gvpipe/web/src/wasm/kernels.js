@@ -134,7 +134,11 @@ export class Kernels {
     let at = result;
     return types.map((type) => {
       const [element, dimensions] = type.split(/[[\]]/);
-      if (dimensions === undefined) return element === "bool" ? memory.getUint8(at) : Number(memory.getBigInt64(at, true));
+      if (dimensions === undefined) {
+        const value = element === "bool" ? memory.getUint8(at) : Number(memory.getBigInt64(at, true));
+        at += 8; // what follows is aligned
+        return value;
+      }
       const shape = Array.from({ length: Number(dimensions) }, (_, i) => Number(memory.getBigInt64(at + 32 + 8 * i, true)));
       const array = { type: element, shape, pointer: memory.getUint32(at + 24, true), owner: memory.getUint32(at, true) };
       at += 32 + 16 * shape.length;
@@ -145,14 +149,8 @@ export class Kernels {
   /** What numba's code asks of its surroundings. */
   #imports() {
     return {
-      NRT_MemInfo_alloc_aligned: (bytes) => {
-        const block = this.#allocate(Number(bytes) + HEADER);
-        const memory = new DataView(this.#exports.memory.buffer, block, HEADER);
-        memory.setBigInt64(0, 1n, true); // references
-        memory.setUint32(16, block + HEADER, true); // where the data are
-        memory.setBigInt64(24, bytes, true);
-        return block;
-      },
+      NRT_MemInfo_alloc_aligned: (bytes) => this.#own(bytes),
+      NRT_MemInfo_new_varsize_dtor: (bytes) => this.#own(bytes), // a list, of plain numbers: they need no destructor
       NRT_MemInfo_call_dtor: (block) => {
         this.#release(block, this.#sizeOf(block));
       },
@@ -172,6 +170,16 @@ export class Kernels {
         memory.setBigInt64(8, BigInt.asIntN(64, product >> 64n), true);
       },
     };
+  }
+
+  /** What numba counts references of: a header, and `bytes` of data. */
+  #own(bytes) {
+    const block = this.#allocate(Number(bytes) + HEADER);
+    const memory = new DataView(this.#exports.memory.buffer, block, HEADER);
+    memory.setBigInt64(0, 1n, true); // references
+    memory.setUint32(16, block + HEADER, true); // where the data are
+    memory.setBigInt64(24, bytes, true);
+    return block;
   }
 
   /** Bytes of a block that a kernel allocated. */
