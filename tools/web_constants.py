@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -57,7 +58,7 @@ SHARED = {
     "gvpipe.fields.residual_kernels": "N_CONTEXTS N_FINE N_COARSE NODES N_MIXERS",
     "gvpipe.fields.segment": "EXACT TRAJECTORIES DERIVED",
     "gvpipe.fields.values": "MAX_COMPONENTS",
-    "gvpipe.media.video": "MAX_SIDE",
+    "gvpipe.media.video": "MAX_SIDE PROFILES",
     "gvpipe.mesh.hierarchy": "MAX_WAVES PEAK_PER_VERTEX PEAK_PER_TRIANGLE KEPT_PER_VERTEX KEPT_PER_TRIANGLE SECONDS_PER_VERTEX "
     "SECONDS_PER_TRIANGLE",
     "gvpipe.rasterizer.colormaps": "MAGMA VIRIDIS",
@@ -77,7 +78,7 @@ SHARED = {
     "gvcodecs.laplacian.normal_equations": "COLUMNS FREE_PRODUCTS PRODUCTS BYTES_PER_PAIR SECONDS_PER_PAIR BYTES_PER_ENTRY "
     "SECONDS_PER_ENTRY SECONDS_PER_PRODUCT SECONDS_PER_STEP SECONDS_PER_SOLVED",
     "gvcodecs.mcgv.base.surface": "STILL",
-    "gvcodecs.mcgv.browser": "VERSION PROFILE",
+    "gvcodecs.mcgv.browser": "VERSION",
     "gvcodecs.mcgv.header": "OF_PICTURES PREDICTIONS PLACEMENTS MAX_CLUSTERS MAX_SEGMENTS",
     "gvcodecs.mcgv.layout.chart_coding": "CONTEXTS",
     "gvcodecs.mcgv.layout.chart_kernels": "MAX_NEAR",
@@ -116,7 +117,7 @@ def _literal(value: Any) -> str:
     if isinstance(value, bytes):
         value = list(value)
     if isinstance(value, dict):
-        return f"new Map({json.dumps(list(value.items()))})"
+        return f"new Map({json.dumps(list(value.items()), default=asdict)})"
     return json.dumps(value, allow_nan=False)
 
 

@@ -393,19 +393,22 @@ cli.add_command(convert)
 @click.argument("source", metavar="FILE.mp4")
 @click.argument("target", metavar="OUT.html")
 @click.option("--up", type=click.Choice(["y", "z"]), help="The axis that stands upright. [default: the file's own, else y]")
+@click.option("--convert", is_flag=True, help="Encode the file anew, in the profile that all browsers play.")
 @click.option("--quality", type=float, help="0-100, of a conversion: the error that it may add. [default: 90]")
 @unlimited_option
 @output_options
-def export_html(source: str, target: str, up: str | None, quality: float | None, unlimited: bool, out: Output) -> None:
+def export_html(
+    source: str, target: str, up: str | None, convert: bool, quality: float | None, unlimited: bool, out: Output
+) -> None:
     """Write a web page of one file that plays a geometry video, without a network.
 
-    Browsers read codec mcgv in its web profile; other files are converted, which adds an error that is told: KG 0.044 or less
-    by default.
+    The page holds the file as it is. 10-bit pictures (profile precise) play in Chromium alone; --convert makes a page for all
+    browsers, as is done for files that no browser reads. That adds an error that is told: KG 0.044 or less by default.
     """
     from gvpipe import web
 
     with source_path(source) as path, out.progress() as progress:
-        report = web.export_html(path, target, up, quality, progress, unlimited=unlimited)
+        report = web.export_html(path, target, up, quality, progress, convert=convert, unlimited=unlimited)
     out.json(report.to_json())
     size = f"{_size(report.bytes)}, {_size(report.video_bytes)} of which are the geometry video"
     out.text(f"{shown(source, STDIN)} -> {target} ({size})")
@@ -611,7 +614,7 @@ def _tell_conversion(out: Output, report: ExportReport) -> None:
         values = (report.rmse_diag, report.max_diag, report.kg)
         rmse, largest, kg = ("not defined" if v is None else f"{v:.1e}" for v in values)
         out.note(
-            f"browsers cannot read {report.converted}; the page holds a conversion to mcgv, web profile, which adds an "
+            f"the page holds a conversion of {report.converted} to mcgv, web profile, which adds an "
             f"error of rmse {rmse}, at most {largest}, of the diagonal (KG {kg} %)"
         )
 

@@ -3,8 +3,8 @@
 What: page = ``page.html`` with the player's bundle (deflated) and the MP4 file as base64 text, so that it opens from a disk.
 Why: browsers load no modules and fetch no files for a page that is itself a file.
 
-A codec knows which of its files browsers play (`gvpipe.registry.browser_obstacle`). Any other file is decoded and encoded anew
-at a Karni-Gotsman error that is small beside that of files. The error that this adds is measured and reported.
+A codec knows which of its files browsers play (`gvpipe.registry.browser_obstacle`). Any other file, and one for which that is
+asked, is decoded and encoded anew at a Karni-Gotsman error that is small beside that of files. The error that this adds is measured and reported.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import Any
 
 from gvpipe.atomic import unnamed_path
 from gvpipe.codec import Progress
+from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import file_bytes
 from gvpipe.container.sources import is_url
 from gvpipe.errors import InputError, OutputError
@@ -44,7 +45,7 @@ class ExportReport:
     Args:
         bytes: of the page.
         video_bytes: of the geometry video in it.
-        converted: what the file was if browsers cannot read that, else "".
+        converted: what the file was if it was converted, else "".
         rmse_diag: root mean square error that the conversion adds, a fraction of the frame-0 bounding-box diagonal; 0 without
             one, None if the diagonal is 0.
         max_diag: the same of the largest error.
@@ -70,6 +71,7 @@ def export_html(
     quality: float | None = None,
     progress: Progress | None = None,
     *,
+    convert: bool = False,
     unlimited: bool = False,
 ) -> ExportReport:
     """Write a page of one file that plays a geometry video.
@@ -81,6 +83,7 @@ def export_html(
         quality: 0..100, of the conversion where there is one: the error that it may add (`gvpipe.quality_scale`); `QUALITY` if
             None.
         progress: called with a stage's name and the part of it that is done.
+        convert: encode the file anew in any case, in the profile that all browsers play.
         unlimited: let the geometry video take whatever memory and work it asks for (`gvpipe.player.Player`).
 
     Raises:
@@ -99,7 +102,7 @@ def export_html(
     if up is None:
         up = player.metadata.up_axis if player.metadata.up_axis in AXES else "y"
     obstacle = browser_obstacle(player.bitstream)
-    if not obstacle:
+    if not obstacle and not convert:
         data = file_bytes(player.bitstream) if is_url(player.path) else Path(player.path).read_bytes()
         return _write_page(player.path, data, target, up)
     trial = _convert(player, QUALITY if quality is None else quality, progress)
@@ -110,7 +113,13 @@ def export_html(
     bitstream = carry_asset(player, trial.encoded, trial.codec)
     page = _write_page(player.path, file_bytes(replace(bitstream, origin=(x, y, z))), target, up)
     added = trial.errors
-    return ExportReport(page.bytes, page.video_bytes, obstacle, added.rmse_diag, added.max_diag, added.kg)
+    return ExportReport(page.bytes, page.video_bytes, obstacle or _kind(player.bitstream), added.rmse_diag, added.max_diag, added.kg)
+
+
+def _kind(bitstream: Bitstream) -> str:
+    """A bitstream's codec and profile, in a few words."""
+    header = bitstream.header
+    return ", ".join([bitstream.codec, *(f"{key} {header[key]}" for key in ("transform", "profile") if key in header)])
 
 
 def _convert(player: Player, quality: float, progress: Progress | None) -> Trial:

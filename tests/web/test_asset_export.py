@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +17,6 @@ import gvpipe
 from gvpipe import Field, Image, Material, Part, Texture
 from gvpipe.container.mp4 import read_file
 
-PRECISE: dict[str, Any] = {"profile": "precise"}  # is converted
 
 
 def noise(shape: tuple[int, ...], seed: int = 0) -> npt.NDArray[np.float32]:
@@ -42,21 +40,21 @@ def asset() -> gvpipe.MeshSequence:
     )
 
 
-@pytest.mark.parametrize("settings", [{}, {"codec": "laplacian"}, {"codec": "pca"}, PRECISE], ids=str)
-def test_pages_carry_the_asset(settings: dict[str, Any], tmp_path: Path) -> None:
+@pytest.mark.parametrize(("codec", "convert"), [("mcgv", False), ("pca", False), ("laplacian", True)])
+def test_pages_carry_the_asset(codec: str, convert: bool, tmp_path: Path) -> None:
     """The file as it is; or converted, with fields within the sum of both bounds, of the triangle that they belong to."""
-    gvpipe.encode(asset(), tmp_path / "a.mp4", **settings)
-    gvpipe.export_html(tmp_path / "a.mp4", tmp_path / "a.html")
+    gvpipe.encode(asset(), tmp_path / "a.mp4", codec)
+    gvpipe.export_html(tmp_path / "a.mp4", tmp_path / "a.html", convert=convert)
     inside = tmp_path / "inside.mp4"
     inside.write_bytes(embedded(tmp_path / "a.html"))
-    assert (inside.read_bytes() == (tmp_path / "a.mp4").read_bytes()) == (settings != PRECISE)
+    assert (inside.read_bytes() == (tmp_path / "a.mp4").read_bytes()) != convert
     whole, shown = gvpipe.open(tmp_path / "a.mp4"), gvpipe.open(inside)
     assert [part.name for part in shown.parts] == ["a", "b"]
     assert shown.materials == whole.materials and shown.images[0].data == whole.images[0].data
     bound = 2 * shown.directory.attributes[0].bound
     assert np.abs(np.asarray(shown.attributes["uv"]) - np.asarray(whole.attributes["uv"])).max() <= bound
     heat, cell = shown.directory.fields
-    assert heat.bound == (2 if settings == PRECISE else 1) * whole.directory.fields[0].bound
+    assert heat.bound == (2 if convert else 1) * whole.directory.fields[0].bound
     assert (heat.unit, heat.components, cell.components) == ("K", 0, 2)
     source = asset()
     assert np.abs(shown.fields["heat"].read(0, 10) - source.fields["heat"].read(0, 10)).max() <= heat.bound
@@ -71,8 +69,8 @@ def test_a_conversion_leaves_normals_of_frames_behind(tmp_path: Path) -> None:
     up = np.zeros((5, 36, 3), np.float32)
     up[:, :, 2] = 1
     sequence = gvpipe.MeshSequence(sheet.positions, sheet.faces, fields={"normal": Field(up, kind="normal")})
-    gvpipe.encode(sequence, tmp_path / "a.mp4", **PRECISE)
-    gvpipe.export_html(tmp_path / "a.mp4", tmp_path / "a.html")
+    gvpipe.encode(sequence, tmp_path / "a.mp4", "laplacian")
+    gvpipe.export_html(tmp_path / "a.mp4", tmp_path / "a.html", convert=True)
     (tmp_path / "inside.mp4").write_bytes(embedded(tmp_path / "a.html"))
     assert "field.0" not in read_file(tmp_path / "inside.mp4").sections
 

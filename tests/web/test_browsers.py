@@ -26,12 +26,13 @@ FILES: dict[str, dict[str, Any]] = {  # several groups of pictures, with B-frame
     "plain": {"prediction": "affine", "preset": "ultrafast", "gop": 4, "clusters": 3},
     "laplacian": {"codec": "laplacian"},
     "pca": {"codec": "pca"},
+    "jpeg": {"image": "jpeg", "prediction": "affine", "quality": 90},
     "held": {"prediction": "blended", "preset": "slow", "gop": 5, "quality": 90},  # at 75 it needs no pictures
 }
 LENGTHS = {"held": [2] * 13 + [14]}  # frames that each picture is shown for, 1 if not given
 DECODERS = {"webcodecs": "", "video": "delete window.VideoDecoder;"}
 pytestmark = pytest.mark.slow
-WITHOUT_PICTURES = ("laplacian", "pca")
+WITHOUT_H264 = ("jpeg", "laplacian", "pca")
 SEEN: dict[str, list[str]] = {}  # of each kind of file, what the first browser made of it
 
 
@@ -75,7 +76,7 @@ def player(driver: Any, site: tuple[Path, str]) -> Callable[..., Any]:
 
 
 def _skip_inexact(name: str, decoder: str, kind: str) -> None:
-    if (name, decoder) == ("webkit", "video") and kind not in WITHOUT_PICTURES:
+    if (name, decoder) == ("webkit", "video") and kind not in WITHOUT_H264:
         pytest.skip("refused; see test_an_inexact_video_is_refused")
 
 
@@ -84,8 +85,8 @@ def test_an_inexact_video_is_refused(name: str, module: Callable[..., Any]) -> N
     load = "const video = await GeometryVideo.load(args[0]); return (await video.frame(0)).length"
     body = f"{DECODERS['video']} return (async () => {{ {load} }})().catch((error) => error.kind)"
     for kind in FILES:
-        has_pictures = kind not in WITHOUT_PICTURES
-        assert module(body, f"{kind}.mp4") == ("unsupported" if name == "webkit" and has_pictures else 3 * 144)
+        needs_h264 = kind not in WITHOUT_H264
+        assert module(body, f"{kind}.mp4") == ("unsupported" if name == "webkit" and needs_h264 else 3 * 144)
 
 
 @pytest.mark.parametrize("decoder", DECODERS)
@@ -99,6 +100,44 @@ def test_positions_are_exact(kind: str, decoder: str, name: str, module: Callabl
         for k, text in zip(order, found, strict=True):
             assert np.array_equal(pages.points(text), video[k]), f"frame {k}"
     assert SEEN.setdefault(kind, found) == found
+
+
+def test_ten_bits_are_exact_or_refused(name: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    """Chromium gives samples of 10 bits; the others say what would help."""
+    gvpipe.encode(waving(12, 40), site[0] / "precise.mp4", profile="precise", prediction="affine", quality=95, gop=8)
+    if name != "chromium":
+        load = "GeometryVideo.load(args[0]).catch((error) => [error.kind, error.message])"
+        kind, message = module(f"return {load}", "precise.mp4")
+        assert kind == "unsupported" and "--convert" in message, message
+        return
+    with gvpipe.open(site[0] / "precise.mp4") as video:
+        order = [9, 0, 39, 17]
+        found = module(pages.FRAMES, "precise.mp4", order)["frames"]
+        for k, text in zip(order, found, strict=True):
+            assert np.array_equal(pages.points(text), video[k]), f"frame {k}"
+    without = module("delete window.VideoDecoder; return GeometryVideo.load(args[0]).catch(({ kind }) => kind)", "precise.mp4")
+    assert without == "unsupported"
+
+
+def test_damaged_jpegs(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    """A picture of another size, and one that ends early; and a browser whose canvas gives other samples."""
+    data = (site[0] / "jpeg.mp4").read_bytes()
+    sizes = data.index(b"\xff\xc0")
+    (site[0] / "size.mp4").write_bytes(data[: sizes + 5] + b"\x01" + data[sizes + 6 :])
+    end = data.index(b"\xff\xd9")
+    (site[0] / "end.mp4").write_bytes(data[:end] + b"\0\0" + data[end + 2 :])
+    load = "return GeometryVideo.load(args[0]).catch((error) => [error.kind, error.message])"
+    for path, what in {"size.mp4": "a JPEG of ", "end.mp4": "no whole JPEG"}.items():
+        kind, message = module(load, path)
+        assert kind == "corrupt" and what in message, message
+    noise = """const read = CanvasRenderingContext2D.prototype.getImageData;
+    CanvasRenderingContext2D.prototype.getImageData = function (...given) {
+      const image = read.apply(this, given);
+      image.data[400]++;
+      return image;
+    };"""
+    kind, message = module(noise + load, "jpeg.mp4")
+    assert kind == "unsupported" and "--convert" in message, message
 
 
 LOOPS = f"""{pages.TEXT} const video = await GeometryVideo.load(args[0]);

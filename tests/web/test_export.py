@@ -40,11 +40,11 @@ def _embedded(page: Path) -> bytes:
     return base64.b64decode(text, validate=True)
 
 
-@pytest.mark.parametrize("codec", ["mcgv", "laplacian", "pca"])
-def test_page_holds_the_file_unchanged(codec: str, video: Path, tmp_path: Path) -> None:
-    if codec != "mcgv":
+@pytest.mark.parametrize("settings", [{}, {"codec": "laplacian"}, {"codec": "pca"}, {"image": "jpeg"}, {"profile": "precise"}], ids=str)
+def test_page_holds_the_file_unchanged(settings: dict[str, Any], video: Path, tmp_path: Path) -> None:
+    if settings:
         video = tmp_path / "other.mp4"
-        gvpipe.encode(waving(8, 6), video, codec)
+        gvpipe.encode(waving(8, 6), video, **settings)
     report = gvpipe.export_html(video, tmp_path / "page.html")
     page = tmp_path / "page.html"
     assert _embedded(page) == video.read_bytes()
@@ -84,12 +84,13 @@ def test_title_is_text(video: Path, tmp_path: Path) -> None:
         ({"profile": "precise"}, "mcgv, profile h264-10"),
         ({"image": "jpeg"}, "mcgv, profile jpeg"),
         ({"prediction": "blended", "transform": "klt"}, "mcgv, transform klt, profile h264-8"),
+        ({"codec": "laplacian"}, "laplacian"),
     ],
     ids=str,
 )
 def test_conversion_is_measured(settings: dict[str, Any], kind: str, tmp_path: Path) -> None:
     gvpipe.encode(waving(10, 12), tmp_path / "other.mp4", **settings)
-    report = gvpipe.export_html(tmp_path / "other.mp4", tmp_path / "page.html", quality=90)
+    report = gvpipe.export_html(tmp_path / "other.mp4", tmp_path / "page.html", quality=90, convert=True)
     (tmp_path / "inside.mp4").write_bytes(_embedded(tmp_path / "page.html"))
     added = gvpipe.compare(gvpipe.decode(tmp_path / "other.mp4"), gvpipe.decode(tmp_path / "inside.mp4"))
     assert report.converted == kind
@@ -106,8 +107,8 @@ def test_conversion_adds_little(tmp_path: Path) -> None:
     sequence = gvpipe.read(SAMPLES / "creature.npz").part(0, 30)
     corners = sequence.faces.ravel()  # a soup: each triangle has vertices of its own
     soup = gvpipe.MeshSequence(sequence.read(0, 30)[:, corners], np.arange(len(corners), dtype=np.int32).reshape(-1, 3), 30.0)
-    gvpipe.encode(soup, tmp_path / "other.mp4", profile="precise")
-    gvpipe.export_html(tmp_path / "other.mp4", tmp_path / "page.html")
+    gvpipe.encode(soup, tmp_path / "other.mp4", "laplacian")
+    gvpipe.export_html(tmp_path / "other.mp4", tmp_path / "page.html", convert=True)
     (tmp_path / "inside.mp4").write_bytes(_embedded(tmp_path / "page.html"))
     own, shown = (gvpipe.compare(soup, gvpipe.decode(tmp_path / name)).kg for name in ("other.mp4", "inside.mp4"))
     assert own is not None and shown is not None and shown <= 1.15 * own
@@ -118,7 +119,7 @@ def test_conversion_adds_little(tmp_path: Path) -> None:
 
 def test_a_conversion_takes_few_encodes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the error allowed is out of reach, the best of them is shown, and the report has its error."""
-    gvpipe.encode(waving(8, 6), tmp_path / "other.mp4", profile="precise")
+    gvpipe.encode(waving(8, 6), tmp_path / "other.mp4", "laplacian")
     qualities: list[float] = []
     encode = Trials.__call__
 
@@ -128,19 +129,19 @@ def test_a_conversion_takes_few_encodes(tmp_path: Path, monkeypatch: pytest.Monk
         return dataclasses.replace(trial, errors=dataclasses.replace(trial.errors, kg=10 / len(qualities)))
 
     monkeypatch.setattr(Trials, "__call__", counted)
-    report = gvpipe.export_html(tmp_path / "other.mp4", tmp_path / "page.html", quality=40)
+    report = gvpipe.export_html(tmp_path / "other.mp4", tmp_path / "page.html", quality=40, convert=True)
     assert len(qualities) == MOST_ENCODES and qualities == sorted(qualities)
     assert report.kg == 10 / MOST_ENCODES
 
 
 def test_command_says_what_it_did(run: Run, video: Path, tmp_path: Path) -> None:
-    gvpipe.encode(waving(8, 6), tmp_path / "other.mp4", profile="precise")
+    gvpipe.encode(waving(8, 6), tmp_path / "other.mp4", "laplacian")
     plain = run("export-html", video, tmp_path / "a.html")
     assert plain.status == 0 and plain.err == "" and "kB" in plain.out
-    converted = run("export-html", tmp_path / "other.mp4", tmp_path / "b.html")
+    converted = run("export-html", "--convert", tmp_path / "other.mp4", tmp_path / "b.html")
     assert converted.status == 0
     assert re.search(
-        r"cannot read mcgv, profile h264-10.*rmse \d\.\de-\d\d, at most \d\.\de-\d\d, of the diagonal \(KG \d\.\de-\d\d %\)",
+        r"a conversion of laplacian to mcgv.*rmse \d\.\de-\d\d, at most \d\.\de-\d\d, of the diagonal \(KG \d\.\de-\d\d %\)",
         converted.err,
     )
     values = json.loads(run("export-html", video, tmp_path / "a.html", "--json").out)

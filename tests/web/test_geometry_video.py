@@ -337,7 +337,7 @@ KLT = {"prediction": "blended", "transform": "klt"}
 
 
 @slow
-@pytest.mark.parametrize("settings", [{"codec": "pdct"}, {"profile": "precise"}, {"image": "jpeg"}, KLT], ids=str)
+@pytest.mark.parametrize("settings", [{"codec": "pdct"}, KLT], ids=str)
 def test_files_not_for_browsers_say_so(settings: dict[str, Any], module: Callable[..., Any], site: tuple[Path, str]) -> None:
     gvpipe.encode(waving(6, 5), site[0] / "other.mp4", **settings)
     kind, message = module("return GeometryVideo.load(args[0]).catch((error) => [error.kind, error.message])", "other.mp4")

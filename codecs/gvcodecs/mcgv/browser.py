@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.media.video import PROFILES
 
 VERSION = 5  # the highest that gvpipe/web/src/mcgv reads
-PROFILE = "h264-8"  # the one that a browser gives back sample by sample
 
 
 def browser_obstacle(bitstream: Bitstream) -> str:
@@ -13,6 +13,6 @@ def browser_obstacle(bitstream: Bitstream) -> str:
     header = bitstream.header
     if bitstream.version > VERSION:
         return f"{bitstream.codec}, version {bitstream.version}"
-    if header.get("pictures") is False or ("transform" not in header and header.get("profile") == PROFILE):
+    if header.get("pictures") is False or ("transform" not in header and header.get("profile") in PROFILES):
         return ""
     return ", ".join([bitstream.codec, *(f"{key} {header[key]}" for key in ("transform", "profile") if key in header)])

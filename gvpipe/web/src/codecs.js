@@ -62,8 +62,8 @@ async function openMcgv(source, { fps, vertices, container }, distinct, repeated
     },
     openPictures() {
       if (!reader.samples) return DecodedPictures.without(fps, repeated, reader.zeroLevels, reader.segmentStarts, load);
-      if (!file) return DecodedPictures.inParts(source, fps, repeated, reader.pictureSize, reader.samples, load);
-      return openPictures(file, fps, repeated, reader.pictureSize, reader.samples, container.track_crc32);
+      if (!file) return DecodedPictures.inParts(source, fps, repeated, reader.planes, load);
+      return openPictures(file, fps, repeated, reader.planes, container.track_crc32);
     },
     rebuild: (frame, levels, positions) => reader.rebuild(frame, levels, positions),
     close() {},

@@ -177,6 +177,7 @@ export const VALUES_MAX_COMPONENTS = 256;
 
 // gvpipe.media.video
 export const VIDEO_MAX_SIDE = 16384;
+export const VIDEO_PROFILES = new Map([["h264-8", {"name": "h264-8", "codec": "h264", "pixel_format": "yuv420p", "depth": 8, "low": 16, "high": 235}], ["h264-10", {"name": "h264-10", "codec": "h264", "pixel_format": "yuv420p10le", "depth": 10, "low": 64, "high": 940}], ["jpeg", {"name": "jpeg", "codec": "mjpeg", "pixel_format": "gray", "depth": 8, "low": 0, "high": 255}]]);
 
 // gvpipe.mesh.hierarchy
 export const HIERARCHY_MAX_WAVES = 64;
@@ -271,7 +272,6 @@ export const SURFACE_STILL = "still";
 
 // gvcodecs.mcgv.browser
 export const BROWSER_VERSION = 5;
-export const BROWSER_PROFILE = "h264-8";
 
 // gvcodecs.mcgv.header
 export const HEADER_OF_PICTURES = ["placement", "profile", "block", "width", "height", "residual_step"];

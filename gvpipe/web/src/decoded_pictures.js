@@ -6,7 +6,7 @@
  */
 
 import { AGAIN, GeometryVideoError } from "./format/errors.js";
-import { GroupDecoder } from "./group_decoder.js";
+import { pictureDecoder } from "./picture_decoder.js";
 import { readTrack } from "./track.js";
 
 const KEPT_BYTES = 64 * 2 ** 20; // of decoded levels
@@ -20,19 +20,19 @@ export const nextRepaint = (tick) => requestAnimationFrame(tick);
 export class DecodedPictures {
   /**
    * @param {Uint8Array} file @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated
-   * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
+   * @param {import("./mcgv/reader.js").Planes} planes
    * @param {number} [checksum] `track_crc32` of the header
    * @returns {Promise<DecodedPictures>} its first group decoded
    * @throws {GeometryVideoError} kind "unsupported": this browser's WebCodecs cannot decode it
    */
-  static async open(file, fps, repeated, size, samples, checksum) {
+  static async open(file, fps, repeated, planes, checksum) {
     const track = readTrack(file, checksum);
     const found = track.groups.reduce((sum, group) => sum + group.length, 0);
     if (found !== repeated.distinct) {
       throw new GeometryVideoError("corrupt", `its video has ${found} pictures in place of ${repeated.distinct}; ${AGAIN}`);
     }
-    const groupBytes = (samples.length * repeated.distinct) / track.groups.length;
-    return DecodedPictures.of(track.groups, groupBytes, fps, repeated, new GroupDecoder(track, size, samples));
+    const groupBytes = (planes.samples.length * repeated.distinct) / track.groups.length;
+    return DecodedPictures.of(track.groups, groupBytes, fps, repeated, pictureDecoder(track, planes));
   }
 
   /**
@@ -58,31 +58,24 @@ export class DecodedPictures {
    * The same of a file in parts: a group is a fragment, fetched when it is decoded with the sections that its frames need.
    *
    * @param {import("./format/stream_file.js").StreamFile} file @param {number} fps
-   * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {[number, number]} size
-   * @param {Uint32Array} samples @param {(first: number, last: number) => Promise<unknown>} load as for `without`
+   * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {import("./mcgv/reader.js").Planes} planes
+   * @param {(first: number, last: number) => Promise<unknown>} load as for `without`
    * @returns {Promise<DecodedPictures>}
    */
-  static async inParts(file, fps, repeated, size, samples, load) {
+  static async inParts(file, fps, repeated, planes, load) {
     if (file.pictures !== repeated.distinct) {
       throw new GeometryVideoError("corrupt", `its video has ${file.pictures} pictures in place of ${repeated.distinct}; ${AGAIN}`);
     }
     const groups = file.fragments.map(({ first, pictures }, fragment) =>
       Array.from({ length: pictures }, (_, i) => ({ picture: first + i, fragment })),
     );
-    const inner = new GroupDecoder(file.description, size, samples);
+    const inner = pictureDecoder(file.description, planes);
     const decode = async (group, give) => {
       const [coded] = await Promise.all([file.samples(group[0].fragment), load(group[0].picture, group.at(-1).picture)]);
       await inner.decode(coded, give);
     };
-    const groupBytes = (samples.length * repeated.distinct) / groups.length;
-    const pictures = new DecodedPictures(groups, groupBytes, fps, repeated, { decode, close: () => inner.close() });
-    try {
-      await pictures.seek(0);
-    } catch (error) {
-      pictures.close();
-      throw error;
-    }
-    return pictures;
+    const groupBytes = (planes.samples.length * repeated.distinct) / groups.length;
+    return DecodedPictures.of(groups, groupBytes, fps, repeated, { decode, close: () => inner.close() });
   }
 
   /**

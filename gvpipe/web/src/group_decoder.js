@@ -5,10 +5,11 @@
  */
 
 import { AGAIN, GeometryVideoError } from "./format/errors.js";
-import { OF_GREY, OF_LUMA } from "./levels.js";
+import { OF_GREY, ofLuma } from "./levels.js";
 
-const LUMA = ["I420", "I420A", "NV12"];
-const COLOURS = ["BGRX", "BGRA", "RGBX", "RGBA"];
+const LUMA = { 8: ["I420", "I420A", "NV12"], 10: ["I420P10", "I420AP10"] };
+const COLOURS = { 8: ["BGRX", "BGRA", "RGBX", "RGBA"], 10: [] };
+const REMEDY = "Chromium does; gvpipe export-html --convert makes a page for all browsers";
 const TICK = 1000; // microseconds of a picture, for the decoder; so that its rounding changes no number
 const QUEUED = 6; // pictures that the decoder has not begun
 const TAKEN = 4; // pictures decoded and not yet read: large ones fill the memory
@@ -18,11 +19,14 @@ export class GroupDecoder {
    * @param {import("./track.js").Track} track
    * @param {[number, number]} size of a picture, pixels
    * @param {Uint32Array} samples indices of a picture's samples
+   * @param {import("./mcgv/header.js").Profile} profile of the video
    */
-  constructor(track, size, samples) {
+  constructor(track, size, samples, profile) {
     this.track = track;
     this.size = size;
     this.samples = samples;
+    this.depth = profile.depth;
+    this.table = ofLuma(profile);
     this.decoder = null;
     this.taking = 0;
     this.taken = Promise.resolve();
@@ -33,7 +37,7 @@ export class GroupDecoder {
 
   /**
    * @param {import("./track.js").Sample[]} group
-   * @param {(picture: number, levels: Uint8Array) => void} give called for each picture, with the levels of `samples`
+   * @param {(picture: number, levels: Uint8Array|Uint16Array) => void} give called for each picture, with the levels of `samples`
    * @throws {GeometryVideoError} this browser has no decoder for it, or the group is damaged
    */
   async decode(group, give) {
@@ -53,7 +57,7 @@ export class GroupDecoder {
       if (this.taking > TAKEN) await Promise.race([this.taken, failed]);
     }
     await Promise.race([decoder.state === "configured" ? decoder.flush() : failed, failed]).catch((error) => {
-      throw error instanceof GeometryVideoError ? error : cannotDecode(error);
+      throw error instanceof GeometryVideoError ? error : this.#cannotDecode(error);
     });
     await Promise.race([this.taken, failed]);
     if (given !== group.length) {
@@ -72,12 +76,12 @@ export class GroupDecoder {
         this.taking++;
         this.taken = this.taken.then(() => this.#take(picture)).catch((error) => this.fail(error));
       },
-      error: (error) => this.fail(cannotDecode(error)),
+      error: (error) => this.fail(this.#cannotDecode(error)),
     });
     try {
       this.decoder.configure({ codec, description });
     } catch (error) {
-      throw cannotDecode(error);
+      throw this.#cannotDecode(error);
     }
   }
 
@@ -89,16 +93,20 @@ export class GroupDecoder {
         const found = `${visibleRect.width}x${visibleRect.height}`;
         throw new GeometryVideoError("corrupt", `its video is ${found} pixels; ${width}x${height} are needed`);
       }
-      if (!LUMA.includes(format) && !COLOURS.includes(format)) {
-        throw new GeometryVideoError("unsupported", `this browser gives pictures as ${format}, which the player cannot read`);
+      const isLuma = LUMA[this.depth].includes(format);
+      if (!isLuma && !COLOURS[this.depth].includes(format)) {
+        const remedy = this.depth === 8 ? "which the player cannot read" : `not 10-bit samples; ${REMEDY}`;
+        throw new GeometryVideoError("unsupported", `this browser gives pictures as ${format ?? "no samples"}, ${remedy}`);
       }
       const bytes = picture.allocationSize();
       if (this.buffer.length !== bytes) this.buffer = new Uint8Array(bytes);
       const [plane] = await picture.copyTo(this.buffer);
-      this.#arrange(plane, LUMA.includes(format) ? 1 : 4);
-      const table = LUMA.includes(format) ? OF_LUMA : OF_GREY;
-      const levels = new Uint8Array(this.samples.length);
-      for (let i = 0; i < levels.length; i++) levels[i] = table[this.buffer[this.offsets[i]]];
+      const isWide = this.depth > 8;
+      this.#arrange(plane, isLuma ? 1 + isWide : 4);
+      const table = isLuma ? this.table : OF_GREY;
+      const buffer = isWide ? new Uint16Array(this.buffer.buffer) : this.buffer;
+      const levels = new buffer.constructor(this.samples.length);
+      for (let i = 0; i < levels.length; i++) levels[i] = table[buffer[this.offsets[i] >> isWide]];
       this.count();
       this.give(Math.round(timestamp / TICK), levels);
     } finally {
@@ -107,7 +115,12 @@ export class GroupDecoder {
     }
   }
 
-  /** Where in the buffer each sample lies. */
+  #cannotDecode(error) {
+    const remedy = this.depth === 8 ? "" : `; it has ${this.depth} bits a sample: ${REMEDY}`;
+    return new GeometryVideoError("unsupported", `this browser cannot decode the video: ${error.message || error.name}${remedy}`);
+  }
+
+  /** Where in the buffer each sample lies, bytes. */
   #arrange({ offset, stride }, bytesPerPixel) {
     const layout = `${offset} ${stride} ${bytesPerPixel}`;
     if (layout === this.layout) return;
@@ -118,8 +131,4 @@ export class GroupDecoder {
       this.offsets[i] = offset + ((sample - x) / width) * stride + x * bytesPerPixel;
     });
   }
-}
-
-function cannotDecode(error) {
-  return new GeometryVideoError("unsupported", `this browser cannot decode the video: ${error.message || error.name}`);
 }

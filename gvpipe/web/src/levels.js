@@ -13,5 +13,11 @@ export const OF_GREY = Uint8Array.from({ length: 256 }, (_, grey) => {
   return Math.abs(grey - ((level - LOW) * 255) / (HIGH - LOW)) <= ROUNDING ? level : 0;
 });
 
-/** Of luma itself: coarse quantisers overshoot, and every reader clips. */
-export const OF_LUMA = Uint8Array.from({ length: 256 }, (_, luma) => Math.min(HIGH, Math.max(LOW, luma)));
+/**
+ * Of luma itself: coarse quantisers overshoot, and every reader clips.
+ *
+ * @param {{depth: number, low: number, high: number}} profile @returns {Uint16Array}
+ */
+export function ofLuma({ depth, low, high }) {
+  return Uint16Array.from({ length: 2 ** depth }, (_, luma) => Math.min(high, Math.max(low, luma)));
+}

@@ -5,20 +5,22 @@ import { GeometryVideoError } from "./format/errors.js";
 import { VideoPictures } from "./video_pictures.js";
 
 /**
- * WebCodecs, or where a browser has none that reads the video (pages of plain http, old browsers), `<video>`.
+ * WebCodecs (of JPEG, the browser's images), or where a browser has none that reads the video (pages of plain http, old browsers), `<video>`.
  *
  * @param {Uint8Array} file @param {number} fps
  * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated which picture each frame shows
- * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
+ * @param {import("./mcgv/reader.js").Planes} planes
  * @param {number} [checksum] of the decoder's configuration and of which pictures are key frames; older files have none
  * @returns {Promise<DecodedPictures|VideoPictures>} with `levels()`, `seek`, `play`, `pause` and `close`
  */
-export async function openPictures(file, fps, repeated, size, samples, checksum) {
-  if (typeof VideoDecoder === "function") {
+export async function openPictures(file, fps, repeated, planes, checksum) {
+  const { size, samples, profile } = planes;
+  const hasAnother = profile.codec === "h264" && profile.depth === 8;
+  if (typeof VideoDecoder === "function" || !hasAnother) {
     try {
-      return await DecodedPictures.open(file, fps, repeated, size, samples, checksum);
+      return await DecodedPictures.open(file, fps, repeated, planes, checksum);
     } catch (error) {
-      if (!(error instanceof GeometryVideoError) || error.kind !== "unsupported") throw error;
+      if (!hasAnother || !(error instanceof GeometryVideoError) || error.kind !== "unsupported") throw error;
     }
   }
   return VideoPictures.open(file, fps, repeated, size, samples);

@@ -1,5 +1,5 @@
 /**
- * The H.264 track of an MP4 file: its samples, and what a decoder must know. For `VideoDecoder`, which reads no files.
+ * The H.264 or JPEG track of an MP4 file: its samples, and what a decoder must know. For `VideoDecoder`, which reads no files.
  *
  * Reads one track whose samples lie in one file, in fragments or not, as gvpipe writes it; a picture's number is its rank by presentation time, so
  * edit lists and offsets of composition times do not matter.
@@ -18,8 +18,8 @@ const VISUAL_ENTRY = 78; // bytes of a visual sample entry before its boxes
  * @property {number} picture its number, in the order of presentation
  *
  * @typedef {object} Track
- * @property {string} codec as `VideoDecoder` names it
- * @property {Uint8Array} description `AVCDecoderConfigurationRecord`
+ * @property {string} codec as `VideoDecoder` names it, or "jpeg"
+ * @property {Uint8Array} description `AVCDecoderConfigurationRecord`; of JPEG nothing
  * @property {Sample[][]} groups of pictures, which decode alone, in the order of decoding
  *
  * @param {Uint8Array} file a whole MP4 file
@@ -116,6 +116,7 @@ class Tables {
   configuration() {
     const { first } = this.#rows("stsd", 8);
     const kind = String.fromCharCode(...this.file.subarray(first + 4, first + 8));
+    if (kind === "mp4v") return { codec: "jpeg", description: new Uint8Array(0) }; // each picture says what it is
     if (kind !== "avc1") throw broken(`its video is ${kind}, not H.264`);
     const end = first + this.view.getUint32(first);
     for (let position = first + 8 + VISUAL_ENTRY; position + 8 <= end; ) {

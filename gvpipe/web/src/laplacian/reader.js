@@ -7,7 +7,7 @@ import { LAPLACIAN_AVERAGE_CODING_FARTHEST as FARTHEST, LAPLACIAN_AVERAGE_CODING
 import { Cursor } from "../format/cursor.js";
 import { corrupt } from "../format/errors.js";
 import { decodeTopology } from "../format/topology_only.js";
-import { decodeBasis } from "../trajectory/basis.js";
+import { decodeBasis, splitBasis } from "../trajectory/basis.js";
 import { keepHierarchy } from "../trajectory/hierarchy_budget.js";
 import { Segment } from "../trajectory/segment.js";
 import { SECTION as STILL, readStill } from "../trajectory/still_points.js";
@@ -114,7 +114,7 @@ export class LaplacianReader {
     const frameCount = this.segmentStart(s + 1) - this.segmentStart(s);
     const step = steps[s] * coding.basisRatio;
     const basis = decodeBasis(own, sections[0], frameCount, this.#still.movingCount, step, names[0], 3, budget);
-    const given = this.#still.givenOf(own, basis, budget);
+    const given = this.#still.count ? this.#still.given(own, ...splitBasis(own, basis), budget) : null;
     const held = given && own.view(given).slice();
     const decoded = this.#domain.decode(own, sections[1], sections[2], names.slice(1), basis.components, steps[s], held);
     const segment = new Segment(this.#kernels.fresh(), basis, this.#kernels.view(decoded), this.#topology.pointCount, false);

@@ -1,7 +1,6 @@
 /** What the reader of an `mcgv` bitstream must know beside its sections. Mirrors `gvcodecs.mcgv.header.Header`. */
 
 import {
-  BROWSER_PROFILE as PROFILE,
   BROWSER_VERSION as VERSION,
   SEGMENTS_HUGE as HUGE,
   HEADER_MAX_CLUSTERS as MAX_CLUSTERS,
@@ -11,18 +10,28 @@ import {
   HEADER_PREDICTIONS as PREDICTIONS,
   SEGMENTS_TINY as TINY,
   VIDEO_MAX_SIDE as MAX_SIDE,
+  VIDEO_PROFILES as PROFILES,
 } from "../constants.js";
 import { GeometryVideoError, corrupt, quote } from "../format/errors.js";
 import { checkInteger, checkNumber } from "../format/payload.js";
 
-export { VERSION, PROFILE };
+export { VERSION };
 
 export const CODEC = "mcgv";
 
+const WITHOUT = "h264-8"; // profile of files without pictures: that of their zero level
+
 /**
+ * How planes become pictures, as `gvpipe.media.video.Profile` says.
+ *
+ * @typedef {object} Profile
+ * @property {"h264"|"mjpeg"} codec @property {number} depth bits of a sample
+ * @property {number} low @property {number} high levels that carry data; that of a zero is half of all
+ *
  * @typedef {object} Header
  * @property {"blended"|"affine"} prediction how the clusters move the slots
  * @property {"halves"|"charts"|"tiles"} placement how the slots get their pixels
+ * @property {Profile} profile of the video
  * @property {number} block side of the blocks of the image coder, pixels
  * @property {number} width @property {number} height of one plane, pixels
  * @property {number} clusters K @property {number} segments
@@ -40,15 +49,14 @@ export function readHeader(header) {
     throw new GeometryVideoError("unsupported", "it holds trajectory images; gvpipe export-html converts it");
   }
   if ("pictures" in settings) return withoutPictures(header);
-  if (settings.profile !== PROFILE) {
-    throw new GeometryVideoError("unsupported", `its profile is ${quote(settings.profile)}; gvpipe export-html converts it`);
-  }
+  if (!PROFILES.has(settings.profile)) throw corrupt("header", `profile is ${quote(settings.profile)}`);
   const [prediction, placement] = header.version === 1 ? ["affine", "charts"] : [settings.prediction, settings.placement];
   if (!PREDICTIONS.includes(prediction)) throw corrupt("header", `prediction is ${quote(prediction)}`);
   if (!PLACEMENTS.includes(placement)) throw corrupt("header", `placement is ${quote(placement)}`);
   const result = {
     prediction,
     placement,
+    profile: PROFILES.get(settings.profile),
     block: checkInteger(settings, "block", 2, 64),
     width: checkInteger(settings, "width", 2, MAX_SIDE),
     height: checkInteger(settings, "height", 2, Math.floor(MAX_SIDE / 3)),
@@ -90,5 +98,5 @@ function withoutPictures(header) {
   if (settings.pictures !== false || header.version < 4 || alien.length || settings.prediction !== "blended") {
     throw corrupt("header", `pictures is ${quote(settings.pictures)} beside ${quote(alien)}`);
   }
-  return { prediction: "blended", ...readMotion(header), residualStep: 1, outliers: false, pictures: false };
+  return { prediction: "blended", ...readMotion(header), residualStep: 1, outliers: false, pictures: false, profile: PROFILES.get(WITHOUT) };
 }

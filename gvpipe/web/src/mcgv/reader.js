@@ -15,7 +15,13 @@ import { decodeClusters, decodePixels, decodeSlotClusters } from "./layout_codin
 import { place } from "./kd_tree.js";
 import { readSurface } from "./surface.js";
 
-const ZERO = 128; // the level of a zero residual
+/**
+ * What is read of pictures.
+ *
+ * @typedef {object} Planes
+ * @property {[number, number]} size of a picture, pixels @property {Uint32Array} samples indices of the samples that are read
+ * @property {import("./header.js").Profile} profile of the video
+ */
 
 export class McgvReader {
   /** @param {import("../format/payload.js").Payload} payload @param {Uint8Array} code of kernels @returns {Promise<McgvReader>} */
@@ -27,6 +33,8 @@ export class McgvReader {
 
   constructor(payload, header, surface, kernels) {
     this.header = header;
+    /** The level of a zero residual. */
+    this.zero = 2 ** (header.profile.depth - 1);
     this.surface = surface;
     const { pixels, motion } = decodeMotion(payload, header, surface, kernels);
     this.motion = motion;
@@ -57,12 +65,12 @@ export class McgvReader {
 
   /** `Uint8Array` (S, 3): the levels of a frame without a residual. */
   get zeroLevels() {
-    return new Uint8Array(3 * this.surface.nSlots).fill(ZERO);
+    return new Uint8Array(3 * this.surface.nSlots).fill(this.zero);
   }
 
-  /** Width and height of a picture: the x, y and z planes, one below the other. */
-  get pictureSize() {
-    return [this.header.width, 3 * this.header.height];
+  /** @returns {Planes} of a picture: the x, y and z planes, one below the other */
+  get planes() {
+    return { size: [this.header.width, 3 * this.header.height], samples: this.samples, profile: this.header.profile };
   }
 
   /** First frame of every segment, and their number at the end. */
@@ -78,15 +86,15 @@ export class McgvReader {
 
   /**
    * @param {number} frame
-   * @param {Uint8Array} levels (S, 3) of the picture's `samples`
+   * @param {Uint8Array|Uint16Array} levels (S, 3) of the picture's `samples`
    * @param {Float32Array} positions (V, 3) filled, model units
    * @throws {GeometryVideoError} one of them is not finite
    */
   rebuild(frame, levels, positions) {
-    const { predicted, placed } = this;
+    const { predicted, placed, zero } = this;
     const step = this.header.residualStep;
     this.motion.predict(frame, predicted);
-    for (let i = 0; i < placed.length; i++) placed[i] = predicted[i] + step * (levels[i] - ZERO); // rounded once
+    for (let i = 0; i < placed.length; i++) placed[i] = predicted[i] + step * (levels[i] - zero); // rounded once
     for (const moves of this.outliers) moves.apply(frame, placed);
     this.surface.spread(placed, positions);
     for (const moves of this.corrections) moves.apply(frame, positions);

@@ -5,7 +5,7 @@
 
 import { HIERARCHY_MAX_WAVES as MAX_WAVES } from "../constants.js";
 import { decodeTopology } from "../format/topology_only.js";
-import { decodeBasis } from "../trajectory/basis.js";
+import { decodeBasis, splitBasis } from "../trajectory/basis.js";
 import { placed, taken } from "../trajectory/causal_order.js";
 import { decodeVectors } from "../trajectory/coefficient_coding.js";
 import { keepHierarchy } from "../trajectory/hierarchy_budget.js";
@@ -137,11 +137,10 @@ export class PcaReader {
 
   /** Coefficients of the still points, in the order of transmission. */
   #given(kernels, basis, isReversed) {
-    const given = this.#still.givenOf(kernels, basis, this.#payload.budget);
-    if (!given) return null;
-    const { components } = basis;
+    if (!this.#still.count) return null;
+    const given = this.#still.given(kernels, ...splitBasis(kernels, basis), this.#payload.budget);
     const values = kernels.view(given);
-    for (let i = 0; isReversed && i < values.length; i += components) values.subarray(i, i + components).reverse();
+    for (let i = 0; isReversed && i < values.length; i += basis.components) values.subarray(i, i + basis.components).reverse();
     return given;
   }
 

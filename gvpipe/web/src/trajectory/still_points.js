@@ -57,24 +57,6 @@ export class StillPoints {
     return result;
   }
 
-  /**
-   * The same of a basis as `decodeBasis` gives it.
-   *
-   * @param {import("../wasm/kernels.js").Kernels} kernels @param {import("./basis.js").Basis} basis
-   * @param {import("../format/budget.js").Budget} budget @returns {import("../wasm/kernels.js").KernelArray|null}
-   */
-  givenOf(kernels, { components, columns }, budget) {
-    if (!this.count) return null;
-    const rows = columns.length / (components + 1);
-    const [mean, vectors] = [kernels.array("float64", [rows]), kernels.array("float64", [rows, components])];
-    const [ofMean, ofVectors] = [kernels.view(mean), kernels.view(vectors)];
-    for (let row = 0; row < rows; row++) {
-      ofMean[row] = columns[row * (components + 1)];
-      ofVectors.set(columns.subarray(row * (components + 1) + 1, (row + 1) * (components + 1)), row * components);
-    }
-    return this.given(kernels, mean, vectors, budget);
-  }
-
   /** Give the still vertices of `frames (n, V, 3)` their positions. @param {Int32Array} points (V) the point of each vertex */
   overwrite(frames, points) {
     if (!this.count) return;
