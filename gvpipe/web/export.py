@@ -4,7 +4,8 @@ What: page = ``page.html`` with the player's bundle (deflated) and the MP4 file 
 Why: browsers load no modules and fetch no files for a page that is itself a file.
 
 A codec knows which of its files browsers play (`gvpipe.registry.browser_obstacle`). Any other file, and one for which that is
-asked, is decoded and encoded anew at a Karni-Gotsman error that is small beside that of files. The error that this adds is measured and reported.
+asked, is decoded and encoded anew at a Karni-Gotsman error that is small beside that of files. The error that this adds is
+measured and reported.
 """
 
 from __future__ import annotations
@@ -113,7 +114,9 @@ def export_html(
     bitstream = carry_asset(player, trial.encoded, trial.codec)
     page = _write_page(player.path, file_bytes(replace(bitstream, origin=(x, y, z))), target, up)
     added = trial.errors
-    return ExportReport(page.bytes, page.video_bytes, obstacle or _kind(player.bitstream), added.rmse_diag, added.max_diag, added.kg)
+    return ExportReport(
+        page.bytes, page.video_bytes, obstacle or _kind(player.bitstream), added.rmse_diag, added.max_diag, added.kg
+    )
 
 
 def _kind(bitstream: Bitstream) -> str:

@@ -18,7 +18,6 @@ from gvpipe import Field, Image, Material, Part, Texture
 from gvpipe.container.mp4 import read_file
 
 
-
 def noise(shape: tuple[int, ...], seed: int = 0) -> npt.NDArray[np.float32]:
     return np.cumsum(np.random.default_rng(seed).normal(size=shape), axis=0).astype(np.float32)
 

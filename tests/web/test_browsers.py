@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import io
 import time
 from collections.abc import Callable, Iterator
@@ -19,6 +20,7 @@ from PIL import Image
 from sequences import held, waving
 
 import gvpipe
+from gvpipe.container.mp4 import read_file, write_file
 
 FILES: dict[str, dict[str, Any]] = {  # several groups of pictures, with B-frames and without
     "affine": {"prediction": "affine", "preset": "slow", "gop": 8, "clusters": 3, "quality": 90},
@@ -120,22 +122,29 @@ def test_ten_bits_are_exact_or_refused(name: str, module: Callable[..., Any], si
 
 
 def test_damaged_jpegs(module: Callable[..., Any], site: tuple[Path, str]) -> None:
-    """A picture of another size, and one that ends early; and a browser whose canvas gives other samples."""
-    data = (site[0] / "jpeg.mp4").read_bytes()
-    sizes = data.index(b"\xff\xc0")
-    (site[0] / "size.mp4").write_bytes(data[: sizes + 5] + b"\x01" + data[sizes + 6 :])
-    end = data.index(b"\xff\xd9")
-    (site[0] / "end.mp4").write_bytes(data[:end] + b"\0\0" + data[end + 2 :])
+    """A picture of another size, and one that ends early."""
+    bitstream = read_file(site[0] / "jpeg.mp4")
+    video = bitstream.video
+    assert isinstance(video, bytes)
+    size, end = video.index(b"\xff\xc0") + 5, video.index(b"\xff\xd9")
+    changes = {"size": video[:size] + b"\x01" + video[size + 1 :], "end": video[:end] + b"\0\0" + video[end + 2 :]}
+    for name, changed in changes.items():
+        write_file(dataclasses.replace(bitstream, video=changed), site[0] / f"{name}.mp4")
     load = "return GeometryVideo.load(args[0]).catch((error) => [error.kind, error.message])"
     for path, what in {"size.mp4": "a JPEG of ", "end.mp4": "no whole JPEG"}.items():
         kind, message = module(load, path)
         assert kind == "corrupt" and what in message, message
+
+
+def test_a_canvas_that_gives_other_samples(module: Callable[..., Any]) -> None:
+    """As browsers do against fingerprints: refused, since positions would be a little off."""
     noise = """const read = CanvasRenderingContext2D.prototype.getImageData;
     CanvasRenderingContext2D.prototype.getImageData = function (...given) {
       const image = read.apply(this, given);
       image.data[400]++;
       return image;
     };"""
+    load = "return GeometryVideo.load(args[0]).then(() => [], (error) => [error.kind, error.message])"
     kind, message = module(noise + load, "jpeg.mp4")
     assert kind == "unsupported" and "--convert" in message, message
 

@@ -40,7 +40,9 @@ def _embedded(page: Path) -> bytes:
     return base64.b64decode(text, validate=True)
 
 
-@pytest.mark.parametrize("settings", [{}, {"codec": "laplacian"}, {"codec": "pca"}, {"image": "jpeg"}, {"profile": "precise"}], ids=str)
+@pytest.mark.parametrize(
+    "settings", [{}, {"codec": "laplacian"}, {"codec": "pca"}, {"image": "jpeg"}, {"profile": "precise"}], ids=str
+)
 def test_page_holds_the_file_unchanged(settings: dict[str, Any], video: Path, tmp_path: Path) -> None:
     if settings:
         video = tmp_path / "other.mp4"
