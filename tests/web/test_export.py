@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import base64
 import dataclasses
+import io
 import json
 import re
 import runpy
 import shutil
 import subprocess
 import webbrowser
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import av
 import numpy as np
 import pytest
 from conftest import Finished
@@ -24,6 +27,7 @@ from sequences import waving
 import gvpipe
 from gvcodecs.mcgv import browser
 from gvpipe.errors import CorruptFile, InputError, OutputError
+from gvpipe.media.jpeg import decode_jpeg
 from gvpipe.quality_scale import error_of
 from gvpipe.rate_control.trials import Trial, Trials
 from gvpipe.registry import codec_class
@@ -230,3 +234,13 @@ def test_bundles_are_what_the_sources_build(tmp_path: Path) -> None:
     subprocess.run(["node", "build.mjs", tmp_path], cwd=WEB, check=True, capture_output=True)
     built = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     assert built == {path.name: path.read_bytes() for path in (WEB / "bundle").iterdir()}
+
+
+def test_the_jpeg_that_probes_browsers_shows_decoders_that_differ() -> None:
+    """Its checksum is that of OpenCV's samples; FFmpeg's decoder, which is off by one in places, has another."""
+    source = (WEB / "src" / "jpeg_decoder.js").read_text("utf-8")
+    data = base64.b64decode("".join(re.findall(r'^  "([A-Za-z0-9+/=]+)",$', source, re.MULTILINE)), validate=True)
+    side, checksum = (int(re.findall(rf"const {name} = (\d+);", source)[0]) for name in ("PROBE_SIDE", "PROBE_CRC32"))
+    with av.open(io.BytesIO(data), format="jpeg_pipe") as file:
+        other = next(file.decode(video=0)).to_ndarray(format="gray")
+    assert zlib.crc32(decode_jpeg(data, side, side).tobytes()) == checksum != zlib.crc32(other.tobytes())

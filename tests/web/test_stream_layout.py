@@ -21,6 +21,8 @@ pytestmark = [pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missi
 VARIANTS: dict[str, dict[str, Any]] = {
     "segments": {"gop": 16, "segment": 20},
     "whole": {"gop": 8, "prediction": "affine"},
+    "jpeg": {"image": "jpeg", "prediction": "affine"},
+    "precise": {"profile": "precise", "gop": 8, "prediction": "affine"},
 }
 LOAD = """const outcomes = [];
 for (const name of args[0]) {
@@ -127,7 +129,7 @@ def test_motion_without_pictures_comes_in_parts(module: Callable[..., Any], tmp_
         assert module(AGAIN, 60)[0] == "loaded"
 
 
-@pytest.mark.parametrize("variant", ["segments", "whole"])
+@pytest.mark.parametrize("variant", VARIANTS)
 def test_frames_equal_pythons(variant: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     path = site[0] / "stream.mp4"
     gvpipe.encode(waving(9, 70), path, preset="ultrafast", stream=True, **VARIANTS[variant])
