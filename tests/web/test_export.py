@@ -241,6 +241,6 @@ def test_the_jpeg_that_probes_browsers_shows_decoders_that_differ() -> None:
     source = (WEB / "src" / "jpeg_decoder.js").read_text("utf-8")
     data = base64.b64decode("".join(re.findall(r'^  "([A-Za-z0-9+/=]+)",$', source, re.MULTILINE)), validate=True)
     side, checksum = (int(re.findall(rf"const {name} = (\d+);", source)[0]) for name in ("PROBE_SIDE", "PROBE_CRC32"))
-    with av.open(io.BytesIO(data), format="jpeg_pipe") as file:
+    with av.open(io.BytesIO(data), "r", format="jpeg_pipe") as file:
         other = next(file.decode(video=0)).to_ndarray(format="gray")
     assert zlib.crc32(decode_jpeg(data, side, side).tobytes()) == checksum != zlib.crc32(other.tobytes())
