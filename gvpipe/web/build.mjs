@@ -1,13 +1,19 @@
 // Builds the bundles in bundle/, or in the folder given: node build.mjs [FOLDER]
 // Builds the modules of the package, which leave three.js outside, in dist/: node build.mjs --package
 import { build } from "esbuild";
+import { zlibSync } from "fflate"; // in place of Node's, whose bytes depend on the processor
 import { copyFileSync, readFileSync, readdirSync, rmSync } from "node:fs";
 import { fileURLToPath } from "node:url";
-import { zlibSync } from "three/examples/jsm/libs/fflate.module.js";
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
 const notice = readFileSync(here("LICENSES/NOTICE.txt"), "utf8").trim();
 
+const deflated = {
+  name: "deflated",
+  setup({ onLoad }) {
+    onLoad({ filter: /\.wasm$/ }, ({ path }) => ({ contents: zlibSync(readFileSync(path), { level: 9 }), loader: "binary" }));
+  },
+};
 const common = {
   absWorkingDir: here("."),
   bundle: true,
@@ -25,14 +31,6 @@ const worker = await build({
   loader: { ".wasm": "empty" }, // the page sends it
   external: ["node:fs", "fs", "path"],
 });
-
-/** WebAssembly as a zlib stream: the same bytes by every version of Node, since its own deflate differs. */
-const deflated = {
-  name: "deflated",
-  setup({ onLoad }) {
-    onLoad({ filter: /\.wasm$/ }, ({ path }) => ({ contents: zlibSync(readFileSync(path), { level: 9 }), loader: "binary" }));
-  },
-};
 
 const pages = {
   ...common,

@@ -1,18 +1,15 @@
 /** Files of all codecs that a page plays, behind one interface. */
 
 import { DecodedPictures } from "./decoded_pictures.js";
-import { loadDraco } from "./format/draco.js";
 import { GeometryVideoError, quote } from "./format/errors.js";
 import { readableVersion } from "./frames/frame_decoder.js";
 import { FrameHost, FrameSource } from "./frames/frame_host.js";
 import { CODEC as MCGV, VERSION as MCGV_VERSION } from "./mcgv/header.js";
 import { McgvReader } from "./mcgv/reader.js";
 import { openPictures } from "./pictures.js";
-import { kernelCode } from "./wasm/code.js";
+import { kernelCode } from "./wasm/inflated.js";
 
 const BYTES_PER_VERTEX = 12; // of a frame
-
-let code = null; // of kernels, unpacked when first needed
 
 /**
  * @typedef {object} Playable
@@ -38,15 +35,16 @@ export async function openCodec(source, payload, repeated, level) {
     const found = `version ${quote(version)} of codec ${codec}`;
     throw new GeometryVideoError("newer", `${found}, this player has ${newest}; a newer player is needed`);
   }
-  [code] = await Promise.all([kernelCode(), loadDraco()]);
+  const code = await kernelCode();
   if (!WebAssembly.validate(code)) {
     throw new GeometryVideoError("unsupported", "this browser has no WebAssembly with SIMD; a newer one is needed");
   }
   const distinct = repeated.distinctPayload(payload);
-  return codec === MCGV ? openMcgv(source, payload.header, distinct, repeated, level) : openFrames(payload.header, distinct, repeated, level);
+  if (codec !== MCGV) return openFrames(code, payload.header, distinct, repeated, level);
+  return openMcgv(code, source, payload.header, distinct, repeated, level);
 }
 
-async function openMcgv(source, { fps, vertices, container }, distinct, repeated, level) {
+async function openMcgv(code, source, { fps, vertices, container }, distinct, repeated, level) {
   if (level) throw new GeometryVideoError("unsupported", `level ${level}: there are levels 0..0`);
   const reader = await McgvReader.open(distinct, code);
   const file = source instanceof Uint8Array ? source : null;
@@ -70,7 +68,7 @@ async function openMcgv(source, { fps, vertices, container }, distinct, repeated
   };
 }
 
-async function openFrames({ fps }, distinct, repeated, level) {
+async function openFrames(code, { fps }, distinct, repeated, level) {
   const host = new FrameHost(distinct, code, level);
   try {
     const { faces, points, levels, bounds } = await host.describe();

@@ -22,7 +22,7 @@ import { CodedField } from "../fields/coded_field.js";
 import { FieldHost } from "../fields/field_host.js";
 import { TYPES } from "../fields/head.js";
 import { Kernels } from "../wasm/kernels.js";
-import { kernelCode } from "../wasm/code.js";
+import { kernelCode } from "../wasm/inflated.js";
 import { AssetEntry } from "./asset_entry.js";
 import { readImages, readMaterials } from "./materials.js";
 
