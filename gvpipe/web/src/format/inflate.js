@@ -7,7 +7,10 @@
  * @returns {Promise<Uint8Array>}
  */
 export async function inflate(data, limit, corrupt) {
-  const reader = new Blob([data]).stream().pipeThrough(new DecompressionStream("deflate")).getReader();
+  const { readable, writable } = new DecompressionStream("deflate"); // without a Blob: workers of pages from a disk may read none
+  const writer = writable.getWriter();
+  for (const written of [writer.write(data), writer.close()]) written.catch(() => {}); // told by the reader
+  const reader = readable.getReader();
   const parts = [];
   let size = 0;
   try {
