@@ -11,6 +11,7 @@ import os
 import pickle
 import subprocess
 import sys
+import time
 import weakref
 from collections.abc import Callable
 from pathlib import Path
@@ -21,10 +22,13 @@ from gvpipe.forks import ForkLock, renew_after_fork
 from gvpipe.io.damage import LONGEST, unreadable
 
 DONE, REFUSED, CHANGED = "done", "refused", "changed"
+LEAST_MEMORY, MEMORY_PER_BYTE = 1 << 30, 200  # bytes that the process may take in any case, and for each byte that it reads
+MOST_LISTED = 10_000  # entries of folders that are looked at
+MOST_RUNNING = 16  # processes at a time: of more files, those that were asked longest ago wait until they are asked again
 
 
 class LibraryProcess:
-    """A process that reads one file; in a forked child there is a new one.
+    """A process that reads one file; in a forked child, and after it had to make room for others, there is a new one.
 
     Args:
         path: of the file.
@@ -39,6 +43,7 @@ class LibraryProcess:
         self._prepared: list[tuple[str, tuple[Any, ...]]] = []
         self._process: subprocess.Popen[bytes] | None = None
         self._finalizer: Any = None
+        self._asked = 0.0  # when that was last
         renew_after_fork(self)
 
     def after_fork(self) -> None:
@@ -61,7 +66,9 @@ class LibraryProcess:
             TopologyChange: as the reader there raised it.
         """
         with self._lock:
+            self._asked = time.monotonic()
             if self._process is None:
+                _make_room()
                 self._start()
                 for prepared in self._prepared:
                     self._exchange(*prepared)
@@ -70,6 +77,23 @@ class LibraryProcess:
     def _start(self) -> None:
         self._process = start_process(self._module, self._path.absolute())
         self._finalizer = weakref.finalize(self, _end, self._process)
+        with _running_lock:
+            _running.add(self)
+
+    def rest(self) -> None:
+        """End the process, unless it is at work; the next request starts another."""
+        if self._lock.try_acquire():
+            try:
+                if self._finalizer is not None:
+                    self._finalizer()
+                self._process = self._finalizer = None
+            finally:
+                self._lock.release()
+
+    @property
+    def asked(self) -> float | None:
+        """When it was last asked, seconds of `time.monotonic`; None without a process."""
+        return None if self._process is None else self._asked
 
     def _exchange(self, name: str, arguments: tuple[Any, ...]) -> Any:
         process = self._process
@@ -91,6 +115,19 @@ class LibraryProcess:
         return result
 
 
+_running: weakref.WeakSet[LibraryProcess] = weakref.WeakSet()
+_running_lock = ForkLock()
+
+
+def _make_room() -> None:
+    """End processes that were asked longest ago, until another one may start."""
+    with _running_lock:
+        busy = [(each.asked, each) for each in _running]
+    alive = sorted(((asked, each) for asked, each in busy if asked is not None), key=lambda pair: pair[0])
+    for _, each in alive[: max(0, len(alive) + 1 - MOST_RUNNING)]:
+        each.rest()
+
+
 def start_process(module: str, path: Path) -> subprocess.Popen[bytes]:
     """A new Python that runs a module, with a path as its argument and pipes for requests and answers."""
     return subprocess.Popen(
@@ -109,6 +146,33 @@ def _end(process: subprocess.Popen[bytes]) -> None:
             with contextlib.suppress(OSError):
                 pipe.close()
     process.wait()
+
+
+def limit_memory(n_bytes: int) -> None:
+    """Let this process take max(`LEAST_MEMORY`, `MEMORY_PER_BYTE` x n_bytes) beside what it has; mapped files do not count."""
+    if sys.platform != "linux":  # others do not keep to such limits
+        return
+    import resource
+
+    with open("/proc/self/status") as status:
+        now = next((int(line.split()[1]) << 10 for line in status if line.startswith("VmData:")), 0)
+    limits = [now + max(LEAST_MEMORY, MEMORY_PER_BYTE * n_bytes), *resource.getrlimit(resource.RLIMIT_DATA)]
+    least = min(each for each in limits if each != resource.RLIM_INFINITY)
+    resource.setrlimit(resource.RLIMIT_DATA, (least, limits[-1]))
+
+
+def bytes_below(folder: Path, suffixes: tuple[str, ...]) -> int:
+    """Bytes of all files of some extensions in a folder and below, where a file's references lie; links are not followed."""
+    total = listed = 0
+    for place, _, names in os.walk(folder):
+        for name in names:
+            listed += 1
+            if listed > MOST_LISTED:
+                return total
+            if name.lower().endswith(suffixes):
+                with contextlib.suppress(OSError):  # it has gone, or may not be looked at
+                    total += os.stat(os.path.join(place, name)).st_size
+    return total
 
 
 def serve(answer: Callable[[str, tuple[Any, ...]], Any]) -> None:
