@@ -303,7 +303,11 @@ FILES: list[tuple[str, str, Callable[[Path], None]]] = [
     ("sim/wavy_vtu_series/mesh.vtu.series", "meshio", by_meshio),
 ]
 
-SCENES = {"usdc": ("usd-core", by_usd_apart), "abc": ("alembic3d", by_alembic_apart), "vtkhdf": ("h5py", by_h5py)}
+SCENES: dict[str, tuple[str, Callable[[Path], None]]] = {
+    "usdc": ("usd-core", by_usd_apart),
+    "abc": ("alembic3d", by_alembic_apart),
+    "vtkhdf": ("h5py", by_h5py),
+}
 
 
 if __name__ == "__main__":
