@@ -34,7 +34,7 @@ LOADED = (
     "pxr.UsdSkel",
     "pxr.UsdShade",
 )
-LONGEST = 1 << 16  # bytes of a request: a number, a module and a path, or the number of what ends
+LONGEST = 1 << 16  # bytes of a request: a number, a module, a path and the working folder, or the number of what ends
 ANSWER = struct.Struct("<dQ")  # what a process took: seconds of processor time, bytes beside those of the server at most
 _numbers = itertools.count()
 _cost = [0.0, 0]  # seconds of all, bytes of the largest, since they were asked for
@@ -49,14 +49,14 @@ class ForkedProcess:
         answers, theirs = os.pipe()
         self._number = next(_numbers)
         self.stdin, self.stdout = os.fdopen(ours, "wb"), os.fdopen(answers, "rb")
-        socket.send_fds(_server(), [pickle.dumps((self._number, module, str(path)))], [requests, theirs])
+        socket.send_fds(_server(), [pickle.dumps((self._number, module, str(path), os.getcwd()))], [requests, theirs])
         os.close(requests)
         os.close(theirs)
 
     def kill(self) -> None:
         """End it; the server waits for it, and says what it took."""
         with contextlib.suppress(OSError, struct.error):  # the server has ended, and all others with it
-            _server().send(pickle.dumps((self._number, "", "")))
+            _server().send(pickle.dumps((self._number, "", "", "")))
             seconds, memory = ANSWER.unpack(_server().recv(ANSWER.size))
             _cost[:] = _cost[0] + seconds, max(_cost[1], memory)
 
@@ -105,11 +105,12 @@ def serve(requests: socket.socket) -> None:
         request, descriptors, _, _ = socket.recv_fds(requests, LONGEST, 2)
         if not request:
             break
-        number, module, path = pickle.loads(request)
+        number, module, path, folder = pickle.loads(request)
         if descriptors:
             process = os.fork()
             if process == 0:
                 requests.close()
+                os.chdir(folder)
                 _become(module, path, descriptors)
             running[number] = process
             for descriptor in descriptors:

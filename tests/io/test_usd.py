@@ -442,6 +442,7 @@ def test_stages_outside_of_the_folder(tmp_path: Path, arc: str) -> None:
     assert io.read(tmp_path / "in" / "c.usda").n_vertices == 3
 
 
+@pytest.mark.usefixtures("new_processes")
 def test_library_that_dies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A damaged file may end the library's process, and no other."""
     (tmp_path / "dying.py").write_text("import os\nos.abort()\n")
@@ -509,6 +510,7 @@ def test_array_of_a_length_that_the_file_does_not_have(tmp_path: Path, count: in
     assert "\n" not in str(caught.value) and str(count) not in str(caught.value)
 
 
+@pytest.mark.usefixtures("new_processes")
 def test_many_files_take_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of many files that are open, the last ones have a process; the others start one when they are asked."""
     monkeypatch.setattr(library_process, "MOST_RUNNING", 1)
