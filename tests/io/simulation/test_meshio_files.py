@@ -49,6 +49,14 @@ def test_frames_and_fields(tmp_path: Path) -> None:
     assert read.attributes["load"].domain == "triangle" and np.unique(load).tolist() == [3.0, 5.0]
 
 
+def test_numbers_of_many_components_are_left_out(tmp_path: Path) -> None:
+    mesh = meshio.Mesh(POINTS, [("hexahedron", HEXAHEDRA)], {"heat": POINTS[:, 0], "wide": np.ones((12, 65))})
+    meshio.write(tmp_path / "a.avs", mesh)
+    read = gvpipe.io.read(tmp_path / "a.avs")
+    assert "heat" in read.attributes and "wide" not in read.attributes
+    assert "numbers that are not of 1 to 64 components were left out: wide" in read.notes
+
+
 @pytest.mark.parametrize("data", [b"hello\n", b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 9 1 9\n"])
 @pytest.mark.parametrize("suffix", ["msh", "inp", "su2", "nas", "vol"])
 def test_damage(tmp_path: Path, suffix: str, data: bytes, capsys: pytest.CaptureFixture[str]) -> None:
