@@ -29,6 +29,8 @@ LOADED = (
     "gvpipe.attributes.normal_kernels",
     "gvpipe.io.fbx.evaluator",
     "gvpipe.io.usd.reader",
+    "gvpipe.io.simulation.meshio_files",
+    "meshio",
     "alembic3d.Abc",
     "ufbx",
     "pxr.UsdSkel",

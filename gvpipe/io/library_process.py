@@ -31,14 +31,14 @@ class LibraryProcess:
     """A process that reads one file; in a forked child, and after it had to make room for others, there is a new one.
 
     Args:
-        path: of the file.
+        path: of the file; of several, which one process may read, that of the next request.
         module: that runs there; it calls `serve`.
         kind: of the file, for messages, such as ``"FBX"``.
         died: what a message says where the process dies.
     """
 
     def __init__(self, path: Path, module: str, kind: str, died: str) -> None:
-        self._path, self._module, self._kind, self._died = path, module, kind, died
+        self.path, self._module, self._kind, self._died = path, module, kind, died
         self._lock = ForkLock()
         self._prepared: list[tuple[str, tuple[Any, ...]]] = []
         self._process: subprocess.Popen[bytes] | None = None
@@ -75,7 +75,7 @@ class LibraryProcess:
             return self._exchange(name, arguments)
 
     def _start(self) -> None:
-        self._process = start_process(self._module, self._path.absolute())
+        self._process = start_process(self._module, self.path.absolute())
         self._finalizer = weakref.finalize(self, _end, self._process)
         with _running_lock:
             _running.add(self)
@@ -104,14 +104,14 @@ class LibraryProcess:
         try:
             state, result = pickle.load(process.stdout)
         except (EOFError, OSError, pickle.UnpicklingError) as exc:
-            raise unreadable(self._path, self._kind, self._died) from exc
+            raise unreadable(self.path, self._kind, self._died) from exc
         if state == CHANGED:
             raise TopologyChange(*result)
         if state == REFUSED:
-            said = str(result).removeprefix(f"{self._path.absolute()}: ")
-            if printable(str(self._path)) in said:
+            said = str(result).removeprefix(f"{self.path.absolute()}: ")
+            if printable(str(self.path)) in said:
                 raise InputError(said)
-            raise unreadable(self._path, self._kind, said)
+            raise unreadable(self.path, self._kind, said)
         return result
 
 

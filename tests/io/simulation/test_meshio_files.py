@@ -75,6 +75,17 @@ def test_text_that_meshio_may_not_read(tmp_path: Path) -> None:
         assert "save it as binary" in str(exc)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such limit")
+def test_a_node_of_a_large_number(tmp_path: Path) -> None:
+    """meshio makes a table as long as the largest number: 2 GB for 1 kB, without its limit of memory."""
+    meshio.write(tmp_path / "a.msh", meshio.Mesh(POINTS, [("hexahedron", HEXAHEDRA)]), file_format="gmsh")
+    data, numbers = (tmp_path / "a.msh").read_bytes(), np.arange(1, 13)
+    assert data.count(numbers.tobytes()) == 1
+    (tmp_path / "a.msh").write_bytes(data.replace(numbers.tobytes(), np.append(numbers[:-1], 1 << 28).tobytes()))
+    with pytest.raises(InputError, match=r"a\.msh cannot be read as MSH: Unable to allocate 2\.00 GiB"):
+        gvpipe.io.read(tmp_path / "a.msh")
+
+
 def test_includes_are_not_followed(tmp_path: Path) -> None:
     (tmp_path / "a.inp").write_text("*NODE\n1, 0, 0, 0\n*Include, input=../b.inp\n")
     with pytest.raises(InputError, match=r"a\.inp .* it includes other files, which are not followed"):
