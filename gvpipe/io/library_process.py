@@ -2,6 +2,9 @@
 
 A request is a name and arguments, an answer ``(state, result)``; both are pickles. The state is ``done``, ``refused`` with an
 error's text, or ``changed`` with the text and the frame of a `TopologyChange`. The process ends with its input.
+
+`limit_memory` lets the system refuse the process more memory than follows from the size of what it reads. The library then
+raises an error or dies, which is one line either way. Linux alone has such a limit.
 """
 
 from __future__ import annotations
@@ -164,11 +167,11 @@ def limit_memory(n_bytes: int) -> None:
 def bytes_below(folder: Path, suffixes: tuple[str, ...]) -> int:
     """Bytes of all files of some extensions in a folder and below, where a file's references lie; links are not followed."""
     total = listed = 0
-    for place, _, names in os.walk(folder):
+    for place, folders, names in os.walk(folder):
+        listed += len(folders) + len(names)
+        if listed > MOST_LISTED:
+            break
         for name in names:
-            listed += 1
-            if listed > MOST_LISTED:
-                return total
             if name.lower().endswith(suffixes):
                 with contextlib.suppress(OSError):  # it has gone, or may not be looked at
                     total += os.stat(os.path.join(place, name)).st_size
