@@ -98,8 +98,9 @@ def answer(handler: http.server.BaseHTTPRequestHandler, served: Served) -> None:
         stop = min(stop, start + served.cut)
     served.sent.append((start, stop - start))
     with contextlib.suppress(OSError):
+        begun = time.perf_counter()
         for at in range(start, stop, CHUNK):
             part = served.data[at : min(at + CHUNK, stop)]
             handler.wfile.write(part)
             if served.rate:
-                time.sleep(8 * len(part) / served.rate)
+                time.sleep(max(0.0, 8 * (at + len(part) - start) / served.rate - (time.perf_counter() - begun)))
