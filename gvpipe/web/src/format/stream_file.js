@@ -40,6 +40,7 @@ export class StreamFile {
     this.url = url;
     /** Bytes that have come so far. */
     this.received = received;
+    this.start = null; // bytes that came at first, until a segment is here
     /** Sections that are here, by name. */
     this.sections = new Map();
     this.segments = new Map(); // number -> names of its sections
@@ -89,8 +90,9 @@ export class StreamFile {
     const start = Math.min(...shared.map(({ offset }) => offset));
     const end = Math.max(...shared.map(({ offset, length }) => offset + length));
     if (end > size) throw new GeometryVideoError("corrupt", `the index names places outside of the file; ${AGAIN}`);
-    const bytes = end <= data.length ? data.subarray(start, end) : await this.#fetch(start, end - start);
-    this.#take(shared.map(({ name }) => name), bytes, start);
+    const more = Math.max(0, end - data.length);
+    this.start = more ? join(data, await this.#fetch(data.length, more)) : data;
+    this.#take(shared.map(({ name }) => name), this.start.subarray(start, end), start);
     return true;
   }
 
@@ -121,11 +123,10 @@ export class StreamFile {
     const places = names.map((name) => this.places.get(name));
     const start = Math.min(...places.map(({ offset }) => offset));
     const length = Math.max(...places.map((place) => place.offset + place.length)) - start;
-    if (length === places.reduce((sum, place) => sum + place.length, 0)) {
-      this.#take(names, await this.#fetch(start, length), start);
-      return;
-    }
-    await Promise.all(places.map(async (place, i) => this.#take([names[i]], await this.#fetch(place.offset, place.length), place.offset)));
+    const areAdjacent = length === places.reduce((sum, place) => sum + place.length, 0);
+    if (areAdjacent) this.#take(names, await this.#fetch(start, length), start);
+    else await Promise.all(places.map(async (place, i) => this.#take([names[i]], await this.#fetch(place.offset, place.length), place.offset)));
+    this.start = null;
   }
 
   /** Forget segments that were not asked for lately. */
@@ -168,6 +169,7 @@ export class StreamFile {
   }
 
   async #fetch(offset, length) {
+    if (offset + length <= this.start?.length) return this.start.subarray(offset, offset + length);
     const wanted = `bytes ${offset} to ${offset + length - 1} of ${this.url}`;
     let response;
     let data;

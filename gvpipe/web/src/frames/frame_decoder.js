@@ -70,10 +70,11 @@ export class FrameDecoder {
    *
    * @param {boolean} [goesOn] whether the frames behind them are likely to be next: their segment is then decoded ahead
    * @returns {Promise<{positions: Float32Array, bounds: {min: number[], max: number[]}}>} (stop - start, V, 3), model units; the box of
-   *   the motion so far, by evenly spaced frames of each segment
+   *   the motion so far: of the frames that were read, and of evenly spaced ones of their segments
    */
   async read(start, stop, level, goesOn = false) {
     const positions = await this.#frames(start, stop, level);
+    stretch(this.#bounds, positions);
     const s = this.#segmentOf(stop - 1);
     await this.#look(s, level);
     if (goesOn) this.#prepare(s + 1, stop, level);

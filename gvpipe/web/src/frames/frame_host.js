@@ -103,7 +103,7 @@ export class FrameSource {
   #frameCount;
   #level;
   #asked = new Map(); // frame -> promise
-  #before = -1;
+  #before = -2; // the frame decoded last; none yet
 
   /** @param {FrameHost} host @param {number} frameCount D distinct frames @param {number} level of detail */
   constructor(host, frameCount, level) {

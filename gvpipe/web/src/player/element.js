@@ -254,7 +254,7 @@ export class GeometryVideoElement extends HTMLElement {
     let video = null;
     try {
       const file = typeof source === "string" && source[0] === "#" ? embedded(source) : source;
-      const level = this.lod || "coarsest"; // which is shown at once
+      const level = this.lod === "auto" ? "coarsest" : this.lod || "coarsest"; // shown at once
       video = await GeometryVideo.load(file, { level });
       if (loading !== this.#loading) return video.close();
       this.#stage ??= openStage(this.shadowRoot.querySelector("canvas"));
