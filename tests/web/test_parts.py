@@ -33,9 +33,9 @@ def node() -> Iterator[Ask]:
     """``ask(command, **given)``: what `run_parts.mjs` answers; an error is a pair of kind and message."""
     command = ["node", str(Path(__file__).with_name("run_parts.mjs")), str(BUNDLE / "geometry-video.js")]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdin is not None and process.stdout is not None
 
         def ask(name: str, **given: Any) -> Any:
+            assert process.stdin is not None and process.stdout is not None
             process.stdin.write(json.dumps({"command": name, **given}) + "\n")
             process.stdin.flush()
             answer = json.loads(process.stdout.readline())

@@ -76,7 +76,8 @@ export class FrameDecoder {
     const positions = await this.#frames(start, stop, level);
     stretch(this.#bounds, positions);
     const s = this.#segmentOf(stop - 1);
-    await this.#look(s, level);
+    const looked = this.#look(s, level);
+    if (this.#looked.size === 1) await looked; // what is shown first needs a view
     if (goesOn) this.#prepare(s + 1, stop, level);
     return { positions, bounds: structuredClone(this.#bounds) };
   }
