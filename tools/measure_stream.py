@@ -8,6 +8,7 @@ Chromium (no GPU: WebGL on the processor) and to a Python process. Prints one li
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 import os
 import re
@@ -115,34 +116,46 @@ def measure_browser(folder: Path, url: str, served: Served, frames: int, options
     """Print how Chromium plays the file."""
     write_pages(folder)
     with served_folder(folder) as address, running("chromium", folder / "profile") as browser:
-        firsts = []
+        firsts, worked = [], []
         for _ in range(options.times):
             served.sent.clear()
             browser.get(f"{address}/player.html")
+            before = processor_time(folder / "profile")
             firsts.append(run(browser, LOAD, url))
+            worked.append(processor_time(folder / "profile") - before)
         for name, words in {"coarse": "coarsest level drawn", "whole": "whole mesh drawn"}.items():
             print(f"Chromium: {words} after {seconds([first[name] / 1000 for first in firsts if name in first])}")
-        print(f"Chromium: {served.n_sent} bytes were sent until then")
+        print(f"Chromium: {seconds(worked)} of processor time, and {served.n_sent} bytes, until then")
         jumps = [run(browser, SEEK, int(jump * frames)) / 1000 for jump in JUMPS]
         print(f"Chromium: a jump takes {seconds(jumps)}")
         rate, gap = run(browser, PLAY, options.seconds)
         print(f"Chromium: plays {rate:.1f} frames per second, longest gap {gap:.0f} ms")
-        memory = max(renderers(folder / "profile"))
+        memory = max(memory_of(process) for process in renderers(folder / "profile"))
         print(f"Chromium: memory of the page's process {memory:.0f} MB; {served.n_sent} bytes were sent in all")
 
 
-def renderers(profile: Path) -> Iterator[float]:
-    """Memory of each page's process of a browser, MB: what is its own."""
+def renderers(profile: Path) -> Iterator[Path]:
+    """The folder in ``/proc`` of each page's process of a browser."""
     for process in Path("/proc").glob("[0-9]*"):
-        try:
+        with contextlib.suppress(OSError):  # it has ended meanwhile
             words = (process / "cmdline").read_bytes().decode("utf-8", "replace")
-            if "--type=renderer" not in words or str(profile) not in words:
-                continue
-            rollup = (process / "smaps_rollup").read_text()
-        except OSError:
-            continue
-        own = [int(line.split()[1]) for line in rollup.splitlines() if line.startswith(("Private_Clean", "Private_Dirty"))]
-        yield sum(own) / 1024
+            if "--type=renderer" in words and str(profile) in words:
+                yield process
+
+
+def memory_of(process: Path) -> float:
+    """What is a process's own, MB."""
+    lines = (process / "smaps_rollup").read_text().splitlines()
+    return sum(int(line.split()[1]) for line in lines if line.startswith(("Private_Clean", "Private_Dirty"))) / 1024
+
+
+def processor_time(profile: Path) -> float:
+    """Seconds that a browser's pages have worked so far."""
+    ticks = 0
+    for process in renderers(profile):
+        fields = (process / "stat").read_text().rpartition(")")[2].split()
+        ticks += int(fields[11]) + int(fields[12])
+    return ticks / os.sysconf("SC_CLK_TCK")
 
 
 def measure_python(folder: Path, url: str, codec: str) -> None:
