@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from file_server import Served, serving
+from file_server import CHUNK, Served, serving
 from pages import BUNDLE
 from sequences import waving
 
@@ -117,6 +117,29 @@ def test_a_server_without_range_sends_the_whole_file(node: Ask, long: Path, site
     with gvpipe.open(long) as video:
         check(node("frame", k=70), video[70])
     assert len(served.sent) == 1
+
+
+def test_without_range_a_file_plays_as_it_comes(node: Ask, long: Path, site: tuple[str, Served]) -> None:
+    url, served = site
+    served.ranges = False
+    served.held = len(served.data) - CHUNK // 2  # the last segments
+    with gvpipe.open(long) as video:
+        node("load", url=url, level=0)
+        check(node("frame", k=10), video[10])
+        assert not served.go.is_set()
+        served.go.set()
+        check(node("frame", k=115), video[115])
+    assert len(served.sent) == 1
+
+
+def test_a_whole_file_that_ends_early_is_one_error(node: Ask, long: Path, site: tuple[str, Served]) -> None:
+    url, served = site
+    served.ranges = False
+    for most, has_length, words in ((20_000, True, "cannot be fetched"), (110_000, False, "bytes came")):
+        served.cut, served.has_length = most, has_length
+        found = node("load", url=url, level=0)
+        kind, message = found if isinstance(found, tuple) else node("frame", k=115)
+        assert kind == "load" and words in message and "\n" not in message
 
 
 @pytest.mark.parametrize(

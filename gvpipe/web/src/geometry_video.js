@@ -39,12 +39,14 @@ export class GeometryVideo {
       pictures = await reader.openPictures();
       const video = new GeometryVideo(payload.header, file?.length ?? parts.size, repeated, reader, pictures);
       video.#isInParts = !file;
+      video.#closeFile = () => parts?.close?.();
       video.#payload = payload;
       video.#takeAsset(reader.level ? await readCoarseAsset(payload) : await video.#readAsset(video, reader));
       return video;
     } catch (error) {
       pictures?.close();
       reader?.close();
+      parts?.close?.();
       if (!(error instanceof RangeError)) throw error; // an array that the browser cannot give
       throw new GeometryVideoError("unsupported", "it needs more memory than this browser has for a page");
     }
@@ -55,11 +57,13 @@ export class GeometryVideo {
   #reader;
   #pictures;
   #isInParts = false; // fetched when it is needed
+  #closeFile = () => {};
   #isClosed = false;
   #shown = 0; // the frame shown last
   #playing = null; // what `play` was given last
   #asset = null; // of level 0, once it is read
   #queue = Promise.resolve();
+  #changed = Promise.resolve(); // one change of the level after the other
   #beside = null; // a promise of pictures of their own, for fields that follow from positions
   #queueBeside = Promise.resolve();
 
@@ -136,10 +140,16 @@ export class GeometryVideo {
    * Show another level of detail from now on: `level`, `indices`, `basePoints`, numbers of vertices and triangles, and what the
    * asset has change. What plays goes on, at the old level until the new one is decoded.
    *
-   * @param {number|"coarsest"} level
+   * @param {number|"coarsest"} level @returns {Promise<void>} that it is shown
    * @throws {GeometryVideoError} there is no such level, or it cannot be fetched or decoded
    */
-  async setLevel(level) {
+  setLevel(level) {
+    const changed = this.#changed.then(() => this.#change(level));
+    this.#changed = changed.catch(() => {});
+    return changed;
+  }
+
+  async #change(level) {
     const reader = await this.#reader.at(level);
     if (reader.level === this.level) return;
     const pictures = await reader.openPictures(this.#shown);
@@ -172,6 +182,7 @@ export class GeometryVideo {
     this.#beside?.then((pictures) => pictures.close()).catch(() => {});
     this.#asset?.close();
     this.#reader.close();
+    this.#closeFile();
   }
 
   #takeLevel(reader, pictures, asset) {

@@ -113,7 +113,12 @@ export class Playback {
     if (this.#isClosed || !this.paused || this.#seeking) return; // what plays, or is sought, is of that level
     const k = this.currentFrame;
     const positions = await this.#video.frame(k);
-    if (!this.#isClosed) this.#on.show(positions, k);
+    if (!this.#isClosed && this.#isCurrent(positions)) this.#on.show(positions, k);
+  }
+
+  /** Whether positions are of the level that is shown: it may have changed since they were asked for. */
+  #isCurrent(positions) {
+    return positions.length === 3 * this.#video.vertexCount;
   }
 
   /** Play on from the frame shown; from the start if that is the last. */
@@ -160,7 +165,8 @@ export class Playback {
         this.#wanted = null;
         const [positions] = await Promise.all([this.#video.frame(k), this.#on.prepare(k)]);
         if (this.#isClosed) return;
-        this.#show(positions, k);
+        if (this.#isCurrent(positions)) this.#show(positions, k);
+        else this.#wanted ??= k;
       }
     } catch (error) {
       this.#fail(error);

@@ -8,6 +8,7 @@ import { readDescription, ranks } from "../track.js";
 import { findIndex, readTag } from "./boxes.js";
 import { crc32 } from "./checksum.js";
 import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
+import { Incoming } from "./incoming.js";
 import { checkHead, readIndex } from "./stream_layout.js";
 
 const FIRST = 1 << 16; // bytes of the first request
@@ -19,27 +20,30 @@ const PARTIAL = 206;
 export class StreamFile {
   /**
    * @param {string|URL} url
-   * @returns {Promise<StreamFile|Uint8Array|null>} the whole file where the server knows no Range, and of a plain layout, of
-   *   fields, where nothing belongs to segments, and of pictures where there is no WebCodecs; null where the server refuses
+   * @returns {Promise<StreamFile|Uint8Array|null>} the whole file where it has the plain layout or fields, where nothing belongs to
+   *   segments, and of pictures where there is no WebCodecs; null where the server refuses
    * @throws {GeometryVideoError} the index is damaged
    */
   static async open(url) {
     const response = await fetch(url, { headers: { Range: `bytes=0-${FIRST - 1}` } });
     if (!response.ok) return null;
-    const start = new Uint8Array(await response.arrayBuffer());
-    if (response.status !== PARTIAL || start.length < FIRST) return start;
+    const incoming = response.status === PARTIAL ? null : new Incoming(response, url);
+    const start = incoming ? await incoming.read(0, FIRST) : new Uint8Array(await response.arrayBuffer());
+    if (start.length < FIRST) return start;
+    const rest = (data) => incoming?.whole() ?? fetchRest(url, data);
     const box = findIndex(start);
-    if (!box) return fetchRest(url, start);
-    const file = new StreamFile(url, start.length);
+    if (!box) return rest(start);
+    const file = new StreamFile(url, start.length, incoming);
     const more = Math.max(0, box.end - start.length);
     const data = more ? join(start, await file.#fetch(start.length, more)) : start;
-    return (await file.#begin(data, box)) ? file : fetchRest(url, data);
+    return (await file.#begin(data, box)) ? file : rest(data);
   }
 
-  constructor(url, received) {
+  constructor(url, received, incoming) {
     this.url = url;
     /** Bytes that have come so far. */
     this.received = received;
+    this.incoming = incoming; // where the server knows no Range
     this.start = null; // bytes that came at first, until a segment is here
     /** Sections that are here, by name. */
     this.sections = new Map();
@@ -48,6 +52,11 @@ export class StreamFile {
     this.used = []; // numbers of segments that are here, the one asked for last at the end
     /** Bytes of segments that are kept, the latest at least. */
     this.mostKept = Infinity;
+  }
+
+  /** Fetch nothing more. */
+  close() {
+    this.incoming?.close();
   }
 
   /** Names of all sections, here or not. */
@@ -173,6 +182,7 @@ export class StreamFile {
     const wanted = `bytes ${offset} to ${offset + length - 1} of ${this.url}`;
     let response;
     let data;
+    if (this.incoming) return this.#await(offset, length, wanted);
     try {
       response = await fetch(this.url, { headers: { Range: `bytes=${offset}-${offset + length - 1}` } });
       if (response.status === PARTIAL) data = new Uint8Array(await response.arrayBuffer());
@@ -181,12 +191,22 @@ export class StreamFile {
       throw new GeometryVideoError("load", `${wanted} cannot be fetched: ${error.message}; try again`);
     }
     if (!data) throw new GeometryVideoError("load", `${wanted} cannot be fetched: status ${response.status}; load the page again`);
-    if (data.length !== length) {
-      throw new GeometryVideoError("load", `${wanted} cannot be fetched: ${data.length} bytes came; load the page again`);
-    }
+    checkLength(data, length, wanted);
     this.received += length;
     return data;
   }
+
+  async #await(offset, length, wanted) {
+    const data = await this.incoming.read(offset, length);
+    checkLength(data, length, wanted);
+    this.received = this.incoming.received;
+    return data;
+  }
+}
+
+function checkLength(data, length, wanted) {
+  if (data.length === length) return;
+  throw new GeometryVideoError("load", `${wanted} cannot be fetched: ${data.length} bytes came; load the page again`);
 }
 
 /** All of a file whose start is here; null if the server refuses. */

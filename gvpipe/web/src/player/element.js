@@ -291,7 +291,7 @@ export class GeometryVideoElement extends HTMLElement {
     this.#stage.setFollowing(this.hasAttribute("follow"));
     mesh.loop = this.loop;
     mesh.playbackRate = this.speed;
-    if (this.lod === "auto") mesh.lod = "auto";
+    if (this.lod !== mesh.lod) mesh.lod = this.lod;
     for (const name of MEDIA_EVENTS) mesh.addEventListener(name, () => this.#tell(name));
     for (const name of ["play", "pause"]) mesh.addEventListener(name, () => this.#bar.setPlaying(!mesh.paused));
     mesh.addEventListener("frame", ({ frame }) => {

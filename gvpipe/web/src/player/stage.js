@@ -17,6 +17,7 @@ import { RoomEnvironment } from "three/addons/environments/RoomEnvironment.js";
 import { GeometryVideoMesh } from "../three/geometry_video_mesh.js";
 
 const FIELD_OF_VIEW = 35; // degrees, of the shorter side
+const FAR = 100; // balls that the motion fits in, at least
 const MARGIN = 1.06; // around what is framed
 const FOLLOWING_ROOM = 1.15; // around a mesh that is followed, which may stretch out later
 const AZIMUTH = Math.PI / 7; // of the first view: from the front, a little from the right and from above
@@ -35,7 +36,7 @@ export class Stage {
     // without a GPU smooth edges would cost more than all else together
     this.renderer = new WebGLRenderer({ canvas, antialias: this.hasGpu, alpha: true });
     this.scene = new Scene();
-    this.camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
+    this.camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, FAR);
     this.scene.add(this.camera);
     const key = new DirectionalLight(0xffffff, 2.2);
     key.position.set(-1.2, 1.6, 1); // light goes with the camera, so that nothing looked at is dark
@@ -121,7 +122,10 @@ export class Stage {
     this.box = this.#motion();
     this.middle = this.isFollowing ? this.#findMiddle() : this.box.getCenter(new Vector3());
     const half = this.isFollowing ? this.#findReach(this.middle) : this.box.getSize(new Vector3()).divideScalar(2).toArray();
-    this.camera.position.copy(direction).multiplyScalar(this.#distance(direction, half)).add(this.middle);
+    const distance = this.#distance(direction, half);
+    this.camera.far = Math.max(FAR, 4 * distance);
+    this.camera.updateProjectionMatrix();
+    this.camera.position.copy(direction).multiplyScalar(distance).add(this.middle);
     this.controls.target.copy(this.middle);
     this.controls.update();
     this.isFramed = true;
