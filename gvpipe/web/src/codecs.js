@@ -98,7 +98,7 @@ async function openFrames(source, { fps }, distinct, repeated, level) {
       get isWaiting() {
         return !isWhole && source.isWaiting;
       },
-      openPictures: (frame) => DecodedPictures.of(frames, size, fps, repeated, new FrameSource(host, repeated.distinct, own), frame),
+      openPictures: (frame) => DecodedPictures.of(frames, size, fps, repeated, new FrameSource(host, own), frame),
       rebuild: (frame, shown, positions) => positions.set(shown),
       at,
       close: () => host.close(),

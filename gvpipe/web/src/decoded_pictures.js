@@ -40,7 +40,8 @@ export class DecodedPictures {
    *
    * @param {{picture: number}[][]} groups in order @param {number} groupBytes of what is kept of a group, about
    * @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated
-   * @param {{decode: (group: object[], give: (picture: number, shown: object) => void) => Promise<void>, close: () => void}} decoder
+   * @param {{decode: (group: object[], give: (picture: number, shown: object) => void) => Promise<void>, close: () => void,
+   *   isConcurrent?: boolean}} decoder `isConcurrent`: it takes a group while it decodes others
    * @param {number} [frame] shown first
    * @returns {Promise<DecodedPictures>}
    */
@@ -231,7 +232,7 @@ export class DecodedPictures {
 
   #decode(number) {
     const group = new Group();
-    this.turn = this.turn.then(async () => {
+    const decode = async () => {
       if (this.isClosed) return;
       try {
         await this.decoder.decode(this.samples[number], (picture, levels) => group.add(picture, levels));
@@ -239,7 +240,9 @@ export class DecodedPictures {
         group.fail(error);
       }
       group.isDone = true;
-    });
+    };
+    if (this.decoder.isConcurrent) decode();
+    else this.turn = this.turn.then(decode);
     return group;
   }
 }

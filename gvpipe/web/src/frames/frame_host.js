@@ -7,8 +7,6 @@ import { dracoBinary } from "../format/draco.js";
 import { GeometryVideoError } from "../format/errors.js";
 import { FrameDecoder } from "./frame_decoder.js";
 
-const AHEAD = 3; // frames
-
 export class FrameHost {
   #payload;
   #worker = null;
@@ -97,18 +95,16 @@ export class FrameHost {
   }
 }
 
-/** The clock's decoder: one frame at a time; of frames in a row, some are asked for before their turn, so that the worker never waits. */
+/** The clock's decoder: frames are asked for at once, and the worker answers in turn. A segment that is not decoded holds up its own alone. */
 export class FrameSource {
+  isConcurrent = true;
   #host;
-  #frameCount;
   #level;
-  #asked = new Map(); // frame -> promise
-  #before = -2; // the frame decoded last; none yet
+  #before = -2; // the frame asked for last; none yet
 
-  /** @param {FrameHost} host @param {number} frameCount D distinct frames @param {number} level of detail */
-  constructor(host, frameCount, level) {
+  /** @param {FrameHost} host @param {number} level of detail */
+  constructor(host, level) {
     this.#host = host;
-    this.#frameCount = frameCount;
     this.#level = level;
   }
 
@@ -116,16 +112,7 @@ export class FrameSource {
   async decode([{ picture }], give) {
     const isNext = picture === this.#before + 1;
     this.#before = picture;
-    const found = this.#asked.get(picture) ?? this.#host.read(picture, picture + 1, this.#level, isNext);
-    const ahead = isNext ? AHEAD : 0;
-    for (const frame of this.#asked.keys()) if (frame <= picture || frame > picture + ahead) this.#asked.delete(frame);
-    for (let frame = picture + 1; frame <= Math.min(picture + ahead, this.#frameCount - 1); frame++) {
-      if (this.#asked.has(frame)) continue;
-      const promise = this.#host.read(frame, frame + 1, this.#level, true);
-      promise.catch(() => this.#asked.get(frame) === promise && this.#asked.delete(frame)); // asked for again in its turn
-      this.#asked.set(frame, promise);
-    }
-    give(picture, await found);
+    give(picture, await this.#host.read(picture, picture + 1, this.#level, isNext));
   }
 
   close() {}
