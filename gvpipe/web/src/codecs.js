@@ -49,20 +49,27 @@ async function openMcgv(source, { fps, vertices, container }, distinct, repeated
   const reader = await McgvReader.open(distinct, code);
   const file = source instanceof Uint8Array ? source : null;
   const load = async (first, last) => file ?? Promise.all(reader.sectionsOf(first, last).map((name) => source.load(name)));
+  const open = () => {
+    if (!reader.samples) return DecodedPictures.without(fps, repeated, reader.zeroLevels, reader.segmentStarts, load);
+    if (!file) return DecodedPictures.inParts(source, fps, repeated, reader.pictureSize, reader.samples, load);
+    return openPictures(file, fps, repeated, reader.pictureSize, reader.samples, container.track_crc32);
+  };
   return {
     faces: reader.faces,
     basePoints: reader.basePoints,
     vertexCount: vertices,
     levels: [vertices],
     level: 0,
-    /** Once pictures are open: of a file in parts, sections come with them. */
-    get bounds() {
-      return reader.bounds();
-    },
-    openPictures() {
-      if (!reader.samples) return DecodedPictures.without(fps, repeated, reader.zeroLevels, reader.segmentStarts, load);
-      if (!file) return DecodedPictures.inParts(source, fps, repeated, reader.pictureSize, reader.samples, load);
-      return openPictures(file, fps, repeated, reader.pictureSize, reader.samples, container.track_crc32);
+    bounds: null,
+    async openPictures() {
+      const pictures = await open();
+      try {
+        this.bounds ??= reader.bounds(); // of a file in parts, sections come with pictures
+      } catch (error) {
+        pictures.close();
+        throw error;
+      }
+      return pictures;
     },
     rebuild: (frame, levels, positions) => reader.rebuild(frame, levels, positions),
     async at(other) {

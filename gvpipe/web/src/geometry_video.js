@@ -154,7 +154,7 @@ export class GeometryVideo {
     if (reader.level === this.level) return;
     const pictures = await reader.openPictures(this.#shown);
     try {
-      const asset = reader.level === 0 ? (this.#asset ?? (await this.#readAsset(wholeOf(this, reader), reader))) : { ...NO_ASSET, metadata: this.metadata };
+      const asset = reader.level === 0 ? (this.#asset ?? (await this.#readAsset(this.#whole(reader), reader))) : { ...NO_ASSET, metadata: this.metadata };
       await this.#queued(async () => {
         for (let i = 0; i < CATCHES && pictures.shown !== this.#shown; i++) await pictures.seek(this.#shown);
         const isPlaying = Boolean(this.#pictures.playing);
@@ -199,6 +199,13 @@ export class GeometryVideo {
     /** `Int32Array` (V, 3): the first frame on the file's lattice, if it has one; vertices with equal rows are one point of the surface. */
     this.basePoints = reader.basePoints;
     this.#takeAsset(asset);
+  }
+
+  /** The whole mesh, which `reader` reads, as `readAsset` needs it while another level is shown. */
+  #whole(reader) {
+    const { faces: indices, vertexCount } = reader;
+    const frame = (k) => this.#positionsBeside(reader, k);
+    return { frameCount: this.frameCount, vertexCount, triangleCount: indices.length / 3, indices, frame };
   }
 
   /** What lies beside positions of level 0, which `reader` reads; kept. */
@@ -257,18 +264,6 @@ export class GeometryVideo {
     this.#reader.rebuild(this.#repeated.distinctOf(k), this.#pictures.levels(), positions);
     return positions;
   }
-}
-
-/** The whole mesh of a video that shows another level, as `readAsset` needs it. */
-function wholeOf({ frameCount }, { faces, vertexCount, openPictures, rebuild }) {
-  const frame = async (k) => {
-    const pictures = await openPictures(k);
-    const positions = new Float32Array(3 * vertexCount);
-    rebuild(0, pictures.levels(), positions);
-    pictures.close();
-    return positions;
-  };
-  return { frameCount, vertexCount, triangleCount: faces.length / 3, indices: faces, frame };
 }
 
 /** The file in parts, where it is on a web server and in the stream layout; else null, or all of it where it has come. */

@@ -36,8 +36,7 @@ export class GeometryVideoElement extends HTMLElement {
   playbackRate: number;
   readonly speed: number;
   /** "auto", or the number of a level of detail; attribute `lod`. */
-  get lod(): number | "auto";
-  set lod(lod: number | "auto");
+  lod: number | "auto";
   /** Seconds: where the frame shown begins, or the one that is sought. To set it keeps what plays playing. */
   currentTime: number;
   /** Seconds; NaN while nothing is loaded. */

@@ -56,8 +56,7 @@ export class GeometryVideoMesh extends Mesh<BufferGeometry, ThreeMaterial | Thre
   /** Shows frame k, and pauses. Of many calls in a row the last counts. */
   seek(k: number): Promise<void>;
   /** "auto": a coarser level of detail where the page cannot keep up while it plays, a finer one again once it can; else the level. */
-  get lod(): number | "auto";
-  set lod(lod: number | "coarsest" | "auto");
+  lod: number | "auto";
   /** Shows another level of detail; a promise that it is shown. */
   setLevel(level: number | "coarsest"): Promise<void>;
   readonly currentFrame: number;

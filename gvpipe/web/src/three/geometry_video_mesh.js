@@ -85,7 +85,7 @@ export class GeometryVideoMesh extends Mesh {
     this.#open(positions, new Set());
     const on = {
       show: (shown, k) => this.#show(shown, k),
-      prepare: (k) => this.#field?.field.load(k),
+      prepare: (k) => (video.level ? undefined : this.#wanted.field?.load(k)),
       tell: (type) => this.dispatchEvent({ type }),
       fail: (error) => this.dispatchEvent({ type: "error", error }),
     };
