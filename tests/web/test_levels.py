@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,8 @@ import browsers
 import numpy as np
 import pytest
 from file_server import serving
+from long_files import write_long
 from pages import LOAD
-from sequences import waving
 
 import gvpipe
 
@@ -24,13 +23,7 @@ for (const name of ["levelchange", "ready"]) element.addEventListener(name, ({ d
 @pytest.fixture(scope="module")
 def long(site: tuple[Path, str]) -> Path:
     """A file of codec `pca` in parts: what all segments share exceeds the first request."""
-    path = site[0] / "long.mp4"
-    waves = waving(16, 60)
-    noise = np.random.default_rng(1).random((2, waves.n_vertices, 60), np.float32)
-    attributes = {"noise": noise[0], "more": noise[1]}
-    sequence = dataclasses.replace(waves, attributes=attributes)
-    gvpipe.encode(sequence, path, "pca", stream=True, segment=12, attributes=dict.fromkeys(attributes, "exact"))
-    return path
+    return write_long(site[0] / "long.mp4", 5)
 
 
 def test_a_worker_asks_for_parts(module: Callable[..., Any], long: Path) -> None:

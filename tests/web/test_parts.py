@@ -14,16 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 from file_server import CHUNK, Served, serving
+from long_files import write_long
 from pages import BUNDLE
-from sequences import waving
 
 import gvpipe
 from gvpipe.container.mp4 import read_file
 from gvpipe.container.stream_layout import StoredSections
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no node")
-FIRST = 1 << 16  # bytes of the player's first request
-SEGMENT = 12  # frames
 VERTICES = [8000, 6000, 4000, 3000, 2000, 1000, 500]
 Ask = Callable[..., Any]
 
@@ -48,16 +46,7 @@ def node() -> Iterator[Ask]:
 @pytest.fixture(scope="module")
 def long(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A `pca` file of ten segments that walk away; what all share exceeds the first request."""
-    path = tmp_path_factory.mktemp("long") / "long.mp4"
-    waves = waving(16, 10 * SEGMENT)
-    walk = 0.1 * np.arange(waves.n_frames, dtype=np.float32)[:, None, None] * np.array([1, 0, 0], np.float32)
-    noise = np.random.default_rng(1).random((2, waves.n_vertices, 60), np.float32)
-    attributes = {"noise": noise[0], "more": noise[1]}
-    sequence = dataclasses.replace(waves, positions=waves.read(0, waves.n_frames) + walk, attributes=attributes)
-    gvpipe.encode(
-        sequence, path, "pca", stream=True, segment=SEGMENT, quality=90, attributes=dict.fromkeys(attributes, "exact")
-    )
-    return path
+    return write_long(tmp_path_factory.mktemp("long") / "long.mp4", 10)
 
 
 @pytest.fixture

@@ -300,6 +300,7 @@ export class GeometryVideoElement extends HTMLElement {
     });
     mesh.addEventListener("levelchange", ({ level }) => {
       this.#bar.setVideo(this.video);
+      if (level === 0) this.#showField();
       this.#tell("levelchange", level);
     });
     mesh.addEventListener("error", ({ error }) => this.#fail(error));
@@ -334,6 +335,7 @@ export class GeometryVideoElement extends HTMLElement {
   /** Show the field of attribute `field`, if the video has it, or else the materials. */
   async #showField() {
     const { video } = this;
+    if (video.level) return; // only the whole mesh has fields
     const showing = (this.#showing = {});
     const field = video.fields.get(this.getAttribute("field")) ?? null;
     this.#say(field ? `Decoding ${field.name} …` : "");
