@@ -251,20 +251,21 @@ export class GeometryVideoElement extends HTMLElement {
     const loading = this.#loading;
     this.#say("Loading …");
     this.#tell("loadstart");
-    let video = null;
+    let [loaded, video] = [null, null];
     try {
       const file = typeof source === "string" && source[0] === "#" ? embedded(source) : source;
       const level = this.lod === "auto" ? "coarsest" : this.lod || "coarsest"; // shown at once
-      video = await GeometryVideo.load(file, { level });
+      loaded = GeometryVideo.load(file, { level });
+      this.#stage ??= openStage(this.shadowRoot.querySelector("canvas")); // while a worker decodes
+      video = await loaded;
       if (loading !== this.#loading) return video.close();
-      this.#stage ??= openStage(this.shadowRoot.querySelector("canvas"));
       await this.#stage.setMesh(video, this.getAttribute("up") ?? (video.metadata.up_axis === "z" ? "z" : "y"));
       if (loading !== this.#loading) return video.close();
       if (video.level) this.#tell("levelchange", video.level);
       if (level === "coarsest" && video.level) await this.#stage.mesh.setLevel(0);
       if (loading !== this.#loading) return video.close();
     } catch (error) {
-      video?.close();
+      loaded?.then((late) => late.close(), () => {});
       if (loading === this.#loading) this.#fail(error);
       return undefined;
     }
