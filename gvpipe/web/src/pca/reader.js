@@ -12,10 +12,10 @@ import {
   HIERARCHY_SECONDS_PER_TRIANGLE as SECONDS_PER_TRIANGLE,
   HIERARCHY_SECONDS_PER_VERTEX as SECONDS_PER_VERTEX,
 } from "../constants.js";
+import { inSlices } from "../format/slices.js";
 import { decodeTopology } from "../format/topology_only.js";
 import { decodeBasis, splitBasis } from "../trajectory/basis.js";
 import { placed, taken } from "../trajectory/causal_order.js";
-import { inSlices } from "../frames/slices.js";
 import { vectorSteps } from "../trajectory/coefficient_coding.js";
 import { Segment } from "../trajectory/segment.js";
 import { SECTION as STILL, readStill } from "../trajectory/still_points.js";
