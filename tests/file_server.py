@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 CHUNK = 1 << 14
+HELD = 30  # s, at most
 
 
 @dataclass
@@ -24,6 +25,8 @@ class Served:
         cut: bytes after which answers end early; 0: they do not.
         etag: of the file.
         rate: bits per second; 0: as fast as it can.
+        held: what lies behind so many bytes is sent once ``go`` is set.
+        go: see ``held``.
         sent: ``(offset, bytes)`` of each answer.
     """
 
@@ -34,6 +37,8 @@ class Served:
     cut: int = 0
     etag: str = '"1"'
     rate: float = 0.0
+    held: int = 1 << 62
+    go: threading.Event = field(default_factory=threading.Event)
     sent: list[tuple[int, int]] = field(default_factory=list)
 
     @property
@@ -98,8 +103,11 @@ def answer(handler: http.server.BaseHTTPRequestHandler, served: Served) -> None:
         stop = min(stop, start + served.cut)
     served.sent.append((start, stop - start))
     with contextlib.suppress(OSError):
-        for at in range(start, stop, CHUNK):
-            part = served.data[at : min(at + CHUNK, stop)]
-            handler.wfile.write(part)
+        begun = time.perf_counter()
+        at = start
+        while at < stop and (at < served.held or served.go.wait(HELD)):
+            end = min(at + CHUNK, stop, served.held if at < served.held else stop)
+            handler.wfile.write(served.data[at:end])
+            at = end
             if served.rate:
-                time.sleep(8 * len(part) / served.rate)
+                time.sleep(max(0.0, 8 * (at - start) / served.rate - (time.perf_counter() - begun)))

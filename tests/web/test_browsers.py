@@ -15,7 +15,9 @@ import numpy as np
 import pages
 import pytest
 from asset_files import picture, write_asset
+from file_server import serving
 from folders import ROOT
+from long_files import write_long
 from PIL import Image
 from sequences import held, waving
 
@@ -62,6 +64,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]
         gvpipe.encode(held(waving(12, len(lengths)), lengths), folder / f"{kind}.mp4", **settings)
     with browsers.served(folder) as address:
         yield folder, address
+
+
+@pytest.fixture(scope="module")
+def long(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_long(tmp_path_factory.mktemp("long") / "long.mp4", 3)
 
 
 @pytest.fixture
@@ -147,6 +154,17 @@ def test_a_canvas_that_gives_other_samples(module: Callable[..., Any]) -> None:
     load = "return GeometryVideo.load(args[0]).then(() => [], (error) => [error.kind, error.message])"
     kind, message = module(noise + load, "jpeg.mp4")
     assert kind == "unsupported" and "--convert" in message, message
+
+
+@pytest.mark.parametrize("ranges", [True, False])
+def test_parts_are_exact(ranges: bool, module: Callable[..., Any], long: Path) -> None:
+    """Frames of a file in parts, fetched by a worker's wish, and of one that comes as a whole."""
+    visited = [0, 31, 5, 35]
+    with gvpipe.open(long) as video, serving(long.read_bytes()) as (url, served):
+        served.ranges = ranges
+        for k, text in zip(visited, module(pages.FRAMES, url, visited)["frames"], strict=True):
+            assert np.array_equal(pages.points(text), video[k]), f"frame {k}"
+        assert (len(served.sent) > 3) == ranges
 
 
 LOOPS = f"""{pages.TEXT} const video = await GeometryVideo.load(args[0]);

@@ -46,7 +46,7 @@ class PcaReader:
         self._still = read_still(bitstream, self._mesh)
         self._causal = leave_out(causal_order(self._hierarchy, self._header.predictor), self._still.flags)
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
-        self._kept: tuple[tuple[int, int], Segment] | None = None  # segment and level; points that the level lacks are 0
+        self._kept: tuple[tuple[int, int], Segment] | None = None  # segment and level, which has its own points alone
 
     @property
     def n_frames(self) -> int:
@@ -90,7 +90,8 @@ class PcaReader:
         vertices = self._mesh.points if lod == 0 else self._alive(lod)
         if not self._still.n_moving:
             return np.repeat(self._still.positions[None, vertices], stop - start, axis=0)
-        frames = read_frames(start, stop, self._bounds, vertices, lambda s: self._decode(s, lod))
+        rows = vertices if lod == 0 else np.arange(len(vertices))  # of a segment's coefficients
+        frames = read_frames(start, stop, self._bounds, rows, lambda s: self._decode(s, lod))
         self._still.overwrite(frames, vertices)
         return frames
 
@@ -118,6 +119,8 @@ class PcaReader:
             )
             if self._header.predictor == "lsp":
                 coefficients = coefficients[:, ::-1]
+            if lod:
+                coefficients = coefficients[self._alive(lod)]
             self._kept = (s, lod), Segment(basis, np.ascontiguousarray(coefficients.T))
         return self._kept[1]
 

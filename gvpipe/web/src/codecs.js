@@ -4,6 +4,7 @@ import { DecodedPictures } from "./decoded_pictures.js";
 import { GeometryVideoError, quote } from "./format/errors.js";
 import { readableVersion } from "./frames/frame_decoder.js";
 import { FrameHost, FrameSource } from "./frames/frame_host.js";
+import { PartPayload } from "./frames/part_payload.js";
 import { CODEC as MCGV, VERSION as MCGV_VERSION } from "./mcgv/header.js";
 import { McgvReader } from "./mcgv/reader.js";
 import { openPictures } from "./pictures.js";
@@ -14,16 +15,17 @@ const BYTES_PER_VERTEX = 12; // of a frame
 /**
  * @typedef {object} Playable
  * @property {Uint32Array} faces (T, 3) flat @property {Int32Array} basePoints (V, 3) flat: equal rows are one point of the surface
- * @property {{min: number[], max: number[]}} bounds of the motion, model units
- * @property {number} vertexCount V @property {number[]} levels vertices of each level of detail
- * @property {() => Promise<DecodedPictures>} openPictures a clock, and what it shows for each distinct frame
+ * @property {{min: number[], max: number[]}} bounds of the motion, model units, once pictures are open; they may grow
+ * @property {number} vertexCount V @property {number[]} levels vertices of each level of detail @property {number} level this one
+ * @property {(frame?: number) => Promise<DecodedPictures>} openPictures a clock, and what it shows for each distinct frame
+ * @property {(level: number) => Promise<Playable>} at another level, closed with this one
  * @property {(frame: number, shown: Uint8Array|Float32Array, positions: Float32Array) => void} rebuild fills positions (V, 3) of a
  *   distinct frame from what the clock shows
  * @property {() => void} close
  *
  * @param {Uint8Array|import("./format/stream_file.js").StreamFile} source the file, or its parts
  * @param {import("./format/payload.js").Payload} payload
- * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {number} level of detail
+ * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {number|"coarsest"} level of detail
  * @returns {Promise<Playable>}
  * @throws {GeometryVideoError} it is damaged, or this player or browser cannot read it
  */
@@ -40,52 +42,79 @@ export async function openCodec(source, payload, repeated, level) {
     throw new GeometryVideoError("unsupported", "this browser has no WebAssembly with SIMD; a newer one is needed");
   }
   const distinct = repeated.distinctPayload(payload);
-  if (codec !== MCGV) return openFrames(code, payload.header, distinct, repeated, level);
+  if (codec !== MCGV) return openFrames(code, source, payload.header, distinct, repeated, level);
   return openMcgv(code, source, payload.header, distinct, repeated, level);
 }
 
 async function openMcgv(code, source, { fps, vertices, container }, distinct, repeated, level) {
-  if (level) throw new GeometryVideoError("unsupported", `level ${level}: there are levels 0..0`);
+  checkOnlyLevel(level);
   const reader = await McgvReader.open(distinct, code);
   const file = source instanceof Uint8Array ? source : null;
   const load = async (first, last) => file ?? Promise.all(reader.sectionsOf(first, last).map((name) => source.load(name)));
+  const open = () => {
+    if (!reader.samples) return DecodedPictures.without(fps, repeated, reader.zeroLevels, reader.segmentStarts, load);
+    if (!file) return DecodedPictures.inParts(source, fps, repeated, reader.planes, load);
+    return openPictures(file, fps, repeated, reader.planes, container.track_crc32);
+  };
   return {
     faces: reader.faces,
     basePoints: reader.basePoints,
     vertexCount: vertices,
     levels: [vertices],
-    /** Once pictures are open: of a file in parts, sections come with them. */
-    get bounds() {
-      return reader.bounds();
-    },
-    openPictures() {
-      if (!reader.samples) return DecodedPictures.without(fps, repeated, reader.zeroLevels, reader.segmentStarts, load);
-      if (!file) return DecodedPictures.inParts(source, fps, repeated, reader.planes, load);
-      return openPictures(file, fps, repeated, reader.planes, container.track_crc32);
+    level: 0,
+    bounds: null,
+    async openPictures() {
+      const pictures = await open();
+      try {
+        this.bounds ??= reader.bounds(); // of a file in parts, sections come with pictures
+      } catch (error) {
+        pictures.close();
+        throw error;
+      }
+      return pictures;
     },
     rebuild: (frame, levels, positions) => reader.rebuild(frame, levels, positions),
+    async at(other) {
+      checkOnlyLevel(other);
+      return this;
+    },
     close() {},
   };
 }
 
-async function openFrames(code, { fps }, distinct, repeated, level) {
-  const host = new FrameHost(distinct, code, level);
-  try {
-    const { faces, points, levels, bounds } = await host.describe();
+function checkOnlyLevel(level) {
+  if (level && level !== "coarsest") throw new GeometryVideoError("unsupported", `level ${level}: there are levels 0..0`);
+}
+
+async function openFrames(code, source, { fps }, distinct, repeated, level) {
+  const isWhole = source instanceof Uint8Array;
+  const host = new FrameHost(isWhole ? distinct : new PartPayload(distinct, source), code);
+  const frames = Array.from({ length: repeated.distinct }, (_, picture) => [{ picture }]);
+  const at = async (wanted) => {
+    const { level: own, faces, points, levels } = await host.describe(wanted);
     const basePoints = new Int32Array(3 * points.length);
     points.forEach((point, v) => (basePoints[3 * v] = point));
-    const frames = Array.from({ length: repeated.distinct }, (_, picture) => [{ picture }]);
     const size = BYTES_PER_VERTEX * points.length;
     return {
       faces,
       basePoints,
-      bounds,
       vertexCount: points.length,
       levels,
-      openPictures: () => DecodedPictures.of(frames, size, fps, repeated, new FrameSource(host, repeated.distinct)),
+      level: own,
+      get bounds() {
+        return host.bounds;
+      },
+      get isWaiting() {
+        return !isWhole && source.isWaiting;
+      },
+      openPictures: (frame) => DecodedPictures.of(frames, size, fps, repeated, new FrameSource(host, own), frame),
       rebuild: (frame, shown, positions) => positions.set(shown),
+      at,
       close: () => host.close(),
     };
+  };
+  try {
+    return await at(level);
   } catch (error) {
     host.close();
     throw error;

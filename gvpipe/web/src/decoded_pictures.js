@@ -40,13 +40,15 @@ export class DecodedPictures {
    *
    * @param {{picture: number}[][]} groups in order @param {number} groupBytes of what is kept of a group, about
    * @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated
-   * @param {{decode: (group: object[], give: (picture: number, shown: object) => void) => Promise<void>, close: () => void}} decoder
+   * @param {{decode: (group: object[], give: (picture: number, shown: object) => void) => Promise<void>, close: () => void,
+   *   isConcurrent?: boolean}} decoder `isConcurrent`: it takes a group while it decodes others
+   * @param {number} [frame] shown first
    * @returns {Promise<DecodedPictures>}
    */
-  static async of(groups, groupBytes, fps, repeated, decoder) {
+  static async of(groups, groupBytes, fps, repeated, decoder, frame = 0) {
     const pictures = new DecodedPictures(groups, groupBytes, fps, repeated, decoder);
     try {
-      await pictures.seek(0);
+      await pictures.seek(frame);
     } catch (error) {
       pictures.close();
       throw error;
@@ -140,9 +142,10 @@ export class DecodedPictures {
 
   /**
    * Play on from here, `rate` times as fast; calls `show(frame)` for each frame that is due, `ended()` at the end if it does
-   * not loop, `failed(error)` if it cannot go on. `nextTick(tick)` has `tick(ms)` called at the next step of the clock.
+   * not loop, `failed(error)` if it cannot go on. `nextTick(tick)` has `tick(ms)` called at the next step of the clock;
+   * `ticked(ms, isThere)` is called then, with whether the frame that is due is there.
    */
-  async play({ show, ended, failed, nextTick = nextRepaint }, rate, loop) {
+  async play({ show, ended, failed, nextTick = nextRepaint, ticked }, rate, loop) {
     const playing = (this.playing = {});
     let position = Math.max(0, this.shown); // frames since the start
     let before = null;
@@ -163,6 +166,7 @@ export class DecodedPictures {
         return;
       }
       const levels = group.levels.get(picture);
+      ticked?.(now, Boolean(levels));
       if (levels) {
         position = loop ? next % this.frames : next;
         if (frame !== this.shown) {
@@ -228,7 +232,7 @@ export class DecodedPictures {
 
   #decode(number) {
     const group = new Group();
-    this.turn = this.turn.then(async () => {
+    const decode = async () => {
       if (this.isClosed) return;
       try {
         await this.decoder.decode(this.samples[number], (picture, levels) => group.add(picture, levels));
@@ -236,7 +240,9 @@ export class DecodedPictures {
         group.fail(error);
       }
       group.isDone = true;
-    });
+    };
+    if (this.decoder.isConcurrent) decode();
+    else this.turn = this.turn.then(decode);
     return group;
   }
 }

@@ -6,7 +6,7 @@
  *     video.play((positions, frame) => draw(positions));   // as the video plays
  */
 
-import { NO_ASSET, readAsset } from "./asset/asset.js";
+import { NO_ASSET, readAsset, readCoarseAsset } from "./asset/asset.js";
 import { openCodec } from "./codecs.js";
 import { readContainer } from "./format/boxes.js";
 import { GeometryVideoError } from "./format/errors.js";
@@ -16,6 +16,7 @@ import { StreamFile } from "./format/stream_file.js";
 
 export { GeometryVideoError };
 
+const CATCHES = 3; // times that another level seeks the frame that plays, which goes on meanwhile
 const FROM_DISK = "pages opened from a disk may not fetch; open it from a web server, or make a page with gvpipe export-html";
 
 export class GeometryVideo {
@@ -23,7 +24,7 @@ export class GeometryVideo {
    * Load a geometry video of codec `laplacian`, `mcgv` or `pca`, as `gvpipe encode` writes it.
    *
    * @param {string|URL|Blob|ArrayBuffer|Uint8Array} source an address, or the file itself
-   * @param {{level?: number}} [options] a level of detail above 0 is a coarser mesh, without attributes and fields
+   * @param {{level?: number|"coarsest"}} [options] a level of detail above 0 is a coarser mesh, without attributes and fields
    * @returns {Promise<GeometryVideo>}
    * @throws {GeometryVideoError} it cannot be fetched, it is no geometry video, it is damaged, or not one for browsers
    */
@@ -38,44 +39,51 @@ export class GeometryVideo {
       pictures = await reader.openPictures();
       const video = new GeometryVideo(payload.header, file?.length ?? parts.size, repeated, reader, pictures);
       video.#isInParts = !file;
-      if (level === 0) video.#takeAsset(await readAsset(payload, video, (k) => video.#positionsBeside(k)));
+      video.#closeFile = () => parts?.close?.();
+      video.#payload = payload;
+      video.#takeAsset(reader.level ? await readCoarseAsset(payload) : await video.#readAsset(video, reader));
       return video;
     } catch (error) {
       pictures?.close();
       reader?.close();
+      parts?.close?.();
       if (!(error instanceof RangeError)) throw error; // an array that the browser cannot give
       throw new GeometryVideoError("unsupported", "it needs more memory than this browser has for a page");
     }
   }
 
+  #payload;
   #repeated;
   #reader;
   #pictures;
   #isInParts = false; // fetched when it is needed
+  #closeFile = () => {};
+  #isClosed = false;
+  #shown = 0; // the frame shown last
+  #playing = null; // what `play` was given last
+  #asset = null; // of level 0, once it is read
   #queue = Promise.resolve();
+  #changed = Promise.resolve(); // one change of the level after the other
   #beside = null; // a promise of pictures of their own, for fields that follow from positions
   #queueBeside = Promise.resolve();
-  #closeAsset;
 
   constructor(header, byteLength, repeated, reader, pictures) {
     this.frameCount = header.frames;
     this.fps = header.fps;
-    this.vertexCount = reader.vertexCount;
-    this.triangleCount = reader.faces.length / 3;
     /** Of the whole file. */
     this.byteLength = byteLength;
-    /** `Uint32Array` (T, 3): triangles, counter-clockwise. */
-    this.indices = reader.faces;
-    /** Vertices of each level of detail, the whole mesh first. */
-    this.levels = reader.levels;
-    /** `Int32Array` (V, 3): the first frame on the file's lattice, if it has one; vertices with equal rows are one point of the surface. */
-    this.basePoints = reader.basePoints;
-    /** `{min, max}`: the box that the motion stays in, model units. */
-    this.bounds = reader.bounds;
-    this.#takeAsset(NO_ASSET);
     this.#repeated = repeated;
-    this.#reader = reader;
-    this.#pictures = pictures;
+    this.#takeLevel(reader, pictures, NO_ASSET);
+  }
+
+  /** `{min, max}`: the box that the motion stays in, model units. Of a file in segments without pictures: of those read so far. */
+  get bounds() {
+    return this.#reader.bounds;
+  }
+
+  /** Whether a part of the file is on its way. */
+  get isWaiting() {
+    return this.#reader.isWaiting ?? false;
   }
 
   /** Seconds. */
@@ -102,17 +110,15 @@ export class GeometryVideo {
    * @param {Float32Array} [positions] to fill, instead of a new array
    * @returns {Promise<Float32Array>} (V, 3), model units
    */
-  frame(k, positions = new Float32Array(3 * this.vertexCount)) {
+  frame(k, positions = null) {
     if (!Number.isInteger(k) || k < 0 || k >= this.frameCount) {
       return Promise.reject(new RangeError(`frame ${k}: there are ${this.frameCount}`));
     }
-    const result = this.#queue.then(async () => {
+    return this.#queued(async () => {
       this.pause();
       await this.#pictures.seek(k);
-      return this.#read(k, positions);
+      return this.#read(k, positions ?? new Float32Array(3 * this.vertexCount));
     });
-    this.#queue = result.catch(() => {});
-    return result;
   }
 
   /**
@@ -120,14 +126,48 @@ export class GeometryVideo {
    *
    * @param {(positions: Float32Array, k: number) => void} show called for each frame; the array is used again for the next
    * @param {{rate?: number, loop?: boolean, ended?: () => void, failed?: (error: Error) => void,
-   *   nextTick?: (tick: (now: number) => void) => void}} [options] `rate` 1 is the video's own speed; `failed` is called if a
-   *   frame later on cannot be decoded; `nextTick` is a clock in place of the page's: it calls `tick` at its next step, with ms
+   *   nextTick?: (tick: (now: number) => void) => void, ticked?: (now: number, isThere: boolean) => void}} [options] `rate` 1 is the
+   *   video's own speed; `failed` is called if a frame later on cannot be decoded; `nextTick` is a clock in place of the page's: it
+   *   calls `tick` at its next step, with ms; `ticked` is called at each step, with whether the frame that is due was there
    */
-  async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {}, nextTick } = {}) {
+  async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {}, nextTick, ticked } = {}) {
     await this.#queue;
-    const positions = new Float32Array(3 * this.vertexCount);
-    const on = { show: (k) => show(this.#read(k, positions), k), ended, failed, nextTick };
-    await this.#pictures.play(on, rate, loop);
+    this.#playing = { show, ended, failed, nextTick, ticked, rate, loop };
+    await this.#start();
+  }
+
+  /**
+   * Show another level of detail from now on: `level`, `indices`, `basePoints`, numbers of vertices and triangles, and what the
+   * asset has change. What plays goes on, at the old level until the new one is decoded.
+   *
+   * @param {number|"coarsest"} level @returns {Promise<void>} that it is shown
+   * @throws {GeometryVideoError} there is no such level, or it cannot be fetched or decoded
+   */
+  setLevel(level) {
+    const changed = this.#changed.then(() => this.#change(level));
+    this.#changed = changed.catch(() => {});
+    return changed;
+  }
+
+  async #change(level) {
+    const reader = await this.#reader.at(level);
+    if (reader.level === this.level) return;
+    const pictures = await reader.openPictures(this.#shown);
+    try {
+      const asset = reader.level === 0 ? (this.#asset ?? (await this.#readAsset(this.#whole(reader), reader))) : { ...NO_ASSET, metadata: this.metadata };
+      await this.#queued(async () => {
+        for (let i = 0; i < CATCHES && pictures.shown !== this.#shown; i++) await pictures.seek(this.#shown);
+        const isPlaying = Boolean(this.#pictures.playing);
+        this.#pictures.close();
+        if (this.#isClosed) return;
+        this.#takeLevel(reader, pictures, asset);
+        if (isPlaying) await this.#start();
+      });
+    } catch (error) {
+      pictures.close();
+      throw error;
+    }
+    if (this.#isClosed) pictures.close();
   }
 
   /** Stop playing. */
@@ -137,10 +177,41 @@ export class GeometryVideo {
 
   /** Free the video; the object is of no use afterwards. */
   close() {
+    this.#isClosed = true;
     this.#pictures.close();
     this.#beside?.then((pictures) => pictures.close()).catch(() => {});
-    this.#closeAsset();
+    this.#asset?.close();
     this.#reader.close();
+    this.#closeFile();
+  }
+
+  #takeLevel(reader, pictures, asset) {
+    this.#reader = reader;
+    this.#pictures = pictures;
+    /** The level of detail; 0: the whole mesh. */
+    this.level = reader.level;
+    /** Vertices of each level of detail, the whole mesh first. */
+    this.levels = reader.levels;
+    this.vertexCount = reader.vertexCount;
+    this.triangleCount = reader.faces.length / 3;
+    /** `Uint32Array` (T, 3): triangles, counter-clockwise. */
+    this.indices = reader.faces;
+    /** `Int32Array` (V, 3): the first frame on the file's lattice, if it has one; vertices with equal rows are one point of the surface. */
+    this.basePoints = reader.basePoints;
+    this.#takeAsset(asset);
+  }
+
+  /** The whole mesh, which `reader` reads, as `readAsset` needs it while another level is shown. */
+  #whole(reader) {
+    const { faces: indices, vertexCount } = reader;
+    const frame = (k) => this.#positionsBeside(reader, k);
+    return { frameCount: this.frameCount, vertexCount, triangleCount: indices.length / 3, indices, frame };
+  }
+
+  /** What lies beside positions of level 0, which `reader` reads; kept. */
+  async #readAsset(video, reader) {
+    this.#asset = await readAsset(this.#payload, video, (k) => this.#positionsBeside(reader, k));
+    return this.#asset;
   }
 
   #takeAsset(asset) {
@@ -159,24 +230,37 @@ export class GeometryVideo {
     this.metadata = asset.metadata;
     /** What of the file is not read, a line each. */
     this.notes = asset.notes;
-    this.#closeAsset = asset.close;
   }
 
-  /** The positions of frame k by pictures of their own, so that what plays goes on. */
-  #positionsBeside(k) {
-    this.#beside ??= this.#reader.openPictures();
+  /** The positions of frame k of level 0 by pictures of their own, so that what plays goes on. */
+  #positionsBeside(reader, k) {
+    this.#beside ??= reader.openPictures();
     const result = this.#queueBeside.then(async () => {
       const pictures = await this.#beside;
       await pictures.seek(k);
-      const positions = new Float32Array(3 * this.vertexCount);
-      this.#reader.rebuild(this.#repeated.distinctOf(k), pictures.levels(), positions);
+      const positions = new Float32Array(3 * reader.vertexCount);
+      reader.rebuild(this.#repeated.distinctOf(k), pictures.levels(), positions);
       return positions;
     });
     this.#queueBeside = result.catch(() => {});
     return result;
   }
 
+  /** What `work` gives, once the calls before are answered. */
+  #queued(work) {
+    const result = this.#queue.then(work);
+    this.#queue = result.catch(() => {});
+    return result;
+  }
+
+  async #start() {
+    const { show, rate, loop, ...on } = this.#playing;
+    const positions = new Float32Array(3 * this.vertexCount);
+    await this.#pictures.play({ ...on, show: (k) => show(this.#read(k, positions), k) }, rate, loop);
+  }
+
   #read(k, positions) {
+    this.#shown = k;
     this.#reader.rebuild(this.#repeated.distinctOf(k), this.#pictures.levels(), positions);
     return positions;
   }
@@ -184,7 +268,7 @@ export class GeometryVideo {
 
 /** The file in parts, where it is on a web server and in the stream layout; else null, or all of it where it has come. */
 async function openParts(source) {
-  if (!(typeof source === "string" || source instanceof URL) || typeof VideoDecoder !== "function") return null;
+  if (!(typeof source === "string" || source instanceof URL)) return null;
   if (!/^https?:$/.test(new URL(source, location.href).protocol)) return null;
   try {
     return await StreamFile.open(source);

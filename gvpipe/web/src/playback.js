@@ -4,6 +4,8 @@
  * Times are seconds. A frame's time is where it begins; the time is the duration once playing has ended.
  */
 
+import { LevelChooser } from "./level_chooser.js";
+
 const ROUNDING = 1e-4; // of a frame: k / fps * fps may be a little less than k
 export const SLOWEST = 0.0625; // what browsers play
 export const FASTEST = 16;
@@ -24,13 +26,14 @@ export class Playback {
   #video;
   #on;
   #nextTick;
-  #positions;
   #wanted = null; // the frame that is to be sought next
   #aim = 0; // the frame that was wanted last
   #seeking = null; // promise
   #rate = 1;
   #loops = false;
   #isClosed = false;
+  #chooser = null; // LevelChooser, where levels are chosen here
+  #isChanging = false; // to the level that it wants
 
   /** The frame shown. */
   currentFrame = 0;
@@ -49,7 +52,6 @@ export class Playback {
     this.#video = video;
     this.#on = on;
     this.#nextTick = nextTick;
-    this.#positions = new Float32Array(3 * video.vertexCount);
   }
 
   get duration() {
@@ -96,6 +98,29 @@ export class Playback {
     this.#playAnew();
   }
 
+  /** Whether the level of detail follows what the page can do while it plays. */
+  get choosesLevel() {
+    return this.#chooser !== null;
+  }
+
+  set choosesLevel(isWanted) {
+    this.#chooser = isWanted && this.#video.levels.length > 1 ? new LevelChooser(this.#video.levels) : null;
+  }
+
+  /** Show another level of detail; what plays goes on. @throws {GeometryVideoError} */
+  async setLevel(level) {
+    await this.#video.setLevel(level);
+    if (this.#isClosed || !this.paused || this.#seeking) return; // what plays, or is sought, is of that level
+    const k = this.currentFrame;
+    const positions = await this.#video.frame(k);
+    if (!this.#isClosed && this.#isCurrent(positions)) this.#on.show(positions, k);
+  }
+
+  /** Whether positions are of the level that is shown: it may have changed since they were asked for. */
+  #isCurrent(positions) {
+    return positions.length === 3 * this.#video.vertexCount;
+  }
+
   /** Play on from the frame shown; from the start if that is the last. */
   async play() {
     if (!this.paused || this.#isClosed) return;
@@ -138,9 +163,10 @@ export class Playback {
       while (this.#wanted !== null) {
         const k = this.#wanted;
         this.#wanted = null;
-        await Promise.all([this.#video.frame(k, this.#positions), this.#on.prepare(k)]);
+        const [positions] = await Promise.all([this.#video.frame(k), this.#on.prepare(k)]);
         if (this.#isClosed) return;
-        this.#show(this.#positions, k);
+        if (this.#isCurrent(positions)) this.#show(positions, k);
+        else this.#wanted ??= k;
       }
     } catch (error) {
       this.#fail(error);
@@ -164,6 +190,7 @@ export class Playback {
       ended: () => this.#end(),
       failed: (error) => this.#fail(error),
       nextTick: this.#nextTick,
+      ticked: (now, isThere) => this.#chooseLevel(now, isThere),
     };
     try {
       await this.#video.play((positions, k) => this.#show(positions, k), on);
@@ -174,6 +201,25 @@ export class Playback {
       if (error.name === "NotAllowedError") this.pause();
       else this.#fail(error);
     }
+  }
+
+  #chooseLevel(now, isThere) {
+    const chooser = this.#chooser;
+    if (!chooser || this.#isChanging) return;
+    if (this.#video.isWaiting) {
+      chooser.restart();
+      return;
+    }
+    const { level, fps } = this.#video;
+    const wanted = chooser.step(now, level, isThere, 1000 / (fps * this.#rate));
+    if (wanted === level) return;
+    this.#isChanging = true;
+    this.setLevel(wanted)
+      .catch((error) => this.#fail(error))
+      .finally(() => {
+        this.#isChanging = false;
+        chooser.restart();
+      });
   }
 
   #show(positions, k) {

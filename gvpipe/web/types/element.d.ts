@@ -9,6 +9,8 @@ export interface GeometryVideoElementEventMap extends HTMLElementEventMap {
   ready: CustomEvent<null>;
   /** The number of the frame that is shown. */
   frame: CustomEvent<number>;
+  /** The level of detail that is shown. */
+  levelchange: CustomEvent<number>;
   /** `detail` is a `GeometryVideoError` if the file is at fault. */
   error: CustomEvent<Error> & ErrorEvent;
 }
@@ -33,6 +35,8 @@ export class GeometryVideoElement extends HTMLElement {
   /** 0.0625 to 16; attribute `speed`. */
   playbackRate: number;
   readonly speed: number;
+  /** "auto", or the number of a level of detail; attribute `lod`. */
+  lod: number | "auto";
   /** Seconds: where the frame shown begins, or the one that is sought. To set it keeps what plays playing. */
   currentTime: number;
   /** Seconds; NaN while nothing is loaded. */

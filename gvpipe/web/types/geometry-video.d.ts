@@ -31,6 +31,8 @@ export interface PlayOptions {
   failed?: (error: Error) => void;
   /** A clock in place of the page's: it calls `tick` once, at its next step, with milliseconds. */
   nextTick?: (tick: (now: number) => void) => void;
+  /** Called at each step of the clock, with whether the frame that is due was there. */
+  ticked?: (now: number, isThere: boolean) => void;
 }
 
 /** A named mesh of the video: ranges `[start, stop]` of its vertices and triangles. */
@@ -116,9 +118,11 @@ export interface Image {
 
 export class GeometryVideo {
   private constructor();
-  /** Rejects with a `GeometryVideoError` if it cannot be fetched, or is no geometry video that browsers play. */
-  /** A `level` of detail above 0 is a coarser mesh, without attributes and fields. */
-  static load(source: Source, options?: { level?: number }): Promise<GeometryVideo>;
+  /**
+   * Rejects with a `GeometryVideoError` if it cannot be fetched, or is no geometry video that browsers play. A `level` of detail above
+   * 0 is a coarser mesh, without attributes and fields.
+   */
+  static load(source: Source, options?: { level?: number | "coarsest" }): Promise<GeometryVideo>;
   readonly frameCount: number;
   /** Frames per second. */
   readonly fps: number;
@@ -138,7 +142,16 @@ export class GeometryVideo {
   readonly basePoints: Int32Array;
   /** Vertices of each level of detail, the whole mesh first. */
   readonly levels: number[];
-  /** The box that the motion stays in, model units. */
+  /** The level of detail that is shown; 0: the whole mesh. */
+  readonly level: number;
+  /**
+   * Shows another level of detail from now on: numbers of vertices and triangles, `indices`, `basePoints` and what lies beside
+   * positions change. What plays goes on.
+   */
+  setLevel(level: number | "coarsest"): Promise<void>;
+  /** Whether a part of the file is on its way. */
+  readonly isWaiting: boolean;
+  /** The box that the motion stays in, model units. It may grow as segments of the file are read. */
   readonly bounds: { min: [number, number, number]; max: [number, number, number] };
   readonly parts: Part[];
   readonly attributes: Map<string, Attribute>;

@@ -31,7 +31,9 @@ export interface GeometryVideoMeshEvents extends Object3DEventMap {
   ratechange: {};
   /** A frame is shown. */
   frame: { frame: number };
-  /** Late values of a field have come: the scene is to be drawn anew. */
+  /** Another level of detail is shown; geometry and materials are new. */
+  levelchange: { level: number };
+  /** Late values of a field, or textures, have come: the scene is to be drawn anew. */
   change: {};
   error: { error: Error };
 }
@@ -53,6 +55,10 @@ export class GeometryVideoMesh extends Mesh<BufferGeometry, ThreeMaterial | Thre
   pause(): void;
   /** Shows frame k, and pauses. Of many calls in a row the last counts. */
   seek(k: number): Promise<void>;
+  /** "auto": a coarser level of detail where the page cannot keep up while it plays, a finer one again once it can; else the level. */
+  lod: number | "auto";
+  /** Shows another level of detail; a promise that it is shown. */
+  setLevel(level: number | "coarsest"): Promise<void>;
   readonly currentFrame: number;
   /** The frame shown, or the one that is sought. */
   readonly soughtFrame: number;

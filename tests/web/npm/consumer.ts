@@ -26,6 +26,8 @@ export async function show(scene: Scene, camera: PerspectiveCamera): Promise<Geo
   camera.lookAt(mesh.geometry.boundingSphere!.center);
   mesh.addEventListener("frame", ({ frame }) => frame.toFixed(0));
   mesh.loop = true;
+  mesh.lod = "auto";
+  await mesh.setLevel(mesh.video.levels.length - 1);
   mesh.currentTime = mesh.duration / 2;
   const range: [number, number] | null = await mesh.showField("height", { colormap: "magma", range: [0, 1] });
   // @ts-expect-error no such colour map

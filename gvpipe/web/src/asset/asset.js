@@ -33,6 +33,7 @@ const HUGE = 3.5e38; // above float32's largest number
 export const KINDS = ["uv", "normal", "tangent", "color", "scalar", "vector", "label"];
 export const DOMAINS = ["vertex", "corner", "triangle", "part"];
 const WIDTHS = { uv: [2], normal: [3], tangent: [3, 4], color: [3, 4] }; // components of a kind; others have any number
+const NEWER = "what the file has beside positions is not shown: a newer gvpipe wrote it";
 const FULL_SCALES = { uint8: 255, uint16: 65535, uint32: 2 ** 32 - 1 };
 
 export const NO_ASSET = {
@@ -56,11 +57,8 @@ export const NO_ASSET = {
  * @throws {GeometryVideoError} a member or a section is not as gvpipe writes it
  */
 export async function readAsset(payload, video, positions) {
-  if (!payload.sections.has(SECTION)) return NO_ASSET;
-  const list = new AssetEntry(await readJson(payload.section(SECTION), payload.budget), "the list");
-  if (list.integer("version", undefined, 1, 2 ** 31) > VERSION) {
-    return { ...NO_ASSET, notes: ["what the file has beside positions is not shown: a newer gvpipe wrote it"] };
-  }
+  const list = await readList(payload);
+  if (!list) return payload.sections.has(SECTION) ? { ...NO_ASSET, notes: [NEWER] } : NO_ASSET;
   const images = readImages(list.list("images", MAX_ITEMS), payload);
   const materials = readMaterials(list.list("materials", MAX_ITEMS), images.length);
   const notes = [];
@@ -75,6 +73,19 @@ export async function readAsset(payload, video, positions) {
   const metadata = list.given.metadata ?? {};
   const close = () => host.close();
   return { indices, parts, attributes, fields, materials, images, polygons, metadata, notes, close };
+}
+
+/** What a coarser level of detail has of an asset: its metadata. @returns {Promise<typeof NO_ASSET>} @throws {GeometryVideoError} */
+export async function readCoarseAsset(payload) {
+  const list = await readList(payload);
+  return { ...NO_ASSET, metadata: list?.given.metadata ?? {} };
+}
+
+/** The list of what an asset has; null if a file has none, or one of a newer gvpipe. */
+async function readList(payload) {
+  if (!payload.sections.has(SECTION)) return null;
+  const list = new AssetEntry(await readJson(payload.section(SECTION), payload.budget), "the list");
+  return list.integer("version", undefined, 1, 2 ** 31) > VERSION ? null : list;
 }
 
 async function readJson(data, budget) {

@@ -18,6 +18,11 @@ export class Budget {
 
   /** @param {number} bytes of the file */
   constructor(bytes) {
+    this.grow(bytes);
+  }
+
+  /** That more of the file has come. @param {number} bytes of the file so far */
+  grow(bytes) {
     this.bytes = bytes;
     this.memory = Math.max(LEAST_BYTES, BYTES_PER_BYTE * bytes);
     this.seconds = Math.max(LEAST_SECONDS, SECONDS_PER_BYTE * bytes);

@@ -1,6 +1,6 @@
 /**
  * A file in the stream layout on a web server, of which parts are fetched by HTTP Range: the index and what all segments share
- * at first, then transforms and fragments of the video when they are asked for. `docs/format.md`, section 1.2.
+ * at first, then sections of segments and fragments of the video when they are asked for. `docs/format.md`, section 1.2.
  */
 
 import { readFragmentSamples } from "../fragments.js";
@@ -8,40 +8,65 @@ import { readDescription, ranks } from "../track.js";
 import { findIndex, readTag } from "./boxes.js";
 import { crc32 } from "./checksum.js";
 import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
+import { Incoming } from "./incoming.js";
 import { checkHead, readIndex } from "./stream_layout.js";
 
 const FIRST = 1 << 16; // bytes of the first request
-const OF_SEGMENTS = /^(transforms|trajectories)\.\d+$/;
+const OF_SEGMENTS = /^(transforms|trajectories|basis|coefficients|anchors|deltas|clip)\.(\d+)$/;
+const OF_PICTURES = /^(transforms|trajectories)\./; // whose fragments need WebCodecs
 const OF_FIELDS = /^field\./;
 const PARTIAL = 206;
 
 export class StreamFile {
   /**
    * @param {string|URL} url
-   * @returns {Promise<StreamFile|Uint8Array|null>} the whole file where the server knows no Range, and of a plain layout, of
-   *   fields, or where nothing belongs to segments; null where the server refuses
+   * @returns {Promise<StreamFile|Uint8Array|null>} the whole file where it has the plain layout or fields, where nothing belongs to
+   *   segments, and of pictures where there is no WebCodecs; null where the server refuses
    * @throws {GeometryVideoError} the index is damaged
    */
   static async open(url) {
     const response = await fetch(url, { headers: { Range: `bytes=0-${FIRST - 1}` } });
     if (!response.ok) return null;
-    const start = new Uint8Array(await response.arrayBuffer());
-    if (response.status !== PARTIAL || start.length < FIRST) return start;
+    const incoming = response.status === PARTIAL ? null : new Incoming(response, url);
+    const start = incoming ? await incoming.read(0, FIRST) : new Uint8Array(await response.arrayBuffer());
+    if (start.length < FIRST) return start;
+    const rest = (data) => incoming?.whole() ?? fetchRest(url, data);
     const box = findIndex(start);
-    if (!box) return fetchRest(url, start);
-    const file = new StreamFile(url, start.length);
+    if (!box) return rest(start);
+    const file = new StreamFile(url, start.length, incoming);
     const more = Math.max(0, box.end - start.length);
     const data = more ? join(start, await file.#fetch(start.length, more)) : start;
-    return (await file.#begin(data, box)) ? file : fetchRest(url, data);
+    return (await file.#begin(data, box)) ? file : rest(data);
   }
 
-  constructor(url, received) {
+  constructor(url, received, incoming) {
     this.url = url;
     /** Bytes that have come so far. */
     this.received = received;
+    this.incoming = incoming; // where the server knows no Range
+    this.start = null; // bytes that came at first, until a segment is here
     /** Sections that are here, by name. */
     this.sections = new Map();
-    this.loading = new Map(); // name -> a promise of it
+    this.segments = new Map(); // number -> names of its sections
+    this.loading = new Map(); // number -> a promise of its sections
+    this.used = []; // numbers of segments that are here, the one asked for last at the end
+    /** Bytes of segments that are kept, the latest at least. */
+    this.mostKept = Infinity;
+  }
+
+  /** Fetch nothing more. */
+  close() {
+    this.incoming?.close();
+  }
+
+  /** Names of all sections, here or not. */
+  get names() {
+    return [...this.places.keys()];
+  }
+
+  /** Whether a segment is on its way. */
+  get isWaiting() {
+    return this.loading.size > 0;
   }
 
   /** What a decoder of its pictures is set up with. @throws {GeometryVideoError} */
@@ -58,6 +83,7 @@ export class StreamFile {
     const { entries, fragments, size, headSize, headChecksum } = readIndex(data.subarray(box.start, box.end));
     const names = entries.map(({ name }) => name);
     if (names.some((name) => OF_FIELDS.test(name)) || !names.some((name) => OF_SEGMENTS.test(name))) return false;
+    if (names.some((name) => OF_PICTURES.test(name)) && typeof VideoDecoder !== "function") return false;
     this.head = checkHead(data, headSize, headChecksum);
     this.id = readTag(this.head)?.[2] ?? "";
     this.size = size;
@@ -65,26 +91,62 @@ export class StreamFile {
     let first = 0;
     this.fragments = fragments.map((fragment) => ({ ...fragment, first: (first += fragment.pictures) - fragment.pictures }));
     this.pictures = first;
+    for (const name of names) {
+      const number = OF_SEGMENTS.exec(name)?.[2];
+      if (number) this.segments.set(number, [...(this.segments.get(number) ?? []), name]);
+    }
     const shared = entries.filter(({ name }) => !OF_SEGMENTS.test(name));
     const start = Math.min(...shared.map(({ offset }) => offset));
     const end = Math.max(...shared.map(({ offset, length }) => offset + length));
     if (end > size) throw new GeometryVideoError("corrupt", `the index names places outside of the file; ${AGAIN}`);
-    const bytes = end <= data.length ? data.subarray(start, end) : await this.#fetch(start, end - start);
-    for (const { name, offset, length, checksum } of shared) {
-      this.#keep(name, bytes.slice(offset - start, offset - start + length), checksum);
-    }
+    const more = Math.max(0, end - data.length);
+    this.start = more ? join(data, await this.#fetch(data.length, more)) : data;
+    this.#take(shared.map(({ name }) => name), this.start.subarray(start, end), start);
     return true;
   }
 
-  /** Have a section here; nothing for names that the file has not. @throws {GeometryVideoError} */
-  load(name) {
-    if (!this.places.has(name) || this.sections.has(name)) return Promise.resolve();
-    if (!this.loading.has(name)) {
-      const { offset, length, checksum } = this.places.get(name);
-      const loaded = this.#fetch(offset, length).then((data) => this.#keep(name, data, checksum));
-      this.loading.set(name, loaded.finally(() => this.loading.delete(name)));
+  /**
+   * Have a section here, with the others of its segment, which lie beside it.
+   *
+   * @returns {Promise<Uint8Array|undefined>} nothing for names that the file has not
+   * @throws {GeometryVideoError} it cannot be fetched, or is not the one that the index describes
+   */
+  async load(name) {
+    const number = this.places.has(name) ? OF_SEGMENTS.exec(name)?.[2] : undefined;
+    if (number === undefined) return this.sections.get(name);
+    if (!this.sections.has(name)) await this.loadSegment(number);
+    const data = this.sections.get(name);
+    this.used = [...this.used.filter((other) => other !== number), number];
+    this.#drop();
+    return data;
+  }
+
+  /** Have all sections of a segment here. @param {string} number @throws {GeometryVideoError} as `load` */
+  loadSegment(number) {
+    if (!this.loading.has(number)) this.loading.set(number, this.#fetchSegment(number).finally(() => this.loading.delete(number)));
+    return this.loading.get(number);
+  }
+
+  async #fetchSegment(number) {
+    const names = this.segments.get(number);
+    const places = names.map((name) => this.places.get(name));
+    const start = Math.min(...places.map(({ offset }) => offset));
+    const length = Math.max(...places.map((place) => place.offset + place.length)) - start;
+    const areAdjacent = length === places.reduce((sum, place) => sum + place.length, 0);
+    if (areAdjacent) this.#take(names, await this.#fetch(start, length), start);
+    else await Promise.all(places.map(async (place, i) => this.#take([names[i]], await this.#fetch(place.offset, place.length), place.offset)));
+    this.start = null;
+  }
+
+  /** Forget segments that were not asked for lately. */
+  #drop() {
+    const size = (number) => this.segments.get(number).reduce((sum, name) => sum + this.places.get(name).length, 0);
+    let bytes = this.used.reduce((sum, number) => sum + size(number), 0);
+    while (bytes > this.mostKept && this.used.length > 1) {
+      const oldest = this.used.shift();
+      bytes -= size(oldest);
+      for (const name of this.segments.get(oldest)) this.sections.delete(name);
     }
-    return this.loading.get(name);
   }
 
   /** The coded pictures of a fragment. @returns {Promise<import("../track.js").Sample[]>} @throws {GeometryVideoError} */
@@ -105,15 +167,22 @@ export class StreamFile {
     return sizes.map((size, i) => ({ data: data.subarray(places[i], places[i] + size), picture: first + order[i] }));
   }
 
-  #keep(name, data, checksum) {
-    if (crc32(data) !== checksum) throw corrupt(name, "its checksum does not match");
-    this.sections.set(name, data);
+  /** Keep sections of these names, of bytes that start at an offset of the file. */
+  #take(names, bytes, start) {
+    for (const name of names) {
+      const { offset, length, checksum } = this.places.get(name);
+      const data = bytes.slice(offset - start, offset - start + length);
+      if (crc32(data) !== checksum) throw corrupt(name, "its checksum does not match");
+      this.sections.set(name, data);
+    }
   }
 
   async #fetch(offset, length) {
+    if (offset + length <= this.start?.length) return this.start.subarray(offset, offset + length);
     const wanted = `bytes ${offset} to ${offset + length - 1} of ${this.url}`;
     let response;
     let data;
+    if (this.incoming) return this.#await(offset, length, wanted);
     try {
       response = await fetch(this.url, { headers: { Range: `bytes=${offset}-${offset + length - 1}` } });
       if (response.status === PARTIAL) data = new Uint8Array(await response.arrayBuffer());
@@ -122,12 +191,22 @@ export class StreamFile {
       throw new GeometryVideoError("load", `${wanted} cannot be fetched: ${error.message}; try again`);
     }
     if (!data) throw new GeometryVideoError("load", `${wanted} cannot be fetched: status ${response.status}; load the page again`);
-    if (data.length !== length) {
-      throw new GeometryVideoError("load", `${wanted} cannot be fetched: ${data.length} bytes came; load the page again`);
-    }
+    checkLength(data, length, wanted);
     this.received += length;
     return data;
   }
+
+  async #await(offset, length, wanted) {
+    const data = await this.incoming.read(offset, length);
+    checkLength(data, length, wanted);
+    this.received = this.incoming.received;
+    return data;
+  }
+}
+
+function checkLength(data, length, wanted) {
+  if (data.length === length) return;
+  throw new GeometryVideoError("load", `${wanted} cannot be fetched: ${data.length} bytes came; load the page again`);
 }
 
 /** All of a file whose start is here; null if the server refuses. */

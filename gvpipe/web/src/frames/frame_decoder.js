@@ -7,9 +7,13 @@ import { PcaReader, VERSION as PCA_VERSION } from "../pca/reader.js";
 import { Kernels } from "../wasm/kernels.js";
 
 const LOOKS = 16; // frames that a look at the motion takes
+const AHEAD = 10; // s: a segment that begins later is not decoded ahead
 const CORRECTIONS = "corrections";
 
-/** Readers by codec: `open(payload, kernels)` gives `faces`, `points`, `levels`, `levelFaces`, `segmentStart` and `read`. */
+/**
+ * Readers by codec: `open(payload, kernels)` gives `faces`, `points`, `levels`, `levelFaces`, `segmentStart` and `read`, and `prepare`
+ * where a segment is decoded ahead.
+ */
 const READERS = {
   laplacian: { version: LAPLACIAN_VERSION, reader: LaplacianReader },
   pca: { version: PCA_VERSION, reader: PcaReader },
@@ -21,61 +25,101 @@ export function readableVersion(codec) {
 }
 
 export class FrameDecoder {
+  #header;
   #reader;
   #corrections;
-  #level;
+  #looked = new Set(); // "segment level" whose motion is in the box
+  #bounds = { min: [Infinity, Infinity, Infinity], max: [-Infinity, -Infinity, -Infinity] };
 
   /**
    * @param {import("../format/payload.js").Payload} payload of the distinct frames; `section` may return promises
-   * @param {Uint8Array} code of kernels @param {number} level of detail
+   * @param {Uint8Array} code of kernels
    * @returns {Promise<FrameDecoder>}
-   * @throws {GeometryVideoError} a section is not as gvpipe writes it, or there is no such level
+   * @throws {GeometryVideoError} a section is not as gvpipe writes it
    */
-  static async open(payload, code, level) {
+  static async open(payload, code) {
     const { codec, frames, vertices } = payload.header;
     const reader = await guarded("mesh", async () => READERS[codec].reader.open(payload, await Kernels.open(code)));
-    if (!(level >= 0 && level < reader.levels.length)) {
-      throw new GeometryVideoError("unsupported", `level ${level}: there are levels 0..${reader.levels.length - 1}`);
-    }
-    const isCorrected = level === 0 && payload.sections.has(CORRECTIONS);
-    const data = isCorrected ? await payload.section(CORRECTIONS) : null;
-    return new FrameDecoder(reader, data && new Displacements(data, frames, vertices, CORRECTIONS), level);
+    const data = payload.sections.has(CORRECTIONS) ? await payload.section(CORRECTIONS) : null;
+    return new FrameDecoder(payload.header, reader, data && new Displacements(data, frames, vertices, CORRECTIONS));
   }
 
-  constructor(reader, corrections, level) {
+  constructor(header, reader, corrections) {
+    this.#header = header;
     this.#reader = reader;
     this.#corrections = corrections;
-    this.#level = level;
   }
 
   /**
-   * What a page must know of the mesh.
+   * What a page must know of the mesh at a level of detail.
    *
-   * @returns {Promise<{faces: Uint32Array, points: Int32Array, levels: number[], bounds: {min: number[], max: number[]}}>} triangles
-   *   (T, 3), flat; the point of each vertex; vertices of each level; the box of the first segment's motion, by evenly spaced frames
+   * @param {number|"coarsest"} wanted
+   * @returns {Promise<{level: number, faces: Uint32Array, points: Int32Array, levels: number[]}>} triangles (T, 3), flat; the point of
+   *   each vertex; vertices of each level
+   * @throws {GeometryVideoError} there is no such level
    */
-  async describe() {
+  async describe(wanted) {
     const reader = this.#reader;
-    const faces = this.#level ? reader.levelFaces(this.#level) : reader.faces;
-    const vertexCount = reader.levels[this.#level];
-    const points = this.#level ? Int32Array.from({ length: vertexCount }, (_, v) => v) : reader.points;
-    const [bounds, last] = [{ min: [0, 0, 0], max: [0, 0, 0] }, reader.segmentStart(1) - 1];
-    const looks = Math.min(LOOKS, last + 1);
-    for (let i = 0; i < looks; i++) {
-      const frame = Math.floor((i * last) / Math.max(1, looks - 1));
-      stretch(bounds, await this.read(frame, frame + 1), i === 0);
+    const { levels } = reader;
+    const level = wanted === "coarsest" ? levels.length - 1 : wanted;
+    if (!(level >= 0 && level < levels.length)) {
+      throw new GeometryVideoError("unsupported", `level ${level}: there are levels 0..${levels.length - 1}`);
     }
-    return { faces, points, levels: reader.levels, bounds };
+    if (level === 0) return { level, levels, faces: reader.faces, points: reader.points };
+    return { level, levels, faces: reader.levelFaces(level), points: Int32Array.from({ length: levels[level] }, (_, v) => v) };
   }
 
-  /** Distinct frames `start` to `stop`. @returns {Promise<Float32Array>} (stop - start, V, 3), model units */
-  async read(start, stop) {
-    const frames = await guarded("coefficients", () => this.#reader.read(start, stop, this.#level));
+  /**
+   * Distinct frames `start` to `stop` of a level.
+   *
+   * @param {boolean} [goesOn] whether the frames behind them are likely to be next: their segment is then decoded ahead
+   * @returns {Promise<{positions: Float32Array, bounds: {min: number[], max: number[]}}>} (stop - start, V, 3), model units; the box of
+   *   the motion so far: of the frames that were read, and of evenly spaced ones of their segments
+   */
+  async read(start, stop, level, goesOn = false) {
+    const positions = await this.#frames(start, stop, level);
+    stretch(this.#bounds, positions);
+    const s = this.#segmentOf(stop - 1);
+    const looked = this.#look(s, level);
+    if (this.#looked.size === 1) await looked; // what is shown first needs a view
+    if (goesOn) this.#prepare(s + 1, stop, level);
+    return { positions, bounds: structuredClone(this.#bounds) };
+  }
+
+  #segmentOf(frame) {
+    let s = 0;
+    while (this.#reader.segmentStart(s + 1) <= frame) s++;
+    return s;
+  }
+
+  async #frames(start, stop, level) {
+    const frames = await guarded("coefficients", () => this.#reader.read(start, stop, level));
     const size = frames.length / (stop - start);
-    for (let k = start; k < stop && this.#corrections; k++) {
+    for (let k = start; k < stop && this.#corrections && level === 0; k++) {
       this.#corrections.apply(k, frames.subarray((k - start) * size, (k - start + 1) * size));
     }
     return frames;
+  }
+
+  /** Stretch the box by a segment's motion, once. A frame that does not decode is told of when it is read. */
+  async #look(s, level) {
+    const key = `${s} ${level}`;
+    if (this.#looked.has(key)) return;
+    this.#looked.add(key);
+    const [first, last] = [this.#reader.segmentStart(s), this.#reader.segmentStart(s + 1) - 1];
+    const looks = Math.min(LOOKS, last - first + 1);
+    for (let i = 0; i < looks; i++) {
+      const frame = first + Math.floor((i * (last - first)) / Math.max(1, looks - 1));
+      stretch(this.#bounds, await this.#frames(frame, frame + 1, level).catch(() => []));
+    }
+  }
+
+  /** Have segment s decoded, if it begins soon. What goes wrong is told when it is read. */
+  async #prepare(s, frame, level) {
+    const { fps, frames } = this.#header;
+    const start = this.#reader.segmentStart(s);
+    if (!this.#reader.prepare || start >= frames || start - frame > AHEAD * fps) return;
+    await this.#reader.prepare(s, level).then(() => this.#look(s, level), () => {});
   }
 }
 
@@ -89,10 +133,10 @@ async function guarded(name, work) {
   }
 }
 
-/** Make a box hold `positions (V, 3)`; the first ones make it. */
-function stretch({ min, max }, positions, isFirst) {
-  for (let axis = 0; axis < 3 && positions.length; axis++) {
-    let [low, high] = isFirst ? [Infinity, -Infinity] : [min[axis], max[axis]];
+/** Make a box hold `positions (V, 3)`. */
+function stretch({ min, max }, positions) {
+  for (let axis = 0; axis < 3; axis++) {
+    let [low, high] = [min[axis], max[axis]];
     for (let i = axis; i < positions.length; i += 3) {
       if (positions[i] < low) low = positions[i];
       if (positions[i] > high) high = positions[i];

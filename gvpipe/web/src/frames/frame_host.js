@@ -7,8 +7,6 @@ import { dracoBinary } from "../format/draco.js";
 import { GeometryVideoError } from "../format/errors.js";
 import { FrameDecoder } from "./frame_decoder.js";
 
-const AHEAD = 3; // frames
-
 export class FrameHost {
   #payload;
   #worker = null;
@@ -17,14 +15,17 @@ export class FrameHost {
   #count = 0;
   #setUp;
 
+  /** `{min, max}`: the box of the motion, of the segments read so far; null: of none. */
+  bounds = null;
+
   /**
-   * @param {import("../format/payload.js").Payload} payload of the distinct frames
-   * @param {Uint8Array} code of kernels @param {number} level of detail
+   * @param {import("../format/payload.js").Payload} payload of the distinct frames; `section` may return promises
+   * @param {Uint8Array} code of kernels
    */
-  constructor(payload, code, level) {
+  constructor(payload, code) {
     this.#payload = payload;
     const { header, sections, budget } = payload;
-    this.#setUp = { task: "frames", header, names: [...sections.keys()], bytes: budget.bytes, code, level, draco: dracoBinary };
+    this.#setUp = { task: "frames", header, names: [...sections.keys()], bytes: budget.bytes, code, draco: dracoBinary };
     try {
       const address = URL.createObjectURL(new Blob([WORKER_SOURCE], { type: "text/javascript" }));
       this.#worker = new Worker(address);
@@ -37,13 +38,15 @@ export class FrameHost {
   }
 
   /** What `FrameDecoder.describe` gives. */
-  describe() {
-    return this.#ask({ method: "describe", given: [] });
+  describe(level) {
+    return this.#ask({ method: "describe", given: [level] });
   }
 
-  /** Distinct frames `start` to `stop`. @returns {Promise<Float32Array>} (stop - start, V, 3), model units */
-  read(start, stop) {
-    return this.#ask({ method: "read", given: [start, stop] });
+  /** As `FrameDecoder.read`. @returns {Promise<Float32Array>} (stop - start, V, 3), model units */
+  async read(...given) {
+    const { positions, bounds } = await this.#ask({ method: "read", given });
+    this.bounds = bounds;
+    return positions;
   }
 
   close() {
@@ -68,7 +71,7 @@ export class FrameHost {
   #goOnHere() {
     this.#worker?.terminate();
     this.#worker = null;
-    this.#decoder = FrameDecoder.open(this.#payload, this.#setUp.code, this.#setUp.level);
+    this.#decoder = FrameDecoder.open(this.#payload, this.#setUp.code);
     this.#decoder.catch(() => {}); // reported by what is asked
     for (const { job, resolve, reject } of this.#jobs.values()) this.#run(job).then(resolve, reject);
     this.#jobs.clear();
@@ -77,9 +80,12 @@ export class FrameHost {
   /** An answer, or a request for a section. */
   async #take({ number, wanted, result, error }) {
     if (wanted !== undefined) {
-      const data = await Promise.resolve(this.#payload.section(wanted)).catch((failure) => failure);
-      if (data instanceof Error) this.#worker?.postMessage({ wanted, error: { kind: data.kind ?? "load", message: data.message } });
-      else this.#worker?.postMessage({ wanted, data: data.slice() });
+      try {
+        const data = (await this.#payload.section(wanted)).slice();
+        this.#worker?.postMessage({ wanted, data, bytes: this.#payload.budget.bytes }, [data.buffer]);
+      } catch ({ kind = "load", message }) {
+        this.#worker?.postMessage({ wanted, error: { kind, message } });
+      }
       return;
     }
     const job = this.#jobs.get(number);
@@ -89,33 +95,24 @@ export class FrameHost {
   }
 }
 
-/** The clock's decoder: one frame at a time; of frames in a row, some are asked for before their turn, so that the worker never waits. */
+/** The clock's decoder: frames are asked for at once, and the worker answers in turn. A segment that is not decoded holds up its own alone. */
 export class FrameSource {
+  isConcurrent = true;
   #host;
-  #frameCount;
-  #asked = new Map(); // frame -> promise
-  #before = -1;
+  #level;
+  #before = -2; // the frame asked for last; none yet
 
-  /** @param {FrameHost} host @param {number} frameCount D distinct frames */
-  constructor(host, frameCount) {
+  /** @param {FrameHost} host @param {number} level of detail */
+  constructor(host, level) {
     this.#host = host;
-    this.#frameCount = frameCount;
+    this.#level = level;
   }
 
   /** As `GroupDecoder.decode`, with positions (V, 3) in place of levels. */
   async decode([{ picture }], give) {
     const isNext = picture === this.#before + 1;
     this.#before = picture;
-    const found = this.#asked.get(picture) ?? this.#host.read(picture, picture + 1);
-    const ahead = isNext ? AHEAD : 0;
-    for (const frame of this.#asked.keys()) if (frame <= picture || frame > picture + ahead) this.#asked.delete(frame);
-    for (let frame = picture + 1; frame <= Math.min(picture + ahead, this.#frameCount - 1); frame++) {
-      if (this.#asked.has(frame)) continue;
-      const promise = this.#host.read(frame, frame + 1);
-      promise.catch(() => {}); // reported when its turn comes
-      this.#asked.set(frame, promise);
-    }
-    give(picture, await found);
+    give(picture, await this.#host.read(picture, picture + 1, this.#level, isNext));
   }
 
   close() {}

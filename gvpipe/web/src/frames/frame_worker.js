@@ -6,10 +6,10 @@ import { FrameDecoder } from "./frame_decoder.js";
 import { RemotePayload } from "./remote_payload.js";
 
 /** @returns {(message: object) => void} what takes the messages after the first */
-export function serveFrames({ header, names, bytes, code, level, draco }) {
+export function serveFrames({ header, names, bytes, code, draco }) {
   useDraco(draco);
   const payload = new RemotePayload(header, names, bytes);
-  const decoder = FrameDecoder.open(payload, code, level);
+  const decoder = FrameDecoder.open(payload, code);
   decoder.catch(() => {}); // reported by what is asked
   return async ({ number, method, given, ...answer }) => {
     if (number === undefined) {
@@ -18,7 +18,7 @@ export function serveFrames({ header, names, bytes, code, level, draco }) {
     }
     try {
       const result = await (await decoder)[method](...given);
-      self.postMessage({ number, result }, result.buffer ? [result.buffer] : []);
+      self.postMessage({ number, result }, result.positions ? [result.positions.buffer] : []);
     } catch (error) {
       const { kind = "unsupported", message } = known(error, "mesh");
       self.postMessage({ number, error: { kind, message } });

@@ -24,7 +24,8 @@ export class RemotePayload {
   }
 
   /** What the page answered. */
-  take({ wanted, data, error }) {
+  take({ wanted, data, bytes, error }) {
+    if (bytes) this.budget.grow(bytes);
     for (const { resolve, reject } of this.#waiting.get(wanted) ?? []) {
       if (error) reject(new GeometryVideoError(error.kind, error.message));
       else resolve(data);

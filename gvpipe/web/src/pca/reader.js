@@ -4,10 +4,11 @@
  */
 
 import { HIERARCHY_MAX_WAVES as MAX_WAVES } from "../constants.js";
+import { inSlices } from "../format/slices.js";
 import { decodeTopology } from "../format/topology_only.js";
 import { decodeBasis, splitBasis } from "../trajectory/basis.js";
 import { placed, taken } from "../trajectory/causal_order.js";
-import { decodeVectors } from "../trajectory/coefficient_coding.js";
+import { vectorSteps } from "../trajectory/coefficient_coding.js";
 import { keepHierarchy } from "../trajectory/hierarchy_budget.js";
 import { Segment } from "../trajectory/segment.js";
 import { SECTION as STILL, readStill } from "../trajectory/still_points.js";
@@ -15,7 +16,7 @@ import { VERSION, readHeader } from "./header.js";
 
 export { VERSION };
 
-const KEPT = 2; // segments: the one shown and the next
+const KEPT = 3; // segments: the one shown and the next, and the one shown at another level
 
 export class PcaReader {
   #payload;
@@ -26,7 +27,7 @@ export class PcaReader {
   #hierarchy; // {order, blocks, waves}
   #still;
   #causal;
-  #segments = new Map(); // "segment level" -> promise, the one used last at the end
+  #segments = new Map(); // "segment level" -> Job, the one used last at the end
 
   /**
    * @param {import("../format/payload.js").Payload} payload `section` may return promises
@@ -97,30 +98,43 @@ export class PcaReader {
    */
   async read(start, stop, level = 0) {
     const points = level ? this.#alive(level) : this.points;
+    const rows = level ? points.map((_, row) => row) : points; // of a segment's numbers
     const frames = new Float32Array(3 * points.length * (stop - start));
     for (let s = 0; s < this.#header.segments && this.#still.movingCount; s++) {
       const [begin, end] = [this.segmentStart(s), this.segmentStart(s + 1)];
       const [first, last] = [Math.max(start, begin), Math.min(stop, end)];
       if (first >= last) continue;
       const segment = await this.#segment(s, level);
-      segment.read(first - begin, last - begin, points, frames.subarray(3 * points.length * (first - start)), first);
+      segment.read(first - begin, last - begin, rows, frames.subarray(3 * points.length * (first - start)), first);
     }
     this.#still.overwrite(frames, points);
     return frames;
   }
 
-  /** A decoded segment; the latest few are kept. @returns {Promise<Segment>} */
-  #segment(s, level) {
-    const key = `${s} ${level}`;
-    const segment = this.#segments.get(key) ?? this.#decode(s, level);
-    this.#segments.delete(key);
-    this.#segments.set(key, segment);
-    if (this.#segments.size > KEPT) this.#segments.delete(this.#segments.keys().next().value);
-    segment.catch(() => this.#segments.delete(key));
-    return segment;
+  /** Have segment s decoded while nothing is that is read. @throws {GeometryVideoError} it does not decode */
+  async prepare(s, level = 0) {
+    if (this.#still.movingCount) await this.#segment(s, level, false);
   }
 
-  async #decode(s, level) {
+  /** A decoded segment; the latest few are kept. @returns {Promise<Segment>} */
+  #segment(s, level, isUrgent = true) {
+    const key = `${s} ${level}`;
+    const job = this.#segments.get(key) ?? { isUrgent, isDone: false };
+    job.isUrgent ||= isUrgent;
+    job.segment ??= this.#decode(s, level, job).finally(() => (job.isDone = true));
+    this.#segments.delete(key);
+    this.#segments.set(key, job);
+    if (this.#segments.size > KEPT) this.#segments.delete(this.#segments.keys().next().value);
+    job.segment.catch(() => this.#segments.get(key) === job && this.#segments.delete(key));
+    return job.segment;
+  }
+
+  /** Whether a segment is being decoded that is read now. */
+  get #isUrgent() {
+    return [...this.#segments.values()].some(({ isUrgent, isDone }) => isUrgent && !isDone);
+  }
+
+  async #decode(s, level, job) {
     const { predictor, beta, steps } = this.#header;
     const { budget } = this.#payload;
     const sections = [await this.#payload.section(`basis.${s}`), await this.#payload.section(`coefficients.${s}`)];
@@ -131,8 +145,10 @@ export class PcaReader {
     const given = this.#given(kernels, basis, isReversed);
     const causal = placed(kernels, this.#causal);
     const how = { predictor, beta, given, blocks: level ? this.#countBlocks(level) : null };
-    const decoded = decodeVectors(kernels, causal, sections[1], basis.components, steps[s], `coefficients.${s}`, how);
-    return new Segment(this.#kernels.fresh(), basis, kernels.view(decoded), this.#topology.pointCount, isReversed);
+    const vectors = vectorSteps(kernels, causal, sections[1], basis.components, steps[s], `coefficients.${s}`, how);
+    const decoded = await inSlices(vectors, () => !job.isUrgent && this.#isUrgent);
+    const chosen = level ? this.#alive(level) : null;
+    return new Segment(this.#kernels.fresh(), basis, kernels.view(decoded), this.#topology.pointCount, isReversed, chosen);
   }
 
   /** Coefficients of the still points, in the order of transmission. */

@@ -3,9 +3,10 @@
  *
  * Attributes: `src` (an address, or `#id` of an element in the page that holds the file as base64 text), `autoplay` (not for
  * those who prefer reduced motion), `loop`, `wireframe`, `follow` (the camera goes with the mesh), `speed` (1 is the video's
- * own), `up` ("y", or "z"), `field` (the name of one that is shown in colours), `colormap`, `range` ("low,high" of the colours).
+ * own), `up` ("y", or "z"), `field` (the name of one that is shown in colours), `colormap`, `range` ("low,high" of the colours),
+ * `lod` (a level of detail, or "auto": a coarser one where the page cannot keep up).
  * Properties, methods and events are those of `HTMLMediaElement` where it has them. Events of its own: `ready`, `frame` (detail:
- * the frame's number); `error` has a `GeometryVideoError` as its detail.
+ * the frame's number), `levelchange` (detail: the level of detail that is shown); `error` has a `GeometryVideoError` as its detail.
  */
 
 import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
@@ -36,7 +37,7 @@ const READY = { nothing: 0, metadata: 1, enough: 4 }; // `readyState`, as in HTM
 const MEDIA_EVENTS = ["play", "playing", "pause", "seeking", "seeked", "timeupdate", "ended", "ratechange"];
 
 export class GeometryVideoElement extends HTMLElement {
-  static observedAttributes = ["src", "loop", "wireframe", "follow", "speed", "field", "colormap", "range"];
+  static observedAttributes = ["src", "loop", "wireframe", "follow", "speed", "field", "colormap", "range", "lod"];
 
   #stage = null;
   #bar;
@@ -98,6 +99,7 @@ export class GeometryVideoElement extends HTMLElement {
     if (["loop", "wireframe", "follow"].includes(name)) this.#bar.setPressed(name, value !== null);
     if (name === "wireframe") this.#stage?.setWireframe(value !== null);
     if (name === "follow") this.#stage?.setFollowing(value !== null);
+    if (name === "lod" && before !== value && this.#mesh) this.#mesh.lod = this.lod;
     if (name === "speed") this.#bar.setSpeed(this.speed);
     if (["field", "colormap", "range"].includes(name) && before !== value && this.#mesh) this.#showField();
     if (name === "loop" && this.#mesh) this.#mesh.loop = this.loop;
@@ -196,6 +198,16 @@ export class GeometryVideoElement extends HTMLElement {
     return new TimeRanges(this.video ? [[0, this.duration]] : []);
   }
 
+  /** "auto", or the number of a level of detail; 0 is the whole mesh. */
+  get lod() {
+    const lod = this.getAttribute("lod") ?? "";
+    return lod === "auto" ? lod : /^\d+$/.test(lod) ? Number(lod) : 0;
+  }
+
+  set lod(lod) {
+    this.setAttribute("lod", lod);
+  }
+
   /** The colour map of fields, one of `COLORMAPS`. */
   get colormap() {
     const name = this.getAttribute("colormap");
@@ -239,15 +251,21 @@ export class GeometryVideoElement extends HTMLElement {
     const loading = this.#loading;
     this.#say("Loading …");
     this.#tell("loadstart");
-    let video = null;
+    let [loaded, video] = [null, null];
     try {
-      video = await GeometryVideo.load(typeof source === "string" && source[0] === "#" ? embedded(source) : source);
+      const file = typeof source === "string" && source[0] === "#" ? embedded(source) : source;
+      const level = this.lod === "auto" ? "coarsest" : this.lod || "coarsest"; // shown at once
+      loaded = GeometryVideo.load(file, { level });
+      this.#stage ??= openStage(this.shadowRoot.querySelector("canvas")); // while a worker decodes
+      video = await loaded;
       if (loading !== this.#loading) return video.close();
-      this.#stage ??= openStage(this.shadowRoot.querySelector("canvas"));
       await this.#stage.setMesh(video, this.getAttribute("up") ?? (video.metadata.up_axis === "z" ? "z" : "y"));
       if (loading !== this.#loading) return video.close();
+      if (video.level) this.#tell("levelchange", video.level);
+      if (level === "coarsest" && video.level) await this.#stage.mesh.setLevel(0);
+      if (loading !== this.#loading) return video.close();
     } catch (error) {
-      video?.close();
+      loaded?.then((late) => late.close(), () => {});
       if (loading === this.#loading) this.#fail(error);
       return undefined;
     }
@@ -274,11 +292,17 @@ export class GeometryVideoElement extends HTMLElement {
     this.#stage.setFollowing(this.hasAttribute("follow"));
     mesh.loop = this.loop;
     mesh.playbackRate = this.speed;
+    if (this.lod !== mesh.lod) mesh.lod = this.lod;
     for (const name of MEDIA_EVENTS) mesh.addEventListener(name, () => this.#tell(name));
     for (const name of ["play", "pause"]) mesh.addEventListener(name, () => this.#bar.setPlaying(!mesh.paused));
     mesh.addEventListener("frame", ({ frame }) => {
       this.#bar.setFrame(frame);
       this.#tell("frame", frame);
+    });
+    mesh.addEventListener("levelchange", ({ level }) => {
+      this.#bar.setVideo(this.video);
+      if (level === 0) this.#showField();
+      this.#tell("levelchange", level);
     });
     mesh.addEventListener("error", ({ error }) => this.#fail(error));
     this.#bar.setVideo(this.video);
@@ -312,6 +336,7 @@ export class GeometryVideoElement extends HTMLElement {
   /** Show the field of attribute `field`, if the video has it, or else the materials. */
   async #showField() {
     const { video } = this;
+    if (video.level) return; // only the whole mesh has fields
     const showing = (this.#showing = {});
     const field = video.fields.get(this.getAttribute("field")) ?? null;
     this.#say(field ? `Decoding ${field.name} …` : "");

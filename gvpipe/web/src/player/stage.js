@@ -1,6 +1,7 @@
 /** The picture: a mesh drawn by three.js, and a camera that frames the whole motion and orbits it. */
 
 import {
+  Box3,
   DirectionalLight,
   HemisphereLight,
   Matrix4,
@@ -16,6 +17,7 @@ import { RoomEnvironment } from "three/addons/environments/RoomEnvironment.js";
 import { GeometryVideoMesh } from "../three/geometry_video_mesh.js";
 
 const FIELD_OF_VIEW = 35; // degrees, of the shorter side
+const FAR = 100; // balls that the motion fits in, at least
 const MARGIN = 1.06; // around what is framed
 const FOLLOWING_ROOM = 1.15; // around a mesh that is followed, which may stretch out later
 const AZIMUTH = Math.PI / 7; // of the first view: from the front, a little from the right and from above
@@ -34,7 +36,7 @@ export class Stage {
     // without a GPU smooth edges would cost more than all else together
     this.renderer = new WebGLRenderer({ canvas, antialias: this.hasGpu, alpha: true });
     this.scene = new Scene();
-    this.camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
+    this.camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, FAR);
     this.scene.add(this.camera);
     const key = new DirectionalLight(0xffffff, 2.2);
     key.position.set(-1.2, 1.6, 1); // light goes with the camera, so that nothing looked at is dark
@@ -58,7 +60,6 @@ export class Stage {
     const { min, max } = video.bounds;
     this.centre = min.map((low, axis) => (low + max[axis]) / 2);
     this.scale = 1 / (Math.hypot(...max.map((high, axis) => high - min[axis])) / 2 || 1); // the scene is a unit ball
-    this.halfBox = max.map((high, axis) => ((high - min[axis]) / 2) * this.scale);
     const { centre, scale, hasGpu } = this;
     const anisotropy = hasGpu ? Math.min(MAX_ANISOTROPY, this.renderer.capabilities.getMaxAnisotropy()) : 1;
     const turn = ++this.turn;
@@ -68,8 +69,8 @@ export class Stage {
     this.mesh = mesh;
     mesh.addEventListener("frame", () => this.#frameShown());
     mesh.addEventListener("change", () => this.requestRender());
-    const all = Uint32Array.from({ length: video.vertexCount }, (_, v) => v);
-    this.used = video.triangleCount ? Uint32Array.from(new Set(video.indices)) : all; // which vertices are drawn
+    mesh.addEventListener("levelchange", () => this.#findUsed());
+    this.#findUsed();
     this.middle = new Vector3();
     this.scene.add(mesh);
     this.camera.up.set(0, up === "z" ? 0 : 1, up === "z" ? 1 : 0);
@@ -118,9 +119,13 @@ export class Stage {
     const up = new Vector3(...upright.slice(3));
     const direction = front.multiplyScalar(Math.cos(ELEVATION)).addScaledVector(up, Math.sin(ELEVATION));
     direction.applyAxisAngle(up, AZIMUTH);
-    this.middle = this.isFollowing ? this.#findMiddle() : new Vector3();
-    const half = this.isFollowing ? this.#findReach(this.middle) : this.halfBox;
-    this.camera.position.copy(direction).multiplyScalar(this.#distance(direction, half)).add(this.middle);
+    this.box = this.#motion();
+    this.middle = this.isFollowing ? this.#findMiddle() : this.box.getCenter(new Vector3());
+    const half = this.isFollowing ? this.#findReach(this.middle) : this.box.getSize(new Vector3()).divideScalar(2).toArray();
+    const distance = this.#distance(direction, half);
+    this.camera.far = Math.max(FAR, 4 * distance);
+    this.camera.updateProjectionMatrix();
+    this.camera.position.copy(direction).multiplyScalar(distance).add(this.middle);
     this.controls.target.copy(this.middle);
     this.controls.update();
     this.isFramed = true;
@@ -189,6 +194,20 @@ export class Stage {
     return this.reflected.texture;
   }
 
+  /** The box of the motion, as far as it is known, in the scene. */
+  #motion() {
+    const { centre, scale } = this;
+    const { min, max } = this.mesh.video.bounds;
+    const [low, high] = [min, max].map((corner) => new Vector3(...corner.map((value, axis) => (value - centre[axis]) * scale)));
+    return new Box3(low, high);
+  }
+
+  #findUsed() {
+    const { indices, vertexCount, triangleCount } = this.mesh.video;
+    const all = Uint32Array.from({ length: vertexCount }, (_, v) => v);
+    this.used = triangleCount ? Uint32Array.from(new Set(indices)) : all; // which vertices are drawn
+  }
+
   /** The mean of the vertices drawn, in the scene. */
   #findMiddle() {
     const array = this.mesh.framePositions;
@@ -211,6 +230,7 @@ export class Stage {
 
   #frameShown() {
     if (this.isFollowing) this.#follow(this.#findMiddle());
+    else if (this.isFramed && !this.box.containsBox(this.#motion())) this.resetView(); // the motion goes farther than was known
     this.requestRender();
   }
 

@@ -45,13 +45,9 @@ export class GeometryVideoMesh extends Mesh {
    * @returns {Promise<GeometryVideoMesh>}
    */
   static async create(video, { centre = [0, 0, 0], scale = 1, gloss = true, anisotropy = 1, environment = () => null, ownClock = false } = {}) {
-    const shown = new Set();
-    for (const material of video.materials) {
-      for (const value of Object.values(material)) if (value?.uv !== undefined) shown.add(value.image);
-    }
     const positions = await video.frame(0);
-    const textures = await Textures.open(video.images, shown, anisotropy);
-    return new GeometryVideoMesh(video, positions, textures, { centre, scale, gloss, environment, ownClock });
+    const textures = await openTextures(video, anisotropy);
+    return new GeometryVideoMesh(video, positions, textures, { centre, scale, gloss, anisotropy, environment, ownClock });
   }
 
   #view;
@@ -59,6 +55,9 @@ export class GeometryVideoMesh extends Mesh {
   #playback;
   #now = 0; // ms of `update`'s clock
   #tick = null; // what waits for its next step
+  #level; // that is drawn
+  #opening = null; // a promise of textures, where a level has others
+  #groupsOf = new Map(); // level -> groups
   #groups = null; // (3T) corners that share a normal
   #normals = null;
   #render = null; // RenderVertices
@@ -68,10 +67,11 @@ export class GeometryVideoMesh extends Mesh {
   #colours; // attribute, or null
   #materials = [];
   #field = null; // FieldColours
-  #wanted = { field: null }; // shown, or to be shown once it is loaded
+  #wanted = { field: null }; // shown, or to be shown once it is loaded, and how
   #fieldRange = [0, 0];
   #drawn = this; // what the materials are of: the mesh, or points
   #wires = null;
+  #isDisposed = false;
 
   /** Made by `create`. */
   constructor(video, positions, textures, view) {
@@ -81,23 +81,11 @@ export class GeometryVideoMesh extends Mesh {
     this.video = video;
     this.#view = view;
     this.#textures = textures;
-    /** `Float32Array` (V, 3): the frame shown, in the geometry's units. */
-    this.framePositions = new Float32Array(positions.length);
-    this.#place(positions);
-    this.#parts = new PartIndex(video.parts, video.triangleCount);
-    this.#colours = colourAttribute(video.attributes);
-    const { channels, notes } = uvChannels(video.materials, video.attributes);
-    this.#channels = channels;
-    /** What is not shown as it should be, a line each. */
-    this.notes = [...video.notes, ...notes, ...textures.notes];
     this.frustumCulled = false; // the box of the motion may be a little small
-    if (video.triangleCount) this.#groupNormals();
-    this.#build(false);
-    if (video.triangleCount) this.#openSurface();
-    else this.#openPoints();
+    this.#open(positions, new Set());
     const on = {
       show: (shown, k) => this.#show(shown, k),
-      prepare: (k) => this.#wanted.field?.load(k),
+      prepare: (k) => (video.level ? undefined : this.#wanted.field?.load(k)),
       tell: (type) => this.dispatchEvent({ type }),
       fail: (error) => this.dispatchEvent({ type: "error", error }),
     };
@@ -179,6 +167,22 @@ export class GeometryVideoMesh extends Mesh {
     this.#playback.playbackRate = rate;
   }
 
+  /** "auto": a coarser level of detail where the page cannot keep up while it plays, a finer one again once it can; else the level. */
+  get lod() {
+    return this.#playback.choosesLevel ? "auto" : this.video.level;
+  }
+
+  set lod(lod) {
+    this.#playback.choosesLevel = lod === "auto";
+    if (lod !== "auto") this.setLevel(lod).catch((error) => this.dispatchEvent({ type: "error", error }));
+  }
+
+  /** Show another level of detail: a promise that it is shown. What plays goes on. @param {number|"coarsest"} level */
+  async setLevel(level) {
+    await this.#playback.setLevel(level);
+    await this.#opening;
+  }
+
   /** Names of the parts, in order, each once. */
   get partNames() {
     return this.#parts.names;
@@ -206,7 +210,7 @@ export class GeometryVideoMesh extends Mesh {
   async showField(name, { colormap = "viridis", range = null } = {}) {
     const field = name === null ? null : this.video.fields.get(name);
     if (field === undefined) throw new RangeError(`there is no field '${name}'; fields: ${[...this.video.fields.keys()].join(", ") || "none"}`);
-    const wanted = (this.#wanted = { field });
+    const wanted = (this.#wanted = { field, colormap, range });
     await field?.load(this.currentFrame);
     if (wanted !== this.#wanted) return null;
     return this.#setField(field, colormap, range);
@@ -219,6 +223,7 @@ export class GeometryVideoMesh extends Mesh {
 
   /** Free the video, and what the GPU has of it. */
   dispose() {
+    this.#isDisposed = true;
     this.#wanted = { field: null };
     this.#playback.close();
     this.#tick = null;
@@ -230,10 +235,71 @@ export class GeometryVideoMesh extends Mesh {
   }
 
   #show(positions, k) {
-    this.#place(positions);
-    this.#update();
-    this.#updateField(k);
+    if (this.video.level === this.#level) {
+      this.#place(positions);
+      this.#setBounds();
+      this.#update();
+      this.#updateField(k);
+    } else {
+      this.#changeLevel(positions);
+    }
     this.dispatchEvent({ type: "frame", frame: k });
+  }
+
+  /** Make all that depends on vertices and triangles; of these parts none is drawn. */
+  #open(positions, hidden) {
+    const { video } = this;
+    this.#level = video.level;
+    /** `Float32Array` (V, 3): the frame shown, in the geometry's units. */
+    this.framePositions = new Float32Array(positions.length);
+    this.#place(positions);
+    this.#parts = new PartIndex(video.parts, video.triangleCount);
+    this.#parts.hide(hidden);
+    this.#colours = colourAttribute(video.attributes);
+    const { channels, notes } = uvChannels(video.materials, video.attributes);
+    this.#channels = channels;
+    /** What is not shown as it should be, a line each. */
+    this.notes = [...video.notes, ...notes, ...this.#textures.notes];
+    if (video.triangleCount && !this.#groupsOf.has(video.level)) this.#groupsOf.set(video.level, this.#groupNormals());
+    this.#groups = this.#groupsOf.get(video.level) ?? null;
+    this.#normals = null;
+    this.#build(false);
+    if (video.triangleCount) this.#openSurface();
+    else this.#openPoints();
+  }
+
+  #changeLevel(positions) {
+    const { video } = this;
+    this.#dropField();
+    this.#closeDrawn();
+    this.#open(positions, this.#parts.hidden);
+    this.dispatchEvent({ type: "levelchange", level: video.level });
+    const { field, ...options } = this.#wanted;
+    if (field && video.fields.has(field.name)) {
+      this.showField(field.name, options).catch((error) => this.dispatchEvent({ type: "error", error }));
+    }
+    if (!video.images.length || this.#textures.images === video.images) return;
+    this.#opening = openTextures(video, this.#view.anisotropy).then((textures) => {
+      this.#textures.dispose();
+      this.#textures = textures;
+      this.notes = [...this.notes, ...textures.notes];
+      if (this.#isDisposed) textures.dispose();
+      if (this.#isDisposed || this.video.images !== textures.images || !this.video.triangleCount) return;
+      const isFieldShown = this.#field !== null;
+      const { material } = this;
+      this.#closeDrawn();
+      this.#openSurface();
+      if (isFieldShown) this.material = material;
+      this.dispatchEvent({ type: "change" });
+    });
+  }
+
+  /** Free materials, and points in place of triangles. */
+  #closeDrawn() {
+    for (const material of [this.#materials].flat()) material.dispose();
+    if (this.#drawn !== this) this.remove(this.#drawn);
+    this.#drawn = this;
+    this.material = [];
   }
 
   #setField(field, colormap, range) {
@@ -266,15 +332,15 @@ export class GeometryVideoMesh extends Mesh {
     }
   }
 
+  /** (3T) which corners share a normal, by the attribute, or by the angles of the frame shown. */
   #groupNormals() {
     const { indices, basePoints, attributes, parts } = this.video;
     const normal = attributes.get("normal");
     if (normal?.kind === "normal" && normal.components === 3) {
-      this.#groups = groupCorners(indices, basePoints, cornerEntries(normal, indices, parts), normal.values);
-    } else {
-      const groups = groupVertices(indices, basePoints, this.framePositions);
-      this.#groups = indices.map((vertex) => groups[vertex]);
+      return groupCorners(indices, basePoints, cornerEntries(normal, indices, parts), normal.values);
     }
+    const groups = groupVertices(indices, basePoints, this.framePositions);
+    return indices.map((vertex) => groups[vertex]);
   }
 
   /** Split vertices as attributes need it, and make the geometry. */
@@ -312,7 +378,7 @@ export class GeometryVideoMesh extends Mesh {
     this.#update();
   }
 
-  /** The box that the whole motion stays in. */
+  /** The box that the whole motion stays in, as far as it is known. */
   #setBounds() {
     const { centre, scale } = this.#view;
     const { min, max } = this.video.bounds;
@@ -379,13 +445,24 @@ export class GeometryVideoMesh extends Mesh {
 
   #closeField() {
     if (!this.#field) return;
-    this.#drawn.material.map?.dispose();
-    this.#drawn.material.dispose();
     const { name } = this.#field;
+    this.#dropField();
     this.geometry.deleteAttribute(name);
-    this.#field = null;
     if (this.#isByTriangle || (name === "color" && this.#colours)) this.#build(false); // as it was before the field
   }
+
+  #dropField() {
+    if (!this.#field) return;
+    this.#drawn.material.map?.dispose();
+    this.#drawn.material.dispose();
+    this.#field = null;
+  }
+}
+
+/** The images that materials show, decoded. */
+function openTextures({ materials, images }, anisotropy) {
+  const textures = materials.flatMap((material) => Object.values(material).filter((value) => value?.uv !== undefined));
+  return Textures.open(images, new Set(textures.map(({ image }) => image)), anisotropy);
 }
 
 /** Which value of an attribute each render vertex has. */

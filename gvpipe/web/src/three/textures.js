@@ -30,6 +30,7 @@ export class Textures {
   static async open(images, wanted, anisotropy) {
     const textures = new Textures();
     textures.anisotropy = anisotropy;
+    textures.images = images;
     /** What cannot be shown, a line each. */
     textures.notes = [];
     for (const number of wanted) { // one after the other, so that few are in memory as pixels twice

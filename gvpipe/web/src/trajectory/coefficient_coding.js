@@ -32,7 +32,12 @@ let tables = null; // made when first needed
  * @returns {import("../wasm/kernels.js").KernelArray} (n, R) float64, by vector
  * @throws {GeometryVideoError} the bytes are not as gvpipe writes them
  */
-export function decodeVectors(kernels, causal, data, components, step, name, { predictor = "kalman", beta = 0, given = null, blocks = null } = {}) {
+export function decodeVectors(...given) {
+  return finish(vectorSteps(...given));
+}
+
+/** `decodeVectors` in steps of some 20 ms, so that other work may come between. @yields after a step */
+export function* vectorSteps(kernels, causal, data, components, step, name, { predictor = "kalman", beta = 0, given = null, blocks = null } = {}) {
   const cursor = new Cursor(data, name);
   const [order, , , , , , bounds] = causal;
   const n = order.shape[0];
@@ -51,12 +56,15 @@ export function decodeVectors(kernels, causal, data, components, step, name, { p
   const inputs = contextInputs(kernels, causal, decoded.shape[0], usual, wanted);
   const residuals = kernels.array("int64", [kernels.view(bounds)[wanted], components]);
   const before = kernels.array("int64", [components], usual);
-  for (let b = 0; b < wanted; b++) stream.check(kernels.call("decode_residuals", residuals, ...inputs, ...stream.arrays, before, b, b + 1)[0]);
+  for (let b = 0; b < wanted; b++) {
+    stream.check(kernels.call("decode_residuals", residuals, ...inputs, ...stream.arrays, before, b, b + 1)[0]);
+    yield;
+  }
   if (blocks === null) stream.end();
   const target = kernels.array("float64", [0, 0]);
   const coding = [...causal, step, residuals, decoded, target];
   const last = predictor === "rbf" ? [beta] : [];
-  inBlocks(residuals.shape[0], (first, end) => kernels.call(`predict_${predictor}`, ...coding, first, end, ...last));
+  yield* blockSteps(residuals.shape[0], (first, end) => kernels.call(`predict_${predictor}`, ...coding, first, end, ...last));
   kernels.free(...inputs, ...stream.arrays, before, residuals, target);
   return decoded;
 }
@@ -67,14 +75,27 @@ export function decodeVectors(kernels, causal, data, components, step, name, { p
  * @param {number} n @param {(first: number, end: number) => unknown} call false ends it @returns {boolean}
  */
 export function inBlocks(n, call) {
+  return finish(blockSteps(n, call));
+}
+
+/** `inBlocks` in steps. @yields after a call */
+function* blockSteps(n, call) {
   let size = LEAST_VECTORS;
   for (let first = 0, end = 0; first < n; first = end) {
     end = Math.min(first + size, n);
     const started = performance.now();
     if (call(first, end) === false) return false;
     if (performance.now() - started < BLOCK_TIME / 2) size *= 2;
+    yield;
   }
   return true;
+}
+
+/** What steps return, taken one after the other. */
+function finish(steps) {
+  let step = steps.next();
+  while (!step.done) step = steps.next();
+  return step.value;
 }
 
 /** The members of Python's `ContextInputs`. */

@@ -16,24 +16,26 @@ export class Segment {
    * @param {import("./basis.js").Basis} basis of n frames
    * @param {Float64Array} coefficients (P, R) by point, flat @param {number} points P
    * @param {boolean} isReversed whether the last component comes first
+   * @param {Int32Array|null} [chosen] points that are read, numbered anew; null: all
    */
-  constructor(kernels, basis, coefficients, points, isReversed) {
+  constructor(kernels, basis, coefficients, points, isReversed, chosen = null) {
     const { components } = basis;
+    const count = chosen?.length ?? points;
     const [mean, vectors] = splitBasis(kernels, basis);
     this.#kernels = kernels;
     this.mean = kernels.view(mean).slice();
     this.#vectors = vectors;
-    this.#coefficients = kernels.array("float64", [components, points]);
+    this.#coefficients = kernels.array("float64", [components, count]);
     const turned = kernels.view(this.#coefficients);
     for (let c = 0; c < components; c++) {
       const from = isReversed ? components - 1 - c : c;
-      for (let point = 0; point < points; point++) turned[c * points + point] = coefficients[point * components + from];
+      for (let i = 0; i < count; i++) turned[c * count + i] = coefficients[(chosen ? chosen[i] : i) * components + from];
     }
   }
 
   /**
    * @param {number} start @param {number} stop frames of the segment
-   * @param {Int32Array} points (V) the point of each vertex
+   * @param {ArrayLike<number>} points (V) the point of each vertex
    * @param {Float32Array} frames (stop - start, V, 3) filled, model units
    * @param {number} number of frame `start` in the file, for messages
    */

@@ -1,0 +1,107 @@
+// Plays a file from a web server as a page does, without a browser: node run_parts.mjs BUNDLE.js; each line of standard input is a
+// command, and gets a line of JSON.
+import { createInterface } from "node:readline";
+import { pathToFileURL } from "node:url";
+import { StreamFile } from "../../gvpipe/web/src/format/stream_file.js";
+import { LevelChooser } from "../../gvpipe/web/src/level_chooser.js";
+import { Playback } from "../../gvpipe/web/src/playback.js";
+
+const { process } = globalThis;
+delete globalThis.process; // Draco's wrapper then takes this for a page
+globalThis.window = globalThis;
+globalThis.location = new URL("http://localhost/");
+const { GeometryVideo } = await import(pathToFileURL(process.argv[2]));
+let video = null;
+
+/** A clock whose steps are `milliseconds` apart, whatever the time is. */
+function clock(milliseconds) {
+  let now = 0;
+  return (tick) => setTimeout(() => tick((now += milliseconds)), 0);
+}
+
+const commands = {
+  async load({ url, level }) {
+    video?.close();
+    video = await GeometryVideo.load(url, { level });
+    return { level: video.level, levels: video.levels, counts: [video.frameCount, video.vertexCount, video.triangleCount] };
+  },
+  async frame({ k }) {
+    const frame = await video.frame(k);
+    return { positions: [...frame], bounds: video.bounds };
+  },
+  async level({ level }) {
+    await video.setLevel(level);
+    return [video.level, video.vertexCount, video.triangleCount, video.indices.length];
+  },
+  /** Plays `count` frames from the one shown last, and changes the level after some of them. */
+  async play({ count, after, level }) {
+    const shown = [];
+    let changed = null;
+    await new Promise((resolve, failed) => {
+      const show = (positions, k) => {
+        shown.push([k, positions.length / 3]);
+        if (shown.length === after) changed = video.setLevel(level);
+        if (shown.length === count) resolve();
+      };
+      video.play(show, { failed, loop: true, nextTick: clock(1000 / video.fps) });
+    });
+    video.pause();
+    await changed;
+    return shown;
+  },
+  /** Sections that a file keeps when it has loaded these, at most so many bytes of segments. */
+  async keep({ url, names, most }) {
+    const file = await StreamFile.open(url);
+    file.mostKept = most;
+    for (const name of names) await file.load(name);
+    return [...file.sections.keys()];
+  },
+  /** The level after each step of a clock: `[ms, isThere, times]`. */
+  choose({ vertices, due, steps }) {
+    const chooser = new LevelChooser(vertices);
+    const levels = [];
+    let [now, level] = [0, 0];
+    for (const [milliseconds, isThere, times] of steps) {
+      for (let i = 0; i < times; i++) level = chooser.step((now += milliseconds), level, isThere, due);
+      levels.push(level);
+    }
+    return levels;
+  },
+  /** Levels of a video that plays by clocks of these steps, whose frames come at once. */
+  async follow({ vertices, steps }) {
+    let on = null;
+    const fake = {
+      levels: vertices,
+      level: 0,
+      fps: 25,
+      frameCount: 1e6,
+      isWaiting: false,
+      play: async (_, given) => (on = given),
+      pause() {},
+      setLevel: async (level) => (fake.level = level),
+      frame: async () => new Float32Array(3 * vertices[fake.level]),
+    };
+    const playback = new Playback(fake, { show() {}, tell() {}, prepare() {}, fail: (error) => { throw error; } });
+    playback.choosesLevel = true;
+    await playback.play();
+    const levels = [];
+    let now = 0;
+    for (const [milliseconds, isWaiting, times] of steps) {
+      fake.isWaiting = isWaiting;
+      for (let i = 0; i < times; i++) {
+        on.ticked((now += milliseconds), true);
+        await null; // a change of the level takes a moment
+      }
+      levels.push(fake.level);
+    }
+    return levels;
+  },
+};
+
+for await (const line of createInterface({ input: process.stdin })) {
+  const { command, ...given } = JSON.parse(line);
+  const answer = await Promise.resolve()
+    .then(() => commands[command](given))
+    .then((value) => ({ value }), (error) => ({ error: [error.kind ?? error.name, error.message] }));
+  process.stdout.write(`${JSON.stringify(answer)}\n`);
+}
