@@ -58,6 +58,12 @@ SERIAL = ("gvpipe.entropy.serial_kernels.SerialCoder", [STREAM, LONGS, LONGS, LO
 PLACED = ("gvpipe.attributes.match_kernels.Entries", [ENTRIES, LONGS, SCALAR, SCALAR])
 CORNERS = ("gvpipe.attributes.sharing_kernels.Corners", [TRIANGLES, LONGS, LONGS])
 POSITIONS = "float32[2]"
+MEMBERS = ("gvcodecs.pdct.shape_kernels.Members", [LONGS] * 3)
+SHAPE = ("gvcodecs.pdct.shape_kernels.Shape", [ROWS, ROWS, FLOATS])
+LOCAL_FRAMES = ("gvcodecs.pdct.shape_kernels.LocalFrames", ["float64[3]", "float64[3]"])
+LAYOUT = ("gvcodecs.pdct.delta_kernels.Layout", [LONGS] * 3)
+LEARNING = ("gvcodecs.pdct.delta_kernels.Learning", [NUMBERS, NUMBERS, NUMBERS, LONGS, LONGS, LONGS, NUMBERS, NUMBERS, LONGS])
+DELTAS = ("gvcodecs.pdct.delta_kernels.DeltaStream", ["uint64[1]", "uint32[1]", BYTES, LONGS])
 WORDS = ["uint64[1]", "uint32[1]"]  # a range decoder's state and its words
 KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and NamedTuples of both
     "gvpipe.mesh.hierarchy_kernels.build_order": [TRIANGLES, SCALAR, SCALAR],
@@ -98,6 +104,15 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
         ("gvcodecs.mcgv.motion.weight_kernels.Listed", [LONGS] * 3),
         ("gvcodecs.mcgv.motion.skinning.Weights", ["int32[2]", "int32[2]"]),
     ],
+    "gvcodecs.pdct.delta_kernels.start_learning": [LAYOUT],
+    "gvcodecs.pdct.delta_kernels.decode_deltas": [LAYOUT, LEARNING, DELTAS, "int64[3]"],
+    "gvcodecs.pdct.shape_kernels.find_members": [LONGS, LONGS, NUMBERS],
+    "gvcodecs.pdct.shape_kernels.lay_out": [MEMBERS],
+    "gvcodecs.pdct.shape_kernels.find_base_seeds": [ROWS, NUMBERS, FLOATS, NUMBERS],
+    "gvcodecs.pdct.shape_kernels.find_frames": ["float64[3]", FLOATS],
+    "gvcodecs.pdct.shape_kernels.shape_members": [ROWS, MEMBERS, LOCAL_FRAMES, "float64"],
+    "gvcodecs.pdct.shape_kernels.rebuild_positions": [MEMBERS, SHAPE, LOCAL_FRAMES, "int64[3]", "float64", "float32[3]"],
+    "gvcodecs.pdct.shape_kernels.place_seeds": [NUMBERS, "int64[3]", FLOATS, "float32[3]"],
     "gvpipe.fields.dual_kernels.find_dual": [TRIANGLES, SCALAR],
     "gvpipe.fields.residual_kernels.decode_rows": [
         ("gvpipe.fields.residual_kernels.Residuals", [NUMBERS, SCALAR, FLAGS, CAUSAL]),

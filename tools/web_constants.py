@@ -1,7 +1,7 @@
 """The constants that the web player shares with Python: python tools/web_constants.py writes gvpipe/web/src/constants.js.
 
 A constant has the name of its module and its own: ``REACH`` of `gvpipe.connectivity.vertex_order` is ``VERTEX_ORDER_REACH``.
-The name of codec ``pca`` comes before.
+Names of the codecs ``pca`` and ``pdct`` come before.
 `tests/web/test_export.py` compares the file with what this script makes.
 """
 
@@ -15,6 +15,7 @@ from typing import Any
 from uuid import UUID
 
 TARGET = Path(__file__).parents[1] / "gvpipe" / "web" / "src" / "constants.js"
+PREFIXED = ("GVCODECS.PCA", "GVCODECS.PDCT")
 SHARED = {
     "gvpipe.asset_coding.directory": "SECTION VERSION MOST MAX_BYTES SURFACE OCTAHEDRAL",
     "gvpipe.asset_coding.encoder": "ARRANGEMENT CODED",
@@ -47,7 +48,7 @@ SHARED = {
     "gvpipe.entropy.number_kernels": "SLOT_BITS MIXERS",
     "gvpipe.entropy.parametric_tables": "N_TOKENS RATIO_BITS RATIOS TOTAL ZEROS",
     "gvpipe.entropy.range_decoder": "PRECISION",
-    "gvpipe.entropy.series": "MAX_CLASS",
+    "gvpipe.entropy.series": "MAX_CLASS FIRST_CLASS",
     "gvpipe.entropy.tokens": "DIRECT TABLE_TOTAL MAX_TOKENS",
     "gvpipe.errors": "REMEDY",
     "gvpipe.fields.derived": "MAGNITUDE SIGNALS",
@@ -79,6 +80,12 @@ SHARED = {
     "gvcodecs.mcgv.motion.weight_coding": "COUNT_CONTEXTS",
     "gvcodecs.mcgv.motion.weight_kernels": "MAX_LISTED",
     "gvcodecs.pca.header": "MAX_SEGMENTS VERSION_STILL",
+    "gvcodecs.pdct.clip": "MAX_CLUSTERS BYTES_PER_POINT SECONDS_PER_POINT BYTES_PER_NUMBER SECONDS_PER_FRAME",
+    "gvcodecs.pdct.delta_coding": "PROBLEMS",
+    "gvcodecs.pdct.header": "MAX_CLIPS VERSION_POINTS",
+    "gvcodecs.pdct.reader": "BYTES_PER_POINT SECONDS_PER_POINT",
+    "gvcodecs.pdct.seed_coding": "ORDERS MAX_COORDINATE",
+    "gvcodecs.pdct.still_points": "SECTION",
 }
 
 
@@ -88,8 +95,8 @@ def make() -> str:
     for module, names in SHARED.items():
         loaded = import_module(module)
         package, _, prefix = module.upper().rpartition(".")
-        if package == "GVCODECS.PCA":
-            prefix = f"PCA_{prefix}"
+        if package in PREFIXED:
+            prefix = f"{package.rpartition('.')[2]}_{prefix}"
         lines += ["", f"// {module}"]
         lines += [f"export const {prefix}_{name} = {_literal(getattr(loaded, name))};" for name in names.split()]
     return "\n".join(lines) + "\n"

@@ -72,8 +72,9 @@ def encoded(sequence: MeshSequence, path: Path, **settings: Any) -> Path:
     return path
 
 
-def test_golden_files(tmp_path: Path) -> None:
-    check(sorted(GOLDEN.glob("pca-*.mp4")), tmp_path)
+@pytest.mark.parametrize("codec", ["pca", "pdct"])
+def test_golden_files(codec: str, tmp_path: Path) -> None:
+    check(sorted(GOLDEN.glob(f"{codec}-*.mp4")), tmp_path)
 
 
 def test_seams_repeated_frames_segments_and_corrections(tmp_path: Path) -> None:
@@ -89,6 +90,25 @@ def test_seams_repeated_frames_segments_and_corrections(tmp_path: Path) -> None:
     )
 
 
+def test_clips(tmp_path: Path) -> None:
+    """Of `pdct`: clusters of one member or none, long ones, fine low frequencies, flat triangles, values with many raw bits."""
+    check(
+        [
+            encoded(patched(), tmp_path / "seams.mp4", codec="pdct", clusters=1),
+            encoded(patched(still=0.5), tmp_path / "still.mp4", codec="pdct", reorder=True, segment=5, quality=100),
+            encoded(patched(still=1.0), tmp_path / "rest.mp4", codec="pdct"),
+            encoded(held(waving(10, 12), [2, *[1] * 10, 7]), tmp_path / "held.mp4", codec="pdct", fineness=8),
+            encoded(waving(14, 30), tmp_path / "clips.mp4", codec="pdct", clip=11, max_error=0.001, clusters=500),
+        ],
+        tmp_path,
+    )
+
+
+@pytest.mark.slow
+def test_awkward_clips(tmp_path: Path) -> None:
+    check([encoded(each, tmp_path / f"{name}.mp4", codec="pdct") for name, each in awkward().items()], tmp_path)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("predictor", ["kalman", "navg", "lsp", "rbf"])
 def test_awkward_inputs(predictor: str, tmp_path: Path) -> None:
@@ -96,30 +116,35 @@ def test_awkward_inputs(predictor: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("codec", ["pca", "pdct"])
 @pytest.mark.parametrize("sample", ["creature", "flag"])
-def test_samples(sample: str, tmp_path: Path) -> None:
-    gvpipe.encode(SAMPLES / f"{sample}.npz", tmp_path / "x.mp4", "pca")
+def test_samples(sample: str, codec: str, tmp_path: Path) -> None:
+    gvpipe.encode(SAMPLES / f"{sample}.npz", tmp_path / "x.mp4", codec)
     check([tmp_path / "x.mp4"], tmp_path)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not DATA.exists(), reason="no ../shared/data")
+@pytest.mark.parametrize("codec", ["pca", "pdct"])
 @pytest.mark.parametrize("name", REAL)
-def test_real_sequences(name: str, tmp_path: Path) -> None:
-    gvpipe.encode(DATA / f"{name}.npz", tmp_path / "x.mp4", "pca")
+def test_real_sequences(name: str, codec: str, tmp_path: Path) -> None:
+    gvpipe.encode(DATA / f"{name}.npz", tmp_path / "x.mp4", codec)
     check([tmp_path / "x.mp4"], tmp_path)
 
 
-def test_damage_is_told_in_a_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize("codec", ["pca", "pdct"])
+def test_damage_is_told_in_a_line(codec: str, tmp_path: Path) -> None:
     """Each section cut, changed or missing: an error, or frames that are finite."""
-    bitstream = read_file(encoded(patched(still=0.5), tmp_path / "a.mp4"))
+    bitstream = read_file(encoded(patched(still=0.5), tmp_path / "a.mp4", codec=codec))
     jobs = []
     for name, data in bitstream.sections.items():
         for kind, changed in {"cut": data[:-3], "changed": data[:9] + bytes(len(data) - 9), "empty": b""}.items():
             path = tmp_path / f"{name}-{kind}.mp4"
             write_file(dataclasses.replace(bitstream, sections={**bitstream.sections, name: changed}), path)
             jobs.append({"path": str(path), "level": 0, "frames": [0]})
-    wrong = {"predictor": "x", "beta": 7, "steps": [0.0], "segments": 99}
+    wrong: dict[str, Any] = {"clips": 99, "base": [0, 0, 0, 0]}
+    if codec == "pca":
+        wrong = {"predictor": "x", "beta": 7, "steps": [0.0], "segments": 99}
     for key, value in wrong.items():
         write_file(dataclasses.replace(bitstream, header={**bitstream.header, key: value}), tmp_path / f"{key}.mp4")
         jobs.append({"path": str(tmp_path / f"{key}.mp4"), "level": 0, "frames": [0]})
@@ -128,5 +153,5 @@ def test_damage_is_told_in_a_line(tmp_path: Path) -> None:
     errors = [each["error"] for each in found if "error" in each]
     assert len(errors) >= 0.7 * len(jobs)
     assert all(error.startswith(("corrupt: ", "unsupported: ")) and "\n" not in error for error in errors), errors
-    assert errors[-1] == "unsupported: level 9: there are levels 0..1"
+    assert errors[-1] == f"unsupported: level 9: there are levels 0..{1 if codec == 'pca' else 0}"
     assert all(np.isfinite(each["frames"]).all() for each in found if "frames" in each)

@@ -46,7 +46,7 @@ MAX_CLUSTERS = 1024
 BYTES_PER_POINT, SECONDS_PER_POINT = 160, 0.4e-6  # of a frame
 BYTES_PER_NUMBER = 64  # of seeds
 SECONDS_PER_FRAME = 0.6e-3
-TOGETHER = 16  # frames decoded and rebuilt at once
+TOGETHER = 16  # frames decoded and rebuilt at once, an even number
 RIDGE = 1e-6  # of the affine fit
 LAMBDA = 0.14  # squared steps that a bit is worth; 0.1155 by theory at a high rate
 

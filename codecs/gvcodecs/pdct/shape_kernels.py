@@ -233,6 +233,9 @@ def rebuild_positions(
 ) -> bool:
     """Fill in the members' positions of n frames; false where one is larger than float32 can hold.
 
+    Two frames are transformed together, an even one of the clip and the next. So their bits do not depend on how many are
+    rebuilt at once, as long as the first of them is even.
+
     Args:
         members: whose positions.
         shape: theirs.
@@ -242,17 +245,16 @@ def rebuild_positions(
         positions: ``(n, V, 3)`` filled, model units.
     """
     n, n_affine, unit = len(sums), 4 * len(members.clusters), step / UNIT
-    n_pairs = (3 * n + 1) // 2
+    n_pairs = 3 * ((n + 1) // 2)  # of signals: an axis in an even frame and in the next
     fits = True
     for c in range(len(members.clusters)):
         first, size = members.bounds[c], members.bounds[c + 1] - members.bounds[c]
-        halves = np.zeros((2, size, n_pairs))  # a signal for each frame and axis
+        halves = np.zeros((2, size, n_pairs))
         for f in range(n):
             for axis in range(3):
-                signal = 3 * f + axis
-                half, column = signal // n_pairs, signal % n_pairs
+                own, column = sums[f, axis], 3 * (f >> 1) + axis
                 for i in range(size):
-                    halves[half, i, column] = sums[f, axis, n_affine + first + i] * (shape.scale[first + i] * unit)
+                    halves[f & 1, i, column] = own[n_affine + first + i] * (shape.scale[first + i] * unit)
         invert_cosines(halves[0], halves[1])
         for f in range(n):
             if not _place_cluster(c, f, members, shape, frames, sums, unit, halves, positions):
@@ -274,7 +276,6 @@ def _place_cluster(
 ) -> bool:
     """Positions of a cluster's members in a frame, from its DCT signals."""
     first, size, k = members.bounds[c], members.bounds[c + 1] - members.bounds[c], members.clusters[c]
-    n_pairs = halves.shape[2]
     origin, axes = frames.origins[f, k], frames.axes[f, k]
     affine, local, fits = np.empty((3, 4)), np.empty(3), True
     for axis in range(3):
@@ -282,11 +283,10 @@ def _place_cluster(
             affine[axis, j] = sums[f, axis, 4 * c + j] * unit
     for i in range(size):
         for axis in range(3):
-            signal = 3 * f + axis
             moved = 0.0
             for j in range(4):
                 moved += affine[axis, j] * shape.functions[j, first + i]
-            local[axis] = (halves[signal // n_pairs, i, signal % n_pairs] + moved) + shape.rest[axis, first + i]
+            local[axis] = (halves[f & 1, i, 3 * (f >> 1) + axis] + moved) + shape.rest[axis, first + i]
         vertex = members.vertices[first + i]
         for j in range(3):
             value = (((0.0 + local[0] * axes[j]) + local[1] * axes[3 + j]) + local[2] * axes[6 + j]) + origin[j]

@@ -136,6 +136,7 @@ export const RANGE_DECODER_PRECISION = 24;
 
 // gvpipe.entropy.series
 export const SERIES_MAX_CLASS = 63;
+export const SERIES_FIRST_CLASS = 63;
 
 // gvpipe.entropy.tokens
 export const TOKENS_DIRECT = 16;
@@ -273,3 +274,28 @@ export const WEIGHT_KERNELS_MAX_LISTED = 32;
 // gvcodecs.pca.header
 export const PCA_HEADER_MAX_SEGMENTS = 2000;
 export const PCA_HEADER_VERSION_STILL = 2;
+
+// gvcodecs.pdct.clip
+export const PDCT_CLIP_MAX_CLUSTERS = 1024;
+export const PDCT_CLIP_BYTES_PER_POINT = 160;
+export const PDCT_CLIP_SECONDS_PER_POINT = 4e-07;
+export const PDCT_CLIP_BYTES_PER_NUMBER = 64;
+export const PDCT_CLIP_SECONDS_PER_FRAME = 0.0006;
+
+// gvcodecs.pdct.delta_coding
+export const PDCT_DELTA_CODING_PROBLEMS = ["", "its range-coded data do not decode", "its raw bits end too early"];
+
+// gvcodecs.pdct.header
+export const PDCT_HEADER_MAX_CLIPS = 4000;
+export const PDCT_HEADER_VERSION_POINTS = 2;
+
+// gvcodecs.pdct.reader
+export const PDCT_READER_BYTES_PER_POINT = 200;
+export const PDCT_READER_SECONDS_PER_POINT = 1e-06;
+
+// gvcodecs.pdct.seed_coding
+export const PDCT_SEED_CODING_ORDERS = [1, 2];
+export const PDCT_SEED_CODING_MAX_COORDINATE = 1073741824;
+
+// gvcodecs.pdct.still_points
+export const PDCT_STILL_POINTS_SECTION = "still";

@@ -6,8 +6,8 @@
  */
 
 import { SURFACE_STILL as STILL } from "../constants.js";
-import { decodeBase } from "../format/base_mesh.js";
-import { AGAIN, GeometryVideoError, corrupt } from "../format/errors.js";
+import { checkCounts, decodeBase } from "../format/base_mesh.js";
+import { corrupt } from "../format/errors.js";
 import { decodePoints } from "../format/welded_mesh.js";
 import { decodeFlags } from "../format/still_vertices.js";
 import { Points, weldVertices } from "./welded_points.js";
@@ -106,12 +106,6 @@ async function readPoints(payload, kernels) {
     points: new Points(Int32Array.from(pointFaces, (p) => slots[p]), moves.length),
     visits: own,
   };
-}
-
-function checkCounts({ vertices, triangles }, n, faces) {
-  if (n !== vertices || faces.length !== 3 * triangles) {
-    throw new GeometryVideoError("corrupt", `the mesh has other counts than the header says; ${AGAIN}`);
-  }
 }
 
 /** Rows of three, flat, one for each of the numbers. */
