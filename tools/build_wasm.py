@@ -104,6 +104,9 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
         ("gvcodecs.mcgv.motion.weight_kernels.Listed", [LONGS] * 3),
         ("gvcodecs.mcgv.motion.skinning.Weights", ["int32[2]", "int32[2]"]),
     ],
+    "gvcodecs.mcgv.motion.blend_kernels.find_energies": [ROWS, "int32[2]", ROWS, SCALAR],
+    "gvcodecs.mcgv.motion.blend_kernels.invert_factors": ["float64[3]"],
+    "gvcodecs.mcgv.motion.blend_kernels.blend_rows": [ROWS, "int32[2]", ROWS, "float64[3]"],
     "gvcodecs.pdct.delta_kernels.start_learning": [LAYOUT],
     "gvcodecs.pdct.delta_kernels.decode_deltas": [LAYOUT, LEARNING, DELTAS, "int64[3]"],
     "gvcodecs.pdct.shape_kernels.find_members": [LONGS, LONGS, NUMBERS],
@@ -141,6 +144,7 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
     "gvpipe.trajectory.spatial_kernels.weigh_traversal": [TRIANGLES, SCALAR],
     "gvpipe.trajectory.still_kernels.fit_still": [ROWS, FLOATS, ROWS],
     "gvpipe.trajectory.product_kernels.weighted_sums": [ROWS, ROWS],
+    "gvpipe.trajectory.product_kernels.multiply": [("gvpipe.trajectory.product_kernels.Rows", [LONGS, INTS, FLOATS]), ROWS],
 }
 
 TRIPLE = "wasm32-unknown-unknown"

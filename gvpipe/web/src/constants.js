@@ -259,11 +259,13 @@ export const KD_TREE_MOMENT_BITS = 10;
 export const KD_TREE_SPREAD = 2;
 export const KD_TREE_MAX_COORDINATE = 1048576;
 
+// gvcodecs.mcgv.motion.blend_kernels
+export const BLEND_KERNELS_FLAT = 1e-06;
+export const BLEND_KERNELS_LEAST_ENERGY = 1e-09;
+
 // gvcodecs.mcgv.motion.skinning
 export const SKINNING_INFLUENCES = 4;
 export const SKINNING_TOTAL = 64;
-export const SKINNING_FLAT = 1e-06;
-export const SKINNING_LEAST_ENERGY = 1e-09;
 
 // gvcodecs.mcgv.motion.weight_coding
 export const WEIGHT_CODING_COUNT_CONTEXTS = 4;
