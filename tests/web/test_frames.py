@@ -17,8 +17,11 @@ from pages import BUNDLE
 from sequences import awkward, held, patched, waving
 
 import gvpipe
+from gvcodecs.mcgv.header import Header
 from gvpipe.codec import LevelReader
+from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file, write_file
+from gvpipe.media.video import VideoReader
 from gvpipe.player import _Level
 from gvpipe.sequence import MeshSequence
 
@@ -43,13 +46,27 @@ def load(jobs: Sequence[dict[str, Any]], folder: Path) -> list[dict[str, Any]]:
     return results
 
 
+def pictures(bitstream: Bitstream, path: Path) -> dict[str, Any]:
+    """The part of a job that tells of the pictures, whose luma goes into a file; nothing if there are none that are read."""
+    if "transform" not in bitstream.header:
+        return {}
+    header = Header.of(bitstream)
+    size = (header.width, 3 * header.height)
+    reader = VideoReader(bitstream.pictures, header.profile, *size)
+    planes = np.concatenate([planes for _, planes in reader.read(0, reader.n_frames)])
+    reader.close()
+    path.write_bytes(np.ascontiguousarray(planes[:, : size[1], : size[0]]).tobytes())
+    return {"planes": str(path), "size": size}
+
+
 def check(paths: Sequence[Path], folder: Path) -> None:
     """Triangles and positions of every level are Python's."""
     jobs = []
     for path in paths:
         with gvpipe.open(path) as video:
             chosen = np.random.default_rng(3).permutation(len(video))[:MOST].tolist()
-            jobs += [{"path": str(path), "level": level, "frames": chosen} for level in range(len(video.levels))]
+            luma = pictures(video.bitstream, folder / f"{path.stem}.luma")
+            jobs += [{"path": str(path), "level": level, "frames": chosen, **luma} for level in range(len(video.levels))]
     for job, found in zip(jobs, load(jobs, folder), strict=True):
         where = f"{Path(job['path']).name}, level {job['level']}"
         assert "error" not in found, f"{where}: {found['error']}"
@@ -99,6 +116,21 @@ def test_clips(tmp_path: Path) -> None:
             encoded(patched(still=1.0), tmp_path / "rest.mp4", codec="pdct"),
             encoded(held(waving(10, 12), [2, *[1] * 10, 7]), tmp_path / "held.mp4", codec="pdct", fineness=8),
             encoded(waving(14, 30), tmp_path / "clips.mp4", codec="pdct", clip=11, max_error=0.001, clusters=500),
+        ],
+        tmp_path,
+    )
+
+
+def test_trajectory_images(tmp_path: Path) -> None:
+    """Of `mcgv`: golden files, each placement, segments, outliers, still points, repeated frames, corrections."""
+    klt = {"codec": "mcgv", "transform": "klt"}
+    names = [path for path in sorted(GOLDEN.glob("mcgv-*-klt.mp4"))]
+    check(
+        [
+            *names,
+            encoded(patched(), tmp_path / "charts.mp4", **klt, placement="charts", quality=100),
+            encoded(patched(still=0.5), tmp_path / "still.mp4", **klt, placement="tiles", segment=5),
+            encoded(held(waving(14, 20), [2, *[1] * 18, 3]), tmp_path / "held.mp4", **klt, placement="halves", max_error=0.001),
         ],
         tmp_path,
     )

@@ -13,6 +13,6 @@ def browser_obstacle(bitstream: Bitstream) -> str:
     header = bitstream.header
     if bitstream.version > VERSION:
         return f"{bitstream.codec}, version {bitstream.version}"
-    if header.get("pictures") is False or ("transform" not in header and header.get("profile") == PROFILE):
+    if header.get("pictures") is False or header.get("profile") == PROFILE:
         return ""
     return ", ".join([bitstream.codec, *(f"{key} {header[key]}" for key in ("transform", "profile") if key in header)])

@@ -4,8 +4,9 @@ import { DecodedPictures } from "./decoded_pictures.js";
 import { GeometryVideoError, quote } from "./format/errors.js";
 import { readableVersion } from "./frames/frame_decoder.js";
 import { FrameHost, FrameSource } from "./frames/frame_host.js";
-import { CODEC as MCGV, VERSION as MCGV_VERSION } from "./mcgv/header.js";
+import { CODEC as MCGV } from "./mcgv/header.js";
 import { McgvReader } from "./mcgv/reader.js";
+import { withPictures } from "./mcgv/trajectory_pictures.js";
 import { openPictures } from "./pictures.js";
 import code from "./wasm/kernels.wasm";
 
@@ -29,7 +30,7 @@ const BYTES_PER_VERTEX = 12; // of a frame
  */
 export async function openCodec(source, payload, repeated, level) {
   const { codec, version } = payload.header;
-  const newest = codec === MCGV ? MCGV_VERSION : readableVersion(codec);
+  const newest = readableVersion(codec);
   if (!newest) throw new GeometryVideoError("unsupported", `it was coded by ${quote(codec)}; gvpipe export-html converts it`);
   if (version > newest) {
     const found = `version ${quote(version)} of codec ${codec}`;
@@ -39,7 +40,9 @@ export async function openCodec(source, payload, repeated, level) {
     throw new GeometryVideoError("unsupported", "this browser has no WebAssembly with SIMD; a newer one is needed");
   }
   const distinct = repeated.distinctPayload(payload);
-  return codec === MCGV ? openMcgv(source, payload.header, distinct, repeated, level) : openFrames(payload.header, distinct, repeated, level);
+  if (codec !== MCGV) return openFrames(payload.header, distinct, repeated, level);
+  if (!("transform" in payload.header.settings)) return openMcgv(source, payload.header, distinct, repeated, level);
+  return openFrames(payload.header, withPictures(source, distinct), repeated, level);
 }
 
 async function openMcgv(source, { fps, vertices, container }, distinct, repeated, level) {
@@ -68,6 +71,10 @@ async function openMcgv(source, { fps, vertices, container }, distinct, repeated
 
 async function openFrames({ fps }, distinct, repeated, level) {
   const host = new FrameHost(distinct, code, level);
+  const close = () => {
+    host.close();
+    distinct.close?.();
+  };
   try {
     const { faces, points, levels, bounds } = await host.describe();
     const basePoints = new Int32Array(3 * points.length);
@@ -82,10 +89,10 @@ async function openFrames({ fps }, distinct, repeated, level) {
       levels,
       openPictures: () => DecodedPictures.of(frames, size, fps, repeated, new FrameSource(host, repeated.distinct)),
       rebuild: (frame, shown, positions) => positions.set(shown),
-      close: () => host.close(),
+      close,
     };
   } catch (error) {
-    host.close();
+    close();
     throw error;
   }
 }

@@ -273,6 +273,16 @@ export const WEIGHT_CODING_COUNT_CONTEXTS = 4;
 // gvcodecs.mcgv.motion.weight_kernels
 export const WEIGHT_KERNELS_MAX_LISTED = 32;
 
+// gvcodecs.mcgv.pictures.trajectories
+export const TRAJECTORIES_PLANES = 3;
+
+// gvcodecs.mcgv.trajectory_header
+export const TRAJECTORY_HEADER_MAX_FINENESS = 256;
+
+// gvcodecs.mcgv.trajectory_reader
+export const TRAJECTORY_READER_BYTES_PER_SAMPLE = 48;
+export const TRAJECTORY_READER_SECONDS_PER_SAMPLE = 1e-07;
+
 // gvcodecs.pca.header
 export const PCA_HEADER_MAX_SEGMENTS = 2000;
 export const PCA_HEADER_VERSION_STILL = 2;

@@ -21,9 +21,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy import sparse
 
-from gvpipe.arrays import Float64, Int32
+from gvpipe.arrays import Float64, Int32, Int64
 
 if TYPE_CHECKING:
+    from scipy.sparse.linalg import SuperLU
+
     from gvpipe.trajectory.product_kernels import Rows
 
 INFLUENCES = 4  # most clusters that a point follows
@@ -41,6 +43,21 @@ class Weights(NamedTuple):
 
     clusters: Int32
     weights: Int32
+
+
+class NormalEquations(NamedTuple):
+    """Normal equations of all clusters' transforms: a block for every two clusters that share a point, and the right side.
+
+    Args:
+        rows, columns: ``(n,) int64`` the clusters of each block, sorted by row, then by column.
+        blocks: ``(n, 4, 4)``.
+        right: ``(K, 4, m)``.
+    """
+
+    rows: Int64
+    columns: Int64
+    blocks: Float64
+    right: Float64
 
 
 class Blend:
@@ -85,36 +102,32 @@ class BlendFit:
     """Least squares for one blend: the normal matrix is factored once, then serves every frame."""
 
     def __init__(self, blend: Blend) -> None:
-        from scipy.linalg import cho_factor
-
         self.matrix = blend.matrix()
-        normal = (self.matrix.T @ self.matrix).toarray()
-        normal[np.diag_indices_from(normal)] += RIDGE
-        self._factor = cho_factor(normal)
+        self._factor = _factorise(self.matrix.T @ self.matrix)
 
     def fit(self, motions: Float64) -> Float64:
         """``(4K, m)`` rows of equal weight that carry displacements ``(P, m)`` best."""
-        from scipy.linalg import cho_solve
-
-        return np.asarray(cho_solve(self._factor, self.matrix.T @ motions))
+        return np.asarray(self._factor.solve(self.matrix.T @ motions))
 
 
-def solve_normal(normal: Float64, right: Float64) -> Float64:
-    """Transforms ``(K, 4, m)`` that solve the normal equations ``normal (4K, 4K)``, ``right (4K, m)``, as `BlendFit` would."""
-    from scipy.linalg import cho_factor, cho_solve
-
-    n = len(normal) // 4
-    blocks = [slice(4 * i, 4 * i + 4) for i in range(n)]
-    inverse = _whiten(normal.reshape(n, 4, n, 4)[np.arange(n), :, np.arange(n)])
-    white = normal.copy()  # in place, block by block: of a thousand clusters it takes 134 MB
-    for factor, block in zip(inverse, blocks, strict=True):
-        white[block] = factor @ white[block]
-    for factor, block in zip(inverse, blocks, strict=True):
-        white[:, block] = (factor @ np.ascontiguousarray(white[:, block].T)).T
-    white[np.diag_indices_from(white)] += RIDGE
-    factors = cho_factor(white.T, overwrite_a=True)  # the library's order: no copy
-    rows = cho_solve(factors, (inverse @ right.reshape(n, 4, -1)).reshape(4 * n, -1))
+def solve_normal(normal: NormalEquations) -> Float64:
+    """Transforms ``(K, 4, m)`` that solve the normal equations, as `BlendFit` would."""
+    n = len(normal.right)
+    is_diagonal = normal.rows == normal.columns  # pairs are sorted
+    inverse = _whiten(normal.blocks[is_diagonal])
+    white = inverse[normal.rows] @ normal.blocks @ inverse[normal.columns].swapaxes(1, 2)
+    starts = np.searchsorted(normal.rows, np.arange(n + 1))
+    factor = _factorise(sparse.bsr_array((white, normal.columns, starts), shape=(4 * n, 4 * n)))
+    rows = factor.solve((inverse @ normal.right).reshape(4 * n, -1))
     return np.ascontiguousarray(inverse.swapaxes(1, 2) @ rows.reshape(n, 4, -1))
+
+
+def _factorise(white: sparse.csr_array | sparse.bsr_array) -> SuperLU:
+    """Factor a normal matrix of rows of equal weight: sparse, since few clusters share points."""
+    from scipy.sparse.linalg import splu
+
+    damped = sparse.csc_array(white) + RIDGE * sparse.eye_array(white.shape[0], format="csc")
+    return splu(damped, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def _whiten(energies: Float64) -> Float64:

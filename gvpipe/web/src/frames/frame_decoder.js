@@ -2,6 +2,7 @@
 
 import { Displacements } from "../format/displacements.js";
 import { GeometryVideoError, corrupt } from "../format/errors.js";
+import { TrajectoryReader, VERSION as MCGV_VERSION } from "../mcgv/trajectory_reader.js";
 import { PcaReader, VERSION as PCA_VERSION } from "../pca/reader.js";
 import { PdctReader, VERSION as PDCT_VERSION } from "../pdct/reader.js";
 import { Kernels } from "../wasm/kernels.js";
@@ -10,7 +11,11 @@ const LOOKS = 16; // frames that a look at the motion takes
 const CORRECTIONS = "corrections";
 
 /** Readers by codec: `open(payload, kernels)` gives `faces`, `points`, `levels`, `levelFaces`, `segmentStart` and `read`. */
-const READERS = { pca: { version: PCA_VERSION, reader: PcaReader }, pdct: { version: PDCT_VERSION, reader: PdctReader } };
+const READERS = {
+  mcgv: { version: MCGV_VERSION, reader: TrajectoryReader }, // of trajectory images
+  pca: { version: PCA_VERSION, reader: PcaReader },
+  pdct: { version: PDCT_VERSION, reader: PdctReader },
+};
 
 /** The highest version of a codec that is read here; 0: none. */
 export function readableVersion(codec) {

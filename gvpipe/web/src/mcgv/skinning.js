@@ -84,7 +84,7 @@ export class Blend {
 }
 
 /** (P, 3) coordinates in the middle of the bounding box, in parts of its longest side. */
-function homogeneous(base) {
+export function homogeneous(base) {
   const low = [Infinity, Infinity, Infinity];
   const high = [-Infinity, -Infinity, -Infinity];
   base.forEach((value, i) => {

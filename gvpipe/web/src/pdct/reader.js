@@ -6,6 +6,7 @@
 import { PDCT_READER_BYTES_PER_POINT as BYTES_PER_POINT, PDCT_READER_SECONDS_PER_POINT as SECONDS_PER_POINT } from "../constants.js";
 import { checkCounts, decodeBase } from "../format/base_mesh.js";
 import { previousEqual } from "../format/points.js";
+import { Recent } from "../format/recent.js";
 import { decodePoints } from "../format/welded_mesh.js";
 import { Clip } from "./clip.js";
 import { VERSION, readHeader } from "./header.js";
@@ -22,7 +23,7 @@ export class PdctReader {
   #mesh; // {faces, point, coded, lattice, traversal}
   #surface; // what clips share
   #still;
-  #clips = new Map(); // number -> promise, the one used last at the end
+  #clips; // by number, promises
 
   /**
    * @param {import("../format/payload.js").Payload} payload `section` may return promises
@@ -49,6 +50,7 @@ export class PdctReader {
     for (const point of this.#still.points) stands[point] = 1;
     this.#surface = { base, traversal: traversal.filter((point) => !stands[point]) };
     payload.budget.keep(`${points} points`, BYTES_PER_POINT * points, SECONDS_PER_POINT * points);
+    this.#clips = new Recent((c) => this.#open(c), KEPT);
     this.#payload = payload;
     this.#header = header;
     this.#kernels = kernels;
@@ -88,7 +90,7 @@ export class PdctReader {
     for (let c = 0; c < this.#header.clips; c++) {
       const [begin, end] = [this.segmentStart(c), this.segmentStart(c + 1)];
       for (let k = Math.max(start, begin); k < Math.min(stop, end); k++) {
-        if (this.#surface.traversal.length) own.set((await this.#clip(c)).frame(k - begin));
+        if (this.#surface.traversal.length) own.set((await this.#clips.get(c)).frame(k - begin));
         this.#spread(own, frames.subarray(size * (k - start), size * (k - start + 1)));
       }
     }
@@ -103,16 +105,6 @@ export class PdctReader {
     for (let v = 0; v < coded.length; v++) {
       for (let axis = 0; axis < 3; axis++) target[3 * v + axis] = own[3 * coded[v] + axis];
     }
-  }
-
-  /** A clip whose frames can be decoded; the latest few are kept. @returns {Promise<Clip>} */
-  #clip(c) {
-    const clip = this.#clips.get(c) ?? this.#open(c);
-    this.#clips.delete(c);
-    this.#clips.set(c, clip);
-    if (this.#clips.size > KEPT) this.#clips.delete(this.#clips.keys().next().value);
-    clip.catch(() => this.#clips.delete(c));
-    return clip;
   }
 
   async #open(c) {

@@ -1,12 +1,14 @@
 /** Frames from a decoded basis and coefficients, each a product of Python's kernels. Mirrors `gvpipe.trajectory.reconstruction`. */
 
 import { AGAIN, GeometryVideoError } from "../format/errors.js";
+import { splitBasis } from "./basis.js";
 
 const PRODUCT_VALUES = 2 ** 21; // of frames that are rebuilt at once
 const MAX_FLOAT32 = 2 ** 128 - 2 ** 104;
 
 export class Segment {
   #kernels;
+  #base;
   #vectors;
   #coefficients;
 
@@ -15,18 +17,15 @@ export class Segment {
    * @param {import("./basis.js").Basis} basis of n frames
    * @param {Float64Array} coefficients (P, R) by point, flat @param {number} points P
    * @param {boolean} isReversed whether the last component comes first
+   * @param {Float64Array|null} base (P, 3) what trajectories count from, flat; null: the origin
    */
-  constructor(kernels, { components, columns }, coefficients, points, isReversed) {
-    const width = components + 1;
-    const rows = columns.length / width;
+  constructor(kernels, basis, coefficients, points, isReversed, base = null) {
+    const { components } = basis;
+    const [mean, vectors] = splitBasis(kernels, basis);
     this.#kernels = kernels;
-    this.mean = new Float64Array(rows);
-    this.#vectors = kernels.array("float64", [rows, components]);
-    const vectors = kernels.view(this.#vectors);
-    for (let row = 0; row < rows; row++) {
-      this.mean[row] = columns[row * width];
-      vectors.set(columns.subarray(row * width + 1, (row + 1) * width), row * components);
-    }
+    this.#base = base;
+    this.mean = kernels.view(mean).slice();
+    this.#vectors = vectors;
     this.#coefficients = kernels.array("float64", [components, points]);
     const turned = kernels.view(this.#coefficients);
     for (let c = 0; c < components; c++) {
@@ -67,12 +66,14 @@ export class Segment {
   /** Fill `target (V, 3)`; false if a position does not fit. */
   #spread(sums, frame, first, points, target) {
     const pointCount = this.#coefficients.shape[1];
+    const base = this.#base;
     let isFinite = true;
     for (let axis = 0; axis < 3; axis++) {
       const mean = this.mean[3 * frame + axis];
       const row = (3 * (frame - first) + axis) * pointCount;
       for (let v = 0; v < points.length; v++) {
-        const value = sums[row + points[v]] + mean;
+        let value = sums[row + points[v]] + mean;
+        if (base) value += base[3 * points[v] + axis];
         if (!(value <= MAX_FLOAT32 && value >= -MAX_FLOAT32)) isFinite = false;
         target[3 * v + axis] = value;
       }

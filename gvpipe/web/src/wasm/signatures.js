@@ -17,6 +17,9 @@ export const SIGNATURES = {
   code_polygons: {"given": ["uint64[1]", "uint32[1]", "uint64[2]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "bool", "int32[2]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]"], "returned": ["int64[1]", "int64[1]", "int64[1]"]},
   code_sharing: {"given": ["uint64[1]", "uint32[1]", "uint64[2]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "bool", "int32[2]", "int64[1]", "int64[1]", "int64", "int64[1]"], "returned": ["int64"]},
   fill_weights: {"given": ["int64[1]", "int64[1]", "int64", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int32[2]", "int32[2]"], "returned": ["int64"]},
+  find_energies: {"given": ["float64[2]", "int32[2]", "float64[2]", "int64"], "returned": ["float64[3]"]},
+  invert_factors: {"given": ["float64[3]"], "returned": ["float64[3]"]},
+  blend_rows: {"given": ["float64[2]", "int32[2]", "float64[2]", "float64[3]"], "returned": ["int64[1]", "int32[1]", "float64[1]"]},
   start_learning: {"given": ["int64[1]", "int64[1]", "int64[1]"], "returned": ["int64[2]", "int64[2]", "int64[2]", "int64[1]", "int64[1]", "int64[1]", "int64[2]", "int64[2]", "int64[1]"]},
   decode_deltas: {"given": ["int64[1]", "int64[1]", "int64[1]", "int64[2]", "int64[2]", "int64[2]", "int64[1]", "int64[1]", "int64[1]", "int64[2]", "int64[2]", "int64[1]", "uint64[1]", "uint32[1]", "uint8[1]", "int64[1]", "int64[3]"], "returned": ["int64"]},
   find_members: {"given": ["int64[1]", "int64[1]", "int64[2]"], "returned": ["int64[1]", "int64[1]", "int64[1]"]},
@@ -39,4 +42,5 @@ export const SIGNATURES = {
   weigh_traversal: {"given": ["int32[2]", "int64"], "returned": ["int32[1]", "int32[1]", "int32[1]", "float64[1]", "float64[1]", "int32[1]", "int32[1]", "bool"]},
   fit_still: {"given": ["float64[2]", "float64[1]", "float64[2]"], "returned": ["float64[2]"]},
   weighted_sums: {"given": ["float64[2]", "float64[2]"], "returned": ["float64[2]"]},
+  multiply: {"given": ["int64[1]", "int32[1]", "float64[1]", "float64[2]"], "returned": ["float64[2]"]},
 };
