@@ -399,8 +399,8 @@ cli.add_command(convert)
 def export_html(source: str, target: str, up: str | None, quality: float | None, unlimited: bool, out: Output) -> None:
     """Write a web page of one file that plays a geometry video, without a network.
 
-    Browsers read codec mcgv in its web profile; other files are converted, which adds an error that is told: KG 0.044 or less
-    by default.
+    Browsers read codecs pca and pdct, and mcgv in its web profile. Other files are converted, which adds an error that is
+    told: KG 0.044 or less by default.
     """
     from gvpipe import web
 

@@ -1,12 +1,19 @@
 // Builds the bundles in bundle/, or in the folder given: node build.mjs [FOLDER]
 // Builds the modules of the package, which leave three.js outside, in dist/: node build.mjs --package
 import { build } from "esbuild";
+import { zlibSync } from "fflate"; // in place of Node's, whose bytes depend on the processor
 import { copyFileSync, readFileSync, readdirSync, rmSync } from "node:fs";
 import { fileURLToPath } from "node:url";
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
 const notice = readFileSync(here("LICENSES/NOTICE.txt"), "utf8").trim();
 
+const deflated = {
+  name: "deflated",
+  setup({ onLoad }) {
+    onLoad({ filter: /\.wasm$/ }, ({ path }) => ({ contents: zlibSync(readFileSync(path), { level: 9 }), loader: "binary" }));
+  },
+};
 const common = {
   absWorkingDir: here("."),
   bundle: true,
@@ -30,7 +37,8 @@ const pages = {
   format: "esm",
   define: { WORKER_SOURCE: JSON.stringify(worker.outputFiles[0].text) }, // pages from a disk may load no second file
   banner: { js: `/*!\n${notice}\n*/` },
-  loader: { ".wasm": "binary", ".css": "text" },
+  loader: { ".css": "text" },
+  plugins: [deflated],
 };
 const outside = ["node:fs", "fs", "path"]; // asked for by Draco's wrapper in Node alone
 

@@ -25,11 +25,14 @@ FILES: dict[str, dict[str, Any]] = {  # several groups of pictures, with B-frame
     "blended": {"prediction": "blended", "preset": "slow", "gop": 32},
     "plain": {"prediction": "affine", "preset": "ultrafast", "gop": 4, "clusters": 3},
     "pca": {"codec": "pca"},
+    "pdct": {"codec": "pdct", "clip": 16},
+    "klt": {"codec": "mcgv", "transform": "klt", "segment": 20},
     "held": {"prediction": "blended", "preset": "slow", "gop": 5, "quality": 90},  # at 75 it needs no pictures
 }
 LENGTHS = {"held": [2] * 13 + [14]}  # frames that each picture is shown for, 1 if not given
 DECODERS = {"webcodecs": "", "video": "delete window.VideoDecoder;"}
 pytestmark = pytest.mark.slow
+PICTURELESS = ("pca", "pdct")
 SEEN: dict[str, list[str]] = {}  # of each kind of file, what the first browser made of it
 
 
@@ -73,7 +76,7 @@ def player(driver: Any, site: tuple[Path, str]) -> Callable[..., Any]:
 
 
 def _skip_inexact(name: str, decoder: str, kind: str) -> None:
-    if (name, decoder) == ("webkit", "video") and kind != "pca":
+    if (name, decoder) == ("webkit", "video") and kind not in PICTURELESS:
         pytest.skip("refused; see test_an_inexact_video_is_refused")
 
 
@@ -82,7 +85,7 @@ def test_an_inexact_video_is_refused(name: str, module: Callable[..., Any]) -> N
     load = "const video = await GeometryVideo.load(args[0]); return (await video.frame(0)).length"
     body = f"{DECODERS['video']} return (async () => {{ {load} }})().catch((error) => error.kind)"
     for kind in FILES:
-        has_pictures = kind != "pca"
+        has_pictures = kind not in PICTURELESS
         assert module(body, f"{kind}.mp4") == ("unsupported" if name == "webkit" and has_pictures else 3 * 144)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from conftest import Finished
 from file_server import serving
-from folders import ROOT, SAMPLES
+from folders import GOLDEN, ROOT, SAMPLES
 from sequences import waving
 
 import gvpipe
@@ -46,6 +46,14 @@ def test_page_holds_the_file_unchanged(video: Path, tmp_path: Path) -> None:
     assert _embedded(page) == video.read_bytes()
     assert report == gvpipe.ExportReport(page.stat().st_size, video.stat().st_size)
     assert report.bytes <= 1.35 * video.stat().st_size + PLAYER_BYTES
+
+
+@pytest.mark.parametrize("name", ["pca-2-still", "pdct-1", "pdct-2-still", "mcgv-5-klt"])
+def test_page_holds_files_of_these_codecs_unchanged(name: str, tmp_path: Path) -> None:
+    path = GOLDEN / f"{name}.mp4"
+    report = gvpipe.export_html(path, tmp_path / "page.html")
+    assert _embedded(tmp_path / "page.html") == path.read_bytes()
+    assert not report.converted and report.bytes <= 1.35 * path.stat().st_size + PLAYER_BYTES
 
 
 @pytest.mark.parametrize("stream", [False, True])
@@ -80,7 +88,7 @@ def test_title_is_text(video: Path, tmp_path: Path) -> None:
         ({"codec": "laplacian"}, "laplacian"),
         ({"profile": "precise"}, "mcgv, profile h264-10"),
         ({"image": "jpeg"}, "mcgv, profile jpeg"),
-        ({"prediction": "blended", "transform": "klt"}, "mcgv, transform klt, profile h264-8"),
+        ({"prediction": "blended", "transform": "klt", "profile": "precise"}, "mcgv, transform klt, profile h264-10"),
     ],
     ids=str,
 )
@@ -209,7 +217,7 @@ def test_licences_are_beside_the_bundles() -> None:
         notice = (WEB / "bundle" / bundle).read_text("utf-8")[:3000]
         assert all(name in notice for name in names)
     assert {path.stem for path in (WEB / "LICENSES").iterdir()} == {"NOTICE", "three", "draco"}
-    assert set(packages) == {"three", "draco3d", "esbuild"}  # esbuild only builds
+    assert set(packages) == {"three", "draco3d", "esbuild", "fflate"}  # the latter two only build
 
 
 def test_lock_file_names_no_registry() -> None:

@@ -124,7 +124,7 @@ def test_clips(tmp_path: Path) -> None:
 def test_trajectory_images(tmp_path: Path) -> None:
     """Of `mcgv`: golden files, each placement, segments, outliers, still points, repeated frames, corrections."""
     klt = {"codec": "mcgv", "transform": "klt"}
-    names = [path for path in sorted(GOLDEN.glob("mcgv-*-klt.mp4"))]
+    names = sorted(GOLDEN.glob("mcgv-*-klt.mp4"))
     check(
         [
             *names,

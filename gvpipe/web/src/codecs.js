@@ -8,7 +8,7 @@ import { CODEC as MCGV } from "./mcgv/header.js";
 import { McgvReader } from "./mcgv/reader.js";
 import { withPictures } from "./mcgv/trajectory_pictures.js";
 import { openPictures } from "./pictures.js";
-import code from "./wasm/kernels.wasm";
+import { kernelCode } from "./wasm/inflated.js";
 
 const BYTES_PER_VERTEX = 12; // of a frame
 
@@ -36,16 +36,17 @@ export async function openCodec(source, payload, repeated, level) {
     const found = `version ${quote(version)} of codec ${codec}`;
     throw new GeometryVideoError("newer", `${found}, this player has ${newest}; a newer player is needed`);
   }
+  const code = await kernelCode();
   if (!WebAssembly.validate(code)) {
     throw new GeometryVideoError("unsupported", "this browser has no WebAssembly with SIMD; a newer one is needed");
   }
   const distinct = repeated.distinctPayload(payload);
-  if (codec !== MCGV) return openFrames(payload.header, distinct, repeated, level);
-  if (!("transform" in payload.header.settings)) return openMcgv(source, payload.header, distinct, repeated, level);
-  return openFrames(payload.header, withPictures(source, distinct), repeated, level);
+  if (codec !== MCGV) return openFrames(code, payload.header, distinct, repeated, level);
+  if (!("transform" in payload.header.settings)) return openMcgv(code, source, payload.header, distinct, repeated, level);
+  return openFrames(code, payload.header, withPictures(source, distinct), repeated, level);
 }
 
-async function openMcgv(source, { fps, vertices, container }, distinct, repeated, level) {
+async function openMcgv(code, source, { fps, vertices, container }, distinct, repeated, level) {
   if (level) throw new GeometryVideoError("unsupported", `level ${level}: there are levels 0..0`);
   const reader = await McgvReader.open(distinct, code);
   const file = source instanceof Uint8Array ? source : null;
@@ -69,7 +70,7 @@ async function openMcgv(source, { fps, vertices, container }, distinct, repeated
   };
 }
 
-async function openFrames({ fps }, distinct, repeated, level) {
+async function openFrames(code, { fps }, distinct, repeated, level) {
   const host = new FrameHost(distinct, code, level);
   const close = () => {
     host.close();

@@ -22,7 +22,7 @@ import { CodedField } from "../fields/coded_field.js";
 import { FieldHost } from "../fields/field_host.js";
 import { TYPES } from "../fields/head.js";
 import { Kernels } from "../wasm/kernels.js";
-import code from "../wasm/kernels.wasm";
+import { kernelCode } from "../wasm/inflated.js";
 import { AssetEntry } from "./asset_entry.js";
 import { readImages, readMaterials } from "./materials.js";
 
@@ -64,6 +64,7 @@ export async function readAsset(payload, video, positions) {
   const images = readImages(list.list("images", MAX_ITEMS), payload);
   const materials = readMaterials(list.list("materials", MAX_ITEMS), images.length);
   const notes = [];
+  const code = await kernelCode();
   const kernels = await Kernels.open(code);
   const { parts, indices, polygons } = readParts(kernels, list, payload, video, materials.length);
   const first = list.flag("geometry", false) ? await video.frame(0) : null;

@@ -6,15 +6,16 @@
 import { BASE_MESH_DRACO_PREFIX as PREFIX, BASE_MESH_MAX_PER_BYTE as MAX_PER_BYTE } from "../constants.js";
 import createDraco from "draco3d/draco_decoder_nodejs.js";
 import wasmBinary from "draco3d/draco_decoder.wasm";
+import { inflated } from "../wasm/inflated.js";
 import { corrupt } from "./errors.js";
 
-/** Draco's WebAssembly; a worker has none of its own. */
+/** Draco's WebAssembly, deflated; a worker has none of its own. */
 export const dracoBinary = wasmBinary;
 
 let binary = wasmBinary;
 let draco = null;
 
-/** Decode by these bytes. @param {Uint8Array} bytes */
+/** Decode by these bytes, deflated. @param {Uint8Array} bytes */
 export function useDraco(bytes) {
   binary = bytes;
 }
@@ -39,7 +40,7 @@ export function decodeDracoTriangles(stream) {
 
 async function decodeMesh(stream, read) {
   checkHeader(stream);
-  draco ??= createDraco({ wasmBinary: binary });
+  draco ??= inflated(binary).then((wasmBinary) => createDraco({ wasmBinary }));
   const module = await draco;
   const decoder = new module.Decoder();
   const mesh = new module.Mesh();
