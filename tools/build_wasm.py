@@ -61,7 +61,7 @@ POSITIONS = "float32[2]"
 MEMBERS = ("gvcodecs.pdct.shape_kernels.Members", [LONGS] * 3)
 SHAPE = ("gvcodecs.pdct.shape_kernels.Shape", [ROWS, ROWS, FLOATS])
 LOCAL_FRAMES = ("gvcodecs.pdct.shape_kernels.LocalFrames", ["float64[3]", "float64[3]"])
-LAYOUT = ("gvcodecs.pdct.delta_kernels.Layout", [LONGS] * 3)
+DELTA_LAYOUT = ("gvcodecs.pdct.delta_kernels.Layout", [LONGS] * 3)
 LEARNING = ("gvcodecs.pdct.delta_kernels.Learning", [NUMBERS, NUMBERS, NUMBERS, LONGS, LONGS, LONGS, NUMBERS, NUMBERS, LONGS])
 DELTAS = ("gvcodecs.pdct.delta_kernels.DeltaStream", ["uint64[1]", "uint32[1]", BYTES, LONGS])
 WORDS = ["uint64[1]", "uint32[1]"]  # a range decoder's state and its words
@@ -107,8 +107,8 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
     "gvcodecs.mcgv.motion.blend_kernels.find_energies": [ROWS, "int32[2]", ROWS, SCALAR],
     "gvcodecs.mcgv.motion.blend_kernels.invert_factors": ["float64[3]"],
     "gvcodecs.mcgv.motion.blend_kernels.blend_rows": [ROWS, "int32[2]", ROWS, "float64[3]"],
-    "gvcodecs.pdct.delta_kernels.start_learning": [LAYOUT],
-    "gvcodecs.pdct.delta_kernels.decode_deltas": [LAYOUT, LEARNING, DELTAS, "int64[3]"],
+    "gvcodecs.pdct.delta_kernels.start_learning": [DELTA_LAYOUT],
+    "gvcodecs.pdct.delta_kernels.decode_deltas": [DELTA_LAYOUT, LEARNING, DELTAS, "int64[3]"],
     "gvcodecs.pdct.shape_kernels.find_members": [LONGS, LONGS, NUMBERS],
     "gvcodecs.pdct.shape_kernels.lay_out": [MEMBERS],
     "gvcodecs.pdct.shape_kernels.find_base_seeds": [ROWS, NUMBERS, FLOATS, NUMBERS],
