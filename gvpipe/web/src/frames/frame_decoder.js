@@ -10,7 +10,10 @@ import { Kernels } from "../wasm/kernels.js";
 const LOOKS = 16; // frames that a look at the motion takes
 const CORRECTIONS = "corrections";
 
-/** Readers by codec: `open(payload, kernels)` gives `faces`, `points`, `levels`, `levelFaces`, `segmentStart` and `read`. */
+/**
+ * Readers by codec: `open(payload, kernels)` gives `faces`, `points`, `levels`, `levelFaces`, `segmentStart` and `read`; where frames come
+ * one after the other, `extend(box)`, too, which has a box hold the motion without decoding it.
+ */
 const READERS = {
   mcgv: { version: MCGV_VERSION, reader: TrajectoryReader }, // of trajectory images
   pca: { version: PCA_VERSION, reader: PcaReader },
@@ -54,7 +57,8 @@ export class FrameDecoder {
    * What a page must know of the mesh.
    *
    * @returns {Promise<{faces: Uint32Array, points: Int32Array, levels: number[], bounds: {min: number[], max: number[]}}>} triangles
-   *   (T, 3), flat; the point of each vertex; vertices of each level; the box of the first segment's motion, by evenly spaced frames
+   *   (T, 3), flat; the point of each vertex; vertices of each level; the box of the first segment's motion, by evenly spaced frames or
+   *   what the reader knows of it
    */
   async describe() {
     const reader = this.#reader;
@@ -62,11 +66,12 @@ export class FrameDecoder {
     const vertexCount = reader.levels[this.#level];
     const points = this.#level ? Int32Array.from({ length: vertexCount }, (_, v) => v) : reader.points;
     const [bounds, last] = [{ min: [0, 0, 0], max: [0, 0, 0] }, reader.segmentStart(1) - 1];
-    const looks = Math.min(LOOKS, last + 1);
+    const looks = reader.extend ? 1 : Math.min(LOOKS, last + 1);
     for (let i = 0; i < looks; i++) {
       const frame = Math.floor((i * last) / Math.max(1, looks - 1));
       stretch(bounds, await this.read(frame, frame + 1), i === 0);
     }
+    await reader.extend?.(bounds);
     return { faces, points, levels: reader.levels, bounds };
   }
 

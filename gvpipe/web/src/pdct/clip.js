@@ -74,7 +74,7 @@ export class Clip {
     const learning = kernels.call("start_learning", ...layout);
     this.#kernels = kernels;
     this.#cursor = cursor;
-    this.#parts = { seeds, lattice, members, layout, shape, seedPoints, stream, learning, step: head.step };
+    this.#parts = { seeds, lattice, members, layout, shape, seedPoints, stream, learning, head };
     this.#positions = kernels.array("float32", [frames, points, 3]);
     [this.#frames, this.#points] = [frames, points];
   }
@@ -85,9 +85,19 @@ export class Clip {
     return this.#kernels.view(this.#rows(k, 1));
   }
 
+  /** Make a box hold the seed vertices of all frames. */
+  extend({ min, max }) {
+    const { seedPoints, head } = this.#parts;
+    for (let i = 0; i < seedPoints.length; i++) {
+      const value = head.origin[i % 3] + seedPoints[i] * head.seedStep;
+      min[i % 3] = Math.min(min[i % 3], value);
+      max[i % 3] = Math.max(max[i % 3], value);
+    }
+  }
+
   #decode(count) {
     const kernels = this.#kernels;
-    const { seeds, lattice, members, layout, shape, seedPoints, stream, learning, step } = this.#parts;
+    const { seeds, lattice, members, layout, shape, seedPoints, stream, learning, head } = this.#parts;
     const sums = kernels.array("int64", [count, 3, layout[0].shape[0]]);
     const [status] = kernels.call("decode_deltas", ...layout, ...learning, ...stream, sums);
     if (status) throw this.#cursor.corrupt(PROBLEMS[status]);
@@ -96,7 +106,7 @@ export class Clip {
     const frames = this.#localFrames(kernels, own, count, lattice);
     const target = this.#rows(this.#done, count);
     const corners = kernels.whole(own, [count, seeds.shape[0], 9]);
-    const fits = kernels.call("rebuild_positions", ...members, ...shape, ...frames, sums, step, target)[0];
+    const fits = kernels.call("rebuild_positions", ...members, ...shape, ...frames, sums, head.step, target)[0];
     if (!kernels.call("place_seeds", seeds, corners, lattice, target)[0] || !fits) throw this.#cursor.corrupt(TOO_LARGE);
     this.#done += count;
     const [, , raw, place] = stream;

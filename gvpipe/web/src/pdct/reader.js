@@ -97,6 +97,11 @@ export class PdctReader {
     return frames;
   }
 
+  /** Make a box hold the seed vertices of the first clip: they lie far from each other. */
+  async extend(box) {
+    if (this.#surface.traversal.length) (await this.#clips.get(0)).extend(box);
+  }
+
   /** Fill `target (V, 3)` from positions of the points, which get those that stand still. */
   #spread(own, target) {
     const { points, positions } = this.#still;
