@@ -163,7 +163,7 @@ def test_seeks_in_the_player(kind: str, player: Callable[..., Any]) -> None:
     assert shown[0] == 9 and shown[1] >= 14 and shown[2] == min(39, shown[1] + 1)
 
 
-@pytest.mark.parametrize("kind", ["affine", "pca"])
+@pytest.mark.parametrize("kind", ["affine", "pca", "klt"])
 def test_exported_page_plays_from_a_disk(kind: str, driver: Any, site: tuple[Path, str], tmp_path: Path) -> None:
     """Two loops, nothing asked for, nothing left behind."""
     gvpipe.export_html(site[0] / f"{kind}.mp4", tmp_path / "page.html")
