@@ -25,7 +25,7 @@ PREFIX = "web-"
 WAIT = 30  # s of the clock, for one file
 MOST_HEAP = 1024  # MB
 MOST_MEMORY = 400 << 20  # bytes that a file may add to what the process held at its peak; what is garbage counts, too
-READ = ("laplacian", "mcgv", "pca")  # codecs that browsers read
+READ = ("laplacian", "mcgv", "pca", "pdct")  # codecs that browsers read
 
 
 class RefusedByPlayer(Exception):

@@ -62,7 +62,13 @@ GRAPH = ("gvpipe.mesh.graph_kernels.Graph", [LONGS, INTS])
 SPARSE = ("gvpipe.trajectory.product_kernels.Rows", [LONGS, INTS, FLOATS])
 LOWER = ("gvcodecs.laplacian.operator_kernels.Lower", [LONGS, INTS, FLOATS, FLOATS])
 FACTORS = ("gvcodecs.laplacian.factor_kernels.Factors", [LONGS, INTS, FLOATS, FLOATS])
-DELTAS = ("gvcodecs.laplacian.delta_kernels.DeltaOrder", [INTS] * 3)
+DELTA_ORDER = ("gvcodecs.laplacian.delta_kernels.DeltaOrder", [INTS] * 3)
+MEMBERS = ("gvcodecs.pdct.shape_kernels.Members", [LONGS] * 3)
+SHAPE = ("gvcodecs.pdct.shape_kernels.Shape", [ROWS, ROWS, FLOATS])
+LOCAL_FRAMES = ("gvcodecs.pdct.shape_kernels.LocalFrames", ["float64[3]", "float64[3]"])
+DELTA_LAYOUT = ("gvcodecs.pdct.delta_kernels.Layout", [LONGS] * 3)
+LEARNING = ("gvcodecs.pdct.delta_kernels.Learning", [NUMBERS, NUMBERS, NUMBERS, LONGS, LONGS, LONGS, NUMBERS, NUMBERS, LONGS])
+DELTAS = ("gvcodecs.pdct.delta_kernels.DeltaStream", ["uint64[1]", "uint32[1]", BYTES, LONGS])
 WORDS = ["uint64[1]", "uint32[1]"]  # a range decoder's state and its words
 KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and NamedTuples of both
     "gvpipe.mesh.hierarchy_kernels.build_order": [TRIANGLES, SCALAR, SCALAR],
@@ -109,7 +115,7 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
     ],
     "gvcodecs.laplacian.anchor_kernels.select_anchors": [SCALAR, "bool", HIERARCHY, CAUSAL, INTS, INTS, FLAGS],
     "gvcodecs.laplacian.delta_kernels.order_deltas": ["bool", HIERARCHY, INTS, FLAGS],
-    "gvcodecs.laplacian.delta_kernels.weigh_deltas": [DELTAS, GRAPH, ROWS, SCALAR, SCALAR],
+    "gvcodecs.laplacian.delta_kernels.weigh_deltas": [DELTA_ORDER, GRAPH, ROWS, SCALAR, SCALAR],
     "gvcodecs.laplacian.elimination_kernels.order_unknowns": [LONGS, INTS, SCALAR, SCALAR],
     "gvcodecs.laplacian.factor_kernels.factor_pattern": [LONGS, INTS, SCALAR],
     "gvcodecs.laplacian.factor_kernels.factorise": [LOWER, LONGS, INTS],
@@ -123,6 +129,18 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
     "gvcodecs.laplacian.operator_kernels.normal_matrix": [SPARSE, SPARSE, FLOATS, INTS, SCALAR],
     "gvcodecs.laplacian.operator_kernels.normal_pattern": [SPARSE, SPARSE],
     "gvcodecs.laplacian.operator_kernels.transpose": [SPARSE],
+    "gvcodecs.mcgv.motion.blend_kernels.find_energies": [ROWS, "int32[2]", ROWS, SCALAR],
+    "gvcodecs.mcgv.motion.blend_kernels.invert_factors": ["float64[3]"],
+    "gvcodecs.mcgv.motion.blend_kernels.blend_rows": [ROWS, "int32[2]", ROWS, "float64[3]"],
+    "gvcodecs.pdct.delta_kernels.start_learning": [DELTA_LAYOUT],
+    "gvcodecs.pdct.delta_kernels.decode_deltas": [DELTA_LAYOUT, LEARNING, DELTAS, "int64[3]"],
+    "gvcodecs.pdct.shape_kernels.find_members": [LONGS, LONGS, NUMBERS],
+    "gvcodecs.pdct.shape_kernels.lay_out": [MEMBERS],
+    "gvcodecs.pdct.shape_kernels.find_base_seeds": [ROWS, NUMBERS, FLOATS, NUMBERS],
+    "gvcodecs.pdct.shape_kernels.find_frames": ["float64[3]", FLOATS],
+    "gvcodecs.pdct.shape_kernels.shape_members": [ROWS, MEMBERS, LOCAL_FRAMES, "float64"],
+    "gvcodecs.pdct.shape_kernels.rebuild_positions": [MEMBERS, SHAPE, LOCAL_FRAMES, "int64[3]", "float64", "float32[3]"],
+    "gvcodecs.pdct.shape_kernels.place_seeds": [NUMBERS, "int64[3]", FLOATS, "float32[3]"],
     "gvpipe.fields.dual_kernels.find_dual": [TRIANGLES, SCALAR],
     "gvpipe.fields.residual_kernels.decode_rows": [
         ("gvpipe.fields.residual_kernels.Residuals", [NUMBERS, SCALAR, FLAGS, CAUSAL]),

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 from uuid import UUID
 
-PREFIXED = ("GVCODECS.LAPLACIAN", "GVCODECS.PCA")
+PREFIXED = ("GVCODECS.LAPLACIAN", "GVCODECS.PCA", "GVCODECS.PDCT")
 TARGET = Path(__file__).parents[1] / "gvpipe" / "web" / "src" / "constants.js"
 SHARED = {
     "gvpipe.asset_coding.directory": "SECTION VERSION MOST MAX_BYTES SURFACE OCTAHEDRAL",
@@ -49,7 +49,7 @@ SHARED = {
     "gvpipe.entropy.number_kernels": "SLOT_BITS MIXERS",
     "gvpipe.entropy.parametric_tables": "N_TOKENS RATIO_BITS RATIOS TOTAL ZEROS",
     "gvpipe.entropy.range_decoder": "PRECISION",
-    "gvpipe.entropy.series": "MAX_CLASS",
+    "gvpipe.entropy.series": "MAX_CLASS FIRST_CLASS",
     "gvpipe.entropy.tokens": "DIRECT TABLE_TOTAL MAX_TOKENS",
     "gvpipe.errors": "REMEDY",
     "gvpipe.fields.derived": "MAGNITUDE SIGNALS",
@@ -84,10 +84,20 @@ SHARED = {
     "gvcodecs.mcgv.layout.chart_kernels": "MAX_NEAR",
     "gvcodecs.mcgv.layout.coding": "CONTEXTS",
     "gvcodecs.mcgv.layout.kd_tree": "COMMON FRAME MOMENT_BITS SPREAD MAX_COORDINATE",
-    "gvcodecs.mcgv.motion.skinning": "INFLUENCES TOTAL FLAT LEAST_ENERGY",
+    "gvcodecs.mcgv.motion.blend_kernels": "FLAT LEAST_ENERGY",
+    "gvcodecs.mcgv.motion.skinning": "INFLUENCES TOTAL",
     "gvcodecs.mcgv.motion.weight_coding": "COUNT_CONTEXTS",
     "gvcodecs.mcgv.motion.weight_kernels": "MAX_LISTED",
+    "gvcodecs.mcgv.pictures.trajectories": "PLANES",
+    "gvcodecs.mcgv.trajectory_header": "MAX_FINENESS",
+    "gvcodecs.mcgv.trajectory_reader": "BYTES_PER_SAMPLE SECONDS_PER_SAMPLE",
     "gvcodecs.pca.header": "MAX_SEGMENTS VERSION_STILL",
+    "gvcodecs.pdct.clip": "MAX_CLUSTERS BYTES_PER_POINT SECONDS_PER_POINT BYTES_PER_NUMBER SECONDS_PER_FRAME",
+    "gvcodecs.pdct.delta_coding": "PROBLEMS",
+    "gvcodecs.pdct.header": "MAX_CLIPS VERSION_POINTS",
+    "gvcodecs.pdct.reader": "BYTES_PER_POINT SECONDS_PER_POINT",
+    "gvcodecs.pdct.seed_coding": "ORDERS MAX_COORDINATE",
+    "gvcodecs.pdct.still_points": "SECTION",
 }
 
 

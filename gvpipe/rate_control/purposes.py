@@ -30,7 +30,7 @@ SERVES: dict[str, dict[str, Own]] = {  # archive: all
     STREAM: {"mcgv": {"gop": 16}, "pdct": {"clip": 24}},  # about half a second and a second: what a jump decodes at most
 }
 NEEDS: dict[str, dict[str, dict[str, Any]]] = {  # settings without which a codec does not serve
-    WEB: {"mcgv": {"image": "h264", "profile": "web", "transform": "none"}, "laplacian": {}, "pca": {}},
+    WEB: {"mcgv": {"image": "h264", "profile": "web"}, "laplacian": {}, "pca": {}, "pdct": {}},
     STREAM: {"mcgv": {"transform": "none"}, "pdct": {}},
 }
 LACKS = {WEB: "browsers do not play", STREAM: "readers cannot start at once with"}

@@ -64,11 +64,22 @@ def deflated_list(whole: Bitstream) -> Bitstream:
     return dataclasses.replace(whole, sections={**whole.sections, "asset": zlib.compress(text, 9)})
 
 
+def long_clip(whole: Bitstream) -> Bitstream:
+    return dataclasses.replace(whole, n_frames=100_000, header={**whole.header, "clips": 1})
+
+
+def wide_pictures(whole: Bitstream) -> Bitstream:
+    """Pictures of as many pixels as a header may name, all of which would go to the worker."""
+    return dataclasses.replace(whole, header={**whole.header, "width": 16384, "height": 5456})
+
+
 BOMBS: dict[str, tuple[Path, Callable[[Bitstream], Bitstream], str]] = {
     "many vertices": (WHOLE, many_vertices, "16777216 vertices"),
     "deflated triangles": (WHOLE, deflated_triangles, "5242880 loose triangles"),
     "many runs": (WHOLE, many_runs, "16777216 distinct frames"),
     "long transforms": (RIGID, long_transforms, "16384 trajectories"),
+    "a long clip": (GOLDEN / "pdct-1.mp4", long_clip, "100000 frames of"),
+    "wide pictures": (GOLDEN / "mcgv-5-klt.mp4", wide_pictures, "pictures of segment 0"),
     "a deflated list": (WHOLE, deflated_list, "inflates to more"),
 }
 

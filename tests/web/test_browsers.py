@@ -31,12 +31,14 @@ FILES: dict[str, dict[str, Any]] = {  # several groups of pictures, with B-frame
     "laplacian": {"codec": "laplacian"},
     "pca": {"codec": "pca"},
     "jpeg": {"image": "jpeg", "prediction": "affine", "quality": 90},
+    "pdct": {"codec": "pdct", "clip": 16},
+    "klt": {"codec": "mcgv", "transform": "klt", "segment": 20},
     "held": {"prediction": "blended", "preset": "slow", "gop": 5, "quality": 90},  # at 75 it needs no pictures
 }
 LENGTHS = {"held": [2] * 13 + [14]}  # frames that each picture is shown for, 1 if not given
 DECODERS = {"webcodecs": "", "video": "delete window.VideoDecoder;"}
 pytestmark = pytest.mark.slow
-WITHOUT_H264 = ("jpeg", "laplacian", "pca")
+WITHOUT_H264 = ("jpeg", "laplacian", "pca", "pdct")
 SEEN: dict[str, list[str]] = {}  # of each kind of file, what the first browser made of it
 
 
@@ -228,7 +230,7 @@ def test_seeks_in_the_player(kind: str, player: Callable[..., Any]) -> None:
     assert shown[0] == 9 and shown[1] >= 14 and shown[2] == min(39, shown[1] + 1)
 
 
-@pytest.mark.parametrize("kind", ["affine", "pca"])
+@pytest.mark.parametrize("kind", ["affine", "pca", "klt"])
 def test_exported_page_plays_from_a_disk(kind: str, driver: Any, site: tuple[Path, str], tmp_path: Path) -> None:
     """Two loops, nothing asked for, nothing left behind."""
     gvpipe.export_html(site[0] / f"{kind}.mp4", tmp_path / "page.html")

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 from conftest import Finished
 from file_server import serving
-from folders import ROOT, SAMPLES
+from folders import GOLDEN, ROOT, SAMPLES
 from sequences import waving
 
 import gvpipe
@@ -58,6 +58,14 @@ def test_page_holds_the_file_unchanged(settings: dict[str, Any], video: Path, tm
     assert report.bytes <= 1.35 * video.stat().st_size + PLAYER_BYTES
 
 
+@pytest.mark.parametrize("name", ["pca-2-still", "pdct-1", "pdct-2-still", "mcgv-5-klt"])
+def test_page_holds_files_of_these_codecs_unchanged(name: str, tmp_path: Path) -> None:
+    path = GOLDEN / f"{name}.mp4"
+    report = gvpipe.export_html(path, tmp_path / "page.html")
+    assert _embedded(tmp_path / "page.html") == path.read_bytes()
+    assert not report.converted and report.bytes <= 1.35 * path.stat().st_size + PLAYER_BYTES
+
+
 @pytest.mark.parametrize("stream", [False, True])
 def test_a_page_of_a_file_on_a_web_server(stream: bool, video: Path, tmp_path: Path) -> None:
     """It holds the file in the plain layout, which loads faster from memory."""
@@ -89,7 +97,7 @@ def test_title_is_text(video: Path, tmp_path: Path) -> None:
     [
         ({"profile": "precise"}, "mcgv, profile h264-10"),
         ({"image": "jpeg"}, "mcgv, profile jpeg"),
-        ({"prediction": "blended", "transform": "klt"}, "mcgv, transform klt, profile h264-8"),
+        ({"prediction": "blended", "transform": "klt", "profile": "precise"}, "mcgv, transform klt, profile h264-10"),
         ({"codec": "laplacian"}, "laplacian"),
     ],
     ids=str,

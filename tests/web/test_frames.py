@@ -17,8 +17,11 @@ from pages import BUNDLE
 from sequences import awkward, held, patched, waving
 
 import gvpipe
+from gvcodecs.mcgv.header import Header
 from gvpipe.codec import LevelReader
+from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file, write_file
+from gvpipe.media.video import VideoReader
 from gvpipe.player import _Level
 from gvpipe.sequence import MeshSequence
 
@@ -27,6 +30,7 @@ REAL = ("samba", "chicken", "cow", "kaykit_spin", "fox_run")
 WRONG: dict[str, dict[str, Any]] = {  # values of header fields
     "laplacian": {"operator": "x", "anchors": 0, "edge_power": 3, "anchor_choice": [], "steps": [0.0], "segments": 99},
     "pca": {"predictor": "x", "beta": 7, "steps": [0.0], "segments": 99},
+    "pdct": {"clips": 99, "base": [0, 0, 0, 0]},
 }
 WALK = {"codec": "laplacian", "delta_prediction": "rigid", "anchor_choice": "walk", "anchors": 40}
 MOST = 6  # frames that are compared of a file
@@ -48,13 +52,27 @@ def load(jobs: Sequence[dict[str, Any]], folder: Path) -> list[dict[str, Any]]:
     return results
 
 
+def pictures(bitstream: Bitstream, path: Path) -> dict[str, Any]:
+    """The part of a job that tells of the pictures, whose luma goes into a file; nothing if there are none that are read."""
+    if "transform" not in bitstream.header:
+        return {}
+    header = Header.of(bitstream)
+    size = (header.width, 3 * header.height)
+    reader = VideoReader(bitstream.pictures, header.profile, *size)
+    planes = np.concatenate([planes for _, planes in reader.read(0, reader.n_frames)])
+    reader.close()
+    path.write_bytes(np.ascontiguousarray(planes[:, : size[1], : size[0]]).tobytes())
+    return {"planes": str(path), "size": size}
+
+
 def check(paths: Sequence[Path], folder: Path) -> None:
     """Triangles and positions of every level are Python's."""
     jobs = []
     for path in paths:
         with gvpipe.open(path) as video:
             chosen = np.random.default_rng(3).permutation(len(video))[:MOST].tolist()
-            jobs += [{"path": str(path), "level": level, "frames": chosen} for level in range(len(video.levels))]
+            luma = pictures(video.bitstream, folder / f"{path.stem}.luma")
+            jobs += [{"path": str(path), "level": level, "frames": chosen, **luma} for level in range(len(video.levels))]
     for job, found in zip(jobs, load(jobs, folder), strict=True):
         where = f"{Path(job['path']).name}, level {job['level']}"
         assert "error" not in found, f"{where}: {found['error']}"
@@ -77,8 +95,9 @@ def encoded(sequence: MeshSequence, path: Path, **settings: Any) -> Path:
     return path
 
 
-def test_golden_files(tmp_path: Path) -> None:
-    check(sorted([*GOLDEN.glob("laplacian-*.mp4"), *GOLDEN.glob("pca-*.mp4")]), tmp_path)
+@pytest.mark.parametrize("codec", ["laplacian", "pca", "pdct"])
+def test_golden_files(codec: str, tmp_path: Path) -> None:
+    check(sorted(GOLDEN.glob(f"{codec}-*.mp4")), tmp_path)
 
 
 def test_seams_repeated_frames_segments_and_corrections(tmp_path: Path) -> None:
@@ -111,6 +130,20 @@ def test_laplacians(tmp_path: Path) -> None:
     )
 
 
+def test_clips(tmp_path: Path) -> None:
+    """Of `pdct`: clusters of one member or none, long ones, fine low frequencies, flat triangles, values with many raw bits."""
+    check(
+        [
+            encoded(patched(), tmp_path / "seams.mp4", codec="pdct", clusters=1),
+            encoded(patched(still=0.5), tmp_path / "still.mp4", codec="pdct", reorder=True, segment=5, quality=100),
+            encoded(patched(still=1.0), tmp_path / "rest.mp4", codec="pdct"),
+            encoded(held(waving(10, 12), [2, *[1] * 10, 7]), tmp_path / "held.mp4", codec="pdct", fineness=8),
+            encoded(waving(14, 30), tmp_path / "clips.mp4", codec="pdct", clip=11, max_error=0.001, clusters=500),
+        ],
+        tmp_path,
+    )
+
+
 def wheel() -> MeshSequence:
     """A hub with 150 neighbours, more than rows keep."""
     spokes = np.arange(1, 151)
@@ -128,6 +161,26 @@ def test_laplacians_of_awkward_inputs(operator: str, tmp_path: Path) -> None:
     check([encoded(each, tmp_path / name, codec="laplacian", operator=operator) for name, each in files.items()], tmp_path)
 
 
+def test_trajectory_images(tmp_path: Path) -> None:
+    """Of `mcgv`: golden files, each placement, segments, outliers, still points, repeated frames, corrections."""
+    klt = {"codec": "mcgv", "transform": "klt"}
+    names = sorted(GOLDEN.glob("mcgv-*-klt.mp4"))
+    check(
+        [
+            *names,
+            encoded(patched(), tmp_path / "charts.mp4", **klt, placement="charts", quality=100),
+            encoded(patched(still=0.5), tmp_path / "still.mp4", **klt, placement="tiles", segment=5),
+            encoded(held(waving(14, 20), [2, *[1] * 18, 3]), tmp_path / "held.mp4", **klt, placement="halves", max_error=0.001),
+        ],
+        tmp_path,
+    )
+
+
+@pytest.mark.slow
+def test_awkward_clips(tmp_path: Path) -> None:
+    check([encoded(each, tmp_path / f"{name}.mp4", codec="pdct") for name, each in awkward().items()], tmp_path)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("predictor", ["kalman", "navg", "lsp", "rbf"])
 def test_awkward_inputs(predictor: str, tmp_path: Path) -> None:
@@ -135,15 +188,19 @@ def test_awkward_inputs(predictor: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("codec", ["pca", "pdct"])
 @pytest.mark.parametrize("sample", ["creature", "flag"])
-def test_samples(sample: str, tmp_path: Path) -> None:
-    gvpipe.encode(SAMPLES / f"{sample}.npz", tmp_path / "x.mp4", "pca")
+def test_samples(sample: str, codec: str, tmp_path: Path) -> None:
+    gvpipe.encode(SAMPLES / f"{sample}.npz", tmp_path / "x.mp4", codec)
     check([tmp_path / "x.mp4"], tmp_path)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not DATA.exists(), reason="no ../shared/data")
-@pytest.mark.parametrize(("codec", "name"), [*(("pca", name) for name in REAL), ("laplacian", "samba"), ("laplacian", "cow")])
+@pytest.mark.parametrize(
+    ("codec", "name"),
+    [*((codec, name) for codec in ("pca", "pdct") for name in REAL), ("laplacian", "samba"), ("laplacian", "cow")],
+)
 def test_real_sequences(codec: str, name: str, tmp_path: Path) -> None:
     gvpipe.encode(DATA / f"{name}.npz", tmp_path / "x.mp4", codec)
     check([tmp_path / "x.mp4"], tmp_path)

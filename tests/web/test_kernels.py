@@ -66,16 +66,19 @@ def test_kernels_equal_numba_on_trajectories(name: str, tmp_path: Path) -> None:
 
 
 @NODE
-@pytest.mark.parametrize("name", ["mcgv-5-seams", "pdct-2-seams"])
+@pytest.mark.parametrize("name", ["mcgv-5-seams", "pdct-2-seams", "mcgv-5-klt"])
 def test_kernels_equal_numba_on_meshes(name: str, tmp_path: Path) -> None:
-    """Seams, vertex orders, adaptive positions."""
+    """Seams, vertex orders, adaptive positions, clips, a blend's matrix."""
     with recorded() as calls, gvpipe.open(GOLDEN / f"{name}.mp4") as video:
         assert np.isfinite(video[0]).all()
     used = {each for each, *_ in calls}
-    if name.startswith("mcgv"):
+    if name.endswith("klt"):
+        assert used >= {"find_energies", "invert_factors", "blend_rows", "multiply", "weighted_sums"}
+    elif name.startswith("mcgv"):
         assert used >= {"order_by_corners", "code_positions", "visit_corners", "code_visits"}
     else:
         assert used >= {"decode_ranks", "sort_neighbours", "traverse_visits"}
+        assert used >= {"find_members", "find_frames", "shape_members", "decode_deltas", "rebuild_positions", "place_seeds"}
     compare(calls, tmp_path)
 
 

@@ -129,6 +129,16 @@ def test_motion_without_pictures_comes_in_parts(module: Callable[..., Any], tmp_
         assert module(AGAIN, 60)[0] == "loaded"
 
 
+def test_trajectory_images_come_in_parts(module: Callable[..., Any], tmp_path: Path) -> None:
+    path = tmp_path / "images.mp4"
+    gvpipe.encode(waving(70, 200), path, preset="ultrafast", stream=True, transform="klt", segment=20, quality=95)
+    assert path.stat().st_size > 2 << 16
+    with gvpipe.open(path) as video, serving(path.read_bytes()) as (url, served):
+        found = module(JUMP, url, 170)
+        assert np.array_equal(np.array(found, np.float32).reshape(-1, 3), video[170])
+        assert served.n_sent < len(served.data)
+
+
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_frames_equal_pythons(variant: str, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     path = site[0] / "stream.mp4"

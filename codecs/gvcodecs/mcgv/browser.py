@@ -6,6 +6,7 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.media.video import PROFILES
 
 VERSION = 5  # the highest that gvpipe/web/src/mcgv reads
+TRAJECTORIES = "h264-8"  # the profile of trajectory images that it reads
 
 
 def browser_obstacle(bitstream: Bitstream) -> str:
@@ -13,6 +14,7 @@ def browser_obstacle(bitstream: Bitstream) -> str:
     header = bitstream.header
     if bitstream.version > VERSION:
         return f"{bitstream.codec}, version {bitstream.version}"
-    if header.get("pictures") is False or ("transform" not in header and header.get("profile") in PROFILES):
+    profiles = PROFILES if "transform" not in header else (TRAJECTORIES,)
+    if header.get("pictures") is False or header.get("profile") in profiles:
         return ""
     return ", ".join([bitstream.codec, *(f"{key} {header[key]}" for key in ("transform", "profile") if key in header)])

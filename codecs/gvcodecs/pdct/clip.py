@@ -10,7 +10,7 @@ grow from frame to frame, and no decision hangs on one. Departures from the pape
 
 - every clip, the first too, starts from the base frame, whose difference to the clip's first frame is coded like any other;
 - a delta is predicted as the part ``w`` (sixteenths) of the delta before. Each group of coefficients (cluster, octave) learns
-  its w by least squares from decoded deltas: near 0 in noise, near 1 in smooth motion (`Momentum`);
+  its w by least squares from decoded deltas: near 0 in noise, near 1 in smooth motion (`delta_coding`);
 - before the DCT, four functions per cluster (1 and the three base coordinates) take the affine part of the motion. A
   traversal of the vertices would turn it into high frequencies (`Dictionary`).
 
@@ -29,10 +29,8 @@ import numpy as np
 
 from gvcodecs.pdct.clustering import Clusters
 from gvcodecs.pdct.delta_coding import DeltaDecoder, DeltaEncoder
-from gvcodecs.pdct.dictionary import UNIT, BaseFrame, Dictionary, model_units
+from gvcodecs.pdct.dictionary import BaseFrame, Dictionary, frames_of
 from gvcodecs.pdct.labels import decode_labels, encode_labels
-from gvcodecs.pdct.local_frames import local_frames
-from gvcodecs.pdct.momentum import Momentum
 from gvcodecs.pdct.seed_coding import decode_seeds, encode_seeds
 from gvpipe.arrays import Float32, Float64, Int64
 from gvpipe.budget import UNLIMITED, Budget
@@ -40,6 +38,7 @@ from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.container.segments import HUGE, TINY
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.entropy.tokens import tokenise
+from gvpipe.errors import InputError
 from gvpipe.mesh.lattice import Lattice
 
 HEAD = struct.Struct("<6d")
@@ -47,7 +46,7 @@ MAX_CLUSTERS = 1024
 BYTES_PER_POINT, SECONDS_PER_POINT = 160, 0.4e-6  # of a frame
 BYTES_PER_NUMBER = 64  # of seeds
 SECONDS_PER_FRAME = 0.6e-3
-LARGEST = float(np.finfo(np.float32).max)
+TOGETHER = 16  # frames decoded and rebuilt at once, an even number
 RIDGE = 1e-6  # of the affine fit
 LAMBDA = 0.14  # squared steps that a bit is worth; 0.1155 by theory at a high rate
 
@@ -65,11 +64,13 @@ def encode_clip(frames: Float32, surface: BaseFrame, quantiser: DeltaQuantiser, 
     """Code ``frames (n, V, 3)``, model units, in the order of vertices that ``surface`` has."""
     lattice = Lattice.over(frames.reshape(-1, 3), seed_bits)
     seeds, labels = clusters.seeds, clusters.labels
-    dictionary = Dictionary(surface, seeds, labels, lattice, quantiser.fineness)
+    dictionary = Dictionary.of(surface, seeds, labels, lattice, quantiser.fineness)
+    if dictionary is None:
+        raise InputError(f"the clip moves within {lattice.step} x 2**{seed_bits}, far from frame 0; subtract its origin")
     seed_points = np.rint((frames[:, seeds].astype(np.float64) - lattice.origin) / lattice.step).astype(np.int64)
-    origins, axes = local_frames(seed_points)
-    local = dictionary.to_local(frames[:, dictionary.members].astype(np.float64), model_units(lattice, origins), axes)
-    signals = dictionary.transform(local - dictionary.rest) / quantiser.step
+    members = dictionary.members.vertices
+    local = dictionary.to_local(frames[:, members].astype(np.float64), frames_of(seed_points, dictionary.lattice))
+    signals = dictionary.transform(local - dictionary.shape.rest) / quantiser.step
     blocks = [
         encode_integers(np.diff(seeds.ravel(), prepend=0)),
         encode_labels(labels[surface.traversal], len(seeds)),
@@ -113,66 +114,57 @@ def decode_clip(data: bytes, n_frames: int, surface: BaseFrame, name: str, budge
         raise cursor.corrupt("a seed vertex does not exist")
     labels = np.zeros(n_vertices, np.int64)
     labels[surface.traversal] = decode_labels(Cursor(blocks[1], name), len(surface.traversal), n_seeds, name)
-    if np.abs((surface.base - origin) / seed_step).max() > 1 << 40:
+    dictionary = Dictionary.of(surface, seeds, labels, lattice, fineness)
+    if dictionary is None:
         raise cursor.corrupt("the base lies out of the seed lattice's range")
-    dictionary = Dictionary(surface, seeds, labels, lattice, fineness)
     seed_points = decode_seeds(Cursor(blocks[2], name), n_frames, dictionary.base_seeds, name)
-    sums = _decode_deltas(cursor, n_frames, dictionary)
-    origins, axes = local_frames(seed_points)
-    result = np.zeros((n_frames, n_vertices, 3))
-    result[:, dictionary.members] = dictionary.to_world(dictionary.rebuild(sums, step), model_units(lattice, origins), axes)
-    result[:, seeds.ravel()] = lattice.points_at(seed_points).reshape(n_frames, -1, 3)
-    if not np.abs(result).max() <= LARGEST:
+    positions = np.zeros((n_frames, n_vertices, 3), np.float32)
+    if not _decode_frames(cursor, dictionary, seeds, seed_points, step, positions):
         raise cursor.corrupt("a position is larger than float32 can hold")
-    return result.astype(np.float32)
+    return positions
+
+
+def _decode_frames(
+    cursor: Cursor, dictionary: Dictionary, seeds: Int64, seed_points: Int64, step: float, positions: Float32
+) -> bool:
+    """Fill in the ``positions (n, V, 3)`` of members and seeds; false where one is larger than float32 can hold."""
+    from gvcodecs.pdct.shape_kernels import place_seeds, rebuild_positions
+
+    coder, lattice, fits = DeltaDecoder(cursor, dictionary.layout), dictionary.lattice, True
+    for first in range(0, len(positions), TOGETHER):
+        block = slice(first, first + TOGETHER)
+        frames, sums = frames_of(seed_points[block], lattice), coder.take_frames(len(positions[block]))
+        fits &= rebuild_positions(dictionary.members, dictionary.shape, frames, sums, step, positions[block])
+    coder.finish()
+    return fits and place_seeds(seeds, seed_points.reshape(len(positions), -1, 9), lattice, positions)
 
 
 def _encode_deltas(signals: Float64, dictionary: Dictionary, quantiser: DeltaQuantiser) -> bytes:
     """Code ``signals (n, 3, N)``, coefficients in steps, by the loop that the decoder runs."""
-    coder, momentum = DeltaEncoder(dictionary.layout), Momentum(dictionary)
-    n_affine, scale = dictionary.n_affine, dictionary.scale
-    shapes = dictionary.transform(dictionary.functions)  # (4, N)
+    from gvcodecs.pdct.delta_kernels import UNIT
+
+    coder = DeltaEncoder(dictionary.layout)
+    n_affine, scale = dictionary.n_affine, dictionary.shape.scale
+    shapes = dictionary.transform(dictionary.shape.functions)  # (4, N)
     projections = np.concatenate([_projection(shapes[:, w]) for w in dictionary.slices] or [np.zeros((4, 0))], axis=1)
-    sizes = np.diff(dictionary.bounds)
-    sums = np.zeros((3, n_affine + len(scale)), np.int64)
+    bounds = dictionary.members.bounds
+    sizes = np.diff(bounds)
     for signal in signals:
-        predicted_delta = momentum.predict()
-        prediction = (sums + predicted_delta) / UNIT
+        prediction = (coder.sums + coder.predict()) / UNIT
         residual = signal - prediction[:, n_affine:] * scale - _expand(prediction[:, :n_affine], shapes, sizes)
         coefficients = np.empty_like(prediction)
-        coefficients[:, :n_affine] = _project(residual, projections, dictionary.bounds)
+        coefficients[:, :n_affine] = _project(residual, projections, bounds)
         residual -= _expand(np.rint(coefficients[:, :n_affine]), shapes, sizes)
         coefficients[:, n_affine:] = residual / scale
         if quantiser.kept > 0:
             _drop_small(coefficients[:, n_affine:], dictionary, quantiser.kept)
-        values, contexts = np.zeros_like(sums), np.zeros_like(sums)
-        costs = coder.contexts.costs()
+        values, contexts = np.zeros(prediction.shape, np.int64), np.zeros(prediction.shape, np.int64)
+        costs = coder.costs()
         for axis in range(3):
-            contexts[axis] = coder.contexts.of(axis, values)
+            coder.find_contexts(axis, values, contexts)
             values[axis] = _choose(coefficients[axis], contexts[axis], costs, n_affine)
-            coder.add_axis(contexts[axis], values[axis])
-        coder.contexts.learn(contexts, values)
-        delta = predicted_delta + UNIT * values
-        momentum.learn(delta)
-        sums += delta
+        coder.add_frame(contexts, values)
     return coder.finish()
-
-
-def _decode_deltas(cursor: Cursor, n_frames: int, dictionary: Dictionary) -> Int64:
-    """Mirror of `_encode_deltas`: the coefficients' sums ``(n_frames, 3, C)``, in units."""
-    coder, momentum = DeltaDecoder(cursor, dictionary.layout), Momentum(dictionary)
-    sums = np.zeros((n_frames, 3, dictionary.n_affine + len(dictionary.members)), np.int64)
-    for frame in range(n_frames):
-        values, contexts = np.zeros_like(sums[0]), np.zeros_like(sums[0])
-        for axis in range(3):
-            contexts[axis] = coder.contexts.of(axis, values)
-            values[axis] = coder.take_axis(contexts[axis])
-        coder.contexts.learn(contexts, values)
-        delta = momentum.predict() + UNIT * values
-        momentum.learn(delta)
-        sums[frame] = delta if frame == 0 else sums[frame - 1] + delta
-    coder.finish()
-    return sums
 
 
 def _drop_small(coefficients: Float64, dictionary: Dictionary, kept: float) -> None:

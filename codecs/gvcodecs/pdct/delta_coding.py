@@ -1,4 +1,4 @@
-"""Range coding of delta coefficients, frame after frame, with tables that learn as they go.
+"""Range coding of delta coefficients, frame after frame, with tables that learn as they go, and a weight in time that does.
 
 What: the three axes of a frame's quantised delta coefficients, in turn; each coefficient's context comes from how large it and
 its neighbours in frequency lately were, and how large it is on the axes before.
@@ -6,106 +6,79 @@ Why not `gvpipe.entropy.integers`: its contexts must be known before a block is 
 decoded. All contexts, counts and probabilities are integers or one division of integers, so no rounding can part decoder and
 encoder.
 
-A value is folded and cut into a token and raw low bits as in `gvpipe.entropy.integers`. Tables start flat, gain `GAIN` per
-token and halve when they reach `FULL`::
+In smooth motion the next delta is nearly the last one; in quantisation noise it is not. Each group of coefficients (an octave
+of a cluster's frequencies) finds how much repeats by least squares over the deltas decoded so far, so no flag is sent.
+
+A value is folded and cut into a token and raw low bits as in `gvpipe.entropy.integers`. Tables start flat, gain 32 per
+token and halve when they reach 65536::
 
     section = [varint] W, [W x u32] range-coded tokens, raw low bits, in order of frame, axis, coefficient
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.arrays import Float64, Int64, UInt8, UInt32
 from gvpipe.container.cursor import Cursor, varint
-from gvpipe.entropy.tokens import DIRECT, model, tokenise
+from gvpipe.entropy.range_decoder import start
+from gvpipe.entropy.tokens import model, tokenise
 
-MAX_BITS = 36  # bit length of the largest folded value
-N_TOKENS = DIRECT + 2 * (MAX_BITS - 4)
-GAIN = 32  # of a token's count, when it occurs
-FULL = 1 << 16  # tokens' counts are halved from here on
-SLOW_LEVELS = np.array([1, 4, 10, 20, 36, 56, 80, 112, 160, 224, 320, 512, 1024, 2048, 4096, 16384])
-N_RECENT = 5
-KINDS = 2  # of coefficients: affine, DCT
-N_BANDS = 16  # contexts of a clip's first frame: octaves of frequency
-N_STEADY = KINDS * (len(SLOW_LEVELS) + 1) * N_RECENT
-N_CONTEXTS = N_STEADY + KINDS * N_BANDS
+if TYPE_CHECKING:
+    from gvcodecs.pdct.delta_kernels import Layout
 
-
-@dataclass(frozen=True)
-class Layout:
-    """What is known of the C coefficients of an axis beforehand.
-
-    Args:
-        kinds: ``(C,)`` 0 affine, 1 DCT.
-        bands: ``(C,)`` octave of its frequency, 0..15.
-    """
-
-    kinds: Int64
-    bands: Int64
-
-
-class Contexts:
-    """Counts per context, and the recent magnitudes that choose the contexts; one for a clip, alike on both sides."""
-
-    def __init__(self, layout: Layout) -> None:
-        self._layout = layout
-        n = len(layout.kinds)
-        self.counts = np.ones((N_CONTEXTS, N_TOKENS), np.int64)
-        self._slow = np.zeros((3, n), np.int64)  # running mean magnitude, 64ths
-        self._last = np.zeros((3, n), np.int64)
-        self._is_first = True
-
-    def of(self, axis: int, values: Int64) -> Int64:
-        """Contexts ``(C,)`` of an axis; ``values (3, C)`` holds this frame's axes before it."""
-        if self._is_first:
-            return N_STEADY + self._layout.kinds * N_BANDS + self._layout.bands
-        slow, last = self._slow[axis], self._last[axis]
-        near = 2 * slow + _beside(slow) + self._slow.sum(axis=0)
-        level = np.searchsorted(SLOW_LEVELS, near >> 1, side="right")
-        recent = 2 * last + _beside(last) + 2 * np.abs(values[:axis]).sum(axis=0)
-        recent_level = np.minimum((recent > 0).astype(np.int64) + (recent > 1) + (recent > 3) + (recent > 7), N_RECENT - 1)
-        return np.asarray((self._layout.kinds * (len(SLOW_LEVELS) + 1) + level) * N_RECENT + recent_level)
-
-    def learn(self, contexts: Int64, values: Int64) -> None:
-        """Take in a whole frame's ``contexts (3, C)`` and ``values (3, C)``."""
-        pairs = contexts.ravel() * N_TOKENS + tokenise(values.ravel())[0]
-        self.counts += GAIN * np.bincount(pairs, minlength=N_CONTEXTS * N_TOKENS).reshape(N_CONTEXTS, N_TOKENS)
-        while (full := self.counts.sum(axis=1) > FULL).any():
-            self.counts[full] = (self.counts[full] + 1) >> 1
-        magnitude = np.minimum(np.abs(values), 1 << 16)
-        if self._is_first:
-            self._slow = 16 * magnitude
-        else:
-            self._slow += (64 * magnitude - self._slow) >> 3
-        self._last = magnitude
-        self._is_first = False
-
-    def costs(self) -> Float64:
-        """Bits ``(contexts, tokens)`` that a token costs, raw bits included; for the encoder's choices only."""
-        return np.asarray(np.log2(self.counts.sum(axis=1, keepdims=True) / self.counts) + EXTRA_BITS)
+PROBLEMS = ("", "its range-coded data do not decode", "its raw bits end too early")  # of `delta_kernels.decode_deltas`
 
 
 class DeltaEncoder:
-    """Collects frames of delta coefficients of one clip."""
+    """Collects frames of delta coefficients of one clip, and learns from them as the decoder does."""
 
     def __init__(self, layout: Layout) -> None:
         import constriction
 
-        self.contexts = Contexts(layout)
+        from gvcodecs.pdct.delta_kernels import start_learning
+
+        self._layout, self._learning = layout, start_learning(layout)
         self._coder = constriction.stream.queue.RangeEncoder()
         self._raw: list[UInt8] = []
 
-    def add_axis(self, contexts: Int64, values: Int64) -> None:
-        """Code one axis of a frame: ``values (C,)`` in ``contexts (C,)``."""
-        tokens, extra, n_extra = tokenise(values)
-        for context, where in _groups(contexts):
-            self._coder.encode(tokens[where].astype(np.int32), model(self.contexts.counts[context]))
-        shifts = _shifts(n_extra)
-        self._raw.append(((np.repeat(extra, n_extra) >> shifts) & 1).astype(np.uint8))
+    @property
+    def sums(self) -> Int64:
+        """``(3, C)`` of all deltas so far, units."""
+        return self._learning.sums
+
+    def predict(self) -> Int64:
+        """The next delta's prediction ``(3, C)``, units."""
+        from gvcodecs.pdct.delta_kernels import predict_delta
+
+        return predict_delta(self._layout, self._learning)
+
+    def find_contexts(self, axis: int, values: Int64, contexts: Int64) -> None:
+        """Fill an axis of ``contexts (3, C)``; ``values (3, C)`` holds this frame's axes before it."""
+        from gvcodecs.pdct.delta_kernels import find_contexts
+
+        find_contexts(self._layout, self._learning, axis, values, contexts)
+
+    def costs(self) -> Float64:
+        """Bits ``(contexts, tokens)`` that a token costs, raw bits included; for the encoder's choices only."""
+        from gvcodecs.pdct.delta_kernels import EXTRA_BITS
+
+        counts = self._learning.counts
+        return np.asarray(np.log2(counts.sum(axis=1, keepdims=True) / counts) + EXTRA_BITS)
+
+    def add_frame(self, contexts: Int64, values: Int64) -> None:
+        """Code a frame: ``values (3, C)`` in ``contexts (3, C)``."""
+        from gvcodecs.pdct.delta_kernels import learn_frame
+
+        for axis in range(3):
+            tokens, extra, n_extra = tokenise(values[axis])
+            for context, where in _groups(contexts[axis]):
+                self._coder.encode(tokens[where].astype(np.int32), model(self._learning.counts[context]))
+            self._raw.append(((np.repeat(extra, n_extra) >> _shifts(n_extra)) & 1).astype(np.uint8))
+        learn_frame(self._layout, self._learning, contexts, values)
 
     def finish(self) -> bytes:
         """Return the section."""
@@ -118,38 +91,27 @@ class DeltaDecoder:
     """Mirror of `DeltaEncoder`; raises `CorruptFile` where the section does not decode."""
 
     def __init__(self, cursor: Cursor, layout: Layout) -> None:
-        import constriction
+        from gvcodecs.pdct.delta_kernels import DeltaStream, start_learning
 
-        self.contexts = Contexts(layout)
         self._cursor = cursor
-        words = cursor.array("<u4", cursor.varint(cursor.left // 4, "the word count"))
-        self._coder = constriction.stream.queue.RangeDecoder(words.astype(np.uint32))
-        self._raw = np.unpackbits(np.frombuffer(cursor.rest(), np.uint8))
-        self._position = 0
+        words = cursor.array("<u4", cursor.varint(cursor.left // 4, "the word count")).astype(np.uint32)
+        raw = np.frombuffer(cursor.rest(), np.uint8)
+        self._layout, self._learning = layout, start_learning(layout)
+        self._stream = DeltaStream(start(words), words, raw.copy(), np.zeros(1, np.int64))
 
-    def take_axis(self, contexts: Int64) -> Int64:
-        """Return one axis of a frame: ``(C,)`` values in ``contexts (C,)``."""
-        tokens = np.zeros(len(contexts), np.int64)
-        try:
-            for context, where in _groups(contexts):
-                tokens[where] = self._coder.decode(model(self.contexts.counts[context]), len(where))
-        except (ValueError, AssertionError, RuntimeError) as exc:
-            raise self._cursor.corrupt("its range-coded data do not decode") from exc
-        n_extra = EXTRA_BITS[tokens]
-        total = int(n_extra.sum())
-        bits = self._raw[self._position : self._position + total].astype(np.int64)
-        if len(bits) < total:
-            raise self._cursor.corrupt("its raw bits end too early")
-        self._position += total
-        sums = np.concatenate([[0], np.cumsum(bits << _shifts(n_extra))])
-        ends = np.cumsum(n_extra)
-        low = sums[ends] - sums[ends - n_extra]
-        u = np.where(tokens < DIRECT, tokens, (2 + (tokens & 1) << n_extra) | low)
-        return np.where(u & 1, -((u + 1) >> 1), u >> 1)
+    def take_frames(self, n_frames: int) -> Int64:
+        """The sums of all deltas in each of the next frames: ``(n_frames, 3, C)``, units."""
+        from gvcodecs.pdct.delta_kernels import decode_deltas
+
+        sums = np.empty((n_frames, 3, len(self._layout.kinds)), np.int64)
+        status = decode_deltas(self._layout, self._learning, self._stream, sums)
+        if status:
+            raise self._cursor.corrupt(PROBLEMS[status])
+        return sums
 
     def finish(self) -> None:
         """Check that no raw byte is left over."""
-        if (self._position + 7) // 8 * 8 != len(self._raw):
+        if (self._stream.place[0] + 7) // 8 != len(self._stream.raw):
             raise self._cursor.corrupt("raw bits are left over")
 
 
@@ -159,19 +121,8 @@ def _shifts(widths: Int64) -> Int64:
     return ends - 1 - np.arange(len(ends))
 
 
-def _beside(values: Int64) -> Int64:
-    """Sum of the coefficients before and after."""
-    result = np.zeros_like(values)
-    result[1:] += values[:-1]
-    result[:-1] += values[1:]
-    return result
-
-
 def _groups(contexts: Int64) -> list[tuple[int, NDArray[np.intp]]]:
     order = np.argsort(contexts.astype(np.int16), kind="stable")
     counts = np.bincount(contexts)
     ends = np.cumsum(counts)
     return [(int(c), order[ends[c] - counts[c] : ends[c]]) for c in np.flatnonzero(counts)]
-
-
-EXTRA_BITS = np.concatenate([np.zeros(DIRECT, np.int64), np.repeat(np.arange(3, MAX_BITS - 1), 2)])

@@ -10,17 +10,17 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.fft import dct, idct
 
-from gvcodecs.pdct.delta_coding import Layout
-from gvcodecs.pdct.local_frames import local_frames
 from gvpipe.arrays import Float64, Int32, Int64, Integers
 from gvpipe.mesh.lattice import Lattice
 
-UNIT = 16  # parts of a step that predictions are kept in
-FINE_PART = 16  # the lowest 1/16 of a cluster's frequencies can have a finer step
+if TYPE_CHECKING:
+    from gvcodecs.pdct.delta_kernels import Layout
+    from gvcodecs.pdct.shape_kernels import LocalFrames, Members, Shape
 
 
 @dataclass(frozen=True)
@@ -42,90 +42,78 @@ class BaseFrame:
         return dataclasses.replace(self, traversal=self.traversal[~np.isin(self.traversal, still)])
 
 
+@dataclass(frozen=True)
 class Dictionary:
     """The functions that a clip's local coordinates are sums of: per cluster four affine ones, then the DCT's.
 
-    Coefficients of an axis are ordered: affine ones of all clusters, then cluster by cluster by frequency.
+    Args:
+        lattice: ``(4,)`` of the seeds: origin and step, model units.
+        base_seeds: ``(K, 3, 3)`` seed triangles in the base frame, lattice steps.
+        members: the vertices that the functions run over.
+        layout: of the coefficients.
+        shape: the functions.
     """
 
-    def __init__(self, surface: BaseFrame, seeds: Int64, labels: Int64, lattice: Lattice, fineness: float) -> None:
-        is_seed = np.zeros(len(surface.base), bool)
-        is_seed[seeds.ravel()] = True
-        order = surface.traversal[~is_seed[surface.traversal]]
-        self.members = order[np.argsort(labels[order], kind="stable")]  # (N,) vertices
-        self.clusters, sizes = np.unique(labels[self.members], return_counts=True)  # those that have members
-        self.bounds = np.concatenate([[0], np.cumsum(sizes)])
-        self.seeds = seeds
-        self.base_seeds = np.rint((surface.base[seeds] - lattice.origin) / lattice.step).astype(np.int64)
-        origins, axes = local_frames(self.base_seeds)
-        self.rest = self.to_local(surface.base[None, self.members], model_units(lattice, origins)[None], axes[None])[
-            0
-        ]  # (3, N)
-        self.functions = np.concatenate([_affine(self.rest[:, b]) for b in self.slices] or [np.zeros((4, 0))], axis=1)  # (4, N)
-        self.n_affine = 4 * len(sizes)
-        frequency = np.concatenate([np.arange(n) for n in sizes]) if len(sizes) else np.zeros(0, np.int64)
-        octave = np.minimum(np.frexp(frequency.astype(np.float64))[1], 15).astype(np.int64)
-        self.layout = Layout(
-            kinds=np.repeat([0, 1], [self.n_affine, len(self.members)]),
-            bands=np.concatenate([np.tile(np.arange(4), len(sizes)), octave]),
-        )
-        owner = np.repeat(np.arange(len(sizes)), sizes)
-        is_low = frequency * FINE_PART < np.repeat(sizes, sizes)
-        self.scale = np.where(is_low, 1 / fineness, 1.0)  # (N,) of the step
-        groups = np.concatenate([np.repeat(np.arange(len(sizes)), 4), len(sizes) + 16 * owner + octave])
-        self.group_starts = np.flatnonzero(np.diff(groups, prepend=-1))
-        self.group_sizes = np.diff(self.group_starts, append=len(groups))
+    lattice: Float64
+    base_seeds: Int64
+    members: Members
+    layout: Layout
+    shape: Shape
+
+    @classmethod
+    def of(cls, surface: BaseFrame, seeds: Int64, labels: Int64, lattice: Lattice, fineness: float) -> Dictionary | None:
+        """The dictionary of a clip, None where the base frame lies out of the lattice's range.
+
+        Args:
+            surface: that all clips share.
+            seeds: ``(K, 3)`` vertices.
+            labels: ``(V,)`` clusters.
+            lattice: of the seeds.
+            fineness: how much finer the step of low frequencies is.
+        """
+        from gvcodecs.pdct.shape_kernels import find_base_seeds, find_members, lay_out, shape_members
+
+        points, numbers = np.zeros((len(seeds), 9), np.int64), np.array([*lattice.origin, lattice.step])
+        base = np.ascontiguousarray(surface.base)
+        if not find_base_seeds(base, seeds, numbers, points):
+            return None
+        members = find_members(np.ascontiguousarray(surface.traversal, np.int64), labels, seeds)
+        base_seeds = points.reshape(-1, 3, 3)
+        shape = shape_members(base, members, frames_of(base_seeds[None], numbers), fineness)
+        return cls(numbers, base_seeds, members, lay_out(members), shape)
+
+    @property
+    def n_affine(self) -> int:
+        """Affine coefficients of an axis, which come before the others."""
+        return 4 * len(self.members.clusters)
 
     @property
     def slices(self) -> list[slice]:
         """Members of each cluster."""
-        return [slice(a, b) for a, b in zip(self.bounds[:-1], self.bounds[1:], strict=True)]
+        bounds = self.members.bounds
+        return [slice(a, b) for a, b in pairwise(bounds)]
 
-    def to_local(self, positions: Float64, origins: Float64, axes: Float64) -> Float64:
-        """``(n, N, 3)`` members' positions to local coordinates ``(n, 3, N)``; ``origins (n, K, 3)``, ``axes (n, K, 3, 3)``."""
+    def to_local(self, positions: Float64, frames: LocalFrames) -> Float64:
+        """``(n, N, 3)`` members' positions to local coordinates ``(n, 3, N)``."""
         result = np.empty((len(positions), 3, positions.shape[1]))
-        for k, where in zip(self.clusters, self.slices, strict=True):
-            local = positions[:, where] - origins[:, k, None]
-            result[:, :, where] = sum(axes[:, k, :, j, None] * local[:, None, :, j] for j in range(3))
-        return result
-
-    def to_world(self, local: Float64, origins: Float64, axes: Float64) -> Float64:
-        """Mirror of `to_local`: ``(n, 3, N) -> (n, N, 3)``."""
-        result = np.empty((len(local), local.shape[2], 3))
-        for k, where in zip(self.clusters, self.slices, strict=True):
-            part = local[:, :, where]
-            for j in range(3):
-                result[:, where, j] = sum(part[:, i] * axes[:, k, i, j, None] for i in range(3)) + origins[:, k, j, None]
+        for k, where in zip(self.members.clusters, self.slices, strict=True):
+            axes = frames.axes[:, k].reshape(-1, 3, 3)
+            local = positions[:, where] - frames.origins[:, k, None]
+            result[:, :, where] = sum(axes[:, :, j, None] * local[:, None, :, j] for j in range(3))
         return result
 
     def transform(self, signals: Float64) -> Float64:
-        """DCT of every cluster's part of ``signals (..., N)``."""
+        """DCT of every cluster's part of ``signals (..., N)``; `cosine_kernels` has its inverse."""
+        from scipy.fft import dct
+
         result = np.empty_like(signals)
         for where in self.slices:
             result[..., where] = dct(signals[..., where], norm="ortho")
         return result
 
-    def rebuild(self, sums: Int64, step: float) -> Float64:
-        """Local coordinates ``(n, 3, N)`` of coefficients ``sums (n, 3, C)``."""
-        from gvpipe.trajectory.product_kernels import weighted_sums
 
-        scaled = sums[..., self.n_affine :] * (self.scale * (step / UNIT))
-        result = np.empty_like(scaled)
-        for c, where in enumerate(self.slices):
-            affine: Float64 = (sums[..., 4 * c : 4 * c + 4] * (step / UNIT)).reshape(-1, 4).astype(np.float64)
-            moved = weighted_sums(affine, np.ascontiguousarray(self.functions[:, where]))
-            result[..., where] = idct(scaled[..., where], norm="ortho") + moved.reshape(*sums.shape[:2], -1)
-        return np.asarray(result + self.rest)
+def frames_of(seed_points: Int64, lattice: Float64) -> LocalFrames:
+    """Local frames, model units, of seed triangles ``(n, K, 3, 3)`` on a lattice ``(4,)``, origin and step."""
+    from gvcodecs.pdct.shape_kernels import find_frames
 
-
-def model_units(lattice: Lattice, points: Float64) -> Float64:
-    """Model units of ``points (..., 3)`` that may lie between the lattice's."""
-    return np.asarray(np.asarray(lattice.origin) + points * lattice.step)
-
-
-def _affine(rest: Float64) -> Float64:
-    """Four functions of about unit norm over a cluster: 1, and the coordinates ``rest (3, n)`` about their mean."""
-    centred = rest - rest.mean(axis=1, keepdims=True)
-    norms = np.linalg.norm(centred, axis=1, keepdims=True)
-    floor = 1e-6 * float(np.abs(rest).max()) + 1e-300  # a flat cluster's coordinate fades out instead of blowing up
-    return np.concatenate([np.full((1, rest.shape[1]), rest.shape[1] ** -0.5), centred / (norms + floor)])
+    return find_frames(seed_points.reshape(*seed_points.shape[:2], 9).astype(np.float64), lattice)

@@ -111,6 +111,11 @@ class Pdct(BaseCodec):
         return PdctReader(bitstream)
 
     @classmethod
+    def browser_obstacle(cls, bitstream: Bitstream) -> str:
+        """What keeps browsers from playing a bitstream of this codec: nothing."""
+        return ""
+
+    @classmethod
     def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
         """What each clip has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
         return numbered_parts(("clip",), Header.of(bitstream).clips)

@@ -5,8 +5,9 @@ import { GeometryVideoError, quote } from "./format/errors.js";
 import { readableVersion } from "./frames/frame_decoder.js";
 import { FrameHost, FrameSource } from "./frames/frame_host.js";
 import { PartPayload } from "./frames/part_payload.js";
-import { CODEC as MCGV, VERSION as MCGV_VERSION } from "./mcgv/header.js";
+import { CODEC as MCGV } from "./mcgv/header.js";
 import { McgvReader } from "./mcgv/reader.js";
+import { withPictures } from "./mcgv/trajectory_pictures.js";
 import { openPictures } from "./pictures.js";
 import { kernelCode } from "./wasm/inflated.js";
 
@@ -31,7 +32,7 @@ const BYTES_PER_VERTEX = 12; // of a frame
  */
 export async function openCodec(source, payload, repeated, level) {
   const { codec, version } = payload.header;
-  const newest = codec === MCGV ? MCGV_VERSION : readableVersion(codec);
+  const newest = readableVersion(codec);
   if (!newest) throw new GeometryVideoError("unsupported", `it was coded by ${quote(codec)}; gvpipe export-html converts it`);
   if (version > newest) {
     const found = `version ${quote(version)} of codec ${codec}`;
@@ -42,8 +43,10 @@ export async function openCodec(source, payload, repeated, level) {
     throw new GeometryVideoError("unsupported", "this browser has no WebAssembly with SIMD; a newer one is needed");
   }
   const distinct = repeated.distinctPayload(payload);
-  if (codec !== MCGV) return openFrames(code, source, payload.header, distinct, repeated, level);
-  return openMcgv(code, source, payload.header, distinct, repeated, level);
+  if (codec === MCGV && !("transform" in payload.header.settings)) return openMcgv(code, source, payload.header, distinct, repeated, level);
+  const isWhole = source instanceof Uint8Array;
+  const sections = isWhole ? distinct : new PartPayload(distinct, source);
+  return openFrames(code, source, codec === MCGV ? withPictures(source, sections) : sections, repeated, level);
 }
 
 async function openMcgv(code, source, { fps, vertices, container }, distinct, repeated, level) {
@@ -86,9 +89,13 @@ function checkOnlyLevel(level) {
   if (level && level !== "coarsest") throw new GeometryVideoError("unsupported", `level ${level}: there are levels 0..0`);
 }
 
-async function openFrames(code, source, { fps }, distinct, repeated, level) {
-  const isWhole = source instanceof Uint8Array;
-  const host = new FrameHost(isWhole ? distinct : new PartPayload(distinct, source), code);
+async function openFrames(code, source, payload, repeated, level) {
+  const { fps } = payload.header;
+  const host = new FrameHost(payload, code);
+  const close = () => {
+    host.close();
+    payload.close?.();
+  };
   const frames = Array.from({ length: repeated.distinct }, (_, picture) => [{ picture }]);
   const at = async (wanted) => {
     const { level: own, faces, points, levels } = await host.describe(wanted);
@@ -105,18 +112,18 @@ async function openFrames(code, source, { fps }, distinct, repeated, level) {
         return host.bounds;
       },
       get isWaiting() {
-        return !isWhole && source.isWaiting;
+        return Boolean(source.isWaiting);
       },
       openPictures: (frame) => DecodedPictures.of(frames, size, fps, repeated, new FrameSource(host, own), frame),
       rebuild: (frame, shown, positions) => positions.set(shown),
       at,
-      close: () => host.close(),
+      close,
     };
   };
   try {
     return await at(level);
   } catch (error) {
-    host.close();
+    close();
     throw error;
   }
 }

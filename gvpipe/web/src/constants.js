@@ -136,6 +136,7 @@ export const RANGE_DECODER_PRECISION = 24;
 
 // gvpipe.entropy.series
 export const SERIES_MAX_CLASS = 63;
+export const SERIES_FIRST_CLASS = 63;
 
 // gvpipe.entropy.tokens
 export const TOKENS_DIRECT = 16;
@@ -296,11 +297,13 @@ export const KD_TREE_MOMENT_BITS = 10;
 export const KD_TREE_SPREAD = 2;
 export const KD_TREE_MAX_COORDINATE = 1048576;
 
+// gvcodecs.mcgv.motion.blend_kernels
+export const BLEND_KERNELS_FLAT = 1e-06;
+export const BLEND_KERNELS_LEAST_ENERGY = 1e-09;
+
 // gvcodecs.mcgv.motion.skinning
 export const SKINNING_INFLUENCES = 4;
 export const SKINNING_TOTAL = 64;
-export const SKINNING_FLAT = 1e-06;
-export const SKINNING_LEAST_ENERGY = 1e-09;
 
 // gvcodecs.mcgv.motion.weight_coding
 export const WEIGHT_CODING_COUNT_CONTEXTS = 4;
@@ -308,6 +311,41 @@ export const WEIGHT_CODING_COUNT_CONTEXTS = 4;
 // gvcodecs.mcgv.motion.weight_kernels
 export const WEIGHT_KERNELS_MAX_LISTED = 32;
 
+// gvcodecs.mcgv.pictures.trajectories
+export const TRAJECTORIES_PLANES = 3;
+
+// gvcodecs.mcgv.trajectory_header
+export const TRAJECTORY_HEADER_MAX_FINENESS = 256;
+
+// gvcodecs.mcgv.trajectory_reader
+export const TRAJECTORY_READER_BYTES_PER_SAMPLE = 48;
+export const TRAJECTORY_READER_SECONDS_PER_SAMPLE = 1e-07;
+
 // gvcodecs.pca.header
 export const PCA_HEADER_MAX_SEGMENTS = 2000;
 export const PCA_HEADER_VERSION_STILL = 2;
+
+// gvcodecs.pdct.clip
+export const PDCT_CLIP_MAX_CLUSTERS = 1024;
+export const PDCT_CLIP_BYTES_PER_POINT = 160;
+export const PDCT_CLIP_SECONDS_PER_POINT = 4e-07;
+export const PDCT_CLIP_BYTES_PER_NUMBER = 64;
+export const PDCT_CLIP_SECONDS_PER_FRAME = 0.0006;
+
+// gvcodecs.pdct.delta_coding
+export const PDCT_DELTA_CODING_PROBLEMS = ["", "its range-coded data do not decode", "its raw bits end too early"];
+
+// gvcodecs.pdct.header
+export const PDCT_HEADER_MAX_CLIPS = 4000;
+export const PDCT_HEADER_VERSION_POINTS = 2;
+
+// gvcodecs.pdct.reader
+export const PDCT_READER_BYTES_PER_POINT = 200;
+export const PDCT_READER_SECONDS_PER_POINT = 1e-06;
+
+// gvcodecs.pdct.seed_coding
+export const PDCT_SEED_CODING_ORDERS = [1, 2];
+export const PDCT_SEED_CODING_MAX_COORDINATE = 1073741824;
+
+// gvcodecs.pdct.still_points
+export const PDCT_STILL_POINTS_SECTION = "still";

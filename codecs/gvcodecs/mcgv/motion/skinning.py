@@ -22,15 +22,14 @@ import numpy as np
 from scipy import sparse
 
 from gvpipe.arrays import Float64, Int32, Int64
-from gvpipe.trajectory.sparse_rows import multiply
 
 if TYPE_CHECKING:
     from scipy.sparse.linalg import SuperLU
 
+    from gvpipe.trajectory.product_kernels import Rows
+
 INFLUENCES = 4  # most clusters that a point follows
 TOTAL = 64  # weights are integers that add up to this
-FLAT = 1e-6  # of a cluster's energy: what directions in which it has no extent count for
-LEAST_ENERGY = 1e-9  # of a cluster that no point follows
 RIDGE = 1e-6
 
 
@@ -71,25 +70,27 @@ class Blend:
     """
 
     def __init__(self, base: Float64, weights: Weights, n_clusters: int) -> None:
+        from gvcodecs.mcgv.motion.blend_kernels import find_energies
+
         self.n_clusters, self.weights = n_clusters, weights
         self.homogeneous = homogeneous(base)
-        parts = weights.weights / TOTAL  # (P, 4)
-        outer = self.homogeneous[:, :, None] * self.homogeneous[:, None, :]
-        rows, columns = weights.clusters.ravel(), np.repeat(np.arange(len(base)), parts.shape[1])
-        squares = sparse.csr_array((np.square(parts).ravel(), (rows, columns)), shape=(n_clusters, len(base)))
-        energy = multiply(squares, outer.reshape(-1, 16)).reshape(n_clusters, 4, 4)
-        self._inverse = _whiten(energy)  # (K, 4, 4)
+        self._inverse = _whiten(find_energies(self.homogeneous, *self._parts, n_clusters))  # (K, 4, 4)
+
+    def rows(self) -> Rows:
+        """B in coordinates of equal weight, ``(P, 4K)``, as kernels take it."""
+        from gvcodecs.mcgv.motion.blend_kernels import blend_rows
+
+        return blend_rows(self.homogeneous, *self._parts, self._inverse)
+
+    @property
+    def _parts(self) -> tuple[Int32, Float64]:
+        """Clusters and weights of the points, ``(P, 4)``, as kernels take them."""
+        return self.weights.clusters, self.weights.weights / TOTAL
 
     def matrix(self) -> sparse.csr_array:
         """B in coordinates of equal weight: ``(P, 4K)``."""
-        n_points = len(self.homogeneous)
-        inverse = self._inverse[self.weights.clusters]  # (P, 4, 4, 4)
-        local = sum(inverse[..., c] * self.homogeneous[:, None, None, c] for c in range(4))  # (P, 4, 4)
-        values = (self.weights.weights / TOTAL)[:, :, None] * local
-        columns = 4 * self.weights.clusters[:, :, None] + np.arange(4)
-        rows = np.broadcast_to(np.arange(n_points)[:, None, None], values.shape)
-        used = np.broadcast_to((self.weights.weights > 0)[:, :, None], values.shape)
-        return sparse.csr_array((values[used], (rows[used], columns[used])), shape=(n_points, 4 * self.n_clusters))
+        rows = self.rows()
+        return sparse.csr_array((rows.values, rows.columns, rows.starts), shape=(len(rows.starts) - 1, 4 * self.n_clusters))
 
     def transforms(self, rows: Float64) -> Float64:
         """``(K, 4, m)`` transforms in model units for ``rows (4K, m)`` of equal weight."""
@@ -129,19 +130,11 @@ def _factorise(white: sparse.csr_array | sparse.bsr_array) -> SuperLU:
     return splu(damped, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
-def _whiten(energy: Float64) -> Float64:
-    """Inverse Cholesky factors ``(K, 4, 4)`` of clusters' energies ``(K, 4, 4)``."""
-    trace = np.trace(energy, axis1=1, axis2=2)
-    raised = energy + (FLAT * trace + LEAST_ENERGY)[:, None, None] * np.eye(4)
-    factor, inverse = np.zeros_like(energy), np.zeros_like(energy)
-    for i in range(4):  # term by term: a library's order of sums depends on the machine
-        for j in range(i + 1):
-            left = raised[:, i, j] - sum(factor[:, i, k] * factor[:, j, k] for k in range(j))
-            factor[:, i, j] = np.sqrt(left) if i == j else left / factor[:, j, j]
-        for j in range(i + 1):
-            left = (i == j) - sum(factor[:, i, k] * inverse[:, k, j] for k in range(j, i))
-            inverse[:, i, j] = left / factor[:, i, i]
-    return inverse
+def _whiten(energies: Float64) -> Float64:
+    """Inverse Cholesky factors ``(K, 4, 4)`` of clusters' energies ``(K, 4, 4)``; term by term, as no library does it."""
+    from gvcodecs.mcgv.motion.blend_kernels import invert_factors
+
+    return invert_factors(energies)
 
 
 def homogeneous(base: Float64) -> Float64:

@@ -6,7 +6,7 @@
 import { VERTEX_ORDER_MAX_VERTICES as MAX_VERTICES } from "../constants.js";
 import { Cursor } from "./cursor.js";
 import { decodeDraco } from "./draco.js";
-import { corrupt } from "./errors.js";
+import { AGAIN, GeometryVideoError, corrupt } from "./errors.js";
 import { inflate } from "./inflate.js";
 import { previousEqual } from "./points.js";
 import { decodeOrder } from "./vertex_order.js";
@@ -97,4 +97,11 @@ function join(Type, first, second) {
   joined.set(first);
   joined.set(second, first.length);
   return joined;
+}
+
+/** Throw unless a mesh has the header's vertices and triangles. */
+export function checkCounts({ vertices, triangles }, n, faces) {
+  if (n !== vertices || faces.length !== 3 * triangles) {
+    throw new GeometryVideoError("corrupt", `the mesh has other counts than the header says; ${AGAIN}`);
+  }
 }

@@ -1,5 +1,7 @@
 /** zlib streams to bytes by the browser's own inflater, with a limit on what may come out. */
 
+const TOGETHER = 1 << 16; // bytes that go in at once, so that little comes out before the limit is looked at
+
 /**
  * @param {Uint8Array} data a whole zlib stream
  * @param {number} limit most bytes that it may inflate to
@@ -7,10 +9,7 @@
  * @returns {Promise<Uint8Array>}
  */
 export async function inflate(data, limit, corrupt) {
-  const { readable, writable } = new DecompressionStream("deflate"); // without a Blob: workers of pages from a disk may read none
-  const writer = writable.getWriter();
-  for (const written of [writer.write(data), writer.close()]) written.catch(() => {}); // told by the reader
-  const reader = readable.getReader();
+  const reader = streamOf(data).pipeThrough(new DecompressionStream("deflate")).getReader();
   const parts = [];
   let size = 0;
   try {
@@ -33,4 +32,15 @@ export async function inflate(data, limit, corrupt) {
     position += part.length;
   }
   return result;
+}
+
+/** Bytes as a stream. A `Blob` has one, too, but not in a worker of WebKit whose page comes from a disk. */
+function streamOf(data) {
+  let position = 0;
+  return new ReadableStream({
+    pull(controller) {
+      if (position < data.length) controller.enqueue(data.subarray(position, (position += TOGETHER)));
+      else controller.close();
+    },
+  });
 }

@@ -3,16 +3,22 @@
 const KEPT = 4;
 
 export class Recent {
-  /** @param {(key: number) => object} make */
-  constructor(make) {
+  /**
+   * @param {(key: number) => object} make what fails, now or as a promise, is made anew when it is asked for again
+   * @param {number} [most] that are kept
+   */
+  constructor(make, most = KEPT) {
     this.make = make;
+    this.most = most;
     this.kept = new Map();
   }
 
   get(key) {
     if (!this.kept.has(key)) {
-      this.kept.set(key, this.make(key));
-      if (this.kept.size > KEPT) this.kept.delete(this.kept.keys().next().value);
+      const made = this.make(key);
+      this.kept.set(key, made);
+      if (made instanceof Promise) made.catch(() => this.kept.delete(key));
+      if (this.kept.size > this.most) this.kept.delete(this.kept.keys().next().value);
     }
     return this.kept.get(key);
   }

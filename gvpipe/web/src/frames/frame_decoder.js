@@ -1,9 +1,11 @@
-/** Frames of codecs without pictures, decoded by Python's kernels: in a worker, or on the page where there is none. */
+/** Frames of codecs without pictures, and of trajectory images, decoded by Python's kernels: in a worker, or on the page where there is none. */
 
 import { Displacements } from "../format/displacements.js";
 import { GeometryVideoError, corrupt } from "../format/errors.js";
 import { LaplacianReader, VERSION as LAPLACIAN_VERSION } from "../laplacian/reader.js";
+import { TrajectoryReader, VERSION as MCGV_VERSION } from "../mcgv/trajectory_reader.js";
 import { PcaReader, VERSION as PCA_VERSION } from "../pca/reader.js";
+import { PdctReader, VERSION as PDCT_VERSION } from "../pdct/reader.js";
 import { Kernels } from "../wasm/kernels.js";
 
 const LOOKS = 16; // frames that a look at the motion takes
@@ -11,12 +13,16 @@ const AHEAD = 10; // s: a segment that begins later is not decoded ahead
 const CORRECTIONS = "corrections";
 
 /**
- * Readers by codec: `open(payload, kernels)` gives `faces`, `points`, `levels`, `levelFaces`, `segmentStart` and `read`, and `prepare`
- * where a segment is decoded ahead.
+/**
+ * Readers by codec: `open(payload, kernels)` gives `faces`, `points`, `levels`, `segmentStart` and `read`; with several levels `levelFaces`;
+ * where a segment is decoded ahead `prepare`; and where its frames come one after the other `extend(box, s)`, which has a box hold
+ * the motion of segment s without decoding it.
  */
 const READERS = {
   laplacian: { version: LAPLACIAN_VERSION, reader: LaplacianReader },
+  mcgv: { version: MCGV_VERSION, reader: TrajectoryReader }, // of trajectory images
   pca: { version: PCA_VERSION, reader: PcaReader },
+  pdct: { version: PDCT_VERSION, reader: PdctReader },
 };
 
 /** The highest version of a codec that is read here; 0: none. */
@@ -106,6 +112,7 @@ export class FrameDecoder {
     const key = `${s} ${level}`;
     if (this.#looked.has(key)) return;
     this.#looked.add(key);
+    if (this.#reader.extend) return void (await guarded("clip", () => this.#reader.extend(this.#bounds, s)).catch(() => {}));
     const [first, last] = [this.#reader.segmentStart(s), this.#reader.segmentStart(s + 1) - 1];
     const looks = Math.min(LOOKS, last - first + 1);
     for (let i = 0; i < looks; i++) {

@@ -9,17 +9,22 @@ import {
   HEADER_PLACEMENTS as PLACEMENTS,
   HEADER_PREDICTIONS as PREDICTIONS,
   SEGMENTS_TINY as TINY,
+  SEGMENTS_LARGEST_STEP as LARGEST_STEP,
+  SEGMENTS_SMALLEST_STEP as SMALLEST_STEP,
+  BASIS_MAX_COMPONENTS as MAX_COMPONENTS,
+  TRAJECTORIES_PLANES as PLANES,
+  TRAJECTORY_HEADER_MAX_FINENESS as MAX_FINENESS,
   VIDEO_MAX_SIDE as MAX_SIDE,
   VIDEO_PROFILES as PROFILES,
 } from "../constants.js";
 import { GeometryVideoError, corrupt, quote } from "../format/errors.js";
 import { checkInteger, checkNumber } from "../format/payload.js";
 
-export { VERSION };
+export { VERSION, PLANES };
 
 export const CODEC = "mcgv";
 
-const WITHOUT = "h264-8"; // profile of files without pictures: that of their zero level
+const WEB = "h264-8"; // profile of trajectory images, and of files without pictures: that of their zero level
 
 /**
  * How planes become pictures, as `gvpipe.media.video.Profile` says.
@@ -36,7 +41,9 @@ const WITHOUT = "h264-8"; // profile of files without pictures: that of their ze
  * @property {number} width @property {number} height of one plane, pixels
  * @property {number} clusters K @property {number} segments
  * @property {number[]} origin @property {number} baseStep lattice of the base frame
- * @property {number} transformStep @property {number} residualStep model units
+ * @property {number} transformStep @property {number} residualStep model units, where pictures are frames
+ * @property {{fineness: number, components: number[], steps: number[]}|null} images where they are coefficients: levels per step; of each
+ *   segment R and the step, model units
  * @property {boolean} outliers whether residuals exceed the pictures' levels
  * @property {boolean} pictures false where frames are their prediction; what tells of pictures is then absent
  *
@@ -45,14 +52,13 @@ const WITHOUT = "h264-8"; // profile of files without pictures: that of their ze
  */
 export function readHeader(header) {
   const settings = header.settings;
-  if (settings.transform !== undefined) {
-    throw new GeometryVideoError("unsupported", "it holds trajectory images; gvpipe export-html converts it");
-  }
   if ("pictures" in settings) return withoutPictures(header);
   if (!PROFILES.has(settings.profile)) throw corrupt("header", `profile is ${quote(settings.profile)}`);
   const [prediction, placement] = header.version === 1 ? ["affine", "charts"] : [settings.prediction, settings.placement];
   if (!PREDICTIONS.includes(prediction)) throw corrupt("header", `prediction is ${quote(prediction)}`);
   if (!PLACEMENTS.includes(placement)) throw corrupt("header", `placement is ${quote(placement)}`);
+  const motion = readMotion(header);
+  const images = "transform" in settings ? readImages(header, motion.segments, prediction) : null;
   const result = {
     prediction,
     placement,
@@ -60,12 +66,14 @@ export function readHeader(header) {
     block: checkInteger(settings, "block", 2, 64),
     width: checkInteger(settings, "width", 2, MAX_SIDE),
     height: checkInteger(settings, "height", 2, Math.floor(MAX_SIDE / 3)),
-    ...readMotion(header),
-    residualStep: checkNumber(settings, "residual_step", TINY, HUGE),
+    ...motion,
+    transformStep: images ? 1 : checkNumber(settings, "transform_step", TINY, HUGE),
+    residualStep: images ? 1 : checkNumber(settings, "residual_step", TINY, HUGE),
+    images,
     outliers: "outliers" in settings,
     pictures: true,
   };
-  if (result.outliers && (settings.outliers !== true || header.version === 1)) {
+  if (result.outliers && (settings.outliers !== true || header.version === 1 || images)) {
     throw corrupt("header", `outliers is ${quote(settings.outliers)}`);
   }
   if (result.width % result.block || result.height % result.block) {
@@ -88,7 +96,6 @@ function readMotion(header) {
     segments: checkInteger(settings, "segments", 1, Math.min(MAX_SEGMENTS, header.frames)),
     origin: base.slice(0, 3),
     baseStep: base[3],
-    transformStep: checkNumber(settings, "transform_step", TINY, HUGE),
   };
 }
 
@@ -98,5 +105,32 @@ function withoutPictures(header) {
   if (settings.pictures !== false || header.version < 4 || alien.length || settings.prediction !== "blended") {
     throw corrupt("header", `pictures is ${quote(settings.pictures)} beside ${quote(alien)}`);
   }
-  return { prediction: "blended", ...readMotion(header), residualStep: 1, outliers: false, pictures: false, profile: PROFILES.get(WITHOUT) };
+  const transformStep = checkNumber(settings, "transform_step", TINY, HUGE);
+  const known = { ...readMotion(header), transformStep, profile: PROFILES.get(WEB) };
+  return { prediction: "blended", ...known, residualStep: 1, images: null, outliers: false, pictures: false };
+}
+
+/** Mirrors `gvcodecs.mcgv.trajectory_header`. */
+function readImages({ version, frames, settings }, segments, prediction) {
+  const { transform, profile, components, steps } = settings;
+  if (transform !== "klt" || version === 1 || prediction !== "blended") {
+    throw corrupt("header", `transform is ${quote(transform)}, prediction ${quote(prediction)}`);
+  }
+  if (profile !== WEB) {
+    throw new GeometryVideoError("unsupported", `its trajectory images have profile ${profile}; gvpipe export-html converts them`);
+  }
+  for (const [key, values] of Object.entries({ components, steps })) {
+    if (!Array.isArray(values) || values.length !== segments) throw corrupt("header", `${key} is ${quote(values)}`);
+  }
+  const most = Math.min(MAX_COMPONENTS, 3 * Math.ceil(frames / segments));
+  for (let s = 0; s < segments; s++) {
+    checkInteger(components, s, 0, most);
+    checkNumber(steps, s, SMALLEST_STEP, LARGEST_STEP);
+  }
+  return { fineness: checkInteger(settings, "fineness", 1, MAX_FINENESS), components, steps };
+}
+
+/** Pictures of a segment of R components: one at least. */
+export function countPictures(components) {
+  return Math.max(1, Math.ceil(components / PLANES));
 }

@@ -8,11 +8,10 @@ import { Displacements } from "../format/displacements.js";
 import { Kernels } from "../wasm/kernels.js";
 import { AffineMotion } from "./affine.js";
 import { BlendedMotion } from "./blended.js";
-import { decodeCharts } from "./chart_coding.js";
-import { placeCharts } from "./tiles.js";
 import { readHeader } from "./header.js";
 import { decodeClusters, decodePixels, decodeSlotClusters } from "./layout_coding.js";
 import { place } from "./kd_tree.js";
+import { SECTIONS, placeSlots } from "./placement.js";
 import { readSurface } from "./surface.js";
 
 /**
@@ -125,29 +124,16 @@ export class McgvReader {
 function decodeMotion(payload, header, surface, kernels) {
   const { lattice, visits, nSlots } = surface;
   if (!header.pictures) return { pixels: null, motion: new BlendedMotion(payload, header, surface, kernels) };
+  if (header.prediction === "blended") {
+    const placement = SECTIONS[header.placement];
+    const pixels = placeSlots(placement ? payload.section(placement) : null, header, surface);
+    return { pixels, motion: new BlendedMotion(payload, header, surface, kernels) };
+  }
   const { width, height } = header;
   if (width * height < nSlots) throw corrupt("header", `planes of ${width}x${height} do not hold ${nSlots} samples`);
   const charts = header.placement === "charts" ? decodePixels(payload.section("pixels"), visits, header) : null;
-  if (header.prediction === "blended") {
-    const pixels = charts ?? placePoints(payload, header, surface);
-    return { pixels, motion: new BlendedMotion(payload, header, surface, kernels) };
-  }
   const data = payload.section("clusters");
   const clusters = charts ? decodeClusters(data, charts, header) : decodeSlotClusters(data, visits, header);
   const pixels = charts ?? place(lattice, clusters, header);
   return { pixels, motion: new AffineMotion(payload, header, surface, clusters) };
-}
-
-/** (S) the connected piece of the surface that each slot belongs to. */
-function piecesOf({ point, points }) {
-  const pieces = points.pieces();
-  return point.map((p) => pieces[p]);
-}
-
-/** The slots' pixels where they follow from the base frame. */
-function placePoints(payload, header, surface) {
-  const { lattice, point, points } = surface;
-  if (header.placement === "halves") return place(lattice, piecesOf(surface), header);
-  const charts = decodeCharts(payload.section("charts"), points.causalNeighbours());
-  return placeCharts(lattice, point.map((p) => charts[p]), header);
 }

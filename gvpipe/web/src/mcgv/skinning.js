@@ -6,9 +6,9 @@
  */
 
 import {
-  SKINNING_FLAT as FLAT,
+  BLEND_KERNELS_FLAT as FLAT,
   SKINNING_INFLUENCES as INFLUENCES,
-  SKINNING_LEAST_ENERGY as LEAST_ENERGY,
+  BLEND_KERNELS_LEAST_ENERGY as LEAST_ENERGY,
   SKINNING_TOTAL as TOTAL,
 } from "../constants.js";
 
@@ -84,7 +84,7 @@ export class Blend {
 }
 
 /** (P, 3) coordinates in the middle of the bounding box, in parts of its longest side. */
-function homogeneous(base) {
+export function homogeneous(base) {
   const low = [Infinity, Infinity, Infinity];
   const high = [-Infinity, -Infinity, -Infinity];
   base.forEach((value, i) => {

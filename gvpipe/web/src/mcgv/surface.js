@@ -6,8 +6,8 @@
  */
 
 import { SURFACE_STILL as STILL } from "../constants.js";
-import { decodeBase } from "../format/base_mesh.js";
-import { AGAIN, GeometryVideoError, corrupt } from "../format/errors.js";
+import { checkCounts, decodeBase } from "../format/base_mesh.js";
+import { corrupt } from "../format/errors.js";
 import { decodePoints } from "../format/welded_mesh.js";
 import { decodeFlags } from "../format/still_vertices.js";
 import { Points, weldVertices } from "./welded_points.js";
@@ -73,7 +73,7 @@ export async function readSurface(payload, header, kernels) {
 
 /** Files before version 3: every vertex is a slot. */
 async function readVertices(payload, kernels) {
-  const { points: lattice, faces, visits } = await decodeBase(kernels, payload.section("mesh"), payload.section("order"), payload.header);
+  const { points: lattice, faces, visits } = await decodeBase(kernels, await payload.section("mesh"), await payload.section("order"), payload.header);
   checkCounts(payload.header, visits.length, faces);
   const welded = weldVertices(lattice, faces, visits);
   return { faces, basePoints: lattice, slot: Int32Array.from(visits.keys()), lattice, visits, ...welded };
@@ -82,15 +82,15 @@ async function readVertices(payload, kernels) {
 async function readPoints(payload, kernels) {
   const { faces, point, lattice, pointFaces } = await decodePoints(
     kernels,
-    payload.section("mesh"),
-    payload.section("order"),
+    await payload.section("mesh"),
+    await payload.section("order"),
     payload.header.version > 3,
     payload.header.version > 4,
     payload.header,
   );
   checkCounts(payload.header, point.length, faces);
   const n = lattice.length / 3;
-  const still = payload.sections.has(STILL) ? decodeFlags(payload.section(STILL), n, STILL) : new Uint8Array(n);
+  const still = payload.sections.has(STILL) ? decodeFlags(await payload.section(STILL), n, STILL) : new Uint8Array(n);
   const moves = Int32Array.from(still.keys()).filter((p) => !still[p]);
   if (!moves.length) throw corrupt(STILL, "one point at least has samples");
   const slots = new Int32Array(n).fill(-1); // of the points
@@ -106,12 +106,6 @@ async function readPoints(payload, kernels) {
     points: new Points(Int32Array.from(pointFaces, (p) => slots[p]), moves.length),
     visits: own,
   };
-}
-
-function checkCounts({ vertices, triangles }, n, faces) {
-  if (n !== vertices || faces.length !== 3 * triangles) {
-    throw new GeometryVideoError("corrupt", `the mesh has other counts than the header says; ${AGAIN}`);
-  }
 }
 
 /** Rows of three, flat, one for each of the numbers. */

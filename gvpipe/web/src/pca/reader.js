@@ -148,7 +148,7 @@ export class PcaReader {
     const vectors = vectorSteps(kernels, causal, sections[1], basis.components, steps[s], `coefficients.${s}`, how);
     const decoded = await inSlices(vectors, () => !job.isUrgent && this.#isUrgent);
     const chosen = level ? this.#alive(level) : null;
-    return new Segment(this.#kernels.fresh(), basis, kernels.view(decoded), this.#topology.pointCount, isReversed, chosen);
+    return new Segment(this.#kernels.fresh(), basis, kernels.view(decoded), this.#topology.pointCount, isReversed, { chosen });
   }
 
   /** Coefficients of the still points, in the order of transmission. */

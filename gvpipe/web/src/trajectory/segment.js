@@ -8,6 +8,7 @@ const MAX_FLOAT32 = 2 ** 128 - 2 ** 104;
 
 export class Segment {
   #kernels;
+  #base;
   #vectors;
   #coefficients;
 
@@ -16,13 +17,15 @@ export class Segment {
    * @param {import("./basis.js").Basis} basis of n frames
    * @param {Float64Array} coefficients (P, R) by point, flat @param {number} points P
    * @param {boolean} isReversed whether the last component comes first
-   * @param {Int32Array|null} [chosen] points that are read, numbered anew; null: all
+   * @param {object} [how] @param {Int32Array|null} [how.chosen] points that are read, numbered anew; null: all
+   * @param {Float64Array|null} [how.base] (P, 3) what trajectories count from, flat; null: the origin
    */
-  constructor(kernels, basis, coefficients, points, isReversed, chosen = null) {
+  constructor(kernels, basis, coefficients, points, isReversed, { chosen = null, base = null } = {}) {
     const { components } = basis;
     const count = chosen?.length ?? points;
     const [mean, vectors] = splitBasis(kernels, basis);
     this.#kernels = kernels;
+    this.#base = base;
     this.mean = kernels.view(mean).slice();
     this.#vectors = vectors;
     this.#coefficients = kernels.array("float64", [components, count]);
@@ -65,12 +68,14 @@ export class Segment {
   /** Fill `target (V, 3)`; false if a position does not fit. */
   #spread(sums, frame, first, points, target) {
     const pointCount = this.#coefficients.shape[1];
+    const base = this.#base;
     let isFinite = true;
     for (let axis = 0; axis < 3; axis++) {
       const mean = this.mean[3 * frame + axis];
       const row = (3 * (frame - first) + axis) * pointCount;
       for (let v = 0; v < points.length; v++) {
-        const value = sums[row + points[v]] + mean;
+        let value = sums[row + points[v]] + mean;
+        if (base) value += base[3 * points[v] + axis];
         if (!(value <= MAX_FLOAT32 && value >= -MAX_FLOAT32)) isFinite = false;
         target[3 * v + axis] = value;
       }
