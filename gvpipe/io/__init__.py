@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from gvpipe.container.sources import check_source, check_target
 from gvpipe.errors import InputError
 from gvpipe.io.cut_pictures import cut_notes
 from gvpipe.io.damage import check_file, reading
@@ -63,8 +64,11 @@ def _read(
 ) -> MeshSequence:
     if not isinstance(path, str | os.PathLike):
         _refuse_clip(clip, "a list of files")
+        for file in path:
+            check_source(file)
         return read_frames([os.fspath(file) for file in path], fps, frames)
     path = os.fspath(path)
+    check_source(path)
     suffix = Path(path).suffix.lower()
     if suffix not in HAVE_CLIPS or not os.path.isfile(path):
         _refuse_clip(clip, path)
@@ -98,6 +102,7 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
         OutputError: a file cannot be written; nothing half-written is left.
     """
     path = os.fspath(path)
+    check_target(path)
     suffix = Path(path).suffix.lower()
     writer = WRITERS.get(suffix)
     # .glb may be a frame, too: of a pattern, or of a sequence of one
