@@ -206,6 +206,8 @@ def read(
         return read_sequence(one, fps, clip, mesh, frames)
     if clip is not None:
         raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
+    if mesh is not None:
+        raise InputError(f"{one} has triangles of its own; mesh={os.fspath(mesh)!r} is for point caches")
     sequence = Player(one, unlimited=unlimited).sequence()
     if frames is not None:
         sequence = sequence.part(*frame_range(sequence, *frames))

@@ -388,9 +388,10 @@ def compare(
     if reference == distorted == PIPE:
         raise click.UsageError("both are -, and there is one standard input", click.get_current_context())
     span = parse_frames(frames)
+    its_mesh, other_mesh = _meshes((reference, distorted), mesh)
     with source_path(reference) as one, source_path(distorted) as other, out.progress() as progress:
-        given = api.read(one, fps, clip, mesh, span, unlimited=unlimited)
-        read_other = partial(api.read, other, None, other_clip, mesh, unlimited=unlimited)
+        given = api.read(one, fps, clip, its_mesh, span, unlimited=unlimited)
+        read_other = partial(api.read, other, None, other_clip, other_mesh, unlimited=unlimited)
         result = comparison.compare(
             given,
             read_other() if span is None else _same_frames(read_other, span, len(given)),
@@ -406,6 +407,16 @@ def compare(
             largest, mean = error["max"], error["mean"]
             measured = "one side lacks it" if largest is None else f"largest error {largest:.4g}, mean {mean:.4g}"
             out.text(f"{kind} {name}: {measured}")
+
+
+def _meshes(paths: tuple[str, str], mesh: str | None) -> list[str | None]:
+    """The mesh of either side: that of sides that are point caches; raises `click.UsageError` if none is."""
+    from gvpipe.io.scene_formats import POINT_CACHES
+
+    needs = [path.lower().endswith(POINT_CACHES) for path in paths]
+    if mesh is not None and not any(needs):
+        raise click.UsageError(f"--mesh is for {', '.join(POINT_CACHES)}; neither side is one", click.get_current_context())
+    return [mesh if need else None for need in needs]
 
 
 def _same_frames(read: Callable[..., MeshSequence], span: tuple[int, int | None], count: int) -> MeshSequence:

@@ -19,7 +19,9 @@ def is_url(path: object) -> bool:
 
 
 def check_source(path: str | os.PathLike[str]) -> None:
-    """Raise `InputError` for an address where a path on disk is needed, or geometry videos at ``https://`` are read alone."""
+    """Raise `InputError` for an empty path, and for an address that is not read, or not there."""
+    if not os.fspath(path):
+        raise InputError("the input's name is empty; give a file or a folder")
     if is_url(path):
         raise InputError(f"{path} is an address; {DOWNLOAD_FIRST}")
     if _is_address(path):
@@ -27,7 +29,9 @@ def check_source(path: str | os.PathLike[str]) -> None:
 
 
 def check_target(path: str | os.PathLike[str]) -> None:
-    """Raise `OutputError` for an output that is an address."""
+    """Raise `OutputError` for an output whose name is empty or an address."""
+    if not os.fspath(path):
+        raise OutputError("the output's name is empty; give a file")
     if _is_address(path):
         raise OutputError(f"cannot write {os.fspath(path)}: it is an address; write a file on disk, then upload it")
 

@@ -20,7 +20,7 @@ from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames import read_frames
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.pattern import match_pattern
-from gvpipe.io.scene_formats import HAVE_CLIPS, OPENVAT, SCENES, SIMULATIONS, WRITERS, scene_readers
+from gvpipe.io.scene_formats import HAVE_CLIPS, OPENVAT, POINT_CACHES, SCENES, SIMULATIONS, WRITERS, scene_readers
 from gvpipe.sequence import MeshSequence
 
 __all__ = ["READERS", "WRITERS", "read", "write"]
@@ -64,6 +64,7 @@ def _read(
 ) -> MeshSequence:
     if not isinstance(path, str | os.PathLike):
         _refuse_clip(clip, "a list of files")
+        _refuse_mesh(mesh, "a list of files")
         for file in path:
             check_source(file)
         return read_frames([os.fspath(file) for file in path], fps, frames)
@@ -72,6 +73,8 @@ def _read(
     suffix = Path(path).suffix.lower()
     if suffix not in HAVE_CLIPS or not os.path.isfile(path):
         _refuse_clip(clip, path)
+    if suffix not in POINT_CACHES:
+        _refuse_mesh(mesh, path)
     if suffix == OPENVAT:
         raise InputError(f"{path}: vertex animation textures are written, not read; give what they were made of")
     reader = READERS.get(suffix)
@@ -121,3 +124,8 @@ def _span(sequence: MeshSequence, frames: tuple[int, int | None] | None) -> Mesh
 def _refuse_clip(clip: str | None, name: str) -> None:
     if clip is not None:
         raise InputError(f"{name} has no clips; clip={clip!r} is for a single {' or '.join(HAVE_CLIPS)}")
+
+
+def _refuse_mesh(mesh: str | os.PathLike[str] | None, name: str) -> None:
+    if mesh is not None:
+        raise InputError(f"{name} has triangles of its own; mesh={os.fspath(mesh)!r} is for {', '.join(POINT_CACHES)} (--mesh)")

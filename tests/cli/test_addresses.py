@@ -1,4 +1,4 @@
-"""Addresses where a path on disk is needed: one line that says which are read, and nothing written."""
+"""Addresses and empty names where a path on disk is needed: one line that says what to give, and nothing written."""
 
 from __future__ import annotations
 
@@ -61,3 +61,8 @@ def test_a_folder_whose_name_ends_in_a_colon(
     Path("take:").mkdir()
     gvpipe.write(sequence, "take:/walk.npz")
     assert run("info", "take:/walk.npz").status == 0
+
+
+def test_empty_names(run: Run, video: Path) -> None:
+    assert run("convert", "", "a.npz").err == "Error: the input's name is empty; give a file or a folder\n"
+    assert run("convert", video, "").err == "Error: the output's name is empty; give a file\n"

@@ -59,6 +59,8 @@ def test_point_caches(run: Run, pair: tuple[Path, Path], tmp_path: Path) -> None
     for path, cache in zip(pair, caches, strict=True):
         gvpipe.write(gvpipe.read(path), cache)
     assert errors(run, *caches, "--mesh", pair[0], "--frames", "1:3") == pytest.approx([1, 2], rel=1e-5)
+    assert errors(run, pair[0], caches[0], "--mesh", pair[0]) == [0] * 11
+    assert run("compare", *pair, "--mesh", pair[0]).status == 2
 
 
 def test_clips(run: Run, tmp_path: Path) -> None:

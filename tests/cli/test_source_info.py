@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from asset_scene import scene
-from gltf_files import two_clips
+from gltf_files import assemble, take_apart, two_clips
 
 import gvpipe
 from gvpipe.sequence import MeshSequence
@@ -58,6 +58,15 @@ def test_clips_of_a_gltf_file(run: Run, tmp_path: Path) -> None:
     assert "time: 0..1 s\nclips: Walk (0..1 s), Run (0..2 s)\n" in run("info", tmp_path / "a.glb").out
     ended = run("info", tmp_path / "a.glb", "--clip", "Rum")
     assert ended.status == 1 and "there are: 'Walk', 'Run'" in ended.err and ended.err.count("\n") == 1
+
+
+def test_scenes_of_a_gltf_file(run: Run, tmp_path: Path) -> None:
+    two_clips(tmp_path / "a.glb")
+    tree, binary = take_apart((tmp_path / "a.glb").read_bytes())
+    tree |= {"nodes": [*tree["nodes"], {"mesh": 0}, {"mesh": 0}], "scenes": [{"nodes": [1, 2]}, {"nodes": [0]}], "scene": 1}
+    (tmp_path / "b.glb").write_bytes(assemble(tree, binary))
+    ended = run("info", tmp_path / "b.glb")
+    assert "3 vertices" in ended.out and "Note: it has 2 scenes; number 1, which it shows, was read alone\n" in ended.err
 
 
 def test_a_point_cache_needs_its_mesh(run: Run, sequence: MeshSequence, tmp_path: Path) -> None:
