@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from gvpipe.entropy.decision_kernels import Mixing
     from gvpipe.mesh.entry_kernels import EntryOrder
 
-MAX_POINTS = 1 << 13  # larger meshes take too long
+MAX_POINTS = 1 << 15  # larger meshes take too long
 MAX_BYTES = 24  # per point, of a stream
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from gvpipe.arrays import Bool, Int64, UInt8
 from gvpipe.compiled import compiled
-from gvpipe.connectivity.visit_kernels import NeighbourLists
+from gvpipe.connectivity.visit_kernels import NeighbourLists, search_visits
 from gvpipe.entropy.decision_kernels import Mixing, put, take
 from gvpipe.entropy.number_kernels import code_number, mix_hash
 
@@ -60,7 +60,7 @@ def code_visits(
         contexts[6] = mix_hash(numbers[match] if match >= 0 else -1, run)
         number = 0
         if not decoding:
-            number = 1 + _search(lists, reach, v, (visited, seen_by, queue), visits, first_left, visits[v], -1)[0]
+            number = 1 + search_visits(lists, reach, v, (visited, seen_by, queue), visits, first_left, visits[v], -1)[0]
         group = 0 if match < 0 else 1 if run < LONG_RUN else 2
         number = code_number(mixing, contexts, group, state, data, decoding, False, number)
         target = visits[v]
@@ -70,7 +70,7 @@ def code_visits(
         elif decoding:
             if number > reach:
                 return False
-            target = _search(lists, reach, v, (visited, seen_by, queue), visits, first_left, -1, number - 1)[1]
+            target = search_visits(lists, reach, v, (visited, seen_by, queue), visits, first_left, -1, number - 1)[1]
             if target < 0:
                 return False
         visits[v] = target
@@ -94,53 +94,6 @@ def code_visits(
         while first_left < n_vertices and visited[first_left]:
             first_left += 1
     return True
-
-
-@compiled
-def _search(
-    lists: NeighbourLists,
-    reach: int,
-    v: int,
-    memory: tuple[Bool, Int64, Int64],
-    visits: Int64,
-    first_left: int,
-    target: int,
-    wanted: int,
-) -> tuple[int, int]:
-    """Search from the vertex before v for a vertex ``target`` or for a rank ``wanted``; return both, -1 if not found."""
-    visited, seen_by, queue = memory
-    n_vertices = len(visited)
-    head = tail = rank = 0
-    seed = first_left
-    if v > 0:
-        queue[0] = visits[v - 1]
-        seen_by[visits[v - 1]] = v
-        tail = 1
-    while tail < reach:
-        if head == tail:  # the component is exhausted: go on with the first vertex left in the codec's order
-            while seed < n_vertices and seed - first_left < reach and (visited[seed] or seen_by[seed] == v):
-                seed += 1
-            if seed == n_vertices or seed - first_left >= reach:
-                break
-            begin, end = -1, 0
-        else:
-            begin, end = lists.starts[queue[head]], lists.starts[queue[head] + 1]
-            head += 1
-        for k in range(begin, end):
-            y = seed if begin < 0 else lists.neighbours[k]
-            if tail == reach:
-                break
-            if seen_by[y] == v:
-                continue
-            seen_by[y] = v
-            queue[tail] = y
-            tail += 1
-            if visited[y]:
-                continue
-            if y == target or rank == wanted:
-                return rank, y
-            rank += 1
-    return -1, -1
 
 
 @compiled

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int64, UInt32, UInt64
+from gvpipe.arrays import Bool, Int64, UInt32, UInt64
 from gvpipe.compiled import compiled
 from gvpipe.connectivity.visit_symbols import ESCAPE, EXACT_RANKS
 from gvpipe.entropy.range_decoder import decode_symbol, decode_uniform
@@ -143,9 +143,8 @@ def traverse_visits(lists: NeighbourLists, reach: int, coded: CodedVisits, decod
     A search looks at ``reach`` vertices at most. Returns the number of vertices done; fewer than V means that a rank or a jump
     points nowhere.
     """
-    starts, neighbours = lists.starts, lists.neighbours
     ranks, jumps, visits = coded.ranks, coded.jumps, coded.visits
-    n_vertices = len(starts) - 1
+    n_vertices = len(visits)
     visited = np.zeros(n_vertices, np.bool_)
     seen_by = np.full(n_vertices, -1, np.int64)  # the last search that saw a vertex
     queue = np.empty(min(reach, n_vertices) + 1, np.int64)
@@ -153,53 +152,18 @@ def traverse_visits(lists: NeighbourLists, reach: int, coded: CodedVisits, decod
     position = np.arange(n_vertices)
     first_left = 0
     for v in range(n_vertices):
-        target = -1
-        if not decoding:
-            target = visits[v]
         if decoding and ranks[v] < 0:
             if jumps[v] >= n_vertices - v:
                 return v
             target = left[jumps[v]]
-        else:
-            head = tail = rank = 0
-            seed = first_left
-            if v > 0:
-                queue[0] = visits[v - 1]
-                seen_by[visits[v - 1]] = v
-                tail = 1
-            found = False
-            while not found and tail < reach:
-                if head == tail:  # the component is exhausted: go on with the first vertex left in the codec's order
-                    while seed < n_vertices and seed - first_left < reach and (visited[seed] or seen_by[seed] == v):
-                        seed += 1
-                    if seed == n_vertices or seed - first_left >= reach:
-                        break
-                    begin, end = -1, 0
-                else:
-                    begin, end = starts[queue[head]], starts[queue[head] + 1]
-                for k in range(begin, end):
-                    y = seed if begin < 0 else neighbours[k]
-                    if tail == reach:
-                        break
-                    if seen_by[y] == v:
-                        continue
-                    seen_by[y] = v
-                    queue[tail] = y
-                    tail += 1
-                    if visited[y]:
-                        continue
-                    if (decoding and rank == ranks[v]) or y == target:
-                        target = y
-                        found = True
-                        break
-                    rank += 1
-                if begin >= 0:
-                    head += 1
-            if not found and decoding:
+        elif decoding:
+            target = search_visits(lists, reach, v, (visited, seen_by, queue), visits, first_left, -1, ranks[v])[1]
+            if target < 0:
                 return v
-            if not decoding:
-                ranks[v] = rank if found else -1
-                jumps[v] = position[target]
+        else:
+            target = visits[v]
+            ranks[v] = search_visits(lists, reach, v, (visited, seen_by, queue), visits, first_left, target, -1)[0]
+            jumps[v] = position[target]
         visits[v] = target
         visited[target] = True
         hole = position[target]
@@ -209,3 +173,60 @@ def traverse_visits(lists: NeighbourLists, reach: int, coded: CodedVisits, decod
         while first_left < n_vertices and visited[first_left]:
             first_left += 1
     return n_vertices
+
+
+@compiled
+def search_visits(
+    lists: NeighbourLists,
+    reach: int,
+    v: int,
+    memory: tuple[Bool, Int64, Int64],
+    visits: Int64,
+    first_left: int,
+    target: int,
+    wanted: int,
+) -> tuple[int, int]:
+    """Search from the vertex before v for a vertex or for a rank; return rank and vertex, -1 if not found.
+
+    Args:
+        lists: neighbours of the vertices.
+        reach: vertices that a search looks at, at most.
+        v: vertices visited so far; ``visits[v - 1]`` is the last.
+        memory: ``(V,)`` who was visited, ``(V,)`` the last search that saw each vertex, and room for reach + 1 vertices.
+        visits: ``(V,)``.
+        first_left: the first vertex not visited.
+        target, wanted: what is looked for; -1: any.
+    """
+    visited, seen_by, queue = memory
+    n_vertices = len(visited)
+    head = tail = rank = 0
+    seed = first_left
+    if v > 0:
+        queue[0] = visits[v - 1]
+        seen_by[visits[v - 1]] = v
+        tail = 1
+    while tail < reach:
+        if head == tail:  # the component is exhausted: go on with the first vertex left in the codec's order
+            while seed < n_vertices and seed - first_left < reach and (visited[seed] or seen_by[seed] == v):
+                seed += 1
+            if seed == n_vertices or seed - first_left >= reach:
+                break
+            begin, end = -1, 0
+        else:
+            begin, end = lists.starts[queue[head]], lists.starts[queue[head] + 1]
+            head += 1
+        for k in range(begin, end):
+            y = seed if begin < 0 else lists.neighbours[k]
+            if tail == reach:
+                break
+            if seen_by[y] == v:
+                continue
+            seen_by[y] = v
+            queue[tail] = y
+            tail += 1
+            if visited[y]:
+                continue
+            if y == target or rank == wanted:
+                return rank, y
+            rank += 1
+    return -1, -1

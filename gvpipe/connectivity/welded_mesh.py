@@ -29,6 +29,8 @@ from gvpipe.mesh.topology import adjacency
 from gvpipe.mesh.unique_rows import smallest_first
 
 ADAPTIVE_MESH, ADAPTIVE_ORDER = 1, 2  # flags
+FEW_POINTS = 1 << 13  # up to which adaptive positions open in no time
+WORTH_WAITING = 0.9  # of the other stream, what theirs must be beyond that
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def _encode_mesh(lattice: Array, faces: Array, adaptive: bool) -> tuple[bytes, i
     streams, base = encode_base(lattice, faces, reorder=True)
     if adaptive and len(lattice) <= adaptive_mesh.MAX_POINTS:
         mesh, permutation, own = adaptive_mesh.encode_adaptive_mesh(lattice, faces)
-        if len(mesh) < len(streams.mesh):
+        if len(mesh) < (1 if len(lattice) <= FEW_POINTS else WORTH_WAITING) * len(streams.mesh):
             points = lattice[permutation].astype(np.int32)
             return mesh, ADAPTIVE_MESH, permutation, BaseMesh(points, own.astype(np.int32), np.arange(len(points)))
     return streams.mesh, 0, streams.permutation, base

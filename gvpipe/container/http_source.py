@@ -91,7 +91,7 @@ class HttpSource:
     def read_all(self) -> bytes:
         """Return the whole file, which is not kept."""
         with self._lock:
-            if self._arriving is None:
+            if self._arriving is None and self.size > BLOCK:  # else it is here already
                 return self._fetch(0, self.size)
         return self.read(0, self.size)
 

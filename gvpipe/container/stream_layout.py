@@ -210,14 +210,14 @@ def _check_places(places: Mapping[str, _Place], fragments: np.ndarray, start: in
     n_bytes = fragments["mdat"].astype(np.int64) - BOX.size
     if (fragments["pictures"] > n_bytes).any() or not fragments["pictures"].all():
         raise corrupt("the index claims more pictures than there are bytes, or none")
-    offsets = np.array([*(place.offset for place in places.values()), *fragments["offset"].tolist()], np.uint64)
     lengths = [place.length for place in places.values()]
     pairs = fragments["moof"].astype(np.int64) + fragments["mdat"]
+    offsets = np.array([*(place.offset for place in places.values()), *fragments["offset"].tolist()], np.uint64)
     if max(lengths) > stop or int(offsets.max()) > stop:
         raise corrupt("the index names places outside of the file")
-    order = np.lexsort((np.array([*lengths, *pairs.tolist()]), offsets))
-    begins, sizes = offsets.astype(np.int64)[order], np.array([*lengths, *pairs.tolist()], np.int64)[order]
-    ends = begins + sizes
+    begins, sizes = offsets.astype(np.int64), np.array([*lengths, *pairs.tolist()])
+    order = np.lexsort((sizes, begins))
+    begins, ends = begins[order], (begins + sizes)[order]
     if begins[0] < start or ends.max() > stop or (ends[:-1] > begins[1:]).any():
         raise corrupt("the index names places that overlap, or lie outside of the file")
 

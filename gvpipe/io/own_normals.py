@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Int32, Int64
+from gvpipe.arrays import Array, Frames, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.attributes.surface_normals import find_rule
 from gvpipe.io.sharing import shared_by_vertex
@@ -38,11 +38,17 @@ def entries_of(normals: Attribute, faces: Int32) -> tuple[Int64, Int64]:
     return entries.reshape(-1), first
 
 
-def first_normals_note(moves: bool, attributes: Mapping[str, Attribute], faces: Int32, positions: Float32) -> tuple[str, ...]:
-    """What to say of a file's normals, if they change (``moves``) and do not follow from the surface in the first frame."""
+def first_normals_note(attributes: Mapping[str, Attribute], faces: Int32, frames: Frames) -> tuple[str, ...]:
+    """What to say of normals that change in a file: nothing if they follow from the surface in the first frame.
+
+    Args:
+        attributes: with the first frame's normals as ``normal``, or without.
+        faces: ``(T, 3)``.
+        frames: ``(F, V, 3)``, of which the first is read if it is needed.
+    """
     normals = attributes.get("normal")
-    if not moves or normals is None or normals.domain not in ("vertex", "corner"):
+    if frames.shape[0] == 1 or normals is None or normals.domain not in ("vertex", "corner"):
         return ()
     entries, corners = entries_of(normals, faces)
     rows = corners if normals.domain == "corner" else faces.reshape(-1)[corners]
-    return () if own_rule(np.asarray(normals)[rows], positions, faces, entries) else (FIRST_NORMALS,)
+    return () if own_rule(np.asarray(normals)[rows], frames[0:1][0], faces, entries) else (FIRST_NORMALS,)

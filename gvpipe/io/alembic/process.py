@@ -101,11 +101,7 @@ def read_alembic(path: Path, options: ReadOptions) -> MeshSequence:
         for name, field in held.fields.items()
     }
     frames = _Frames(process, held)
-    unruled = (
-        first_normals_note(True, held.attributes, held.faces, frames[0:1][0])
-        if held.moves_normals and frames.shape[0] > 1
-        else ()
-    )
+    unruled = first_normals_note(held.attributes, held.faces, frames) if held.moves_normals else ()
     return MeshSequence(
         frames,
         held.faces,

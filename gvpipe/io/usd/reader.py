@@ -71,7 +71,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
     sampled = [sampled_of(found.meshes[number], mesh, float(times[0])) for number, mesh in zip(kept, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times, where)
     moves = any(_has_moving_normals(motion.prim) for motion in motions)
-    unruled = first_normals_note(moves and frames.shape[0] > 1, attributes, joined.faces, frames[0:1][0])
+    unruled = first_normals_note(attributes, joined.faces, frames) if moves else ()
     misfits = misfit_note("primvars", [*(names for _, names in read), torn])
     drawn, images = materials.drawn()
     return MeshSequence(

@@ -39,7 +39,7 @@ export const SHARING_KERNELS_N_CONTEXTS = 12;
 export const VALUE_CODING_MAX_SHIFT = 32;
 
 // gvpipe.connectivity.adaptive_mesh
-export const ADAPTIVE_MESH_MAX_POINTS = 8192;
+export const ADAPTIVE_MESH_MAX_POINTS = 32768;
 
 // gvpipe.connectivity.adaptive_order
 export const ADAPTIVE_ORDER_MAX_VERTICES = 65536;

@@ -75,14 +75,7 @@ export class DecodedPictures {
       await inner.decode(coded, give);
     };
     const groupBytes = (samples.length * repeated.distinct) / groups.length;
-    const pictures = new DecodedPictures(groups, groupBytes, fps, repeated, { decode, close: () => inner.close() });
-    try {
-      await pictures.seek(0);
-    } catch (error) {
-      pictures.close();
-      throw error;
-    }
-    return pictures;
+    return DecodedPictures.of(groups, groupBytes, fps, repeated, { decode, close: () => inner.close() });
   }
 
   /**

@@ -73,23 +73,23 @@ class Start:
         return vertices, own[vertices]
 
 
-def begin(job: Job, step: float, target_error: float, point: Int64 | None = None) -> Start:
+def begin(job: Job, step: float, target_error: float, before: Start | None = None) -> Start:
     """Code the base frame for a quantisation step and a target error, model units, and see the sequence as the decoder will.
 
-    ``point (V,)`` is the point of each vertex, if that is known.
+    A start ``before`` gives its points; what gained nothing from adaptive contexts there is not tried again.
     """
     given, settings = job.sequence, job.settings
     job.report("base", 0)
     first = given.read(0, 1)[0]
     still = job.memo("still", lambda: find_still(given))
-    if point is None:
-        point = _weld(given, still, MERGED * step)
+    point = before.point if before else _weld(given, still, MERGED * step)
+    adaptive = before.coded.is_adaptive if before else settings.is_blended
     members = np.unique(point, return_index=True)[1]
     lattice = choose_lattice(settings, first[members], min(base_step(step, given.n_frames), target_error))
     positions = quantise_base(settings, lattice, first[members])
     coded, mesh = job.memo(
         f"base {lattice.step} {len(members)}",
-        lambda: encode_points(positions, given.faces, point, settings.reorder, True, settings.is_blended),
+        lambda: encode_points(positions, given.faces, point, settings.reorder, True, adaptive),
     )
     sources = coded.permutation[mesh.members]  # the given vertex of each point
     is_still = still[sources].copy()

@@ -42,7 +42,7 @@ def rebase(job: Job, candidate: Candidate, step: float, target_error: float) -> 
 
     given, fitted = candidate.start, candidate.fitted
     assert fitted
-    start = dataclasses.replace(begin(job, step, target_error, given.point), pictures=False)
+    start = dataclasses.replace(begin(job, step, target_error, given), pictures=False)
     number = np.empty(len(given.point), np.int64)
     number[given.point[given.sources]] = np.arange(len(given.sources))
     before = number[start.point[start.sources]]  # the number that each point had

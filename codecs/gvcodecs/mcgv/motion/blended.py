@@ -46,7 +46,7 @@ def code_blended(start: Start, fitted: Fitted, report: Progress) -> CodedMotion:
         coded[f"transforms.{s}"], decoded = encode_trajectories(transforms, start.step)
         segments.append(decoded)
         report("transforms", (s + 1) / (len(bounds) - 1))
-    matrix = fit.matrix  # without its factors: of a thousand clusters they take 134 MB
+    matrix = fit.matrix  # the factors of its normal equations are needed no more
 
     def predict(first: int, stop: int) -> Float64:
         s = locate(bounds, first)

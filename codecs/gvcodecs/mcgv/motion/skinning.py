@@ -16,13 +16,16 @@ displacements that they cause, and one quantisation step suits all of them.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
-from gvpipe.arrays import Float64, Int32
+from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.trajectory.sparse_rows import multiply
+
+if TYPE_CHECKING:
+    from scipy.sparse.linalg import SuperLU
 
 INFLUENCES = 4  # most clusters that a point follows
 TOTAL = 64  # weights are integers that add up to this
@@ -41,6 +44,21 @@ class Weights(NamedTuple):
 
     clusters: Int32
     weights: Int32
+
+
+class NormalEquations(NamedTuple):
+    """Normal equations of all clusters' transforms: a block for every two clusters that share a point, and the right side.
+
+    Args:
+        rows, columns: ``(n,) int64`` the clusters of each block, sorted by row, then by column.
+        blocks: ``(n, 4, 4)``.
+        right: ``(K, 4, m)``.
+    """
+
+    rows: Int64
+    columns: Int64
+    blocks: Float64
+    right: Float64
 
 
 class Blend:
@@ -83,38 +101,32 @@ class BlendFit:
     """Least squares for one blend: the normal matrix is factored once, then serves every frame."""
 
     def __init__(self, blend: Blend) -> None:
-        from scipy.linalg import cho_factor
-
         self.matrix = blend.matrix()
-        normal = (self.matrix.T @ self.matrix).toarray(order="F")  # the library's order: no copy
-        normal[np.diag_indices_from(normal)] += RIDGE
-        self._factor = cho_factor(normal, overwrite_a=True)
+        self._factor = _factorise(self.matrix.T @ self.matrix)
 
     def fit(self, motions: Float64) -> Float64:
         """``(4K, m)`` rows of equal weight that carry displacements ``(P, m)`` best."""
-        from scipy.linalg import cho_solve
-
-        return np.asarray(cho_solve(self._factor, self.matrix.T @ motions))
+        return np.asarray(self._factor.solve(self.matrix.T @ motions))
 
 
-def solve_normal(normal: Float64, right: Float64) -> Float64:
-    """Transforms ``(K, 4, m)`` that solve the normal equations ``normal (4K, 4K)``, ``right (4K, m)``, as `BlendFit` would.
-
-    ``normal`` is factored in place: of a thousand clusters it takes 134 MB.
-    """
-    from scipy.linalg import cho_factor, cho_solve
-
-    n = len(normal) // 4
-    blocks = [slice(4 * i, 4 * i + 4) for i in range(n)]
-    inverse = _whiten(normal.reshape(n, 4, n, 4)[np.arange(n), :, np.arange(n)])
-    for factor, block in zip(inverse, blocks, strict=True):
-        normal[block] = factor @ normal[block]
-    for factor, block in zip(inverse, blocks, strict=True):
-        normal[:, block] = (factor @ np.ascontiguousarray(normal[:, block].T)).T
-    normal[np.diag_indices_from(normal)] += RIDGE
-    factors = cho_factor(normal.T, overwrite_a=True)  # the library's order: no copy
-    rows = cho_solve(factors, (inverse @ right.reshape(n, 4, -1)).reshape(4 * n, -1))
+def solve_normal(normal: NormalEquations) -> Float64:
+    """Transforms ``(K, 4, m)`` that solve the normal equations, as `BlendFit` would."""
+    n = len(normal.right)
+    is_diagonal = normal.rows == normal.columns  # pairs are sorted
+    inverse = _whiten(normal.blocks[is_diagonal])
+    white = inverse[normal.rows] @ normal.blocks @ inverse[normal.columns].swapaxes(1, 2)
+    starts = np.searchsorted(normal.rows, np.arange(n + 1))
+    factor = _factorise(sparse.bsr_array((white, normal.columns, starts), shape=(4 * n, 4 * n)))
+    rows = factor.solve((inverse @ normal.right).reshape(4 * n, -1))
     return np.ascontiguousarray(inverse.swapaxes(1, 2) @ rows.reshape(n, 4, -1))
+
+
+def _factorise(white: sparse.csr_array | sparse.bsr_array) -> SuperLU:
+    """Factor a normal matrix of rows of equal weight: sparse, since few clusters share points."""
+    from scipy.sparse.linalg import splu
+
+    damped = sparse.csc_array(white) + RIDGE * sparse.eye_array(white.shape[0], format="csc")
+    return splu(damped, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def _whiten(energy: Float64) -> Float64:

@@ -193,7 +193,7 @@ class _Problem:
         from gvcodecs.mcgv.motion.skinning_fit_kernels import normal_equations
 
         clusters, parts = fitted.weights.clusters, fitted.weights.weights / TOTAL
-        return solve_normal(*normal_equations(clusters, parts, self.homogeneous, self.motions, fitted.n_clusters))
+        return solve_normal(normal_equations(clusters, parts, self.homogeneous, self.motions, fitted.n_clusters))
 
     def measure(self, fitted: Fitted) -> _Trial:
         """Solve for the transforms, and sum up errors and costs."""
@@ -209,16 +209,19 @@ class _Problem:
 def _find_number(problem: _Problem, clustering: Clustering, starts: list[Fitted]) -> list[_Trial]:
     """The blends, of as many clusters as pay, that cost least after a few turns: grown, and from k-means.
 
-    ``starts`` are blends found for another step, or of one cluster: numbers from half of theirs up are tried.
+    ``starts`` are blends found for another step, or of one cluster: numbers from half of theirs up are tried, or from theirs
+    up where there are too many for k-means.
     """
     draw, patches = np.random.default_rng(SEED), k_ring(problem.neighbours, PATCH)
     last = min(map(problem.measure, starts), key=lambda trial: trial.cost)
     best, least = [last, last], [np.inf, np.inf]
-    most = min(MOST, len(problem.base) / LEAST_POINTS)
-    count, worse = float(max(FEWEST, starts[0].n_clusters // 2)), 0
+    most, most_clustered = min(MOST, len(problem.base) / LEAST_POINTS), MOST_DISTANCES / len(problem.base)
+    half = starts[0].n_clusters // 2
+    count = float(max(FEWEST, half if half <= most_clustered else starts[0].n_clusters))  # to grow to fewer changes nothing
+    worse = 0
     while count <= most and problem.cluster_price * count < min(least) and worse < PATIENCE:
         begun = [_grow(last, round(count), patches, draw)]
-        if count * len(problem.base) <= MOST_DISTANCES:
+        if count <= most_clustered:
             begun.append(clustering.start(round(count)))
         tried = _try_all(problem, begun, TRIAL_PASSES)
         costs = [trial.cost for trial in tried]

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int32
+from gvcodecs.mcgv.motion.skinning import NormalEquations
+from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.compiled import compiled
 
 
 @compiled
 def normal_equations(
     clusters: Int32, weights: Float64, homogeneous: Float64, motions: Float64, n_clusters: int
-) -> tuple[Float64, Float64]:
-    """Return the normal equations of all clusters' transforms: ``(4K, 4K)``, symmetric, and the right side ``(4K, m)``.
+) -> NormalEquations:
+    """Return the normal equations of all clusters' transforms.
 
     Args:
         clusters, weights: ``(P, 4)`` of the points, used ones first, unused weights 0.
@@ -20,27 +21,49 @@ def normal_equations(
         motions: ``(P, m)`` displacements that the transforms are to give.
         n_clusters: K.
     """
+    rows, columns, numbers = _number_pairs(clusters, weights, n_clusters)
     n_motion = motions.shape[1]
-    normal, right = np.zeros((4 * n_clusters, 4 * n_clusters)), np.zeros((4 * n_clusters, n_motion))
+    blocks, right = np.zeros((len(rows), 4, 4)), np.zeros((n_clusters, 4, n_motion))
     for point in range(len(clusters)):
         for i in range(clusters.shape[1]):
             if weights[point, i] == 0.0:
                 break
-            first = 4 * clusters[point, i]
             for r in range(4):
                 scale = weights[point, i] * homogeneous[point, r]
-                row = right[first + r]
+                row = right[clusters[point, i], r]
                 for c in range(n_motion):
                     row[c] += scale * motions[point, c]
             for j in range(clusters.shape[1]):
                 if weights[point, j] == 0.0:
                     break
-                second = 4 * clusters[point, j]
+                block = blocks[numbers[clusters[point, i], clusters[point, j]]]
                 both = weights[point, i] * weights[point, j]
                 for r in range(4):
                     for c in range(4):
-                        normal[first + r, second + c] += both * homogeneous[point, r] * homogeneous[point, c]
-    return normal, right
+                        block[r, c] += both * homogeneous[point, r] * homogeneous[point, c]
+    return NormalEquations(rows, columns, blocks, right)
+
+
+@compiled
+def _number_pairs(clusters: Int32, weights: Float64, n_clusters: int) -> tuple[Int64, Int64, Int32]:
+    """Every two clusters that share a point, and each cluster with itself: rows, columns, and numbers ``(K, K)`` of pairs."""
+    numbers = np.zeros((n_clusters, n_clusters), np.int32)
+    for cluster in range(n_clusters):
+        numbers[cluster, cluster] = 1
+    for point in range(len(clusters)):
+        for i in range(clusters.shape[1]):
+            for j in range(clusters.shape[1]):
+                if weights[point, i] != 0.0 and weights[point, j] != 0.0:
+                    numbers[clusters[point, i], clusters[point, j]] = 1
+    n_pairs = numbers.sum()
+    rows, columns = np.empty(n_pairs, np.int64), np.empty(n_pairs, np.int64)
+    n = 0
+    for row in range(n_clusters):
+        for column in range(n_clusters):
+            if numbers[row, column]:
+                rows[n], columns[n], numbers[row, column] = row, column, n
+                n += 1
+    return rows, columns, numbers
 
 
 @compiled

@@ -13,7 +13,7 @@ import {
   HIERARCHY_SECONDS_PER_VERTEX as SECONDS_PER_VERTEX,
 } from "../constants.js";
 import { decodeTopology } from "../format/topology_only.js";
-import { decodeBasis } from "../trajectory/basis.js";
+import { decodeBasis, splitBasis } from "../trajectory/basis.js";
 import { placed, taken } from "../trajectory/causal_order.js";
 import { decodeVectors } from "../trajectory/coefficient_coding.js";
 import { Segment } from "../trajectory/segment.js";
@@ -143,18 +143,11 @@ export class PcaReader {
   }
 
   /** Coefficients of the still points, in the order of transmission. */
-  #given(kernels, { components, columns }, isReversed) {
+  #given(kernels, basis, isReversed) {
     if (!this.#still.count) return null;
-    const rows = columns.length / (components + 1);
-    const [mean, vectors] = [kernels.array("float64", [rows]), kernels.array("float64", [rows, components])];
-    const [ofMean, ofVectors] = [kernels.view(mean), kernels.view(vectors)];
-    for (let row = 0; row < rows; row++) {
-      ofMean[row] = columns[row * (components + 1)];
-      ofVectors.set(columns.subarray(row * (components + 1) + 1, (row + 1) * (components + 1)), row * components);
-    }
-    const given = this.#still.given(kernels, mean, vectors, this.#payload.budget);
+    const given = this.#still.given(kernels, ...splitBasis(kernels, basis), this.#payload.budget);
     const values = kernels.view(given);
-    for (let i = 0; isReversed && i < values.length; i += components) values.subarray(i, i + components).reverse();
+    for (let i = 0; isReversed && i < values.length; i += basis.components) values.subarray(i, i + basis.components).reverse();
     return given;
   }
 

@@ -56,3 +56,22 @@ export function decodeBasis(kernels, data, frames, points, step, name, axes = 3,
   for (let i = 0; i < columns.length; i++) columns[i] /= scales[i % width];
   return { components, columns };
 }
+
+/**
+ * A basis as kernels take it.
+ *
+ * @param {import("../wasm/kernels.js").Kernels} kernels
+ * @param {Basis} basis
+ * @returns {[object, object]} the mean (A F) and the principal trajectories (A F, R), arrays of `kernels`
+ */
+export function splitBasis(kernels, { components, columns }) {
+  const width = components + 1;
+  const rows = columns.length / width;
+  const [mean, vectors] = [kernels.array("float64", [rows]), kernels.array("float64", [rows, components])];
+  const [ofMean, ofVectors] = [kernels.view(mean), kernels.view(vectors)];
+  for (let row = 0; row < rows; row++) {
+    ofMean[row] = columns[row * width];
+    ofVectors.set(columns.subarray(row * width + 1, (row + 1) * width), row * components);
+  }
+  return [mean, vectors];
+}

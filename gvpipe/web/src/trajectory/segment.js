@@ -1,6 +1,7 @@
 /** Frames from a decoded basis and coefficients, each a product of Python's kernels. Mirrors `gvpipe.trajectory.reconstruction`. */
 
 import { AGAIN, GeometryVideoError } from "../format/errors.js";
+import { splitBasis } from "./basis.js";
 
 const PRODUCT_VALUES = 2 ** 21; // of frames that are rebuilt at once
 const MAX_FLOAT32 = 2 ** 128 - 2 ** 104;
@@ -16,17 +17,12 @@ export class Segment {
    * @param {Float64Array} coefficients (P, R) by point, flat @param {number} points P
    * @param {boolean} isReversed whether the last component comes first
    */
-  constructor(kernels, { components, columns }, coefficients, points, isReversed) {
-    const width = components + 1;
-    const rows = columns.length / width;
+  constructor(kernels, basis, coefficients, points, isReversed) {
+    const { components } = basis;
+    const [mean, vectors] = splitBasis(kernels, basis);
     this.#kernels = kernels;
-    this.mean = new Float64Array(rows);
-    this.#vectors = kernels.array("float64", [rows, components]);
-    const vectors = kernels.view(this.#vectors);
-    for (let row = 0; row < rows; row++) {
-      this.mean[row] = columns[row * width];
-      vectors.set(columns.subarray(row * width + 1, (row + 1) * width), row * components);
-    }
+    this.mean = kernels.view(mean).slice();
+    this.#vectors = vectors;
     this.#coefficients = kernels.array("float64", [components, points]);
     const turned = kernels.view(this.#coefficients);
     for (let c = 0; c < components; c++) {
