@@ -1,7 +1,8 @@
 """Default files against ``prediction=affine``, on sequences made here and on files: python tools/measure_held_out.py FILES.
 
-Prints a table of bytes and errors (Karni and Gotsman) at quality 75. Made here: two robots of rigid parts, a cloth,
-and a cloth as a triangle soup. Files are anything that gvpipe reads; ``--soups`` measures them as triangle soups, too.
+Prints a table of bytes and errors (Karni and Gotsman) at quality 75. Made here: two robots of rigid parts, a walker whose
+limbs bend, one whose limbs are rigid halves, a cloth, and a cloth as a triangle soup. Files are anything that gvpipe
+reads; ``--soups`` measures them as triangle soups, too.
 """
 
 from __future__ import annotations
@@ -43,6 +44,8 @@ def made() -> dict[str, gvpipe.MeshSequence]:
     return {
         "robot, 13 boxes": make_robot(13, box(13)),
         "robot, 9 cylinders": make_robot(9, cylinder(48, 25)),
+        "walker, limbs that bend": make_walker(bend_width=0.04),
+        "walker, rigid halves": make_walker(bend_width=0.0),
         "cloth": make_cloth(65),
         "cloth, soup": soup(cloth),
     }
@@ -100,6 +103,54 @@ def make_robot(n_parts: int, part: tuple[Floats, Ints]) -> gvpipe.MeshSequence:
         frames.append(np.concatenate(parts))
     every = np.concatenate([faces + k * len(points) for k in range(n_parts)])
     return gvpipe.MeshSequence(np.array(frames, np.float32), every.astype(np.int32), FPS)
+
+
+def make_walker(bend_width: float) -> gvpipe.MeshSequence:
+    """Two legs, two arms, a body and a head that walk on; knees and elbows bend over a width of the limb, or sharply (0)."""
+    limbs = [
+        (-0.12, 0.0, 0.6, 0.4, 0.0),
+        (0.12, 0.0, 0.6, 0.4, np.pi),
+        (-0.28, 0.62, 0.5, -0.3, np.pi),
+        (0.28, 0.62, 0.5, -0.3, 0.0),
+    ]
+    tube, tube_faces = capsule(32, 52)
+    frames = []
+    for k in range(FRAMES):
+        phase = 2 * np.pi * k / 40
+        parts = []
+        for x, y, swing, bend, offset in limbs:
+            half = 0.5 if y == 0 else 0.33
+            down = tube * (0.09, -2 * half, 0.09)
+            beyond = -down[:, 1:2] - half
+            lower = 1 / (1 + np.exp(-beyond / bend_width)) if bend_width else (beyond > 0).astype(float)
+            upper_turn = rotation(swing * np.sin(phase + offset), 0)
+            lower_turn = upper_turn @ rotation(bend * (1 + np.sin(phase + offset + 1)), 0)
+            joint = np.array([0.0, -half, 0.0])
+            bent = (down - joint) @ lower_turn.T + upper_turn @ joint
+            parts.append((1 - lower) * (down @ upper_turn.T) + lower * bent + (x, y, 0.0))
+        parts.append(tube * (0.2, 0.65, 0.15) @ rotation(0.15 * np.sin(phase), 1).T)
+        parts.append(tube * (0.12, 0.25, 0.12) @ rotation(0.1 * np.sin(2 * phase), 0).T + (0.0, 0.7, 0.0))
+        frames.append(np.concatenate(parts) + np.array([0.0, 0.04 * np.cos(2 * phase), 1.2 * k / 40]))
+    faces = np.concatenate([tube_faces + k * len(tube) for k in range(6)])
+    return gvpipe.MeshSequence(np.array(frames, np.float32), faces.astype(np.int32), FPS)
+
+
+def capsule(n_around: int, n_along: int) -> tuple[Floats, Ints]:
+    """A tube of radius 1 around y, from 0 to 1, that narrows at both ends and bulges a little; its rings are closed."""
+    angle, along = 2 * np.pi * np.arange(n_around) / n_around, np.linspace(0.0, 1.0, n_along)
+    radius = np.sqrt(np.clip(1 - np.clip(np.abs(2 * along - 1) - 0.8, 0, 0.199) ** 2 / 0.04, 0, 1)) * (
+        1 + 0.15 * np.sin(3 * along)
+    )
+    rings = [
+        np.column_stack([r * np.cos(angle), np.full(n_around, y), r * np.sin(angle)])
+        for r, y in zip(radius, along, strict=True)
+    ]
+    seam = np.arange(n_along)[:, None] * n_around
+    corner = seam[:-1] + np.arange(n_around)
+    beside = seam[:-1] + (np.arange(n_around) + 1) % n_around
+    first = np.stack([corner, corner + n_around, beside], axis=-1)
+    second = np.stack([beside, corner + n_around, beside + n_around], axis=-1)
+    return np.concatenate(rings), np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)])
 
 
 def box(side: int) -> tuple[Floats, Ints]:
