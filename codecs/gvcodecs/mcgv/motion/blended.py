@@ -39,7 +39,8 @@ def code_blended(start: Start, fitted: Fitted, report: Progress) -> CodedMotion:
     coded = {"weights": encode_weights(fitted.weights, causal_neighbours(start.points.neighbours))}
     segments: list[Trajectories] = []
     for s, (begin, end) in enumerate(pairwise(bounds)):
-        transforms = np.empty((4 * fitted.n_clusters, 3 * (end - begin)))
+        # column by column, as solvers give them: the order decides the last bits of products
+        transforms = np.empty((4 * fitted.n_clusters, 3 * (end - begin)), order="F")
         for first, block in start.sequence.chunks(begin, end):
             at = 3 * (first - begin)
             transforms[:, at : at + 3 * len(block)] = fit.fit(_columns(block - base))
