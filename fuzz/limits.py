@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from fuzz.library_processes import library_cost
 from fuzz.parts import BrokenPromise, Target
 from fuzz.results import check_text
 
@@ -92,7 +93,10 @@ def _origin(exc: BaseException) -> str:
 
 @dataclass
 class Cost:
-    """Processor time, and bytes by which memory grew at its peak (0 where the system does not say)."""
+    """Processor time, and bytes by which memory grew at its peak (0 where the system does not say).
+
+    Time includes that of a library's process; memory is this process's or that one's, whichever is larger.
+    """
 
     seconds: float = 0.0
     memory: int = 0
@@ -102,11 +106,13 @@ class Cost:
 def measured() -> Iterator[Cost]:
     """Measure what is done inside."""
     cost = Cost()
+    library_cost()
     before = _memory(reset=True)
     started = time.process_time()
     yield cost
-    cost.seconds = time.process_time() - started
-    cost.memory = _memory(reset=False) - before
+    seconds, memory = library_cost()
+    cost.seconds = time.process_time() - started + seconds
+    cost.memory = max(_memory(reset=False) - before, memory)
 
 
 def _memory(reset: bool) -> int:

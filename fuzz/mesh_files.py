@@ -14,15 +14,15 @@ from fuzz.mutation import Change, Rng, mutate_bytes, mutate_json, mutate_text
 from fuzz.parts import Parts, Seed, Target
 from fuzz.results import check_asset, check_faces, check_positions
 from gvpipe.errors import InputError
+from gvpipe.io.library_process import LEAST_MEMORY
 
 MESH = "mesh.obj"  # what a point cache belongs to
 CACHES = (".pc2", ".mdd", ".npy")
 MOST_VALUES = 1 << 22
-MEMORY = 1 << 30  # bytes; no budget is promised for mesh files, and libraries allocate before they look
-USD_MEMORY = 4 << 30  # OpenUSD fills an array of the length that a damaged file says before it finds the end of the file
+MEMORY = LEAST_MEMORY + (256 << 20)  # bytes: the limit of libraries' processes, and what they have before that
 INSIDE = "|"  # between a file's name and the name of what it holds
 GLTF_JSON = 0x4E4F534A  # kind of a chunk
-TEXTS = (b"ply\n", b"v ", b"#", b"solid", b"OFF", b"<?xml", b"<", b"FORMAT", b"; FBX", b"{")
+TEXTS = (b"ply\n", b"v ", b"#", b"solid", b"OFF", b"<?xml", b"<", b"FORMAT", b"; FBX", b"{", b"$", b"*")
 
 
 def mesh_targets(seeds: dict[str, tuple[Seed, ...]]) -> list[Target]:
@@ -36,7 +36,7 @@ def mesh_targets(seeds: dict[str, tuple[Seed, ...]]) -> list[Target]:
             join_files,
             parse_mesh,
             (InputError,),
-            USD_MEMORY if name.startswith("usd") else MEMORY,
+            MEMORY,
         )
         for name, group in seeds.items()
     ]

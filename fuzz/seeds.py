@@ -127,6 +127,8 @@ def _make_meshes(folder: Path) -> None:
 def _made_by_tests() -> list[tuple[str, str, Callable[[Path], Any]]]:
     files, hdf = _of_tests("io/simulation/test_files.py"), _of_tests("io/simulation/test_hdf.py")
     gltf, fbx = _of_tests("gltf_files.py"), _of_tests("io/fbx/test_fbx.py")
+    boxes = _of_tests("io/simulation/test_meshio_files.py").boxes()  # volumes with numbers per point and cell
+    bare = type(boxes)(boxes.points, boxes.cells)
     heat = np.arange(8, dtype=np.float32)
 
     def write_vtu(form: str) -> Callable[[Path], Any]:
@@ -161,6 +163,9 @@ def _made_by_tests() -> list[tuple[str, str, Callable[[Path], Any]]]:
         ("case", "ensight", _write_ensight),
         ("fbx", "text", lambda path: path.write_text(fbx.FBX)),
         ("gltf", "text", lambda path: _write_gltf(gltf, path)),
+        ("msh", "binary", partial(boxes.write, file_format="gmsh")),
+        ("msh", "text", partial(bare.write, file_format="gmsh", binary=False)),
+        *((suffix, "boxes", boxes.write) for suffix in ("inp", "avs")),
         ("ply", "text", lambda path: path.write_text(PLY)),
         ("stl", "text", lambda path: path.write_text(STL)),
         ("obj", "text", lambda path: (path.write_text(OBJ), path.with_name("a.mtl").write_text(MTL))),

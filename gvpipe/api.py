@@ -187,7 +187,7 @@ def read(
         clip: name of the animation to read, of a glTF or FBX file that has several; None: the first.
         mesh: a file with the triangles of a point cache.
         frames: first frame that is read, and the one after the last (None: all that follow).
-        unlimited: as for `open`, of a geometry video.
+        unlimited: as for `open`, of a geometry video; of a USD file, whether it may take any memory.
 
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
@@ -199,11 +199,11 @@ def read(
         for file in path:
             check_path(file, "a file of gvpipe.read's list")
         if len(path) != 1:
-            return read_sequence(path, fps, clip, mesh, frames)
+            return read_sequence(path, fps, clip, mesh, frames, unlimited)
         path = path[0]
     one = check_path(path, "what gvpipe.read is given", "a list of frame files or ")
     if Path(one).suffix.lower() not in VIDEO_SUFFIXES and not is_url(one):
-        return read_sequence(one, fps, clip, mesh, frames)
+        return read_sequence(one, fps, clip, mesh, frames, unlimited)
     if clip is not None:
         raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
     if mesh is not None:

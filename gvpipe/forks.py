@@ -43,6 +43,14 @@ class ForkLock:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._lock.__exit__(kind, error, trace)
 
+    def try_acquire(self) -> bool:
+        """Take it if no other thread has it, and say whether that was so; `release` gives it back."""
+        return self._lock.acquire(blocking=False)
+
+    def release(self) -> None:
+        """Give it back."""
+        self._lock.release()
+
     def after_fork(self) -> None:
         """Forget who held it."""
         self._lock = threading.RLock()

@@ -54,18 +54,22 @@ class SourceInfo:
 
 
 def source_info(
-    path: StrPath, clip: str | None = None, mesh: StrPath | None = None, frames: tuple[int, int | None] | None = None
+    path: StrPath,
+    clip: str | None = None,
+    mesh: StrPath | None = None,
+    frames: tuple[int, int | None] | None = None,
+    unlimited: bool = False,
 ) -> SourceInfo:
     """Return what gvpipe reads of a source; only the first of the frames is evaluated.
 
     Args:
-        path, clip, mesh, frames: as of `gvpipe.read`.
+        path, clip, mesh, frames, unlimited: as of `gvpipe.read`.
 
     Raises:
         InputError: it cannot be read.
     """
     name = os.fspath(path)
-    sequence = read(name, None, clip, mesh, frames)
+    sequence = read(name, None, clip, mesh, frames, unlimited)
     first = sequence[0]
     clips = list_clips(name)
     things = Things(sequence.parts, sequence.polygons, sequence.materials, sequence.images, sequence.metadata)

@@ -14,7 +14,9 @@ from folders import SAMPLES
 from hypothesis import settings
 
 import gvpipe
+from fuzz.library_processes import fork_library_processes
 from gvpipe.cli.commands import main
+from gvpipe.io import library_process
 from gvpipe.sequence import MeshSequence
 
 # the same examples in every run, however busy the machine; --hypothesis-profile=default draws others
@@ -22,6 +24,8 @@ settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
 # settings that cost little, for tests of anything but coding
 FAST: dict[str, Any] = {"preset": "ultrafast", "clusters": 3, "gop": 4}
+start_process = library_process.start_process
+fork_library_processes()  # USD, Alembic and FBX files then take no start of Python each
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -35,6 +39,12 @@ class Finished:
     status: int
     out: str
     err: str
+
+
+@pytest.fixture
+def new_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """USD, Alembic and FBX files are read by new processes, as outside of the tests."""
+    monkeypatch.setattr(library_process, "start_process", start_process)
 
 
 @pytest.fixture(scope="session")

@@ -323,7 +323,7 @@ def info(source: str, clip: str | None, mesh: str | None, frames: str | None, un
 
     with source_path(source) as path, out.progress():
         if not is_video(path):
-            _source_info(source, path, (clip, mesh, frames), out)
+            _source_info(source, path, (clip, mesh, frames, unlimited), out)
             return
         if clip is not None or mesh is not None or frames is not None:
             raise click.UsageError("--clip, --mesh and --frames are for sources; a geometry video is shown whole")
@@ -343,14 +343,14 @@ def info(source: str, clip: str | None, mesh: str | None, frames: str | None, un
     _print_sections(out, found.sections, found.vertices * found.frames)
 
 
-def _source_info(source: str, path: str, given: tuple[str | None, str | None, str | None], out: Output) -> None:
-    """Print what is read of an input that is no geometry video; ``given`` are --clip, --mesh and --frames."""
+def _source_info(source: str, path: str, given: tuple[str | None, str | None, str | None, bool], out: Output) -> None:
+    """Print what is read of an input that is no geometry video; ``given`` are --clip, --mesh, --frames and --unlimited."""
     from gvpipe.cli.asset_lines import asset_lines, shape_lines, time_lines
     from gvpipe.cli.choices import parse_frames
     from gvpipe.source_info import source_info
 
-    clip, mesh, frames = given
-    found = source_info(path, clip, mesh, parse_frames(frames))
+    clip, mesh, frames, unlimited = given
+    found = source_info(path, clip, mesh, parse_frames(frames), unlimited)
     out.json(found.to_json())
     out.text(shown(source, STDIN) + ("" if found.bytes is None else f": {_size(found.bytes)}"))
     for line in [*shape_lines(found), *asset_lines(found), *time_lines(found)]:

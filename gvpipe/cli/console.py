@@ -97,7 +97,9 @@ class Output:
 
 
 unlimited_option = click.option(
-    "--unlimited", is_flag=True, help="Let a geometry video take whatever memory and time it asks for: you trust its source."
+    "--unlimited",
+    is_flag=True,
+    help="Let a geometry video or a USD file take whatever memory and time it asks for: you trust its source.",
 )
 
 

@@ -32,6 +32,7 @@ def read(
     clip: str | None = None,
     mesh: str | os.PathLike[str] | None = None,
     frames: tuple[int, int | None] | None = None,
+    unlimited: bool = False,
 ) -> MeshSequence:
     """Read a mesh sequence.
 
@@ -45,36 +46,31 @@ def read(
         clip: name of the animation to read, of a file that has several; None: the first.
         mesh: a file with the triangles of a point cache.
         frames: first frame that is read, and the one after the last (None: all that follow).
+        unlimited: whether OpenUSD may take any memory (`gvpipe.io.usd.worker`).
 
     Raises:
         InputError: the path or what it holds cannot be used. Frame files after the first are read, and may raise it,
             when their positions are.
     """
-    sequence = _read(path, fps, clip, mesh, frames)
+    sequence = _read(path, ReadOptions(fps, clip, mesh, frames, unlimited))
     cut = cut_notes(sequence.images)
     return replace(sequence, notes=(*sequence.notes, *cut)) if cut else sequence
 
 
-def _read(
-    path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
-    fps: float | None,
-    clip: str | None,
-    mesh: str | os.PathLike[str] | None,
-    frames: tuple[int, int | None] | None,
-) -> MeshSequence:
+def _read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], options: ReadOptions) -> MeshSequence:
     if not isinstance(path, str | os.PathLike):
-        _refuse_clip(clip, "a list of files")
-        _refuse_mesh(mesh, "a list of files")
+        _refuse_clip(options.clip, "a list of files")
+        _refuse_mesh(options.mesh, "a list of files")
         for file in path:
             check_source(file)
-        return read_frames([os.fspath(file) for file in path], fps, frames)
+        return read_frames([os.fspath(file) for file in path], options.fps, options.frames)
     path = os.fspath(path)
     check_source(path)
     suffix = Path(path).suffix.lower()
     if suffix not in HAVE_CLIPS or not os.path.isfile(path):
-        _refuse_clip(clip, path)
+        _refuse_clip(options.clip, path)
     if suffix not in POINT_CACHES:
-        _refuse_mesh(mesh, path)
+        _refuse_mesh(options.mesh, path)
     if suffix == OPENVAT:
         raise InputError(f"{path}: vertex animation textures are written, not read; give what they were made of")
     reader = READERS.get(suffix)
@@ -82,10 +78,10 @@ def _read(
     if reader is not None and (os.path.isfile(path) or (suffix not in FRAME_FORMATS and not os.path.isdir(path))):
         check_file(Path(path))
         with reading(Path(path), ""):
-            sequence = reader(Path(path), ReadOptions(fps, clip, mesh, frames))
+            sequence = reader(Path(path), options)
         if sequence is not None:
-            return sequence if suffix in (*SIMULATIONS, *SCENES) else _span(sequence, frames)
-    return read_frames(path, fps, frames)
+            return sequence if suffix in (*SIMULATIONS, *SCENES) else _span(sequence, options.frames)
+    return read_frames(path, options.fps, options.frames)
 
 
 READERS = scene_readers(read)

@@ -19,7 +19,7 @@ from gvpipe.asset.attribute import Attribute, guess_kind
 from gvpipe.asset.field import Field
 from gvpipe.io.damage import FRAME_AGAIN, reading
 from gvpipe.io.frame_files import FrameFiles
-from gvpipe.io.mesh import FrameValues, Mesh
+from gvpipe.io.mesh import FrameValues, Mesh, left_note
 from gvpipe.io.own_normals import FIRST_NORMALS, entries_of, own_rule
 
 SAMPLES = 3  # files that are compared with the first before all are
@@ -54,8 +54,10 @@ def split_columns(frames: FrameFiles) -> Columns:
     """
     with reading(frames.paths[0], "", remedy=FRAME_AGAIN):
         given = {name: make() for name, make in frames.first.animated.items()}
-    given = {name: one._replace(values=_narrow(one.values)) for name, one in given.items()}
-    statics = {name: _static(frames.first, name, one) for name, one in given.items() if not _has_holes(one.values)}
+    left = [name for name, one in given.items() if not one.can_be_held]
+    given = {name: one._replace(values=_narrow(one.values)) for name, one in given.items() if name not in left}
+    with reading(frames.paths[0], "", remedy=FRAME_AGAIN):
+        statics = {name: _static(frames.first, name, one) for name, one in given.items() if not _has_holes(one.values)}
     n_frames = len(frames.paths)
     samples = np.unique(np.linspace(1, n_frames - 1, SAMPLES).astype(int)).tolist() if n_frames > 1 else []
     moving = set(given) - set(statics)
@@ -87,7 +89,7 @@ def split_columns(frames: FrameFiles) -> Columns:
         if name in moving - corners
     }
     attributes = {name: each for name, each in statics.items() if name not in fields}
-    return Columns(attributes, fields, (FIRST_NORMALS,) if corners else ())
+    return Columns(attributes, fields, (*((FIRST_NORMALS,) if corners else ()), *left_note(left)))
 
 
 def _keep(frames: FrameFiles, names: set[str], given: dict[str, FrameValues], n_frames: int) -> None:

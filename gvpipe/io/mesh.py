@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.arrays import Array, Bool, Float32, Floats, Int32, Int64, Integers, UInt8
-from gvpipe.asset.attribute import Attribute
+from gvpipe.asset.attribute import MAX_COMPONENTS, Attribute
 from gvpipe.asset.material import Image, Material
 from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part
@@ -31,6 +31,17 @@ class FrameValues(NamedTuple):
     domain: str = "vertex"
     kind: str = ""
     unit: str = ""
+
+    @property
+    def can_be_held(self) -> bool:
+        """Whether an attribute or a field can have numbers of their type and as many components."""
+        width = self.values.shape[1] if self.values.ndim == 2 else 1
+        return self.values.ndim in (1, 2) and self.values.dtype.kind in "biuf" and 1 <= width <= MAX_COMPONENTS
+
+
+def left_note(names: Sequence[str]) -> tuple[str, ...]:
+    """What to say of numbers that cannot be held."""
+    return (f"numbers that are not of 1 to {MAX_COMPONENTS} components were left out: {', '.join(names[:5])}",) if names else ()
 
 
 @dataclass(frozen=True)

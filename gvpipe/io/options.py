@@ -18,12 +18,14 @@ class ReadOptions:
         mesh: a file with the mesh, for formats that hold positions alone (point caches).
         frames: first frame that is read, and the one after the last (None: all that follow). Simulations whose topology
             changes are read from frame to frame where it does not.
+        unlimited: whether a library that runs in a process of its own may take any memory.
     """
 
     fps: float | None = None
     clip: str | None = None
     mesh: str | os.PathLike[str] | None = None
     frames: tuple[int, int | None] | None = None
+    unlimited: bool = False
 
     def span(self, n_frames: int, where: str) -> tuple[int, int]:
         """First frame of a file of ``n_frames``, and the one after the last; ``where`` is the file, for messages.

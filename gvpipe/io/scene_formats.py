@@ -32,7 +32,7 @@ SCENE_SUFFIXES = (".npz", *SCENES, ".fbx", *SIMULATIONS, *POINT_CACHES)  # that 
 WRITERS: dict[str, SceneWriter] = {
     ".npz": late("npz", "write_npz"),
     ".glb": late("gltf", "write_animated"),
-    **dict.fromkeys(USD, late("usd", "write_usd")),
+    **dict.fromkeys(USD, late("usd.writer", "write_usd")),
     ".abc": late("alembic.writer", "write_alembic"),
     ".pc2": late("point_cache", "write_pc2"),
     ".mdd": late("point_cache", "write_mdd"),
@@ -48,7 +48,7 @@ def scene_readers(read_mesh: MeshReader) -> dict[str, SceneReader]:
     return {
         ".npz": lambda path, options: late("npz", "read_npz")(path, options.fps),
         **dict.fromkeys(GLTF, late("gltf", "read_animated")),
-        **dict.fromkeys(USD, late("usd", "read_usd")),
+        **dict.fromkeys(USD, late("usd.process", "read_usd")),
         ".abc": late("alembic.process", "read_alembic"),
         ".fbx": late("fbx.reader", "read_fbx"),
         **SIMULATIONS,

@@ -16,6 +16,7 @@ from gvpipe.errors import InputError
 pytest.importorskip("alembic3d")
 
 
+@pytest.mark.usefixtures("new_processes")
 def test_everything_comes_back(tmp_path: Path) -> None:
     given = scene()
     io.write(given, tmp_path / "a.abc")
@@ -134,6 +135,7 @@ def test_missing_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         io.write(scene(), tmp_path / "b.abc")
 
 
+@pytest.mark.usefixtures("new_processes")
 def test_library_that_dies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A damaged archive may crash the library, in a process of its own."""
     (tmp_path / "dying.py").write_text("import os\nos.abort()\n")

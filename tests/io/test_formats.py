@@ -167,7 +167,8 @@ def test_formats_load_only_when_needed() -> None:
     import subprocess
 
     heavy = {"numba", "scipy", "trimesh", "gvpipe.io.gltf", "gvpipe.io.obj", "urllib.request"}
-    code = f"import sys, gvpipe.io.alembic.worker, gvpipe.io.fbx.worker; sys.exit(str({heavy} & set(sys.modules) or ''))"
+    workers = ", ".join(f"gvpipe.io.{name}.worker" for name in ("alembic", "fbx", "usd"))
+    code = f"import sys, {workers}; sys.exit(str({heavy} & set(sys.modules) or ''))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False).stderr.strip() == ""
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import subprocess
 import sys
 import zipfile
 from dataclasses import replace
@@ -16,6 +18,7 @@ from scenes import FACES, assert_same, scene
 from gvpipe import io
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError, OutputError
+from gvpipe.io import library_process
 from gvpipe.sequence import MeshSequence
 
 pytest.importorskip("pxr")
@@ -437,3 +440,89 @@ def test_stages_outside_of_the_folder(tmp_path: Path, arc: str) -> None:
         io.read(tmp_path / "in" / "a.usda")
     (tmp_path / "in" / "c.usda").write_text(head.replace("@../", "@below/"))
     assert io.read(tmp_path / "in" / "c.usda").n_vertices == 3
+
+
+@pytest.mark.usefixtures("new_processes")
+def test_library_that_dies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A damaged file may end the library's process, and no other."""
+    (tmp_path / "dying.py").write_text("import os\nos.abort()\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr("gvpipe.io.usd.process.WORKER", "dying")
+    path = stage(tmp_path, f'def Mesh "m" {{ {TRIANGLE} }}')
+    with pytest.raises(
+        InputError, match=r"a\.usda cannot be read as USD: OpenUSD died of it, or of its limit of memory; export"
+    ):
+        io.read(path)
+
+
+def many_copies(folder: Path, copies: int) -> Path:
+    """A small file that asks for much memory: copies of a mesh of 4,900 vertices."""
+    side = 70
+    points = ", ".join(f"({k % side}, {k // side}, 0)" for k in range(side * side))
+    mesh = f"""
+    class Xform "proto" {{
+        def Mesh "m" {{
+        int[] faceVertexCounts = [3]
+        int[] faceVertexIndices = [0, 1, {side}]
+        point3f[] points = [{points}]
+        }}
+    }}
+    """
+    body = "".join(f'def Xform "c{k}" (instanceable = true; inherits = </proto>) {{}}\n' for k in range(copies))
+    return stage(folder, mesh + body)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such limit")
+def test_memory_follows_from_the_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(library_process, "start_process", start_with_little_memory)
+    path = many_copies(tmp_path, 100)
+    with pytest.raises(InputError, match=r"a\.usda.*(more memory|more numbers than memory|limit of memory).*; export it again"):
+        io.read(path)
+    assert io.read(path, unlimited=True).n_vertices == 490_000
+    (tmp_path / "other.usdc").write_bytes(bytes(40 << 20))  # it might show that
+    assert io.read(path).n_vertices == 490_000
+
+
+def start_with_little_memory(module: str, path: Path) -> subprocess.Popen[bytes]:
+    """A process whose limit is 64 times smaller, so that a test need not fill a gigabyte."""
+    code = (
+        "import runpy\nfrom gvpipe.io import library_process\n"
+        "library_process.LEAST_MEMORY >>= 6\nlibrary_process.MEMORY_PER_BYTE = 10\n"
+        f"runpy.run_module({module!r}, run_name='__main__')"
+    )
+    return subprocess.Popen(
+        [sys.executable, "-c", code, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such limit")
+@pytest.mark.parametrize("count", [1 << 28, 1 << 31])
+def test_array_of_a_length_that_the_file_does_not_have(tmp_path: Path, count: int) -> None:
+    """OpenUSD fills an array before it finds the end of the file: 4 GB for 2 kB, without its limit of memory."""
+    corners = np.concatenate([np.arange(39).reshape(-1, 3) + k for k in range(3)]).astype(np.int32)
+    io.write(MeshSequence(np.random.default_rng(3).random((1, 41, 3)).astype(np.float32), corners, 30), tmp_path / "a.usdc")
+    data = (tmp_path / "a.usdc").read_bytes()
+    length = struct.pack("<Q", corners.size)
+    assert data.count(length) == 1
+    (tmp_path / "a.usdc").write_bytes(data.replace(length, struct.pack("<Q", count)))
+    with pytest.raises(InputError, match=r"a\.usdc cannot be read as USD: ") as caught:
+        io.read(tmp_path / "a.usdc")
+    assert "\n" not in str(caught.value) and str(count) not in str(caught.value)
+
+
+@pytest.mark.usefixtures("new_processes")
+def test_many_files_take_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of many files that are open, the last ones have a process; the others start one when they are asked."""
+    monkeypatch.setattr(library_process, "MOST_RUNNING", 1)
+    started: list[subprocess.Popen[bytes]] = []
+    start = library_process.start_process
+
+    def counted(module: str, path: Path) -> subprocess.Popen[bytes]:
+        started.append(start(module, path))
+        return started[-1]
+
+    monkeypatch.setattr(library_process, "start_process", counted)
+    sequences = [io.read(stage(tmp_path, f'def Mesh "m" {{ {MOVING} }}')) for _ in range(2)]
+    assert [process.poll() is None for process in started] == [False, True]
+    assert [sequence[2][0].tolist() for sequence in sequences] == [[0, 0, 4]] * 2
+    assert sum(process.poll() is None for process in started) == 1

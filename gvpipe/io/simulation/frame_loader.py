@@ -11,7 +11,7 @@ from gvpipe.io.mesh import FrameValues, Mesh
 from gvpipe.io.simulation.cells import Cells
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
 from gvpipe.io.simulation.legacy import load_legacy
-from gvpipe.io.simulation.meshio_files import load_by_meshio
+from gvpipe.io.simulation.meshio_files import MeshioLoader
 from gvpipe.io.simulation.surface import Surface, extract_surface
 from gvpipe.io.simulation.xml_grids import load_xml_grid
 
@@ -64,4 +64,4 @@ def xml_loader() -> SurfaceLoader:
 
 def meshio_loader() -> SurfaceLoader:
     """What loads files that meshio reads."""
-    return SurfaceLoader(load_by_meshio)
+    return SurfaceLoader(MeshioLoader())

@@ -1,28 +1,31 @@
 """Meshes of Gmsh, Ansys, Abaqus, Nastran, Medit, SU2, AVS-UCD, Netgen, FLAC3D, Kratos and Tecplot, by meshio.
 
 meshio's cells have VTK's order of nodes. Its HDF5 formats are left out: links in them may lead to any file.
+It makes tables as long as the largest number of a node, so it runs in a process with a limit of memory.
 
 Source: N. Schlömer, meshio (https://github.com/nschloe/meshio).
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
+import importlib.util
 import re
 import warnings
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gvpipe.arrays import Array, Floats
 from gvpipe.errors import InputError
+from gvpipe.io.library_process import LibraryProcess
 from gvpipe.io.simulation.cells import Cells, equal_cells, join_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 
+WORKER = "gvpipe.io.simulation.meshio_worker"
+DIED = "meshio died of it"
 EXTRA = "it needs meshio; install it with: pip install 'gvpipe[vtk]'"
 TYPES = {
     "vertex": 1, "line": 3, "triangle": 5, "polygon": 7, "quad": 9, "tetra": 10, "hexahedron": 12, "wedge": 13, "pyramid": 14,
@@ -34,22 +37,49 @@ UNMATCHED = "unmatched data", "cannot reshape array of size"
 INCLUDE = re.compile(rb"^\s*\*include", re.IGNORECASE | re.MULTILINE)  # Abaqus: the name of any file
 
 
-def load_by_meshio(path: Path) -> Dataset:
-    """Load a file as one time step.
+class MeshioLoader:
+    """Loads one file after the other as a time step, by meshio in a process of its own (`meshio_worker`)."""
 
-    Raises:
-        InputError: meshio is missing.
-        ValueError: meshio cannot read the file, or a cell has a type that is not known.
-    """
-    try:
-        import meshio
-    except ImportError as exc:
-        raise InputError(f"{path}: {EXTRA}") from exc
+    def __init__(self) -> None:
+        self._process: LibraryProcess | None = None
+
+    def __call__(self, path: Path) -> Dataset:
+        """Load a file.
+
+        Raises:
+            InputError: meshio is missing, or cannot read the file, or a cell has a type that is not known.
+        """
+        if importlib.util.find_spec("meshio") is None:
+            raise InputError(f"{path}: {EXTRA}")
+        if self._process is None:
+            self._process = LibraryProcess(path, WORKER, path.suffix[1:].upper(), DIED)
+        self._process.path = path
+        held: Arrays = self._process.ask("load", str(path.absolute()))
+        return Dataset(
+            lambda: _points(held.points),
+            lambda: _cells(held.cells),
+            {name: DataArray(partial(np.asarray, values)) for name, values in held.point_data.items()},
+            {name: DataArray(_joined(blocks)) for name, blocks in held.cell_data.items()},
+        )
+
+
+class Arrays(NamedTuple):
+    """What meshio reads of a file: points, cells by type, numbers by name (of cells for each type)."""
+
+    points: Array
+    cells: list[tuple[str, Array]]
+    point_data: dict[str, Array]
+    cell_data: dict[str, list[Array]]
+
+
+def read_by_meshio(path: Path) -> Arrays:
+    """Read a file by meshio, in this process; raises `ValueError`."""
+    import meshio
+
     if path.suffix.lower() == ".inp" and INCLUDE.search(path.read_bytes()):
         raise ValueError("it includes other files, which are not followed; write it as one file")
-    said = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
+        with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of NumPy, about how meshio calls it
             mesh: Any = meshio.read(path)
     except ValueError as exc:
@@ -63,11 +93,11 @@ def load_by_meshio(path: Path) -> Dataset:
     strange = sorted({block.type for block in mesh.cells} - set(TYPES))
     if strange:
         raise ValueError(f"it has cells of type {', '.join(strange)}, which are not read")
-    return Dataset(
-        lambda: _points(mesh.points),
-        lambda: _cells(mesh.cells),
-        {name: DataArray(partial(np.asarray, values)) for name, values in mesh.point_data.items()},
-        {name: DataArray(_joined(blocks)) for name, blocks in mesh.cell_data.items()},
+    return Arrays(
+        mesh.points,
+        [(block.type, np.asarray(block.data)) for block in mesh.cells],
+        {name: np.asarray(values) for name, values in mesh.point_data.items()},
+        {name: [np.asarray(each) for each in blocks] for name, blocks in mesh.cell_data.items()},
     )
 
 
@@ -78,12 +108,12 @@ def _points(points: Array) -> Floats:
     return found
 
 
-def _cells(blocks: list[Any]) -> Cells:
-    made = [equal_cells(TYPES[block.type], np.asarray(block.data)) for block in blocks]
+def _cells(blocks: list[tuple[str, Array]]) -> Cells:
+    made = [equal_cells(TYPES[kind], data) for kind, data in blocks]
     if not made:
         raise ValueError("it has no cells")
     return join_cells(made, [0] * len(made))
 
 
-def _joined(blocks: list[Any]) -> Callable[[], Array]:
-    return lambda: np.concatenate([np.asarray(each) for each in blocks])
+def _joined(blocks: list[Array]) -> Callable[[], Array]:
+    return lambda: np.concatenate(blocks)

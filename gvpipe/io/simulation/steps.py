@@ -13,13 +13,13 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from gvpipe.arrays import Array, Float32, Float64, Floats
-from gvpipe.asset.attribute import MAX_COMPONENTS, Attribute
+from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError, TopologyChange
 from gvpipe.forks import ForkLock
 from gvpipe.io.damage import reading
-from gvpipe.io.mesh import FrameValues
+from gvpipe.io.mesh import FrameValues, left_note
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
 from gvpipe.io.simulation.surface import Surface, extract_surface
@@ -162,9 +162,6 @@ def read_steps(steps: Steps, path: Path, options: ReadOptions, notes: tuple[str,
     attributes, fields, left = _split(frames, str(path))
     times = steps.times
     timing = time_steps(None if times is None else times[first:stop], stop - first, options.fps)
-    left_note = (
-        (f"numbers that are not of 1 to {MAX_COMPONENTS} components were left out: {', '.join(left[:5])}",) if left else ()
-    )
     return MeshSequence(
         frames,
         frames.surface.faces,
@@ -172,7 +169,7 @@ def read_steps(steps: Steps, path: Path, options: ReadOptions, notes: tuple[str,
         attributes,
         str(path),
         frames.origin,
-        (*notes, *frames.first.notes, *frames.surface.notes, *timing.notes, *left_note),
+        (*notes, *frames.first.notes, *frames.surface.notes, *timing.notes, *left_note(left)),
         fields,
         block_parts(frames.first, frames.surface),
         frames.surface.polygons,
@@ -185,11 +182,7 @@ def _split(frames: StepFrames, where: str) -> tuple[dict[str, Attribute], dict[s
     attributes, fields, left = {}, {}, []
     for name, read in frames.values.items():
         first = frames.guarded(0, read)
-        if (
-            first.values.ndim > 2
-            or first.values.dtype.kind not in "iuf"
-            or (first.values.shape[1:] or (1,))[0] > MAX_COMPONENTS
-        ):
+        if not first.can_be_held:
             left.append(name)
         elif _is_still(frames, name, first.values):
             attributes[name] = Attribute(first.values, first.domain, first.kind, unit=first.unit, name=f"{where}: {name}")

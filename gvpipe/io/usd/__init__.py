@@ -2,8 +2,3 @@
 
 Source: Pixar, Universal Scene Description 26.11: UsdGeom, UsdSkel, UsdShade (UsdPreviewSurface specification).
 """
-
-from gvpipe.io.usd.reader import read_usd
-from gvpipe.io.usd.writer import write_usd
-
-__all__ = ["read_usd", "write_usd"]

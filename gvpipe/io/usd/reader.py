@@ -12,7 +12,6 @@ from gvpipe.arrays import Float64
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.own_normals import first_normals_note
 from gvpipe.io.scene_fields import join_fields, misfit_note
 from gvpipe.io.scene_frames import SceneFrames
 from gvpipe.io.scene_layers import join_layers
@@ -26,15 +25,16 @@ from gvpipe.io.usd.stage import check_inside, open_stage, stage_times, usd_error
 from gvpipe.sequence import MeshSequence
 
 
-def read_usd(path: Path, options: ReadOptions) -> MeshSequence:
-    """Read the meshes of a USD file, in the stage's units and axes, with the world transforms of its prims.
+def read_stage(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
+    """Read the meshes of a USD file, in the stage's units and axes, with the world transforms of its prims, and whether normals
+    change.
 
     Args:
         path: .usda, .usdc, .usd or .usdz; files that it refers to are read too.
         options: `fps` samples the stage's range at that rate instead of once per time code; `frames` are those that are read.
 
     Raises:
-        InputError: usd-core is missing, the file is damaged or refers to a file that is missing or outside of its folder,
+        InputError: the file is damaged or refers to a file that is missing or outside of its folder,
             it has no mesh, a mesh's topology changes in the frames that are read, a position is not finite.
     """
     stage = open_stage(path)
@@ -42,7 +42,7 @@ def read_usd(path: Path, options: ReadOptions) -> MeshSequence:
         return _read_stage(stage, path, options)
 
 
-def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
+def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
     from pxr import UsdGeom
 
     where = str(path)
@@ -70,18 +70,16 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
     sampled = [sampled_of(found.meshes[number], mesh, float(times[0])) for number, mesh in zip(kept, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times, where)
-    moves = any(_has_moving_normals(motion.prim) for motion in motions)
-    unruled = first_normals_note(attributes, joined.faces, frames) if moves else ()
     misfits = misfit_note("primvars", [*(names for _, names in read), torn])
     drawn, images = materials.drawn()
-    return MeshSequence(
+    sequence = MeshSequence(
         frames,
         joined.faces,
         fps,
         attributes,
         where,
         frames.origin,
-        (*found.notes, *time_notes, *materials.notes(), *layer_notes, *unruled, *misfits),
+        (*found.notes, *time_notes, *materials.notes(), *layer_notes, *misfits),
         fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,
@@ -89,6 +87,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> MeshSequence:
         images=images,
         metadata=_metadata(stage, path, float(times[0])),
     )
+    return sequence, any(_has_moving_normals(motion.prim) for motion in motions)
 
 
 def _read_mesh(

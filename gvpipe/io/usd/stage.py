@@ -19,6 +19,7 @@ from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_frames import between_note, frame_times
 
 EXTRA = "USD files need the package usd-core; install it by: pip install 'gvpipe[usd]'"
+TOO_LARGE = "it asks for more memory than files of its size may take; export it again, or read it with --unlimited"
 SIGNATURES = {  # first bytes by extension; .usd is text or binary
     ".usda": (b"#usda", b"#sdf"),
     ".usdc": (b"PXR-USDC",),
@@ -30,27 +31,30 @@ FASTEST = 120.0  # time codes a second above which codes are a unit of time rath
 SLOWEST = 5.0  # and below which
 
 
-def open_stage(path: Path) -> Any:
-    """Open a stage.
-
-    Raises:
-        InputError: usd-core is missing, the file is none of USD's or damaged, or a file that it refers to is missing.
-    """
+def check_signature(path: Path) -> None:
+    """Raise `InputError` unless a file begins as its extension says, and a package ends as one."""
     try:
-        from pxr import Sdf, Usd
-    except ImportError as exc:
-        raise InputError(f"{path}: {EXTRA}") from exc
-    head = _head(path)
+        with open(path, "rb") as file:
+            head = file.read(16)
+    except OSError as exc:
+        raise InputError(f"{path} cannot be read: {exc.strerror}; check the path") from exc
     if not head.startswith(SIGNATURES[path.suffix.lower()]):
         begins = f"it begins with {head[:8]!r}" if head else "it is empty"
         raise InputError(f"{path} is not a {path.suffix.lower()} file ({begins}); export it again")
     if path.suffix.lower() == ".usdz" and not zipfile.is_zipfile(path):
         raise InputError(f"{path} is cut short or damaged; get it again from its source")
+
+
+def open_stage(path: Path) -> Any:
+    """Open a stage.
+
+    Raises:
+        InputError: it is damaged, or a file that it refers to is missing.
+    """
+    from pxr import Usd
+
     with usd_errors(path):
-        is_known = Sdf.Layer.Find(str(path)) is not None  # of a sequence that is in use
         stage = Usd.Stage.Open(str(path))
-        if is_known:
-            stage.Reload()  # what has changed on the disk since
         for error in stage.GetCompositionErrors():
             if type(error).__name__ in MISSING:
                 named = re.search(r"@(.*?)@", str(error))
@@ -69,7 +73,10 @@ def usd_errors(path: Path) -> Iterator[None]:
     silencer = UsdUtils.CoalescingDiagnosticDelegate()
     try:
         with reading(path, "USD"):
-            yield
+            try:
+                yield
+            except MemoryError as exc:
+                raise ValueError(TOO_LARGE) from exc
     finally:
         silencer.TakeUncoalescedDiagnostics()
         del silencer
@@ -131,11 +138,3 @@ def _step(stage: Any, codes: float, samples: Float64) -> float:
     if SLOWEST <= codes <= FASTEST or len(samples) < 2:
         return 1.0
     return max(float(np.diff(samples).min()), codes / FASTEST)
-
-
-def _head(path: Path) -> bytes:
-    try:
-        with open(path, "rb") as file:
-            return file.read(16)
-    except OSError as exc:
-        raise InputError(f"{path} cannot be read: {exc.strerror}; check the path") from exc

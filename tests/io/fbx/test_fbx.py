@@ -30,6 +30,7 @@ def test_a_moving_node(tmp_path: Path) -> None:
     assert len(gvpipe.io.read(tmp_path / "a.fbx", fps=12)) == 13
 
 
+@pytest.mark.usefixtures("new_processes")
 def test_takes_by_name(tmp_path: Path) -> None:
     (tmp_path / "a.fbx").write_text(FBX)
     assert len(gvpipe.io.read(tmp_path / "a.fbx", clip="Lift")) == 25

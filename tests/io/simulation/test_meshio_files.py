@@ -49,6 +49,14 @@ def test_frames_and_fields(tmp_path: Path) -> None:
     assert read.attributes["load"].domain == "triangle" and np.unique(load).tolist() == [3.0, 5.0]
 
 
+def test_numbers_of_many_components_are_left_out(tmp_path: Path) -> None:
+    mesh = meshio.Mesh(POINTS, [("hexahedron", HEXAHEDRA)], {"heat": POINTS[:, 0], "wide": np.ones((12, 65))})
+    meshio.write(tmp_path / "a.avs", mesh)
+    read = gvpipe.io.read(tmp_path / "a.avs")
+    assert "heat" in read.attributes and "wide" not in read.attributes
+    assert "numbers that are not of 1 to 64 components were left out: wide" in read.notes
+
+
 @pytest.mark.parametrize("data", [b"hello\n", b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 9 1 9\n"])
 @pytest.mark.parametrize("suffix", ["msh", "inp", "su2", "nas", "vol"])
 def test_damage(tmp_path: Path, suffix: str, data: bytes, capsys: pytest.CaptureFixture[str]) -> None:
@@ -65,6 +73,17 @@ def test_text_that_meshio_may_not_read(tmp_path: Path) -> None:
         assert len(gvpipe.io.read(tmp_path / "a.msh").faces) == 20
     except InputError as exc:
         assert "save it as binary" in str(exc)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such limit")
+def test_a_node_of_a_large_number(tmp_path: Path) -> None:
+    """meshio makes a table as long as the largest number: 2 GB for 1 kB, without its limit of memory."""
+    meshio.write(tmp_path / "a.msh", meshio.Mesh(POINTS, [("hexahedron", HEXAHEDRA)]), file_format="gmsh")
+    data, numbers = (tmp_path / "a.msh").read_bytes(), np.arange(1, 13)
+    assert data.count(numbers.tobytes()) == 1
+    (tmp_path / "a.msh").write_bytes(data.replace(numbers.tobytes(), np.append(numbers[:-1], 1 << 28).tobytes()))
+    with pytest.raises(InputError, match=r"a\.msh cannot be read as MSH: Unable to allocate 2\.00 GiB"):
+        gvpipe.io.read(tmp_path / "a.msh")
 
 
 def test_includes_are_not_followed(tmp_path: Path) -> None:

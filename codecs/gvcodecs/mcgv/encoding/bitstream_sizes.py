@@ -13,9 +13,9 @@ POSTER = 1000  # bytes that stand in place of pictures, about
 FALL = 0.2  # bytes of one blend go with the error to the power of about minus this
 
 
-def cost(trial: StepTrial) -> float:
-    """Bytes, as if at equal error."""
-    return count_bytes(trial.bitstream) * math.pow(trial.error, FALL)
+def cost(trial: StepTrial, fall: float = FALL) -> float:
+    """Bytes, as if at equal error: they go with the error to the power of minus ``fall``."""
+    return count_bytes(trial.bitstream) * math.pow(trial.error, fall)
 
 
 def count_bytes(bitstream: Bitstream) -> int:

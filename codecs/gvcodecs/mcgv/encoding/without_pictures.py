@@ -27,6 +27,7 @@ REBASED = 1.2  # times the lattice step of a base frame, another one is tried
 PUBLISHED = 0.43  # lattice steps, root mean square, that the published mode's base frame leaves at least
 MAX_TRANSFORMS = 0.25  # part of the bytes that transforms may take for a finer error to be tried: rigid motion takes less
 FINE_LATTICES = 1.05, 1.2, 1.35, 1.5  # times that error, lattice steps of base frames: the smallest mesh is taken
+FINE_WORTH = 0.3  # bytes may grow by the quotient of the errors to this power: motion that is not rigid costs 0.5 and more
 FINE_BAND = 0.88, 1.0  # of that error, which is close enough
 
 
@@ -77,10 +78,11 @@ def refine(trials: StepTrials, trial: StepTrial) -> StepTrial:
     step = trial.step * (fine_error / trial.error) ** (1 / SLOPE)
     bases = [rebase(job, candidate, step, part * fine_error) for part in FINE_LATTICES]
     finer = StepTrials(job, min(bases, key=lambda based: len(based.start.coded.mesh)))
-    if cost(finer(step)) > cost(trial):
+    most = cost(trial, FINE_WORTH)
+    if cost(finer(step), FINE_WORTH) > most:
         return trial
     fine = find_step(finer, step, fine_error, FINE_BAND, SLOPE, MAX_ROUNDS)
-    return fine if fine.error <= fine_error and cost(fine) <= cost(trial) else trial
+    return fine if fine.error <= fine_error and cost(fine, FINE_WORTH) <= most else trial
 
 
 def _are_pictures_dear(trials: StepTrials, step: float, target_error: float) -> bool:

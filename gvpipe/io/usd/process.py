@@ -1,0 +1,24 @@
+"""A USD file, read in a process of its own: for a damaged file OpenUSD may take any memory, and ends the process."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+from gvpipe.errors import InputError
+from gvpipe.io.library_process import LibraryProcess
+from gvpipe.io.options import ReadOptions
+from gvpipe.io.scene_process import read_scene
+from gvpipe.io.usd.stage import EXTRA, check_signature
+from gvpipe.sequence import MeshSequence
+
+WORKER = "gvpipe.io.usd.worker"
+DIED = "OpenUSD died of it, or of its limit of memory; export it again, or read it with --unlimited"
+
+
+def read_usd(path: Path, options: ReadOptions) -> MeshSequence:
+    """Read a file as `gvpipe.io.usd.reader.read_stage` does, which says what is raised."""
+    if importlib.util.find_spec("pxr") is None:
+        raise InputError(f"{path}: {EXTRA}")
+    check_signature(path)
+    return read_scene(LibraryProcess(path, WORKER, "USD", DIED), str(path), options)

@@ -1,0 +1,29 @@
+"""The process that runs OpenUSD, with a limit of memory that follows from the size of what it reads."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from gvpipe.io.library_process import bytes_below, limit_memory
+from gvpipe.io.options import ReadOptions
+from gvpipe.io.scene_worker import serve_scene
+from gvpipe.io.usd.reader import read_stage
+from gvpipe.io.usd.stage import SIGNATURES
+from gvpipe.sequence import MeshSequence
+
+THREADS = 4  # of OpenUSD: each one's stack counts as memory
+
+
+def read_limited(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
+    """Read as `read_stage` does; files beside the file count to its size, as it may refer to them."""
+    os.environ.setdefault("PXR_WORK_THREAD_LIMIT", str(THREADS))
+    import pxr.UsdSkel  # noqa: F401  libraries of code do not count
+
+    if not options.unlimited:
+        limit_memory(max(path.stat().st_size, bytes_below(path.absolute().parent, tuple(SIGNATURES))))
+    return read_stage(path, options)
+
+
+if __name__ == "__main__":
+    serve_scene(read_limited)
