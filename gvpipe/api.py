@@ -19,7 +19,7 @@ from gvpipe.budget import Budget
 from gvpipe.codec import Codec, Encoded, Progress
 from gvpipe.container.bitstream import PLAIN, STREAM, Bitstream
 from gvpipe.container.mp4 import bytes_by_part, read_file, write_file
-from gvpipe.container.sources import is_url
+from gvpipe.container.sources import check_target, is_url
 from gvpipe.errors import InputError, OutputError, OverBudget, SettingError, in_file
 from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.player import Player
@@ -206,6 +206,8 @@ def read(
         return read_sequence(one, fps, clip, mesh, frames, unlimited)
     if clip is not None:
         raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
+    if mesh is not None:
+        raise InputError(f"{one} has triangles of its own; mesh={os.fspath(mesh)!r} is for point caches")
     sequence = Player(one, unlimited=unlimited).sequence()
     if frames is not None:
         sequence = sequence.part(*frame_range(sequence, *frames))
@@ -412,6 +414,7 @@ def render(
     clip: str | None = None,
     mesh: StrPath | None = None,
     frames: tuple[int, int | None] | None = None,
+    fps: float | None = None,
     progress: Progress | None = None,
     unlimited: bool = False,
 ) -> list[str]:
@@ -438,7 +441,7 @@ def render(
         field_range: the values at the ends of the colours; ``"symmetric"``: about 0. By default the range of the frames drawn.
         parts: the name of the part to paint, or several; none: all.
         plain: paint the shape alone, without materials and colours.
-        clip, mesh, frames: of the source, as for `read`.
+        clip, mesh, frames, fps: of the source, as for `read`.
         progress: called with ``"render"`` and the part that is done.
         unlimited: as for `read`.
 
@@ -449,6 +452,7 @@ def render(
     """
     from gvpipe.rendering.films import PictureOptions, check_output, write_pictures
 
+    check_target(path)
     target = Path(path)
     pixels = (size, size) if isinstance(size, int) else size
     options = PictureOptions(
@@ -474,9 +478,10 @@ def render(
     reference = error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of, unlimited=unlimited)
     if isinstance(source, MeshSequence):
         sequence = source if frames is None else source.part(*frame_range(source, *frames))
+        sequence = sequence if fps is None else sequence.with_fps(fps)
     else:
-        sequence = read(source, None, clip, mesh, frames, unlimited=unlimited)
-    return list(write_pictures(sequence, target, options, reference, progress))
+        sequence = read(source, fps, clip, mesh, frames, unlimited=unlimited)
+    return list(dict.fromkeys([*sequence.notes, *write_pictures(sequence, target, options, reference, progress)]))
 
 
 def info(path: StrPath, *, unlimited: bool = False) -> Info:
@@ -643,6 +648,7 @@ def _is_among(path: StrPath, source: MeshSequence | Source) -> bool:
 def _check_output(given: StrPath) -> None:
     """Refuse an output that cannot be written before the work, not after it."""
     path = Path(check_path(given, "gvpipe.encode's path"))
+    check_target(given)
     if path.suffix.lower() not in VIDEO_SUFFIXES:
         raise InputError(f"{path}: the output is an MP4 file; end its name in .mp4")
     if os.path.isdir(path):  # unlike Path.is_dir, it takes any name, too long ones as well

@@ -153,7 +153,9 @@ class Player:
         """
         if lod == 0:
             return self.sequence()
-        if not isinstance(self._reader, LevelReader) or not 0 < lod < len(self.levels):
+        if not isinstance(self._reader, LevelReader):
+            raise InputError(f"{self.path}: no level of detail {lod}, only 0; files of codec pca have coarser ones")
+        if not 0 < lod < len(self.levels):
             raise InputError(f"{self.path}: no level of detail {lod}; there are levels 0..{len(self.levels) - 1}")
         with in_file(self.path):
             faces, (points, kept) = self._reader.level_faces(lod), self._reader.level_points(lod)

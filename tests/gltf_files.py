@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from gvpipe.io.gltf.glb import Glb
+
 COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], np.float32)  # a square
@@ -137,3 +139,22 @@ def take_apart(data: bytes) -> tuple[dict[str, Any], bytes]:
     """JSON and binary chunk of a file."""
     (length,) = struct.unpack("<I", data[12:16])
     return json.loads(data[20 : 20 + length]), data[28 + length :]
+
+
+def two_clips(path: Path) -> None:
+    """One triangle, whose node has two animations of different lengths."""
+    glb = Glb()
+    positions = glb.array(np.eye(3, dtype=np.float32), bounds=True)
+    glb.append("meshes", {"primitives": [{"attributes": {"POSITION": positions}}]})
+    glb.append("nodes", {"mesh": 0})
+    glb.append("scenes", {"nodes": [0]})
+    for name, seconds in (("Walk", 1), ("Run", 2)):
+        times = glb.array(np.array([[0], [seconds]], np.float32), bounds=True)
+        places = glb.array(np.array([[0, 0, 0], [0, 1, 0]], np.float32))
+        sampler = {"input": times, "output": places}
+        glb.append(
+            "animations",
+            {"name": name, "samplers": [sampler], "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]},
+        )
+    path.write_bytes(glb.data())
+    glb.close()

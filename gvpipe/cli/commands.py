@@ -13,7 +13,9 @@ import os
 import signal
 import sys
 import traceback
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -23,10 +25,11 @@ from gvpipe.cli.console import Output, is_verbose, output_options, print_options
 from gvpipe.cli.conversion import convert
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.cli.process import Ended, ending_by_exception, replace_closed_streams
-from gvpipe.errors import GvpipeError
+from gvpipe.errors import GvpipeError, TopologyChange
 
 if TYPE_CHECKING:
     from gvpipe.api import Report
+    from gvpipe.sequence import MeshSequence
     from gvpipe.web import ExportReport
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
@@ -161,6 +164,7 @@ def encode(
     """
     from gvpipe import api
     from gvpipe.cli.choices import parse_frames
+    from gvpipe.cli.process import give_back_large_arrays
     from gvpipe.cli.splitting import write_runs
     from gvpipe.rate_control.purposes import candidates
     from gvpipe.registry import codec_class
@@ -186,6 +190,7 @@ def encode(
         lambda name, own: codec_class(name).from_texts({**{key: str(value) for key, value in own.items()}, **settings}),
         frozenset(settings),
     )
+    give_back_large_arrays()
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
         given: dict[str, Any] = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames)}
@@ -358,20 +363,38 @@ def _source_info(source: str, path: str, given: tuple[str | None, str | None, st
 @click.argument("reference", metavar="REFERENCE")
 @click.argument("distorted", metavar="DISTORTED")
 @click.option("--clip", metavar="NAME", help="The animation of REFERENCE, of a file that has several. [default: the first]")
+@click.option("--other-clip", metavar="NAME", help="The same of DISTORTED.")
+@click.option("--mesh", metavar="FILE", help="The triangles of point caches (.pc2, .mdd, .npy), of either side.")
+@click.option("--frames", metavar="A:B", help="Only frames A to B - 1, of DISTORTED too unless it holds just as many.")
 @click.option("--fps", type=float, help="Frames per second at which REFERENCE is sampled.")
 @unlimited_option
 @output_options
-def compare(reference: str, distorted: str, clip: str | None, fps: float | None, unlimited: bool, out: Output) -> None:
+def compare(
+    reference: str,
+    distorted: str,
+    clip: str | None,
+    other_clip: str | None,
+    mesh: str | None,
+    frames: str | None,
+    fps: float | None,
+    unlimited: bool,
+    out: Output,
+) -> None:
     """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos, one may be - for standard input."""
     from gvpipe import api
+    from gvpipe.cli.choices import parse_frames
     from gvpipe.metrics import comparison
 
     if reference == distorted == PIPE:
         raise click.UsageError("both are -, and there is one standard input", click.get_current_context())
+    span = parse_frames(frames)
+    its_mesh, other_mesh = _meshes((reference, distorted), mesh)
     with source_path(reference) as one, source_path(distorted) as other, out.progress() as progress:
+        given = api.read(one, fps, clip, its_mesh, span, unlimited=unlimited)
+        read_other = partial(api.read, other, None, other_clip, other_mesh, unlimited=unlimited)
         result = comparison.compare(
-            api.read(one, fps, clip, unlimited=unlimited),
-            api.read(other, unlimited=unlimited),
+            given,
+            read_other() if span is None else _same_frames(read_other, span, len(given)),
             lambda done, of: progress("compare", done / of) if progress else None,
         )
     values = result.to_json()
@@ -384,6 +407,25 @@ def compare(reference: str, distorted: str, clip: str | None, fps: float | None,
             largest, mean = error["max"], error["mean"]
             measured = "one side lacks it" if largest is None else f"largest error {largest:.4g}, mean {mean:.4g}"
             out.text(f"{kind} {name}: {measured}")
+
+
+def _meshes(paths: tuple[str, str], mesh: str | None) -> list[str | None]:
+    """The mesh of either side: that of sides that are point caches; raises `click.UsageError` if none is."""
+    from gvpipe.io.scene_formats import POINT_CACHES
+
+    needs = [path.lower().endswith(POINT_CACHES) for path in paths]
+    if mesh is not None and not any(needs):
+        raise click.UsageError(f"--mesh is for {', '.join(POINT_CACHES)}; neither side is one", click.get_current_context())
+    return [mesh if need else None for need in needs]
+
+
+def _same_frames(read: Callable[..., MeshSequence], span: tuple[int, int | None], count: int) -> MeshSequence:
+    """What `read` returns if it has ``count`` frames, else a span of it."""
+    try:
+        whole = read()
+    except TopologyChange:  # not in the span, maybe
+        return read(frames=span)
+    return whole if len(whole) == count else read(frames=span)
 
 
 cli.add_command(convert)
@@ -465,6 +507,7 @@ def play(source: str, up: str | None, unlimited: bool, out: Output) -> None:
 @click.option("--clip", metavar="NAME", help="The animation to paint, of a file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
+@click.option("--fps", type=float, help="Frames per second, instead of the input's; scenes are sampled at it.")
 @unlimited_option
 @output_options
 def render(source: str, target: str, size: str, limits: str | None, frames: str | None, out: Output, **options: Any) -> None:

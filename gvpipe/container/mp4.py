@@ -29,7 +29,7 @@ from gvpipe.container.bitstream import VERSION, Bitstream, pack_header, pack_pay
 from gvpipe.container.boxes import BOX, LARGE, uuid_head
 from gvpipe.container.sample_tables import check_tables
 from gvpipe.container.segments import SegmentParts
-from gvpipe.container.sources import FileSource, is_url
+from gvpipe.container.sources import DOWNLOAD_FIRST, FileSource, check_source, is_url
 from gvpipe.container.stream_layout import VERSION as STREAM_VERSION
 from gvpipe.container.stream_layout import find_index, pack_stream, read_stream
 from gvpipe.container.track import TAG_PREFIX, inspect, remux, remux_fragments
@@ -92,6 +92,7 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False) -> Bitstrea
     """
     if is_url(path):
         return _read_url(str(path), unlimited)
+    check_source(path)
     path = Path(path)
     try:
         source = FileSource(path)
@@ -157,6 +158,8 @@ def _read_url(url: str, unlimited: bool) -> Bitstream:
             return read_stream(source, index, budget)
         data = source.read_all()
         return _read(io.BytesIO(data), len(data), budget)
+    except NotGeometryVideo as exc:
+        raise NotGeometryVideo(f"{url}: {str(exc).replace(ENCODE_FIRST, DOWNLOAD_FIRST)}") from exc
     except FormatError as exc:
         raise type(exc)(f"{url}: {exc}") from exc
 

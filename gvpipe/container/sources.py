@@ -3,16 +3,43 @@
 from __future__ import annotations
 
 import os
+import re
 from typing import Protocol
 
-from gvpipe.errors import FormatError, InputError, TruncatedFile
+from gvpipe.errors import FormatError, InputError, OutputError, TruncatedFile
 
 SCHEMES = ("http://", "https://")
+ADDRESS = re.compile(r"([a-z][a-z0-9+.-]+:)/", re.IGNORECASE)  # two letters or more: C:/ is a drive
+DOWNLOAD_FIRST = "mesh sequences are read from disk; download it first"
 
 
 def is_url(path: object) -> bool:
     """Whether a path is the address of a file on a web server."""
     return isinstance(path, str) and path.lower().startswith(SCHEMES)
+
+
+def check_source(path: str | os.PathLike[str]) -> None:
+    """Raise `InputError` for an empty path, and for an address that is not read, or not there."""
+    if not os.fspath(path):
+        raise InputError("the input's name is empty; give a file or a folder")
+    if is_url(path):
+        raise InputError(f"{path} is an address; {DOWNLOAD_FIRST}")
+    if _is_address(path):
+        raise InputError(f"{path} is an address; give a path on disk, or http:// or https:// of a geometry video")
+
+
+def check_target(path: str | os.PathLike[str]) -> None:
+    """Raise `OutputError` for an output whose name is empty or an address."""
+    if not os.fspath(path):
+        raise OutputError("the output's name is empty; give a file")
+    if _is_address(path):
+        raise OutputError(f"cannot write {os.fspath(path)}: it is an address; write a file on disk, then upload it")
+
+
+def _is_address(path: str | os.PathLike[str]) -> bool:
+    """Whether a path begins as addresses do, and not with a folder that is there."""
+    found = ADDRESS.match(os.fspath(path))
+    return found is not None and not os.path.lexists(found[1])
 
 
 class Source(Protocol):

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from gvpipe.container.sources import check_source, check_target
 from gvpipe.errors import InputError
 from gvpipe.io.cut_pictures import cut_notes
 from gvpipe.io.damage import check_file, reading
@@ -19,7 +20,7 @@ from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames import read_frames
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.pattern import match_pattern
-from gvpipe.io.scene_formats import HAVE_CLIPS, OPENVAT, SCENES, SIMULATIONS, WRITERS, scene_readers
+from gvpipe.io.scene_formats import HAVE_CLIPS, OPENVAT, POINT_CACHES, SCENES, SIMULATIONS, WRITERS, scene_readers
 from gvpipe.sequence import MeshSequence
 
 __all__ = ["READERS", "WRITERS", "read", "write"]
@@ -59,11 +60,17 @@ def read(
 def _read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], options: ReadOptions) -> MeshSequence:
     if not isinstance(path, str | os.PathLike):
         _refuse_clip(options.clip, "a list of files")
+        _refuse_mesh(options.mesh, "a list of files")
+        for file in path:
+            check_source(file)
         return read_frames([os.fspath(file) for file in path], options.fps, options.frames)
     path = os.fspath(path)
+    check_source(path)
     suffix = Path(path).suffix.lower()
     if suffix not in HAVE_CLIPS or not os.path.isfile(path):
         _refuse_clip(options.clip, path)
+    if suffix not in POINT_CACHES:
+        _refuse_mesh(options.mesh, path)
     if suffix == OPENVAT:
         raise InputError(f"{path}: vertex animation textures are written, not read; give what they were made of")
     reader = READERS.get(suffix)
@@ -94,6 +101,7 @@ def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) 
         OutputError: a file cannot be written; nothing half-written is left.
     """
     path = os.fspath(path)
+    check_target(path)
     suffix = Path(path).suffix.lower()
     writer = WRITERS.get(suffix)
     # .glb may be a frame, too: of a pattern, or of a sequence of one
@@ -112,3 +120,8 @@ def _span(sequence: MeshSequence, frames: tuple[int, int | None] | None) -> Mesh
 def _refuse_clip(clip: str | None, name: str) -> None:
     if clip is not None:
         raise InputError(f"{name} has no clips; clip={clip!r} is for a single {' or '.join(HAVE_CLIPS)}")
+
+
+def _refuse_mesh(mesh: str | os.PathLike[str] | None, name: str) -> None:
+    if mesh is not None:
+        raise InputError(f"{name} has triangles of its own; mesh={os.fspath(mesh)!r} is for {', '.join(POINT_CACHES)} (--mesh)")

@@ -11,6 +11,7 @@ from gvpipe.atomic import output_error, unnamed_path
 from gvpipe.errors import InputError
 from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.pattern import match_pattern
+from gvpipe.io.scene_formats import WRITERS
 from gvpipe.sequence import CHUNK_BYTES, MeshSequence
 
 DEFAULT_PATTERN = "%04d.obj"
@@ -38,8 +39,8 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> tuple[str
     entry = FRAME_FORMATS.get(target.suffix.lower())
     if entry is None or entry.encoder is None:
         raise InputError(
-            f"{path}: frames cannot be written as {target.suffix or 'a file without extension'}; give a folder that "
-            f"ends in '/', or a name with %04d and one of {', '.join(writable)}"
+            f"{path} cannot be written as {target.suffix or 'a file without extension'}; give a folder that ends in '/', "
+            f"a name with %04d and one of {', '.join(writable)}, or a name that ends in one of {', '.join(WRITERS)}"
         )
     pattern = match_pattern(path)
     if pattern is None and sequence.n_frames > 1:

@@ -25,8 +25,9 @@ SIMULATIONS: dict[str, SceneReader] = {
     **dict.fromkeys((".case", ".encas"), late("simulation.ensight", "read_ensight")),
 }
 OPENVAT = ".openvat"
+POINT_CACHES = (".pc2", ".mdd", ".npy")
 HAVE_CLIPS = (*GLTF, ".fbx")
-SCENE_SUFFIXES = (".npz", *SCENES, ".fbx", *SIMULATIONS, ".pc2", ".mdd", ".npy")  # that are no frames
+SCENE_SUFFIXES = (".npz", *SCENES, ".fbx", *SIMULATIONS, *POINT_CACHES)  # that are no frames
 
 WRITERS: dict[str, SceneWriter] = {
     ".npz": late("npz", "write_npz"),

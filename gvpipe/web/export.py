@@ -23,7 +23,7 @@ from gvpipe.atomic import unnamed_path
 from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import file_bytes
-from gvpipe.container.sources import is_url
+from gvpipe.container.sources import check_target, is_url
 from gvpipe.errors import InputError, OutputError
 from gvpipe.player import Player
 from gvpipe.quality_scale import error_of, quality_of
@@ -92,6 +92,7 @@ def export_html(
         FormatError: not a geometry video, or a damaged one.
         OutputError: the page cannot be written; no part of it is left.
     """
+    check_target(target)
     target = Path(target)
     if target.suffix.lower() not in SUFFIXES:
         raise InputError(f"{target}: the output is a web page; end its name in .html")

@@ -7,12 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from asset_scene import scene
+from gltf_files import assemble, take_apart, two_clips
 
 import gvpipe
-from gvpipe.io.gltf.glb import Glb
 from gvpipe.sequence import MeshSequence
 
 Run = Callable[..., Any]
@@ -50,25 +49,6 @@ def test_frame_files(run: Run, sequence: MeshSequence, tmp_path: Path, source: s
     assert ended.err.startswith("Note: ") and values["notes"] == [ended.err[len("Note: ") :].strip()]
 
 
-def two_clips(path: Path) -> None:
-    """One triangle, whose node has two animations of different lengths."""
-    glb = Glb()
-    positions = glb.array(np.eye(3, dtype=np.float32), bounds=True)
-    glb.append("meshes", {"primitives": [{"attributes": {"POSITION": positions}}]})
-    glb.append("nodes", {"mesh": 0})
-    glb.append("scenes", {"nodes": [0]})
-    for name, seconds in (("Walk", 1), ("Run", 2)):
-        times = glb.array(np.array([[0], [seconds]], np.float32), bounds=True)
-        places = glb.array(np.array([[0, 0, 0], [0, 1, 0]], np.float32))
-        sampler = {"input": times, "output": places}
-        glb.append(
-            "animations",
-            {"name": name, "samplers": [sampler], "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]},
-        )
-    path.write_bytes(glb.data())
-    glb.close()
-
-
 def test_clips_of_a_gltf_file(run: Run, tmp_path: Path) -> None:
     two_clips(tmp_path / "a.glb")
     values = json.loads(run("info", tmp_path / "a.glb", "--json").out)
@@ -78,6 +58,15 @@ def test_clips_of_a_gltf_file(run: Run, tmp_path: Path) -> None:
     assert "time: 0..1 s\nclips: Walk (0..1 s), Run (0..2 s)\n" in run("info", tmp_path / "a.glb").out
     ended = run("info", tmp_path / "a.glb", "--clip", "Rum")
     assert ended.status == 1 and "there are: 'Walk', 'Run'" in ended.err and ended.err.count("\n") == 1
+
+
+def test_scenes_of_a_gltf_file(run: Run, tmp_path: Path) -> None:
+    two_clips(tmp_path / "a.glb")
+    tree, binary = take_apart((tmp_path / "a.glb").read_bytes())
+    tree |= {"nodes": [*tree["nodes"], {"mesh": 0}, {"mesh": 0}], "scenes": [{"nodes": [1, 2]}, {"nodes": [0]}], "scene": 1}
+    (tmp_path / "b.glb").write_bytes(assemble(tree, binary))
+    ended = run("info", tmp_path / "b.glb")
+    assert "3 vertices" in ended.out and "Note: it has 2 scenes; number 1, which it shows, was read alone\n" in ended.err
 
 
 def test_a_point_cache_needs_its_mesh(run: Run, sequence: MeshSequence, tmp_path: Path) -> None:
@@ -105,7 +94,11 @@ def test_some_frames_where_the_topology_changes(run: Run, sequence: MeshSequence
 
 def test_a_clip_is_painted(run: Run, tmp_path: Path) -> None:
     two_clips(tmp_path / "a.glb")
+    ended = run("render", tmp_path / "a.glb", tmp_path / "a.png", "--frame", 30, "--size", 32)
+    assert ended.status == 0 and "clip 'Walk' was read; others of the file: Run (clip, --clip)" in ended.err
     assert run("render", tmp_path / "a.glb", tmp_path / "a.png", "--clip", "Run", "--frame", 60, "--size", 32).status == 0
+    assert run("render", tmp_path / "a.glb", tmp_path / "a.png", "--fps", 4, "--frame", 4, "--size", 32).status == 0
+    assert run("render", tmp_path / "a.glb", tmp_path / "a.png", "--fps", 4, "--frame", 5, "--size", 32).status == 1
     ended = run("render", tmp_path / "a.glb", tmp_path / "a.png", "--clip", "Rum")
     assert ended.status == 1 and "there are: 'Walk', 'Run'" in ended.err
 

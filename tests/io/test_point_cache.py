@@ -72,6 +72,8 @@ def test_no_mesh_and_another_mesh(tmp_path: Path, suffix: str) -> None:
     io.write(MeshSequence(np.zeros((1, 4, 3)), [[0, 1, 2]]), tmp_path / "other.npz")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="has 9 vertices, its mesh .*other.npz has 4"):
         io.read(tmp_path / f"a{suffix}", mesh=tmp_path / "other.npz")
+    with pytest.raises(InputError, match="other.npz has triangles of its own; mesh='a.obj' is for .pc2, .mdd, .npy"):
+        io.read(tmp_path / "other.npz", mesh="a.obj")
 
 
 HEAD = struct.Struct("<12siiffi")

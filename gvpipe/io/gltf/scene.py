@@ -176,4 +176,7 @@ def _notes(document: Document, shown: list[Shown]) -> tuple[str, ...]:
     lines = notes.left_out(sum(each.mesh.n_others for each in shown))
     if instanced:
         lines += (f"{len(instanced)} of its nodes repeat their mesh by {INSTANCING}; it was read once each",)
+    n_scenes = len(document.items("scenes"))
+    if n_scenes > 1:
+        lines += (f"it has {n_scenes} scenes; number {document.tree.get('scene', 0)}, which it shows, was read alone",)
     return lines

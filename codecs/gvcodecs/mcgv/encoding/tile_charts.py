@@ -13,8 +13,12 @@ PART = 250  # points of a part by motion that charts refine: xatlas takes more t
 
 
 def motions_of(job: Job, start: Start) -> Motions:
-    """The points' motions over all frames."""
-    return job.memo(f"motions {start.key}", lambda: Motions(start.sequence, start.base, start.points.neighbours))
+    """The points' motions over all frames; those of the last start alone are kept."""
+    kept = job.memo("motions", dict[str, Motions])
+    if start.key not in kept:
+        kept.clear()  # first: of 10,000 points they take 50 MB
+        kept[start.key] = Motions(start.sequence, start.base, start.points.neighbours)
+    return kept[start.key]
 
 
 def charts_of(job: Job, start: Start) -> Int64:

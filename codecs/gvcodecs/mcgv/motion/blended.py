@@ -39,14 +39,19 @@ def code_blended(start: Start, fitted: Fitted, report: Progress) -> CodedMotion:
     coded = {"weights": encode_weights(fitted.weights, causal_neighbours(start.points.neighbours))}
     segments: list[Trajectories] = []
     for s, (begin, end) in enumerate(pairwise(bounds)):
-        transforms = [fit.fit(_columns(block - base)) for _, block in start.sequence.chunks(begin, end)]
-        coded[f"transforms.{s}"], decoded = encode_trajectories(np.hstack(transforms), start.step)
+        # column by column, as solvers give them: the order decides the last bits of products
+        transforms = np.empty((4 * fitted.n_clusters, 3 * (end - begin)), order="F")
+        for first, block in start.sequence.chunks(begin, end):
+            at = 3 * (first - begin)
+            transforms[:, at : at + 3 * len(block)] = fit.fit(_columns(block - base))
+        coded[f"transforms.{s}"], decoded = encode_trajectories(transforms, start.step)
         segments.append(decoded)
         report("transforms", (s + 1) / (len(bounds) - 1))
+    matrix = fit.matrix  # the factors of its normal equations are needed no more
 
     def predict(first: int, stop: int) -> Float64:
         s = locate(bounds, first)
-        moved = multiply(fit.matrix, segments[s].rows(first - bounds[s], stop - bounds[s]))  # (P, 3n)
+        moved = multiply(matrix, segments[s].rows(first - bounds[s], stop - bounds[s]))  # (P, 3n)
         return np.asarray(base + moved.reshape(len(moved), stop - first, 3).swapaxes(0, 1))
 
     return CodedMotion(fitted.n_clusters, start.step, coded, predict)
