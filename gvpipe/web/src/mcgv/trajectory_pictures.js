@@ -22,14 +22,13 @@ export function withPictures(source, payload) {
   const firsts = counts.map((_, s) => counts.slice(0, s).reduce((a, b) => a + b, 0));
   const size = [header.width, PLANES * header.height];
   const pixels = size[0] * size[1];
-  const samples = Uint32Array.from({ length: pixels }, (_, pixel) => pixel);
   const all = firsts.at(-1) + counts.at(-1);
   let pictures = null; // a promise
   let turn = Promise.resolve(); // one segment after the other
 
   async function decode(s) {
     payload.budget.ask(`pictures of segment ${s}`, pixels * counts[s]);
-    pictures ??= open(source, payload.header, { size, samples, profile: header.profile }, all);
+    pictures ??= open(source, payload.header, size, header.profile, all);
     const decoder = await pictures;
     const levels = new Uint8Array(pixels * counts[s]);
     for (let i = 0; i < counts[s]; i++) {
@@ -52,8 +51,9 @@ export function withPictures(source, payload) {
   return { header: payload.header, sections: new Map(names.map((name) => [name, null])), budget: payload.budget, section, close };
 }
 
-function open(source, { fps, container }, planes, count) {
+function open(source, { fps, container }, size, profile, count) {
   const repeated = new RepeatedFrames(count);
+  const planes = { size, samples: Uint32Array.from({ length: size[0] * size[1] }, (_, pixel) => pixel), profile };
   if (source instanceof Uint8Array) return openPictures(source, fps, repeated, planes, container.track_crc32);
   return DecodedPictures.inParts(source, fps, repeated, planes, () => Promise.resolve());
 }
