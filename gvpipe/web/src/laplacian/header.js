@@ -13,12 +13,10 @@ import {
   LAPLACIAN_HEADER_MOST_RATIO as MOST_RATIO,
   LAPLACIAN_HEADER_VERSION_STILL as VERSION,
   LAPLACIAN_LAPLACE_OPERATORS_OPERATORS as OPERATORS,
-  SEGMENTS_LARGEST_STEP as LARGEST_STEP,
-  SEGMENTS_MAX_SEGMENT as MAX_SEGMENT,
-  SEGMENTS_SMALLEST_STEP as SMALLEST_STEP,
 } from "../constants.js";
 import { corrupt, quote } from "../format/errors.js";
 import { checkInteger, checkNumber } from "../format/payload.js";
+import { readSegments, readSteps } from "../format/segments.js";
 
 export { VERSION };
 
@@ -37,12 +35,9 @@ export { VERSION };
  * @param {object} header of the payload, of this codec
  * @returns {Header}
  */
-export function readHeader({ settings, frames }) {
-  const { steps } = settings;
-  const segments = checkInteger(settings, "segments", 1, Math.min(MAX_SEGMENTS, frames));
-  if (Math.ceil(frames / segments) > MAX_SEGMENT) throw corrupt("header", `${frames} frames in ${segments} segments`);
-  if (!Array.isArray(steps) || steps.length !== segments) throw corrupt("header", `steps is ${quote(steps)}`);
-  for (const s of steps.keys()) checkNumber(steps, s, SMALLEST_STEP, LARGEST_STEP);
+export function readHeader(header) {
+  const { settings } = header;
+  const segments = readSegments(header, MAX_SEGMENTS);
   const coding = {
     operator: choice(settings, "operator", OPERATORS),
     deltaPrediction: choice(settings, "delta_prediction", DELTA_PREDICTIONS),
@@ -53,7 +48,7 @@ export function readHeader({ settings, frames }) {
     anchorRatio: checkNumber(settings, "anchor_ratio", LEAST_RATIO, MOST_RATIO),
     basisRatio: checkNumber(settings, "basis_ratio", LEAST_RATIO, MOST_RATIO),
   };
-  return { coding, segments, steps };
+  return { coding, segments, steps: readSteps(settings, segments) };
 }
 
 /** Whether there is an average mesh. @param {CoefficientCoding} coding */

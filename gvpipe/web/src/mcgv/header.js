@@ -9,8 +9,6 @@ import {
   HEADER_PLACEMENTS as PLACEMENTS,
   HEADER_PREDICTIONS as PREDICTIONS,
   SEGMENTS_TINY as TINY,
-  SEGMENTS_LARGEST_STEP as LARGEST_STEP,
-  SEGMENTS_SMALLEST_STEP as SMALLEST_STEP,
   BASIS_MAX_COMPONENTS as MAX_COMPONENTS,
   TRAJECTORIES_PLANES as PLANES,
   TRAJECTORY_HEADER_MAX_FINENESS as MAX_FINENESS,
@@ -19,6 +17,7 @@ import {
 } from "../constants.js";
 import { GeometryVideoError, corrupt, quote } from "../format/errors.js";
 import { checkInteger, checkNumber } from "../format/payload.js";
+import { readSteps } from "../format/segments.js";
 
 export { VERSION, PLANES };
 
@@ -112,22 +111,17 @@ function withoutPictures(header) {
 
 /** Mirrors `gvcodecs.mcgv.trajectory_header`. */
 function readImages({ version, frames, settings }, segments, prediction) {
-  const { transform, profile, components, steps } = settings;
+  const { transform, profile, components } = settings;
   if (transform !== "klt" || version === 1 || prediction !== "blended") {
     throw corrupt("header", `transform is ${quote(transform)}, prediction ${quote(prediction)}`);
   }
   if (profile !== WEB) {
     throw new GeometryVideoError("unsupported", `its trajectory images have profile ${profile}; gvpipe export-html converts them`);
   }
-  for (const [key, values] of Object.entries({ components, steps })) {
-    if (!Array.isArray(values) || values.length !== segments) throw corrupt("header", `${key} is ${quote(values)}`);
-  }
+  if (!Array.isArray(components) || components.length !== segments) throw corrupt("header", `components is ${quote(components)}`);
   const most = Math.min(MAX_COMPONENTS, 3 * Math.ceil(frames / segments));
-  for (let s = 0; s < segments; s++) {
-    checkInteger(components, s, 0, most);
-    checkNumber(steps, s, SMALLEST_STEP, LARGEST_STEP);
-  }
-  return { fineness: checkInteger(settings, "fineness", 1, MAX_FINENESS), components, steps };
+  for (const s of components.keys()) checkInteger(components, s, 0, most);
+  return { fineness: checkInteger(settings, "fineness", 1, MAX_FINENESS), components, steps: readSteps(settings, segments) };
 }
 
 /** Pictures of a segment of R components: one at least. */

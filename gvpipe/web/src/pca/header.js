@@ -4,12 +4,10 @@ import {
   PCA_HEADER_MAX_SEGMENTS as MAX_SEGMENTS,
   PCA_HEADER_VERSION_STILL as VERSION,
   PREDICTION_PREDICTORS as PREDICTORS,
-  SEGMENTS_LARGEST_STEP as LARGEST_STEP,
-  SEGMENTS_MAX_SEGMENT as MAX_SEGMENT,
-  SEGMENTS_SMALLEST_STEP as SMALLEST_STEP,
 } from "../constants.js";
 import { corrupt, quote } from "../format/errors.js";
-import { checkInteger, checkNumber } from "../format/payload.js";
+import { checkNumber } from "../format/payload.js";
+import { readSegments, readSteps } from "../format/segments.js";
 
 export { VERSION };
 
@@ -21,12 +19,10 @@ export { VERSION };
  * @param {object} header of the payload, of this codec
  * @returns {Header}
  */
-export function readHeader({ settings, frames }) {
-  const { predictor, steps } = settings;
+export function readHeader(header) {
+  const { settings } = header;
+  const { predictor } = settings;
   if (!PREDICTORS.includes(predictor)) throw corrupt("header", `predictor is ${quote(predictor)}`);
-  const segments = checkInteger(settings, "segments", 1, Math.min(MAX_SEGMENTS, frames));
-  if (Math.ceil(frames / segments) > MAX_SEGMENT) throw corrupt("header", `${frames} frames in ${segments} segments`);
-  if (!Array.isArray(steps) || steps.length !== segments) throw corrupt("header", `steps is ${quote(steps)}`);
-  for (const s of steps.keys()) checkNumber(steps, s, SMALLEST_STEP, LARGEST_STEP);
-  return { predictor, beta: checkNumber(settings, "beta", 0.1, 1.99), segments, steps };
+  const segments = readSegments(header, MAX_SEGMENTS);
+  return { predictor, beta: checkNumber(settings, "beta", 0.1, 1.99), segments, steps: readSteps(settings, segments) };
 }

@@ -1,13 +1,8 @@
 /** What the reader of a `pdct` bitstream must know beside its sections. Mirrors `gvcodecs.pdct.header`. */
 
-import {
-  PDCT_HEADER_MAX_CLIPS as MAX_CLIPS,
-  PDCT_HEADER_VERSION_POINTS as VERSION,
-  SEGMENTS_HUGE as HUGE,
-  SEGMENTS_MAX_SEGMENT as MAX_SEGMENT,
-} from "../constants.js";
+import { PDCT_HEADER_MAX_CLIPS as MAX_CLIPS, PDCT_HEADER_VERSION_POINTS as VERSION, SEGMENTS_HUGE as HUGE } from "../constants.js";
 import { corrupt, quote } from "../format/errors.js";
-import { checkInteger } from "../format/payload.js";
+import { readSegments } from "../format/segments.js";
 
 export { VERSION };
 
@@ -18,10 +13,9 @@ export { VERSION };
  * @param {object} header of the payload, of this codec
  * @returns {Header}
  */
-export function readHeader({ settings, frames }) {
-  const clips = checkInteger(settings, "clips", 1, Math.min(MAX_CLIPS, frames));
-  if (Math.ceil(frames / clips) > MAX_SEGMENT) throw corrupt("header", `${frames} frames in ${clips} clips`);
-  const { base } = settings;
+export function readHeader(header) {
+  const clips = readSegments(header, MAX_CLIPS, "clips");
+  const { base } = header.settings;
   const isLattice = Array.isArray(base) && base.length === 4 && base.every((v) => typeof v === "number" && Math.abs(v) <= HUGE);
   if (!isLattice || !(base[3] > 0)) throw corrupt("header", `base is ${quote(base)}`);
   return { clips, base };
