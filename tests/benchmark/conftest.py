@@ -12,13 +12,13 @@ from gvpipe.benchmark import sweep
 from gvpipe.benchmark.report import BenchReport
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def sheet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("bench") / "sheet.npz"
     gvpipe.write(waving(10, 12), path)
     return path
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def report(sheet: Path) -> BenchReport:
     return sweep.run([str(sheet)], ["pca", "pdct"], (30, 80), {"reorder": "true"})
