@@ -73,12 +73,18 @@ def wide_pictures(whole: Bitstream) -> Bitstream:
     return dataclasses.replace(whole, header={**whole.header, "width": 16384, "height": 5456})
 
 
+def many_frames(whole: Bitstream) -> Bitstream:
+    """Frames that none of the sections tells apart."""
+    return dataclasses.replace(whole, n_frames=12_000_000)
+
+
 BOMBS: dict[str, tuple[Path, Callable[[Bitstream], Bitstream], str]] = {
     "many vertices": (WHOLE, many_vertices, "16777216 vertices"),
     "deflated triangles": (WHOLE, deflated_triangles, "5242880 loose triangles"),
     "many runs": (WHOLE, many_runs, "16777216 distinct frames"),
     "long transforms": (RIGID, long_transforms, "16384 trajectories"),
     "a long clip": (GOLDEN / "pdct-1.mp4", long_clip, "100000 frames of"),
+    "many frames": (GOLDEN / "pca-1-rbf.mp4", many_frames, "12000000 frames"),
     "wide pictures": (GOLDEN / "mcgv-5-klt.mp4", wide_pictures, "pictures of segment 0"),
     "a deflated list": (WHOLE, deflated_list, "inflates to more"),
 }

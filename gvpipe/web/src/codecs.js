@@ -12,6 +12,7 @@ import { openPictures } from "./pictures.js";
 import { kernelCode } from "./wasm/inflated.js";
 
 const BYTES_PER_VERTEX = 12; // of a frame
+const BYTES_PER_FRAME = 160; // that a clock keeps
 
 /**
  * @typedef {object} Playable
@@ -91,6 +92,7 @@ function checkOnlyLevel(level) {
 
 async function openFrames(code, source, payload, repeated, level) {
   const { fps } = payload.header;
+  payload.budget.ask(`${repeated.distinct} frames`, BYTES_PER_FRAME * repeated.distinct);
   const host = new FrameHost(payload, code);
   const close = () => {
     host.close();
