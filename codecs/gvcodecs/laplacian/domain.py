@@ -64,24 +64,28 @@ class Domain:
 
 def build_surface(point_faces: Int32, n_points: int) -> Surface:
     """Take in the mesh ``point_faces (T, 3)``."""
-    from gvpipe.mesh.graph_kernels import link_vertices
-    from gvpipe.mesh.hierarchy_kernels import proper_triangles
-
-    faces = proper_triangles(np.ascontiguousarray(point_faces, np.int32))
+    faces, graph = _link(point_faces, n_points)
     hierarchy = build_hierarchy(faces, n_points)
-    return Surface(faces, link_vertices(faces, n_points), hierarchy, hierarchy_order(hierarchy))
+    return Surface(faces, graph, hierarchy, hierarchy_order(hierarchy))
 
 
 def is_factorable(point_faces: Int32, n_points: int) -> bool:
     """Whether the least squares over a mesh stay within `most_products` and `STEPS`, whatever the operator."""
     from gvcodecs.laplacian.laplace_kernels import thin_rows
+
+    limit = most_products(n_points)
+    operator = laplacian(np.zeros((n_points, 3)), *_link(point_faces, n_points), "tutte")
+    fill = count_fill(thin_rows(operator), limit)
+    return fill.products <= limit and fill.steps <= STEPS
+
+
+def _link(point_faces: Int32, n_points: int) -> tuple[Int32, Graph]:
+    """Triangles of three different points, and their graph."""
     from gvpipe.mesh.graph_kernels import link_vertices
     from gvpipe.mesh.hierarchy_kernels import proper_triangles
 
-    faces, limit = proper_triangles(np.ascontiguousarray(point_faces, np.int32)), most_products(n_points)
-    operator = laplacian(np.zeros((n_points, 3)), faces, link_vertices(faces, n_points), "tutte")
-    fill = count_fill(thin_rows(operator), limit)
-    return fill.products <= limit and fill.steps <= STEPS
+    faces = proper_triangles(np.ascontiguousarray(point_faces, np.int32))
+    return faces, link_vertices(faces, n_points)
 
 
 def build_domain(

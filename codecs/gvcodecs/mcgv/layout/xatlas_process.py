@@ -1,7 +1,8 @@
-"""xatlas in a process of its own, which may hang or crash without harm.
+"""xatlas in processes of its own, which may hang or crash without harm.
 
 xatlas's threads sleep on condition variables. Its destructor wakes them without holding their mutex, so a thread that is about
-to sleep misses it, and the destructor waits for ever (docs/decisions/0123-xatlas-in-a-process.md).
+to sleep misses it, and the destructor waits for ever (docs/decisions/0123-xatlas-in-a-process.md). Meshes are added to a list
+that moves while threads read it, so each has an atlas (docs/decisions/0188-an-atlas-for-each-mesh.md).
 """
 
 from __future__ import annotations
@@ -10,23 +11,40 @@ import os
 import pickle
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+
+import numpy as np
 
 from gvcodecs.mcgv.layout import xatlas_worker
 from gvcodecs.mcgv.layout.xatlas_worker import Charts, Mesh
 from gvpipe.errors import InputError
 
-ATTEMPTS = 2
+ATTEMPTS = 4
 SECONDS = 600.0  # that an attempt may take, whatever the meshes
 SECONDS_TRIANGLE = 0.02  # and as many for each triangle: a hundred times what xatlas takes
+TRIANGLES_PROCESS = 5_000  # that a process is worth: it takes a tenth of a second to start
+MESHES_PROCESS = 64  # at most, since each atlas keeps a thread for each processor
 
 
 def run_xatlas(meshes: list[Mesh]) -> list[Charts]:
-    """Charts of meshes (`gvcodecs.mcgv.layout.xatlas_worker.make_charts`).
+    """Charts of each mesh (`gvcodecs.mcgv.layout.xatlas_worker.charts_of`), found by a process for each processor.
 
     Raises:
-        InputError: xatlas hung or died twice.
+        InputError: xatlas hung or died four times.
     """
+    n_processors = os.cpu_count() or 1
+    n_triangles = sum(len(triangles) for _, triangles in meshes)
+    n_shares = max(min(n_processors, n_triangles // TRIANGLES_PROCESS), -(-len(meshes) // MESHES_PROCESS), 1)
+    largest_first = sorted(range(len(meshes)), key=lambda number: -len(meshes[number][1]))
+    shares = [largest_first[start::n_shares] for start in range(n_shares)]
+    with ThreadPoolExecutor(min(n_shares, n_processors)) as pool:
+        answers = list(pool.map(_run, ([meshes[number] for number in share] for share in shares)))
+    return [answers[place % n_shares][place // n_shares] for place in np.argsort(largest_first)]
+
+
+def _run(meshes: list[Mesh]) -> list[Charts]:
+    """Charts of some meshes, by one process."""
     command = [sys.executable, "-P", str(Path(xatlas_worker.__file__))]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "OPENBLAS_NUM_THREADS": "1"}
     limit = SECONDS + SECONDS_TRIANGLE * sum(len(triangles) for _, triangles in meshes)

@@ -16,7 +16,7 @@ MAX_COST = 8.0  # xatlas' limit for growing a chart (its default is 2): fewer, l
 TEXELS_PER_UNIT = 64.0  # only a scale here: charts are packed into blocks by `packing`
 
 Mesh = tuple[Any, Any]  # positions (n, 3) float32, triangles (m, 3) uint32
-Charts = tuple[Any, Any, Any, Any]  # of one mesh, see `make_charts`
+Charts = tuple[Any, Any, Any, Any]  # of one mesh, see `charts_of`
 _atlases: list[Any] = []  # they stay until the process ends, so that none is destroyed
 
 
@@ -24,34 +24,29 @@ def main() -> None:
     """Answer one request."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # nothing but the answer may reach it
-    pickle.dump(make_charts(pickle.load(sys.stdin.buffer)), answers, protocol=5)
+    pickle.dump([charts_of(*mesh) for mesh in pickle.load(sys.stdin.buffer)], answers, protocol=5)
     answers.flush()
 
 
-def make_charts(meshes: list[Mesh]) -> list[Charts]:
-    """Charts of meshes; none crosses from one mesh to another.
+def charts_of(positions: Any, triangles: Any) -> Charts:
+    """Charts of a mesh, by an atlas of its own: of two meshes in one, the second may free what the first's thread reads.
 
-    Returns for each mesh: the vertex ``(k,)`` of each place, triangles ``(t, 3)`` of places, the places ``(k, 2) float64`` in
-    the mesh's unit, and the chart ``(k,) uint32`` of each place, numbered over all meshes.
+    Returns the vertex ``(k,)`` of each place, triangles ``(t, 3)`` of places, the places ``(k, 2) float64`` in the mesh's unit,
+    and the chart ``(k,) uint32`` of each place.
     """
     import xatlas
 
     atlas = xatlas.Atlas()
     _atlases.append(atlas)
-    for positions, triangles in meshes:
-        atlas.add_mesh(positions, triangles)
+    atlas.add_mesh(positions, triangles)
     options, packing = xatlas.ChartOptions(), xatlas.PackOptions()
     options.max_cost = MAX_COST
     packing.texels_per_unit = TEXELS_PER_UNIT
     packing.rotate_charts = False
     atlas.generate(options, packing)
-    size = (atlas.width, atlas.height)
-    charts = []
-    for number in range(len(meshes)):
-        vertex, triangles, places = atlas.get_mesh(number)
-        places = places.astype("f8") * size / atlas.texels_per_unit
-        charts.append((vertex, triangles, places, atlas.get_mesh_vertex_assignment(number)[1]))
-    return charts
+    vertex, corners, places = atlas.get_mesh(0)
+    places = places.astype("f8") * (atlas.width, atlas.height) / atlas.texels_per_unit
+    return vertex, corners, places, atlas.get_mesh_vertex_assignment(0)[1]
 
 
 if __name__ == "__main__":

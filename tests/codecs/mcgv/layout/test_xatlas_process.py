@@ -23,13 +23,13 @@ with open({tries!r}, "a") as tries:
 if open({tries!r}).read() == "x":
     {first}
 print("library output", file=sys.stderr)
-sys.stdout.buffer.write(pickle.dumps("charts"))
+sys.stdout.buffer.write(pickle.dumps(["charts"]))
 """
 # the worker's steps, in processes that are forked from one that has no threads: 10,000 starts in two minutes
 MANY = """
 import os, signal, sys
 import numpy as np, xatlas
-from gvcodecs.mcgv.layout.xatlas_worker import make_charts
+from gvcodecs.mcgv.layout.xatlas_worker import charts_of
 
 turn = np.arange(12) * np.pi / 6
 ring = np.stack([np.cos(turn), np.sin(turn), 0 * turn], 1).astype(np.float32)
@@ -40,36 +40,50 @@ for _ in range(int(sys.argv[1])):
     child = os.fork()
     if not child:
         signal.alarm(60)
-        charts = make_charts([(tube, triangles), (ring[:3], triangles[:1] * 0 + np.uint32([0, 1, 2]))])
-        os._exit(0 if len(charts) == 2 else 1)
+        charts = [charts_of(tube, triangles), charts_of(ring[:3], triangles[:1] * 0 + np.uint32([0, 1, 2]))]
+        os._exit(0 if len(charts[1][0]) == 3 else 1)
     assert os.waitpid(child, 0)[1] == 0
 print("none hung")
 """
 
 
 def square() -> Mesh:
-    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
-    return corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+    return strip(1)
+
+
+def strip(n_squares: int) -> Mesh:
+    """Squares of side 1 in a row."""
+    corners = np.array([[x, y, 0] for x in range(n_squares + 1) for y in (0, 1)], np.float32)
+    return corners, np.array([[i, i + 1, i + 2] if i % 2 == 0 else [i + 1, i, i + 2] for i in range(2 * n_squares)], np.uint32)
 
 
 def test_charts_of_two_meshes() -> None:
     for vertex, triangles, places, chart in run_xatlas([square(), square()]):
         assert sorted(vertex) == [0, 1, 2, 3] and len(triangles) == 2 and len(set(chart)) == 1
         sides = np.linalg.norm(np.diff(places[np.argsort(vertex)], axis=0), axis=1)
-        np.testing.assert_allclose(sides, 1, atol=0.1)  # places have the mesh's unit
+        own = np.linalg.norm(np.diff(square()[0], axis=0), axis=1)
+        np.testing.assert_allclose(sides, own, atol=0.1)  # places have the mesh's unit
+
+
+def test_meshes_of_several_processes_keep_their_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(xatlas_process, "MESHES_PROCESS", 2)
+    sizes = [3, 1, 4, 1, 5, 9, 2]
+    found = run_xatlas([strip(n) for n in sizes])
+    assert [len(triangles) for _, triangles, _, _ in found] == [2 * n for n in sizes]
+    assert [int(np.unique(vertex).size) for vertex, _, _, _ in found] == [2 * n + 2 for n in sizes]
 
 
 @pytest.mark.parametrize("first", ["time.sleep(600)", "sys.exit(3)", "import os, signal; os.kill(os.getpid(), signal.SIGTERM)"])
 def test_a_process_that_hangs_or_dies_once(first: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _use(SECOND_TIME.format(tries=str(tmp_path / "tries"), first=first), tmp_path, monkeypatch)
     charts: object = run_xatlas([square()])
-    assert charts == "charts"
+    assert charts == ["charts"]
     assert (tmp_path / "tries").read_text() == "xx"
 
 
-def test_a_process_that_dies_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_dies_each_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _use("raise ValueError('no such mesh')", tmp_path, monkeypatch)
-    with pytest.raises(InputError, match=r"status 1 \(ValueError: no such mesh\), 2 times; --set placement=halves"):
+    with pytest.raises(InputError, match=r"status 1 \(ValueError: no such mesh\), 4 times; --set placement=halves"):
         run_xatlas([square()])
 
 
