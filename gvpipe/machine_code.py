@@ -38,11 +38,12 @@ import llvmlite
 import numba
 import numpy as np
 from llvmlite import binding
-from numba.core import config, types
+from numba.core import config
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
+from numba.core.types.containers import BaseNamedTuple, BaseTuple
 from numba.misc.appdirs import AppDirs
 
 FORMAT = 1  # of the files
@@ -207,10 +208,10 @@ def _surroundings() -> tuple[object, ...]:
 
 def _spelt(kind: Any) -> str:
     """An argument's type; named tuples with their modules."""
-    if isinstance(kind, types.BaseNamedTuple):
+    if isinstance(kind, BaseNamedTuple):
         fields = ", ".join(map(_spelt, kind))
         return f"{kind.instance_class.__module__}.{kind.instance_class.__qualname__}({fields})"
-    return f"({', '.join(map(_spelt, kind))})" if isinstance(kind, types.BaseTuple) else str(kind)
+    return f"({', '.join(map(_spelt, kind))})" if isinstance(kind, BaseTuple) else str(kind)
 
 
 def _content(function: FunctionType) -> str:
@@ -266,7 +267,7 @@ def _value(value: Any, called: list[FunctionType]) -> str:
     if isinstance(value, type):
         return f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')} {getattr(value, '__members__', '')}"
     if isinstance(value, np.ndarray):
-        return f"{value.dtype.str} {value.shape} {hashlib.sha256(np.ascontiguousarray(value)).hexdigest()}"
+        return f"{value.dtype.str} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
     if isinstance(value, tuple | list):
         return f"{type(value).__qualname__}({', '.join(_value(each, called) for each in value)})"
     if isinstance(value, frozenset):

@@ -14,6 +14,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from numba.core import config
 
 from gvpipe import compiled as module
 from gvpipe import machine_code
@@ -140,7 +141,7 @@ def test_the_code_of_other_types(kernels: Any) -> None:
 
 def test_other_settings_of_the_compiler(kernels: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     assert kernels().double(2) == 4
-    monkeypatch.setattr(machine_code.config, "BOUNDSCHECK", 1)
+    monkeypatch.setattr(config, "BOUNDSCHECK", 1)
     machine_code._surroundings.cache_clear()
     kernel = kernels().double
     assert kernel(3) == 6 and hits(kernel) == 0
@@ -200,7 +201,7 @@ def test_code_of_the_installation(kernels: Any, monkeypatch: pytest.MonkeyPatch,
 
 
 def test_the_portable_processor_stands_in_for_none_that_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(machine_code.config, "CPU_NAME", "generic")
+    monkeypatch.setattr(config, "CPU_NAME", "generic")
     assert not machine_code.stands_in.__wrapped__()
 
 
