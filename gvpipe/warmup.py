@@ -119,8 +119,9 @@ def run_task(task: str) -> None:
             api.render(video, str(Path(folder, "errors.png")), frame=0, size=PICTURE, error_of=dressed)
             api.render(video, str(Path(folder, "plain.png")), frame=0, size=PICTURE, plain=True, shading="flat")
         else:
-            api.encode(_torus(), video, task)
-            api.decode(video)
+            for sequence in (_torus(), _bent()):
+                api.encode(sequence, video, task)
+                api.decode(video)
 
 
 def _torus() -> MeshSequence:
@@ -136,6 +137,15 @@ def _torus() -> MeshSequence:
     radius = 1 + 0.2 * np.sin(3 * a + t) + 0.1 * np.cos(2 * b - 2 * t)  # (F, V)
     across = 3 + radius * np.cos(b)
     return MeshSequence(np.stack([across * np.cos(a), across * np.sin(a), radius * np.sin(b)], axis=-1), faces.astype(np.int32))
+
+
+def _bent() -> MeshSequence:
+    """The torus as it stands in the first frame, bent to and fro as by two bones, which a blend predicts without pictures."""
+    torus = _torus()
+    x, y, z = np.moveaxis(torus.read(0, 1).astype(np.float64), -1, 0)  # (1, V)
+    angle = np.sin(2 * np.pi * np.arange(FRAMES)[:, None] / FRAMES) / (1 + np.exp(-2 * x))  # (F, V)
+    bent = np.stack([x * np.cos(angle) - z * np.sin(angle), y + 0 * angle, x * np.sin(angle) + z * np.cos(angle)], axis=-1)
+    return type(torus)(bent, torus.faces)
 
 
 def _dressed() -> MeshSequence:
