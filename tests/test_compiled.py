@@ -1,4 +1,4 @@
-"""A cache of machine code that is stale, damaged or mixed costs time, and never a result."""
+"""A file of machine code that is stale, damaged or another's costs time, and never a result."""
 
 from __future__ import annotations
 
@@ -6,19 +6,23 @@ import importlib
 import importlib.util
 import logging
 import os
+import shutil
 import sys
-import threading
+import time
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+from numba.core import config
 
 from gvpipe import compiled as module
+from gvpipe import machine_code
 from gvpipe.compiled import compiled
 
 KERNELS = """
 from {home} import Pair
+from callees import SCALE, factor
 from gvpipe.compiled import compiled
 
 @compiled
@@ -28,117 +32,139 @@ def total(pair):
 @compiled
 def double(value):
     return 2 * value
+
+@compiled
+def scaled(value):
+    return SCALE * factor() * value
 """
 PAIR = "from typing import NamedTuple\nclass Pair(NamedTuple):\n    a: float\n    b: float\n"
+CALLEES = "from gvpipe.compiled import compiled\nSCALE = {scale}\n@compiled\ndef factor():\n    return {factor}\n"
+MODULES = ("pairs", "elsewhere", "callees", "some_kernels")
 
 
 @pytest.fixture
 def kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """``kernels("pairs")`` loads two kernels as a new process would; their `Pair` is of the module of that name."""
-    monkeypatch.syspath_prepend(str(tmp_path))
-    path = tmp_path / "some_kernels.py"
+    """``kernels("pairs")`` loads kernels as a new process would; their `Pair` is of the module of that name."""
+    folder = tmp_path / "code"
+    folder.mkdir()
+    monkeypatch.setattr(machine_code, "own_folder", lambda: folder)
+    monkeypatch.setattr(machine_code, "INSTALLED", tmp_path / "installed")
 
-    def load(home: str = "pairs") -> ModuleType:
-        for name in ("pairs", "elsewhere"):
-            (tmp_path / f"{name}.py").unlink(missing_ok=True)
-            sys.modules.pop(name, None)
+    def load(home: str = "pairs", *, clone: str = "clone", scale: int = 1, factor: int = 1) -> ModuleType:
+        forget()
+        shutil.rmtree(tmp_path / clone, ignore_errors=True)
+        (tmp_path / clone).mkdir()
+        monkeypatch.syspath_prepend(str(tmp_path / clone))
+        for name, text in (
+            (home, PAIR),
+            ("callees", CALLEES.format(scale=scale, factor=factor)),
+            ("some_kernels", KERNELS.format(home=home)),
+        ):
+            (tmp_path / clone / f"{name}.py").write_text(text, encoding="utf-8")
         importlib.invalidate_caches()
-        (tmp_path / f"{home}.py").write_text(PAIR, encoding="utf-8")
-        path.write_text(KERNELS.format(home=home), encoding="utf-8")
-        spec = importlib.util.spec_from_file_location("some_kernels", path)
-        assert spec is not None and spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        monkeypatch.setitem(sys.modules, "some_kernels", module)
-        spec.loader.exec_module(module)
-        return module
+        return importlib.import_module("some_kernels")
 
+    def forget() -> None:
+        for name in MODULES:
+            sys.modules.pop(name, None)
+
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # of modules that change within a second
     yield load
-    for name in ("pairs", "elsewhere"):
-        sys.modules.pop(name, None)
+    forget()
 
 
-def files(kernel: Any, kind: str) -> list[Path]:
-    """Files of a kernel's cache: ``nbi`` the index, ``nbc`` the machine code."""
-    return sorted(Path(kernel.stats.cache_path).glob(f"some_kernels.{kernel.py_func.__name__}-*.{kind}"))
+def files(kernel: Any) -> list[Path]:
+    """Files of a kernel's machine code."""
+    return sorted(Path(kernel.stats.cache_path).glob(f"some_kernels.{kernel.py_func.__name__}-*.nbc"))
 
 
 def hits(kernel: Any) -> int:
     return sum(kernel.stats.cache_hits.values())
 
 
-def test_code_comes_from_the_cache(kernels: Any) -> None:
+def test_code_comes_from_files(kernels: Any) -> None:
     assert kernels().double(2) == 4
     again = kernels().double
     assert again(3) == 6 and hits(again) == 1
 
 
+def test_one_folder_serves_all_clones(kernels: Any) -> None:
+    """Neither a path nor a time is part of a file's name."""
+    assert kernels().scaled(2) == 2
+    other = kernels(clone="another").scaled
+    assert other(3) == 3 and hits(other) == 1
+
+
+@pytest.mark.parametrize("changed", [{"scale": 5}, {"factor": 5}])
+def test_what_a_kernel_names_has_changed(kernels: Any, changed: dict[str, int]) -> None:
+    """Machine code holds constants and callees, which may come from another file."""
+    assert kernels().scaled(2) == 2
+    kernel = kernels(**changed).scaled
+    assert kernel(2) == 10 and hits(kernel) == 0
+
+
 def test_classes_that_have_moved(kernels: Any) -> None:
-    """The cached index names ``pairs.Pair``, which is gone."""
+    """The code for ``pairs.Pair`` names a class that is gone."""
     old = kernels("pairs")
     assert old.total(old.Pair(1.0, 2.0)) == 3
     new = kernels("elsewhere")
-    assert new.total(new.Pair(1.0, 2.5)) == 3.5
+    assert new.total(new.Pair(1.0, 2.5)) == 3.5 and hits(new.total) == 0
     again = kernels("elsewhere")
-    assert again.total(again.Pair(1.0, 2.5)) == 3.5
+    assert again.total(again.Pair(1.0, 2.5)) == 3.5 and hits(again.total) == 1
 
 
-@pytest.mark.parametrize("kind", ["nbi", "nbc"])
 @pytest.mark.parametrize(
-    "damage", [lambda data: b"", lambda data: data[:-9], lambda data: b"\x80" + data], ids=["empty", "cut", "shifted"]
+    "damage",
+    [lambda data: b"", lambda data: data[:-9], lambda data: b"\x80" + data, lambda data: data[:99] + b"?" + data[100:]],
+    ids=["empty", "cut", "shifted", "flipped"],
 )
-def test_damaged_files(kernels: Any, kind: str, damage: Any) -> None:
+def test_damaged_files(kernels: Any, damage: Any) -> None:
     assert kernels().double(2) == 4
     kernel = kernels().double
-    (path,) = files(kernel, kind)
+    (path,) = files(kernel)
     path.write_bytes(damage(path.read_bytes()))
     assert kernel(3) == 6 and hits(kernel) == 0
     again = kernels().double
     assert again(4) == 8 and hits(again) == 1  # mended
 
 
-def test_an_index_with_the_code_of_other_types(kernels: Any) -> None:
-    """Two processes compiled at once: the index is of the one, the machine code of the other."""
+def test_the_code_of_other_types(kernels: Any) -> None:
     kernel = kernels().double
     assert kernel(2) == 4
-    (index,), (code,) = files(kernel, "nbi"), files(kernel, "nbc")
-    of_integers = code.read_bytes()
-    index.unlink()
-    code.unlink()
-    assert kernels().double(0.5) == 1.0
-    code.write_bytes(of_integers)
+    (of_integers,) = files(kernel)
+    assert kernel(0.5) == 1.0
+    (of_floats,) = set(files(kernel)) - {of_integers}
+    of_floats.write_bytes(of_integers.read_bytes())
     mixed = kernels().double
     assert mixed(0.75) == 1.5 and hits(mixed) == 0
-    again = kernels().double
-    assert again(0.75) == 1.5 and hits(again) == 1
 
 
-def test_a_folder_that_takes_no_file(kernels: Any) -> None:
-    """Neither a stale index that cannot be replaced nor new code that cannot be stored is an error."""
+def test_other_settings_of_the_compiler(kernels: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert kernels().double(2) == 4
+    monkeypatch.setattr(config, "BOUNDSCHECK", 1)
+    machine_code._surroundings.cache_clear()
+    kernel = kernels().double
+    assert kernel(3) == 6 and hits(kernel) == 0
+    machine_code._surroundings.cache_clear()
+
+
+def test_a_file_that_cannot_be_replaced(kernels: Any) -> None:
     kernel = kernels().double
     assert kernel(2) == 4
+    (path,) = files(kernel)
+    path.unlink()
+    path.mkdir()
     kernel = kernels().double
-    (index,) = files(kernel, "nbi")
-    index.unlink()
-    index.mkdir()  # opening it raises an OSError, whoever asks
     assert kernel(3) == 6
-    index.rmdir()
+    assert [each.name for each in path.parent.iterdir()] == [path.name]  # nothing is left half written
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="no such locks")
-def test_processes_save_in_turn(kernels: Any) -> None:
-    import fcntl
-
-    assert kernels().total(kernels().Pair(1.0, 2.0)) == 3.0  # the folder is there
-    kernel = kernels().double
-    descriptor = os.open(kernel.stats.cache_path, os.O_RDONLY)
-    fcntl.flock(descriptor, fcntl.LOCK_EX)  # as another process that saves
-    thread = threading.Thread(target=kernel, args=(2,))
-    thread.start()
-    thread.join(1)
-    assert thread.is_alive() and files(kernel, "nbi") == []
-    os.close(descriptor)
-    thread.join(20)
-    assert len(files(kernel, "nbi")) == len(files(kernel, "nbc")) == 1
+def test_no_folder_takes_files(kernels: Any, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    monkeypatch.setattr(machine_code, "own_folder", lambda: None)
+    module._announce.cache_clear()
+    with caplog.at_level(logging.INFO, logger="gvpipe.compiled"):
+        assert kernels().double(2) == 4
+    assert caplog.messages == [module.ONCE, module.EVERY_TIME]
 
 
 def test_functions_without_a_file() -> None:
@@ -146,7 +172,7 @@ def test_functions_without_a_file() -> None:
 
 
 def test_compiling_is_logged_once(kernels: Any, caplog: pytest.LogCaptureFixture) -> None:
-    """At level INFO, so that a library's user sees nothing unasked; loading code from the cache is not logged."""
+    """At level INFO, so that a library's user sees nothing unasked; loading code from files is not logged."""
     for wanted in ([module.ONCE], []):
         module._announce.cache_clear()
         caplog.clear()
@@ -156,30 +182,37 @@ def test_compiling_is_logged_once(kernels: Any, caplog: pytest.LogCaptureFixture
         assert caplog.messages == wanted
 
 
-def test_code_that_no_folder_takes_is_logged(caplog: pytest.LogCaptureFixture) -> None:
-    module._announce.cache_clear()
-    with caplog.at_level(logging.INFO, logger="gvpipe.compiled"):
-        compiled(eval("lambda value: value + 1"))
-    assert caplog.messages == [module.EVERY_TIME]
+def test_code_of_the_installation(kernels: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """It is found where the user's folder has none: for this processor, and for the portable one if that can stand in."""
+    kernel = kernels().double
+    assert kernel(2) == 4
+    (made,) = files(kernel)
+    (signature,) = kernel.signatures
+    portable = kernel._cache._name(signature, machine_code._portable()[:2])
+    (tmp_path / "installed").mkdir()
+    for name, stands_in, found in ((made.name, False, 1), (portable, True, 1), (portable, False, 0)):
+        monkeypatch.setattr(machine_code, "stands_in", lambda value=stands_in: value)
+        shutil.move(files(kernel)[0], tmp_path / "installed" / name)
+        again = kernels().double
+        assert again(3) == 6 and hits(again) == found
+        if found:
+            assert files(kernel) == []
+            shutil.move(tmp_path / "installed" / name, made)
 
 
-def test_a_callee_that_has_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Machine code holds what a kernel calls, which may come from another file."""
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(module, "PACKAGES", ("callee_kernels", "caller_kernels"))
-    head = "from gvpipe.compiled import compiled\n"
-    (tmp_path / "caller_kernels.py").write_text(
-        f"from callee_kernels import factor\n{head}\n@compiled\ndef scaled(x):\n    return factor() * x\n", encoding="utf-8"
-    )
-    for number, changed in ((2, 1_000_000_000), (3, 1_000_000_100)):
-        callee = tmp_path / "callee_kernels.py"
-        callee.write_text(f"{head}\n@compiled\ndef factor():\n    return {number}\n", encoding="utf-8")
-        os.utime(callee, (changed, changed))
-        for name in ("callee_kernels", "caller_kernels"):
-            sys.modules.pop(name, None)
-        importlib.invalidate_caches()
-        module._changed.cache_clear()
-        assert importlib.import_module("caller_kernels").scaled(5) == 5 * number
-    for name in ("callee_kernels", "caller_kernels"):
-        sys.modules.pop(name, None)
-    module._changed.cache_clear()
+def test_the_portable_processor_stands_in_for_none_that_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(config, "CPU_NAME", "generic")
+    assert not machine_code.stands_in.__wrapped__()
+
+
+def test_files_that_nobody_reads_go(kernels: Any) -> None:
+    kernel = kernels().double
+    assert kernel(2) == 4
+    (path,) = files(kernel)
+    old, stale = path.with_name("some_kernels.double-0.nbc"), time.time() - 100 * machine_code.DAY
+    old.write_bytes(b"")
+    os.utime(old, (stale, stale))
+    os.utime(path, (stale, stale))
+    assert kernels().double(2) == 4  # it is read, so it stays
+    assert kernel(0.5) == 1.0
+    assert not old.exists() and path in files(kernel) and len(files(kernel)) == 2

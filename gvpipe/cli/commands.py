@@ -624,6 +624,24 @@ def codecs(out: Output) -> None:
             out.text(f"  --codec auto tries too: {' '.join(f'{key}={value}' for key, value in own.items())}")
 
 
+@cli.command()
+@click.option("--installed", is_flag=True, help="Keep the machine code in the installation, for all its users.")
+@click.option("--portable", is_flag=True, help="With --installed: for most processors of this kind, not for this one.")
+@output_options
+def warmup(installed: bool, portable: bool, out: Output) -> None:
+    """Compile what commands need, so that the first ones do not wait: for images and installations of many users."""
+    import dataclasses
+
+    from gvpipe.warmup import warm_up
+
+    with out.progress() as progress:
+        found = warm_up(installed, portable, progress)
+    out.json(dataclasses.asdict(found))
+    out.text(
+        f"{found.folder}: {found.files} files of machine code, {found.new} new, {_size(found.size)}; {found.seconds:.1f} s"
+    )
+
+
 def _parse_numbers(option: str, text: str) -> list[float]:
     try:
         return [float(number) for number in text.split(",")]

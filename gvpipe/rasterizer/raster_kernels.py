@@ -42,7 +42,7 @@ def project(positions: Array, view: View, projection: Projection) -> None:
 
 
 @compiled
-def rasterise(chosen: Array, scene: Scene, look: Look, z_buffer: ZBuffer, layer: int, rows: tuple[int, int]) -> int:
+def rasterise(chosen: Array, scene: Scene, look: Look | None, z_buffer: ZBuffer, layer: int, rows: tuple[int, int]) -> int:
     """Fill rows of one layer of the z-buffer with some triangles; return how many samples were set.
 
     The last layer keeps what is nearest. Any other keeps what is nearest of all that lies before the last layer and, from the
@@ -50,13 +50,16 @@ def rasterise(chosen: Array, scene: Scene, look: Look, z_buffer: ZBuffer, layer:
 
     Args:
         chosen: ``(n,) int32``, the triangles.
+        look: materials, or None; numba then leaves out all that they need.
         rows: the first, and the one after the last.
     """
     faces, snapped, nearness = scene.faces, scene.projection.snapped, scene.projection.nearness
-    depths, triangles, of_triangles, flags = z_buffer.depths, z_buffer.triangles, look.of_triangles, look.flags
-    (top, bottom), (n_layers, _, width), has_materials = rows, depths.shape, len(of_triangles) > 0
+    depths, triangles = z_buffer.depths, z_buffer.triangles
+    (top, bottom), (n_layers, _, width) = rows, depths.shape
     _clear(z_buffer, layer, rows)
-    span, n_set = empty_fragments(width if has_materials else 0), 0
+    n_set, flag = 0, 0
+    if look is not None:
+        span = empty_fragments(width)
     for number in range(len(chosen)):
         t = chosen[number]
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
@@ -71,7 +74,8 @@ def rasterise(chosen: Array, scene: Scene, look: Look, z_buffer: ZBuffer, layer:
         left = max(0, (min(xa, xb, xc) - HALF + SNAP - 1) >> SNAP_BITS)
         right = min(width - 1, (max(xa, xb, xc) - HALF) >> SNAP_BITS)
         area = (xb - xa) * (yc - ya) - (xc - xa) * (yb - ya)  # below 0 where the front is seen, since y grows downwards
-        flag = flags[of_triangles[t]] if has_materials else 0
+        if look is not None:
+            flag = look.flags[look.of_triangles[t]]
         if left > right or area == 0 or (area > 0 and flag & CULLED):
             continue
         if area < 0:
@@ -84,7 +88,7 @@ def rasterise(chosen: Array, scene: Scene, look: Look, z_buffer: ZBuffer, layer:
             first, end = _clip((xa, ya), (xb, yb), py, left, right)
             first, end = _clip((xb, yb), (xc, yc), py, first, end)
             first, end = _clip((xc, yc), (xa, ya), py, first, end)
-            if flag & TESTED and first <= end:
+            if look is not None and flag & TESTED and first <= end:
                 find_alpha(scene, look, t, (first, end, y), span)
             for x in range(first, end + 1):
                 q = qa + across * ((x << SNAP_BITS) + HALF - xa) + down * (py - ya)
@@ -92,7 +96,7 @@ def rasterise(chosen: Array, scene: Scene, look: Look, z_buffer: ZBuffer, layer:
                 if q > depths[layer, y, x]:
                     if layer > 0 and layer < n_layers - 1 and q >= depths[layer - 1, y, x]:
                         continue
-                    if flag & TESTED and span.colours[x - first, 3] < look.cutoffs[of_triangles[t]]:
+                    if look is not None and flag & TESTED and span.colours[x - first, 3] < look.cutoffs[look.of_triangles[t]]:
                         continue
                     depths[layer, y, x], triangles[layer, y, x] = q, t
                     n_set += 1

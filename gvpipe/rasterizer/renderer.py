@@ -147,7 +147,7 @@ class Renderer:
 
         def paint_band(top: int, bottom: int) -> None:
             triangles = self._rasterise(scene, look, top, bottom)
-            shade(triangles, scene, look, paint, (top, bottom), picture)
+            shade(triangles, scene, look if len(look.of_triangles) else None, paint, (top, bottom), picture)
 
         self._in_bands(paint_band)
         return picture
@@ -211,7 +211,7 @@ class Renderer:
         buffer, last = self._z_buffer, len(self._z_buffer.triangles) - 1
         if not len(look.of_triangles):
             buffer = ZBuffer(buffer.depths[last:], buffer.triangles[last:])
-            rasterise(self._everything, scene, look, buffer, 0, rows)
+            rasterise(self._everything, scene, None, buffer, 0, rows)
             return buffer.triangles
         rasterise(self._opaque, scene, look, buffer, last, rows)
         for layer in range(last):
