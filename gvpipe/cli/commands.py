@@ -128,6 +128,7 @@ def cli() -> None:
     is_flag=True,
     help="Write the stream layout: it plays over HTTP while it loads. --for stream chooses a codec that suits.",
 )
+@click.option("--bare", is_flag=True, help="Write the bare layout, for data sets: no poster, nothing that only players need.")
 @unlimited_option
 @output_options
 def encode(
@@ -152,6 +153,7 @@ def encode(
     split: bool,
     textures: str | None,
     stream: bool,
+    bare: bool,
     unlimited: bool,
     out: Output,
 ) -> None:
@@ -194,7 +196,7 @@ def encode(
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
         given: dict[str, Any] = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames)}
-        wanted: dict[str, Any] = {**targets, "textures": textures, "stream": stream}
+        wanted: dict[str, Any] = {**targets, "textures": textures, "stream": stream, "bare": bare}
         wanted |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
         if split:
             runs = api.read_runs(source, **given, unlimited=unlimited)
@@ -291,7 +293,7 @@ def decode(
 @cli.command()
 @click.argument("source", metavar="FILE.mp4")
 @click.argument("target", metavar="OUTPUT.mp4")
-@click.option("--layout", type=click.Choice(["stream", "plain"]), help="Of OUTPUT. [default: the one that FILE has not]")
+@click.option("--layout", type=click.Choice(["stream", "plain"]), help="Of OUTPUT. [default: plain, unless FILE has it]")
 @unlimited_option
 @output_options
 def restream(source: str, target: str, layout: str | None, unlimited: bool, out: Output) -> None:
@@ -329,7 +331,7 @@ def info(source: str, clip: str | None, mesh: str | None, frames: str | None, un
             raise click.UsageError("--clip, --mesh and --frames are for sources; a geometry video is shown whole")
         found = api.info(path, unlimited=unlimited)
     out.json(found.to_json())
-    layout = ", stream layout" if found.layout == "stream" else ""
+    layout = "" if found.layout == "plain" else f", {found.layout} layout"
     out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}{layout}")
     for line in shape_lines(found):
         out.text(line)
