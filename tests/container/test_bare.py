@@ -73,7 +73,7 @@ def test_restream_gives_it_a_poster(files: tuple[Path, Path], tmp_path: Path) ->
 
 def test_every_damage_is_noticed(files: tuple[Path, Path], tmp_path: Path) -> None:
     data, path = files[1].read_bytes(), tmp_path / "a.mp4"
-    for size in [*range(0, 70), *range(70, len(data), 61), len(data) - 1]:
+    for size in [*range(70), *range(70, len(data), 61), len(data) - 1]:
         path.write_bytes(data[:size])
         with pytest.raises(FormatError, match=r"a\.mp4: "):
             read_file(path)
