@@ -27,6 +27,7 @@ from gvpipe.errors import CorruptFile, NewerVersion, TruncatedFile, corrupt, cor
 
 if TYPE_CHECKING:
     from gvpipe.media.video import Fragments
+    from gvpipe.shared_parts import SharedParts
 
 MAGIC = b"gvpipe\r\n"
 VERSION = 1
@@ -70,6 +71,7 @@ class Bitstream:
         is_bare: whether its file has the bare layout (`gvpipe.container.bare`), which has a video for pictures alone.
         n_bytes: of the file that it was read from, 0 if it was not.
         budget: what its readers may take (`gvpipe.budget`).
+        shared: what files of one data set have in common (`gvpipe.shared_parts`), None for a file alone.
     """
 
     codec: str
@@ -86,6 +88,7 @@ class Bitstream:
     is_bare: bool = field(default=False, compare=False)
     n_bytes: int = field(default=0, compare=False)
     budget: Budget = field(default=UNLIMITED, compare=False, repr=False)
+    shared: SharedParts | None = field(default=None, compare=False, repr=False)
 
     @property
     def layout(self) -> str:

@@ -31,7 +31,7 @@ from gvpipe.container.boxes import BOX, LARGE, uuid_head
 from gvpipe.container.json_object import JsonObject
 from gvpipe.container.sample_tables import check_tables
 from gvpipe.container.segments import SegmentParts
-from gvpipe.container.sources import DOWNLOAD_FIRST, FileSource, check_source, is_url
+from gvpipe.container.sources import DOWNLOAD_FIRST, BytesSource, FileSource, check_source, is_url
 from gvpipe.container.stream_layout import VERSION as STREAM_VERSION
 from gvpipe.container.stream_layout import find_index, pack_stream, read_stream
 from gvpipe.container.track import TAG_PREFIX, Track, inspect, remux, remux_fragments
@@ -109,6 +109,16 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False) -> Bitstrea
         raise InputError(f"{path}: no such file; check the path") from exc
     except OSError as exc:
         raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check its permissions") from exc
+
+
+def read_bytes(data: bytes, name: str, unlimited: bool = False) -> Bitstream:
+    """As `read_file`, of a file in memory; messages call it ``name``."""
+    try:
+        source = BytesSource(data)
+        budget, index = Budget(None if unlimited else source.size), find_index(source)
+        return _read(io.BytesIO(data), source.size, budget) if index is None else read_stream(source, index, budget)
+    except FormatError as exc:
+        raise type(exc)(f"{name}: {exc}") from exc
 
 
 def bytes_by_part(bitstream: Bitstream, size: int) -> dict[str, int]:
