@@ -221,7 +221,7 @@ def _source(path: str) -> FileSource:
 def _clip_level(reader: FrameReader, lod: int) -> int:
     if lod < 0:
         raise InputError(f"no level of detail {lod}; 0 is the mesh, higher ones are coarser")
-    return min(lod, len(reader.levels) - 1) if isinstance(reader, LevelReader) else 0
+    return min(lod, len(reader.levels) - 1) if lod and isinstance(reader, LevelReader) else 0
 
 
 def _read(reader: FrameReader, n_frames: int, frames: slice, lod: int) -> Float32:
