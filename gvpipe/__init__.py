@@ -50,7 +50,6 @@ __all__ = [
     "Restreamed",
     "Texture",
     "compare",
-    "datasets",
     "decode",
     "encode",
     "export_html",
