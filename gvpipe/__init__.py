@@ -80,6 +80,8 @@ _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
+    if name == "datasets":  # a package of its own functions
+        return import_module("gvpipe.datasets")
     if name not in _HOME:
         raise AttributeError(f"module 'gvpipe' has no attribute {name!r}")
     return getattr(import_module(_HOME[name]), name)

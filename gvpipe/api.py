@@ -17,7 +17,7 @@ from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.budget import Budget
 from gvpipe.codec import Codec, Encoded, Progress
-from gvpipe.container.bitstream import PLAIN, STREAM, Bitstream
+from gvpipe.container.bitstream import BARE, PLAIN, STREAM, Bitstream
 from gvpipe.container.mp4 import bytes_by_part, read_file, write_file
 from gvpipe.container.sources import check_target, is_url
 from gvpipe.errors import InputError, OutputError, OverBudget, SettingError, in_file
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 Source = StrPath | Sequence[StrPath]
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
 ASSET = ("attributes", "fields", "textures", "clip", "mesh", "frames", "unlimited")
-KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", "stream", *ASSET)  # of `encode`
+KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", "stream", "bare", *ASSET)  # of `encode`
 
 
 @dataclass(frozen=True)
@@ -272,6 +272,7 @@ def encode(
     mesh: StrPath | None = None,
     frames: tuple[int, int | None] | None = None,
     stream: bool = False,
+    bare: bool = False,
     unlimited: bool = False,
     **settings: Any,
 ) -> Report:
@@ -300,6 +301,7 @@ def encode(
             both: ``"1024,webp"``. None: bytes as they came.
         clip, mesh, frames, unlimited: as for `read`.
         stream: write the stream layout, which plays over HTTP while it loads (`restream`).
+        bare: write the bare layout, for data sets: without poster and what else only players need.
 
     Raises:
         InputError: the source, a setting or the path cannot be used, or no quality meets the target.
@@ -312,15 +314,17 @@ def encode(
     targets = {"target_rmse": target_rmse, "target_kg": target_kg, "target_bpvf": target_bpvf, "max_error": max_error}
     if sum(value is not None for value in targets.values()) > 1:
         raise SettingError(f"more than one target is given; choose one of {', '.join(targets)}")
-    if stream and target_bpvf is not None:
-        raise SettingError("target_bpvf counts the plain layout; encode without stream, then change the layout by restream")
+    if stream and bare:
+        raise SettingError("stream and bare are two layouts; choose one of them")
+    if (stream or bare) and target_bpvf is not None:
+        raise SettingError("target_bpvf counts the plain layout; encode to it, then change the layout by restream")
     given = _candidates(codec, settings, purpose)
     clock = _StageClock(progress)
     sequence = _open_source(source, path, fps, {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited})
     target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
     asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
     coded = _code(sequence, given, target, asset, clock)
-    size, bitstream = _write(sequence, coded, path, clock, stream)
+    size, bitstream = _write(sequence, coded, path, clock, STREAM if stream else BARE if bare else PLAIN)
     clock("", 1.0)
     return Report(
         codec=coded.codec.id,
@@ -364,12 +368,13 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
     """Change the layout of a geometry video, without loss: sections and pictures stay as they are, to the bit.
 
     The *stream* layout has an index first, then each segment's sections beside its pictures. It plays over HTTP while it
-    loads, and a jump costs one segment. The *plain* layout is a little smaller.
+    loads, and a jump costs one segment. The *plain* layout is a little smaller. A file of the *bare* layout gets the poster
+    that it lacks.
 
     Args:
         source: a geometry video, or its address.
         path: of the file to write.
-        layout: ``"stream"`` or ``"plain"``; None: the one that the source has not.
+        layout: ``"stream"`` or ``"plain"``; None: ``"plain"`` unless the source has it.
         unlimited: as for `open`.
 
     Raises:
@@ -382,9 +387,13 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
     _check_output(path)
     bitstream = read_file(check_path(source, "the geometry video"), unlimited)
     with in_file(os.fspath(source)):
-        chosen = layout or (PLAIN if bitstream.layout == STREAM else STREAM)
+        chosen = layout or (STREAM if bitstream.layout == PLAIN else PLAIN)
+        n_bytes = bitstream.n_bytes
+        if bitstream.layout == BARE:
+            video = bitstream.video or poster_of(Player(source, unlimited=unlimited).sequence())
+            bitstream = dataclasses.replace(bitstream, video=video, is_bare=False)
         size = write_file(bitstream, path, parts=segment_parts(bitstream) if chosen == STREAM else None)
-    return Restreamed(chosen, bitstream.n_bytes, size)
+    return Restreamed(chosen, n_bytes, size)
 
 
 def open(path: StrPath, *, unlimited: bool = False) -> Player:
@@ -604,15 +613,15 @@ def _code(
     return _Coded(trial.codec, encoded, check, choice.tried, choice.reason)
 
 
-def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progress, stream: bool) -> tuple[int, Bitstream]:
-    """Write the file with its poster and origin; return its bytes and what it holds."""
+def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progress, layout: str) -> tuple[int, Bitstream]:
+    """Write the file with its poster, unless it is bare, and origin; return its bytes and what it holds."""
     progress("write", 0.0)
     bitstream = coded.encoded.bitstream
-    if not bitstream.video:
+    if not bitstream.video and layout != BARE:
         bitstream = dataclasses.replace(bitstream, video=poster_of(sequence))
     x, y, z = sequence.origin.tolist()
-    bitstream = dataclasses.replace(bitstream, origin=(x, y, z))
-    return write_file(bitstream, path, coded.check, segment_parts(bitstream) if stream else None), bitstream
+    bitstream = dataclasses.replace(bitstream, origin=(x, y, z), is_bare=layout == BARE)
+    return write_file(bitstream, path, coded.check, segment_parts(bitstream) if layout == STREAM else None), bitstream
 
 
 def _notes(sequence: MeshSequence, target: Target | None, left_out: Sequence[str]) -> list[str]:

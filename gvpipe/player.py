@@ -24,7 +24,7 @@ from gvpipe.asset_coding.reader import AssetReader
 from gvpipe.coarse_asset import add_asset
 from gvpipe.codec import GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.mp4 import read_file
+from gvpipe.container.mp4 import read_bytes, read_file
 from gvpipe.container.sources import is_url
 from gvpipe.errors import InputError, in_file, printable
 from gvpipe.frame_cache import FrameCache
@@ -45,6 +45,7 @@ class Player:
     Args:
         path: of the file, or its address (``https://...``): of a file in the stream layout, what is asked for is fetched.
         unlimited: let it take whatever memory and work it asks for; by default its size limits both (`gvpipe.budget`).
+        data: the file's bytes, of a file in memory; ``path`` is its name in messages then.
 
     Raises:
         InputError: there is no such file.
@@ -52,13 +53,13 @@ class Player:
         FormatError: it is not a geometry video, or it is damaged; the kinds are in `gvpipe.errors`.
     """
 
-    def __init__(self, path: str | os.PathLike[str], *, unlimited: bool = False) -> None:
+    def __init__(self, path: str | os.PathLike[str], *, unlimited: bool = False, data: bytes | None = None) -> None:
         check_path(path, "the geometry video")
         self.path = os.fspath(path)
         # another process may have another working directory
-        self._absolute = self.path if is_url(self.path) else os.path.abspath(self.path)
-        self._unlimited = unlimited
-        self.bitstream: Bitstream = read_file(path, unlimited)
+        self._absolute = self.path if data is not None or is_url(self.path) else os.path.abspath(self.path)
+        self._unlimited, self._data = unlimited, data
+        self.bitstream: Bitstream = read_file(path, unlimited) if data is None else read_bytes(data, self.path, unlimited)
         with in_file(self.path):
             self._reader = open_reader(self.bitstream)
             self._shared = SharedReader(self.bitstream, self._reader, self.path)
@@ -67,7 +68,7 @@ class Player:
         self._cache = FrameCache(self._shared.read, group, len(self), 12 * self.bitstream.n_vertices)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return partial(type(self), unlimited=self._unlimited), (self._absolute,)
+        return partial(type(self), unlimited=self._unlimited, data=self._data), (self._absolute,)
 
     @property
     def faces(self) -> Int32:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import measure_datasets
 import pytest
 from folders import ROOT
 
@@ -21,3 +22,9 @@ def test_help(script: Path, tmp_path: Path) -> None:
     summary = script.read_text("utf-8").split('"""')[1].splitlines()[0]
     assert summary in done.stdout
     assert list(tmp_path.iterdir()) == []
+
+
+def test_tables_of_data_sets_are_those_of_the_results() -> None:
+    page = (ROOT / "docs" / "datasets.md").read_text("utf-8")
+    for line in measure_datasets.tables(ROOT / "docs" / "benchmarks"):
+        assert line in page

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,15 @@ def parse_frames(text: str | None) -> tuple[int, int | None] | None:
         return int(first or 0), int(last) if last else None
     except ValueError as exc:
         raise click.UsageError(f"--frames {text}: A:B is needed, such as --frames 10:50") from exc
+
+
+def parse_bytes(option: str, text: str) -> int:
+    """``500MB`` as 500,000,000: a number of bytes, kB, MB, GB or TB; raises `click.UsageError`."""
+    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?(|k|M|G|T)B?", text, re.ASCII | re.IGNORECASE)
+    count = int(float(found[1]) * 1000 ** " kmgt".index(found[2].lower() or " ")) if found else 0
+    if count < 1:
+        raise click.UsageError(f"{option} {text}: a number of bytes is needed, such as {option} 500MB")
+    return count
 
 
 def chosen_frames(start: int | None, stop: int | None, frames: str | None) -> tuple[int, int | None]:

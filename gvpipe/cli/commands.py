@@ -25,7 +25,7 @@ from gvpipe.cli.console import Output, is_verbose, output_options, print_options
 from gvpipe.cli.conversion import convert
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.cli.process import Ended, ending_by_exception, replace_closed_streams
-from gvpipe.errors import GvpipeError, TopologyChange
+from gvpipe.errors import GvpipeError, InputError, TopologyChange
 
 if TYPE_CHECKING:
     from gvpipe.api import Report
@@ -128,6 +128,7 @@ def cli() -> None:
     is_flag=True,
     help="Write the stream layout: it plays over HTTP while it loads. --for stream chooses a codec that suits.",
 )
+@click.option("--bare", is_flag=True, help="Write the bare layout, for data sets: no poster, nothing that only players need.")
 @unlimited_option
 @output_options
 def encode(
@@ -152,6 +153,7 @@ def encode(
     split: bool,
     textures: str | None,
     stream: bool,
+    bare: bool,
     unlimited: bool,
     out: Output,
 ) -> None:
@@ -194,7 +196,7 @@ def encode(
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
         given: dict[str, Any] = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames)}
-        wanted: dict[str, Any] = {**targets, "textures": textures, "stream": stream}
+        wanted: dict[str, Any] = {**targets, "textures": textures, "stream": stream, "bare": bare}
         wanted |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
         if split:
             runs = api.read_runs(source, **given, unlimited=unlimited)
@@ -291,7 +293,7 @@ def decode(
 @cli.command()
 @click.argument("source", metavar="FILE.mp4")
 @click.argument("target", metavar="OUTPUT.mp4")
-@click.option("--layout", type=click.Choice(["stream", "plain"]), help="Of OUTPUT. [default: the one that FILE has not]")
+@click.option("--layout", type=click.Choice(["stream", "plain"]), help="Of OUTPUT. [default: plain, unless FILE has it]")
 @unlimited_option
 @output_options
 def restream(source: str, target: str, layout: str | None, unlimited: bool, out: Output) -> None:
@@ -310,6 +312,35 @@ def restream(source: str, target: str, layout: str | None, unlimited: bool, out:
 
 
 @cli.command()
+@click.argument("folder", metavar="FOLDER")
+@click.argument("target", metavar="SHARD-%05d.tar")
+@click.option("--shard-size", metavar="BYTES", default="1GB", show_default=True, help="Most bytes of a shard: 500MB, 2GB.")
+@click.option("--shard-count", type=click.IntRange(1), metavar="N", help="Most sequences of a shard.")
+@unlimited_option
+@output_options
+def pack(folder: str, target: str, shard_size: str, shard_count: int | None, unlimited: bool, out: Output) -> None:
+    """Pack the geometry videos of a folder into shards for machine learning, in WebDataset's layout.
+
+    A shard is a tar file. Each NAME.mp4 becomes NAME.mp4 and NAME.json in it, the latter with what is in NAME.json beside it.
+    """
+    from gvpipe import datasets
+    from gvpipe.cli.choices import parse_bytes
+
+    limit = parse_bytes("--shard-size", shard_size)
+    with out.progress() as progress:
+        packed = datasets.pack(
+            folder, target, shard_bytes=limit, shard_sequences=shard_count, progress=progress, unlimited=unlimited
+        )
+    out.json(packed.to_json())
+    for reason in packed.left_out.values():
+        out.note(f"left out: {reason}")
+    shards = f"{len(packed.shards)} shard{'s' if len(packed.shards) != 1 else ''}"
+    out.text(f"{folder} -> {target} ({packed.sequences} sequences, {shards}, {_size(packed.bytes)})")
+    if packed.left_out:
+        raise InputError(f"{len(packed.left_out)} files of {folder} are left out; {next(iter(packed.left_out.values()))}")
+
+
+@cli.command()
 @click.argument("source", metavar="FILE")
 @click.option("--clip", metavar="NAME", help="The animation to look at, of a file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
@@ -317,9 +348,19 @@ def restream(source: str, target: str, layout: str | None, unlimited: bool, out:
 @unlimited_option
 @output_options
 def info(source: str, clip: str | None, mesh: str | None, frames: str | None, unlimited: bool, out: Output) -> None:
-    """Tell what a geometry video (- for standard input) holds and where its bytes go, or what is read of any other input."""
+    """Tell what a geometry video (- for standard input) holds and where its bytes go, or what is read of any other input.
+
+    Of shards (shard.tar, 'shard-*.tar') it sums up the sequences, and checks each.
+    """
     from gvpipe import api
     from gvpipe.cli.asset_lines import asset_lines, shape_lines
+    from gvpipe.cli.shards import show_shards
+
+    if source.lower().endswith(".tar"):
+        if clip is not None or mesh is not None or frames is not None:
+            raise click.UsageError("--clip, --mesh and --frames are for sources; shards are summed up whole")
+        show_shards(source, unlimited, out)
+        return
 
     with source_path(source) as path, out.progress():
         if not is_video(path):
@@ -329,7 +370,7 @@ def info(source: str, clip: str | None, mesh: str | None, frames: str | None, un
             raise click.UsageError("--clip, --mesh and --frames are for sources; a geometry video is shown whole")
         found = api.info(path, unlimited=unlimited)
     out.json(found.to_json())
-    layout = ", stream layout" if found.layout == "stream" else ""
+    layout = "" if found.layout == "plain" else f", {found.layout} layout"
     out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}{layout}")
     for line in shape_lines(found):
         out.text(line)

@@ -27,6 +27,7 @@ from gvpipe.errors import CorruptFile, NewerVersion, TruncatedFile, corrupt, cor
 
 if TYPE_CHECKING:
     from gvpipe.media.video import Fragments
+    from gvpipe.shared_parts import SharedParts
 
 MAGIC = b"gvpipe\r\n"
 VERSION = 1
@@ -45,7 +46,7 @@ MAX_FRAMES = 1 << 24
 MAX_VERTICES = 1 << 28
 
 
-PLAIN, STREAM = "plain", "stream"  # layouts of files
+PLAIN, STREAM, BARE = "plain", "stream", "bare"  # layouts of files
 NO_ORIGIN = (0.0, 0.0, 0.0)
 MAX_ORIGIN = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]  # of its coordinates' magnitudes: float32's largest number
 
@@ -67,8 +68,10 @@ class Bitstream:
         video: an MP4 file whose one track holds the codec's images; empty for codecs that have none, whose files show a
             poster (`gvpipe.rendering.poster`) instead.
         fragments: in place of ``video``, of a file in the stream layout (`gvpipe.container.stream_layout`).
+        is_bare: whether its file has the bare layout (`gvpipe.container.bare`), which has a video for pictures alone.
         n_bytes: of the file that it was read from, 0 if it was not.
         budget: what its readers may take (`gvpipe.budget`).
+        shared: what files of one data set have in common (`gvpipe.shared_parts`), None for a file alone.
     """
 
     codec: str
@@ -82,13 +85,17 @@ class Bitstream:
     video: bytes = b""
     origin: tuple[float, float, float] = NO_ORIGIN
     fragments: Fragments | None = field(default=None, compare=False, repr=False)
+    is_bare: bool = field(default=False, compare=False)
     n_bytes: int = field(default=0, compare=False)
     budget: Budget = field(default=UNLIMITED, compare=False, repr=False)
+    shared: SharedParts | None = field(default=None, compare=False, repr=False)
 
     @property
     def layout(self) -> str:
-        """Of its file: ``plain``, or ``stream``."""
-        return STREAM if self.fragments is not None else PLAIN
+        """Of its file: ``plain``, ``stream`` or ``bare``."""
+        if self.fragments is not None:
+            return STREAM
+        return BARE if self.is_bare else PLAIN
 
     @property
     def pictures(self) -> bytes | Fragments:
@@ -121,9 +128,9 @@ class Bitstream:
         return JsonObject(self.header, HEADER)
 
 
-def pack_header(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
-    """Return the section ``header``; ``extra`` is the container's own part of it."""
-    header = {
+def header_values(bitstream: Bitstream, extra: Mapping[str, Any]) -> dict[str, Any]:
+    """The header as JSON values; ``extra`` is the container's own part of it."""
+    return {
         "codec": bitstream.codec,
         "version": bitstream.version,
         "frames": bitstream.n_frames,
@@ -131,10 +138,14 @@ def pack_header(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
         "triangles": bitstream.n_triangles,
         "fps": bitstream.fps,
         **({"origin": list(bitstream.origin)} if bitstream.origin != NO_ORIGIN else {}),
-        "container": dict(extra),
+        **({"container": dict(extra)} if extra else {}),
         "settings": dict(bitstream.header),
     }
-    return zlib.compress(json.dumps(header, separators=(",", ":"), allow_nan=False).encode(), 9)
+
+
+def pack_header(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
+    """Return the section ``header``; ``extra`` is the container's own part of it."""
+    return zlib.compress(json.dumps(header_values(bitstream, extra), separators=(",", ":"), allow_nan=False).encode(), 9)
 
 
 def pack_payload(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
@@ -192,6 +203,15 @@ def unpack_payload(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstrea
     return replace(bitstream, sections=sections), container
 
 
+def check_version(payload: bytes, newest: int) -> None:
+    """Raise `NewerVersion` for a payload of a container version above ``newest``, whatever else it is."""
+    head = payload[: len(MAGIC) + PREFIX.size]
+    if len(head) == len(MAGIC) + PREFIX.size and head.startswith(MAGIC):
+        version, _ = PREFIX.unpack(head[len(MAGIC) :])
+        if version > newest:
+            raise NewerVersion(f"the file has container version {version}, this gvpipe reads up to {newest}; upgrade gvpipe")
+
+
 def _read_sections(cursor: Cursor, entries: list[tuple[bytes, int, int]]) -> dict[str, bytes]:
     wanted = sum(length for _, length, _ in entries)
     if wanted > cursor.left:
@@ -212,8 +232,13 @@ def _read_sections(cursor: Cursor, entries: list[tuple[bytes, int, int]]) -> dic
 def read_header(section: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstream, JsonObject]:
     """Mirror of `pack_header`: a bitstream without sections, and the container's part; raises `CorruptFile`, `OverBudget`."""
     header = unpack_json(section, HEADER, MAX_HEADER, budget)
+    return parse_header(header, budget), header.object("container")
+
+
+def parse_header(header: JsonObject, budget: Budget = UNLIMITED) -> Bitstream:
+    """Mirror of `header_values`: a bitstream without sections; raises `CorruptFile`."""
     x, y, z = header.numbers("origin", 3, -MAX_ORIGIN, MAX_ORIGIN, NO_ORIGIN)
-    bitstream = Bitstream(
+    return Bitstream(
         codec=header.text("codec"),
         version=header.integer("version", 1, 1 << 16),
         n_frames=header.integer("frames", 1, MAX_FRAMES),
@@ -224,4 +249,3 @@ def read_header(section: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstream, 
         origin=(x, y, z),
         budget=budget,
     )
-    return bitstream, header.object("container")

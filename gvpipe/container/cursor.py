@@ -99,6 +99,9 @@ class Cursor:
 
     def varint(self, limit: int, what: str = "a number") -> int:
         """Return a varint that must not exceed ``limit``; ``what`` names it in the message."""
+        if self._position < len(self._data) and self._data[self._position] < min(limit + 1, 0x80):  # most are one byte
+            self._position += 1
+            return self._data[self._position - 1]
         value = 0
         for k in range(MAX_VARINT_BYTES):
             byte = self.take(1)[0]

@@ -139,7 +139,9 @@ def pack_json(values: Mapping[str, Any]) -> bytes:
     return zlib.compress(json.dumps(values, separators=(",", ":"), allow_nan=False, ensure_ascii=False).encode(), 9)
 
 
-def unpack_json(data: bytes, section: str, most: int, budget: Budget = UNLIMITED) -> JsonObject:
+def unpack_json(
+    data: bytes, section: str, most: int, budget: Budget = UNLIMITED, inflater: zlib._Decompress | None = None
+) -> JsonObject:
     """Mirror of `pack_json`.
 
     Args:
@@ -147,6 +149,7 @@ def unpack_json(data: bytes, section: str, most: int, budget: Budget = UNLIMITED
         section: its name.
         most: bytes that it may inflate to.
         budget: of the file.
+        inflater: a fresh one, for what is not deflated as `pack_json` does.
 
     Raises:
         CorruptFile: it is not deflated JSON of an object, or larger.
@@ -154,7 +157,7 @@ def unpack_json(data: bytes, section: str, most: int, budget: Budget = UNLIMITED
     """
     room = min(most, budget.memory_left // BYTES_PER_CHARACTER)
     try:
-        inflater = zlib.decompressobj()
+        inflater = zlib.decompressobj() if inflater is None else inflater
         text = inflater.decompress(data, int(room) + 1)
         budget.ask(f"section {section!r}", BYTES_PER_CHARACTER * len(text), SECONDS_PER_CHARACTER * len(text))
         if len(text) > most or inflater.unconsumed_tail or not inflater.eof or inflater.unused_data:

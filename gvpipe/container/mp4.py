@@ -25,14 +25,16 @@ from uuid import UUID
 
 from gvpipe.atomic import unnamed_path
 from gvpipe.budget import Budget
-from gvpipe.container.bitstream import VERSION, Bitstream, pack_header, pack_payload, unpack_payload
+from gvpipe.container import bare
+from gvpipe.container.bitstream import VERSION, Bitstream, check_version, pack_header, pack_payload, unpack_payload
 from gvpipe.container.boxes import BOX, LARGE, uuid_head
+from gvpipe.container.json_object import JsonObject
 from gvpipe.container.sample_tables import check_tables
 from gvpipe.container.segments import SegmentParts
-from gvpipe.container.sources import DOWNLOAD_FIRST, FileSource, check_source, is_url
+from gvpipe.container.sources import DOWNLOAD_FIRST, BytesSource, FileSource, check_source, is_url
 from gvpipe.container.stream_layout import VERSION as STREAM_VERSION
 from gvpipe.container.stream_layout import find_index, pack_stream, read_stream
-from gvpipe.container.track import TAG_PREFIX, inspect, remux, remux_fragments
+from gvpipe.container.track import TAG_PREFIX, Track, inspect, remux, remux_fragments
 from gvpipe.errors import REMEDY, FormatError, InputError, NewerVersion, NotGeometryVideo, StrippedFile, TruncatedFile, corrupt
 
 BOX_UUID = UUID("6a1f0c52-3d7b-4e0e-9c55-67e4f0a7d1b9")
@@ -109,11 +111,24 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False) -> Bitstrea
         raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check its permissions") from exc
 
 
+def read_bytes(data: bytes, name: str, unlimited: bool = False) -> Bitstream:
+    """As `read_file`, of a file in memory; messages call it ``name``."""
+    try:
+        source = BytesSource(data)
+        budget, index = Budget(None if unlimited else source.size), find_index(source)
+        return _read(io.BytesIO(data), source.size, budget) if index is None else read_stream(source, index, budget)
+    except FormatError as exc:
+        raise type(exc)(f"{name}: {exc}") from exc
+
+
 def bytes_by_part(bitstream: Bitstream, size: int) -> dict[str, int]:
     """Bytes of the codec's sections, of the video's samples and of everything else in a file of ``size`` bytes."""
     parts = dict(bitstream.section_sizes)
     fragments = bitstream.fragments
-    parts["video"] = inspect(bitstream.video, bitstream.budget).n_bytes if fragments is None else fragments.n_bytes
+    if fragments is not None:
+        parts["video"] = fragments.n_bytes
+    elif bitstream.video:
+        parts["video"] = inspect(bitstream.video, bitstream.budget).n_bytes
     return {**parts, "container": size - sum(parts.values())}
 
 
@@ -136,6 +151,8 @@ def load(bitstream: Bitstream) -> Bitstream:
 def _pack(bitstream: Bitstream, parts: SegmentParts | None) -> Iterable[bytes]:
     """A file in parts: in the plain layout the video with its tag, the head of the box, the payload."""
     bitstream = load(bitstream)
+    if bitstream.is_bare and parts is None:
+        return _pack_bare(bitstream)
     identity = _content_id(bitstream)
     track = inspect(bitstream.video)
     extra = {"id": identity, "video_crc32": track.checksum, "track_crc32": track.configuration}
@@ -144,6 +161,16 @@ def _pack(bitstream: Bitstream, parts: SegmentParts | None) -> Iterable[bytes]:
         return pack_stream(video, pack_header(bitstream, extra), bitstream.sections, parts)
     payload = pack_payload(bitstream, extra)
     return remux(bitstream.video, f"{VERSION} {identity}"), uuid_head(BOX_UUID, len(payload)), payload
+
+
+def _pack_bare(bitstream: Bitstream) -> Iterable[bytes]:
+    """A file of the bare layout in parts."""
+    extra, video = {}, bare.NO_TRACKS
+    if bitstream.video:
+        track, video = inspect(bitstream.video), remux(bitstream.video)
+        extra = {"video_crc32": track.checksum, "track_crc32": track.configuration}
+    payload = bare.pack_bare(bitstream, extra)
+    return video, uuid_head(BOX_UUID, len(payload)), payload
 
 
 def _read_url(url: str, unlimited: bool) -> Bitstream:
@@ -172,22 +199,44 @@ def _read(file: IO[bytes], size: int, budget: Budget) -> Bitstream:
         raise NotGeometryVideo(f"an MP4 file, but not one that gvpipe wrote; {ENCODE_FIRST}")
     file.seek(0)
     video = file.read(layout.video_end)
+    file.seek(layout.payload[0])
+    payload = file.read(layout.payload[1] - layout.payload[0])
+    if payload.startswith(bare.START):
+        return _read_bare(video, layout, payload, budget, size)
+    check_version(payload, bare.VERSION)
     check_tables(video[slice(*layout.moov)], layout.video_end)
     track = inspect(video, budget)
     tag = track.tag
     version = tag.partition(" ")[0]
-    if version.isascii() and version.isdecimal() and len(version) < 10 and int(version) > STREAM_VERSION:
-        raise NewerVersion(f"container version {version}, this gvpipe reads up to {STREAM_VERSION}; upgrade gvpipe")
-    file.seek(layout.payload[0])
-    bitstream, container = unpack_payload(file.read(layout.payload[1] - layout.payload[0]), budget)
+    if version.isascii() and version.isdecimal() and len(version) < 10 and int(version) > bare.VERSION:
+        raise NewerVersion(f"container version {version}, this gvpipe reads up to {bare.VERSION}; upgrade gvpipe")
+    bitstream, container = unpack_payload(payload, budget)
     identity = _content_id(bitstream)
     if container.text("id") != identity or (tag and tag.split()[-1] != identity):
         raise corrupt("its geometry belongs to another file")
+    _check_track(container, track)
+    return replace(bitstream, video=video, n_bytes=size)
+
+
+def _read_bare(video: bytes, layout: _Layout, payload: bytes, budget: Budget, size: int) -> Bitstream:
+    """A file of the bare layout; what has no pictures is not given to FFmpeg."""
+    bitstream, header = bare.unpack_bare(payload, budget)
+    bitstream = replace(bitstream, n_bytes=size)
+    if "container" not in header:
+        if video != bare.NO_TRACKS:
+            raise corrupt("it has a video that its header does not describe")
+        return bitstream
+    check_tables(video[slice(*layout.moov)], layout.video_end)
+    _check_track(header.object("container"), inspect(video, budget))
+    return replace(bitstream, video=video)
+
+
+def _check_track(container: JsonObject, track: Track) -> None:
+    """Raise `CorruptFile` unless the video is the one that the header describes."""
     if container.integer("video_crc32", 0, MAX_CRC) != track.checksum:
         raise corrupt("its video is damaged, or was re-encoded")
     if container.integer("track_crc32", 0, MAX_CRC, track.configuration) != track.configuration:
         raise corrupt("the description of its video is damaged")
-    return replace(bitstream, video=video, n_bytes=size)
 
 
 def _is_tagged(file: IO[bytes], layout: _Layout) -> bool:

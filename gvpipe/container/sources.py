@@ -95,5 +95,24 @@ class FileSource:
         return data
 
 
+class BytesSource:
+    """A file in memory.
+
+    Args:
+        data: its bytes.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self.size = len(data)
+
+    def read(self, offset: int, length: int) -> bytes:
+        """Return bytes ``offset`` to ``offset + length``; raises `TruncatedFile` if there are fewer."""
+        data = self._data[offset : offset + length]
+        if len(data) != length:
+            raise TruncatedFile(f"it ends at byte {self.size}, {length} from {offset} on are needed")
+        return data
+
+
 def _state(found: os.stat_result) -> tuple[int, int, int]:
     return found.st_size, found.st_mtime_ns, found.st_ino

@@ -18,8 +18,8 @@ FRAGMENTS = "+frag_keyframe+delay_moov+default_base_moof+skip_trailer"
 LEAST_PICTURES = 16  # of a fragment, the last apart: each costs 100 bytes
 
 
-def remux(video: bytes, tag: str) -> bytes:
-    """Copy the video's one track, unchanged, into a file that carries the tag and whose index comes first.
+def remux(video: bytes, tag: str = "") -> bytes:
+    """Copy the video's one track, unchanged, into a file that carries the tag, if there is one, and whose index comes first.
 
     In memory, where the video is already: a file that PyAV writes itself stays open, and its disk space taken, if the
     last write to it fails. What no player needs is left out: bit rates, the handler's name, the edit list where each picture
@@ -53,7 +53,8 @@ def _copy(video: bytes, tag: str, options: dict[str, str], least: int = 0) -> by
         if least and packets and packets[0].duration and packets[0].time_base:
             options["min_frag_duration"] = str(int(least * packets[0].duration * packets[0].time_base * 1_000_000))
         with av.open(result, "w", format="mp4", options=options, io_open=reopen) as target:
-            target.metadata[TAG] = TAG_PREFIX + tag
+            if tag:
+                target.metadata[TAG] = TAG_PREFIX + tag
             copy = target.add_stream_from_template(track)
             for packet in packets:
                 packet.stream = copy

@@ -40,8 +40,9 @@ def shape(ratio: int) -> Int64:
     return np.array(frequencies, np.int64)
 
 
+@functools.cache
 def table(zero: int, ratio: int) -> Int64:
-    """Return frequencies ``(N_TOKENS,)`` for ``zero`` in 0..255 and the ratio of that index.
+    """Return frequencies ``(N_TOKENS,)`` for ``zero`` in 0..255 and the ratio of that index; they must not be changed.
 
     Examples:
         >>> table(128, 10)[:3].tolist()
@@ -49,6 +50,7 @@ def table(zero: int, ratio: int) -> Int64:
     """
     frequencies = np.maximum(1, shape(ratio) * (ZEROS - zero) // ZEROS)
     frequencies[0] = max(1, TOTAL * zero // ZEROS)
+    frequencies.flags.writeable = False
     return frequencies
 
 

@@ -12,6 +12,8 @@ Source: Bamler, "Understanding Entropy Coding With Asymmetric Numeral Systems", 
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from gvpipe.arrays import Float64, Int64, UInt32, UInt64
@@ -22,6 +24,7 @@ TOTAL = 1 << PRECISION
 WORD = np.uint64(32)
 SHIFT = np.uint64(PRECISION)
 ONE = np.uint64(1)
+KEPT = 4096  # tables, of at most 700 bytes
 
 
 def start(words: UInt32) -> UInt64:
@@ -37,8 +40,19 @@ def may_be_exhausted(state: UInt64, words: UInt32) -> bool:
 
 
 def edges_of(table: Int64) -> UInt64:
-    """`edges_of_weights` of frequencies, which constriction is given as shares of their sum."""
-    return edges_of_weights(table.astype(np.float64) / float(table.sum())) if len(table) else np.zeros(1, np.uint64)
+    """`edges_of_weights` of frequencies ``(n,)``, which constriction is given as shares of their sum."""
+    return _edges(table.tobytes())
+
+
+@functools.lru_cache(KEPT)
+def _edges(table: bytes) -> UInt64:
+    """The same of int64 frequencies; short files have many tables in common."""
+    frequencies = np.frombuffer(table, np.int64)
+    if not len(frequencies):
+        return np.zeros(1, np.uint64)
+    edges = edges_of_weights(frequencies.astype(np.float64) / float(frequencies.sum()))
+    edges.flags.writeable = False
+    return edges
 
 
 def edges_of_weights(weights: Float64) -> UInt64:

@@ -103,8 +103,6 @@ class Trials:
         codec = cast("Codec", dataclasses.replace(cast("DataclassInstance", self.codec), quality=quality))
         encoded = encode_sequence(codec, self._sequence, self._progress, memo)
         bitstream = encoded.bitstream
-        if not bitstream.video:
-            bitstream = dataclasses.replace(bitstream, video=memo("poster", lambda: poster_of(self._sequence)))
         report("measure", 0.0)
         reader = open_reader(bitstream)
         reference = self._sequence.reordered(encoded.permutation, reader.faces)
@@ -116,7 +114,8 @@ class Trials:
         if self._asset is not None:
             report("asset", 0.0)
             bitstream = self._asset.add(dataclasses.replace(encoded, bitstream=bitstream), codec, is_final=False)
-        size = file_size(bitstream)
+        video = bitstream.video or memo("poster", lambda: poster_of(self._sequence))
+        size = file_size(dataclasses.replace(bitstream, video=video))
         report("measure", 1.0)
         bpvf = 8 * size / (bitstream.n_vertices * bitstream.n_frames)
         return Trial(codec, size, bpvf, errors, Encoded(bitstream, encoded.permutation))

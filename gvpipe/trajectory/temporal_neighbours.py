@@ -10,10 +10,13 @@ Vector A f + a is axis a of frame f, of A axes: three of positions, any number o
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from gvpipe.trajectory.causal_order import CausalOrder
 
+KEPT = 8  # orders: segments and short files have few lengths
 MAX_NEIGHBOURS = 6  # frames that predict a frame
 VARIANCE = 0.02  # prior variance of a weight
 MIN_BLOCK = 48  # vectors coded at once, at least
@@ -22,8 +25,9 @@ LINEAR = {-1: 0.5, 1: 0.5}
 OFFSETS = (-1, 1, -3, 3, -2, -5, 5, -4)  # frames that may be decoded, those that predict best first
 
 
+@functools.lru_cache(KEPT)
 def temporal_order(n_frames: int, n_axes: int = 3) -> CausalOrder:
-    """Return the order of the A F vectors of ``n_frames`` frames with A axes.
+    """Return the order of the A F vectors of ``n_frames`` frames with A axes; it must not be changed.
 
     Examples:
         >>> (temporal_order(5).order[::3] // 3).tolist()

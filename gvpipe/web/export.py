@@ -21,7 +21,7 @@ from typing import Any
 
 from gvpipe.atomic import unnamed_path
 from gvpipe.codec import Progress
-from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.bitstream import BARE, STREAM, Bitstream
 from gvpipe.container.mp4 import file_bytes
 from gvpipe.container.sources import check_target, is_url
 from gvpipe.errors import InputError, OutputError
@@ -30,6 +30,7 @@ from gvpipe.quality_scale import error_of, quality_of
 from gvpipe.rate_control.purposes import SERVES, WEB
 from gvpipe.rate_control.trials import Trial, Trials
 from gvpipe.registry import browser_obstacle, make_codec
+from gvpipe.rendering.poster import poster_of
 from gvpipe.web.asset_export import carry_asset
 
 SUFFIXES = (".html", ".htm")
@@ -105,7 +106,7 @@ def export_html(
         up = player.metadata.up_axis if player.metadata.up_axis in AXES else "y"
     obstacle = browser_obstacle(player.bitstream)
     if not obstacle and not convert:
-        data = file_bytes(player.bitstream) if is_url(player.path) else Path(player.path).read_bytes()
+        data = Path(player.path).read_bytes() if player.bitstream.layout != BARE and not is_url(player.path) else _plain(player)
         return _write_page(player.path, data, target, up)
     trial = _convert(player, QUALITY if quality is None else quality, progress)
     remaining = browser_obstacle(trial.bitstream)
@@ -113,11 +114,19 @@ def export_html(
         raise InputError(f"the web player does not read {remaining} yet; use an older gvpipe to convert")
     x, y, z = player.bitstream.origin
     bitstream = carry_asset(player, trial.encoded, trial.codec)
-    page = _write_page(player.path, file_bytes(replace(bitstream, origin=(x, y, z))), target, up)
+    video = bitstream.video or poster_of(player.sequence())
+    page = _write_page(player.path, file_bytes(replace(bitstream, origin=(x, y, z), video=video)), target, up)
     added = trial.errors
     return ExportReport(
         page.bytes, page.video_bytes, obstacle or _kind(player.bitstream), added.rmse_diag, added.max_diag, added.kg
     )
+
+
+def _plain(player: Player) -> bytes:
+    """A geometry video as a file of the plain layout."""
+    video = player.bitstream.video or poster_of(player.sequence())
+    bitstream = player.bitstream if player.bitstream.layout == STREAM else replace(player.bitstream, video=video, is_bare=False)
+    return file_bytes(bitstream)
 
 
 def _kind(bitstream: Bitstream) -> str:

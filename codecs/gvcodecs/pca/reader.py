@@ -11,7 +11,7 @@ import numpy as np
 
 from gvcodecs.pca.header import Header
 from gvpipe.arrays import Float32, Int32
-from gvpipe.connectivity.topology_only import read_mesh
+from gvpipe.connectivity.topology_only import Topology, read_mesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import InputError
@@ -40,11 +40,10 @@ class PcaReader:
 
     def __init__(self, bitstream: Bitstream) -> None:
         self._header = Header.of(bitstream)
-        self._mesh, self._bitstream = read_mesh(bitstream), bitstream
-        keep_hierarchy(bitstream.budget, self._mesh.n_points, len(self._mesh.point_faces))
-        self._hierarchy = build_hierarchy(self._mesh.point_faces, self._mesh.n_points)
+        self._bitstream = bitstream
+        self._mesh, self._hierarchy, order = _read_connectivity(bitstream, self._header.predictor)
         self._still = read_still(bitstream, self._mesh)
-        self._causal = leave_out(causal_order(self._hierarchy, self._header.predictor), self._still.flags)
+        self._causal = leave_out(order, self._still.flags)
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
         self._kept: tuple[tuple[int, int], Segment] | None = None  # segment and level, which has its own points alone
 
@@ -136,6 +135,22 @@ class PcaReader:
     def _check_level(self, lod: int) -> None:
         if not 0 <= lod < len(self.levels):
             raise InputError(f"level {lod}: there are levels 0..{len(self.levels) - 1}")
+
+
+def _read_connectivity(bitstream: Bitstream, predictor: str) -> tuple[Topology, Hierarchy, CausalOrder]:
+    """What follows from connectivity alone; files of a data set that have the same bytes there share it."""
+
+    def read() -> tuple[Topology, Hierarchy, CausalOrder]:
+        mesh = read_mesh(bitstream)
+        keep_hierarchy(bitstream.budget, mesh.n_points, len(mesh.point_faces))
+        hierarchy = build_hierarchy(mesh.point_faces, mesh.n_points)
+        return mesh, hierarchy, causal_order(hierarchy, predictor)
+
+    if bitstream.shared is None:
+        return read()
+    found = bitstream.shared(f"pca {predictor}", (bitstream.section("mesh"), bitstream.section("order")), read)
+    bitstream.check_size(len(found[0].points), len(found[0].faces))
+    return found
 
 
 def causal_order(hierarchy: Hierarchy, predictor: str) -> CausalOrder:

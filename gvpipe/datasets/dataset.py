@@ -1,0 +1,238 @@
+"""Sequences of shards at random, without unpacking: where each lies is read once, and each read is one of the disk.
+
+Nothing is open between two reads, so that threads, forked processes and pickled copies read side by side.
+"""
+
+from __future__ import annotations
+
+import json
+import operator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gvpipe.arrays import Float32, Int32
+from gvpipe.codec import ClosableReader, FrameReader, LevelReader
+from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.mp4 import read_bytes
+from gvpipe.container.sources import FileSource
+from gvpipe.datasets.shard_index import Place, Sample, index_shard
+from gvpipe.errors import FormatError, InputError, corrupt, in_file, quote
+from gvpipe.player import Player
+from gvpipe.registry import open_reader
+from gvpipe.shared_parts import SharedParts
+
+ALL = slice(None)
+MAX_JSON = 1 << 24  # bytes of a sample's description
+MAX_VIDEO = 1 << 32  # bytes of a sample's video
+
+
+class Dataset:
+    """Sequences by number or by key; a map-style data set of PyTorch as it is.
+
+    ``dataset[3]`` and ``dataset["cats/walk"]`` give samples (`Samples`). Thread-safe; a forked process goes on with it;
+    pickled, it takes its index along, so that a spawned process reads no headers again.
+
+    Args:
+        shards: paths of tar files, absolute.
+        unlimited: as for `gvpipe.open`, of every file in it.
+
+    Raises:
+        InputError: there is no such shard, or two samples have one key.
+        FormatError: a shard is cut or damaged; the message names shard, sample and byte.
+    """
+
+    def __init__(self, shards: Sequence[str], *, unlimited: bool = False) -> None:
+        self.shards = list(shards)
+        self._unlimited = unlimited
+        self._sources = [_source(path) for path in self.shards]
+        self._places: list[tuple[int, Sample]] = []
+        for k, path in enumerate(self.shards):
+            self._places += [(k, sample) for sample in index_shard(path)]
+        self._numbers: dict[str, int] = {}
+        for number, (k, sample) in enumerate(self._places):
+            first = self._numbers.setdefault(sample.key, number)
+            if first != number:
+                raise InputError(f"sample {sample.key!r} is in {self.shards[self._places[first][0]]} and in {self.shards[k]}")
+        self._shared = SharedParts()
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __getitem__(self, sample: int | str) -> Any:
+        return self.samples()[sample]
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        return iter(self.samples())
+
+    def __repr__(self) -> str:
+        return f"<Dataset of {len(self)} sequences in {len(self.shards)} shards>"
+
+    @property
+    def keys(self) -> list[str]:
+        """The key of each sample."""
+        return list(self._numbers)
+
+    def read(self, sample: int | str, frames: slice = ALL, lod: int = 0) -> Float32:
+        """Return positions of a sequence: ``(n, V, 3) float32``, model units, relative to its origin.
+
+        Args:
+            sample: its number or its key.
+            frames: which, such as ``slice(0, 8)``; it may go backwards, and have steps.
+            lod: level of detail: 0 is the mesh, higher ones are coarser, down to the coarsest that the sequence has.
+
+        Raises:
+            IndexError, KeyError: there is no such sample.
+            FormatError: the sample is cut or damaged.
+        """
+        return self._decode(self.number(sample), frames, lod, False)[0]
+
+    def faces(self, sample: int | str, lod: int = 0) -> Int32:
+        """Return the triangles of a sequence, ``(T, 3) int32``, at a level of detail as `read` takes it."""
+        return self._decode(self.number(sample), slice(0, 0), lod, True)[1]
+
+    def description(self, sample: int | str) -> dict[str, Any]:
+        """Return the JSON object of a sample; empty if it has none."""
+        number = self.number(sample)
+        with in_file(self._name(number)):
+            place = self._places[number][1].description
+            if not place.length:
+                return {}
+            try:
+                found = json.loads(self._bytes(number, place, MAX_JSON))
+            except (ValueError, RecursionError) as exc:
+                raise corrupt(f"its description is not JSON ({exc})") from exc
+            if not isinstance(found, dict):
+                raise corrupt("its description is no JSON object")
+            return found
+
+    def open(self, sample: int | str) -> Player:
+        """Open a sequence with all that it has, as `gvpipe.open` does."""
+        number = self.number(sample)
+        return Player(self._name(number), unlimited=self._unlimited, data=self._video(number))
+
+    def bitstream(self, sample: int | str) -> Bitstream:
+        """Return the coded sequence, whose checksums hold."""
+        number = self.number(sample)
+        bitstream = read_bytes(self._video(number), self._name(number), self._unlimited)
+        return replace(bitstream, shared=self._shared)
+
+    def samples(self, frames: slice = ALL, lod: int = 0, transform: Callable[[dict[str, Any]], Any] | None = None) -> Samples:
+        """The same sequences, of which samples have some frames or a coarser mesh, or are transformed."""
+        return Samples(self, frames, lod, transform)
+
+    def batches(
+        self, size: int, frames: slice = ALL, lod: int = 0, *, seed: int | None = None
+    ) -> Iterator[list[dict[str, Any]]]:
+        """Yield all samples, ``size`` at a time; with a seed, in the random order that follows from it.
+
+        Raises:
+            InputError: the size is below 1.
+        """
+        if size < 1:
+            raise InputError(f"a batch of {size} samples; give 1 or more")
+        order = np.arange(len(self)) if seed is None else np.random.default_rng(seed).permutation(len(self))
+        samples = self.samples(frames, lod)
+        return ([samples[int(k)] for k in order[at : at + size]] for at in range(0, len(self), size))
+
+    def number(self, sample: int | str) -> int:
+        """The number of a sample, from 0, by its number (negative: from the end) or its key; raises IndexError, KeyError."""
+        if isinstance(sample, str):
+            if sample not in self._numbers:
+                raise KeyError(f"no sample {quote(sample)}; there are {len(self)}, see Dataset.keys")
+            return self._numbers[sample]
+        number = operator.index(sample)
+        if not -len(self) <= number < len(self):
+            raise IndexError(f"sample {number}: there are {len(self)}")
+        return number % len(self)
+
+    def _decode(self, number: int, frames: slice, lod: int, with_faces: bool) -> tuple[Float32, Int32, Bitstream]:
+        bitstream = self.bitstream(number)
+        with in_file(self._name(number)):
+            reader = open_reader(bitstream)
+            try:
+                lod = _clip_level(reader, lod)
+                positions = _read(reader, bitstream.n_frames, frames, lod)
+                faces = _faces(reader, lod) if with_faces else np.zeros((0, 3), np.int32)
+            finally:
+                if isinstance(reader, ClosableReader):
+                    reader.close()
+        if with_faces and not lod and "asset" in bitstream.sections:  # its parts have an order of their own
+            faces = self.open(number).faces
+        return positions, faces, bitstream
+
+    def _video(self, number: int) -> bytes:
+        with in_file(self._name(number)):
+            return self._bytes(number, self._places[number][1].video, MAX_VIDEO)
+
+    def _bytes(self, number: int, place: Place, most: int) -> bytes:
+        if place.length > most:
+            raise corrupt(f"the member at byte {place.offset} has {place.length} bytes, above {most}")
+        try:
+            return self._sources[self._places[number][0]].read(*place)
+        except FormatError as exc:
+            raise type(exc)(f"byte {place.offset} of the shard: {exc}") from exc
+
+    def _name(self, number: int) -> str:
+        """A sample in messages: its shard and its key."""
+        shard, sample = self._places[number]
+        return f"{self.shards[shard]}, sample {sample.key!r} at byte {sample.video.offset}"
+
+
+class Samples:
+    """A map-style data set: ``samples[k]`` is ``{"key", "positions", "faces", "fps"}``, or what ``transform`` makes of it.
+
+    Positions are ``(n, V, 3) float32``, faces ``(T, 3) int32``. It goes to ``torch.utils.data.DataLoader`` as it is.
+
+    Args:
+        dataset: of the sequences.
+        frames, lod: as for `Dataset.read`.
+        transform: called with each sample.
+    """
+
+    def __init__(
+        self, dataset: Dataset, frames: slice = ALL, lod: int = 0, transform: Callable[[dict[str, Any]], Any] | None = None
+    ) -> None:
+        self._dataset, self._frames, self._lod, self._transform = dataset, frames, lod, transform
+
+    def __len__(self) -> int:
+        return len(self._dataset)
+
+    def __getitem__(self, sample: int | str) -> Any:
+        number = self._dataset.number(sample)
+        positions, faces, bitstream = self._dataset._decode(number, self._frames, self._lod, True)
+        key = self._dataset._places[number][1].key
+        found = {"key": key, "positions": positions, "faces": faces, "fps": bitstream.fps}
+        return found if self._transform is None else self._transform(found)
+
+    def __iter__(self) -> Iterator[Any]:
+        return (self[k] for k in range(len(self)))
+
+
+def _source(path: str) -> FileSource:
+    try:
+        return FileSource(path)
+    except OSError as exc:
+        raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check the path and its permissions") from exc
+
+
+def _clip_level(reader: FrameReader, lod: int) -> int:
+    if lod < 0:
+        raise InputError(f"no level of detail {lod}; 0 is the mesh, higher ones are coarser")
+    return min(lod, len(reader.levels) - 1) if lod and isinstance(reader, LevelReader) else 0
+
+
+def _read(reader: FrameReader, n_frames: int, frames: slice, lod: int) -> Float32:
+    """The frames of a slice, which are read as one span."""
+    wanted = range(*frames.indices(n_frames))
+    start, stop = (min(wanted[0], wanted[-1]), max(wanted[0], wanted[-1]) + 1) if wanted else (0, 0)
+    positions = reader.read(start, stop, lod=lod) if lod and isinstance(reader, LevelReader) else reader.read(start, stop)
+    return positions if wanted.step == 1 or not wanted else positions[[k - start for k in wanted]]
+
+
+def _faces(reader: FrameReader, lod: int) -> Int32:
+    """Triangles that are the caller's own: readers may share theirs."""
+    faces = reader.level_faces(lod) if lod and isinstance(reader, LevelReader) else reader.faces
+    return faces.copy()

@@ -1,0 +1,44 @@
+"""The paths of shards, and a data set of them."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Sequence
+
+from gvpipe.arguments import StrPath, check_path
+from gvpipe.container.sources import check_source
+from gvpipe.datasets.dataset import Dataset
+from gvpipe.errors import InputError
+from gvpipe.io.numbering import natural_key
+
+
+def open(shards: StrPath | Sequence[StrPath], *, unlimited: bool = False) -> Dataset:
+    """Open a data set: ``"shard-*.tar"``, one shard, or a list of those.
+
+    Args:
+        shards: paths, or globs. Shards of a glob come in natural order.
+        unlimited: as for `gvpipe.open`, of every file in it.
+
+    Raises:
+        InputError: there is no such shard, or two samples have one key.
+        FormatError: a shard is cut or damaged; the message names shard, sample and byte.
+        TypeError: it is no path.
+    """
+    return Dataset(find_shards(shards), unlimited=unlimited)
+
+
+def find_shards(shards: StrPath | Sequence[StrPath]) -> list[str]:
+    """The paths that are meant, absolute, each once; raises `InputError` where there are none."""
+    given = shards if isinstance(shards, list | tuple) else [shards]
+    found: list[str] = []
+    for one in given:
+        path = os.fspath(check_path(one, "the shards", "a list of paths or "))
+        check_source(path)
+        matches = [path] if os.path.exists(path) else sorted(glob.glob(path), key=natural_key)
+        if not matches:
+            raise InputError(f"{path}: no such shard; check the path")
+        found += map(os.path.abspath, matches)
+    if not found:
+        raise InputError("the list of shards is empty; give at least one")
+    return list(dict.fromkeys(found))
