@@ -23,6 +23,7 @@ import click
 from gvpipe import __version__
 from gvpipe.cli.console import Output, is_verbose, output_options, print_options, unlimited_option
 from gvpipe.cli.conversion import convert
+from gvpipe.cli.encode_all import encode_all
 from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_pairs
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.cli.process import Ended, ending_by_exception, replace_closed_streams
@@ -87,8 +88,18 @@ def cli() -> None:
 @click.argument("target", metavar="OUTPUT.mp4")
 @encode_options
 @click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.mp4, ...")
+@click.option("--workers", type=int, metavar="N", help="Code segments in N processes: same bytes. Not for codec mcgv.")
+@click.option("--scheduler", metavar="ADDRESS", help="Code them on a Dask cluster, such as tcp://host:8786.")
 @output_options
-def encode(sources: tuple[str, ...], target: str, split: bool, out: Output, **options: Any) -> None:
+def encode(
+    sources: tuple[str, ...],
+    target: str,
+    split: bool,
+    workers: int | None,
+    scheduler: str | None,
+    out: Output,
+    **options: Any,
+) -> None:
     """Encode a mesh sequence as a geometry video.
 
     INPUT is an .npz (vertices (F,V,3), faces (T,3), fps), a scene (animated .glb or .gltf, .usd, .abc, .fbx), a simulation
@@ -107,6 +118,9 @@ def encode(sources: tuple[str, ...], target: str, split: bool, out: Output, **op
         raise click.UsageError("- is one input among others; give it alone", click.get_current_context())
     if split and target == PIPE:
         raise click.UsageError("--split writes several files, and OUTPUT is -; give a file's name", click.get_current_context())
+    if (workers is not None or scheduler is not None) and (split or PIPE in sources):
+        message = "--workers and --scheduler read INPUT by its path, as a whole; leave out --split, and name no -"
+        raise click.UsageError(message, click.get_current_context())
     asked = parse_encoding(options)
     give_back_large_arrays()
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
@@ -117,7 +131,7 @@ def encode(sources: tuple[str, ...], target: str, split: bool, out: Output, **op
                 runs, target, lambda run, own: api.encode(run.sequence, own, asked.codec, progress, **asked.making)
             )
         else:
-            report = api.encode(source, path, asked.codec, progress, **asked.keywords)
+            report = api.encode(source, path, asked.codec, progress, **asked.keywords, workers=workers, scheduler=scheduler)
     out = out.carrying(target)
     name = shown(sources[0], STDIN) + (f" and {len(sources) - 1} more" if len(sources) > 1 else "")
     if not split:
@@ -346,6 +360,7 @@ def _same_frames(read: Callable[..., MeshSequence], span: tuple[int, int | None]
 
 
 cli.add_command(convert)
+cli.add_command(encode_all)
 
 
 @cli.command("export-html")
