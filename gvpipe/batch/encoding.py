@@ -91,6 +91,8 @@ def hash_input(source: str, mesh: str | None = None) -> str:
     """
     digest = hashlib.sha256()
     files = [source] if os.path.exists(source) else sorted(glob.glob(source))
+    if not files:
+        raise InputError(f"{source}: no such file; it has gone since the sequences were listed")
     if len(files) == 1 and mesh is None:
         _add(digest, files[0])
         return digest.hexdigest()

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gvpipe.arguments import StrPath, check_path
-from gvpipe.container.sources import check_source, check_target, is_url
+from gvpipe.container.sources import check_source, check_target
 from gvpipe.errors import InputError
 from gvpipe.io import READERS
 from gvpipe.io.formats import FRAME_FORMATS
@@ -53,11 +53,11 @@ def find_jobs(sources: Sequence[StrPath], folder: StrPath) -> Found:
 
     Args:
         sources: globs such as ``captures/**/*.glb``, folders, with all below them, or files. Geometry videos count where a
-            glob or a name asks for them, files below ``folder`` never.
+            glob or a name asks for them, those below ``folder`` never.
         folder: of the outputs.
 
     Raises:
-        InputError: nothing is found, two sequences would become one file, or a file would replace its input.
+        InputError: nothing is found, or two sequences would become one file.
     """
     check_target(folder)
     own = os.path.realpath(folder)
@@ -66,13 +66,11 @@ def find_jobs(sources: Sequence[StrPath], folder: StrPath) -> Found:
     for given in sources:
         source = os.fspath(check_path(given, "an input"))
         check_source(source)
-        if is_url(source):
-            raise InputError(f"{source}: addresses are not listed; give files, folders or globs")
         n_before = len(jobs) + len(left_out)
         root, files = _list(source)
         for file in files:
-            if os.path.realpath(file).startswith(own + os.sep):
-                continue
+            if file.lower().endswith(VIDEO_SUFFIXES) and os.path.realpath(file).startswith(own + os.sep):
+                continue  # an output of another run
             job = _job(root, file)
             if job is None:
                 left_out.append(file)
@@ -153,8 +151,6 @@ def _add(jobs: dict[str, Job], job: Job, folder: str) -> None:
             f"{other.source} and {job.source} would both become {os.path.join(folder, job.output)}; "
             "encode them into different folders"
         )
-    if os.path.realpath(job.source) == os.path.realpath(os.path.join(folder, job.output)):
-        raise InputError(f"{job.source} would be replaced with a coarser copy; choose another folder for the outputs")
 
 
 def _is_same(one: str, other: str) -> bool:

@@ -49,6 +49,7 @@ def encode_all(
     out.text(f"{report.sequences} sequences: {counts}; {report.bytes / 1e6:.2f} MB in {report.seconds:.1f} s")
     out.text(f"manifest: {report.manifest}")
     for failed in report.failed:
-        click.echo(f"Error: {failed['input']}: {failed['error'].removeprefix(failed['input'] + ': ')}", err=True)
+        name, error = failed["input"], failed["error"]
+        click.echo(f"Error: {error if error.startswith(name) else f'{name}: {error}'}", err=True)
     if report.failed:
         click.get_current_context().exit(1)
