@@ -22,7 +22,7 @@ from gvpipe.batch.manifest import Entry, Manifest, open_manifest
 from gvpipe.codec import Codec, Progress
 from gvpipe.rate_control.purposes import own_settings
 from gvpipe.tasks.choice import open_executor
-from gvpipe.tasks.executor import ATTEMPTS, Executor, Outcome, WorkerDied
+from gvpipe.tasks.executor import Executor, Outcome, WorkerDied
 
 STAGE = "sequences"
 
@@ -178,7 +178,5 @@ def _done(outcome: Outcome) -> Done:
         return outcome.value
     error = outcome.error
     if isinstance(error, WorkerDied):
-        return Done(
-            None, f"{error}, {ATTEMPTS} times; give it more memory (fewer --workers), or fewer frames (--frames)", 0, 0.0
-        )
+        return Done(None, f"{error}; give it more memory (fewer --workers), or fewer frames (--frames)", 0, 0.0)
     return Done(None, " ".join(str(error).split()), 0, 0.0)

@@ -14,14 +14,14 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from gvpipe.errors import InputError
-from gvpipe.tasks.executor import ATTEMPTS, Outcome, Prepare, Work, WorkerDied
+from gvpipe.tasks.executor import Outcome, Prepare, Work, WorkerDied
 
 PACKAGE = "gvpipe"
 EXTRA = "a scheduler needs the packages dask and distributed: pip install 'gvpipe[cluster]'"
 TIMEOUT = 10.0  # seconds until a scheduler answers, and until it has a worker
 AHEAD = 2  # tasks in flight for each thread of the cluster, so that none waits for this process
 LARGE = "1 TiB"  # of a task graph, before Dask warns; ours hold what segments share, once
-CONFIG = {"distributed.admin.large-graph-warning-threshold": LARGE, "distributed.scheduler.allowed-failures": ATTEMPTS - 1}
+CONFIG = {"distributed.admin.large-graph-warning-threshold": LARGE}
 
 
 class Cluster:
@@ -74,7 +74,7 @@ class Cluster:
         if error is None:
             return Outcome(index, future.result())
         if isinstance(error, KilledWorker):
-            return Outcome(index, None, WorkerDied("its workers died; the cluster's logs say of what"))
+            return Outcome(index, None, WorkerDied("workers died of it one after the other; their logs say how"))
         if isinstance(error, ImportError):
             raise InputError(
                 f"a worker of {self._address} lacks {error.name or error}; install the same gvpipe there"

@@ -141,7 +141,7 @@ def _serve(slot: _Slot, first: bytes, waiting: deque[tuple[int, Any]], ended: qu
                 outcome = _outcome(index, slot.ask(pickle.dumps((TASK, task), PROTOCOL)))
                 break
             except WorkerDied as exc:
-                outcome = Outcome(index, None, exc)
+                outcome = Outcome(index, None, WorkerDied(f"{exc}, {ATTEMPTS} times"))
             except Exception as exc:  # no process starts; the others' tasks go on
                 outcome = Outcome(index, None, exc)
                 break

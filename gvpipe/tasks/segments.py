@@ -15,7 +15,7 @@ from typing import Any
 from gvpipe.errors import GvpipeError, InputError
 from gvpipe.segment_map import Report
 from gvpipe.sequence import MeshSequence
-from gvpipe.tasks.executor import ATTEMPTS, Executor, Outcome, Work, WorkerDied
+from gvpipe.tasks.executor import Executor, Outcome, Work, WorkerDied
 
 PROTOCOL = 5  # of pickle
 SEQUENCE = "sequence"  # its name in pickles
@@ -101,7 +101,7 @@ def _value(outcome: Outcome, n_tasks: int) -> Any:
     if error is None:
         return outcome.value
     if isinstance(error, WorkerDied):
-        raise InputError(f"segment {outcome.index + 1} of {n_tasks}, tried {ATTEMPTS} times: {error}; {REMEDY}") from error
+        raise InputError(f"segment {outcome.index + 1} of {n_tasks}: {error}; {REMEDY}") from error
     if isinstance(error, GvpipeError):
         raise InputError(f"on a worker: {error}") from error
     raise error

@@ -72,7 +72,7 @@ def test_failures_stop_nothing_and_the_rest_is_resumed(inputs: Path, tmp_path: P
     assert (first.sequences, first.encoded, first.skipped) == (4, 2, 0)
     assert {Path(each["input"]).name: each["error"] for each in first.failed} == {
         "bad.npz": "in/bad.npz is not an .npz archive, or is cut short; write it again with numpy.savez",
-        "deadly.npz": "its process was ended, 3 times; give it more memory (fewer --workers), or fewer frames (--frames)",
+        "deadly.npz": "its process was ended; give it more memory (fewer --workers), or fewer frames (--frames)",
     }
     entry = next(each for each in lines(out) if each["input"] == "in/more/b.npz")
     gvpipe.encode(inputs / "more" / "b.npz", tmp_path / "alone.mp4", "pca", quality=50)

@@ -29,7 +29,7 @@ def test_tasks_errors_and_deaths(tmp_path: Path) -> None:
         5: "1",
     }
     assert isinstance(outcomes[1].error, InputError) and str(outcomes[1].error) == "no b"
-    assert isinstance(outcomes[4].error, WorkerDied) and "SIGKILL" in str(outcomes[4].error)
+    assert isinstance(outcomes[4].error, WorkerDied) and "SIGKILL" in (said := str(outcomes[4].error)) and "3 times" in said
     assert again == ["then d"]
 
 
