@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from gvpipe.asset.material import Image, Material, Texture
     from gvpipe.asset.metadata import Metadata
     from gvpipe.asset.part import Part
+    from gvpipe.batch.runs import BatchReport, encode_all
     from gvpipe.errors import GvpipeError
     from gvpipe.metrics.comparison import Comparison, compare
     from gvpipe.player import Player
@@ -33,6 +34,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Attribute",
+    "BatchReport",
     "Camera",
     "Comparison",
     "ExportReport",
@@ -52,6 +54,7 @@ __all__ = [
     "compare",
     "decode",
     "encode",
+    "encode_all",
     "export_html",
     "info",
     "open",
@@ -68,6 +71,7 @@ _HOMES = {
     "gvpipe.asset.material": ("Image", "Material", "Texture"),
     "gvpipe.asset.metadata": ("Metadata",),
     "gvpipe.asset.part": ("Part",),
+    "gvpipe.batch.runs": ("BatchReport", "encode_all"),
     "gvpipe.errors": ("GvpipeError",),
     "gvpipe.metrics.comparison": ("Comparison", "compare"),
     "gvpipe.player": ("Player",),

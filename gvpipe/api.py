@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -28,9 +29,13 @@ from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
 from gvpipe.rate_control.search import meet
 from gvpipe.rate_control.targets import Target, parse_bound
 from gvpipe.rate_control.trials import Trial
-from gvpipe.registry import encode_sequence, make_codec, segment_parts
+from gvpipe.registry import check_mapped, encode_sequence, make_codec, segment_parts
 from gvpipe.rendering.poster import poster_of
+from gvpipe.segment_map import segments_mapped_by
 from gvpipe.sequence import MeshSequence
+from gvpipe.tasks.choice import open_executor
+from gvpipe.tasks.executor import Executor
+from gvpipe.tasks.segments import RemoteSegments
 
 COSTLY_VERTEX = 400  # bytes of memory, with its triangles: less than any codec takes
 COSTLY_ATTRIBUTES = 4000  # bytes of memory, of a vertex with attributes of 40 components in all
@@ -45,7 +50,9 @@ if TYPE_CHECKING:
 Source = StrPath | Sequence[StrPath]
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
 ASSET = ("attributes", "fields", "textures", "clip", "mesh", "frames", "unlimited")
-KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", "stream", "bare", *ASSET)  # of `encode`
+ELSEWHERE = ("workers", "scheduler")
+LAYOUTS = ("stream", "bare")
+KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", *LAYOUTS, *ASSET, *ELSEWHERE)  # of `encode`
 
 
 @dataclass(frozen=True)
@@ -274,6 +281,8 @@ def encode(
     stream: bool = False,
     bare: bool = False,
     unlimited: bool = False,
+    workers: int | None = None,
+    scheduler: str | None = None,
     **settings: Any,
 ) -> Report:
     """Encode a sequence into a geometry video.
@@ -302,28 +311,30 @@ def encode(
         clip, mesh, frames, unlimited: as for `read`.
         stream: write the stream layout, which plays over HTTP while it loads (`restream`).
         bare: write the bare layout, for data sets: without poster and what else only players need.
+        workers: code segments in so many processes of this machine, with the same bytes. Codec ``mcgv`` cannot.
+        scheduler: code them on the Dask cluster of this address, such as ``"tcp://host:8786"``, whose workers read ``source``
+            at the same path (extra ``cluster``).
 
     Raises:
-        InputError: the source, a setting or the path cannot be used, or no quality meets the target.
+        InputError: the source, a setting or the path cannot be used, no quality meets the target, or a worker cannot work.
         OutputError: the file cannot be written; no part of it is left.
         TypeError: an argument of a type that is none of these.
     """
     from gvpipe.asset_coding.encoder import AssetCoder
 
     _check_output(path)
-    targets = {"target_rmse": target_rmse, "target_kg": target_kg, "target_bpvf": target_bpvf, "max_error": max_error}
-    if sum(value is not None for value in targets.values()) > 1:
-        raise SettingError(f"more than one target is given; choose one of {', '.join(targets)}")
-    if stream and bare:
-        raise SettingError("stream and bare are two layouts; choose one of them")
-    if (stream or bare) and target_bpvf is not None:
-        raise SettingError("target_bpvf counts the plain layout; encode to it, then change the layout by restream")
+    _check_wanted((target_rmse, target_kg, target_bpvf, max_error), stream, bare)
     given = _candidates(codec, settings, purpose)
+    if workers is not None or scheduler is not None:
+        check_mapped(given)
     clock = _StageClock(progress)
-    sequence = _open_source(source, path, fps, {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited})
-    target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
-    asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
-    coded = _code(sequence, given, target, asset, clock)
+    with open_executor(scheduler, workers) as executor:
+        options = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited}
+        sequence = _open_source(source, path, fps, options)
+        target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
+        asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
+        with _segments_coded_by(executor, sequence, source, {"fps": fps, **options}):
+            coded = _code(sequence, given, target, asset, clock)
     size, bitstream = _write(sequence, coded, path, clock, STREAM if stream else BARE if bare else PLAIN)
     clock("", 1.0)
     return Report(
@@ -532,6 +543,28 @@ def frame_range(video: Player | MeshSequence, start: int, stop: int | None) -> t
     return start, stop
 
 
+def checked_keywords(codec: str | Codec | Sequence[Codec] | None = None, **keywords: Any) -> dict[str, Any]:
+    """Keywords for `encode`, checked as far as can be without a sequence; a codec's settings become its settings object.
+
+    Raises:
+        SettingError, TypeError: as `encode`.
+    """
+    settings = {name: value for name, value in keywords.items() if name not in KEYWORDS}
+    others = {name: value for name, value in keywords.items() if name in KEYWORDS}
+    _check_wanted([others.get(name) for name in TARGETS], *(others.get(name, False) for name in LAYOUTS))
+    return {**others, "codec": _candidates(codec, settings, others.get("purpose"))}
+
+
+def _check_wanted(values: Sequence[float | str | None], stream: bool, bare: bool) -> None:
+    """Refuse more than one target, of `TARGETS`, or layout, and a target that does not go with the layout."""
+    if sum(value is not None for value in values) > 1:
+        raise SettingError(f"more than one target is given; choose one of {', '.join(TARGETS)}")
+    if stream and bare:
+        raise SettingError("stream and bare are two layouts; choose one of them")
+    if (stream or bare) and values[TARGETS.index("target_bpvf")] is not None:
+        raise SettingError("target_bpvf counts the plain layout; encode to it, then change the layout by restream")
+
+
 def _candidates(
     codec: str | Codec | Sequence[Codec] | None, settings: dict[str, Any], purpose: str | None
 ) -> Codec | Sequence[Codec]:
@@ -572,6 +605,29 @@ def _open_source(
     if _is_among(path, source):
         raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
     return read(source, fps, **options)
+
+
+@contextlib.contextmanager
+def _segments_coded_by(
+    executor: Executor | None, sequence: MeshSequence, source: MeshSequence | Source, options: dict[str, Any]
+) -> Iterator[None]:
+    """Let an executor code segments of a sequence that was read from ``source`` with the ``options`` of `read`."""
+    if executor is None:
+        yield
+        return
+    reopen = None if isinstance(source, MeshSequence) else partial(read, _absolute(source), **options)
+    if reopen and options["mesh"] is not None:
+        reopen = partial(reopen, mesh=_absolute(options["mesh"]))
+    with segments_mapped_by(RemoteSegments(executor, sequence, reopen)):
+        yield
+
+
+def _absolute(source: Source) -> Source:
+    """The same paths for processes whose current folder is another."""
+    if isinstance(source, list | tuple):
+        return [os.path.abspath(one) for one in source]
+    one = check_path(source, "the input")
+    return one if is_url(one) else os.path.abspath(one)
 
 
 def _target(

@@ -16,6 +16,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Iterator
+from typing import Any
 
 from gvpipe.errors import OverBudget
 
@@ -45,6 +46,14 @@ class Budget:
         self.memory = float("inf") if n_bytes is None else max(LEAST_BYTES, BYTES_PER_BYTE * n_bytes)
         self.seconds = float("inf") if n_bytes is None else max(LEAST_SECONDS, SECONDS_PER_BYTE * n_bytes)
         self._kept_memory, self._kept_seconds = 0.0, 0.0
+        self._lock = threading.Lock()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the lock, which no other process can have."""
+        return {name: value for name, value in self.__dict__.items() if name != "_lock"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
         self._lock = threading.Lock()
 
     def grow(self, n_bytes: int) -> None:

@@ -130,7 +130,8 @@ class Codec(Protocol):
 
     A class attribute ``holds = True``, after the section of that name, says that the codec never sees repeated frames: run
     lengths around it code them (`gvpipe.repeated_frames`). Its ``version`` then knows of them; ``holds_version`` names an older
-    one that does, too. A class attribute ``same_bits = False`` says that machines may decode slightly different positions.
+    one that does, too. A class attribute ``same_bits = False`` says that machines may decode slightly different positions, and
+    ``maps_segments = True`` that segments are coded by `gvpipe.segment_map.map_segments`, which may do it elsewhere.
     """
 
     id: ClassVar[str]

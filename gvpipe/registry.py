@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
@@ -125,6 +125,17 @@ def encode_sequence(
     encoded = codec.encode(holds.distinct(sequence), progress, memo)
     version = max(encoded.bitstream.version, getattr(codec, "holds_version", codec.version))
     return Encoded(add_repeated_frames(encoded.bitstream, holds, version), encoded.permutation)
+
+
+def check_mapped(codecs: Codec | Sequence[Codec]) -> None:
+    """Raise `SettingError` unless the segments of all these codecs can be coded elsewhere (`gvpipe.segment_map`)."""
+    for codec in [codecs] if isinstance(codecs, Codec) else codecs:
+        if not getattr(codec, "maps_segments", False):
+            others = [name for name in codec_ids() if getattr(codec_class(name), "maps_segments", False)]
+            raise SettingError(
+                f"codec {codec.id} fits all frames together, so workers cannot share them; choose codec {' or '.join(others)}, "
+                "or encode many sequences side by side (gvpipe encode-all)"
+            )
 
 
 @functools.cache

@@ -23,6 +23,8 @@ import click
 from gvpipe import __version__
 from gvpipe.cli.console import Output, is_verbose, output_options, print_options, unlimited_option
 from gvpipe.cli.conversion import convert
+from gvpipe.cli.encode_all import encode_all
+from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_pairs
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.cli.process import Ended, ending_by_exception, replace_closed_streams
 from gvpipe.errors import GvpipeError, InputError, TopologyChange
@@ -84,78 +86,19 @@ def cli() -> None:
 @cli.command()
 @click.argument("sources", metavar="INPUT...", nargs=-1, required=True)
 @click.argument("target", metavar="OUTPUT.mp4")
-@click.option("--codec", help="See `gvpipe codecs`; auto: the one with the smallest file. [default: mcgv; with --for, auto]")
-@click.option(
-    "--for",
-    "purpose",
-    type=click.Choice(["web", "archive", "stream"]),
-    help="What the file is for: browsers play it; the smallest; starts at once and jumps fast. [default: archive]",
-)
-@click.option(
-    "--quality",
-    type=float,
-    help="0-100, higher is better; with --target-bpvf and --max-error, where the search begins. [default: 75]",
-)
-@click.option("--target-rmse", type=float, metavar="X", help="Largest rmse, as a part of the diagonal, such as 1e-4.")
-@click.option("--target-kg", type=float, metavar="X", help="Largest KG error, percent, such as 0.1.")
-@click.option("--target-bpvf", type=float, metavar="X", help="Most bits per vertex and frame.")
-@click.option("--max-error", metavar="E", help="Bound for every vertex: model units, or 0.05% of the diagonal.")
-@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the codec; repeat for more.")
-@click.option("--segment", type=int, help="Most frames per segment. [default: 500]")
-@click.option("--fps", type=float, help="Frames per second, instead of the input's.")
-@click.option("--reorder", is_flag=True, help="Let the codec choose the vertex order: smaller.")
-@click.option(
-    "--attribute",
-    "attributes",
-    multiple=True,
-    metavar="NAME=BOUND",
-    help="Largest error of an attribute: a number (degrees for normals), 0.1% of its range, exact or none; repeat for more.",
-)
-@click.option(
-    "--field",
-    "fields",
-    multiple=True,
-    metavar="NAME=BOUND",
-    help="The same for an animated field; 0.1%,nan=keep keeps NaN as holes.",
-)
-@click.option("--clip", metavar="NAME", help="The animation to read, of a file that has several. [default: the first]")
-@click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
-@click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
+@encode_options
 @click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.mp4, ...")
-@click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp.")
-@click.option(
-    "--stream",
-    is_flag=True,
-    help="Write the stream layout: it plays over HTTP while it loads. --for stream chooses a codec that suits.",
-)
-@click.option("--bare", is_flag=True, help="Write the bare layout, for data sets: no poster, nothing that only players need.")
-@unlimited_option
+@click.option("--workers", type=int, metavar="N", help="Code segments in N processes: same bytes. Not for codec mcgv.")
+@click.option("--scheduler", metavar="ADDRESS", help="Code them on a Dask cluster, such as tcp://host:8786.")
 @output_options
 def encode(
     sources: tuple[str, ...],
     target: str,
-    codec: str | None,
-    purpose: str | None,
-    quality: float | None,
-    target_rmse: float | None,
-    target_kg: float | None,
-    target_bpvf: float | None,
-    max_error: str | None,
-    pairs: tuple[str, ...],
-    segment: int | None,
-    fps: float | None,
-    reorder: bool,
-    attributes: tuple[str, ...],
-    fields: tuple[str, ...],
-    clip: str | None,
-    mesh: str | None,
-    frames: str | None,
     split: bool,
-    textures: str | None,
-    stream: bool,
-    bare: bool,
-    unlimited: bool,
+    workers: int | None,
+    scheduler: str | None,
     out: Output,
+    **options: Any,
 ) -> None:
     """Encode a mesh sequence as a geometry video.
 
@@ -165,11 +108,8 @@ def encode(
     'walk/$F4.obj'), a geometry video, or - for an .npz or a geometry video on standard input. OUTPUT - is standard output.
     """
     from gvpipe import api
-    from gvpipe.cli.choices import parse_frames
     from gvpipe.cli.process import give_back_large_arrays
     from gvpipe.cli.splitting import write_runs
-    from gvpipe.rate_control.purposes import candidates
-    from gvpipe.registry import codec_class
 
     if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
         message = f"{len(sources) + 1} files are given, and the last, {target}, is no .mp4; end with the output's name"
@@ -178,31 +118,20 @@ def encode(
         raise click.UsageError("- is one input among others; give it alone", click.get_current_context())
     if split and target == PIPE:
         raise click.UsageError("--split writes several files, and OUTPUT is -; give a file's name", click.get_current_context())
-    targets = {"target_rmse": target_rmse, "target_kg": target_kg, "target_bpvf": target_bpvf, "max_error": max_error}
-    if sum(value is not None for value in targets.values()) > 1:
-        raise click.UsageError("give one of --target-rmse, --target-kg, --target-bpvf and --max-error")
-    settings = _parse_pairs(pairs)
-    if quality is not None and "quality" in settings:
-        raise click.UsageError("give --quality or --set quality=, not both")
-    plain = {"quality": quality, "segment": segment, "reorder": reorder or None}
-    settings.update({key: str(value) for key, value in plain.items() if value is not None})
-    chosen = candidates(
-        codec,
-        purpose,
-        lambda name, own: codec_class(name).from_texts({**{key: str(value) for key, value in own.items()}, **settings}),
-        frozenset(settings),
-    )
+    if (workers is not None or scheduler is not None) and (split or PIPE in sources):
+        message = "--workers and --scheduler read INPUT by its path, as a whole; leave out --split, and name no -"
+        raise click.UsageError(message, click.get_current_context())
+    asked = parse_encoding(options)
     give_back_large_arrays()
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
-        given: dict[str, Any] = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames)}
-        wanted: dict[str, Any] = {**targets, "textures": textures, "stream": stream, "bare": bare}
-        wanted |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
         if split:
-            runs = api.read_runs(source, **given, unlimited=unlimited)
-            written = write_runs(runs, target, lambda run, own: api.encode(run.sequence, own, chosen, progress, **wanted))
+            runs = api.read_runs(source, **asked.reading, unlimited=asked.unlimited)
+            written = write_runs(
+                runs, target, lambda run, own: api.encode(run.sequence, own, asked.codec, progress, **asked.making)
+            )
         else:
-            report = api.encode(source, path, chosen, progress, **given, **wanted, unlimited=unlimited)
+            report = api.encode(source, path, asked.codec, progress, **asked.keywords, workers=workers, scheduler=scheduler)
     out = out.carrying(target)
     name = shown(sources[0], STDIN) + (f" and {len(sources) - 1} more" if len(sources) > 1 else "")
     if not split:
@@ -470,6 +399,7 @@ def _same_frames(read: Callable[..., MeshSequence], span: tuple[int, int | None]
 
 
 cli.add_command(convert)
+cli.add_command(encode_all)
 
 
 @cli.command("export-html")
@@ -618,7 +548,7 @@ def bench(
     wanted = _parse_numbers("--qualities", qualities) if qualities else list(sweep.QUALITIES)
     levels = {"kg": _parse_numbers("--kg", kg), **({"sted": _parse_numbers("--sted", sted)} if sted else {})}
     with out.progress() as progress:
-        made = sweep.run(sources, chosen, wanted, _parse_pairs(pairs), progress)
+        made = sweep.run(sources, chosen, wanted, parse_pairs(pairs), progress)
     if target not in (None, PIPE):
         made.write(target)
     out.json(made.to_json())
@@ -688,26 +618,6 @@ def _parse_numbers(option: str, text: str) -> list[float]:
         return [float(number) for number in text.split(",")]
     except ValueError as exc:
         raise click.UsageError(f"{option} {text}: numbers with commas between are needed") from exc
-
-
-def _parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:
-    settings = {}
-    for pair in pairs:
-        key, equals, value = pair.partition("=")
-        if not equals:
-            raise click.UsageError(f"--set {pair}: KEY=VALUE is needed, such as --set clusters=30")
-        settings[key.strip()] = value.strip()
-    return settings
-
-
-def _parse_bounds(option: str, texts: tuple[str, ...]) -> dict[str, str]:
-    bounds = {}
-    for text in texts:
-        name, equals, bound = text.partition("=")
-        if not (name and equals and bound):
-            raise click.UsageError(f"{option} {text}: NAME=BOUND is needed, such as {option} {name or 'uv'}=0.1%")
-        bounds[name] = bound
-    return bounds
 
 
 def _tell_conversion(out: Output, report: ExportReport) -> None:

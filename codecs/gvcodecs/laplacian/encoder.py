@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -46,6 +46,7 @@ from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_parts
 from gvpipe.rate_control.step_search import NEAR, Anchor, StepTrial, find_step, first_step, step_between
+from gvpipe.segment_map import map_segments
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import MAX_COMPONENTS, reduce_trajectories, squared_errors
 from gvpipe.trajectory.coded_points import CodedConnectivity, code_connectivity, read_trajectories
@@ -72,6 +73,7 @@ class Laplacian(BaseCodec):
     version: ClassVar[int] = VERSION_STILL
     summary: ClassVar[str] = "trajectory PCA through geometric Laplacians: smallest files at equal perceived distortion"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
+    maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.segment_map`)
 
     quality: float = 75.0  # 0..100, higher is better
     operator: str = "mean-value"  # mean-value, cotangent or tutte
@@ -137,27 +139,18 @@ class Laplacian(BaseCodec):
     def _code(self, sequence: MeshSequence, start: _Start, asked: float, report: Progress) -> StepTrial:
         """Code with the step that would leave the error ``asked`` if nothing drifted, and tell the error that is left."""
         still = start.still
-        moving = start.shared.members[~still.flags]
-        sections, steps, squared = dict(start.sections), [], start.still_error(sequence)
+        segments = _Segments(self, sequence, start, asked)
         bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
         n_segments = len(bounds) - 1
-        for s, (first, stop) in enumerate(pairwise(bounds) if still.n_moving else []):
-            report("segments", s / n_segments)
-            trajectories = read_trajectories(sequence, first, stop, moving)
-            error = asked**2 * still.n_moving * (stop - first)
-            most = still.most_components
-            reduced = reduce_trajectories(
-                trajectories, error, self.components, self.basis_ratio, POINT_COST, ROW_COST, NOISE, most
-            )
-            given = still.given(reduced.decoded)
-            coefficients = still.join(reduced.coefficients, given)
-            anchors, deltas, decoded = encode_coefficients(coefficients, reduced.step, start.domain, start.coding, given)
-            sections |= {f"basis.{s}": reduced.basis, f"anchors.{s}": anchors, f"deltas.{s}": deltas}
-            steps.append(reduced.step)
-            errors = squared_errors(trajectories, reduced.decoded, decoded[~still.flags])
-            squared += float(errors @ start.copies[~still.flags])
+        spans = list(pairwise(bounds)) if still.n_moving else []
+        coded = map_segments(_code_segment, segments, spans, lambda done: report("segments", done))
+        sections = dict(start.sections)
+        for s, each in enumerate(coded):
+            sections |= {f"basis.{s}": each.basis, f"anchors.{s}": each.anchors, f"deltas.{s}": each.deltas}
+        squared = sum((each.squared for each in coded), start.still_error(sequence))
+        steps = tuple(each.step for each in coded)
         report("segments", 1)
-        header = Header(start.coding, n_segments, tuple(steps) or (1.0,) * n_segments)
+        header = Header(start.coding, n_segments, steps or (1.0,) * n_segments)
         bitstream = self._bitstream(sequence, header.to_json(), sections, version=None if SECTION in sections else 1)
         encoded = Encoded(bitstream, start.shared.coded.permutation)
         return StepTrial(encoded, asked, math.sqrt(squared / (sequence.n_frames * sequence.n_vertices)))
@@ -198,6 +191,48 @@ class _Start:
         flags = self.still.flags
         off = sequence.read(0, 1)[0, self.shared.members[flags]].astype(np.float64) - self.still.positions[flags]
         return sequence.n_frames * float(np.square(off).sum(axis=1) @ self.copies[flags])
+
+
+class _Segments(NamedTuple):
+    """What coding each segment needs.
+
+    Args:
+        codec: its settings.
+        sequence: whose frames are read.
+        start: what does not depend on the step.
+        asked: the error that the step would leave if nothing drifted, model units.
+    """
+
+    codec: Laplacian
+    sequence: MeshSequence
+    start: _Start
+    asked: float
+
+
+class _Segment(NamedTuple):
+    """A segment, coded: its sections, their step, model units, and the squared error of its moving vertices."""
+
+    step: float
+    basis: bytes
+    anchors: bytes
+    deltas: bytes
+    squared: float
+
+
+def _code_segment(segments: _Segments, span: tuple[int, int]) -> _Segment:
+    """Code the frames of a span."""
+    codec, start, still = segments.codec, segments.start, segments.start.still
+    first, stop = span
+    trajectories = read_trajectories(segments.sequence, first, stop, start.shared.members[~still.flags])
+    error = segments.asked**2 * still.n_moving * (stop - first)
+    most = still.most_components
+    reduced = reduce_trajectories(trajectories, error, codec.components, codec.basis_ratio, POINT_COST, ROW_COST, NOISE, most)
+    given = still.given(reduced.decoded)
+    coefficients = still.join(reduced.coefficients, given)
+    anchors, deltas, decoded = encode_coefficients(coefficients, reduced.step, start.domain, start.coding, given)
+    errors = squared_errors(trajectories, reduced.decoded, decoded[~still.flags])
+    squared = float(errors @ start.copies[~still.flags])
+    return _Segment(reduced.step, reduced.basis, anchors, deltas, squared)
 
 
 def _prepare(

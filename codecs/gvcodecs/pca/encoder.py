@@ -14,16 +14,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from gvcodecs.pca.header import MAX_SEGMENTS, VERSION_STILL, Header
 from gvcodecs.pca.reader import PcaReader, causal_order
+from gvpipe.arrays import Int64
 from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_parts
 from gvpipe.mesh.hierarchy import build_hierarchy
+from gvpipe.segment_map import map_segments
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import MAX_COMPONENTS, Reduced, reduce_trajectories
 from gvpipe.trajectory.causal_order import CausalOrder
@@ -50,6 +52,7 @@ class Pca(BaseCodec):
     version: ClassVar[int] = VERSION_STILL
     summary: ClassVar[str] = "trajectory PCA with geometric predictors: smallest files, levels of detail"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
+    maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.segment_map`)
 
     quality: float = 75.0  # 0..100, higher is better
     predictor: str = "kalman"  # kalman, or the paper's rbf, lsp, navg
@@ -74,27 +77,16 @@ class Pca(BaseCodec):
         bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
         n_segments = len(bounds) - 1
         sections = {"mesh": shared.coded.mesh, "order": shared.coded.order, **({SECTION: data} if data else {})}
-        steps = []
-        for s, (start, stop) in enumerate(pairwise(bounds) if still.n_moving else []):
-            report("segments", s / n_segments)
-            trajectories = read_trajectories(sequence, start, stop, moving)
-            error = (target_error / LEFT) ** 2 * still.n_moving * (stop - start)
-            reduced = reduce_trajectories(trajectories, error, self.components, most=still.most_components)
-            steps.append(reduced.step)
-            sections[f"basis.{s}"] = reduced.basis
-            sections[f"coefficients.{s}"] = self._encode_coefficients(reduced, still, causal)
+        segments = _Segments(self, sequence, moving, still, causal, target_error)
+        spans = list(pairwise(bounds)) if still.n_moving else []
+        coded = map_segments(_code_segment, segments, spans, lambda done: report("segments", done))
+        for s, each in enumerate(coded):
+            sections[f"basis.{s}"], sections[f"coefficients.{s}"] = each.basis, each.coefficients
         report("segments", 1)
-        header = Header(self.predictor, float(self.beta), n_segments, tuple(steps) or (1.0,) * n_segments)
+        steps = tuple(each.step for each in coded)
+        header = Header(self.predictor, float(self.beta), n_segments, steps or (1.0,) * n_segments)
         bitstream = self._bitstream(sequence, header.to_json(), sections, version=None if data else 1)
         return Encoded(bitstream, shared.coded.permutation)
-
-    def _encode_coefficients(self, reduced: Reduced, still: StillPoints, causal: CausalOrder) -> bytes:
-        given = still.given(reduced.decoded)
-        wanted = still.join(reduced.coefficients, given)
-        if self.predictor == "lsp":  # section 3.4: the small ones first
-            wanted = np.ascontiguousarray(wanted[:, ::-1])
-            given = None if given is None else np.ascontiguousarray(given[:, ::-1])
-        return encode_vectors(wanted, reduced.step, causal, self.predictor, self.beta, given)[0]
 
     @classmethod
     def reader(cls, bitstream: Bitstream) -> FrameReader:
@@ -110,3 +102,50 @@ class Pca(BaseCodec):
     def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
         """What each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
         return numbered_parts(("basis", "coefficients"), Header.of(bitstream).segments)
+
+
+class _Segments(NamedTuple):
+    """What coding each segment needs.
+
+    Args:
+        codec: its settings.
+        sequence: whose frames are read.
+        moving: a vertex of each point that moves.
+        still: points.
+        causal: order of all points.
+        target_error: root mean square error of a vertex, model units.
+    """
+
+    codec: Pca
+    sequence: MeshSequence
+    moving: Int64
+    still: StillPoints
+    causal: CausalOrder
+    target_error: float
+
+
+class _Segment(NamedTuple):
+    """A segment, coded: its sections, and their step, model units."""
+
+    step: float
+    basis: bytes
+    coefficients: bytes
+
+
+def _code_segment(segments: _Segments, span: tuple[int, int]) -> _Segment:
+    """Code the frames of a span."""
+    codec, still = segments.codec, segments.still
+    start, stop = span
+    trajectories = read_trajectories(segments.sequence, start, stop, segments.moving)
+    error = (segments.target_error / LEFT) ** 2 * still.n_moving * (stop - start)
+    reduced = reduce_trajectories(trajectories, error, codec.components, most=still.most_components)
+    return _Segment(reduced.step, reduced.basis, _encode_coefficients(codec, reduced, still, segments.causal))
+
+
+def _encode_coefficients(codec: Pca, reduced: Reduced, still: StillPoints, causal: CausalOrder) -> bytes:
+    given = still.given(reduced.decoded)
+    wanted = still.join(reduced.coefficients, given)
+    if codec.predictor == "lsp":  # section 3.4: the small ones first
+        wanted = np.ascontiguousarray(wanted[:, ::-1])
+        given = None if given is None else np.ascontiguousarray(given[:, ::-1])
+    return encode_vectors(wanted, reduced.step, causal, codec.predictor, codec.beta, given)[0]

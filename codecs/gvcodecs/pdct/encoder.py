@@ -12,8 +12,8 @@ that come one by one, without points and without the loop.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar
+from itertools import pairwise
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -33,6 +33,7 @@ from gvpipe.mesh.lattice import Lattice
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of
 from gvpipe.rate_control.step_search import NEAR, Anchor, StepTrial, find_step, first_step, root_mean_square, step_between
+from gvpipe.segment_map import map_segments
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.still_vertices import find_still
 from gvpipe.trajectory.welding import find_points
@@ -59,6 +60,7 @@ class Pdct(BaseCodec):
     version: ClassVar[int] = VERSION_POINTS
     summary: ClassVar[str] = "predictive DCT in local coordinate frames: streams frame by frame, short clips"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
+    maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.segment_map`)
 
     quality: float = 75.0  # 0..100, higher is better
     clusters: int = 0  # N, seed triangles per clip, 1..1024; 0: one per 200 vertices, 20..64
@@ -154,11 +156,12 @@ class Pdct(BaseCodec):
         """Code with a step, model units."""
         bounds = cut(sequence.n_frames, self.clip_frames, MAX_CLIPS)
         n_clips, sections = len(bounds) - 1, dict(start.sections)
-        for c in range(n_clips if len(start.surface.traversal) else 0):
-            report("clips", c / n_clips)
-            frames = np.ascontiguousarray(sequence.read(bounds[c], bounds[c + 1])[:, start.sources])
-            clusters = memo(f"clip.{c}", partial(self.find_clusters, frames, start.surface))
-            sections[f"clip.{c}"] = self.encode_clip(frames, start.surface, clusters, step)
+        spans = list(pairwise(bounds)) if len(start.surface.traversal) else []
+        found = memo("clusters", dict[int, Clusters])  # of clips that were coded before, with another step
+        tasks = [(span, found.get(c)) for c, span in enumerate(spans)]
+        clips = _Clips(self, sequence, start.sources, start.surface, step)
+        for c, each in enumerate(map_segments(_code_clip, clips, tasks, lambda done: report("clips", done))):
+            sections[f"clip.{c}"], found[c] = each
         report("clips", 1)
         bitstream = self._bitstream(sequence, Header(n_clips, start.lattice).to_json(), sections)
         return Encoded(bitstream, start.coded.permutation)
@@ -183,6 +186,32 @@ class _Start:
     sources: Int64
     surface: BaseFrame
     sections: dict[str, bytes]
+
+
+class _Clips(NamedTuple):
+    """What coding each clip needs.
+
+    Args:
+        codec: its settings.
+        sequence: whose frames are read.
+        sources: ``(P,)`` the given vertex of each point.
+        surface: of the points that move.
+        step: model units.
+    """
+
+    codec: Pdct
+    sequence: MeshSequence
+    sources: Int64
+    surface: BaseFrame
+    step: float
+
+
+def _code_clip(clips: _Clips, task: tuple[tuple[int, int], Clusters | None]) -> tuple[bytes, Clusters]:
+    """Code the frames of a span; its clusters are given, or found and returned too."""
+    span, known = task
+    frames = np.ascontiguousarray(clips.sequence.read(*span)[:, clips.sources])
+    clusters = clips.codec.find_clusters(frames, clips.surface) if known is None else known
+    return clips.codec.encode_clip(frames, clips.surface, clusters, clips.step), clusters
 
 
 def diagonal_of(frames: Float32) -> float:

@@ -1,0 +1,1 @@
+"""Many sequences, a geometry video each: found (`inputs`), encoded side by side (`runs`), written down (`manifest`)."""

@@ -1,0 +1,182 @@
+"""Encode many sequences side by side, and resume where a run has ended."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import pickle
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gvpipe
+from gvpipe.api import checked_keywords
+from gvpipe.arguments import StrPath, check_path
+from gvpipe.atomic import output_error
+from gvpipe.batch.encoding import Done, Task, prepare
+from gvpipe.batch.inputs import Job, find_jobs
+from gvpipe.batch.manifest import Entry, Manifest, open_manifest
+from gvpipe.codec import Codec, Progress
+from gvpipe.rate_control.purposes import own_settings
+from gvpipe.tasks.choice import open_executor
+from gvpipe.tasks.executor import Executor, Outcome, WorkerDied
+
+STAGE = "sequences"
+
+Told = Callable[[Entry, Done], None]
+"""Called when a sequence ends."""
+
+
+@dataclass(frozen=True)
+class BatchReport:
+    """What a run did.
+
+    Args:
+        sequences: how many there are.
+        encoded: how many files are new.
+        skipped: how many were there.
+        failed: input and error of each of the others.
+        left_out: how many files are of no format that is read.
+        bytes: of all files.
+        seconds: of the run.
+        manifest: its path.
+    """
+
+    sequences: int
+    encoded: int
+    skipped: int
+    failed: list[dict[str, str]]
+    left_out: int
+    bytes: int
+    seconds: float
+    manifest: str
+
+    def with_entry(self, entry: Entry, is_new: bool) -> BatchReport:
+        """The report with one more sequence."""
+        is_made = entry.error is None
+        return dataclasses.replace(
+            self,
+            encoded=self.encoded + (is_made and is_new),
+            skipped=self.skipped + (is_made and not is_new),
+            failed=self.failed if entry.error is None else [*self.failed, {"input": entry.input, "error": entry.error}],
+            bytes=self.bytes + entry.bytes,
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as JSON values."""
+        return dataclasses.asdict(self)
+
+
+def encode_all(
+    sources: StrPath | Sequence[StrPath],
+    folder: StrPath,
+    codec: str | Codec | Sequence[Codec] | None = None,
+    progress: Progress | None = None,
+    told: Told | None = None,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    **options: Any,
+) -> BatchReport:
+    """Encode many sequences, a geometry video each; a sequence that cannot be encoded stops no other.
+
+    What each became is a line of ``manifest.jsonl`` in ``folder`` (`gvpipe.batch.manifest`). Sequences that it lists as done,
+    of the same bytes, are skipped.
+
+    Args:
+        sources: globs, folders and files (`gvpipe.batch.inputs`).
+        folder: of the outputs, which keep the inputs' folders; it is made if it is missing.
+        codec: as for `gvpipe.encode`.
+        progress: called with the part of the sequences that has ended.
+        told: called when a sequence ends.
+        workers: processes of this machine, one sequence each; None: one for each core.
+        scheduler: address of a Dask scheduler whose workers encode them instead; they see the same files (extra ``cluster``).
+        options: other keywords of `gvpipe.encode`, and settings of the codec, the same for all.
+
+    Raises:
+        InputError: no sequence is found, two would become one file, an option cannot be used, a manifest of other settings,
+            or the scheduler cannot be used.
+        OutputError: the folder or the manifest cannot be written.
+    """
+    started = time.perf_counter()
+    given = [sources] if isinstance(sources, str | os.PathLike) else list(sources)
+    place = Path(check_path(folder, "the folder of the outputs"))
+    keywords = checked_keywords(codec, **options)
+    settings = settings_json(keywords)
+    if keywords.get("mesh") is not None:
+        keywords["mesh"] = os.path.abspath(keywords["mesh"])  # workers may have another current folder
+    found = find_jobs(given, place)
+    _make(place)
+    count = count_cores() if workers is None and scheduler is None else workers
+    with open_manifest(place, settings) as manifest, open_executor(scheduler, count) as executor:
+        assert executor is not None  # a count of workers or a scheduler is given
+        ended = _encode(executor, found.jobs, manifest, keywords, settings)
+        report = BatchReport(len(found.jobs), 0, 0, [], len(found.left_out), 0, 0.0, str(manifest.path))
+        for number, (entry, done) in enumerate(ended, 1):
+            report = report.with_entry(entry, done.is_new)
+            if told:
+                told(entry, done)
+            if progress:
+                progress(STAGE, number / len(found.jobs))
+    return dataclasses.replace(report, seconds=time.perf_counter() - started)
+
+
+def settings_json(keywords: Mapping[str, Any]) -> dict[str, Any]:
+    """What is asked for, as JSON values: codecs with their settings other than defaults, and the keywords that are set."""
+    given = keywords["codec"]
+    codecs = [
+        {"id": one.id, "quality": one.quality, **own_settings(one)} for one in ([given] if isinstance(given, Codec) else given)
+    ]
+    others = {name: value for name, value in keywords.items() if name != "codec" and value not in (None, False, {}, ())}
+    values: dict[str, Any] = json.loads(json.dumps({"codecs": codecs, **others}, default=str))
+    return values
+
+
+def count_cores() -> int:
+    """How many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as exc:
+        raise output_error(folder, exc) from exc
+
+
+def _encode(
+    executor: Executor, jobs: Sequence[Job], manifest: Manifest, keywords: Mapping[str, Any], settings: Mapping[str, Any]
+) -> Iterator[tuple[Entry, Done]]:
+    """Let workers encode; yield what became of each sequence once the manifest has it."""
+    place = manifest.path.parent
+    tasks = [_task(job, place, manifest.entries.get(job.output)) for job in jobs]
+    for outcome in executor.run(prepare, pickle.dumps(dict(keywords)), tasks):
+        job, done = jobs[outcome.index], _done(outcome)
+        error = done.error and done.error.replace(tasks[outcome.index].source, job.source)
+        entry = Entry(
+            job.source, done.hash, job.output, error, done.bytes, round(done.seconds, 3), gvpipe.__version__, settings
+        )
+        if done.is_new:
+            manifest.add(entry)
+        yield entry, done
+
+
+def _task(job: Job, place: Path, before: Entry | None) -> Task:
+    target = place.absolute() / job.output
+    is_done = before is not None and before.error is None and target.is_file() and target.stat().st_size == before.bytes
+    return Task(os.path.abspath(job.source), str(target), before.hash if before is not None and is_done else None)
+
+
+def _done(outcome: Outcome) -> Done:
+    """What a worker says, or that it died."""
+    if isinstance(outcome.value, Done):
+        return outcome.value
+    error = outcome.error
+    if isinstance(error, WorkerDied):
+        return Done(None, f"{error}; give it more memory (fewer --workers), or fewer frames (--frames)", 0, 0.0)
+    return Done(None, " ".join(str(error).split()), 0, 0.0)

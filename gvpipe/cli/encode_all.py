@@ -1,0 +1,55 @@
+"""``gvpipe encode-all``: a geometry video for each of many sequences."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gvpipe.cli.console import Output, output_options
+from gvpipe.cli.encode_options import encode_options, parse_encoding
+
+if TYPE_CHECKING:
+    from gvpipe.batch.encoding import Done
+    from gvpipe.batch.manifest import Entry
+
+
+@click.command("encode-all")
+@click.argument("sources", metavar="INPUTS...", nargs=-1, required=True)
+@click.argument("folder", metavar="FOLDER")
+@encode_options
+@click.option("--workers", type=int, metavar="N", help="Encode N sequences at a time. [default: as many as cores]")
+@click.option("--scheduler", metavar="ADDRESS", help="Encode them on a Dask cluster, such as tcp://host:8786.")
+@output_options
+def encode_all(
+    sources: tuple[str, ...], folder: str, workers: int | None, scheduler: str | None, out: Output, **options: Any
+) -> None:
+    """Encode many mesh sequences, a geometry video each, into FOLDER.
+
+    INPUTS are globs in quotes ('captures/**/*.glb'), folders with all sequences below them, or files. Outputs keep the
+    inputs' folders. FOLDER/manifest.jsonl has a line for each sequence; the same command again does what is left. A sequence
+    that fails is listed in the end, and the exit status is 1.
+    """
+    from gvpipe.batch.runs import encode_all
+
+    asked = parse_encoding(options)
+
+    def tell(entry: Entry, done: Done) -> None:
+        for note in done.notes:
+            out.note(f"{entry.input}: {note}")
+
+    with out.progress() as progress:
+        report = encode_all(
+            sources, folder, asked.codec, progress, tell, workers=workers, scheduler=scheduler, **asked.keywords
+        )
+    if report.left_out:
+        out.note(f"{report.left_out} files are of no format that gvpipe reads, and were left out")
+    out.json(report.to_json())
+    counts = f"{report.encoded} encoded, {report.skipped} were done, {len(report.failed)} failed"
+    out.text(f"{report.sequences} sequences: {counts}; {report.bytes / 1e6:.2f} MB in {report.seconds:.1f} s")
+    out.text(f"manifest: {report.manifest}")
+    for failed in report.failed:
+        name, error = failed["input"], failed["error"]
+        click.echo(f"Error: {error if error.startswith(name) else f'{name}: {error}'}", err=True)
+    if report.failed:
+        click.get_current_context().exit(1)

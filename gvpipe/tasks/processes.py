@@ -1,0 +1,181 @@
+"""Processes of this machine that do tasks, each with one BLAS thread; one that dies is replaced.
+
+They are new Pythons, not forks: threads and compiled kernels of this process do not matter to them, and no ``__main__`` is run
+again. They last as long as the pool, so that kernels are loaded once.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Iterator, Sequence
+from types import TracebackType
+from typing import Any, Self
+
+from gvpipe.tasks.executor import ATTEMPTS, Outcome, Prepare, WorkerDied
+from gvpipe.tasks.worker import PREPARE, PROTOCOL, TASK, receive, send
+
+ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1")
+PATIENCE = 0.5  # seconds between looks at signals, which Windows passes on only then
+
+
+class Processes:
+    """A pool; a context manager, which ends them.
+
+    Args:
+        count: of processes. They start when there are tasks for them.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._slots = [_Slot() for _ in range(count)]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        for slot in self._slots:
+            slot.close()
+
+    def run(self, prepare: Prepare, data: bytes, tasks: Sequence[Any]) -> Iterator[Outcome]:
+        """Do tasks; see `gvpipe.tasks.executor.Executor`. Each process has one at a time."""
+        waiting = deque(enumerate(tasks))
+        ended: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
+        first = pickle.dumps((PREPARE, prepare, data), PROTOCOL)
+        busy = self._slots[: len(waiting)]
+        threads = [threading.Thread(target=_serve, args=(slot, first, waiting, ended), daemon=True) for slot in busy]
+        n_left = len(tasks)
+        try:
+            for thread in threads:
+                thread.start()
+            while n_left:
+                with contextlib.suppress(queue.Empty):
+                    yield ended.get(timeout=PATIENCE)
+                    n_left -= 1
+        finally:
+            if n_left:  # nobody wants the rest
+                waiting.clear()
+                for slot in busy:
+                    slot.close()
+            for thread in threads:
+                if thread.ident is not None:
+                    thread.join()
+
+
+class _Slot:
+    """A place for one process."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._lock = threading.Lock()
+        self._is_closed = False
+
+    def ask(self, message: bytes) -> bytes:
+        """What the process answers; raises `WorkerDied`."""
+        self.tell(message)
+        process = self._process
+        try:
+            if process is None or process.stdout is None:
+                raise EOFError
+            return receive(process.stdout)
+        except (EOFError, OSError, ValueError) as exc:  # ValueError: closed meanwhile
+            how = _how_it_ended(process)
+            self.end()
+            raise WorkerDied(how) from exc
+
+    def tell(self, message: bytes) -> None:
+        """Send a message to the process, a new one if there is none; raises `WorkerDied` once the place is closed."""
+        with self._lock:
+            if self._is_closed:
+                raise WorkerDied("nobody wants its answer")
+            process = self._process = self._process or _start()
+        with contextlib.suppress(OSError, ValueError):  # it has died, which the missing answer says
+            if process.stdin is not None:
+                send(process.stdin, message)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is no process."""
+        return self._process is None
+
+    def close(self) -> None:
+        """End the process for ever, in the middle of a task too."""
+        with self._lock:
+            self._is_closed = True
+        self.end()
+
+    def end(self) -> None:
+        """End the process; the next message starts another."""
+        with self._lock:
+            process, self._process = self._process, None
+        if process is None:
+            return
+        process.kill()
+        process.wait()
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                with contextlib.suppress(OSError):
+                    pipe.close()
+
+
+def _serve(slot: _Slot, first: bytes, waiting: deque[tuple[int, Any]], ended: queue.SimpleQueue[Outcome]) -> None:
+    """Give tasks to one process until none is left."""
+    is_prepared = False
+    while True:
+        try:
+            index, task = waiting.popleft()
+        except IndexError:
+            return
+        outcome = Outcome(index)
+        for _ in range(ATTEMPTS):
+            try:
+                if slot.is_empty or not is_prepared:
+                    slot.tell(first)
+                    is_prepared = True
+                outcome = _outcome(index, slot.ask(pickle.dumps((TASK, task), PROTOCOL)))
+                break
+            except WorkerDied as exc:
+                outcome = Outcome(index, None, WorkerDied(f"{exc}, {ATTEMPTS} times"))
+            except Exception as exc:  # no process starts; the others' tasks go on
+                outcome = Outcome(index, None, exc)
+                break
+        ended.put(outcome)
+
+
+def _outcome(index: int, answer: bytes) -> Outcome:
+    try:
+        value, error = pickle.loads(answer)
+    except Exception as exc:  # an exception that pickles, but not back
+        return Outcome(index, None, exc)
+    return Outcome(index, value, error)
+
+
+def _start() -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "gvpipe.tasks.worker"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **ONE_THREAD},
+    )
+
+
+def _how_it_ended(process: subprocess.Popen[bytes] | None) -> str:
+    """In a few words."""
+    if process is None:
+        return "its process was ended"
+    try:
+        status = process.wait(timeout=10)
+    except subprocess.TimeoutExpired:
+        return "its process stopped answering"
+    if status < 0:
+        name = signal.Signals(-status).name if -status in set(signal.Signals) else f"signal {-status}"
+        memory = ", as systems do that run out of memory" if name == "SIGKILL" else ""
+        return f"its process was ended by {name}{memory}"
+    return f"its process ended with status {status}"

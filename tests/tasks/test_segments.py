@@ -1,0 +1,122 @@
+"""Segments coded by workers: the same bytes, and one clear line for what cannot be."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sequences import held, partly_still, waving
+
+import gvpipe
+from gvpipe import api
+from gvpipe.budget import Budget
+from gvpipe.errors import InputError, SettingError
+from gvpipe.segment_map import map_segments, segments_mapped_by
+from gvpipe.sequence import MeshSequence
+from gvpipe.tasks.executor import Outcome, Prepare, WorkerDied
+from gvpipe.tasks.segments import RemoteSegments
+
+
+class Here:
+    """Does tasks in this process, the last one first; data and results are pickled on the way."""
+
+    def __init__(self) -> None:
+        self.n_tasks: list[int] = []
+
+    def run(self, prepare: Prepare, data: bytes, tasks: Sequence[Any]) -> Iterator[Outcome]:
+        self.n_tasks.append(len(tasks))
+        work = prepare(data)
+        for index in reversed(range(len(tasks))):
+            task = pickle.loads(pickle.dumps(tasks[index]))
+            yield Outcome(index, pickle.loads(pickle.dumps(work(task))))
+
+
+def second(shared: Any, task: Any) -> Any:
+    """Work for tests that never do it."""
+    return task
+
+
+def answering(error: Exception) -> Any:
+    """An executor whose workers raise."""
+
+    class Failing:
+        def run(self, prepare: Prepare, data: bytes, tasks: Sequence[Any]) -> Iterator[Outcome]:
+            yield Outcome(0, None, error)
+
+    return Failing()
+
+
+@pytest.mark.parametrize(
+    ("codec", "kind"),
+    [("pca", "moving"), ("pca", "held"), ("laplacian", "still"), ("laplacian", "held"), ("pdct", "moving"), ("pdct", "still")],
+)
+def test_same_bytes(codec: str, kind: str, tmp_path: Path) -> None:
+    sequences = {"moving": waving(6, 12), "still": partly_still(), "held": held(waving(6, 6), [1, 3, 1, 2, 1, 1])}
+    sequence = sequences[kind]
+    gvpipe.write(sequence, tmp_path / "in.npz")
+    gvpipe.encode(tmp_path / "in.npz", tmp_path / "here.mp4", codec=codec, segment=4)
+    here = Here()
+    elsewhere = RemoteSegments(here, given := gvpipe.read(tmp_path / "in.npz"), partial(gvpipe.read, tmp_path / "in.npz"))
+    with segments_mapped_by(elsewhere):
+        gvpipe.encode(given, tmp_path / "there.mp4", codec=codec, segment=4)
+    assert (tmp_path / "there.mp4").read_bytes() == (tmp_path / "here.mp4").read_bytes()
+    assert here.n_tasks and min(here.n_tasks) > 1
+
+
+def test_processes_write_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a relative path; and from memory."""
+    gvpipe.write(waving(6, 12), tmp_path / "in.npz")
+    monkeypatch.chdir(tmp_path)
+    for workers, target in ((None, "here.mp4"), (2, "there.mp4")):
+        gvpipe.encode("in.npz", target, codec="pca", segment=4, workers=workers)
+    sequence = gvpipe.read("in.npz")
+    with segments_mapped_by(RemoteSegments(Here(), sequence, None)):
+        gvpipe.encode(sequence, "memory.mp4", codec="pca", segment=4)
+    files = [Path(name).read_bytes() for name in ("here.mp4", "there.mp4", "memory.mp4")]
+    assert files[0] == files[1] == files[2]
+
+
+def test_codecs_that_fit_all_frames_together_are_refused(sequence: MeshSequence, tmp_path: Path) -> None:
+    for codec in ("mcgv", "auto"):
+        with pytest.raises(SettingError, match="codec mcgv fits all frames together.*laplacian or pca or pdct"):
+            gvpipe.encode(sequence, tmp_path / "a.mp4", codec=codec, workers=2)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_errors_of_workers_are_one_line(sequence: MeshSequence) -> None:
+    for error, words in (
+        (WorkerDied("it died"), "segment 1 of 1.*it died.*--segment"),
+        (InputError("no x"), "on a worker: no x"),
+    ):
+        with pytest.raises(InputError, match=words), segments_mapped_by(RemoteSegments(answering(error), sequence, None)):
+            map_segments(second, None, [0], lambda done: None)
+
+
+def test_another_file_there_is_refused(sequence: MeshSequence, tmp_path: Path) -> None:
+    gvpipe.write(sequence.part(0, 5), tmp_path / "in.npz")
+    elsewhere = RemoteSegments(Here(), sequence, partial(api.read, tmp_path / "in.npz"))
+    with pytest.raises(InputError, match="it has 5 frames of 72 vertices there, 11 frames of 72 vertices here"):
+        elsewhere(second, None, [0], lambda done: None)
+
+
+def test_frames_that_do_not_pickle_need_a_path() -> None:
+    class Open:
+        shape = (2, 3, 3)
+
+        def __getitem__(self, key: slice) -> np.ndarray:
+            return np.zeros((2, 3, 3), np.float32)[key]
+
+    sequence = MeshSequence(Open(), np.array([[0, 1, 2]], np.int32))
+    with pytest.raises(InputError, match="give its path"):
+        RemoteSegments(Here(), sequence, None)(second, sequence, [0], lambda done: None)
+
+
+def test_budgets_pickle() -> None:
+    budget = Budget(1000)
+    budget.keep("a step", memory=5)
+    assert pickle.loads(pickle.dumps(budget)).memory_left == budget.memory_left
