@@ -15,13 +15,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gvpipe.api import Info, Report, Restreamed, decode, encode, info, open, read, render, restream, write
+    from gvpipe.api import Info, Report, Restreamed, decode, encode, info, open, render, restream
     from gvpipe.asset.attribute import Attribute
     from gvpipe.asset.field import Field
     from gvpipe.asset.material import Image, Material, Texture
     from gvpipe.asset.metadata import Metadata
     from gvpipe.asset.part import Part
     from gvpipe.errors import GvpipeError
+    from gvpipe.files import read, write
     from gvpipe.metrics.comparison import Comparison, compare
     from gvpipe.player import Player
     from gvpipe.rasterizer.camera import Camera
@@ -62,13 +63,14 @@ __all__ = [
 ]
 
 _HOMES = {
-    "gvpipe.api": ("Info", "Report", "Restreamed", "decode", "encode", "info", "open", "read", "render", "restream", "write"),
+    "gvpipe.api": ("Info", "Report", "Restreamed", "decode", "encode", "info", "open", "render", "restream"),
     "gvpipe.asset.attribute": ("Attribute",),
     "gvpipe.asset.field": ("Field",),
     "gvpipe.asset.material": ("Image", "Material", "Texture"),
     "gvpipe.asset.metadata": ("Metadata",),
     "gvpipe.asset.part": ("Part",),
     "gvpipe.errors": ("GvpipeError",),
+    "gvpipe.files": ("read", "write"),
     "gvpipe.metrics.comparison": ("Comparison", "compare"),
     "gvpipe.player": ("Player",),
     "gvpipe.rasterizer.camera": ("Camera",),

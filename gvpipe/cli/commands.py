@@ -162,7 +162,7 @@ def encode(
     OFF, GLB, VTP, VTU), a glob ('walk/*.obj', or without the quotes), a pattern (walk/%04d.obj, walk/####.obj,
     'walk/$F4.obj'), a geometry video, or - for an .npz or a geometry video on standard input. OUTPUT - is standard output.
     """
-    from gvpipe import api
+    from gvpipe import api, files
     from gvpipe.cli.choices import parse_frames
     from gvpipe.cli.process import give_back_large_arrays
     from gvpipe.cli.splitting import write_runs
@@ -197,7 +197,7 @@ def encode(
         wanted: dict[str, Any] = {**targets, "textures": textures, "stream": stream}
         wanted |= {"attributes": _parse_bounds("--attribute", attributes), "fields": _parse_bounds("--field", fields)}
         if split:
-            runs = api.read_runs(source, **given, unlimited=unlimited)
+            runs = files.read_runs(source, **given, unlimited=unlimited)
             written = write_runs(runs, target, lambda run, own: api.encode(run.sequence, own, chosen, progress, **wanted))
         else:
             report = api.encode(source, path, chosen, progress, **given, **wanted, unlimited=unlimited)
@@ -266,17 +266,17 @@ def decode(
     folder of vertex animation textures (.openvat), or a pattern of frame files such as out/%04d.obj (also .ply, .stl, .off,
     .glb, .vtp), or - for an .npz on standard output. FILE - is a geometry video on standard input.
     """
-    from gvpipe import api, notes
+    from gvpipe import api, files, notes
     from gvpipe.cli.choices import chosen, chosen_frames
 
     out = out.carrying(target)
     first, last = chosen_frames(start, stop, frames)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         player = api.open(given, unlimited=unlimited)
-        start, stop = api.frame_range(player, first, last)
+        start, stop = files.frame_range(player, first, last)
         level = player.level(lod)
         sequence = chosen(level.part(start, stop), parts, fps, "decode", progress)
-        noticed = api.write(sequence.local() if local else sequence, path, start)
+        noticed = files.write(sequence.local() if local else sequence, path, start)
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
     noticed += level.notes if lod else ()
     for note in noticed:
@@ -381,7 +381,7 @@ def compare(
     out: Output,
 ) -> None:
     """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos, one may be - for standard input."""
-    from gvpipe import api
+    from gvpipe import files
     from gvpipe.cli.choices import parse_frames
     from gvpipe.metrics import comparison
 
@@ -390,8 +390,8 @@ def compare(
     span = parse_frames(frames)
     its_mesh, other_mesh = _meshes((reference, distorted), mesh)
     with source_path(reference) as one, source_path(distorted) as other, out.progress() as progress:
-        given = api.read(one, fps, clip, its_mesh, span, unlimited=unlimited)
-        read_other = partial(api.read, other, None, other_clip, other_mesh, unlimited=unlimited)
+        given = files.read(one, fps, clip, its_mesh, span, unlimited=unlimited)
+        read_other = partial(files.read, other, None, other_clip, other_mesh, unlimited=unlimited)
         result = comparison.compare(
             given,
             read_other() if span is None else _same_frames(read_other, span, len(given)),

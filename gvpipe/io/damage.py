@@ -12,8 +12,6 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
-
 from gvpipe.arguments import did_you_mean
 from gvpipe.errors import InputError, TopologyChange, printable
 
@@ -33,6 +31,8 @@ def reading(path: Path, kind: str, at: str = "", remedy: str = AGAIN) -> Iterato
         at: where in the file, such as ``"frame 3"``.
         remedy: what the user can do.
     """
+    import numpy as np  # late: a process of a library starts before it is loaded
+
     try:
         with np.errstate(all="ignore"):  # readers check what they made of the numbers
             yield

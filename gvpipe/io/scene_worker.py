@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gvpipe.io.library_process import serve
+from gvpipe.io.library_worker import serve
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_process import Described, FieldShape
 from gvpipe.sequence import MeshSequence
