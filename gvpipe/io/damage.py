@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from gvpipe.arguments import did_you_mean
+from gvpipe.container.sources import NO_FILE
 from gvpipe.errors import InputError, TopologyChange, printable
 
 AGAIN, FRAME_AGAIN = "export it again", "export this frame again"
@@ -53,7 +54,7 @@ def check_file(path: Path) -> None:
     except OSError as exc:
         raise InputError(f"{path} cannot be read: {exc.strerror}; check the path") from exc
     if not stat.S_ISREG(state.st_mode):
-        raise InputError(f"{path} is no ordinary file, but a pipe or a device; write what it gives to a file first")
+        raise InputError(f"{path} {NO_FILE}")
     if not state.st_size:
         raise InputError(f"{path} is empty; {AGAIN}")
 

@@ -71,7 +71,7 @@ del atlas
 IN_ANOTHER = """
 import numpy as np
 from gvcodecs.mcgv.layout.xatlas_process import run_xatlas
-print(sorted(run_xatlas([(np.eye(3, dtype=np.float32), np.arange(3, dtype=np.uint32)[None])])[0][0]))
+print(sorted(map(int, run_xatlas([(np.eye(3, dtype=np.float32), np.arange(3, dtype=np.uint32)[None])])[0][0])))
 """
 
 
