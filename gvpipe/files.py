@@ -118,5 +118,5 @@ def frame_range(video: Player | MeshSequence, start: int, stop: int | None) -> t
         from gvpipe.player import Player
 
         name = video.path if isinstance(video, Player) else video.name
-        raise InputError(f"{name}: frames {start} to {stop} asked for; 0 <= start < stop <= {len(video)} is needed")
+        raise InputError(f"{name}: frames {start}:{stop} asked for; 0 <= start < stop <= {len(video)} is needed")
     return start, stop

@@ -215,11 +215,12 @@ def encode(
 
 def _print_report(out: Output, report: Report, name: str, target: str) -> None:
     """Print what an encode did, as text and notes."""
+    from gvpipe import notes
     from gvpipe.rate_control.purposes import name_with
 
     for note in report.notes:
         out.note(note)
-    shape = f"{report.frames} frames, {report.vertices} vertices"
+    shape = notes.shape(report.frames, report.vertices)
     size = f"{_size(report.bytes)}, {report.bpvf:.3f} bits per vertex and frame"
     out.text(f"{name} ({shape}) -> {target} ({size})")
     seconds = dict(report.seconds)
@@ -284,7 +285,7 @@ def decode(
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces), "lod": lod}
     out.json({**values, "origin": [0.0, 0.0, 0.0] if local else player.origin.tolist(), "notes": noticed})
-    shape = f"{stop - start} frames, {sequence.n_vertices} vertices"
+    shape = notes.shape(stop - start, sequence.n_vertices)
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")
 
 
@@ -314,19 +315,29 @@ def restream(source: str, target: str, layout: str | None, unlimited: bool, out:
 @click.option("--clip", metavar="NAME", help="The animation to look at, of a file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
+@click.option("--fps", type=float, help="Frames per second, instead of the input's; scenes are sampled at it.")
 @unlimited_option
 @output_options
-def info(source: str, clip: str | None, mesh: str | None, frames: str | None, unlimited: bool, out: Output) -> None:
+def info(
+    source: str,
+    clip: str | None,
+    mesh: str | None,
+    frames: str | None,
+    fps: float | None,
+    unlimited: bool,
+    out: Output,
+) -> None:
     """Tell what a geometry video (- for standard input) holds and where its bytes go, or what is read of any other input."""
     from gvpipe import api
     from gvpipe.cli.asset_lines import asset_lines, shape_lines
+    from gvpipe.cli.choices import parse_frames
 
     with source_path(source) as path, out.progress():
         if not is_video(path):
-            _source_info(source, path, (clip, mesh, frames, unlimited), out)
+            _source_info(source, path, (clip, mesh, parse_frames(frames), unlimited, fps), out)
             return
-        if clip is not None or mesh is not None or frames is not None:
-            raise click.UsageError("--clip, --mesh and --frames are for sources; a geometry video is shown whole")
+        if any(each is not None for each in (clip, mesh, frames, fps)):
+            raise click.UsageError("--clip, --mesh, --frames and --fps are for sources; a geometry video is shown whole")
         found = api.info(path, unlimited=unlimited)
     out.json(found.to_json())
     layout = ", stream layout" if found.layout == "stream" else ""
@@ -343,14 +354,12 @@ def info(source: str, clip: str | None, mesh: str | None, frames: str | None, un
     _print_sections(out, found.sections, found.vertices * found.frames)
 
 
-def _source_info(source: str, path: str, given: tuple[str | None, str | None, str | None, bool], out: Output) -> None:
-    """Print what is read of an input that is no geometry video; ``given`` are --clip, --mesh, --frames and --unlimited."""
+def _source_info(source: str, path: str, given: tuple[Any, ...], out: Output) -> None:
+    """Print what is read of an input that is no geometry video; ``given`` are further arguments of `source_info`."""
     from gvpipe.cli.asset_lines import asset_lines, shape_lines, time_lines
-    from gvpipe.cli.choices import parse_frames
     from gvpipe.source_info import source_info
 
-    clip, mesh, frames, unlimited = given
-    found = source_info(path, clip, mesh, parse_frames(frames), unlimited)
+    found = source_info(path, *given)
     out.json(found.to_json())
     out.text(shown(source, STDIN) + ("" if found.bytes is None else f": {_size(found.bytes)}"))
     for line in [*shape_lines(found), *asset_lines(found), *time_lines(found)]:

@@ -14,6 +14,7 @@ import click
 from gvpipe.cli.console import Output, output_options, unlimited_option
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.errors import InputError
+from gvpipe.notes import shape as shape_of
 
 if TYPE_CHECKING:
     from gvpipe.sequence import MeshSequence
@@ -85,7 +86,7 @@ def convert(
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces)}
     out.json({**values, "origin": sequence.origin.tolist(), "notes": noticed})
-    shape = f"{stop - start} frames, {sequence.n_vertices} vertices"
+    shape = shape_of(stop - start, sequence.n_vertices)
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")
 
 
@@ -118,7 +119,7 @@ def _convert_split(source: str, target: str, options: dict[str, Any], parts: tup
     ]
     out.json({"files": listed, "notes": noticed})
     for each in listed:
-        shape = f"{each['frames']} frames, {each['vertices']} vertices"
+        shape = shape_of(each["frames"], each["vertices"])
         out.text(f"{shown(source, STDIN)}, frames {each['start']}:{each['stop']} -> {each['output']} ({shape})")
 
 

@@ -30,14 +30,14 @@ class LibraryProcess:
     """A process that reads one file; in a forked child, and after it had to make room for others, there is a new one.
 
     Args:
-        path: of the file; of several, which one process may read, that of the next request.
+        path: of the file; of several, which one process may read, that of the first.
         module: that runs there; it calls `gvpipe.io.library_worker.serve`.
         kind: of the file, for messages, such as ``"FBX"``.
         died: what a message says where the process dies.
     """
 
     def __init__(self, path: Path, module: str, kind: str, died: str) -> None:
-        self.path, self._module, self._kind, self._died = path, module, kind, died
+        self._path, self._module, self._kind, self._died = path, module, kind, died
         self._lock = ForkLock()
         self._prepared: list[tuple[str, tuple[Any, ...]]] = []
         self._process: subprocess.Popen[bytes] | None = None
@@ -57,8 +57,8 @@ class LibraryProcess:
         self._prepared.append((name, arguments))
         return result
 
-    def ask(self, name: str, *arguments: Any) -> Any:
-        """What the process answers.
+    def ask(self, name: str, *arguments: Any, path: Path | None = None) -> Any:
+        """What the process answers; of a process that reads several files, ``path`` is that of this request.
 
         Raises:
             InputError: it refuses the file, or it dies.
@@ -66,6 +66,7 @@ class LibraryProcess:
         """
         with self._lock:
             self._asked = time.monotonic()
+            self._path = path or self._path
             self._begin()
             return self._exchange(name, arguments)
 
@@ -84,7 +85,7 @@ class LibraryProcess:
                 self._exchange(*prepared)
 
     def _start(self) -> None:
-        self._process = start_process(self._module, self.path.absolute())
+        self._process = start_process(self._module, self._path.absolute())
         self._finalizer = weakref.finalize(self, _end, self._process)
         with _running_lock:
             _running.add(self)
@@ -113,14 +114,14 @@ class LibraryProcess:
         try:
             state, result = pickle.load(process.stdout)
         except (EOFError, OSError, pickle.UnpicklingError) as exc:
-            raise unreadable(self.path, self._kind, self._died) from exc
+            raise unreadable(self._path, self._kind, self._died) from exc
         if state == CHANGED:
             raise TopologyChange(*result)
         if state == REFUSED:
-            said = str(result).removeprefix(f"{self.path.absolute()}: ")
-            if printable(str(self.path)) in said:
+            said = str(result).removeprefix(f"{self._path.absolute()}: ")
+            if printable(str(self._path)) in said:
                 raise InputError(said)
-            raise unreadable(self.path, self._kind, said)
+            raise unreadable(self._path, self._kind, said)
         return result
 
 
