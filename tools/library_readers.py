@@ -1,6 +1,6 @@
 """Readings of mesh animations by other libraries alone: what `tools/measure_formats.py` compares gvpipe with.
 
-    python -c "from library_readers import by_usd; by_usd('walk.usdc')"
+    python tools/library_readers.py walk.usdc
 
 Each function gives what gvpipe reads, as arrays: positions in world space, polygons, texture coordinates, normals, colours,
 fields. What gvpipe does beside, none does: triangles, surfaces of volume meshes, parts, materials, checks.
@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -197,3 +198,22 @@ def reader_of(path: Path) -> tuple[str, Callable[[str], None]] | None:
     if path.suffix in (".e", ".exo"):
         return ("h5py", by_h5py) if path.read_bytes().startswith(HDF5) else ("scipy", by_scipy)
     return READERS.get(path.suffix, ("trimesh", by_trimesh) if path.is_dir() else None)
+
+
+def main() -> int:
+    """Read what the command line names; status 1 if no library reads it."""
+    import argparse
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("path", type=Path, help="a file, or a folder of frames")
+    path = parser.parse_args().path
+    found = reader_of(path)
+    if found is None:
+        return 1
+    print(found[0], flush=True)
+    found[1](str(path))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
