@@ -14,7 +14,7 @@ from fuzz.mutation import Change, Rng, mutate_bytes, mutate_json, mutate_text
 from fuzz.parts import Parts, Seed, Target
 from fuzz.results import check_asset, check_faces, check_positions
 from gvpipe.errors import InputError
-from gvpipe.io.library_process import LEAST_MEMORY
+from gvpipe.io.library_worker import LEAST_MEMORY
 
 MESH = "mesh.obj"  # what a point cache belongs to
 CACHES = (".pc2", ".mdd", ".npy")

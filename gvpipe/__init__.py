@@ -15,7 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gvpipe.api import Info, Report, Restreamed, decode, encode, info, open, read, render, restream, write
+    from gvpipe.api import Info, Report, Restreamed, decode, encode, info, open, render, restream
     from gvpipe.asset.attribute import Attribute
     from gvpipe.asset.field import Field
     from gvpipe.asset.material import Image, Material, Texture
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from gvpipe.asset.part import Part
     from gvpipe.batch.runs import BatchReport, encode_all
     from gvpipe.errors import GvpipeError
+    from gvpipe.files import read, write
     from gvpipe.metrics.comparison import Comparison, compare
     from gvpipe.player import Player
     from gvpipe.rasterizer.camera import Camera
@@ -65,7 +66,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "gvpipe.api": ("Info", "Report", "Restreamed", "decode", "encode", "info", "open", "read", "render", "restream", "write"),
+    "gvpipe.api": ("Info", "Report", "Restreamed", "decode", "encode", "info", "open", "render", "restream"),
     "gvpipe.asset.attribute": ("Attribute",),
     "gvpipe.asset.field": ("Field",),
     "gvpipe.asset.material": ("Image", "Material", "Texture"),
@@ -73,6 +74,7 @@ _HOMES = {
     "gvpipe.asset.part": ("Part",),
     "gvpipe.batch.runs": ("BatchReport", "encode_all"),
     "gvpipe.errors": ("GvpipeError",),
+    "gvpipe.files": ("read", "write"),
     "gvpipe.metrics.comparison": ("Comparison", "compare"),
     "gvpipe.player": ("Player",),
     "gvpipe.rasterizer.camera": ("Camera",),

@@ -13,6 +13,16 @@ DEFAULT_FPS = 30.0
 ASSUMED_FPS = f"the input has no frame rate; {DEFAULT_FPS:g} frames per second were assumed (fps, --fps)"
 
 
+def count(number: int, noun: str, several: str = "") -> str:
+    """``1 frame``, ``2 frames``; ``several`` is what no s makes of a noun."""
+    return f"{number} {noun if number == 1 else several or noun + 's'}"
+
+
+def shape(n_frames: int, n_vertices: int) -> str:
+    """``24 frames, 300 vertices``."""
+    return f"{count(n_frames, 'frame')}, {count(n_vertices, 'vertex', 'vertices')}"
+
+
 def left_out(n_primitives: int) -> tuple[str, ...]:
     """Of points and lines beside the triangles."""
     return (f"{n_primitives} of its primitives are points or lines; they were left out",) if n_primitives else ()

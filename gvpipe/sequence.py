@@ -27,7 +27,7 @@ from gvpipe.asset.part import Part, check_parts
 from gvpipe.asset.polygons import as_polygons
 from gvpipe.errors import InputError, printable
 from gvpipe.frame_views import Narrowed, Permuted, Shifted, Span, Watched
-from gvpipe.notes import ASSUMED_FPS, show_origin
+from gvpipe.notes import ASSUMED_FPS, count, show_origin
 from gvpipe.origin import as_origin, choose_origin, narrow, rounding
 
 BARE: dict[str, Any] = {
@@ -75,7 +75,7 @@ class MeshSequence:
         >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
         >>> sequence = MeshSequence(np.array([corners, np.add(corners, [0, 0, 0.5])]), np.array([[0, 1, 2]]), fps=25)
         >>> sequence
-        <MeshSequence sequence: 2 frames of 3 vertices, 1 triangles, 25 fps>
+        <MeshSequence sequence: 2 frames of 3 vertices, 1 triangle, 25 fps>
         >>> sequence[1][:, 2].tolist()  # z of the second frame's vertices
         [0.5, 0.5, 0.5]
         >>> sequence.part(1, 2).shape
@@ -310,7 +310,8 @@ class MeshSequence:
 
 def describe(sequence: MeshSequence) -> str:
     """``24 frames of 300 vertices, 596 triangles, 30 fps``."""
-    parts = [f"{sequence.n_frames} frames of {sequence.n_vertices} vertices", f"{len(sequence.faces)} triangles"]
+    vertices = count(sequence.n_vertices, "vertex", "vertices")
+    parts = [f"{count(sequence.n_frames, 'frame')} of {vertices}", count(len(sequence.faces), "triangle")]
     parts.append(f"{sequence.fps:g} fps")
     if sequence.origin.any():
         parts.append(f"origin ({show_origin(sequence.origin)})")

@@ -59,17 +59,18 @@ def source_info(
     mesh: StrPath | None = None,
     frames: tuple[int, int | None] | None = None,
     unlimited: bool = False,
+    fps: float | None = None,
 ) -> SourceInfo:
     """Return what gvpipe reads of a source; only the first of the frames is evaluated.
 
     Args:
-        path, clip, mesh, frames, unlimited: as of `gvpipe.read`.
+        path, clip, mesh, frames, unlimited, fps: as of `gvpipe.read`.
 
     Raises:
         InputError: it cannot be read.
     """
     name = os.fspath(path)
-    sequence = read(name, None, clip, mesh, frames, unlimited)
+    sequence = read(name, fps, clip, mesh, frames, unlimited)
     first = sequence[0]
     clips = list_clips(name)
     things = Things(sequence.parts, sequence.polygons, sequence.materials, sequence.images, sequence.metadata)

@@ -44,6 +44,7 @@ from gvpipe.fields.head import Head
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.reader import FieldReader
 from gvpipe.fields.values import FieldBound
+from gvpipe.files import read_runs
 from gvpipe.media.video import PROFILES, VideoReader
 from gvpipe.sequence import MeshSequence
 
@@ -227,7 +228,7 @@ def test_a_limit_can_be_lifted(tmp_path: Path) -> None:
     with pytest.raises(CorruptFile, match="1048576 frames in 3 segments"):  # its runs were decoded
         gvpipe.open(tmp_path / "a.mp4", unlimited=True)
     with pytest.raises(CorruptFile, match="1048576 frames"):
-        gvpipe.api.read_runs(tmp_path / "a.mp4", unlimited=True)
+        read_runs(tmp_path / "a.mp4", unlimited=True)
 
 
 @pytest.mark.parametrize("command", [("convert", "out.npz"), ("encode", "out.mp4")])

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
+from folders import GOLDEN
 from sequences import waving
 
 import gvpipe
+from gvpipe.container.mp4 import read_file, write_file
+from gvpipe.errors import CorruptFile
 from gvpipe.registry import codec_ids
 
 
@@ -29,3 +34,12 @@ def test_a_video_plays_alike_forwards_backwards_and_from_threads(codec: str, tmp
             for k, frame in zip(order, pool.map(video.__getitem__, order), strict=True):
                 np.testing.assert_array_equal(frame, whole[k])
     np.testing.assert_array_equal(video[4], whole[4])  # closing lets go of memory and no more
+
+
+@pytest.mark.parametrize("codec", codec_ids())
+def test_damaged_triangles_are_those_of_a_file(codec: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.mp4"
+    bitstream = read_file(sorted(GOLDEN.glob(f"{codec}-*.mp4"))[-1])
+    write_file(dataclasses.replace(bitstream, sections={**bitstream.sections, "mesh": bytes(9)}), path)
+    with pytest.raises(CorruptFile, match=re.escape(f"{path}: section 'mesh'")):
+        _ = gvpipe.open(path).faces

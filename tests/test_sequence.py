@@ -21,7 +21,7 @@ def test_repr(sequence: MeshSequence, video: Path) -> None:
     assert repr(sequence) == f"<MeshSequence sequence: {shape}>"
     assert repr(gvpipe.open(video)) == f"<Player {video}: codec mcgv, {shape}>"
     far = MeshSequence(np.array([[[5e6, 0, 0], [5e6 + 0.3, 0, 1], [5e6 + 0.1, 1, 0]]]), np.array([[0, 1, 2]]), 30.0, name="far")
-    assert repr(far) == "<MeshSequence far: 1 frames of 3 vertices, 1 triangles, 30 fps, origin (5000000, 0, 0)>"
+    assert repr(far) == "<MeshSequence far: 1 frame of 3 vertices, 1 triangle, 30 fps, origin (5000000, 0, 0)>"
 
 
 def test_slices(frames: Any) -> None:

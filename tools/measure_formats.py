@@ -1,54 +1,75 @@
-"""How fast formats are read, beside the libraries themselves, and written.
+"""How long reading takes from the start of Python to its end, beside the libraries themselves; how long writing takes.
 
-    python tools/measure_formats.py ../shared/data [--only abc] [--markdown]
+    python tools/measure_formats.py ../shared/data [--only abc] [--repeats 5] [--markdown]
 
-Reading: every frame of an asset, by gvpipe and by the format's own library alone: usd-core, alembic3d, ufbx, trimesh (frames of
-GLB, OBJ and PLY), h5py and meshio (simulations). The libraries give what gvpipe reads, as arrays: positions in world space,
-polygons, texture coordinates, normals, colours, fields. What gvpipe does beside, they do not: triangles, surfaces of volume
-meshes, parts, materials, checks. Both run in turn, the fastest of `--repeats` counts. Times are of the processor, with those of
-processes that are started. gvpipe starts one for USD, FBX and Alembic, whose libraries damaged files can crash; so do these
-libraries here. Writing: `samba.npz` as `.glb`, `.usdc` and `.abc`.
+Reading: each asset in a new Python that imports gvpipe, and in one that imports the format's own library alone
+(`library_readers.py`). Both read every frame. They take turns, and the medians of `--repeats` turns count: seconds of the
+processor with those of processes that are started, and seconds of the clock. Byte code is cached, as in an installation.
+Writing: `samba.npz` as `.glb`, `.usdc` and `.abc`, in this process.
 
-Status 1: reading takes more than twice the library's own time, and writing more than 3 s. Readings below 0.2 s may take 0.1 s
-more.
+Status 1: reading takes more than twice the library's own time of the processor, or writing more than 3 s.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
+from library_readers import READERS, reader_of
 
 import gvpipe
 
 TIMES, LONGEST = 2.0, 3.0  # of the library's own reading; seconds of writing
-SHORT, SLACK = 0.2, 0.1  # seconds of a reading that may take more, and how much
+SEQUENCES = "objseq", "plyseq"  # kinds of assets that are a folder of frames
+FRAMES = (".obj", ".ply", ".vtu", ".vtp", ".vts")  # that belong to such a folder, or to a list
+OTHERS = (".e", ".exo", ".pvd", ".case")  # that one library or none reads
+OURS = """
+import sys, gvpipe
+sequence = gvpipe.read(sys.argv[1])
+for _ in sequence.chunks():
+    pass
+for field in sequence.fields.values():
+    field.read(0, len(field))
+"""
+THEIRS = "import sys, library_readers; library_readers.{}(sys.argv[1])"
+
+
+class Spent(NamedTuple):
+    """Seconds of a process and those that it starts."""
+
+    processor: float
+    clock: float
 
 
 class Row(NamedTuple):
-    """What was measured of a file."""
+    """What was measured of a file; of one that no library reads, ``own`` is None."""
 
     file: str
     library: str
-    own: float | None
-    ours: float
+    own: Spent | None
+    ours: Spent
 
     @property
     def is_slow(self) -> bool:
-        """Whether gvpipe misses its budget."""
-        if self.own is None:
-            return self.ours > LONGEST
-        return self.ours > TIMES * self.own + (SLACK if self.ours < SHORT else 0.0)
+        """Whether reading misses its budget."""
+        return self.own is not None and self.ours.processor > TIMES * self.own.processor
+
+    def cells(self) -> list[str]:
+        """Name, library, then both times and their ratio, of the processor and of the clock."""
+        cells = [self.file, self.library]
+        for number, ours in enumerate(self.ours):
+            own = None if self.own is None else self.own[number]
+            cells += ["-", f"{ours:.2f}", "-"] if own is None else [f"{own:.2f}", f"{ours:.2f}", f"{ours / own:.2f}"]
+        return cells
 
 
 def main() -> int:
@@ -56,258 +77,106 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="with assets/ and samba.npz")
     parser.add_argument("--only", default="", help="files whose path holds this text")
-    parser.add_argument("--repeats", type=int, default=3, help="readings of each file [default: 3]")
-    parser.add_argument("--markdown", action="store_true", help="print a table for the documentation")
+    parser.add_argument("--repeats", type=int, default=5, help="readings of each file [default: 5]")
+    parser.add_argument("--markdown", action="store_true", help="print tables for the documentation")
     given = parser.parse_args()
     if given.markdown:
-        print("| file | library | its seconds | gvpipe's seconds | ratio |\n| --- | --- | --- | --- | --- |")
-    is_slow = False
-    for row in chain(read_rows(given.folder, given.only, given.repeats), write_rows(given.folder, given.only, given.repeats)):
-        is_slow |= row.is_slow
-        own, ratio = ("-", "-") if row.own is None else (f"{row.own:.3f}", f"{row.ours / row.own:.2f}")
-        cells = [row.file, row.library, own, f"{row.ours:.3f}", ratio]
-        text = "| " + " | ".join(cells) + " |" if given.markdown else "  ".join(cells) + ("  too slow" if row.is_slow else "")
-        print(text, flush=True)
-    return int(is_slow)
+        print("| file | library | its processor s | gvpipe's | ratio | its clock s | gvpipe's | ratio |")
+        print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    rows = []
+    for row in read_rows(given.folder, given.only, given.repeats):
+        text = "| " + " | ".join(row.cells()) + " |" if given.markdown else "  ".join(row.cells())
+        print(text + ("  too slow" if row.is_slow and not given.markdown else ""), flush=True)
+        rows.append(row)
+    summarise(rows)
+    n_slow = sum(row.is_slow for row in rows)
+    for name, spent in written(given.folder, given.only, given.repeats):
+        print(f"{name}, written: {spent:.2f} s of the processor", flush=True)
+        n_slow += spent > LONGEST
+    return int(n_slow > 0)
+
+
+def summarise(rows: list[Row]) -> None:
+    """Print median and largest ratio of each library."""
+    for library in sorted({row.library for row in rows if row.own}):
+        for kind, name in enumerate(Spent._fields):
+            ratios = [row.ours[kind] / row.own[kind] for row in rows if row.library == library and row.own]
+            print(f"{library}, {name}: {len(ratios)} files, median {statistics.median(ratios):.2f}, most {max(ratios):.2f}")
 
 
 def read_rows(folder: Path, only: str, repeats: int) -> Iterator[Row]:
-    """Yield a row for each file that is read."""
-    for name, library, own in FILES:
-        if only in name:
-            yield compared(name, library, own, folder / "assets" / name, repeats)
-    with tempfile.TemporaryDirectory() as place:
-        for suffix, (library, own) in SCENES.items():
-            name, path = f"samba as .{suffix}", Path(place, f"a.{suffix}")
+    """Yield a row for each asset that is read, then for samba in other formats."""
+    with tempfile.TemporaryDirectory() as cache:
+        for path in find_assets(folder / "assets"):
+            name = path.relative_to(folder / "assets").as_posix()
+            if only in name:
+                yield from compared(name, path, repeats, cache)
+        for suffix in ("usdc", "abc", "vtkhdf", "glb"):
+            name, path = f"samba as .{suffix}", Path(cache, f"samba.{suffix}")
             if only in name:
                 gvpipe.write(gvpipe.read(folder / "samba.npz"), path)
-                yield compared(name, library, own, path, repeats)
-    name = "samba, 20 frames as .glb"
-    if only in name:
-        with tempfile.TemporaryDirectory() as place:
-            gvpipe.write(gvpipe.read(folder / "samba.npz").part(0, 20), Path(place, "%03d.glb"))
-            yield compared(name, "trimesh", by_trimesh, Path(place), repeats)
+                yield from compared(name, path, repeats, cache)
 
 
-def compared(name: str, library: str, own: Callable[[Path], None], path: Path, repeats: int) -> Row:
-    """The row of one file."""
-    return Row(name, library, seconds(lambda: own(path), repeats), seconds(lambda: read(path), repeats))
+def find_assets(folder: Path) -> Iterator[Path]:
+    """Yield files that are a whole asset, and folders of frames."""
+    for path in sorted(folder.rglob("*")):
+        is_file = path.suffix in (*READERS, *OTHERS) and path.suffix not in FRAMES
+        if is_file or path.parent.name in SEQUENCES:
+            yield path
 
 
-def write_rows(folder: Path, only: str, repeats: int) -> Iterator[Row]:
-    """Yield a row for each format that samba is written in."""
+def compared(name: str, path: Path, repeats: int, cache: str) -> Iterator[Row]:
+    """Yield the row of an asset, unless gvpipe refuses it."""
+    found = reader_of(path)
+    ours, own = partial(run, OURS, path, cache), None
+    if found is not None:
+        own = partial(run, THEIRS.format(found[1].__name__), path, cache)
+    if ours() is None:  # a first run of each fills the cache
+        return
+    own = None if own is None or own() is None else own
+    spent: dict[bool, list[Spent]] = {True: [], False: []}
+    for _ in range(repeats):
+        for is_ours, work in ((False, own), (True, ours)):
+            one = None if work is None else work()
+            if one is not None:
+                spent[is_ours].append(one)
+    yield Row(name, found[0] if found and own else "-", middle(spent[False]) if own else None, middle(spent[True]))
+
+
+def middle(spent: list[Spent]) -> Spent:
+    """The medians of processor and clock."""
+    return Spent(*map(statistics.median, zip(*spent, strict=True)))
+
+
+def run(code: str, path: Path, cache: str) -> Spent | None:
+    """What a new Python spends on some code, with a path as its argument; None if it fails."""
+    folders = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    environment = {**os.environ, "PYTHONPATH": folders, "PYTHONPYCACHEPREFIX": cache}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    before, started = os.times(), time.perf_counter()
+    done = subprocess.run([sys.executable, "-c", code, str(path)], stderr=subprocess.DEVNULL, env=environment)
+    clock, after = time.perf_counter() - started, os.times()
+    below = after.children_user + after.children_system - before.children_user - before.children_system
+    return None if done.returncode else Spent(below, clock)
+
+
+def written(folder: Path, only: str, repeats: int) -> Iterator[tuple[str, float]]:
+    """Yield formats and the least seconds of the processor that writing samba takes."""
     samba = gvpipe.read(folder / "samba.npz")
     samba.read(0, 1)
     with tempfile.TemporaryDirectory() as place:
         for suffix in ("glb", "usdc", "abc"):
-            name = f"samba.{suffix}, written"
+            name = f"samba.{suffix}"
             if only in name:
-                target = Path(place, f"a.{suffix}")
-                yield Row(name, "-", None, seconds(partial(gvpipe.write, samba, target), repeats))
+                yield name, min(seconds(partial(gvpipe.write, samba, Path(place, f"a.{suffix}"))) for _ in range(repeats))
 
 
-def seconds(work: Callable[[], Any], repeats: int) -> float:
-    """Seconds of the processor that some work takes, processes that it starts and ends included, the least of several times."""
-    spent = []
-    for _ in range(repeats):
-        started, before = time.process_time(), os.times()
-        work()
-        after = os.times()
-        below = after.children_user + after.children_system - before.children_user - before.children_system
-        spent.append(time.process_time() - started + below)
-    return min(spent)
-
-
-def read(path: Path) -> None:
-    """Read all frames and fields by gvpipe."""
-    sequence = gvpipe.read(path)
-    for _ in sequence.chunks():
-        pass
-    for field in sequence.fields.values():
-        field.read(0, len(field))
-
-
-def by_usd(path: Path) -> None:
-    """Points of all meshes at all time codes in world space, polygons, normals and primvars."""
-    from pxr import Usd, UsdGeom, UsdSkel
-
-    stage: Any = Usd.Stage.Open(str(path))
-    meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
-    roots = [UsdSkel.Root(prim) for prim in stage.Traverse() if prim.IsA(UsdSkel.Root)]
-    start, stop = stage.GetStartTimeCode(), stage.GetEndTimeCode()
-    for root in roots:
-        UsdSkel.BakeSkinning(root, _interval(start, stop))
-    for mesh in meshes:
-        for held in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr(), mesh.GetNormalsAttr()):
-            _ = np.array(held.Get(start) or ())
-        for primvar in UsdGeom.PrimvarsAPI(mesh.GetPrim()).GetPrimvars():
-            _ = np.array(primvar.Get(start)), np.array(primvar.GetIndices(start))
-        for frame in np.arange(start, stop + 1):
-            points = np.array(mesh.GetPointsAttr().Get(frame), np.float64)
-            world = np.array(UsdGeom.Imageable(mesh).ComputeLocalToWorldTransform(frame))
-            _ = points @ world[:3, :3] + world[3, :3]
-
-
-def _interval(start: float, stop: float) -> Any:
-    from pxr import Gf
-
-    return Gf.Interval(start, stop)
-
-
-def apart(name: str, path: Path) -> None:
-    """A function of this module in a process of its own; only its library counts, not what gvpipe imports."""
-    code = f"import sys; from pathlib import Path; from measure_formats import {name}; {name}(Path(sys.argv[1]))"
-    folders = os.pathsep.join([str(Path(__file__).parent), *sys.path])
-    subprocess.run([sys.executable, "-c", code, str(path)], check=True, env={**os.environ, "PYTHONPATH": folders})
-
-
-by_usd_apart = partial(apart, "by_usd")
-by_alembic_apart = partial(apart, "by_alembic")
-
-
-def by_alembic(path: Path) -> None:
-    """Positions of all meshes in all samples, in world space, with polygons, texture coordinates, normals and face sets."""
-    from alembic3d import Abc, AbcGeom
-
-    archive = Abc.IArchive(str(path))
-    held: list[Any] = []
-
-    def visit(item: Any, above: list[Any]) -> None:
-        for number in range(item.getNumChildren()):
-            child = item.getChild(number)
-            if child.getMetaData().get("schema") == "AbcGeom_PolyMesh_v1":
-                mesh = AbcGeom.IPolyMesh(item, child.getName())
-                held.append(mesh)
-                schema = mesh.getSchema()
-                _ = np.array(schema.getFaceIndicesProperty().getValue()), np.array(schema.getFaceCountsProperty().getValue())
-                for param in (schema.getUVsParam(), schema.getNormalsParam()):
-                    if param.valid():
-                        value = param.getIndexedValue()
-                        _ = np.array(value.getVals()), np.array(value.getIndices())
-                for name in schema.getFaceSetNames():
-                    faces = schema.getFaceSet(str(name))
-                    _ = np.array(faces.getSchema().getValue().getFaces())
-                for one in moments([schema.getPositionsProperty(), *(xform.getSchema() for xform in above)]):
-                    selector = Abc.ISampleSelector(float(one))
-                    points = np.array(schema.getPositionsProperty().getValue(selector), np.float64)
-                    for xform in above:
-                        matrix = np.array(xform.getSchema().getValue(selector).getMatrix())
-                        points = points @ matrix[:3, :3] + matrix[3, :3]
-            elif child.getMetaData().get("schema") == "AbcGeom_Xform_v3":
-                held.append(AbcGeom.IXform(item, child.getName()))
-                visit(child, [held[-1], *above])
-                continue
-            visit(child, above)
-
-    visit(archive.getTop(), [])
-
-
-def moments(schemas: list[Any]) -> set[float]:
-    """Times of the samples of what has several, or of the first."""
-    moving = [one for one in schemas if one.getNumSamples() > 1] or schemas[:1]
-    return {one.getTimeSampling().getSampleTime(number) for one in moving for number in range(one.getNumSamples())}
-
-
-UFBX = """
-import ctypes, gc, sys
-import numpy as np, ufbx
-gc.disable()
-keep = ctypes.pythonapi.Py_IncRef
-keep.argtypes, keep.restype = [ctypes.py_object], None
-def hold(found):  # the library frees what is still in use
-    if found is not None:
-        keep(found)
-    return found
-def listed(found):
-    hold(found)
-    return [hold(found[number]) for number in range(len(found))]
-def array(found):  # an empty list ends the process
-    hold(found)
-    return np.array(found) if len(found) else None
-scene = hold(ufbx.load_file(sys.argv[1], generate_missing_normals=True))
-for mesh in listed(scene.meshes):
-    for each in (mesh.faces, mesh.vertex_indices, hold(mesh.vertex_normal).values, hold(mesh.vertex_normal).indices):
-        array(each)
-    for uv in listed(mesh.uv_sets):
-        array(hold(uv.vertex_uv).values), array(hold(uv.vertex_uv).indices)
-rate = hold(scene.settings).frames_per_second
-take = listed(scene.anim_stacks)[0]
-for frame in range(int((take.time_end - take.time_begin) * rate + 1.5)):
-    now = hold(ufbx.evaluate_scene(scene, hold(take.anim), take.time_begin + frame / rate, evaluate_skinning=True))
-    for node in listed(now.nodes):
-        if hold(node.mesh) is not None:
-            array(hold(node.mesh.skinned_position).values).reshape(-1, 3) @ np.array(hold(node.geometry_to_world))[:3]
-    now.free()
-"""
-
-
-def by_ufbx(path: Path) -> None:
-    """Positions of all meshes in all frames of the first take, polygons, normals and texture coordinates, in another process.
-
-    There its objects can be held for ever; in this one, those of one reading would slow the next.
-    """
-    subprocess.run([sys.executable, "-c", UFBX, str(path)], check=True)
-
-
-def by_trimesh(folder: Path) -> None:
-    """All frames of a folder, or one file, as vertices and faces."""
-    import trimesh
-
-    for path in sorted(folder.iterdir()) if folder.is_dir() else [folder]:
-        if path.suffix in (".obj", ".ply", ".glb"):
-            mesh: Any = trimesh.load(path, process=False, force="mesh")
-            _ = mesh.vertices, mesh.faces
-
-
-def by_h5py(path: Path) -> None:
-    """All numbers of an HDF5 file."""
-    import h5py
-
-    with h5py.File(path) as file:
-        found: list[Any] = []
-        file.visititems(lambda _, one: found.append(one))  # what the function returns would end the visit
-        _ = [one[...] for one in found if isinstance(one, h5py.Dataset)]
-
-
-def by_meshio(path: Path) -> None:
-    """All steps of a simulation, as meshio gives them."""
-    import contextlib
-    import io
-
-    import meshio
-
-    with contextlib.redirect_stdout(io.StringIO()):
-        if path.suffix == ".xdmf":
-            with meshio.xdmf.TimeSeriesReader(path) as reader:
-                reader.read_points_cells()
-                for step in range(reader.num_steps):
-                    reader.read_data(step)
-        else:
-            for file in sorted(path.parent.rglob("*.vtu")) if path.suffix == ".series" else [path]:
-                meshio.read(file)
-
-
-FILES: list[tuple[str, str, Callable[[Path], None]]] = [
-    ("usd/HIK_Export/HIK_Export.usda", "usd-core", by_usd_apart),
-    ("usd/bunny_walk_skel/bunny_walk_skel.usdc", "usd-core", by_usd_apart),
-    ("usd/transformAnim/transformAnim.usda", "usd-core", by_usd_apart),
-    ("usd/skinCluster/skinCluster.usda", "usd-core", by_usd_apart),
-    ("abc/barbarian_walk_abc/barbarian_walk_abc.abc", "alembic3d", by_alembic_apart),
-    ("abc/cubes_hi/cubes-hi.abc", "alembic3d", by_alembic_apart),
-    ("abc/testUsdAbcIsConstant/testUsdAbcIsConstant.abc", "alembic3d", by_alembic_apart),
-    ("fbx/bunny_walk_fbx/bunny_walk.fbx", "ufbx", by_ufbx),
-    ("objseq/cesium_man_obj", "trimesh", by_trimesh),
-    ("plyseq/fox_run_ply", "trimesh", by_trimesh),
-    ("sim/can_vtkhdf/can-vtu.hdf", "h5py", by_h5py),
-    ("sim/dolfinx_xdmf/no_checkpoint.xdmf", "meshio", by_meshio),
-    ("sim/wavy_vtu_series/mesh.vtu.series", "meshio", by_meshio),
-]
-
-SCENES: dict[str, tuple[str, Callable[[Path], None]]] = {
-    "usdc": ("usd-core", by_usd_apart),
-    "abc": ("alembic3d", by_alembic_apart),
-    "vtkhdf": ("h5py", by_h5py),
-}
+def seconds(work: Callable[[], Any]) -> float:
+    """Seconds of the processor that some work takes in this process."""
+    started = time.process_time()
+    work()
+    return time.process_time() - started
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from Polygonal Facets", 1998 (angle); Max, "Weights for Computing Vertex Normals
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.errors import InputError
 
 RULES = ("area", "angle", "uniform", "flat")
+Normals = Callable[[Array, Array, Array, str], Float32]
 
 
 def surface_normals(positions: Array, faces: Array, entries: Array, rule: str) -> Float32:
@@ -49,7 +51,37 @@ def surface_normals(positions: Array, faces: Array, entries: Array, rule: str) -
     return normals
 
 
-def find_rule(normals: Array, entries: Array, positions: Array, faces: Array, bound: float) -> str | None:
+def start_free_normals(positions: Array, faces: Array, entries: Array, rule: str) -> Float32:
+    """The same as `surface_normals` but for rounding, by NumPy: slower, without the start of numba."""
+    points, corners = np.asarray(positions, np.float64), np.asarray(entries).reshape(-1, 3)
+    n_entries = int(corners.max(initial=-1)) + 1
+    return np.stack([_normals_of(frame[faces], corners, rule, n_entries) for frame in points]).astype(np.float32)
+
+
+def _normals_of(triangles: Float64, corners: Array, rule: str, n_entries: int) -> Float64:
+    """Unit normals ``(N, 3)`` of ``triangles (T, 3, 3)``, whose corners have the normals ``corners (T, 3)``."""
+    edges = np.roll(triangles, -1, axis=1) - triangles  # edge k leads from corner k to the next
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    area = np.sqrt((normals**2).sum(axis=1))  # doubled
+    has_area = area > 0.0
+    edges, normals, area, corners = edges[has_area], normals[has_area], area[has_area], corners[has_area]
+    sums = np.zeros((n_entries, 3))
+    if rule == "flat":
+        used, first = np.unique(corners.reshape(-1), return_index=True)
+        sums[used] = normals[first // 3]
+    else:
+        weights = np.ones_like(corners, np.float64) if rule == "area" else np.repeat(1.0 / area[:, None], 3, axis=1)
+        if rule == "angle":
+            weights *= np.arctan2(area[:, None], -(edges * np.roll(edges, 1, axis=1)).sum(axis=2))
+        for axis in range(3):
+            sums[:, axis] = np.bincount(corners.ravel(), (weights * normals[:, axis, None]).ravel(), n_entries)
+    length = np.sqrt((sums**2).sum(axis=1, keepdims=True))
+    return sums / np.where(length > 0.0, length, 1.0)
+
+
+def find_rule(
+    normals: Array, entries: Array, positions: Array, faces: Array, bound: float, compute: Normals = surface_normals
+) -> str | None:
     """Return the rule that gives all normals within an angle, the most accurate one; None if there is none.
 
     Args:
@@ -58,11 +90,12 @@ def find_rule(normals: Array, entries: Array, positions: Array, faces: Array, bo
         positions: ``(V, 3)``, or ``(n, V, 3)`` by frame: of several frames, all must fit.
         faces: ``(T, 3)``.
         bound: degrees.
+        compute: makes normals of positions, as `surface_normals` does.
     """
     given = np.asarray(normals, np.float64).reshape(-1, *normals.shape[-2:])
     frames = np.asarray(positions).reshape(-1, *positions.shape[-2:])
     used = np.flatnonzero(np.bincount(entries, minlength=given.shape[1]))
-    errors = {rule: largest_error(given[:, used], surface_normals(frames, faces, entries, rule)[:, used]) for rule in RULES}
+    errors = {rule: largest_error(given[:, used], compute(frames, faces, entries, rule)[:, used]) for rule in RULES}
     best = min(RULES, key=lambda rule: errors[rule])
     return best if errors[best] <= bound else None
 

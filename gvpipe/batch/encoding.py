@@ -24,7 +24,7 @@ class Task:
     """A sequence to encode.
 
     Args:
-        source: as `gvpipe.api.read` takes it, absolute.
+        source: as `gvpipe.files.read` takes it, absolute.
         target: of the file to write, absolute.
         done_hash: of the input that the file was made of, None if there is no such file.
     """

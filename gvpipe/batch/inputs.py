@@ -28,7 +28,7 @@ class Job:
 
     Args:
         output: below the folder of all outputs, with ``/`` between folders.
-        source: as `gvpipe.api.read` takes it.
+        source: as `gvpipe.files.read` takes it.
     """
 
     output: str

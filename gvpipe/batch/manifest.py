@@ -28,7 +28,7 @@ class Entry:
     """A line.
 
     Args:
-        input: as `gvpipe.api.read` takes it.
+        input: as `gvpipe.files.read` takes it.
         hash: SHA-256 of the input's bytes, as hexadecimal digits; None: it could not be read.
         output: below the manifest's folder, with ``/`` between folders.
         error: why there is no output; None: it is there.

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 import gvpipe
-from gvpipe import api
+from gvpipe import api, files
 from gvpipe.atomic import output_error
 from gvpipe.benchmark.report import BenchReport, Curve
 from gvpipe.codec import Progress
@@ -83,7 +83,7 @@ def run(
 
 def measure_curve(source: str, codec: str, qualities: list[float], texts: dict[str, str]) -> Curve:
     """Measure one codec on one sequence, in this process."""
-    sequence = api.read(source)
+    sequence = files.read(source)
     settings = _settings(codec, sorted(qualities), texts)
     points = []
     with tempfile.TemporaryDirectory() as folder:

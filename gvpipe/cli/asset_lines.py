@@ -14,11 +14,12 @@ MOST = 12  # names in a line
 
 def shape_lines(info: Info | SourceInfo) -> Iterator[str]:
     """Yield the numbers of vertices, triangles and frames, and where frame 0 lies."""
-    from gvpipe.notes import show_origin
+    from gvpipe.notes import count, show_origin
 
     low, high = info.bounding_box["min"], info.bounding_box["max"]
     place = f", relative to {show_origin(info.origin)}" if any(info.origin) else ""
-    yield f"{info.vertices} vertices, {info.triangles} triangles, {info.frames} frames at {info.fps:g} fps"
+    vertices, triangles = count(info.vertices, "vertex", "vertices"), count(info.triangles, "triangle")
+    yield f"{vertices}, {triangles}, {count(info.frames, 'frame')} at {info.fps:g} fps"
     yield "frame 0 lies in " + " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True)) + place
 
 

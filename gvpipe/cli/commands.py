@@ -107,7 +107,7 @@ def encode(
     OFF, GLB, VTP, VTU), a glob ('walk/*.obj', or without the quotes), a pattern (walk/%04d.obj, walk/####.obj,
     'walk/$F4.obj'), a geometry video, or - for an .npz or a geometry video on standard input. OUTPUT - is standard output.
     """
-    from gvpipe import api
+    from gvpipe import api, files
     from gvpipe.cli.process import give_back_large_arrays
     from gvpipe.cli.splitting import write_runs
 
@@ -126,7 +126,7 @@ def encode(
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
         if split:
-            runs = api.read_runs(source, **asked.reading, unlimited=asked.unlimited)
+            runs = files.read_runs(source, **asked.reading, unlimited=asked.unlimited)
             written = write_runs(
                 runs, target, lambda run, own: api.encode(run.sequence, own, asked.codec, progress, **asked.making)
             )
@@ -146,11 +146,12 @@ def encode(
 
 def _print_report(out: Output, report: Report, name: str, target: str) -> None:
     """Print what an encode did, as text and notes."""
+    from gvpipe import notes
     from gvpipe.rate_control.purposes import name_with
 
     for note in report.notes:
         out.note(note)
-    shape = f"{report.frames} frames, {report.vertices} vertices"
+    shape = notes.shape(report.frames, report.vertices)
     size = f"{_size(report.bytes)}, {report.bpvf:.3f} bits per vertex and frame"
     out.text(f"{name} ({shape}) -> {target} ({size})")
     seconds = dict(report.seconds)
@@ -197,17 +198,17 @@ def decode(
     folder of vertex animation textures (.openvat), or a pattern of frame files such as out/%04d.obj (also .ply, .stl, .off,
     .glb, .vtp), or - for an .npz on standard output. FILE - is a geometry video on standard input.
     """
-    from gvpipe import api, notes
+    from gvpipe import api, files, notes
     from gvpipe.cli.choices import chosen, chosen_frames
 
     out = out.carrying(target)
     first, last = chosen_frames(start, stop, frames)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         player = api.open(given, unlimited=unlimited)
-        start, stop = api.frame_range(player, first, last)
+        start, stop = files.frame_range(player, first, last)
         level = player.level(lod)
         sequence = chosen(level.part(start, stop), parts, fps, "decode", progress)
-        noticed = api.write(sequence.local() if local else sequence, path, start)
+        noticed = files.write(sequence.local() if local else sequence, path, start)
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
     noticed += level.notes if lod else ()
     for note in noticed:
@@ -215,7 +216,7 @@ def decode(
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces), "lod": lod}
     out.json({**values, "origin": [0.0, 0.0, 0.0] if local else player.origin.tolist(), "notes": noticed})
-    shape = f"{stop - start} frames, {sequence.n_vertices} vertices"
+    shape = notes.shape(stop - start, sequence.n_vertices)
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")
 
 
@@ -274,29 +275,39 @@ def pack(folder: str, target: str, shard_size: str, shard_count: int | None, unl
 @click.option("--clip", metavar="NAME", help="The animation to look at, of a file that has several. [default: the first]")
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
+@click.option("--fps", type=float, help="Frames per second, instead of the input's; scenes are sampled at it.")
 @unlimited_option
 @output_options
-def info(source: str, clip: str | None, mesh: str | None, frames: str | None, unlimited: bool, out: Output) -> None:
+def info(
+    source: str,
+    clip: str | None,
+    mesh: str | None,
+    frames: str | None,
+    fps: float | None,
+    unlimited: bool,
+    out: Output,
+) -> None:
     """Tell what a geometry video (- for standard input) holds and where its bytes go, or what is read of any other input.
 
     Of shards (shard.tar, 'shard-*.tar') it sums up the sequences, and checks each.
     """
     from gvpipe import api
     from gvpipe.cli.asset_lines import asset_lines, shape_lines
+    from gvpipe.cli.choices import parse_frames
     from gvpipe.cli.shards import show_shards
 
     if source.lower().endswith(".tar"):
-        if clip is not None or mesh is not None or frames is not None:
-            raise click.UsageError("--clip, --mesh and --frames are for sources; shards are summed up whole")
+        if any(value is not None for value in (clip, mesh, frames, fps)):
+            raise click.UsageError("--clip, --mesh, --frames and --fps are for sources; shards are summed up whole")
         show_shards(source, unlimited, out)
         return
 
     with source_path(source) as path, out.progress():
         if not is_video(path):
-            _source_info(source, path, (clip, mesh, frames, unlimited), out)
+            _source_info(source, path, (clip, mesh, parse_frames(frames), unlimited, fps), out)
             return
-        if clip is not None or mesh is not None or frames is not None:
-            raise click.UsageError("--clip, --mesh and --frames are for sources; a geometry video is shown whole")
+        if any(each is not None for each in (clip, mesh, frames, fps)):
+            raise click.UsageError("--clip, --mesh, --frames and --fps are for sources; a geometry video is shown whole")
         found = api.info(path, unlimited=unlimited)
     out.json(found.to_json())
     layout = "" if found.layout == "plain" else f", {found.layout} layout"
@@ -313,14 +324,12 @@ def info(source: str, clip: str | None, mesh: str | None, frames: str | None, un
     _print_sections(out, found.sections, found.vertices * found.frames)
 
 
-def _source_info(source: str, path: str, given: tuple[str | None, str | None, str | None, bool], out: Output) -> None:
-    """Print what is read of an input that is no geometry video; ``given`` are --clip, --mesh, --frames and --unlimited."""
+def _source_info(source: str, path: str, given: tuple[Any, ...], out: Output) -> None:
+    """Print what is read of an input that is no geometry video; ``given`` are further arguments of `source_info`."""
     from gvpipe.cli.asset_lines import asset_lines, shape_lines, time_lines
-    from gvpipe.cli.choices import parse_frames
     from gvpipe.source_info import source_info
 
-    clip, mesh, frames, unlimited = given
-    found = source_info(path, clip, mesh, parse_frames(frames), unlimited)
+    found = source_info(path, *given)
     out.json(found.to_json())
     out.text(shown(source, STDIN) + ("" if found.bytes is None else f": {_size(found.bytes)}"))
     for line in [*shape_lines(found), *asset_lines(found), *time_lines(found)]:
@@ -351,7 +360,7 @@ def compare(
     out: Output,
 ) -> None:
     """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos, one may be - for standard input."""
-    from gvpipe import api
+    from gvpipe import files
     from gvpipe.cli.choices import parse_frames
     from gvpipe.metrics import comparison
 
@@ -360,8 +369,8 @@ def compare(
     span = parse_frames(frames)
     its_mesh, other_mesh = _meshes((reference, distorted), mesh)
     with source_path(reference) as one, source_path(distorted) as other, out.progress() as progress:
-        given = api.read(one, fps, clip, its_mesh, span, unlimited=unlimited)
-        read_other = partial(api.read, other, None, other_clip, other_mesh, unlimited=unlimited)
+        given = files.read(one, fps, clip, its_mesh, span, unlimited=unlimited)
+        read_other = partial(files.read, other, None, other_clip, other_mesh, unlimited=unlimited)
         result = comparison.compare(
             given,
             read_other() if span is None else _same_frames(read_other, span, len(given)),

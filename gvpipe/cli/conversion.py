@@ -14,6 +14,7 @@ import click
 from gvpipe.cli.console import Output, output_options, unlimited_option
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.errors import InputError
+from gvpipe.notes import shape as shape_of
 
 if TYPE_CHECKING:
     from gvpipe.sequence import MeshSequence
@@ -53,7 +54,7 @@ def convert(
     INPUT is what `gvpipe encode` takes; OUTPUT is what `gvpipe decode` takes. No codec is between, so that nothing changes but
     what a format cannot hold, which is said.
     """
-    from gvpipe import api
+    from gvpipe import files
     from gvpipe.cli.choices import chosen, chosen_frames, parse_frames
 
     out = out.carrying(target)
@@ -67,41 +68,43 @@ def convert(
         return
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         read = (
-            _level_reader(given, lod, unlimited) if lod else partial(api.read, given, clip=clip, mesh=mesh, unlimited=unlimited)
+            _level_reader(given, lod, unlimited)
+            if lod
+            else partial(files.read, given, clip=clip, mesh=mesh, unlimited=unlimited)
         )
         if frames is not None:
             some = read(fps=fps, frames=(first, last))
             start, stop = first, first + len(some)
         else:
             whole = read(fps=fps)
-            start, stop = api.frame_range(whole, first, last)
+            start, stop = files.frame_range(whole, first, last)
             some = whole.part(start, stop)
         sequence = chosen(some, parts, None, "convert", progress)
-        noticed = [*some.notes, *api.write(sequence, path, start)]
+        noticed = [*some.notes, *files.write(sequence, path, start)]
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces)}
     out.json({**values, "origin": sequence.origin.tolist(), "notes": noticed})
-    shape = f"{stop - start} frames, {sequence.n_vertices} vertices"
+    shape = shape_of(stop - start, sequence.n_vertices)
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")
 
 
 def _convert_split(source: str, target: str, options: dict[str, Any], parts: tuple[str, ...], out: Output) -> None:
     """Convert each run of frames of one topology."""
-    from gvpipe import api
+    from gvpipe import files
     from gvpipe.cli.choices import chosen
     from gvpipe.cli.splitting import write_runs
 
     with source_path(source) as given, out.progress() as progress:
-        runs = api.read_runs(given, **options)
+        runs = files.read_runs(given, **options)
         ready = [replace(run, sequence=chosen(run.sequence, parts, None, "convert", progress)) for run in runs]
-        written = write_runs(ready, target, lambda run, path: api.write(run.sequence, path, run.start))
+        written = write_runs(ready, target, lambda run, path: files.write(run.sequence, path, run.start))
     every = (note for run, (_, said) in zip(runs, written, strict=True) for note in (*run.sequence.notes, *said))
     noticed = list(dict.fromkeys(every))
     for note in noticed:
         out.note(note)
-    files = [
+    listed = [
         {
             "output": name,
             "start": run.start,
@@ -114,15 +117,15 @@ def _convert_split(source: str, target: str, options: dict[str, Any], parts: tup
         }
         for (name, _), run in zip(written, ready, strict=True)
     ]
-    out.json({"files": files, "notes": noticed})
-    for each in files:
-        shape = f"{each['frames']} frames, {each['vertices']} vertices"
+    out.json({"files": listed, "notes": noticed})
+    for each in listed:
+        shape = shape_of(each["frames"], each["vertices"])
         out.text(f"{shown(source, STDIN)}, frames {each['start']}:{each['stop']} -> {each['output']} ({shape})")
 
 
 def _level_reader(source: str, lod: int, unlimited: bool) -> Callable[..., MeshSequence]:
     """What reads frames of a level of detail of a geometry video, at a frame rate."""
-    from gvpipe import api
+    from gvpipe import api, files
 
     if not is_video(source):
         raise InputError(f"{source} has no levels of detail; encode it with --codec pca, whose files have them")
@@ -130,7 +133,7 @@ def _level_reader(source: str, lod: int, unlimited: bool) -> Callable[..., MeshS
 
     def read(fps: float | None, frames: tuple[int, int | None] | None = None) -> MeshSequence:
         own = level if fps is None else level.with_fps(fps)
-        return own if frames is None else own.part(*api.frame_range(own, *frames))
+        return own if frames is None else own.part(*files.frame_range(own, *frames))
 
     return read
 

@@ -76,9 +76,9 @@ class Encoding:
 
     Args:
         codec: settings, or those of all codecs to choose from.
-        reading: keywords of `gvpipe.api.read`, but for ``unlimited``.
+        reading: keywords of `gvpipe.files.read`, but for ``unlimited``.
         making: keywords of `gvpipe.api.encode` for what is made of it.
-        unlimited: as for `gvpipe.api.read`.
+        unlimited: as for `gvpipe.files.read`.
     """
 
     codec: Codec | list[Codec]

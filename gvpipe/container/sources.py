@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import re
+import stat
 from typing import Protocol
 
 from gvpipe.errors import FormatError, InputError, OutputError, TruncatedFile
 
 SCHEMES = ("http://", "https://")
 ADDRESS = re.compile(r"([a-z][a-z0-9+.-]+:)/", re.IGNORECASE)  # two letters or more: C:/ is a drive
+NO_FILE = "is no ordinary file, but a pipe or a device; write what it gives to a file first"
 DOWNLOAD_FIRST = "mesh sequences are read from disk; download it first"
 
 
@@ -68,11 +70,15 @@ class FileSource:
 
     Raises:
         OSError: there is no such file.
+        InputError: it is a pipe or a device, which would be waited for.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self._path = os.path.abspath(path)
-        self._state = _state(os.stat(self._path))
+        found = os.stat(self._path)
+        if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):  # opening a folder says that it is one
+            raise InputError(f"{path} {NO_FILE}")
+        self._state = _state(found)
         self.size = self._state[0]
 
     def read(self, offset: int, length: int) -> bytes:

@@ -1,127 +1,31 @@
 """Mesh sequences from files and to files.
 
 A format that holds a whole sequence in one file has a module here and an entry in `scene_formats`. A format of single frames
-has a module and an entry in `formats.FRAME_FORMATS`.
+has a module and an entry in `formats.FRAME_FORMATS`. What is named in ``__all__`` loads on first use: a process that runs a
+library imports its own format alone.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
-from dataclasses import replace
-from pathlib import Path
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-from gvpipe.container.sources import check_source, check_target
-from gvpipe.errors import InputError
-from gvpipe.io.cut_pictures import cut_notes
-from gvpipe.io.damage import check_file, reading
-from gvpipe.io.export import write_frames
-from gvpipe.io.formats import FRAME_FORMATS
-from gvpipe.io.frames import read_frames
-from gvpipe.io.options import ReadOptions
-from gvpipe.io.pattern import match_pattern
-from gvpipe.io.scene_formats import HAVE_CLIPS, OPENVAT, POINT_CACHES, SCENES, SIMULATIONS, WRITERS, scene_readers
-from gvpipe.sequence import MeshSequence
+if TYPE_CHECKING:
+    from gvpipe.io.reading import READERS, read
+    from gvpipe.io.scene_formats import WRITERS
+    from gvpipe.io.writing import write
 
 __all__ = ["READERS", "WRITERS", "read", "write"]
 
-
-def read(
-    path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
-    fps: float | None = None,
-    clip: str | None = None,
-    mesh: str | os.PathLike[str] | None = None,
-    frames: tuple[int, int | None] | None = None,
-    unlimited: bool = False,
-) -> MeshSequence:
-    """Read a mesh sequence.
-
-    Args:
-        path: an ``.npz``, a scene (animated ``.glb`` or ``.gltf``, ``.usd``, ``.usda``, ``.usdc``, ``.usdz``, ``.abc``,
-            ``.fbx``), a simulation (``.pvd``, ``.vtkhdf``, ``.xdmf``, ``.exo``, ``.case``), a point cache (``.pc2``, ``.mdd``,
-            ``.npy``), or frame files as a folder, a glob (``walk/*.obj``), a pattern (``walk/%04d.obj``, ``walk/####.obj``,
-            ``walk/$F4.obj``), one file or a list of files.
-        fps: frames per second; overrides the file's. Frame files, and archives without one, have 30 by default. An animated
-            glTF file is sampled at it; by default at the rate of its keys.
-        clip: name of the animation to read, of a file that has several; None: the first.
-        mesh: a file with the triangles of a point cache.
-        frames: first frame that is read, and the one after the last (None: all that follow).
-        unlimited: whether OpenUSD may take any memory (`gvpipe.io.usd.worker`).
-
-    Raises:
-        InputError: the path or what it holds cannot be used. Frame files after the first are read, and may raise it,
-            when their positions are.
-    """
-    sequence = _read(path, ReadOptions(fps, clip, mesh, frames, unlimited))
-    cut = cut_notes(sequence.images)
-    return replace(sequence, notes=(*sequence.notes, *cut)) if cut else sequence
+_HOME = {
+    "READERS": "gvpipe.io.reading",
+    "WRITERS": "gvpipe.io.scene_formats",
+    "read": "gvpipe.io.reading",
+    "write": "gvpipe.io.writing",
+}
 
 
-def _read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], options: ReadOptions) -> MeshSequence:
-    if not isinstance(path, str | os.PathLike):
-        _refuse_clip(options.clip, "a list of files")
-        _refuse_mesh(options.mesh, "a list of files")
-        for file in path:
-            check_source(file)
-        return read_frames([os.fspath(file) for file in path], options.fps, options.frames)
-    path = os.fspath(path)
-    check_source(path)
-    suffix = Path(path).suffix.lower()
-    if suffix not in HAVE_CLIPS or not os.path.isfile(path):
-        _refuse_clip(options.clip, path)
-    if suffix not in POINT_CACHES:
-        _refuse_mesh(options.mesh, path)
-    if suffix == OPENVAT:
-        raise InputError(f"{path}: vertex animation textures are written, not read; give what they were made of")
-    reader = READERS.get(suffix)
-    # a pattern of frames may end in .glb, too
-    if reader is not None and (os.path.isfile(path) or (suffix not in FRAME_FORMATS and not os.path.isdir(path))):
-        check_file(Path(path))
-        with reading(Path(path), ""):
-            sequence = reader(Path(path), options)
-        if sequence is not None:
-            return sequence if suffix in (*SIMULATIONS, *SCENES) else _span(sequence, options.frames)
-    return read_frames(path, options.fps, options.frames)
-
-
-READERS = scene_readers(read)
-
-
-def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) -> tuple[str, ...]:
-    """Write a mesh sequence; returns what the format cannot hold, a line each.
-
-    Args:
-        path: an ``.npz``, a scene (animated ``.glb``, ``.usda``, ``.usdc``, ``.usd``, ``.usdz``, ``.abc``), a point cache
-            (``.pc2``, ``.mdd``, ``.npy``), a folder of vertex animation textures (``.openvat``), a pattern of frame files
-            (``out/%04d.obj``) or a folder (existing, or ending in ``/``).
-        start: number of the first frame file.
-
-    Raises:
-        InputError: the path names no format that can be written.
-        OutputError: a file cannot be written; nothing half-written is left.
-    """
-    path = os.fspath(path)
-    check_target(path)
-    suffix = Path(path).suffix.lower()
-    writer = WRITERS.get(suffix)
-    # .glb may be a frame, too: of a pattern, or of a sequence of one
-    is_frame = suffix in FRAME_FORMATS and (sequence.n_frames == 1 or match_pattern(path) is not None or os.path.isdir(path))
-    is_folder = path.endswith(("/", os.sep)) and suffix != OPENVAT
-    if writer is not None and not is_folder and not is_frame:
-        return writer(sequence, Path(path)) or ()
-    return write_frames(sequence, path, start)
-
-
-def _span(sequence: MeshSequence, frames: tuple[int, int | None] | None) -> MeshSequence:
-    """Some frames of a sequence; formats whose topology may change take theirs before it is compared."""
-    return sequence if frames is None else sequence.part(*ReadOptions(frames=frames).span(len(sequence), sequence.name))
-
-
-def _refuse_clip(clip: str | None, name: str) -> None:
-    if clip is not None:
-        raise InputError(f"{name} has no clips; clip={clip!r} is for a single {' or '.join(HAVE_CLIPS)}")
-
-
-def _refuse_mesh(mesh: str | os.PathLike[str] | None, name: str) -> None:
-    if mesh is not None:
-        raise InputError(f"{name} has triangles of its own; mesh={os.fspath(mesh)!r} is for {', '.join(POINT_CACHES)} (--mesh)")
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'gvpipe.io' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)

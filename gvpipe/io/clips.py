@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-from gvpipe.io.fbx.reader import read_takes
+from gvpipe.io.fbx.process import read_takes
 from gvpipe.io.gltf import read_clips
 from gvpipe.io.scene_formats import GLTF
 

@@ -6,8 +6,10 @@ Pictures are not decoded for this; their formats say where they end.
 from __future__ import annotations
 
 import struct
+from typing import TYPE_CHECKING
 
-from gvpipe.asset.material import Image
+if TYPE_CHECKING:
+    from gvpipe.asset.material import Image
 
 PNG = b"\x89PNG\r\n\x1a\n"
 JPEG, JPEG_END = b"\xff\xd8\xff", b"\xff\xd9"

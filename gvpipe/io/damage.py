@@ -12,9 +12,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
-
 from gvpipe.arguments import did_you_mean
+from gvpipe.container.sources import NO_FILE
 from gvpipe.errors import InputError, TopologyChange, printable
 
 AGAIN, FRAME_AGAIN = "export it again", "export this frame again"
@@ -33,6 +32,8 @@ def reading(path: Path, kind: str, at: str = "", remedy: str = AGAIN) -> Iterato
         at: where in the file, such as ``"frame 3"``.
         remedy: what the user can do.
     """
+    import numpy as np  # late: a process of a library starts before it is loaded
+
     try:
         with np.errstate(all="ignore"):  # readers check what they made of the numbers
             yield
@@ -53,7 +54,7 @@ def check_file(path: Path) -> None:
     except OSError as exc:
         raise InputError(f"{path} cannot be read: {exc.strerror}; check the path") from exc
     if not stat.S_ISREG(state.st_mode):
-        raise InputError(f"{path} is no ordinary file, but a pipe or a device; write what it gives to a file first")
+        raise InputError(f"{path} {NO_FILE}")
     if not state.st_size:
         raise InputError(f"{path} is empty; {AGAIN}")
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from gvpipe.io.late import late
-from gvpipe.io.mesh import EncoderMaker, Loader
+
+if TYPE_CHECKING:
+    from gvpipe.io.mesh import EncoderMaker, Loader
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,7 @@
 
 A request is a name and arguments, an answer ``(state, result)``; both are pickles. The state is ``done``, ``refused`` with an
 error's text, or ``changed`` with the text and the frame of a `TopologyChange`. The process ends with its input.
-
-`limit_memory` lets the system refuse the process more memory than follows from the size of what it reads. The library then
-raises an error or dies, which is one line either way. Linux alone has such a limit.
+What runs there is in `gvpipe.io.library_worker`. Neither module imports NumPy: both processes load it at the same time.
 """
 
 from __future__ import annotations
@@ -16,18 +14,15 @@ import subprocess
 import sys
 import time
 import weakref
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from gvpipe.errors import InputError, TopologyChange, printable
 from gvpipe.forks import ForkLock, renew_after_fork
-from gvpipe.io.damage import LONGEST, unreadable
+from gvpipe.io.damage import unreadable
+from gvpipe.io.library_worker import CHANGED, REFUSED
 
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # numpy loads 10 to 20 ms earlier, and has no large products here
-DONE, REFUSED, CHANGED = "done", "refused", "changed"
-LEAST_MEMORY, MEMORY_PER_BYTE = 1 << 30, 200  # bytes that the process may take in any case, and for each byte that it reads
-MOST_LISTED = 10_000  # entries of folders that are looked at
 MOST_RUNNING = 16  # processes at a time: of more files, those that were asked longest ago wait until they are asked again
 
 
@@ -35,14 +30,14 @@ class LibraryProcess:
     """A process that reads one file; in a forked child, and after it had to make room for others, there is a new one.
 
     Args:
-        path: of the file; of several, which one process may read, that of the next request.
-        module: that runs there; it calls `serve`.
+        path: of the file; of several, which one process may read, that of the first.
+        module: that runs there; it calls `gvpipe.io.library_worker.serve`.
         kind: of the file, for messages, such as ``"FBX"``.
         died: what a message says where the process dies.
     """
 
     def __init__(self, path: Path, module: str, kind: str, died: str) -> None:
-        self.path, self._module, self._kind, self._died = path, module, kind, died
+        self._path, self._module, self._kind, self._died = path, module, kind, died
         self._lock = ForkLock()
         self._prepared: list[tuple[str, tuple[Any, ...]]] = []
         self._process: subprocess.Popen[bytes] | None = None
@@ -62,8 +57,8 @@ class LibraryProcess:
         self._prepared.append((name, arguments))
         return result
 
-    def ask(self, name: str, *arguments: Any) -> Any:
-        """What the process answers.
+    def ask(self, name: str, *arguments: Any, path: Path | None = None) -> Any:
+        """What the process answers; of a process that reads several files, ``path`` is that of this request.
 
         Raises:
             InputError: it refuses the file, or it dies.
@@ -71,15 +66,26 @@ class LibraryProcess:
         """
         with self._lock:
             self._asked = time.monotonic()
-            if self._process is None:
-                _make_room()
-                self._start()
-                for prepared in self._prepared:
-                    self._exchange(*prepared)
+            self._path = path or self._path
+            self._begin()
             return self._exchange(name, arguments)
 
+    def start(self) -> None:
+        """Start the process now, so that it loads its library while this one goes on."""
+        with self._lock:
+            self._asked = time.monotonic()
+            self._begin()
+
+    def _begin(self) -> None:
+        """See to it that there is a process that is prepared."""
+        if self._process is None:
+            _make_room()
+            self._start()
+            for prepared in self._prepared:
+                self._exchange(*prepared)
+
     def _start(self) -> None:
-        self._process = start_process(self._module, self.path.absolute())
+        self._process = start_process(self._module, self._path.absolute())
         self._finalizer = weakref.finalize(self, _end, self._process)
         with _running_lock:
             _running.add(self)
@@ -108,14 +114,14 @@ class LibraryProcess:
         try:
             state, result = pickle.load(process.stdout)
         except (EOFError, OSError, pickle.UnpicklingError) as exc:
-            raise unreadable(self.path, self._kind, self._died) from exc
+            raise unreadable(self._path, self._kind, self._died) from exc
         if state == CHANGED:
             raise TopologyChange(*result)
         if state == REFUSED:
-            said = str(result).removeprefix(f"{self.path.absolute()}: ")
-            if printable(str(self.path)) in said:
+            said = str(result).removeprefix(f"{self._path.absolute()}: ")
+            if printable(str(self._path)) in said:
                 raise InputError(said)
-            raise unreadable(self.path, self._kind, said)
+            raise unreadable(self._path, self._kind, said)
         return result
 
 
@@ -150,55 +156,3 @@ def _end(process: subprocess.Popen[bytes]) -> None:
             with contextlib.suppress(OSError):
                 pipe.close()
     process.wait()
-
-
-def limit_memory(n_bytes: int) -> None:
-    """Let this process take max(`LEAST_MEMORY`, `MEMORY_PER_BYTE` x n_bytes) beside what it has; mapped files do not count."""
-    if sys.platform != "linux":  # others do not keep to such limits
-        return
-    import resource
-
-    with open("/proc/self/status") as status:
-        now = next((int(line.split()[1]) << 10 for line in status if line.startswith("VmData:")), 0)
-    limits = [now + max(LEAST_MEMORY, MEMORY_PER_BYTE * n_bytes), *resource.getrlimit(resource.RLIMIT_DATA)]
-    least = min(each for each in limits if each != resource.RLIM_INFINITY)
-    resource.setrlimit(resource.RLIMIT_DATA, (least, limits[-1]))
-
-
-def bytes_below(folder: Path, suffixes: tuple[str, ...]) -> int:
-    """Bytes of all files of some extensions in a folder and below, where a file's references lie; links are not followed."""
-    total = listed = 0
-    for place, folders, names in os.walk(folder):
-        listed += len(folders) + len(names)
-        if listed > MOST_LISTED:
-            break
-        for name in names:
-            if name.lower().endswith(suffixes):
-                with contextlib.suppress(OSError):  # it has gone, or may not be looked at
-                    total += os.stat(os.path.join(place, name)).st_size
-    return total
-
-
-def serve(answer: Callable[[str, tuple[Any, ...]], Any]) -> None:
-    """Answer requests until the input ends, then end the process without taking anything down, which may crash."""
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # nothing but answers may reach them
-    while True:
-        try:
-            name, arguments = pickle.load(sys.stdin.buffer)
-        except EOFError:
-            break
-        pickle.dump(_state_of(answer, name, arguments), answers, protocol=5)
-        answers.flush()
-    os._exit(0)
-
-
-def _state_of(answer: Callable[[str, tuple[Any, ...]], Any], name: str, arguments: tuple[Any, ...]) -> tuple[str, Any]:
-    try:
-        return DONE, answer(name, arguments)
-    except TopologyChange as exc:
-        return CHANGED, (str(exc), exc.frame)
-    except InputError as exc:
-        return REFUSED, str(exc)
-    except Exception as exc:  # whatever it is, the other process turns it into one line
-        return REFUSED, " ".join(str(exc).split())[:LONGEST] or type(exc).__name__

@@ -31,14 +31,14 @@ class ReadOptions:
         """First frame of a file of ``n_frames``, and the one after the last; ``where`` is the file, for messages.
 
         Raises:
-            InputError: there is no such frame.
+            InputError: some of them are not there.
         """
         if n_frames < 1:
             raise InputError(f"{where} has no time steps; at least one is needed")
         start, stop = self.frames or (0, None)
-        stop = n_frames if stop is None else min(stop, n_frames)
-        if not 0 <= start < stop:
-            raise InputError(f"{where}: frames {start}:{stop} are none of its {n_frames}; give a first and a later last frame")
+        stop = n_frames if stop is None else stop
+        if not 0 <= start < stop <= n_frames:
+            raise InputError(f"{where}: frames {start}:{stop} asked for; 0 <= start < stop <= {n_frames} is needed")
         return start, stop
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from gvpipe.arrays import Array, Frames, Int32, Int64
 from gvpipe.asset.attribute import Attribute
-from gvpipe.attributes.surface_normals import find_rule
+from gvpipe.attributes.surface_normals import find_rule, start_free_normals
 from gvpipe.io.sharing import shared_by_vertex
 from gvpipe.mesh.unique_rows import row_ids
 
@@ -51,4 +51,6 @@ def first_normals_note(attributes: Mapping[str, Attribute], faces: Int32, frames
         return ()
     entries, corners = entries_of(normals, faces)
     rows = corners if normals.domain == "corner" else faces.reshape(-1)[corners]
-    return () if own_rule(np.asarray(normals)[rows], frames[0:1][0], faces, entries) else (FIRST_NORMALS,)
+    # one frame: NumPy is done before numba has started
+    rule = find_rule(np.asarray(normals)[rows], entries, frames[0:1][0], faces, TOLERANCE, start_free_normals)
+    return (FIRST_NORMALS,) if rule is None else ()

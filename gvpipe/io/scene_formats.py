@@ -5,17 +5,21 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Optional
 
 from gvpipe.io.late import late
 from gvpipe.io.options import ReadOptions
-from gvpipe.sequence import MeshSequence
 
-MeshReader = Callable[[str | os.PathLike[str]], MeshSequence]
-SceneReader = Callable[[Path, ReadOptions], MeshSequence | None]  # None for a file that is one frame
-SceneWriter = Callable[[MeshSequence, Path], tuple[str, ...] | None]  # what the format cannot hold, a line each
+if TYPE_CHECKING:
+    from gvpipe.sequence import MeshSequence
+
+MeshReader = Callable[[str | os.PathLike[str]], "MeshSequence"]
+SceneReader = Callable[[Path, ReadOptions], Optional["MeshSequence"]]  # None for a file that is one frame
+SceneWriter = Callable[["MeshSequence", Path], tuple[str, ...] | None]  # what the format cannot hold, a line each
 
 USD = (".usda", ".usdc", ".usd", ".usdz")
 SCENES = (*USD, ".abc")  # whose topology may change
+IN_PROCESSES = (*SCENES, ".fbx")  # their readers start one, then turn what is raised into errors themselves
 GLTF = (".glb", ".gltf")
 SIMULATIONS: dict[str, SceneReader] = {
     **dict.fromkeys((".pvd", ".series"), late("step_lists", "read_step_list")),
@@ -50,7 +54,7 @@ def scene_readers(read_mesh: MeshReader) -> dict[str, SceneReader]:
         **dict.fromkeys(GLTF, late("gltf", "read_animated")),
         **dict.fromkeys(USD, late("usd.process", "read_usd")),
         ".abc": late("alembic.process", "read_alembic"),
-        ".fbx": late("fbx.reader", "read_fbx"),
+        ".fbx": late("fbx.process", "read_fbx"),
         **SIMULATIONS,
         ".pc2": lambda path, options: late("point_cache", "read_pc2")(path, options, read_mesh),
         ".mdd": lambda path, options: late("point_cache", "read_mdd")(path, options, read_mesh),

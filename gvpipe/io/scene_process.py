@@ -6,57 +6,19 @@ The process runs `gvpipe.io.scene_worker`. It gives a bounded number of frames a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Float64, Int32
-from gvpipe.asset.attribute import Attribute
+from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.asset.field import Field
-from gvpipe.asset.material import Image, Material
-from gvpipe.asset.metadata import Metadata
-from gvpipe.asset.part import Part
+from gvpipe.io.described import Described, FieldShape
 from gvpipe.io.library_process import LibraryProcess
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.own_normals import first_normals_note
 from gvpipe.sequence import MeshSequence
 
 MOST_AT_ONCE = 8 << 20  # bytes of frames in an answer; a frame may have more
-
-
-@dataclass(frozen=True)
-class FieldShape:
-    """A field without its values; see `gvpipe.Field`."""
-
-    shape: tuple[int, ...]
-    dtype: Any
-    domain: str
-    kind: str
-
-
-@dataclass(frozen=True)
-class Described:
-    """A sequence without its positions and the values of its fields; see `gvpipe.MeshSequence`.
-
-    Args:
-        moves_normals: whether the file's normals change; the note about them needs what takes long to import.
-    """
-
-    shape: tuple[int, ...]
-    faces: Int32
-    fps: float
-    attributes: dict[str, Attribute]
-    origin: Float64
-    notes: tuple[str, ...]
-    fields: dict[str, FieldShape]
-    parts: tuple[Part, ...]
-    polygons: Int32 | None
-    materials: tuple[Material, ...]
-    images: tuple[Image, ...]
-    metadata: Metadata
-    rounding: float
-    moves_normals: bool
 
 
 class _Frames:

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gvpipe.io.library_process import serve
+from gvpipe.io.described import Described, FieldShape
+from gvpipe.io.library_worker import serve
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_process import Described, FieldShape
 from gvpipe.sequence import MeshSequence
 
 Reader = Callable[[Path, ReadOptions], tuple[MeshSequence, bool]]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapes import ball
 
-from gvpipe.attributes.surface_normals import RULES, find_rule, surface_normals
+from gvpipe.attributes.surface_normals import RULES, find_rule, start_free_normals, surface_normals
 from gvpipe.errors import InputError
 
 
@@ -58,3 +58,16 @@ def test_without_area_there_is_no_normal() -> None:
     assert find_rule(np.ones((3, 3)), faces.ravel(), points, faces, 10.0) is None
     with pytest.raises(InputError, match="one of"):
         surface_normals(points, faces, faces.ravel(), "smooth")
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_numpy_gives_the_same_normals(rule: str) -> None:
+    """Triangles at random, some without an area, whose corners share normals at random."""
+    random = np.random.default_rng(5)
+    points, faces = random.normal(size=(2, 40, 3)).astype(np.float32), random.integers(0, 40, (90, 3))
+    faces[::9, 1] = faces[::9, 0]
+    entries = random.integers(0, 60, faces.size)
+    expected = surface_normals(points, faces, entries, rule)
+    np.testing.assert_allclose(start_free_normals(points, faces, entries, rule), expected, atol=1e-5)
+    assert not start_free_normals(points[:, :3] * 0, faces[:1] % 3, entries[:3], rule).any()
+    assert start_free_normals(points[:1], faces[:0], entries[:0], rule).shape == (1, 0, 3)

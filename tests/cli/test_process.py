@@ -104,3 +104,13 @@ def test_large_arrays_are_given_back() -> None:
     """Of 24 MiB each; by default the C library keeps the second."""
     done = subprocess.run([sys.executable, "-c", FREED], capture_output=True, text=True, check=True)
     assert int(done.stdout) < 8 << 20
+
+
+def test_a_pipe_with_a_name_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.mp4")
+    done = subprocess.run(f"{PROGRAM} info {tmp_path}/a.mp4", shell=True, capture_output=True, text=True, timeout=WAIT)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert (
+        done.stderr
+        == f"Error: {tmp_path}/a.mp4 is no ordinary file, but a pipe or a device; write what it gives to a file first\n"
+    )

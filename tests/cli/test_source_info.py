@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from asset_scene import scene
 from gltf_files import assemble, take_apart, two_clips
@@ -114,4 +115,20 @@ def test_what_cannot_be_read(run: Run, tmp_path: Path, name: str, data: bytes) -
 
 
 def test_a_video_has_no_clips(run: Run, video: Path) -> None:
-    assert run("info", video, "--clip", "Run").status == run("info", video, "--frames", "0:1").status == 2
+    for option, value in (("--clip", "Run"), ("--frames", "0:1"), ("--fps", 12)):
+        assert run("info", video, option, value).status == 2
+
+
+def test_info_at_another_rate(run: Run, tmp_path: Path) -> None:
+    two_clips(tmp_path / "a.glb")
+    given, other = (json.loads(run("info", tmp_path / "a.glb", *fps, "--json").out) for fps in ((), ("--fps", 4)))
+    assert other["fps"] == 4 and other["frames"] < given["frames"] and other["time_range"] == pytest.approx(given["time_range"])
+
+
+def test_one_is_no_plural(run: Run, tmp_path: Path) -> None:
+    still = gvpipe.MeshSequence(np.eye(3, dtype=np.float32)[None], np.array([[0, 1, 2]], np.int32))
+    gvpipe.write(still, tmp_path / "a.npz")
+    assert "3 vertices, 1 triangle, 1 frame at 30 fps\n" in run("info", tmp_path / "a.npz").out
+    assert run("convert", tmp_path / "a.npz", tmp_path / "b.npz").out.endswith("b.npz (1 frame, 3 vertices)\n")
+    refused = run("convert", tmp_path / "a.npz", tmp_path / "b.npz", "--frames", "0:2")
+    assert refused.status == 1 and "a.npz: frames 0:2 asked for; 0 <= start < stop <= 1 is needed" in refused.err

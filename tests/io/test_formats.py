@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import subprocess
 import sys
 import tempfile
 import zipfile
@@ -164,12 +165,16 @@ def test_output_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_formats_load_only_when_needed() -> None:
     """A process that runs a library starts fast: other formats, SciPy and compiled loops stay out."""
-    import subprocess
-
     heavy = {"numba", "scipy", "trimesh", "gvpipe.io.gltf", "gvpipe.io.obj", "urllib.request"}
     workers = ", ".join(f"gvpipe.io.{name}.worker" for name in ("alembic", "fbx", "usd"))
     code = f"import sys, {workers}; sys.exit(str({heavy} & set(sys.modules) or ''))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False).stderr.strip() == ""
+
+
+def test_processes_start_before_numpy_loads() -> None:
+    processes = ", ".join(f"gvpipe.io.{name}.process" for name in ("alembic", "fbx", "usd"))
+    code = f"import sys, gvpipe, gvpipe.io.reading, {processes}; gvpipe.read, gvpipe.write; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_names_that_load_late_exist() -> None:

@@ -13,7 +13,7 @@ import pytest
 from sequences import held, partly_still, waving
 
 import gvpipe
-from gvpipe import api
+from gvpipe import files
 from gvpipe.budget import Budget
 from gvpipe.errors import InputError, SettingError
 from gvpipe.segment_map import map_segments, segments_mapped_by
@@ -99,7 +99,7 @@ def test_errors_of_workers_are_one_line(sequence: MeshSequence) -> None:
 
 def test_another_file_there_is_refused(sequence: MeshSequence, tmp_path: Path) -> None:
     gvpipe.write(sequence.part(0, 5), tmp_path / "in.npz")
-    elsewhere = RemoteSegments(Here(), sequence, partial(api.read, tmp_path / "in.npz"))
+    elsewhere = RemoteSegments(Here(), sequence, partial(files.read, tmp_path / "in.npz"))
     with pytest.raises(InputError, match="it has 5 frames of 72 vertices there, 11 frames of 72 vertices here"):
         elsewhere(second, None, [0], lambda done: None)
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import importlib.util
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gvpipe.errors import InputError
 from gvpipe.io.alembic.archive import EXTRA
 from gvpipe.io.library_process import LibraryProcess
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_process import read_scene
-from gvpipe.sequence import MeshSequence
+
+if TYPE_CHECKING:
+    from gvpipe.sequence import MeshSequence
 
 WORKER = "gvpipe.io.alembic.worker"
 DIED = "Alembic's library died of it"
@@ -20,4 +22,8 @@ def read_alembic(path: Path, options: ReadOptions) -> MeshSequence:
     """Read an archive as `gvpipe.io.alembic.reader.read_archive` does, which says what is raised."""
     if importlib.util.find_spec("alembic3d") is None:
         raise InputError(f"{path}: {EXTRA}")
-    return read_scene(LibraryProcess(path, WORKER, "Alembic", DIED), str(path), options)
+    process = LibraryProcess(path, WORKER, "Alembic", DIED)
+    process.start()
+    from gvpipe.io.scene_process import read_scene  # NumPy loads here while it loads there
+
+    return read_scene(process, str(path), options)

@@ -11,7 +11,6 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
 from gvpipe.io.damage import reading, unknown_name
 from gvpipe.io.fbx.evaluator import Described, Take
-from gvpipe.io.fbx.process import fbx_process
 from gvpipe.io.library_process import LibraryProcess
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_frames import SceneFrames, frame_times
@@ -49,23 +48,23 @@ class FbxMotion:
         return self._poses.at(time)[self._number]
 
 
-def read_fbx(path: Path, options: ReadOptions) -> MeshSequence:
+def read_by(process: LibraryProcess, path: Path, options: ReadOptions) -> MeshSequence:
     """Read the meshes of an FBX file, in the file's units and axes, with the world transforms of its nodes.
 
     Args:
+        process: that runs `gvpipe.io.fbx.worker`.
         path: .fbx; textures and geometry caches beside it are read too.
         options: `clip` names a take, the first by default; `fps` samples it at that rate instead of the file's; `frames`.
 
     Raises:
-        InputError: ufbx is missing, the file is damaged, it has no mesh, there is no such take, a position is not finite.
+        InputError: the file is damaged, it has no mesh, there is no such take, a position is not finite.
     """
     with reading(path, "FBX"):
-        return _read_fbx(path, options)
+        return _read_by(process, path, options)
 
 
-def _read_fbx(path: Path, options: ReadOptions) -> MeshSequence:
+def _read_by(process: LibraryProcess, path: Path, options: ReadOptions) -> MeshSequence:
     where = str(path)
-    process = fbx_process(path)
     takes: list[Take] = process.ask("takes")
     take, take_notes = _take(takes, options.clip)
     if take is not None:
@@ -100,12 +99,6 @@ def _read_fbx(path: Path, options: ReadOptions) -> MeshSequence:
         images=held.images,
         metadata=Metadata(held.up, unit, float(times[0]), path.name, texts),
     )
-
-
-def read_takes(path: Path) -> list[Take]:
-    """The takes of a file; raises `InputError`."""
-    takes: list[Take] = fbx_process(path).ask("takes")
-    return takes
 
 
 def _take(takes: list[Take], clip: str | None) -> tuple[Take | None, tuple[str, ...]]:

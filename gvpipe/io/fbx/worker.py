@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.io.fbx.evaluator import FbxScene
-from gvpipe.io.library_process import serve
+from gvpipe.io.library_worker import serve
 
 METHODS = ("takes", "choose", "describe", "positions")
 

@@ -53,8 +53,7 @@ class MeshioLoader:
             raise InputError(f"{path}: {EXTRA}")
         if self._process is None:
             self._process = LibraryProcess(path, WORKER, path.suffix[1:].upper(), DIED)
-        self._process.path = path
-        held: Arrays = self._process.ask("load", str(path.absolute()))
+        held: Arrays = self._process.ask("load", str(path.absolute()), path=path)
         return Dataset(
             lambda: _points(held.points),
             lambda: _cells(held.cells),

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from gvpipe.io.library_process import bytes_below, limit_memory, serve
+from gvpipe.io.library_worker import bytes_below, limit_memory, serve
 from gvpipe.io.simulation.meshio_files import Arrays, read_by_meshio
 
 

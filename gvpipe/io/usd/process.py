@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import importlib.util
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gvpipe.errors import InputError
 from gvpipe.io.library_process import LibraryProcess
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_process import read_scene
-from gvpipe.io.usd.stage import EXTRA, check_signature
-from gvpipe.sequence import MeshSequence
+from gvpipe.io.usd.signature import EXTRA, check_signature
+
+if TYPE_CHECKING:
+    from gvpipe.sequence import MeshSequence
 
 WORKER = "gvpipe.io.usd.worker"
 DIED = "OpenUSD died of it, or of its limit of memory; export it again, or read it with --unlimited"
@@ -21,4 +23,8 @@ def read_usd(path: Path, options: ReadOptions) -> MeshSequence:
     if importlib.util.find_spec("pxr") is None:
         raise InputError(f"{path}: {EXTRA}")
     check_signature(path)
-    return read_scene(LibraryProcess(path, WORKER, "USD", DIED), str(path), options)
+    process = LibraryProcess(path, WORKER, "USD", DIED)
+    process.start()
+    from gvpipe.io.scene_process import read_scene  # NumPy loads here while it loads there
+
+    return read_scene(process, str(path), options)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import zipfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,31 +17,10 @@ from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_frames import between_note, frame_times
 
-EXTRA = "USD files need the package usd-core; install it by: pip install 'gvpipe[usd]'"
 TOO_LARGE = "it asks for more memory than files of its size may take; export it again, or read it with --unlimited"
-SIGNATURES = {  # first bytes by extension; .usd is text or binary
-    ".usda": (b"#usda", b"#sdf"),
-    ".usdc": (b"PXR-USDC",),
-    ".usd": (b"#usda", b"#sdf", b"PXR-USDC"),
-    ".usdz": (b"PK\x03\x04",),
-}
 MISSING = ("ErrorInvalidAssetPath", "ErrorInvalidSublayerPath")  # of composition: a file that is not there
 FASTEST = 120.0  # time codes a second above which codes are a unit of time rather than frames
 SLOWEST = 5.0  # and below which
-
-
-def check_signature(path: Path) -> None:
-    """Raise `InputError` unless a file begins as its extension says, and a package ends as one."""
-    try:
-        with open(path, "rb") as file:
-            head = file.read(16)
-    except OSError as exc:
-        raise InputError(f"{path} cannot be read: {exc.strerror}; check the path") from exc
-    if not head.startswith(SIGNATURES[path.suffix.lower()]):
-        begins = f"it begins with {head[:8]!r}" if head else "it is empty"
-        raise InputError(f"{path} is not a {path.suffix.lower()} file ({begins}); export it again")
-    if path.suffix.lower() == ".usdz" and not zipfile.is_zipfile(path):
-        raise InputError(f"{path} is cut short or damaged; get it again from its source")
 
 
 def open_stage(path: Path) -> Any:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from gvpipe.io.library_process import bytes_below, limit_memory
+from gvpipe.io.library_worker import bytes_below, limit_memory
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_worker import serve_scene
 from gvpipe.io.usd.reader import read_stage
-from gvpipe.io.usd.stage import SIGNATURES
+from gvpipe.io.usd.signature import SIGNATURES
 from gvpipe.sequence import MeshSequence
 
 THREADS = 4  # of OpenUSD: each one's stack counts as memory

@@ -24,7 +24,7 @@ from gvpipe.io.scene_normals import SceneNormals
 from gvpipe.io.usd.material_writer import MaterialWriter
 from gvpipe.io.usd.names import ADDED, identifier, name_prim
 from gvpipe.io.usd.primvar_writer import primvar_names, write_field, write_normals, write_primvars
-from gvpipe.io.usd.stage import EXTRA
+from gvpipe.io.usd.signature import EXTRA
 from gvpipe.sequence import MeshSequence
 
 ROOT = "root"  # of meshes that have no common node

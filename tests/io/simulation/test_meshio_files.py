@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 import gvpipe.io
 from gvpipe.errors import InputError
+from gvpipe.io.simulation.meshio_files import MeshioLoader
 
 meshio: Any = pytest.importorskip("meshio")
 
@@ -55,6 +57,23 @@ def test_numbers_of_many_components_are_left_out(tmp_path: Path) -> None:
     read = gvpipe.io.read(tmp_path / "a.avs")
     assert "heat" in read.attributes and "wide" not in read.attributes
     assert "numbers that are not of 1 to 64 components were left out: wide" in read.notes
+
+
+def test_threads_share_a_process(tmp_path: Path) -> None:
+    """A message names the file of its own request."""
+    paths = [tmp_path / f"{number}.msh" for number in range(20)]
+    for path in paths:
+        path.write_bytes(b"hello\n")
+    loader = MeshioLoader()
+
+    def message(path: Path) -> str:
+        with pytest.raises(InputError) as caught:
+            loader(path)
+        return str(caught.value)
+
+    with ThreadPoolExecutor(4) as pool:
+        messages = list(pool.map(message, paths))
+    assert [str(path) in said for path, said in zip(paths, messages, strict=True)] == [True] * 20
 
 
 @pytest.mark.parametrize("data", [b"hello\n", b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 9 1 9\n"])

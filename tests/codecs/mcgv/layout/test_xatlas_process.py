@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +46,32 @@ for _ in range(int(sys.argv[1])):
         os._exit(0 if len(charts[1][0]) == 3 else 1)
     assert os.waitpid(child, 0)[1] == 0
 print("none hung")
+"""
+
+# holds up each thread that is about to sleep, between its look at the flag and its sleep
+LATE = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <pthread.h>
+#include <unistd.h>
+int pthread_cond_wait(pthread_cond_t *condition, pthread_mutex_t *mutex)
+{
+    sleep(2);
+    return ((int (*)(pthread_cond_t *, pthread_mutex_t *))dlsym(RTLD_NEXT, "pthread_cond_wait"))(condition, mutex);
+}
+"""
+IN_THIS_PROCESS = """
+import numpy as np, xatlas
+atlas = xatlas.Atlas()
+atlas.add_mesh(np.eye(3, dtype=np.float32), np.arange(3, dtype=np.uint32)[None])
+atlas.generate()
+print("generated", flush=True)
+del atlas
+"""
+IN_ANOTHER = """
+import numpy as np
+from gvcodecs.mcgv.layout.xatlas_process import run_xatlas
+print(sorted(map(int, run_xatlas([(np.eye(3, dtype=np.float32), np.arange(3, dtype=np.uint32)[None])])[0][0])))
 """
 
 
@@ -94,6 +122,20 @@ def test_many_starts_and_ends() -> None:
     count = os.environ.get("GVPIPE_STARTS", "1000")
     done = subprocess.run([sys.executable, "-c", MANY, count], capture_output=True, text=True, timeout=1500)
     assert (done.stdout, done.stderr) == ("none hung\n", "")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux" or shutil.which("cc") is None, reason="needs Linux and a C compiler")
+def test_a_thread_that_misses_its_end(tmp_path: Path) -> None:
+    """The destructor's call comes between a thread's look at the flag and its sleep: in this process it waits for ever."""
+    (tmp_path / "late.c").write_text(LATE)
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", tmp_path / "late.so", tmp_path / "late.c", "-ldl"], check=True)
+    environment = {**os.environ, "LD_PRELOAD": str(tmp_path / "late.so"), "OPENBLAS_NUM_THREADS": "1"}
+    run = partial(subprocess.run, capture_output=True, text=True, env=environment)
+    with pytest.raises(subprocess.TimeoutExpired) as caught:
+        run([sys.executable, "-c", IN_THIS_PROCESS], timeout=10)
+    assert caught.value.stdout == b"generated\n"
+    assert run([sys.executable, "-c", IN_ANOTHER], timeout=60).stdout == "[0, 1, 2]\n"
 
 
 def _use(program: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
