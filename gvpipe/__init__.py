@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from gvpipe.asset.metadata import Metadata
     from gvpipe.asset.part import Part
     from gvpipe.errors import GvpipeError
+    from gvpipe.live import LiveEncoder, open_live
     from gvpipe.metrics.comparison import Comparison, compare
     from gvpipe.player import Player
     from gvpipe.rasterizer.camera import Camera
@@ -40,6 +41,7 @@ __all__ = [
     "GvpipeError",
     "Image",
     "Info",
+    "LiveEncoder",
     "Material",
     "MeshSequence",
     "Metadata",
@@ -55,6 +57,7 @@ __all__ = [
     "export_html",
     "info",
     "open",
+    "open_live",
     "read",
     "render",
     "restream",
@@ -69,6 +72,7 @@ _HOMES = {
     "gvpipe.asset.metadata": ("Metadata",),
     "gvpipe.asset.part": ("Part",),
     "gvpipe.errors": ("GvpipeError",),
+    "gvpipe.live": ("LiveEncoder", "open_live"),
     "gvpipe.metrics.comparison": ("Comparison", "compare"),
     "gvpipe.player": ("Player",),
     "gvpipe.rasterizer.camera": ("Camera",),

@@ -329,7 +329,7 @@ def info(source: str, clip: str | None, mesh: str | None, frames: str | None, un
             raise click.UsageError("--clip, --mesh and --frames are for sources; a geometry video is shown whole")
         found = api.info(path, unlimited=unlimited)
     out.json(found.to_json())
-    layout = ", stream layout" if found.layout == "stream" else ""
+    layout = "" if found.layout == "plain" else f", {found.layout} layout"
     out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}{layout}")
     for line in shape_lines(found):
         out.text(line)

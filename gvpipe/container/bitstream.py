@@ -45,7 +45,7 @@ MAX_FRAMES = 1 << 24
 MAX_VERTICES = 1 << 28
 
 
-PLAIN, STREAM = "plain", "stream"  # layouts of files
+PLAIN, STREAM, LIVE = "plain", "stream", "live"  # layouts of files
 NO_ORIGIN = (0.0, 0.0, 0.0)
 MAX_ORIGIN = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]  # of its coordinates' magnitudes: float32's largest number
 
@@ -68,6 +68,8 @@ class Bitstream:
             poster (`gvpipe.rendering.poster`) instead.
         fragments: in place of ``video``, of a file in the stream layout (`gvpipe.container.stream_layout`).
         n_bytes: of the file that it was read from, 0 if it was not.
+        is_unfinished: it has the first frames of a file that is still written, or was left so, and no video
+            (`gvpipe.container.live_layout`).
         budget: what its readers may take (`gvpipe.budget`).
     """
 
@@ -83,11 +85,14 @@ class Bitstream:
     origin: tuple[float, float, float] = NO_ORIGIN
     fragments: Fragments | None = field(default=None, compare=False, repr=False)
     n_bytes: int = field(default=0, compare=False)
+    is_unfinished: bool = field(default=False, compare=False)
     budget: Budget = field(default=UNLIMITED, compare=False, repr=False)
 
     @property
     def layout(self) -> str:
-        """Of its file: ``plain``, or ``stream``."""
+        """Of its file: ``plain``, ``stream``, or ``live``: a stream that is not finished."""
+        if self.is_unfinished:
+            return LIVE
         return STREAM if self.fragments is not None else PLAIN
 
     @property
