@@ -37,6 +37,8 @@ export class Payload {
 export async function readPayload(container) {
   const sections = container.sections ?? readPayloadSections(container.payload);
   const header = await readHeader(sections);
+  if (container.frames) header.frames = container.frames; // of a file that is not finished
+  container.clips?.forEach((data, number) => sections.set(clipName(header, number), data));
   const { id, video_crc32: checksum } = header.container;
   if (container.id && container.id !== id) {
     throw new GeometryVideoError("corrupt", `its geometry belongs to another file; ${AGAIN}`);
@@ -89,7 +91,13 @@ function readSections(cursor, entries) {
   return sections;
 }
 
-async function readHeader(sections) {
+/** The name of a clip's section, of a file that was written as frames came. @param {object} header @param {number} number */
+export function clipName({ container }, number) {
+  return `${container.live}.${number}`;
+}
+
+/** The header. @param {Map<string, Uint8Array>} sections @throws {GeometryVideoError} it is not as gvpipe writes it */
+export async function readHeader(sections) {
   const wrong = (what) => corrupt("header", what);
   if (!sections.has("header")) throw wrong("it is missing");
   const text = await inflate(sections.get("header"), MAX_HEADER, wrong);
