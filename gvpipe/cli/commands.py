@@ -128,6 +128,11 @@ def cli() -> None:
     is_flag=True,
     help="Write the stream layout: it plays over HTTP while it loads. --for stream chooses a codec that suits.",
 )
+@click.option(
+    "--live",
+    is_flag=True,
+    help="Write the file while frames come on standard input, float32 positions each; --mesh has the triangles.",
+)
 @unlimited_option
 @output_options
 def encode(
@@ -152,6 +157,7 @@ def encode(
     split: bool,
     textures: str | None,
     stream: bool,
+    live: bool,
     unlimited: bool,
     out: Output,
 ) -> None:
@@ -184,6 +190,12 @@ def encode(
         raise click.UsageError("give --quality or --set quality=, not both")
     plain = {"quality": quality, "segment": segment, "reorder": reorder or None}
     settings.update({key: str(value) for key, value in plain.items() if value is not None})
+    if live:
+        options = (purpose, *targets.values(), *attributes, *fields, clip, frames, textures)
+        if split or stream or unlimited or any(option is not None for option in options):
+            raise click.UsageError("--live knows --mesh, --fps, --codec, --quality, --segment, --reorder and --set alone")
+        _encode_live(sources, target, (mesh, fps, codec), settings, out)
+        return
     chosen = candidates(
         codec,
         purpose,
@@ -211,6 +223,24 @@ def encode(
     out.json({"files": [{**span, **report.to_json()} for span, (_, report) in zip(spans, written, strict=True)]})
     for (file, report), run in zip(written, runs, strict=True):
         _print_report(out, report, f"{name}, frames {run.start}:{run.stop}", file)
+
+
+def _encode_live(
+    sources: tuple[str, ...],
+    target: str,
+    given: tuple[str | None, float | None, str | None],
+    settings: dict[str, str],
+    out: Output,
+) -> None:
+    """Write a file while its frames come, of a mesh at a rate by a codec."""
+    from dataclasses import asdict
+
+    from gvpipe.cli.live_input import encode_live
+
+    mesh, fps, codec = given
+    report = encode_live(sources, target, mesh, fps, codec, settings)
+    out.json(asdict(report))
+    out.text(f"{STDIN} ({report.frames} frames, {report.vertices} vertices) -> {target} ({_size(report.bytes)})")
 
 
 def _print_report(out: Output, report: Report, name: str, target: str) -> None:
