@@ -84,7 +84,7 @@ def read_live(source: Source, room: Box, budget: Budget) -> Bitstream:
     bitstream, container = read_header(StoredSections(source, index.places)[HEADER], budget)
     name = container.text("live")
     header = index.places[HEADER]
-    rows = _rows(data[header.offset + header.length - box.content :])
+    rows = read_rows(data[header.offset + header.length - box.content :])
     if not CLIP_NAME.fullmatch(name) or header.offset + header.length > box.stop:
         raise corrupt("the table of its clips is not as gvpipe writes it")
     places = {each: place for each, place in index.places.items() if each != HEADER}
@@ -104,7 +104,7 @@ def read_live(source: Source, room: Box, budget: Budget) -> Bitstream:
     return replace(bitstream, n_frames=n_frames, sections=sections, n_bytes=source.size, is_unfinished=True)
 
 
-def _rows(table: bytes) -> Iterator[ClipRow]:
+def read_rows(table: bytes) -> Iterator[ClipRow]:
     """The rows that are written, up to the end."""
     for at in range(0, len(table) - ROW_BYTES + 1, ROW_BYTES):
         row = table[at : at + ROW.size]
