@@ -26,7 +26,7 @@ CLIP_SECONDS = 1.0  # of a clip, unless its frames are set: who watches is at mo
 class LiveEncoder:
     """Writes a geometry video whose frames come one by one. A context manager, which finishes the file.
 
-    At any moment the file opens up to its last whole clip, and pages play it while it grows (`docs/live.md`). Its layout is
+    At any moment the file opens up to its last whole clip, and pages play it while it grows (`docs/cli.md`). Its layout is
     ``live`` until it is finished; then it is an ordinary file in the stream layout. If the process is killed, the clips stay.
 
     Memory is that of one clip. The frame that completes a clip waits until the clip is coded and on the disk.
@@ -90,9 +90,12 @@ class LiveEncoder:
         try:
             if self._frames:
                 self._flush()
-            self._writer.finish()
         finally:
-            self._writer.close()
+            try:
+                if self._writer.n_clips:
+                    self._writer.finish()
+            finally:
+                self._writer.close()
 
     def __enter__(self) -> LiveEncoder:
         return self
@@ -137,9 +140,8 @@ class LiveEncoder:
 
     def _flush(self) -> None:
         assert self._coder is not None and self._writer is not None
-        data = self._coder.encode(np.stack(self._frames))
-        self._writer.add(data, len(self._frames))
-        self._frames = []
+        frames, self._frames = np.stack(self._frames), []
+        self._writer.add(self._coder.encode(frames), len(frames))
 
 
 def open_live(path: StrPath, faces: Integers, fps: float = 30.0, codec: str = "pdct", **settings: Any) -> LiveEncoder:

@@ -12,6 +12,7 @@ from sequences import waving
 
 import gvpipe
 from gvcodecs.pdct import StreamReader
+from gvcodecs.pdct.encoder import ClipCoder
 from gvpipe.container import mp4
 from gvpipe.container.bitstream import HEADER
 from gvpipe.container.live_writer import LiveWriter
@@ -211,8 +212,6 @@ def test_positions_far_from_the_origin(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from gvcodecs.pdct.encoder import ClipCoder
-
     monkeypatch.setattr(ClipCoder, "most_clips", 2)
     with gvpipe.open_live(tmp_path / "a.mp4", SEQUENCE.faces, segment=1) as live:
         for frame in SEQUENCE.read(0, 2):
@@ -230,3 +229,16 @@ def test_a_header_of_another_clip_length_is_refused(states: list[bytes], tmp_pat
         changed = type(bitstream)(**{**vars(bitstream), "header": {**bitstream.header, "clip": clip}})
         with pytest.raises(CorruptFile):
             open_reader(changed).read(0, N_FRAMES)
+
+
+def test_a_clip_that_cannot_be_coded_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    live = gvpipe.open_live(tmp_path / "a.mp4", SEQUENCE.faces, segment=2)
+    frames = SEQUENCE.read(0, N_FRAMES)
+    for frame in frames[:3]:
+        live.append(frame)
+    with monkeypatch.context() as patch, pytest.raises(InputError, match="far from frame 0"):
+        patch.setattr(ClipCoder, "encode", lambda *_: (_ for _ in ()).throw(InputError("far from frame 0")))
+        live.append(frames[3])
+    live.append(frames[4])
+    live.close()
+    assert len(gvpipe.open(tmp_path / "a.mp4")) == 3
