@@ -12,7 +12,7 @@ import { readTrack } from "./track.js";
 const KEPT_BYTES = 64 * 2 ** 20; // of decoded levels
 const KEPT_GROUPS = 3; // at least: what is shown, what comes next, and one of before
 const AHEAD = 1; // s, decoded ahead of what plays
-const BEHIND = 1.5; // clips of a file that is still written: what is left behind is not played
+const BEHIND = 1.25; // clips of a file that is still written: what is left behind is not played
 const EDGE = 1e-3; // frames before the end of such a file, where the clock waits
 const LONGEST_STEP = 1000; // ms that the clock goes on at once: a hidden page is asked for nothing
 
