@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,7 @@ from typing import Any
 import browsers
 import pages
 import pytest
-from pages import BUNDLE, run
+from pages import run
 
 
 @pytest.fixture(scope="module")
@@ -41,20 +39,3 @@ def player(browser: Any, site: tuple[Path, str]) -> Callable[..., Any]:
     """The same in a page with a player, which is `element` there."""
     browser.get(f"{site[1]}/player.html")
     return lambda body, *arguments: run(browser, "const element = document.querySelector('geometry-video');" + body, *arguments)
-
-
-@pytest.fixture(scope="module")
-def node() -> Iterator[Callable[..., Any]]:
-    """``ask(command, **given)``: what `run_parts.mjs` answers; an error is a pair of kind and message."""
-    command = ["node", str(Path(__file__).with_name("run_parts.mjs")), str(BUNDLE / "geometry-video.js")]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-
-        def ask(name: str, **given: Any) -> Any:
-            assert process.stdin is not None and process.stdout is not None
-            process.stdin.write(json.dumps({"command": name, **given}) + "\n")
-            process.stdin.flush()
-            answer = json.loads(process.stdout.readline())
-            return answer["value"] if "value" in answer else tuple(answer["error"])
-
-        yield ask
-        process.kill()
