@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ from file_server import serving
 from sequences import waving
 
 import gvpipe
+from fuzz.live import join_live, split_live
+from fuzz.videos import FILE
 from gvcodecs.pdct import StreamReader
 from gvcodecs.pdct.encoder import ClipCoder
 from gvpipe.container import mp4
@@ -174,6 +177,15 @@ def test_what_cannot_be_appended(tmp_path: Path) -> None:
     assert len(gvpipe.open(path)) == 2
     with pytest.raises(InputError, match="is finished"):
         live.append(frame)
+
+
+def test_files_of_other_codecs_do_not_grow(states: list[bytes], tmp_path: Path) -> None:
+    parts, path = split_live(states[-2]), tmp_path / "a.mp4"
+    for codec in ("mcgv", "pca"):
+        changed = {**json.loads(parts["header"]), "codec": codec, "version": 1}
+        path.write_bytes(join_live({**parts, "header": json.dumps(changed).encode()})[FILE])
+        with pytest.raises(CorruptFile, match=f"files of codec '{codec}' do not grow"):
+            gvpipe.open(path)
 
 
 def test_what_cannot_be_started(tmp_path: Path) -> None:

@@ -16,6 +16,8 @@ from file_server import Served, serving
 from sequences import waving
 
 import gvpipe
+from fuzz.live import join_live, split_live
+from fuzz.videos import FILE
 from gvpipe.container.live_layout import ROW_BYTES
 
 Ask = Callable[..., Any]
@@ -160,6 +162,12 @@ def test_bytes_of_an_unfinished_file(node: Ask, states: list[bytes], frames: np.
     check(node("frame", k=11), frames[11])
     path.write_bytes(states[0])
     assert node("join", path=str(path))[0] == "truncated"
+    parts = split_live(states[3])
+    path.write_bytes(join_live({**parts, "header": parts["header"].replace(b"pdct", b"mcgv")})[FILE])
+    assert node("join", path=str(path)) == (
+        "corrupt",
+        "section 'header' is corrupt: files of its codec do not grow; get the file again from its source",
+    )
     data = bytearray(states[3])
     data[-ROW_BYTES] ^= 1
     path.write_bytes(data)

@@ -23,7 +23,7 @@ const BYTES_PER_FRAME = 160; // that a clock keeps
  * @property {(level: number) => Promise<Playable>} at another level, closed with this one
  * @property {(frame: number, shown: Uint8Array|Float32Array, positions: Float32Array) => void} rebuild fills positions (V, 3) of a
  *   distinct frame from what the clock shows
- * @property {() => void} [grow] that the file has as many frames as `repeated` says by now, before clocks of its `openPictures` are told
+ * @property {(frames: number) => void} [grow] that the file has so many frames by now, before clocks of its `openPictures` are told
  * @property {() => void} close
  *
  * @param {Uint8Array|import("./format/stream_file.js").StreamFile} source the file, or its parts
@@ -100,10 +100,10 @@ async function openFrames(code, source, payload, repeated, level) {
     payload.close?.();
   };
   const frames = Array.from({ length: repeated.distinct }, (_, picture) => [{ picture }]);
-  const grow = () => {
-    payload.budget.ask(`${repeated.distinct} frames`, BYTES_PER_FRAME * repeated.distinct);
-    while (frames.length < repeated.distinct) frames.push([{ picture: frames.length }]);
-    host.grow(repeated.distinct);
+  const grow = (count) => {
+    payload.budget.ask(`${count} frames`, BYTES_PER_FRAME * count);
+    while (frames.length < count) frames.push([{ picture: frames.length }]);
+    host.grow(count);
   };
   const at = async (wanted) => {
     const { level: own, faces, points, levels } = await host.describe(wanted);

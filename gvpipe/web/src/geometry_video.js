@@ -237,10 +237,10 @@ export class GeometryVideo {
   #grow(file) {
     const { live, size } = file;
     if (live.frames === this.frameCount && !live.hasEnded) return;
+    this.#reader.grow(live.frames);
     this.#repeated.grow(live.frames, live.hasEnded ? 0 : live.clip);
     this.frameCount = live.frames;
     this.byteLength = size;
-    this.#reader.grow();
     this.#pictures.grow();
     this.grown();
   }
