@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 import gvpipe
+from fuzz.live import split_live
 from fuzz.mesh_files import CACHES, MESH
 from fuzz.parts import Parts, Seed
 from fuzz.streams import split_stream
@@ -66,6 +67,20 @@ def load_seeds(
         if kind in formats and path.is_file() and path.stat().st_size <= LARGEST:
             formats[kind] = (*formats[kind], Seed(path.name, {f"a{path.suffix.lower()}": path.read_bytes()}))
     return seeds, streams, formats
+
+
+def load_live(folder: Path) -> tuple[Seed, ...]:
+    """Files that are still written; made there if they are missing."""
+    folder = folder / "live"
+    if not folder.exists():
+        folder.mkdir(parents=True)
+        for sample, sequence in _samples().items():
+            with gvpipe.open_live(folder / f"{sample}.mp4", sequence.faces, sequence.fps, segment=2) as live:
+                for frame in sequence.read(0, N_FRAMES):
+                    live.append(frame)
+                data = (folder / f"{sample}.mp4").read_bytes()
+            (folder / f"{sample}.mp4").write_bytes(data)  # as it was before it was finished
+    return tuple(Seed(path.stem, split_live(path.read_bytes())) for path in sorted(folder.glob("*.mp4")))
 
 
 def make_seeds(folder: Path) -> None:

@@ -53,8 +53,9 @@ def load_targets(options: Options) -> list[Target]:
     if options.loader is not None:
         return options.loader(options)
     from fuzz.browser import browser_targets
+    from fuzz.live import live_target
     from fuzz.mesh_files import mesh_targets
-    from fuzz.seeds import load_seeds
+    from fuzz.seeds import load_live, load_seeds
     from fuzz.streams import stream_target
     from fuzz.videos import video_targets
 
@@ -63,10 +64,11 @@ def load_targets(options: Options) -> list[Target]:
 
         refuse_bad_indices()
     videos, streams, meshes = load_seeds(Path(options.seeds), Path(options.more) if options.more else None)
+    growing = load_live(Path(options.seeds))
     kinds = {
-        "video": [*video_targets(videos), stream_target(streams)],
+        "video": [*video_targets(videos), stream_target(streams), live_target(growing)],
         "mesh": mesh_targets(meshes),
-        "web": browser_targets(videos, streams),
+        "web": browser_targets(videos, streams, growing),
     }
     targets = [target for kind, group in kinds.items() if options.kind in ("", kind) for target in group]
     unknown = {*options.targets, *options.without} - {target.name for target in targets}

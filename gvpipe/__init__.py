@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gvpipe.batch.runs import BatchReport, encode_all
     from gvpipe.errors import GvpipeError
     from gvpipe.files import read, write
+    from gvpipe.live import LiveEncoder, open_live
     from gvpipe.metrics.comparison import Comparison, compare
     from gvpipe.player import Player
     from gvpipe.rasterizer.camera import Camera
@@ -43,6 +44,7 @@ __all__ = [
     "GvpipeError",
     "Image",
     "Info",
+    "LiveEncoder",
     "Material",
     "MeshSequence",
     "Metadata",
@@ -59,6 +61,7 @@ __all__ = [
     "export_html",
     "info",
     "open",
+    "open_live",
     "read",
     "render",
     "restream",
@@ -75,6 +78,7 @@ _HOMES = {
     "gvpipe.batch.runs": ("BatchReport", "encode_all"),
     "gvpipe.errors": ("GvpipeError",),
     "gvpipe.files": ("read", "write"),
+    "gvpipe.live": ("LiveEncoder", "open_live"),
     "gvpipe.metrics.comparison": ("Comparison", "compare"),
     "gvpipe.player": ("Player",),
     "gvpipe.rasterizer.camera": ("Camera",),

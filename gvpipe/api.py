@@ -20,9 +20,9 @@ from gvpipe.budget import Budget
 from gvpipe.codec import Codec, Encoded, Progress
 from gvpipe.container.bitstream import BARE, PLAIN, STREAM, Bitstream
 from gvpipe.container.mp4 import bytes_by_part, read_file, write_file
-from gvpipe.container.sources import check_target, is_url
-from gvpipe.errors import InputError, OutputError, OverBudget, SettingError, in_file
-from gvpipe.files import VIDEO_SUFFIXES, Source, frame_range, read
+from gvpipe.container.sources import check_target, check_video_target, is_url
+from gvpipe.errors import InputError, OverBudget, SettingError, in_file
+from gvpipe.files import Source, frame_range, read
 from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
@@ -97,7 +97,7 @@ class Info:
         sections: bytes of every part of the file, which add up to ``bytes``.
         levels: vertex counts of the levels of detail, the mesh itself first.
         settings: the bitstream's header.
-        layout: ``plain`` or ``stream`` (`restream`).
+        layout: ``plain``, ``stream`` (`restream`), or ``live``: still written, or left unfinished (`gvpipe.live`).
         origin: to add to positions, model units.
         parts: name, ranges of vertices and triangles, name of the material, parent.
         attributes: name, kind, domain, components, type, unit, bound (degrees for normals) and bytes of each.
@@ -236,7 +236,7 @@ def encode(
     """
     from gvpipe.asset_coding.encoder import AssetCoder
 
-    _check_output(path)
+    check_video_target(path, "gvpipe.encode's path")
     _check_wanted((target_rmse, target_kg, target_bpvf, max_error), stream, bare)
     given = _candidates(codec, settings, purpose)
     if workers is not None or scheduler is not None:
@@ -294,7 +294,7 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
 
     The *stream* layout has an index first, then each segment's sections beside its pictures. It plays over HTTP while it
     loads, and a jump costs one segment. The *plain* layout is a little smaller. A file of the *bare* layout gets the poster
-    that it lacks.
+    that it lacks. Of a file that was left unfinished (layout ``live``) the new file has the clips that are there.
 
     Args:
         source: a geometry video, or its address.
@@ -309,8 +309,10 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
     """
     if layout not in (None, PLAIN, STREAM):
         raise InputError(f"layout is {layout!r}; {PLAIN} or {STREAM} is needed")
-    _check_output(path)
+    check_video_target(path, "gvpipe.restream's path")
     bitstream = read_file(check_path(source, "the geometry video"), unlimited)
+    if bitstream.is_unfinished:
+        bitstream = dataclasses.replace(bitstream, video=poster_of(Player(source, unlimited=unlimited).sequence()))
     with in_file(os.fspath(source)):
         chosen = layout or (STREAM if bitstream.layout == PLAIN else PLAIN)
         n_bytes = bitstream.n_bytes
@@ -613,17 +615,3 @@ def _is_among(path: StrPath, source: MeshSequence | Source) -> bool:
         return False
     sources = [source] if isinstance(source, str | os.PathLike) else source
     return any(os.path.exists(one) and os.path.samefile(one, path) for one in sources)
-
-
-def _check_output(given: StrPath) -> None:
-    """Refuse an output that cannot be written before the work, not after it."""
-    path = Path(check_path(given, "gvpipe.encode's path"))
-    check_target(given)
-    if path.suffix.lower() not in VIDEO_SUFFIXES:
-        raise InputError(f"{path}: the output is an MP4 file; end its name in .mp4")
-    if os.path.isdir(path):  # unlike Path.is_dir, it takes any name, too long ones as well
-        raise OutputError(f"cannot write {path}: it is a folder; choose another name")
-    if not os.path.isdir(path.parent):
-        raise OutputError(f"cannot write {path}: no folder {path.parent}; create it first")
-    if not os.access(path.parent, os.W_OK):
-        raise OutputError(f"cannot write {path}: the folder {path.parent} is read-only; choose another one")

@@ -84,6 +84,26 @@ class LevelReader(Protocol):
         ...
 
 
+class LiveCoder(Protocol):
+    """Codes frames whose number is not known, a clip at a time (`gvpipe.live`).
+
+    A codec that can do so has a method ``start_live(frame (V, 3), faces (T, 3), fps) -> LiveCoder``, given frame 0.
+    """
+
+    name: ClassVar[str]  # of a clip's section, before a dot and its number
+    most_clips: ClassVar[int]
+    bitstream: Bitstream  # of what all clips share
+
+    @property
+    def clip_frames(self) -> int:
+        """Frames of each clip but the last."""
+        ...
+
+    def encode(self, frames: Float32) -> bytes:
+        """Return the section of a clip, ``frames (n, V, 3)``, model units."""
+        ...
+
+
 @runtime_checkable
 class GroupReader(Protocol):
     """A frame reader whose codec decodes a group of frames at the price of one."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gvpipe.arguments import StrPath, check_path, show
-from gvpipe.container.sources import is_url
+from gvpipe.container.sources import VIDEO_SUFFIXES, is_url
 from gvpipe.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from gvpipe.sequence import MeshSequence
 
 Source = StrPath | Sequence[StrPath]
-VIDEO_SUFFIXES = (".mp4", ".m4v")
 
 
 def read(

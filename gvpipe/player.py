@@ -32,6 +32,8 @@ from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence, describe, numbers_of
 from gvpipe.shared_reader import SharedReader
 
+UNFINISHED = "the file is not finished: open it again for frames that come later, or make a file of these by gvpipe restream"
+
 
 class Player:
     """An open geometry video: a sequence of frames, each ``(V, 3) float32``, model units, relative to ``origin``.
@@ -122,12 +124,13 @@ class Player:
     def list_asset(self) -> dict[str, Any]:
         """What it holds beside positions, as JSON values (`gvpipe.Info`)."""
         with in_file(self.path):
-            return list_asset(self._asset, self.bitstream)
+            return {**list_asset(self._asset, self.bitstream), "notes": list(self.notes)}
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What a user should know of the file, a line each."""
-        return tuple(map(printable, self._asset.notes))
+        unfinished = (UNFINISHED,) if self.bitstream.is_unfinished else ()
+        return (*unfinished, *map(printable, self._asset.notes))
 
     @property
     def fps(self) -> float:

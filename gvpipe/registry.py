@@ -17,7 +17,7 @@ from gvpipe.codec import Codec, Encoded, FrameReader, Memo, Progress, check_name
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import SegmentParts
 from gvpipe.corrections.bound import correct
-from gvpipe.errors import NewerVersion, SettingError, quote
+from gvpipe.errors import NewerVersion, SettingError, corrupt, quote
 from gvpipe.repeated_frames import RepeatedFramesReader, add_repeated_frames, find_repeated_frames, read_repeated_frames
 from gvpipe.sequence import MeshSequence
 
@@ -75,6 +75,8 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
             f"it was made by version {bitstream.version} of codec {bitstream.codec!r}, this gvpipe has version "
             f"{codec.version}; upgrade gvpipe"
         )
+    if bitstream.is_unfinished and not hasattr(codec, "start_live"):
+        raise corrupt(f"it is not finished, and files of codec {bitstream.codec!r} do not grow")
     holds = read_repeated_frames(bitstream) if _is_held(codec) else None
     distinct = bitstream if holds is None else dataclasses.replace(bitstream, n_frames=holds.n_distinct)
     reader = correct(distinct, codec.reader(distinct))

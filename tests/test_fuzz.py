@@ -18,10 +18,12 @@ from fuzz.boxes import parse_boxes
 from fuzz.browser import Node, RefusedByPlayer
 from fuzz.hdf import mutate_hdf
 from fuzz.limits import ACCEPTED, REFUSED, judge
+from fuzz.live import live_target, split_live
 from fuzz.mesh_files import join_files, mesh_targets, split_files
 from fuzz.mutation import mutate_bytes, mutate_json, mutate_text
 from fuzz.parts import Seed
 from fuzz.reduction import reduce_parts
+from fuzz.seeds import load_live
 from fuzz.session import Session
 from fuzz.streams import split_stream, stream_target
 from fuzz.targets import Options
@@ -50,6 +52,16 @@ def test_a_stream_put_together_is_the_same(tmp_path: Path) -> None:
     assert split_stream(again.read_bytes()) == seed.parts
     assert np.array_equal(gvpipe.open(again)[:], gvpipe.open(STILL)[:])
     verdicts = [judge(target, write_files(target.join(target.case(1, k)[1]), tmp_path / "case"), 10**4) for k in range(1, 30)]
+    assert {verdict.kind for verdict in verdicts} == {ACCEPTED, REFUSED}, verdicts
+
+
+def test_a_file_that_grows_put_together_is_the_same(tmp_path: Path) -> None:
+    seed = load_live(tmp_path)[0]
+    target = live_target((seed,))
+    again = write_files(target.join(seed.parts), tmp_path / "case")
+    assert split_live(again.read_bytes()) == seed.parts
+    assert np.array_equal(gvpipe.open(again)[:], gvpipe.open(tmp_path / "live" / f"{seed.name}.mp4")[:])
+    verdicts = [judge(target, write_files(target.join(target.case(1, k)[1]), tmp_path / "case"), 10**4) for k in range(1, 40)]
     assert {verdict.kind for verdict in verdicts} == {ACCEPTED, REFUSED}, verdicts
 
 

@@ -24,7 +24,7 @@ from gvpipe import __version__
 from gvpipe.cli.console import Output, is_verbose, output_options, print_options, unlimited_option
 from gvpipe.cli.conversion import convert
 from gvpipe.cli.encode_all import encode_all
-from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_pairs
+from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_pairs, parse_settings
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.cli.process import Ended, ending_by_exception, replace_closed_streams
 from gvpipe.errors import GvpipeError, InputError, TopologyChange
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from gvpipe.web import ExportReport
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+LIVE_OPTIONS = {"mesh", "fps", "codec", "quality", "segment", "reorder", "pairs"}  # that `encode --live` knows
 COLLECTED = 100_000  # objects made between garbage collections: a command makes cycles by imports, hardly by its work
 
 
@@ -88,6 +89,11 @@ def cli() -> None:
 @click.argument("target", metavar="OUTPUT.mp4")
 @encode_options
 @click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.mp4, ...")
+@click.option(
+    "--live",
+    is_flag=True,
+    help="Write the file while frames come on standard input, float32 positions each; --mesh has the triangles.",
+)
 @click.option("--workers", type=int, metavar="N", help="Code segments in N processes: same bytes. Not for codec mcgv.")
 @click.option("--scheduler", metavar="ADDRESS", help="Code them on a Dask cluster, such as tcp://host:8786.")
 @output_options
@@ -95,6 +101,7 @@ def encode(
     sources: tuple[str, ...],
     target: str,
     split: bool,
+    live: bool,
     workers: int | None,
     scheduler: str | None,
     out: Output,
@@ -118,6 +125,9 @@ def encode(
         raise click.UsageError("- is one input among others; give it alone", click.get_current_context())
     if split and target == PIPE:
         raise click.UsageError("--split writes several files, and OUTPUT is -; give a file's name", click.get_current_context())
+    if live:
+        _encode_live(sources, target, {**options, "split": split, "workers": workers, "scheduler": scheduler}, out)
+        return
     if (workers is not None or scheduler is not None) and (split or PIPE in sources):
         message = "--workers and --scheduler read INPUT by its path, as a whole; leave out --split, and name no -"
         raise click.UsageError(message, click.get_current_context())
@@ -142,6 +152,20 @@ def encode(
     out.json({"files": [{**span, **report.to_json()} for span, (_, report) in zip(spans, written, strict=True)]})
     for (file, report), run in zip(written, runs, strict=True):
         _print_report(out, report, f"{name}, frames {run.start}:{run.stop}", file)
+
+
+def _encode_live(sources: tuple[str, ...], target: str, options: dict[str, Any], out: Output) -> None:
+    """Write a file while its frames come."""
+    from dataclasses import asdict
+
+    from gvpipe.cli.live_input import encode_live
+
+    if any(options[name] not in (None, False, ()) for name in options.keys() - LIVE_OPTIONS):
+        raise click.UsageError("--live knows --mesh, --fps, --codec, --quality, --segment, --reorder and --set alone")
+    mesh, fps, codec = (options[name] for name in ("mesh", "fps", "codec"))
+    report = encode_live(sources, target, mesh, fps, codec, parse_settings(options))
+    out.json(asdict(report))
+    out.text(f"{STDIN} ({report.frames} frames, {report.vertices} vertices) -> {target} ({_size(report.bytes)})")
 
 
 def _print_report(out: Output, report: Report, name: str, target: str) -> None:

@@ -113,11 +113,7 @@ def parse_encoding(options: dict[str, Any]) -> Encoding:
     targets = {name: options[name] for name in TARGETS}
     if sum(value is not None for value in targets.values()) > 1:
         raise click.UsageError("give one of --target-rmse, --target-kg, --target-bpvf and --max-error")
-    settings = parse_pairs(options["pairs"])
-    if options["quality"] is not None and "quality" in settings:
-        raise click.UsageError("give --quality or --set quality=, not both")
-    plain = {"quality": options["quality"], "segment": options["segment"], "reorder": options["reorder"] or None}
-    settings.update({key: str(value) for key, value in plain.items() if value is not None})
+    settings = parse_settings(options)
     codec = candidates(
         options["codec"],
         options["purpose"],
@@ -129,6 +125,15 @@ def parse_encoding(options: dict[str, Any]) -> Encoding:
     making["attributes"] = _parse_bounds("--attribute", options["attributes"])
     making["fields"] = _parse_bounds("--field", options["fields"])
     return Encoding(codec, reading, making, options["unlimited"])
+
+
+def parse_settings(options: dict[str, Any]) -> dict[str, str]:
+    """Settings of the codec that are given, by name; raises `click.UsageError`."""
+    settings = parse_pairs(options["pairs"])
+    if options["quality"] is not None and "quality" in settings:
+        raise click.UsageError("give --quality or --set quality=, not both")
+    plain = {"quality": options["quality"], "segment": options["segment"], "reorder": options["reorder"] or None}
+    return settings | {key: str(value) for key, value in plain.items() if value is not None}
 
 
 def parse_pairs(pairs: tuple[str, ...]) -> dict[str, str]:

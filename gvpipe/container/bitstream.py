@@ -46,7 +46,7 @@ MAX_FRAMES = 1 << 24
 MAX_VERTICES = 1 << 28
 
 
-PLAIN, STREAM, BARE = "plain", "stream", "bare"  # layouts of files
+PLAIN, STREAM, BARE, LIVE = "plain", "stream", "bare", "live"  # layouts of files
 NO_ORIGIN = (0.0, 0.0, 0.0)
 MAX_ORIGIN = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]  # of its coordinates' magnitudes: float32's largest number
 
@@ -70,6 +70,8 @@ class Bitstream:
         fragments: in place of ``video``, of a file in the stream layout (`gvpipe.container.stream_layout`).
         is_bare: whether its file has the bare layout (`gvpipe.container.bare`), which has a video for pictures alone.
         n_bytes: of the file that it was read from, 0 if it was not.
+        is_unfinished: it has the first frames of a file that is still written, or was left so, and no video
+            (`gvpipe.container.live_layout`).
         budget: what its readers may take (`gvpipe.budget`).
         shared: what files of one data set have in common (`gvpipe.shared_parts`), None for a file alone.
     """
@@ -87,12 +89,15 @@ class Bitstream:
     fragments: Fragments | None = field(default=None, compare=False, repr=False)
     is_bare: bool = field(default=False, compare=False)
     n_bytes: int = field(default=0, compare=False)
+    is_unfinished: bool = field(default=False, compare=False)
     budget: Budget = field(default=UNLIMITED, compare=False, repr=False)
     shared: SharedParts | None = field(default=None, compare=False, repr=False)
 
     @property
     def layout(self) -> str:
-        """Of its file: ``plain``, ``stream`` or ``bare``."""
+        """Of its file: ``plain``, ``stream``, ``bare``, or ``live``: a stream that is not finished."""
+        if self.is_unfinished:
+            return LIVE
         if self.fragments is not None:
             return STREAM
         return BARE if self.is_bare else PLAIN

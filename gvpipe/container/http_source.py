@@ -45,6 +45,7 @@ class HttpSource:
         self._received = 0
         self._arriving: _Arriving | None = None
         self._is_forked = False
+        self._may_grow = False
         with self._asking():
             answer = self._request(0, BLOCK)
             self._validators = _validators(answer.headers)
@@ -60,6 +61,10 @@ class HttpSource:
     def after_fork(self) -> None:
         """Ask anew in a forked child: what still comes in would be shared with the parent."""
         self._is_forked = self._arriving is not None
+
+    def let_grow(self) -> None:
+        """Read on though the file has become larger; its size stays what it was."""
+        self._may_grow = True
 
     def read(self, offset: int, length: int) -> bytes:
         """Return bytes ``offset`` to ``offset + length``.
@@ -123,7 +128,9 @@ class HttpSource:
         with self._asking(), self._request(offset, length) as answer:
             if answer.status == 200:
                 raise InputError(f"the server no longer sends parts of the file (200 without Range); {OPEN_AGAIN}")
-            if _total(answer.headers, offset) != self.size or _validators(answer.headers) != self._validators:
+            size = _total(answer.headers, offset)
+            is_same = size == self.size and _validators(answer.headers) == self._validators
+            if not is_same and not (self._may_grow and size >= self.size):
                 raise CorruptFile(f"the server has another file by now; {OPEN_AGAIN}")
             return self._body(answer, length)
 

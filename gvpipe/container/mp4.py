@@ -27,13 +27,14 @@ from gvpipe.atomic import unnamed_path
 from gvpipe.budget import Budget
 from gvpipe.container import bare
 from gvpipe.container.bitstream import VERSION, Bitstream, check_version, pack_header, pack_payload, unpack_payload
-from gvpipe.container.boxes import BOX, LARGE, uuid_head
+from gvpipe.container.boxes import BOX, LARGE, Box, uuid_head
 from gvpipe.container.json_object import JsonObject
+from gvpipe.container.live_layout import read_live
 from gvpipe.container.sample_tables import check_tables
 from gvpipe.container.segments import SegmentParts
-from gvpipe.container.sources import DOWNLOAD_FIRST, BytesSource, FileSource, check_source, is_url
+from gvpipe.container.sources import DOWNLOAD_FIRST, BytesSource, FileSource, Source, check_source, is_url
+from gvpipe.container.stream_layout import ROOM_UUID, find_index, pack_stream, read_stream
 from gvpipe.container.stream_layout import VERSION as STREAM_VERSION
-from gvpipe.container.stream_layout import find_index, pack_stream, read_stream
 from gvpipe.container.track import TAG_PREFIX, Track, inspect, remux, remux_fragments
 from gvpipe.errors import REMEDY, FormatError, InputError, NewerVersion, NotGeometryVideo, StrippedFile, TruncatedFile, corrupt
 
@@ -100,7 +101,7 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False) -> Bitstrea
         source = FileSource(path)
         with open(path, "rb") as file:
             budget, index = Budget(None if unlimited else source.size), find_index(source)
-            return _read(file, source.size, budget) if index is None else read_stream(source, index, budget)
+            return _read(file, source.size, budget) if index is None else _read_parts(source, index, budget)
     except FormatError as exc:
         raise type(exc)(f"{path}: {exc}") from exc
     except IsADirectoryError as exc:
@@ -116,7 +117,7 @@ def read_bytes(data: bytes, name: str, unlimited: bool = False) -> Bitstream:
     try:
         source = BytesSource(data)
         budget, index = Budget(None if unlimited else source.size), find_index(source)
-        return _read(io.BytesIO(data), source.size, budget) if index is None else read_stream(source, index, budget)
+        return _read(io.BytesIO(data), source.size, budget) if index is None else _read_parts(source, index, budget)
     except FormatError as exc:
         raise type(exc)(f"{name}: {exc}") from exc
 
@@ -125,7 +126,9 @@ def bytes_by_part(bitstream: Bitstream, size: int) -> dict[str, int]:
     """Bytes of the codec's sections, of the video's samples and of everything else in a file of ``size`` bytes."""
     parts = dict(bitstream.section_sizes)
     fragments = bitstream.fragments
-    if fragments is not None:
+    if bitstream.is_unfinished:  # its poster is not read
+        parts["video"] = 0
+    elif fragments is not None:
         parts["video"] = fragments.n_bytes
     elif bitstream.video:
         parts["video"] = inspect(bitstream.video, bitstream.budget).n_bytes
@@ -182,13 +185,18 @@ def _read_url(url: str, unlimited: bool) -> Bitstream:
         source = HttpSource(url, budget.grow)
         index = find_index(source)
         if index is not None:
-            return read_stream(source, index, budget)
+            return _read_parts(source, index, budget)
         data = source.read_all()
         return _read(io.BytesIO(data), len(data), budget)
     except NotGeometryVideo as exc:
         raise NotGeometryVideo(f"{url}: {str(exc).replace(ENCODE_FIRST, DOWNLOAD_FIRST)}") from exc
     except FormatError as exc:
         raise type(exc)(f"{url}: {exc}") from exc
+
+
+def _read_parts(source: Source, index: Box, budget: Budget) -> Bitstream:
+    """Of a file in the stream layout, finished or not."""
+    return (read_live if index.uuid == ROOM_UUID.bytes else read_stream)(source, index, budget)
 
 
 def _read(file: IO[bytes], size: int, budget: Budget) -> Bitstream:
@@ -306,5 +314,15 @@ def _find_payload(file: IO[bytes], size: int) -> _Layout:
 def _content_id(bitstream: Bitstream) -> str:
     digest = hashlib.sha256()
     for name, data in bitstream.sections.items():
-        digest.update(name.encode() + b"\0" + struct.pack("<Q", len(data)) + data)
+        add_to_id(digest, name, data)
+    return id_of(digest)
+
+
+def add_to_id(digest: hashlib._Hash, name: str, data: bytes) -> None:
+    """Have a content id cover a section."""
+    digest.update(name.encode() + b"\0" + struct.pack("<Q", len(data)) + data)
+
+
+def id_of(digest: hashlib._Hash) -> str:
+    """The content id of the sections that were added."""
     return digest.hexdigest()[:32]

@@ -5,13 +5,16 @@ from __future__ import annotations
 import os
 import re
 import stat
+from pathlib import Path
 from typing import Protocol
 
+from gvpipe.arguments import check_path
 from gvpipe.errors import FormatError, InputError, OutputError, TruncatedFile
 
 SCHEMES = ("http://", "https://")
 ADDRESS = re.compile(r"([a-z][a-z0-9+.-]+:)/", re.IGNORECASE)  # two letters or more: C:/ is a drive
 NO_FILE = "is no ordinary file, but a pipe or a device; write what it gives to a file first"
+VIDEO_SUFFIXES = (".mp4", ".m4v")
 DOWNLOAD_FIRST = "mesh sequences are read from disk; download it first"
 
 
@@ -38,6 +41,20 @@ def check_target(path: str | os.PathLike[str]) -> None:
         raise OutputError(f"cannot write {os.fspath(path)}: it is an address; write a file on disk, then upload it")
 
 
+def check_video_target(given: str | os.PathLike[str], name: str) -> None:
+    """Refuse a geometry video's path that cannot be written before the work, not after it; ``name`` is the argument's."""
+    path = Path(check_path(given, name))
+    check_target(given)
+    if path.suffix.lower() not in VIDEO_SUFFIXES:
+        raise InputError(f"{path}: the output is an MP4 file; end its name in .mp4")
+    if os.path.isdir(path):  # unlike Path.is_dir, it takes any name, too long ones as well
+        raise OutputError(f"cannot write {path}: it is a folder; choose another name")
+    if not os.path.isdir(path.parent):
+        raise OutputError(f"cannot write {path}: no folder {path.parent}; create it first")
+    if not os.access(path.parent, os.W_OK):
+        raise OutputError(f"cannot write {path}: the folder {path.parent} is read-only; choose another one")
+
+
 def _is_address(path: str | os.PathLike[str]) -> bool:
     """Whether a path begins as addresses do, and not with a folder that is there."""
     found = ADDRESS.match(os.fspath(path))
@@ -45,11 +62,15 @@ def _is_address(path: str | os.PathLike[str]) -> bool:
 
 
 class Source(Protocol):
-    """Bytes of one file that does not change."""
+    """Bytes of one file that does not change, or that grows at its end."""
 
     @property
     def size(self) -> int:
         """Bytes of the whole."""
+        ...
+
+    def let_grow(self) -> None:
+        """Read on though the file has become larger; its size stays what it was."""
         ...
 
     def read(self, offset: int, length: int) -> bytes:
@@ -80,6 +101,11 @@ class FileSource:
             raise InputError(f"{path} {NO_FILE}")
         self._state = _state(found)
         self.size = self._state[0]
+        self._may_grow = False
+
+    def let_grow(self) -> None:
+        """Read on though the file has become larger; its size stays what it was."""
+        self._may_grow = True
 
     def read(self, offset: int, length: int) -> bytes:
         """Return bytes ``offset`` to ``offset + length``.
@@ -90,7 +116,8 @@ class FileSource:
         """
         try:
             with open(self._path, "rb") as file:
-                if _state(os.fstat(file.fileno())) != self._state:
+                state = _state(os.fstat(file.fileno()))
+                if state != self._state and not (self._may_grow and state[0] >= self.size and state[2] == self._state[2]):
                     raise FormatError("the file has changed since it was opened; open it again")
                 file.seek(offset)
                 data = file.read(length)
@@ -118,6 +145,9 @@ class BytesSource:
         if len(data) != length:
             raise TruncatedFile(f"it ends at byte {self.size}, {length} from {offset} on are needed")
         return data
+
+    def let_grow(self) -> None:
+        """Nothing changes: what is in memory stays as it is."""
 
 
 def _state(found: os.stat_result) -> tuple[int, int, int]:

@@ -37,6 +37,7 @@ from gvpipe.errors import NewerVersion, TruncatedFile, corrupt, corrupt_section
 
 VERSION = 2  # of the container
 INDEX_UUID = UUID("3c0a7e35-8f0d-4a86-9b0e-1f5b8f1f6f52")
+ROOM_UUID = UUID("3c0a7e35-8f0d-4a86-9b0e-1f5b8f1f6f53")  # of the index of a file that is not finished (`live_layout`)
 DATA_UUID = UUID("b9c6d1a4-52e7-4f3b-8a55-0d6e7c2f9a31")
 PLACE = struct.Struct("<QIQ")
 COUNT = struct.Struct("<I")
@@ -46,7 +47,7 @@ MAX_INDEX = 1 << 25  # bytes: a fragment for every 16 pictures, sections, a head
 
 
 @dataclass(frozen=True)
-class _Place:
+class Place:
     """Where a section lies."""
 
     offset: int
@@ -64,9 +65,9 @@ def pack_stream(fragmented: bytes, header: bytes, sections: Mapping[str, bytes],
         parts: what each segment has of sections and pictures.
     """
     head, fragments = split_fragments(fragmented)
-    index_size = _index_size([HEADER, *sections], len(fragments)) + len(header)
-    offset = len(head) + len(uuid_head(INDEX_UUID, index_size)) + index_size
-    places = {HEADER: _Place(offset - len(header), len(header), zlib.crc32(header))}
+    n_bytes = index_size([HEADER, *sections], len(fragments)) + len(header)
+    offset = len(head) + len(uuid_head(INDEX_UUID, n_bytes)) + n_bytes
+    places = {HEADER: Place(offset - len(header), len(header), zlib.crc32(header))}
     table = np.zeros(len(fragments), FRAGMENT)
     content: list[bytes] = []
     for names, numbers in _groups(sections, fragments, parts):
@@ -75,7 +76,7 @@ def pack_stream(fragmented: bytes, header: bytes, sections: Mapping[str, bytes],
             content.append(uuid_head(DATA_UUID, length))
             offset += len(content[-1])
         for name in names:
-            places[name] = _Place(offset, len(sections[name]), zlib.crc32(sections[name]))
+            places[name] = Place(offset, len(sections[name]), zlib.crc32(sections[name]))
             content.append(sections[name])
             offset += len(sections[name])
         for number in numbers:
@@ -84,8 +85,8 @@ def pack_stream(fragmented: bytes, header: bytes, sections: Mapping[str, bytes],
             content += moof, mdat
             offset += len(moof) + len(mdat)
     ordered = {name: places[name] for name in (HEADER, *sections)}
-    index = _pack_index(ordered, table, WHOLE.pack(offset, len(head), zlib.crc32(head)))
-    yield from (head, uuid_head(INDEX_UUID, index_size), index, header, *content)
+    index = pack_index(ordered, table, WHOLE.pack(offset, len(head), zlib.crc32(head)))
+    yield from (head, uuid_head(INDEX_UUID, n_bytes), index, header, *content)
 
 
 def _groups(
@@ -105,12 +106,14 @@ def _groups(
     yield [name for name in parts.late if name in sections], range(0)
 
 
-def _index_size(names: Sequence[str], n_fragments: int) -> int:
+def index_size(names: Sequence[str], n_fragments: int) -> int:
+    """Bytes of the index of sections with these names."""
     entries = sum(1 + len(name) + PLACE.size for name in names) + n_fragments * FRAGMENT.itemsize
     return len(MAGIC) + PREFIX.size + entries + COUNT.size + WHOLE.size + CHECKSUM.size
 
 
-def _pack_index(places: Mapping[str, _Place], table: np.ndarray, whole: bytes) -> bytes:
+def pack_index(places: Mapping[str, Place], table: np.ndarray, whole: bytes) -> bytes:
+    """The index, without the header behind it; ``whole`` is `WHOLE`."""
     rows = [MAGIC, PREFIX.pack(VERSION, len(places))]
     for name, place in places.items():
         encoded = name.encode()
@@ -121,7 +124,7 @@ def _pack_index(places: Mapping[str, _Place], table: np.ndarray, whole: bytes) -
 
 
 def find_index(source: Source) -> Box | None:
-    """The box of the index, behind one ``ftyp`` and one ``moov``; None for files of the plain layout."""
+    """The box of the index, or room for it, behind one ``ftyp`` and one ``moov``; None for files of the plain layout."""
     at = 0
     for kind in (b"ftyp", b"moov"):
         box = read_box(source.read, at, source.size)
@@ -129,10 +132,11 @@ def find_index(source: Source) -> Box | None:
             return None
         at = box.stop
     head = source.read(at, max(0, min(LONGEST_HEAD, source.size - at)))
-    if head[4:8] != b"uuid" or INDEX_UUID.bytes not in head:
+    kinds = (INDEX_UUID.bytes, ROOM_UUID.bytes)
+    if head[4:8] != b"uuid" or not any(kind in head for kind in kinds):
         return None
     box = read_box(source.read, at, source.size)
-    if box is None or box.uuid != INDEX_UUID.bytes:
+    if box is None or box.uuid not in kinds:
         raise TruncatedFile("it ends inside its index; get the file again from its source")
     return box
 
@@ -160,10 +164,45 @@ def read_stream(source: Source, index: Box, budget: Budget) -> Bitstream:
     return replace(bitstream, sections=codec_sections, fragments=stored, n_bytes=source.size)
 
 
-def _read_index(source: Source, index: Box) -> tuple[dict[str, _Place], np.ndarray, bytes]:
+@dataclass(frozen=True)
+class Index:
+    """What an index says.
+
+    Args:
+        places: of sections, by name.
+        fragments: of `FRAGMENT`.
+        size: of the file.
+        head: bytes of ``ftyp`` and ``moov``, and their CRC-32.
+        n_bytes: of the index itself.
+    """
+
+    places: dict[str, Place]
+    fragments: np.ndarray
+    size: int
+    head: tuple[int, int]
+    n_bytes: int
+
+
+def _read_index(source: Source, index: Box) -> tuple[dict[str, Place], np.ndarray, bytes]:
     if index.stop - index.content > MAX_INDEX:
         raise corrupt(f"its index has {index.stop - index.content} bytes; {MAX_INDEX} at most are allowed")
-    data = source.read(index.content, index.stop - index.content)
+    found = unpack_index(source.read(index.content, index.stop - index.content))
+    if source.size < found.size:
+        raise TruncatedFile(f"it ends {found.size - source.size} bytes early; get the file again from its source")
+    if source.size > found.size:
+        raise corrupt(f"{source.size - found.size} stray bytes follow its last box")
+    head_size, head_checksum = found.head
+    if head_size != index.start:
+        raise corrupt_section("index", "its place is not behind the description of the video")
+    check_places(found.places, found.fragments, index.content + found.n_bytes, found.size)
+    head = source.read(0, head_size)
+    if zlib.crc32(head) != head_checksum:
+        raise corrupt("the description of its video is damaged")
+    return found.places, found.fragments, head
+
+
+def unpack_index(data: bytes) -> Index:
+    """Mirror of `pack_index`; more may follow it in ``data``. Raises `CorruptFile`, `NewerVersion`."""
     if data[: len(MAGIC)] != MAGIC:
         raise corrupt("the index does not start with gvpipe's magic")
     cursor = Cursor(data, "index")
@@ -177,7 +216,7 @@ def _read_index(source: Source, index: Box) -> tuple[dict[str, _Place], np.ndarr
     for _ in range(count):
         name = cursor.take(min(cursor.take(1)[0], MAX_NAME))
         length, checksum, offset = cursor.struct(PLACE)
-        entries.append((name, _Place(offset, length, checksum)))
+        entries.append((name, Place(offset, length, checksum)))
     (n_fragments,) = cursor.struct(COUNT)
     fragments = np.frombuffer(cursor.take(n_fragments * FRAGMENT.itemsize), FRAGMENT)
     size, head_size, head_checksum = cursor.struct(WHOLE)
@@ -185,24 +224,14 @@ def _read_index(source: Source, index: Box) -> tuple[dict[str, _Place], np.ndarr
     (checksum,) = cursor.struct(CHECKSUM)
     if zlib.crc32(data[:packed]) != checksum:
         raise cursor.corrupt("its checksum does not match")
-    if source.size < size:
-        raise TruncatedFile(f"it ends {size - source.size} bytes early; get the file again from its source")
-    if source.size > size:
-        raise corrupt(f"{source.size - size} stray bytes follow its last box")
     places = dict(entries)
     if len(places) != len(entries) or entries[0][0] != HEADER.encode() or not all(NAME.fullmatch(name) for name in places):
         raise cursor.corrupt("its sections' names are not those of a geometry video")
-    if head_size != index.start:
-        raise cursor.corrupt("its place is not behind the description of the video")
     named = {name.decode("ascii"): place for name, place in places.items()}
-    _check_places(named, fragments, index.content + packed + CHECKSUM.size, size)
-    head = source.read(0, head_size)
-    if zlib.crc32(head) != head_checksum:
-        raise corrupt("the description of its video is damaged")
-    return named, fragments, head
+    return Index(named, fragments, size, (head_size, head_checksum), packed + CHECKSUM.size)
 
 
-def _check_places(places: Mapping[str, _Place], fragments: np.ndarray, start: int, stop: int) -> None:
+def check_places(places: Mapping[str, Place], fragments: np.ndarray, start: int, stop: int) -> None:
     """Sections and fragments lie between two bytes of the file, and no two overlap; a picture has a byte at least.
 
     So what they claim is there, and pictures are no more than bytes.
@@ -229,7 +258,7 @@ class StoredSections(Mapping[str, bytes]):
         CorruptFile: a checksum does not match.
     """
 
-    def __init__(self, source: Source, places: Mapping[str, _Place]) -> None:
+    def __init__(self, source: Source, places: Mapping[str, Place]) -> None:
         self._source, self._places = source, places
 
     def __getitem__(self, name: str, /) -> bytes:

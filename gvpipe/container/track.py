@@ -15,6 +15,7 @@ TAG = "comment"
 TAG_PREFIX = "gvpipe "
 PLAIN = {"fflags": "+bitexact", "write_btrt": "0", "empty_hdlr_name": "1"}  # what no player needs is left out
 FRAGMENTS = "+frag_keyframe+delay_moov+default_base_moof+skip_trailer"
+LONGEST_MICROSECONDS = (1 << 31) - 1  # of FFmpeg's options
 LEAST_PICTURES = 16  # of a fragment, the last apart: each costs 100 bytes
 
 
@@ -51,7 +52,8 @@ def _copy(video: bytes, tag: str, options: dict[str, str], least: int = 0) -> by
         if all(packet.pts == packet.dts for packet in packets):
             options["use_editlist"] = "0"
         if least and packets and packets[0].duration and packets[0].time_base:
-            options["min_frag_duration"] = str(int(least * packets[0].duration * packets[0].time_base * 1_000_000))
+            shortest = int(least * packets[0].duration * packets[0].time_base * 1_000_000)
+            options["min_frag_duration"] = str(min(shortest, LONGEST_MICROSECONDS))
         with av.open(result, "w", format="mp4", options=options, io_open=reopen) as target:
             if tag:
                 target.metadata[TAG] = TAG_PREFIX + tag

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from folders import GOLDEN
 
 from gvpipe.container import mp4
+from gvpipe.container.track import inspect, remux_fragments
 from gvpipe.errors import CorruptFile
+from gvpipe.rendering.poster import make_poster
 
 
 def written_again(name: str, path: Path) -> bytes:
@@ -43,3 +46,9 @@ def test_boxes_that_are_not_gvpipes_are_refused(tmp_path: Path) -> None:
         path.write_bytes(data[:at] + (8).to_bytes(4, "big") + kind + data[at:])
         with pytest.raises(CorruptFile, match="comes before its geometry"):
             mp4.read_file(path)
+
+
+def test_one_picture_may_last_for_hours() -> None:
+    positions, faces = np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32)
+    video = make_poster(positions, faces, 30.0, 400_000)
+    assert inspect(remux_fragments(video, "2 x")).checksum == inspect(video).checksum

@@ -1,5 +1,6 @@
 // Plays a file from a web server as a page does, without a browser: node run_parts.mjs BUNDLE.js; each line of standard input is a
 // command, and gets a line of JSON.
+import { readFileSync } from "node:fs";
 import { createInterface } from "node:readline";
 import { pathToFileURL } from "node:url";
 import { StreamFile } from "../../gvpipe/web/src/format/stream_file.js";
@@ -12,6 +13,10 @@ globalThis.window = globalThis;
 globalThis.location = new URL("http://localhost/");
 const { GeometryVideo } = await import(pathToFileURL(process.argv[2]));
 let video = null;
+let lost = null; // the error that ended following a file
+let playing = null; // what has been shown
+
+const state = () => [video.frameCount, video.isLive, video.startFrame, String(video.duration), lost && [lost.kind, lost.message]];
 
 /** A clock whose steps are `milliseconds` apart, whatever the time is. */
 function clock(milliseconds) {
@@ -32,6 +37,35 @@ const commands = {
   async level({ level }) {
     await video.setLevel(level);
     return [video.level, video.vertexCount, video.triangleCount, video.indices.length];
+  },
+  /** A file that is still written, or bytes on the disk. */
+  async join({ url, path }) {
+    video?.close();
+    lost = null;
+    video = await GeometryVideo.load(url ?? new Uint8Array(readFileSync(path)));
+    video.lost = (error) => (lost = error);
+    return state();
+  },
+  /** The state once there are so many frames, or all, or the file is lost, or time is over. */
+  async grown({ frames, seconds = 8 }) {
+    const end = performance.now() + 1000 * seconds;
+    while (video.frameCount < frames && video.isLive && !lost && performance.now() < end) await new Promise((go) => setTimeout(go, 10));
+    return state();
+  },
+  /** Starts to play, by a clock that is as fast as the page's. */
+  async start() {
+    playing = { frames: [], waits: [], ended: 0 };
+    const on = { failed: (error) => (lost = error), ended: () => playing.ended++, waits: (isWaiting) => playing.waits.push(isWaiting) };
+    let now = 0;
+    const nextTick = (tick) => setTimeout(() => tick((now += 10)), 10);
+    await video.play((positions, k) => playing.frames.push(k), { ...on, nextTick });
+    return true;
+  },
+  /** What was shown, once so many frames were, or after so many seconds. */
+  async shown({ count, seconds = 8 }) {
+    const end = performance.now() + 1000 * seconds;
+    while (playing.frames.length < count && performance.now() < end) await new Promise((go) => setTimeout(go, 10));
+    return playing;
   },
   /** Plays `count` frames from the one shown last, and changes the level after some of them. */
   async play({ count, after, level }) {

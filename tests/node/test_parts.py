@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import re
 import shutil
-import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +13,6 @@ import numpy as np
 import pytest
 from file_server import CHUNK, Served, serving
 from long_files import write_long
-from pages import BUNDLE
 
 import gvpipe
 from gvpipe.container.mp4 import read_file
@@ -24,23 +21,6 @@ from gvpipe.container.stream_layout import StoredSections
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no node")
 VERTICES = [8000, 6000, 4000, 3000, 2000, 1000, 500]
 Ask = Callable[..., Any]
-
-
-@pytest.fixture(scope="module")
-def node() -> Iterator[Ask]:
-    """``ask(command, **given)``: what `run_parts.mjs` answers; an error is a pair of kind and message."""
-    command = ["node", str(Path(__file__).with_name("run_parts.mjs")), str(BUNDLE / "geometry-video.js")]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-
-        def ask(name: str, **given: Any) -> Any:
-            assert process.stdin is not None and process.stdout is not None
-            process.stdin.write(json.dumps({"command": name, **given}) + "\n")
-            process.stdin.flush()
-            answer = json.loads(process.stdout.readline())
-            return answer["value"] if "value" in answer else tuple(answer["error"])
-
-        yield ask
-        process.kill()
 
 
 @pytest.fixture(scope="module")

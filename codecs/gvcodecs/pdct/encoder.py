@@ -20,12 +20,12 @@ import numpy as np
 from gvcodecs.pdct.clip import MAX_CLUSTERS, DeltaQuantiser, encode_clip
 from gvcodecs.pdct.clustering import Clusters, find_clusters
 from gvcodecs.pdct.dictionary import BaseFrame
-from gvcodecs.pdct.header import MAX_CLIPS, VERSION_POINTS, Header, surface_of_points
+from gvcodecs.pdct.header import MAX_CLIPS, VERSION_LIVE, VERSION_POINTS, Header, surface_of, surface_of_points
 from gvcodecs.pdct.reader import PdctReader
 from gvcodecs.pdct.still_points import SECTION, encode_still
-from gvpipe.arrays import Float32, Int64
+from gvpipe.arrays import Float32, Int32, Int64
 from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
-from gvpipe.connectivity.base_mesh import EncodedMesh
+from gvpipe.connectivity.base_mesh import EncodedMesh, encode_base
 from gvpipe.connectivity.welded_mesh import WeldedMesh, encode_points
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_parts
@@ -57,7 +57,8 @@ class Pdct(BaseCodec):
     """
 
     id: ClassVar[str] = "pdct"
-    version: ClassVar[int] = VERSION_POINTS
+    version: ClassVar[int] = VERSION_LIVE
+    holds_version: ClassVar[int] = VERSION_POINTS
     summary: ClassVar[str] = "predictive DCT in local coordinate frames: streams frame by frame, short clips"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
     maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.segment_map`)
@@ -122,6 +123,10 @@ class Pdct(BaseCodec):
         """What each clip has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
         return numbered_parts(("clip",), Header.of(bitstream).clips)
 
+    def start_live(self, frame: Float32, faces: Int32, fps: float) -> ClipCoder:
+        """Code frames that come one by one, the first of which is ``frame (V, 3)`` (`gvpipe.codec.LiveCoder`)."""
+        return ClipCoder(self, frame, faces, fps)
+
     def open_step(self, diagonal: float) -> float:
         """The step, model units, where only a frame's ``diagonal`` is known, as in streams."""
         return OPEN * error_of(self.quality) / 100 * diagonal
@@ -163,8 +168,49 @@ class Pdct(BaseCodec):
         for c, each in enumerate(map_segments(_code_clip, clips, tasks, lambda done: report("clips", done))):
             sections[f"clip.{c}"], found[c] = each
         report("clips", 1)
-        bitstream = self._bitstream(sequence, Header(n_clips, start.lattice).to_json(), sections)
+        bitstream = self._bitstream(sequence, Header(n_clips, start.lattice).to_json(), sections, version=VERSION_POINTS)
         return Encoded(bitstream, start.coded.permutation)
+
+
+class ClipCoder:
+    """Codes clips as they come, from frame 0 alone: every vertex is a point, and no loop corrects the step.
+
+    Args:
+        settings: of the codec.
+        frame: frame 0, ``(V, 3)``, model units.
+        faces: ``(T, 3)`` triangles.
+        fps: frames per second.
+    """
+
+    name: ClassVar[str] = "clip"  # of a clip's section, before a dot and its number
+    most_clips: ClassVar[int] = MAX_CLIPS
+
+    def __init__(self, settings: Pdct, frame: Float32, faces: Int32, fps: float) -> None:
+        self.lattice = Lattice.over(frame, settings.base_bits)
+        self.mesh, base = encode_base(self.lattice.quantise(frame), faces, settings.reorder)
+        self._settings, self._surface, self._diagonal = settings, surface_of(base, self.lattice), diagonal_of(frame)
+        self.bitstream = Bitstream(
+            codec=settings.id,
+            version=VERSION_LIVE,
+            n_frames=1,
+            n_vertices=len(frame),
+            n_triangles=len(faces),
+            fps=fps,
+            header=Header(1, self.lattice, settings.clip_frames).to_json(),
+            sections={"mesh": self.mesh.mesh, "order": self.mesh.order},
+        )
+
+    @property
+    def clip_frames(self) -> int:
+        """Frames of each clip but the last."""
+        return self._settings.clip_frames
+
+    def encode(self, frames: Float32) -> bytes:
+        """Return the section of a clip, ``frames (n, V, 3)``, model units."""
+        frames = np.ascontiguousarray(frames[:, self.mesh.permutation])
+        step = self._settings.open_step(self._diagonal or diagonal_of(frames))
+        clusters = self._settings.find_clusters(frames, self._surface)
+        return self._settings.encode_clip(frames, self._surface, clusters, step)
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,12 @@
 ``mesh``      base frame (frame 0) of the points, on its lattice, and connectivity (`gvpipe.connectivity.welded_mesh`)
 ``order``     vertex order, empty if the codec's own (`gvpipe.connectivity.seams`)
 ``still``     points that never move, and their positions (`stillness`); absent if all move
-``clip.N``    frames of clip N (`clip`); clip c starts at frame ``c * F // clips``
+``clip.N``    frames of clip N (`clip`); clip c starts at frame ``c * F // clips``, of version 3 at frame ``c * clip``
 ============  ===========================================================================
 
 Version 1 has no section ``still``, and every vertex is a point: ``mesh`` and ``order`` are those of
-`gvpipe.connectivity.base_mesh`. If no point moves, there are no clips.
+`gvpipe.connectivity.base_mesh`. If no point moves, there are no clips. Version 3 is that of files that are written as frames
+come: sections are those of version 1, and all clips but the last have the same number of frames, since F is not known.
 """
 
 from __future__ import annotations
@@ -23,10 +24,12 @@ from gvpipe.connectivity.base_mesh import BaseMesh
 from gvpipe.connectivity.welded_mesh import WeldedMesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.lattice_field import read_lattice
-from gvpipe.container.segments import read_segments
+from gvpipe.container.segments import MAX_SEGMENT, count_segments, read_segments, segment_starts
+from gvpipe.errors import CorruptFile
 from gvpipe.mesh.lattice import Lattice
 
 VERSION_POINTS = 2  # vertices that share a trajectory are one point; sections `still` and `holds`
+VERSION_LIVE = 3  # written as frames come
 MAX_CLIPS = 4000
 
 
@@ -37,19 +40,35 @@ class Header:
     Args:
         clips: how many.
         base: lattice of the base frame, model units.
+        clip: frames of each clip but the last; 0: even cuts.
     """
 
     clips: int
     base: Lattice
+    clip: int = 0
 
     def to_json(self) -> dict[str, Any]:
         """Return the header as JSON values."""
-        return {"clips": self.clips, "base": [*self.base.origin, self.base.step]}
+        cuts = {"clip": self.clip} if self.clip else {"clips": self.clips}
+        return {**cuts, "base": [*self.base.origin, self.base.step]}
+
+    def starts(self, n_frames: int) -> list[int]:
+        """First frame of every clip, and F."""
+        if not self.clip:
+            return segment_starts(n_frames, self.clips)
+        return [*range(0, n_frames, self.clip), n_frames]
 
     @classmethod
     def of(cls, bitstream: Bitstream) -> Header:
         """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
-        return cls(read_segments(bitstream, MAX_CLIPS, "clips"), read_lattice(bitstream.fields))
+        base = read_lattice(bitstream.fields)
+        if bitstream.version < VERSION_LIVE:
+            return cls(read_segments(bitstream, MAX_CLIPS, "clips"), base)
+        clip = bitstream.fields.integer("clip", 1, MAX_SEGMENT)
+        clips = count_segments(bitstream.n_frames, clip)
+        if clips > MAX_CLIPS:
+            raise CorruptFile(f"header: {bitstream.n_frames} frames in clips of {clip}; at most {MAX_CLIPS} clips are allowed")
+        return cls(clips, base, clip)
 
 
 def surface_of(mesh: BaseMesh, lattice: Lattice) -> BaseFrame:

@@ -13,7 +13,6 @@ from gvpipe.arrays import Float32, Int32, Int64
 from gvpipe.connectivity.base_mesh import read_base
 from gvpipe.connectivity.welded_mesh import read_points
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.segments import segment_starts
 
 BYTES_PER_POINT, SECONDS_PER_POINT = 200, 1e-6  # of the base frame, its traversal, still points
 
@@ -29,7 +28,7 @@ class PdctReader:
         header = Header.of(bitstream)
         self._bitstream = bitstream
         self._point: Int64 | None = None  # (V,) of each vertex; None: every vertex is one
-        if bitstream.version < VERSION_POINTS:
+        if bitstream.version != VERSION_POINTS:
             base = read_base(bitstream)
             self._faces, surface = base.faces, surface_of(base, header.base)
         else:
@@ -39,7 +38,7 @@ class PdctReader:
         self._surface = surface if self._still is None else surface.without(self._still.points)
         n_points = len(surface.base)
         bitstream.budget.keep(f"{n_points} points", BYTES_PER_POINT * n_points, SECONDS_PER_POINT * n_points)
-        self._bounds = segment_starts(bitstream.n_frames, header.clips)
+        self._bounds = header.starts(bitstream.n_frames)
         self._clip: tuple[int, Float32] = (-1, np.zeros((0, 0, 3), np.float32))
 
     @property

@@ -14,23 +14,21 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from gvcodecs.pdct.clip import decode_clip
 from gvcodecs.pdct.dictionary import BaseFrame
-from gvcodecs.pdct.encoder import Pdct, diagonal_of
+from gvcodecs.pdct.encoder import ClipCoder, Pdct
 from gvcodecs.pdct.header import surface_of
 from gvcodecs.pdct.reader import BYTES_PER_POINT, SECONDS_PER_POINT
 from gvpipe.arrays import Float32, Floats, Int32, Integers
 from gvpipe.budget import Budget
-from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base, keep_mesh
+from gvpipe.connectivity.base_mesh import BaseMesh, decode_base, keep_mesh
 from gvpipe.container.json_object import JsonObject
 from gvpipe.container.lattice_field import read_lattice
 from gvpipe.container.segments import MAX_SEGMENT
 from gvpipe.errors import CorruptFile, InputError, NewerVersion, NotGeometryVideo, TruncatedFile
-from gvpipe.mesh.lattice import Lattice
 from gvpipe.sequence import check_finite
 
 MAGIC = b"gvpdct\r\n"
@@ -54,7 +52,7 @@ class StreamEncoder:
     def __init__(self, faces: Integers, settings: Pdct | None = None, fps: float = 30.0) -> None:
         self._faces, self._fps = np.asarray(faces, np.int32).reshape(-1, 3), float(fps)
         self._settings = settings or Pdct()
-        self._base: _Base | None = None
+        self._coder: ClipCoder | None = None
         self._frames: list[Float32] = []
         self._count = 0
         self._is_closed = False
@@ -72,13 +70,13 @@ class StreamEncoder:
             raise InputError(f"frame {self._count} has shape {positions.shape}; (vertices >= 1, 3) is needed")
         check_finite(positions[None], "stream", self._count)
         head = b""
-        if self._base is None:
+        if self._coder is None:
             if self._faces.size and not 0 <= self._faces.min() <= self._faces.max() < len(positions):
                 raise InputError(f"triangles name vertices up to {self._faces.max()}; there are {len(positions)}")
-            self._base = _Base.of(positions, self._faces, self._settings)
-            head = self._head(self._base, len(positions))
-        elif len(positions) != len(self._base.surface.base):
-            raise InputError(f"frame {self._count} has {len(positions)} vertices, the first {len(self._base.surface.base)}")
+            self._coder = self._settings.start_live(positions, self._faces, self._fps)
+            head = _head(self._coder)
+        elif len(positions) != self._coder.bitstream.n_vertices:
+            raise InputError(f"frame {self._count} has {len(positions)} vertices, the first {self._coder.bitstream.n_vertices}")
         self._frames.append(positions)
         self._count += 1
         return head + (self._flush() if len(self._frames) == self._settings.clip_frames else b"")
@@ -87,43 +85,24 @@ class StreamEncoder:
         """Return what is left: the last, shorter clip and the end mark."""
         if self._is_closed:
             raise InputError("the stream is finished already")
-        if self._base is None:
+        if self._coder is None:
             raise InputError("a stream needs at least one frame")
         self._is_closed = True
         return (self._flush() if self._frames else b"") + END
 
-    def _head(self, base: _Base, n_vertices: int) -> bytes:
-        mesh, order = base.coded.mesh, base.coded.order
-        lattice = (*base.lattice.origin, base.lattice.step)
-        numbers = HEAD.pack(VERSION, n_vertices, len(self._faces), len(order), len(mesh), self._fps, *lattice)
-        return MAGIC + numbers + mesh + order
-
     def _flush(self) -> bytes:
-        assert self._base is not None
-        base, settings = self._base, self._settings
-        frames = np.ascontiguousarray(np.stack(self._frames)[:, base.coded.permutation])
-        step = settings.open_step(base.diagonal or diagonal_of(frames))
-        data = settings.encode_clip(frames, base.surface, settings.find_clusters(frames, base.surface), step)
+        assert self._coder is not None
+        data = self._coder.encode(np.stack(self._frames))
         head = CLIP.pack(len(self._frames), zlib.crc32(data), len(data))
         self._frames = []
         return head + data
 
 
-@dataclass(frozen=True)
-class _Base:
-    """Frame 0 and connectivity, coded; ``diagonal`` of frame 0, model units."""
-
-    lattice: Lattice
-    coded: EncodedMesh
-    surface: BaseFrame
-    diagonal: float
-
-    @classmethod
-    def of(cls, frame: Float32, faces: Int32, settings: Pdct) -> _Base:
-        """Code a mesh with positions ``frame (V, 3)`` and triangles ``faces (T, 3)``."""
-        lattice = Lattice.over(frame, settings.base_bits)
-        coded, base = encode_base(lattice.quantise(frame), faces, settings.reorder)
-        return cls(lattice, coded, surface_of(base, lattice), diagonal_of(frame))
+def _head(coder: ClipCoder) -> bytes:
+    mesh, order, start = coder.mesh.mesh, coder.mesh.order, coder.bitstream
+    lattice = (*coder.lattice.origin, coder.lattice.step)
+    numbers = HEAD.pack(VERSION, start.n_vertices, start.n_triangles, len(order), len(mesh), start.fps, *lattice)
+    return MAGIC + numbers + mesh + order
 
 
 class StreamReader:

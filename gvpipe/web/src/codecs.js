@@ -23,6 +23,7 @@ const BYTES_PER_FRAME = 160; // that a clock keeps
  * @property {(level: number) => Promise<Playable>} at another level, closed with this one
  * @property {(frame: number, shown: Uint8Array|Float32Array, positions: Float32Array) => void} rebuild fills positions (V, 3) of a
  *   distinct frame from what the clock shows
+ * @property {(frames: number) => void} [grow] that the file has so many frames by now, before clocks of its `openPictures` are told
  * @property {() => void} close
  *
  * @param {Uint8Array|import("./format/stream_file.js").StreamFile} source the file, or its parts
@@ -99,6 +100,11 @@ async function openFrames(code, source, payload, repeated, level) {
     payload.close?.();
   };
   const frames = Array.from({ length: repeated.distinct }, (_, picture) => [{ picture }]);
+  const grow = (count) => {
+    payload.budget.ask(`${count} frames`, BYTES_PER_FRAME * count);
+    while (frames.length < count) frames.push([{ picture: frames.length }]);
+    host.grow(count);
+  };
   const at = async (wanted) => {
     const { level: own, faces, points, levels } = await host.describe(wanted);
     const basePoints = new Int32Array(3 * points.length);
@@ -119,6 +125,7 @@ async function openFrames(code, source, payload, repeated, level) {
       openPictures: (frame) => DecodedPictures.of(frames, size, fps, repeated, new FrameSource(host, own), frame),
       rebuild: (frame, shown, positions) => positions.set(shown),
       at,
+      grow,
       close,
     };
   };

@@ -94,9 +94,14 @@ export const SEGMENTS_SMALLEST_STEP = 3.6734198463196485e-40;
 export const SEGMENTS_LARGEST_STEP = 6.80564733841877e+38;
 export const SEGMENTS_MAX_SEGMENT = 100000;
 
+// gvpipe.container.live_layout
+export const LIVE_LAYOUT_HEAD_BYTES = 24;
+export const LIVE_LAYOUT_LIVE_UUID = [213, 240, 177, 200, 106, 30, 76, 87, 159, 67, 43, 122, 144, 196, 232, 97];
+
 // gvpipe.container.stream_layout
 export const STREAM_LAYOUT_VERSION = 2;
 export const STREAM_LAYOUT_INDEX_UUID = [60, 10, 126, 53, 143, 13, 74, 134, 155, 14, 31, 91, 143, 31, 111, 82];
+export const STREAM_LAYOUT_ROOM_UUID = [60, 10, 126, 53, 143, 13, 74, 134, 155, 14, 31, 91, 143, 31, 111, 83];
 export const STREAM_LAYOUT_MAX_INDEX = 33554432;
 
 // gvpipe.corrections.displacements
@@ -338,6 +343,7 @@ export const PDCT_DELTA_CODING_PROBLEMS = ["", "its range-coded data do not deco
 // gvcodecs.pdct.header
 export const PDCT_HEADER_MAX_CLIPS = 4000;
 export const PDCT_HEADER_VERSION_POINTS = 2;
+export const PDCT_HEADER_VERSION_LIVE = 3;
 
 // gvcodecs.pdct.reader
 export const PDCT_READER_BYTES_PER_POINT = 200;

@@ -12,6 +12,8 @@ import { readTrack } from "./track.js";
 const KEPT_BYTES = 64 * 2 ** 20; // of decoded levels
 const KEPT_GROUPS = 3; // at least: what is shown, what comes next, and one of before
 const AHEAD = 1; // s, decoded ahead of what plays
+const BEHIND = 1.25; // clips of a file that is still written: what is left behind is not played
+const EDGE = 1e-3; // frames before the end of such a file, where the clock waits
 const LONGEST_STEP = 1000; // ms that the clock goes on at once: a hidden page is asked for nothing
 
 /** The clock of pages: one tick before each repaint. */
@@ -102,17 +104,26 @@ export class DecodedPictures {
   constructor(groups, groupBytes, fps, repeated, decoder) {
     this.fps = fps;
     this.repeated = repeated;
-    this.frames = repeated.frames;
     /** The frame shown. */
     this.shown = -1;
     this.decoder = decoder;
     this.groupBytes = groupBytes;
     this.samples = groups;
-    /** Of each picture its group. */
-    this.groupOf = new Uint32Array(repeated.distinct);
-    groups.forEach((group, g) => group.forEach(({ picture }) => (this.groupOf[picture] = g)));
+    this.grow();
     this.kept = new Map(); // group -> Group, the one asked for last at the end
     this.turn = Promise.resolve(); // one group after the other
+  }
+
+  /** That there are as many pictures as `repeated` says by now, in groups that were added to the list. */
+  grow() {
+    /** Of each picture its group. */
+    this.groupOf = new Uint32Array(this.repeated.distinct);
+    this.samples.forEach((group, g) => group.forEach(({ picture }) => (this.groupOf[picture] = g)));
+  }
+
+  /** How many frames there are. */
+  get frames() {
+    return this.repeated.frames;
   }
 
   /** `Uint8Array` (V, 3): the levels of the frame shown. */
@@ -143,19 +154,27 @@ export class DecodedPictures {
   /**
    * Play on from here, `rate` times as fast; calls `show(frame)` for each frame that is due, `ended()` at the end if it does
    * not loop, `failed(error)` if it cannot go on. `nextTick(tick)` has `tick(ms)` called at the next step of the clock;
-   * `ticked(ms, isThere)` is called then, with whether the frame that is due is there.
+   * `ticked(ms, isThere)` is called then, with whether the frame that is due is there. At the end of a file that is still written
+   * it waits for more, and `waits(isWaiting)` says so. Played from its last two clips on, it never falls behind them.
    */
-  async play({ show, ended, failed, nextTick = nextRepaint, ticked }, rate, loop) {
+  async play({ show, ended, failed, nextTick = nextRepaint, ticked, waits }, rate, loop) {
     const playing = (this.playing = {});
     let position = Math.max(0, this.shown); // frames since the start
     let before = null;
+    let isWaiting = false;
+    const { repeated } = this;
+    const follows = position >= this.frames - 2 * repeated.clip && rate >= 1;
     this.shown = -1; // it is shown again, at once
     await this.#picture(this.repeated.distinctOf(Math.floor(position)));
     const tick = (now) => {
       if (this.playing !== playing) return;
       const step = Math.min(Math.max(0, now - (before ?? now)), LONGEST_STEP);
-      const next = position + (step * rate * this.fps) / 1000;
+      const isLive = repeated.clip > 0;
+      if (isLive && follows && this.frames - position > BEHIND * repeated.clip) position = this.frames - repeated.clip;
+      let next = position + (step * rate * this.fps) / 1000;
       before = now;
+      if ((isLive && next >= this.frames) !== isWaiting) waits?.((isWaiting = !isWaiting));
+      if (isWaiting) next = this.frames - EDGE;
       const isOver = !loop && next >= this.frames;
       const frame = loop ? Math.floor(next) % this.frames : Math.min(Math.floor(next), this.frames - 1);
       const picture = this.repeated.distinctOf(frame);
@@ -201,6 +220,7 @@ export class DecodedPictures {
   #decodeAhead(group, pictures) {
     const most = Math.min(this.samples.length - 1, KEPT_BYTES / 2 / this.groupBytes);
     for (let i = 1, ahead = 0; i === 1 || (i <= most && ahead < pictures); i++) {
+      if (this.repeated.clip && group + i >= this.samples.length) break; // more will come
       const next = (group + i) % this.samples.length;
       this.#group(next);
       ahead += this.samples[next].length;

@@ -17,6 +17,11 @@ import { StreamFile } from "./format/stream_file.js";
 export { GeometryVideoError };
 
 const CATCHES = 3; // times that another level seeks the frame that plays, which goes on meanwhile
+const LOOKS_PER_CLIP = 4; // at a file that is still written
+const SOONEST = 100; // ms between two of them
+const LATEST = 1000; // while clips come
+const IDLE = 5000; // while none does
+const TRIES = 5; // of a look that fails
 const FROM_DISK = "pages opened from a disk may not fetch; open it from a web server, or make a page with gvpipe export-html";
 
 export class GeometryVideo {
@@ -36,12 +41,16 @@ export class GeometryVideo {
       const payload = await readPayload(file ? readContainer(file) : parts.container);
       const repeated = readRepeatedFrames(payload);
       reader = await openCodec(file ?? parts, payload, repeated, level);
-      pictures = await reader.openPictures();
+      const start = file ? 0 : parts.startFrame;
+      if (parts?.isGrowing) repeated.grow(parts.live.frames, parts.live.clip);
+      pictures = await reader.openPictures(start);
       const video = new GeometryVideo(payload.header, file?.length ?? parts.size, repeated, reader, pictures);
+      video.startFrame = start;
       video.#isInParts = !file;
       video.#closeFile = () => parts?.close?.();
       video.#payload = payload;
       video.#takeAsset(reader.level ? await readCoarseAsset(payload) : await video.#readAsset(video, reader));
+      if (parts?.isGrowing) video.#follow(parts);
       return video;
     } catch (error) {
       pictures?.close();
@@ -66,6 +75,14 @@ export class GeometryVideo {
   #changed = Promise.resolve(); // one change of the level after the other
   #beside = null; // a promise of pictures of their own, for fields that follow from positions
   #queueBeside = Promise.resolve();
+  #wake = () => {}; // ends a wait for the next look
+
+  /** The frame that is shown first: 0; of a file that is still written, that where its latest clip begins. */
+  startFrame = 0;
+  /** Called when frames have come to a file that is still written, and when it is finished. */
+  grown = () => {};
+  /** Called when it cannot be followed any longer, with the error. */
+  lost = () => {};
 
   constructor(header, byteLength, repeated, reader, pictures) {
     this.frameCount = header.frames;
@@ -86,9 +103,14 @@ export class GeometryVideo {
     return this.#reader.isWaiting ?? false;
   }
 
-  /** Seconds. */
+  /** Whether the file is still written: frames come. */
+  get isLive() {
+    return this.#repeated.clip > 0;
+  }
+
+  /** Seconds; `Infinity` while the file is still written. */
   get duration() {
-    return this.frameCount / this.fps;
+    return this.isLive ? Infinity : this.frameCount / this.fps;
   }
 
   /** Seconds that play without a wait for the file: a list of `[start, end]`. */
@@ -100,7 +122,7 @@ export class GeometryVideo {
 
   /** Bits of the file per second of playing. */
   get bitRate() {
-    return (8 * this.byteLength) / this.duration;
+    return (8 * this.byteLength * this.fps) / this.frameCount;
   }
 
   /**
@@ -126,13 +148,14 @@ export class GeometryVideo {
    *
    * @param {(positions: Float32Array, k: number) => void} show called for each frame; the array is used again for the next
    * @param {{rate?: number, loop?: boolean, ended?: () => void, failed?: (error: Error) => void,
-   *   nextTick?: (tick: (now: number) => void) => void, ticked?: (now: number, isThere: boolean) => void}} [options] `rate` 1 is the
-   *   video's own speed; `failed` is called if a frame later on cannot be decoded; `nextTick` is a clock in place of the page's: it
+   *   nextTick?: (tick: (now: number) => void) => void, ticked?: (now: number, isThere: boolean) => void,
+   *   waits?: (isWaiting: boolean) => void}} [options] `rate` 1 is the video's own speed; `waits` is called when it waits for frames of a
+   *   file that is still written, and when it goes on; `failed` is called if a frame later on cannot be decoded; `nextTick` is a clock in place of the page's: it
    *   calls `tick` at its next step, with ms; `ticked` is called at each step, with whether the frame that is due was there
    */
-  async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {}, nextTick, ticked } = {}) {
+  async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {}, nextTick, ticked, waits } = {}) {
     await this.#queue;
-    this.#playing = { show, ended, failed, nextTick, ticked, rate, loop };
+    this.#playing = { show, ended, failed, nextTick, ticked, waits, rate, loop };
     await this.#start();
   }
 
@@ -178,11 +201,48 @@ export class GeometryVideo {
   /** Free the video; the object is of no use afterwards. */
   close() {
     this.#isClosed = true;
+    this.#wake();
     this.#pictures.close();
     this.#beside?.then((pictures) => pictures.close()).catch(() => {});
     this.#asset?.close();
     this.#reader.close();
     this.#closeFile();
+  }
+
+  /** Look for frames that come, until the end is there: a few times per clip, and seldom while nothing comes. */
+  async #follow(file) {
+    const soonest = Math.min(Math.max(SOONEST, (1000 * file.live.clip) / this.fps / LOOKS_PER_CLIP), LATEST);
+    let [since, tries] = [performance.now(), 0];
+    while (this.isLive && !this.#isClosed) {
+      const wait = Math.min(Math.max(soonest, (performance.now() - since) / (2 * LOOKS_PER_CLIP)), IDLE);
+      await new Promise((resolve) => {
+        this.#wake = resolve;
+        setTimeout(resolve, wait);
+      });
+      if (this.#isClosed) return;
+      try {
+        if (await file.poll()) since = performance.now();
+        tries = 0;
+        if (!this.#isClosed) this.#grow(file);
+      } catch (error) {
+        tries++;
+        if (this.#isClosed) return;
+        if (error.kind === "load" && tries < TRIES) continue;
+        this.lost(error);
+        return;
+      }
+    }
+  }
+
+  #grow(file) {
+    const { live, size } = file;
+    if (live.frames === this.frameCount && !live.hasEnded) return;
+    this.#reader.grow(live.frames);
+    this.#repeated.grow(live.frames, live.hasEnded ? 0 : live.clip);
+    this.frameCount = live.frames;
+    this.byteLength = size;
+    this.#pictures.grow();
+    this.grown();
   }
 
   #takeLevel(reader, pictures, asset) {

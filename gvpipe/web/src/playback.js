@@ -27,7 +27,7 @@ export class Playback {
   #on;
   #nextTick;
   #wanted = null; // the frame that is to be sought next
-  #aim = 0; // the frame that was wanted last
+  #aim; // the frame that was wanted last
   #seeking = null; // promise
   #rate = 1;
   #loops = false;
@@ -36,7 +36,7 @@ export class Playback {
   #isChanging = false; // to the level that it wants
 
   /** The frame shown. */
-  currentFrame = 0;
+  currentFrame;
   paused = true;
   /** Whether it played to the end, and was not sought since. */
   ended = false;
@@ -52,6 +52,7 @@ export class Playback {
     this.#video = video;
     this.#on = on;
     this.#nextTick = nextTick;
+    this.currentFrame = this.#aim = video.startFrame ?? 0;
   }
 
   get duration() {
@@ -126,7 +127,7 @@ export class Playback {
     if (!this.paused || this.#isClosed) return;
     this.paused = false;
     this.#on.tell("play");
-    if (this.aim === this.#video.frameCount - 1) this.#request(0);
+    if (this.aim === this.#video.frameCount - 1 && !this.#video.isLive) this.#request(0);
     await (this.#seeking ?? this.#start());
   }
 
@@ -191,6 +192,7 @@ export class Playback {
       failed: (error) => this.#fail(error),
       nextTick: this.#nextTick,
       ticked: (now, isThere) => this.#chooseLevel(now, isThere),
+      waits: (isWaiting) => this.#on.tell(isWaiting ? "waiting" : "playing"),
     };
     try {
       await this.#video.play((positions, k) => this.#show(positions, k), on);

@@ -33,6 +33,8 @@ export interface PlayOptions {
   nextTick?: (tick: (now: number) => void) => void;
   /** Called at each step of the clock, with whether the frame that is due was there. */
   ticked?: (now: number, isThere: boolean) => void;
+  /** Called when it waits for frames of a file that is still written, and when it goes on. */
+  waits?: (isWaiting: boolean) => void;
 }
 
 /** A named mesh of the video: ranges `[start, stop]` of its vertices and triangles. */
@@ -130,8 +132,16 @@ export class GeometryVideo {
   readonly triangleCount: number;
   /** Bytes of the file. */
   readonly byteLength: number;
-  /** Seconds. */
+  /** Seconds; `Infinity` while the file is still written. */
   readonly duration: number;
+  /** Whether the file is still written: `frameCount` grows. */
+  readonly isLive: boolean;
+  /** The frame that is shown first: 0; of a file that is still written, that where its latest clip began. */
+  readonly startFrame: number;
+  /** Called when frames have come to a file that is still written, and when it is finished. */
+  grown: () => void;
+  /** Called when it cannot be followed any longer. */
+  lost: (error: Error) => void;
   /** Seconds that play without a wait for the file: `[start, end]` of each stretch. */
   readonly buffered: [number, number][];
   /** Bits per second. */

@@ -27,6 +27,12 @@ export interface GeometryVideoMeshEvents extends Object3DEventMap {
   seeking: {};
   seeked: {};
   timeupdate: {};
+  /** It waits for frames of a file that is still written. */
+  waiting: {};
+  /** Such frames have come. */
+  progress: {};
+  /** Such a file is finished. */
+  durationchange: {};
   ended: {};
   ratechange: {};
   /** A frame is shown. */

@@ -9,10 +9,12 @@ import {
   MP4_MAX_BOXES as MAX_BOXES,
   STREAM_LAYOUT_INDEX_UUID as INDEX_UUID,
   STREAM_LAYOUT_MAX_INDEX as MAX_INDEX,
+  STREAM_LAYOUT_ROOM_UUID as ROOM_UUID,
   STREAM_LAYOUT_VERSION as STREAM_VERSION,
 } from "../constants.js";
 import { crc32 } from "./checksum.js";
 import { AGAIN, GeometryVideoError } from "./errors.js";
+import { readUnfinished } from "./live_layout.js";
 import { readStream } from "./stream_layout.js";
 
 export { CONTAINER_VERSION };
@@ -25,12 +27,15 @@ const TAG = /gvpipe (\d{1,9}) ([0-9a-f]{32})/;
  * @property {Map<string, Uint8Array>} [sections] of the stream layout
  * @property {number} bytes of the file
  * @property {string} id the content id of the tag, "" if the file has none
+ * @property {Uint8Array[]} [clips] of a file that is not finished, by number @property {number} [frames] in them
  * @property {number} videoChecksum CRC-32 over the samples: gvpipe's files hold nothing else in their `mdat` boxes
  *
  * @param {Uint8Array} file a whole MP4 file
  * @returns {Container}
  */
 export function readContainer(file) {
+  const index = findIndex(file);
+  if (index?.isRoom) return { ...readUnfinished(file, index.end), bytes: file.length, id: "" };
   const boxes = listBoxes(file);
   const having = (uuid) => boxes.filter((box) => box.kind === "uuid" && uuid.every((byte, i) => file[box.start + i] === byte));
   const [payloads, indices] = [having(UUID), having(INDEX_UUID)];
@@ -43,8 +48,8 @@ export function readContainer(file) {
   const tag = readTag(file.subarray(moov.start, moov.end));
   if (tag && Number(tag[1]) > STREAM_VERSION) throw newerContainer(tag[1]);
   if (indices.length === 1 && boxes[2] === indices[0]) {
-    const index = { start: indices[0].start + INDEX_UUID.length, end: indices[0].end };
-    return { ...readStream(file, index), bytes: file.length, id: tag ? tag[2] : "" };
+    const box = { start: indices[0].start + INDEX_UUID.length, end: indices[0].end };
+    return { ...readStream(file, box), bytes: file.length, id: tag ? tag[2] : "" };
   }
   if (payloads.length === 0) {
     if (tag) throw new GeometryVideoError("stripped", `its geometry was stripped, as remuxing or re-encoding does; ${AGAIN}`);
@@ -65,9 +70,9 @@ export function readTag(moov) {
 }
 
 /**
- * The content of the index, of a file of which the start is here; null if it is not of the stream layout.
+ * The content of the index, or of the room for it, of a file of which the start is here; null if it is not of the stream layout.
  *
- * @param {Uint8Array} start of the file, not just of the index @returns {{start: number, end: number}|null}
+ * @param {Uint8Array} start of the file, not just of the index @returns {{start: number, end: number, isRoom: boolean}|null}
  */
 export function findIndex(start) {
   const view = new DataView(start.buffer, start.byteOffset, start.byteLength);
@@ -77,8 +82,10 @@ export function findIndex(start) {
     const size = view.getUint32(position);
     const kind = String.fromCharCode(...start.subarray(position + 4, position + 8));
     if (kind !== wanted || size < 8) return null;
-    if (kind === "uuid" && INDEX_UUID.every((byte, i) => start[position + 8 + i] === byte) && size <= MAX_INDEX) {
-      return { start: position + 8 + INDEX_UUID.length, end: position + size };
+    const isOf = (uuid) => uuid.every((byte, i) => start[position + 8 + i] === byte);
+    const isRoom = isOf(ROOM_UUID);
+    if (kind === "uuid" && (isRoom || isOf(INDEX_UUID)) && size <= MAX_INDEX) {
+      return { start: position + 8 + INDEX_UUID.length, end: position + size, isRoom };
     }
     position += size;
   }

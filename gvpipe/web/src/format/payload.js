@@ -15,6 +15,7 @@ import { Cursor } from "./cursor.js";
 import { AGAIN, GeometryVideoError, corrupt, quote } from "./errors.js";
 import { inflate } from "./inflate.js";
 
+const WITH_PICTURES = "mcgv";
 const LIMITS = { version: [1, 1 << 16], frames: [1, MAX_FRAMES], vertices: [1, MAX_VERTICES], triangles: [0, 1 << 29] };
 
 /** A geometry video's header and sections, and what reading them may cost. */
@@ -37,6 +38,8 @@ export class Payload {
 export async function readPayload(container) {
   const sections = container.sections ?? readPayloadSections(container.payload);
   const header = await readHeader(sections);
+  if (container.frames) setFrames(header, container.frames);
+  container.clips?.forEach((data, number) => sections.set(clipName(header, number), data));
   const { id, video_crc32: checksum } = header.container;
   if (container.id && container.id !== id) {
     throw new GeometryVideoError("corrupt", `its geometry belongs to another file; ${AGAIN}`);
@@ -89,7 +92,20 @@ function readSections(cursor, entries) {
   return sections;
 }
 
-async function readHeader(sections) {
+/** Of a file that is not finished. */
+function setFrames(header, frames) {
+  header.frames = frames;
+  checkInteger(header, "frames", ...LIMITS.frames);
+  if (header.codec === WITH_PICTURES) throw corrupt("header", "files of its codec do not grow");
+}
+
+/** The name of a clip's section, of a file that was written as frames came. @param {object} header @param {number} number */
+export function clipName({ container }, number) {
+  return `${container.live}.${number}`;
+}
+
+/** The header. @param {Map<string, Uint8Array>} sections @throws {GeometryVideoError} it is not as gvpipe writes it */
+export async function readHeader(sections) {
   const wrong = (what) => corrupt("header", what);
   if (!sections.has("header")) throw wrong("it is missing");
   const text = await inflate(sections.get("header"), MAX_HEADER, wrong);

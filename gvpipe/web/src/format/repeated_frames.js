@@ -20,6 +20,14 @@ export class RepeatedFrames {
     this.starts = starts;
     /** D, the number of distinct frames. */
     this.distinct = starts ? starts.length : frames;
+    /** Frames that come at once, of a file that is still written; 0: it is finished. */
+    this.clip = 0;
+  }
+
+  /** That a file in which no frame repeats another has so many frames by now. @param {number} frames @param {number} clip as above */
+  grow(frames, clip) {
+    this.frames = this.distinct = frames;
+    this.clip = clip;
   }
 
   /** Which distinct frame a frame shows, 0..D - 1. */

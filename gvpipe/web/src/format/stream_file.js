@@ -9,6 +9,8 @@ import { findIndex, readTag } from "./boxes.js";
 import { crc32 } from "./checksum.js";
 import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
 import { Incoming } from "./incoming.js";
+import { liveSize, placeClips, readLive, readRows, ROW_BYTES } from "./live_layout.js";
+import { clipName, readHeader } from "./payload.js";
 import { checkHead, readIndex } from "./stream_layout.js";
 
 const FIRST = 1 << 16; // bytes of the first request
@@ -16,6 +18,10 @@ const OF_SEGMENTS = /^(transforms|trajectories|basis|coefficients|anchors|deltas
 const OF_PICTURES = /^(transforms|trajectories)\./; // whose fragments need WebCodecs
 const OF_FIELDS = /^field\./;
 const PARTIAL = 206;
+const FIRST_LIVE = 1 << 17; // bytes of the second request, of a file that is still written
+const ROWS = 64; // of the table of clips, asked for at once
+const LOOK_AGAIN = 500; // ms between looks for a first clip
+const LOOKS = 120;
 
 export class StreamFile {
   /**
@@ -33,10 +39,23 @@ export class StreamFile {
     const rest = (data) => incoming?.whole() ?? fetchRest(url, data);
     const box = findIndex(start);
     if (!box) return rest(start);
+    if (box.isRoom) return StreamFile.#openLive(url, start.length, box.end, incoming);
     const file = new StreamFile(url, start.length, incoming);
     const more = Math.max(0, box.end - start.length);
     const data = more ? join(start, await file.#fetch(start.length, more)) : start;
     return (await file.#begin(data, box)) ? file : rest(data);
+  }
+
+  /** A file that is still written, once a clip is there. @param {number} place behind the room for the index */
+  static async #openLive(url, received, place, incoming) {
+    incoming?.close();
+    if (incoming) throw new GeometryVideoError("load", `${url} is still written, and its server knows no Range; try again when it is finished`);
+    const file = new StreamFile(url, received, null);
+    for (let i = 0; i < LOOKS; i++) {
+      if (await file.#beginLive(place)) return file;
+      await new Promise((resolve) => setTimeout(resolve, LOOK_AGAIN));
+    }
+    throw new GeometryVideoError("load", `${url} is still written, and nothing comes; try again`);
   }
 
   constructor(url, received, incoming) {
@@ -52,6 +71,8 @@ export class StreamFile {
     this.used = []; // numbers of segments that are here, the one asked for last at the end
     /** Bytes of segments that are kept, the latest at least. */
     this.mostKept = Infinity;
+    /** Of a file that is still written: `frames` so far, frames of a `clip`, whether it `hasEnded`; else null. */
+    this.live = null;
   }
 
   /** Fetch nothing more. */
@@ -76,7 +97,79 @@ export class StreamFile {
 
   /** What `readContainer` gives of a whole file. */
   get container() {
-    return { sections: this.sections, bytes: this.received, id: this.id };
+    return { sections: this.sections, bytes: this.received, id: this.id, frames: this.live?.frames };
+  }
+
+  /** Number of the segment that is shown first: of a file that is still written, the latest. */
+  get firstSegment() {
+    return this.live ? String(this.live.rows.length - 1) : "0";
+  }
+
+  /** The frame where that segment begins. */
+  get startFrame() {
+    return this.live ? this.live.frames - this.live.rows.at(-1).frames : 0;
+  }
+
+  /** Whether more may come. */
+  get isGrowing() {
+    return this.live !== null && !this.live.hasEnded;
+  }
+
+  /**
+   * Look whether clips have come to a file that is still written.
+   *
+   * @returns {Promise<boolean>} whether there are more, or the end is there
+   * @throws {GeometryVideoError} the table cannot be fetched, or is that of another file
+   */
+  async poll() {
+    const { table, tableEnd, rows } = this.live;
+    const start = table + ROW_BYTES * (rows.length - 1); // the last one that is known, by which the file is known again
+    const found = readRows(await this.#fetch(start, Math.min(ROW_BYTES * ROWS, tableEnd - start)));
+    const [same, before] = [found.rows[0], rows.at(-1)];
+    if (!same || ["length", "checksum", "frames"].some((field) => same[field] !== before[field])) {
+      throw new GeometryVideoError("corrupt", `${this.url} has another file by now; load the page again`);
+    }
+    this.#addClips(found.rows.slice(1));
+    this.live.hasEnded = found.hasEnded || start + ROW_BYTES >= tableEnd;
+    return this.live.hasEnded || found.rows.length > 1;
+  }
+
+  async #beginLive(place) {
+    this.live = { rows: [] }; // nothing of it comes from a cache
+    let data = await this.#fetch(place, FIRST_LIVE, true);
+    const fill = async (size) => {
+      if (size > data.length) data = join(data, await this.#fetch(place + data.length, size - data.length));
+    };
+    const size = liveSize(data);
+    await fill(size);
+    const { entries, first, table } = readLive(data.subarray(0, size), place);
+    const { rows, hasEnded } = readRows(data.subarray(table - place, size));
+    if (!rows.length) return false;
+    await fill(first - place);
+    this.head = null;
+    this.id = "";
+    this.fragments = [];
+    this.pictures = 0;
+    this.places = new Map(entries.map((entry) => [entry.name, entry]));
+    this.#take(entries.map(({ name }) => name), data, place);
+    this.header = await readHeader(this.sections);
+    this.live = { table, tableEnd: place + size, rows: [], frames: 0, clip: rows[0].frames, hasEnded };
+    this.size = first;
+    this.#addClips(rows);
+    return true;
+  }
+
+  /** Have the clips behind those that are known. */
+  #addClips(rows) {
+    const { live } = this;
+    for (const [i, place] of placeClips(rows, this.size).entries()) {
+      const [number, name] = [String(live.rows.length), clipName(this.header, live.rows.length)];
+      this.places.set(name, place);
+      this.segments.set(number, [name]);
+      live.rows.push(rows[i]);
+      live.frames += rows[i].frames;
+      this.size = place.offset + place.length;
+    }
   }
 
   async #begin(data, box) {
@@ -177,22 +270,24 @@ export class StreamFile {
     }
   }
 
-  async #fetch(offset, length) {
+  /** @param {boolean} [mayEnd] whether the file may end before */
+  async #fetch(offset, length, mayEnd = false) {
     if (offset + length <= this.start?.length) return this.start.subarray(offset, offset + length);
     const wanted = `bytes ${offset} to ${offset + length - 1} of ${this.url}`;
     let response;
     let data;
     if (this.incoming) return this.#await(offset, length, wanted);
     try {
-      response = await fetch(this.url, { headers: { Range: `bytes=${offset}-${offset + length - 1}` } });
+      const cache = this.live ? "no-store" : "default";
+      response = await fetch(this.url, { cache, headers: { Range: `bytes=${offset}-${offset + length - 1}` } });
       if (response.status === PARTIAL) data = new Uint8Array(await response.arrayBuffer());
       else await response.body?.cancel(); // 200: the whole file would come
     } catch (error) {
       throw new GeometryVideoError("load", `${wanted} cannot be fetched: ${error.message}; try again`);
     }
     if (!data) throw new GeometryVideoError("load", `${wanted} cannot be fetched: status ${response.status}; load the page again`);
-    checkLength(data, length, wanted);
-    this.received += length;
+    if (!mayEnd || data.length > length) checkLength(data, length, wanted);
+    this.received += data.length;
     return data;
   }
 

@@ -49,6 +49,12 @@ export class FrameHost {
     return positions;
   }
 
+  /** That the file has so many frames by now. */
+  grow(frames) {
+    const names = this.#payload.grow(frames);
+    this.#worker?.postMessage({ grown: { frames, names } });
+  }
+
   close() {
     this.#worker?.terminate();
     this.#jobs.clear();

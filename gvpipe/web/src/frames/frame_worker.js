@@ -11,7 +11,11 @@ export function serveFrames({ header, names, bytes, code, draco }) {
   const payload = new RemotePayload(header, names, bytes);
   const decoder = FrameDecoder.open(payload, code);
   decoder.catch(() => {}); // reported by what is asked
-  return async ({ number, method, given, ...answer }) => {
+  return async ({ number, method, given, grown, ...answer }) => {
+    if (grown) {
+      payload.grow(grown);
+      return;
+    }
     if (number === undefined) {
       payload.take(answer);
       return;

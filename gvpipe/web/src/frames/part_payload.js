@@ -18,7 +18,15 @@ export class PartPayload {
     this.sections = new Set(file.names);
     this.#file = file;
     file.mostKept = KEPT_BYTES;
-    file.loadSegment("0").catch(() => {}); // while the mesh is decoded; what goes wrong is told when it is asked for
+    file.loadSegment(file.firstSegment).catch(() => {}); // while the mesh is decoded; what goes wrong is told when it is asked for
+  }
+
+  /** That the file has so many frames by now. @returns {string[]} names of the sections that have come */
+  grow(frames) {
+    this.header.frames = frames;
+    const names = this.#file.names.filter((name) => !this.sections.has(name));
+    for (const name of names) this.sections.add(name);
+    return names;
   }
 
   /** @returns {Promise<Uint8Array>} */

@@ -23,6 +23,12 @@ export class RemotePayload {
     });
   }
 
+  /** That the file has grown. @param {{frames: number, names: string[]}} grown frames by now, names of the sections that have come */
+  grow({ frames, names }) {
+    this.header.frames = frames;
+    for (const name of names) this.sections.add(name);
+  }
+
   /** What the page answered. */
   take({ wanted, data, bytes, error }) {
     if (bytes) this.budget.grow(bytes);

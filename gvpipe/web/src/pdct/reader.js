@@ -9,7 +9,7 @@ import { previousEqual } from "../format/points.js";
 import { Recent } from "../format/recent.js";
 import { decodePoints } from "../format/welded_mesh.js";
 import { Clip } from "./clip.js";
-import { VERSION, readHeader } from "./header.js";
+import { VERSION, VERSION_POINTS, readHeader } from "./header.js";
 import { SECTION as STILL, decodeStill } from "./still_points.js";
 
 export { VERSION };
@@ -34,7 +34,7 @@ export class PdctReader {
   static async open(payload, kernels) {
     const header = readHeader(payload.header);
     const sections = [await payload.section("mesh"), await payload.section("order")];
-    const read = payload.header.version < VERSION ? readVertices : readPoints;
+    const read = payload.header.version === VERSION_POINTS ? readPoints : readVertices;
     const mesh = await read(kernels, ...sections, payload.header);
     checkCounts(payload.header, mesh.point.length, mesh.faces);
     const still = payload.sections.has(STILL) ? await payload.section(STILL) : null;
@@ -62,7 +62,7 @@ export class PdctReader {
     return this.#mesh.faces;
   }
 
-  /** `Int32Array` (V): the point of each vertex; before version 2, that of the base frame. */
+  /** `Int32Array` (V): the point of each vertex; of versions 1 and 3, that of the base frame. */
   get points() {
     return this.#mesh.point;
   }
@@ -74,7 +74,9 @@ export class PdctReader {
 
   /** First frame of clip c; F for the one after the last. */
   segmentStart(c) {
-    return Math.floor((c * this.#payload.header.frames) / this.#header.clips);
+    const { frames } = this.#payload.header;
+    const { clip, clips } = this.#header;
+    return clip ? Math.min(c * clip, frames) : Math.floor((c * frames) / clips);
   }
 
   /**
@@ -87,7 +89,7 @@ export class PdctReader {
     const size = 3 * this.#mesh.point.length;
     const frames = new Float32Array(size * (stop - start));
     const own = new Float32Array(this.#surface.base.length); // of the points
-    for (let c = 0; c < this.#header.clips; c++) {
+    for (let c = 0; this.segmentStart(c) < stop; c++) {
       const [begin, end] = [this.segmentStart(c), this.segmentStart(c + 1)];
       for (let k = Math.max(start, begin); k < Math.min(stop, end); k++) {
         if (this.#surface.traversal.length) own.set((await this.#clips.get(c)).frame(k - begin));
@@ -120,7 +122,7 @@ export class PdctReader {
   }
 }
 
-/** Files of version 1: every vertex is a point. */
+/** Files of versions 1 and 3: every vertex is a point. */
 async function readVertices(kernels, mesh, order, header) {
   const { points: lattice, faces, visits } = await decodeBase(kernels, mesh, order, header);
   const traversal = new Int32Array(visits.length); // the codec's order

@@ -59,6 +59,7 @@ export class Bar {
     this.slider.max = video.frameCount - 1;
     const bits = (8 * video.byteLength) / (video.vertexCount * video.frameCount);
     this.facts.textContent = [
+      ...(video.isLive ? ["live"] : []),
       `${video.vertexCount.toLocaleString("en")} vertices`,
       `${video.triangleCount.toLocaleString("en")} triangles`,
       `${video.frameCount} frames at ${Number(video.fps.toPrecision(4))} fps`,

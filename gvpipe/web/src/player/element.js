@@ -34,7 +34,7 @@ const MARKUP = `<style>${style}</style>
 const TURN = Math.PI / 18; // by one press of a key
 const ZOOM = 1.15;
 const READY = { nothing: 0, metadata: 1, enough: 4 }; // `readyState`, as in HTMLMediaElement
-const MEDIA_EVENTS = ["play", "playing", "pause", "seeking", "seeked", "timeupdate", "ended", "ratechange"];
+const MEDIA_EVENTS = ["play", "playing", "pause", "seeking", "seeked", "timeupdate", "waiting", "ended", "ratechange"];
 
 export class GeometryVideoElement extends HTMLElement {
   static observedAttributes = ["src", "loop", "wireframe", "follow", "speed", "field", "colormap", "range", "lod"];
@@ -195,7 +195,7 @@ export class GeometryVideoElement extends HTMLElement {
   }
 
   get seekable() {
-    return new TimeRanges(this.video ? [[0, this.duration]] : []);
+    return new TimeRanges(this.video ? [[0, this.video.frameCount / this.video.fps]] : []);
   }
 
   /** "auto", or the number of a level of detail; 0 is the whole mesh. */
@@ -276,8 +276,8 @@ export class GeometryVideoElement extends HTMLElement {
     if (loading !== this.#loading) return undefined;
     this.#bar.setEnabled(true);
     this.#setReady(READY.metadata, "durationchange", "loadedmetadata");
-    this.#bar.setFrame(0);
-    this.#tell("frame", 0);
+    this.#bar.setFrame(this.currentFrame);
+    this.#tell("frame", this.currentFrame);
     this.#setReady(READY.enough, "loadeddata", "progress", "canplay", "canplaythrough", "ready");
     if (loading !== this.#loading) return undefined; // a listener has loaded another
     if (this.#startTime) this.#mesh.currentTime = this.#startTime;
@@ -304,6 +304,13 @@ export class GeometryVideoElement extends HTMLElement {
       if (level === 0) this.#showField();
       this.#tell("levelchange", level);
     });
+    for (const name of ["progress", "durationchange"]) {
+      mesh.addEventListener(name, () => {
+        this.#bar.setVideo(this.video);
+        this.#bar.setFrame(mesh.currentFrame);
+        this.#tell(name);
+      });
+    }
     mesh.addEventListener("error", ({ error }) => this.#fail(error));
     this.#bar.setVideo(this.video);
     this.#bar.setNotes(mesh.notes);

@@ -45,7 +45,7 @@ export class GeometryVideoMesh extends Mesh {
    * @returns {Promise<GeometryVideoMesh>}
    */
   static async create(video, { centre = [0, 0, 0], scale = 1, gloss = true, anisotropy = 1, environment = () => null, ownClock = false } = {}) {
-    const positions = await video.frame(0);
+    const positions = await video.frame(video.startFrame);
     const textures = await openTextures(video, anisotropy);
     return new GeometryVideoMesh(video, positions, textures, { centre, scale, gloss, anisotropy, environment, ownClock });
   }
@@ -89,6 +89,8 @@ export class GeometryVideoMesh extends Mesh {
       tell: (type) => this.dispatchEvent({ type }),
       fail: (error) => this.dispatchEvent({ type: "error", error }),
     };
+    video.grown = () => this.dispatchEvent({ type: video.isLive ? "progress" : "durationchange" });
+    video.lost = on.fail;
     this.#playback = new Playback(video, on, view.ownClock ? undefined : (tick) => (this.#tick = tick));
   }
 
