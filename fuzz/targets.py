@@ -54,7 +54,8 @@ def load_targets(options: Options) -> list[Target]:
         return options.loader(options)
     from fuzz.browser import browser_targets
     from fuzz.mesh_files import mesh_targets
-    from fuzz.seeds import load_seeds
+    from fuzz.seeds import TESTS, load_seeds
+    from fuzz.shards import shard_seeds, shard_target
     from fuzz.streams import stream_target
     from fuzz.videos import video_targets
 
@@ -63,8 +64,9 @@ def load_targets(options: Options) -> list[Target]:
 
         refuse_bad_indices()
     videos, streams, meshes = load_seeds(Path(options.seeds), Path(options.more) if options.more else None)
+    shards = shard_seeds([TESTS / "golden" / f"{name}.mp4" for name in ("pca-1-kalman", "pca-2-still", "pdct-1")])
     kinds = {
-        "video": [*video_targets(videos), stream_target(streams)],
+        "video": [*video_targets(videos), stream_target(streams), shard_target(shards)],
         "mesh": mesh_targets(meshes),
         "web": browser_targets(videos, streams),
     }
