@@ -55,7 +55,8 @@ def load_targets(options: Options) -> list[Target]:
     from fuzz.browser import browser_targets
     from fuzz.live import live_target
     from fuzz.mesh_files import mesh_targets
-    from fuzz.seeds import load_live, load_seeds
+    from fuzz.seeds import TESTS, load_live, load_seeds
+    from fuzz.shards import shard_seeds, shard_target
     from fuzz.streams import stream_target
     from fuzz.videos import video_targets
 
@@ -65,8 +66,9 @@ def load_targets(options: Options) -> list[Target]:
         refuse_bad_indices()
     videos, streams, meshes = load_seeds(Path(options.seeds), Path(options.more) if options.more else None)
     growing = load_live(Path(options.seeds))
+    shards = shard_seeds([TESTS / "golden" / f"{name}.mp4" for name in ("pca-1-kalman", "pca-2-still", "pdct-1")])
     kinds = {
-        "video": [*video_targets(videos), stream_target(streams), live_target(growing)],
+        "video": [*video_targets(videos), stream_target(streams), live_target(growing), shard_target(shards)],
         "mesh": mesh_targets(meshes),
         "web": browser_targets(videos, streams, growing),
     }

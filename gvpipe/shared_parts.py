@@ -14,6 +14,7 @@ from typing import Any, TypeVar, cast
 from gvpipe.forks import renew_after_fork
 
 MOST = 32  # parts
+MOST_BYTES = 1 << 18  # of all that they follow from: parts of large meshes take hundreds of times as much
 Part = TypeVar("Part")
 
 
@@ -21,7 +22,7 @@ class SharedParts:
     """The last parts that were made; thread-safe, goes on in a forked process, pickles empty.
 
     Args:
-        most: how many are kept.
+        most: how many are kept, at most; fewer of large meshes (`MOST_BYTES`), but always the last.
 
     Examples:
         >>> shared = SharedParts()
@@ -33,7 +34,7 @@ class SharedParts:
 
     def __init__(self, most: int = MOST) -> None:
         self._most = most
-        self._parts: OrderedDict[tuple[str, bytes], Any] = OrderedDict()
+        self._parts: OrderedDict[tuple[str, bytes], tuple[Any, int]] = OrderedDict()  # each with the bytes that it follows from
         self._lock = threading.Lock()
         renew_after_fork(self)
 
@@ -46,13 +47,16 @@ class SharedParts:
         with self._lock:
             if key in self._parts:
                 self._parts.move_to_end(key)
-                return cast("Part", self._parts[key])
+                return cast("Part", self._parts[key][0])
         part = make()  # two threads may make the same
         with self._lock:
-            self._parts[key] = part
-            while len(self._parts) > self._most:
+            self._parts[key] = part, sum(map(len, sources))
+            while len(self._parts) > 1 and (len(self._parts) > self._most or self._n_bytes() > MOST_BYTES):
                 self._parts.popitem(last=False)
         return part
+
+    def _n_bytes(self) -> int:
+        return sum(n_bytes for _, n_bytes in self._parts.values())
 
     def after_fork(self) -> None:
         """Go on in a forked child (`gvpipe.forks`), with nothing that another thread was changing."""

@@ -25,6 +25,7 @@ from fuzz.parts import Seed
 from fuzz.reduction import reduce_parts
 from fuzz.seeds import load_live
 from fuzz.session import Session
+from fuzz.shards import shard_seeds, shard_target
 from fuzz.streams import split_stream, stream_target
 from fuzz.targets import Options
 from fuzz.videos import FILE, VIDEO, join_video, split_video, video_targets
@@ -62,6 +63,18 @@ def test_a_file_that_grows_put_together_is_the_same(tmp_path: Path) -> None:
     assert split_live(again.read_bytes()) == seed.parts
     assert np.array_equal(gvpipe.open(again)[:], gvpipe.open(tmp_path / "live" / f"{seed.name}.mp4")[:])
     verdicts = [judge(target, write_files(target.join(target.case(1, k)[1]), tmp_path / "case"), 10**4) for k in range(1, 40)]
+    assert {verdict.kind for verdict in verdicts} == {ACCEPTED, REFUSED}, verdicts
+
+
+def test_a_shard_put_together_is_read(tmp_path: Path) -> None:
+    (seed,) = shard_seeds([GOLDEN / "pca-2-still.mp4"])
+    target = shard_target((seed,))
+    again = gvpipe.datasets.open(write_files(target.join(seed.parts), tmp_path / "case"))
+    assert (
+        np.array_equal(again.read("a"), gvpipe.open(GOLDEN / "pca-2-still.mp4")[:])
+        and again.description(0)["max_diag"] == 0.001
+    )
+    verdicts = [judge(target, write_files(target.join(target.case(1, k)[1]), tmp_path / "case"), 10**4) for k in range(1, 30)]
     assert {verdict.kind for verdict in verdicts} == {ACCEPTED, REFUSED}, verdicts
 
 

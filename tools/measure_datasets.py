@@ -53,7 +53,7 @@ LEVELS = (2, 5, 100)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
     for name in ("sizes", "rates", "tables"):
         command = commands.add_parser(name)

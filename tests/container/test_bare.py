@@ -73,6 +73,11 @@ def test_restream_gives_it_a_poster(files: tuple[Path, Path], tmp_path: Path) ->
     np.testing.assert_array_equal(gvpipe.open(tmp_path / "a.mp4")[:], gvpipe.open(files[1])[:])
 
 
+def test_a_page_holds_the_plain_layout(files: tuple[Path, Path], tmp_path: Path) -> None:
+    report = gvpipe.export_html(files[1], tmp_path / "a.html")
+    assert abs(report.video_bytes - files[0].stat().st_size) < 100  # the poster is of decoded positions
+
+
 def test_every_damage_is_noticed(files: tuple[Path, Path], tmp_path: Path) -> None:
     data, path = files[1].read_bytes(), tmp_path / "a.mp4"
     for size in [*range(70), *range(70, len(data), 61), len(data) - 1]:

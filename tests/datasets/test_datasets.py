@@ -67,6 +67,7 @@ def test_equal_folders_make_equal_shards(folder: Path, shards: Path, tmp_path: P
     assert [len(datasets.open(path)) for path in sorted(tmp_path.glob("b-*.tar"))] == [1, 1, 1]
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
 @pytest.mark.filterwarnings("ignore::ResourceWarning")  # it leaves files to the garbage collector
 def test_webdataset_reads_them(shards: Path) -> None:
     webdataset = pytest.importorskip("webdataset")

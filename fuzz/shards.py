@@ -1,0 +1,117 @@
+"""Shards of data sets: headers of tar members, and a bare geometry video inside, changed and put together again.
+
+A member's checksum is made anew after each change of its header, and so are those of the video.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import tarfile
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fuzz.mutation import mutate_bytes, mutate_json
+from fuzz.parts import BrokenPromise, Parts, Seed, Target
+from fuzz.results import check_faces, check_positions
+from gvpipe import datasets
+from gvpipe.container.bare import DICTIONARY, NO_TRACKS, RAW, START
+from gvpipe.container.bitstream import CHECKSUM, HEADER
+from gvpipe.container.boxes import uuid_head
+from gvpipe.container.cursor import Cursor, pack_block
+from gvpipe.container.mp4 import BOX_UUID, file_bytes, read_file
+from gvpipe.errors import FormatError, InputError
+
+FILE = "a.tar"
+BLOCK = tarfile.BLOCKSIZE
+CHECKSUM_AT = slice(148, 156)
+VIDEO_HEAD, TEXT_HEAD, TEXT, END = "(tar video)", "(tar text)", "(text)", "(end)"
+OWN = (VIDEO_HEAD, TEXT_HEAD, TEXT, END)
+
+
+def split_shard(video: bytes, description: bytes) -> Parts:
+    """A shard of one sample in parts: tar headers, the header of a bare video as JSON, its sections, the description."""
+    cursor = Cursor(video[len(NO_TRACKS) + len(uuid_head(BOX_UUID, 0)) + len(START) : -CHECKSUM.size], HEADER)
+    header = zlib.decompressobj(RAW, zdict=DICTIONARY).decompress(cursor.block())
+    sections = {name: cursor.take(length) for name, length in json.loads(header)["sections"].items()}
+    heads = {name: _head(name, len(data)) for name, data in (("a.mp4", video), ("a.json", description))}
+    return {
+        VIDEO_HEAD: heads["a.mp4"],
+        HEADER: header,
+        **sections,
+        TEXT_HEAD: heads["a.json"],
+        TEXT: description,
+        END: bytes(BLOCK),
+    }
+
+
+def join_shard(parts: Parts) -> dict[str, bytes]:
+    """The shard of some parts."""
+    deflater = zlib.compressobj(9, zlib.DEFLATED, RAW, zdict=DICTIONARY)
+    header = pack_block(deflater.compress(parts[HEADER]) + deflater.flush())
+    payload = b"".join([START, header, *(data for name, data in parts.items() if name not in (*OWN, HEADER))])
+    payload += CHECKSUM.pack(zlib.crc32(payload))
+    video = NO_TRACKS + uuid_head(BOX_UUID, len(payload)) + payload
+    content = [_checked(parts[VIDEO_HEAD]), _filled(video), _checked(parts[TEXT_HEAD]), _filled(parts[TEXT]), parts[END]]
+    return {FILE: b"".join(content)}
+
+
+def shard_seeds(paths: list[Path]) -> tuple[Seed, ...]:
+    """Shards of geometry videos whose codecs have no pictures."""
+    seeds = []
+    for path in paths:
+        video = file_bytes(replace(read_file(path), video=b"", is_bare=True))
+        seeds.append(Seed(path.stem, split_shard(video, b'{"codec":"pca","label":[1,"walk"],"max_diag":0.001}')))
+    return tuple(seeds)
+
+
+def shard_target(seeds: tuple[Seed, ...]) -> Target:
+    """The reader of shards."""
+    return Target("shard", seeds, _mutate, join_shard, parse_shard, (FormatError, InputError))
+
+
+def parse_shard(path: Path) -> None:
+    """Open a shard and read every sample in it.
+
+    Raises:
+        FormatError: it is refused.
+        BrokenPromise: what was read cannot be.
+    """
+    dataset = datasets.open(path)
+    for key in dataset.keys:
+        if not isinstance(dataset.description(key), dict):
+            raise BrokenPromise("a description is no object")
+        bitstream = dataset.bitstream(key)
+        check_positions(dataset.read(key, slice(0, 2)), (min(2, bitstream.n_frames), bitstream.n_vertices, 3))
+        check_faces(dataset.faces(key), bitstream.n_vertices)
+
+
+def _mutate(parts: Parts, rng: np.random.Generator, seeds: tuple[Seed, ...]) -> Parts:
+    """Change parts, tar headers and the JSON most."""
+    for _ in range(1 + int(rng.geometric(0.5))):
+        names = [VIDEO_HEAD, TEXT_HEAD, HEADER, TEXT, *parts]
+        name = names[int(rng.integers(len(names)))]
+        parts[name] = (mutate_json if name in (HEADER, TEXT) else mutate_bytes)(parts[name], rng)
+    return parts
+
+
+def _head(name: str, size: int) -> bytes:
+    member = tarfile.TarInfo(name)
+    member.size = size
+    return member.tobuf(tarfile.USTAR_FORMAT)
+
+
+def _checked(head: bytes) -> bytes:
+    """A member's header with the checksum that it should have, in one or more whole blocks."""
+    filled = bytearray(_filled(head))
+    if len(filled) >= BLOCK:
+        filled[CHECKSUM_AT] = b" " * 8
+        filled[CHECKSUM_AT] = struct.pack("8s", f"{sum(filled[:BLOCK]):06o}\0 ".encode())
+    return bytes(filled)
+
+
+def _filled(data: bytes) -> bytes:
+    return data + bytes(-len(data) % BLOCK)
