@@ -7,7 +7,8 @@ import json
 import os
 import pickle
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,9 +27,6 @@ from gvpipe.tasks.executor import Executor, Outcome, WorkerDied
 
 STAGE = "sequences"
 
-Told = Callable[[Entry, Done], None]
-"""Called when a sequence ends."""
-
 
 @dataclass(frozen=True)
 class BatchReport:
@@ -43,6 +41,7 @@ class BatchReport:
         bytes: of all files.
         seconds: of the run.
         manifest: its path.
+        notes: what a user should know, and of how many sequences that are new.
     """
 
     sequences: int
@@ -53,17 +52,7 @@ class BatchReport:
     bytes: int
     seconds: float
     manifest: str
-
-    def with_entry(self, entry: Entry, is_new: bool) -> BatchReport:
-        """The report with one more sequence."""
-        is_made = entry.error is None
-        return dataclasses.replace(
-            self,
-            encoded=self.encoded + (is_made and is_new),
-            skipped=self.skipped + (is_made and not is_new),
-            failed=self.failed if entry.error is None else [*self.failed, {"input": entry.input, "error": entry.error}],
-            bytes=self.bytes + entry.bytes,
-        )
+    notes: dict[str, int]
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values."""
@@ -75,7 +64,6 @@ def encode_all(
     folder: StrPath,
     codec: str | Codec | Sequence[Codec] | None = None,
     progress: Progress | None = None,
-    told: Told | None = None,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -91,7 +79,6 @@ def encode_all(
         folder: of the outputs, which keep the inputs' folders; it is made if it is missing.
         codec: as for `gvpipe.encode`.
         progress: called with the part of the sequences that has ended.
-        told: called when a sequence ends.
         workers: processes of this machine, one sequence each; None: one for each core.
         scheduler: address of a Dask scheduler whose workers encode them instead; they see the same files (extra ``cluster``).
         options: other keywords of `gvpipe.encode`, and settings of the codec, the same for all.
@@ -114,14 +101,26 @@ def encode_all(
     with open_manifest(place, settings) as manifest, open_executor(scheduler, count) as executor:
         assert executor is not None  # a count of workers or a scheduler is given
         ended = _encode(executor, found.jobs, manifest, keywords, settings)
-        report = BatchReport(len(found.jobs), 0, 0, [], len(found.left_out), 0, 0.0, str(manifest.path))
+        counts, notes, failed = Counter[str](), Counter[str](), []
         for number, (entry, done) in enumerate(ended, 1):
-            report = report.with_entry(entry, done.is_new)
-            if told:
-                told(entry, done)
+            notes.update(done.notes)
+            if entry.error is not None:
+                failed.append({"input": entry.input, "error": entry.error})
+            else:
+                counts.update({"encoded" if done.is_new else "skipped": 1, "bytes": entry.bytes})
             if progress:
                 progress(STAGE, number / len(found.jobs))
-    return dataclasses.replace(report, seconds=time.perf_counter() - started)
+    return BatchReport(
+        sequences=len(found.jobs),
+        encoded=counts["encoded"],
+        skipped=counts["skipped"],
+        failed=failed,
+        left_out=len(found.left_out),
+        bytes=counts["bytes"],
+        seconds=time.perf_counter() - started,
+        manifest=str(manifest.path),
+        notes=dict(notes),
+    )
 
 
 def settings_json(keywords: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from gvpipe.cli.console import Output, output_options
 from gvpipe.cli.encode_options import encode_options, parse_encoding
-
-if TYPE_CHECKING:
-    from gvpipe.batch.encoding import Done
-    from gvpipe.batch.manifest import Entry
 
 
 @click.command("encode-all")
@@ -34,14 +30,10 @@ def encode_all(
 
     asked = parse_encoding(options)
 
-    def tell(entry: Entry, done: Done) -> None:
-        for note in done.notes:
-            out.note(f"{entry.input}: {note}")
-
     with out.progress() as progress:
-        report = encode_all(
-            sources, folder, asked.codec, progress, tell, workers=workers, scheduler=scheduler, **asked.keywords
-        )
+        report = encode_all(sources, folder, asked.codec, progress, workers=workers, scheduler=scheduler, **asked.keywords)
+    for note, count in report.notes.items():
+        out.note(f"{note} ({count} of {report.sequences} sequences)")
     if report.left_out:
         out.note(f"{report.left_out} files are of no format that gvpipe reads, and were left out")
     out.json(report.to_json())

@@ -62,7 +62,7 @@ class Cluster:
         finally:
             self._client.cancel([*numbers, held])
             with contextlib.suppress(Exception):  # the cluster may have gone
-                self._client.run(_forget)
+                self._client.run(_forget, on_error="ignore")
 
     def _outcome(self, index: int, future: Any) -> Outcome:
         """What became of a task; raises `InputError` if the scheduler has gone."""

@@ -67,9 +67,11 @@ def lines(folder: Path) -> list[dict[str, Any]]:
 @pytest.mark.usefixtures("here")
 def test_failures_stop_nothing_and_the_rest_is_resumed(inputs: Path, tmp_path: Path) -> None:
     gvpipe.write(waving(4, 5), inputs / "deadly.npz")
+    gvpipe.write(waving(4, 3), inputs / "frames" / "%02d.obj")
     out = tmp_path / "out"
     first = encode_all("in", "out", "pca", quality=50)
-    assert (first.sequences, first.encoded, first.skipped) == (4, 2, 0)
+    assert (first.sequences, first.encoded, first.skipped) == (5, 3, 0)
+    assert [("30 frames per second" in note, count) for note, count in first.notes.items()] == [(True, 1)]
     assert {Path(each["input"]).name: each["error"] for each in first.failed} == {
         "bad.npz": "in/bad.npz is not an .npz archive, or is cut short; write it again with numpy.savez",
         "deadly.npz": "its process was ended; give it more memory (fewer --workers), or fewer frames (--frames)",
@@ -93,7 +95,7 @@ def test_failures_stop_nothing_and_the_rest_is_resumed(inputs: Path, tmp_path: P
     before = (out / "more" / "b.mp4").stat().st_mtime_ns
     (inputs / "deadly.npz").unlink()
     again = encode_all("in", "out", "pca", quality=50)
-    assert (again.encoded, again.skipped, again.failed) == (2, 1, [])
+    assert (again.encoded, again.skipped, again.failed, again.notes) == (2, 2, [], {})
     assert gvpipe.info(out / "a.mp4").frames == 6 and (out / "more" / "b.mp4").stat().st_mtime_ns == before
     (out / "bad.mp4").unlink()
     assert encode_all("in", "out", "pca", quality=50).encoded == 1 and (out / "bad.mp4").exists()

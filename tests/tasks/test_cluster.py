@@ -17,6 +17,8 @@ from gvpipe.batch.runs import encode_all
 from gvpipe.errors import InputError
 from gvpipe.tasks import cluster
 
+pytestmark = pytest.mark.filterwarnings("ignore")  # Dask's own
+
 
 def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
@@ -24,7 +26,6 @@ def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
         pass
 
 
-@pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "127.0.0.1", "foo://127.0.0.1:1", ""])
 def test_no_scheduler(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
@@ -65,8 +66,29 @@ def test_tasks_refuse_another_version() -> None:
         cluster._do("0.0.9", lambda data: lambda task: task, b"", 1)
 
 
+class FakeFuture:
+    """A task that ended so."""
+
+    def __init__(self, status: str, error: Exception | None = None) -> None:
+        self.status, self._error = status, error
+
+    def exception(self) -> Exception | None:
+        return self._error
+
+
+def test_clusters_that_break() -> None:
+    """The scheduler goes away; a worker that came late has no gvpipe; a task fails."""
+    pytest.importorskip("distributed")
+    broken = cluster.Cluster(None, "tcp://s:1")
+    with pytest.raises(InputError, match="the scheduler at tcp://s:1 has gone"):
+        broken._outcome(0, FakeFuture("cancelled"))
+    with pytest.raises(InputError, match="a worker of tcp://s:1 lacks gvpipe"):
+        broken._outcome(0, FakeFuture("error", ModuleNotFoundError("No module named 'gvpipe'", name="gvpipe")))
+    error = InputError("no such file")
+    assert broken._outcome(3, FakeFuture("error", error)).error is error
+
+
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
 def test_same_bytes_while_workers_are_killed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     distributed = pytest.importorskip("distributed")
