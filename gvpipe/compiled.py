@@ -28,7 +28,7 @@ EVERY_TIME = "compiling kernels in every run, since no folder takes machine code
 OPTIONS = {
     "nogil": True,
     "no_cfunc_wrapper": True,
-}  # nothing calls kernels by C pointers, whose wrappers take a sixth of compiling
+}  # nothing calls kernels by C pointers, and their wrappers take a tenth of compiling
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
