@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import socket
 import threading
 import warnings
 from collections.abc import Iterator, Sequence
@@ -96,6 +97,7 @@ def connect(address: str) -> Iterator[Cluster]:
         raise InputError(EXTRA) from exc
     with _quiet(), dask.config.set(CONFIG):
         try:
+            _knock(address)  # a Client that cannot connect leaves threads that may lock up the next one
             client = Client(address, timeout=TIMEOUT, set_as_default=False)
         except Exception as exc:  # it depends on the address what is raised
             said = "nothing answers there" if isinstance(exc, OSError) else " ".join(str(exc).split())
@@ -103,6 +105,14 @@ def connect(address: str) -> Iterator[Cluster]:
         with client:
             _check_workers(client, address)
             yield Cluster(client, address)
+
+
+def _knock(address: str) -> None:
+    """Raise ValueError for what is no address, OSError where no port is open."""
+    from distributed.comm.addressing import get_address_host_port
+
+    host, port = get_address_host_port(address)
+    socket.create_connection((host, port), TIMEOUT).close()
 
 
 def _check_workers(client: Any, address: str) -> None:
