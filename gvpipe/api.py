@@ -18,7 +18,7 @@ from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.budget import Budget
 from gvpipe.codec import Codec, Encoded, Progress
-from gvpipe.container.bitstream import BARE, PLAIN, STREAM, Bitstream
+from gvpipe.container.bitstream import BARE, LIVE, PLAIN, STREAM, Bitstream
 from gvpipe.container.mp4 import bytes_by_part, read_file, write_file
 from gvpipe.container.sources import check_target, check_video_target, is_url
 from gvpipe.errors import InputError, OverBudget, SettingError, in_file
@@ -299,7 +299,7 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
     Args:
         source: a geometry video, or its address.
         path: of the file to write.
-        layout: ``"stream"`` or ``"plain"``; None: ``"plain"`` unless the source has it.
+        layout: ``"stream"`` or ``"plain"``; None: ``"stream"`` for plain and unfinished files, ``"plain"`` for others.
         unlimited: as for `open`.
 
     Raises:
@@ -311,16 +311,13 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
         raise InputError(f"layout is {layout!r}; {PLAIN} or {STREAM} is needed")
     check_video_target(path, "gvpipe.restream's path")
     bitstream = read_file(check_path(source, "the geometry video"), unlimited)
-    if bitstream.is_unfinished:
-        bitstream = dataclasses.replace(bitstream, video=poster_of(Player(source, unlimited=unlimited).sequence()))
+    chosen = layout or (STREAM if bitstream.layout in (PLAIN, LIVE) else PLAIN)
+    if bitstream.layout in (BARE, LIVE):  # which have no poster, or none that is read
+        video = bitstream.video or poster_of(Player(source, unlimited=unlimited).sequence())
+        bitstream = dataclasses.replace(bitstream, video=video, is_bare=False)
     with in_file(os.fspath(source)):
-        chosen = layout or (STREAM if bitstream.layout == PLAIN else PLAIN)
-        n_bytes = bitstream.n_bytes
-        if bitstream.layout == BARE:
-            video = bitstream.video or poster_of(Player(source, unlimited=unlimited).sequence())
-            bitstream = dataclasses.replace(bitstream, video=video, is_bare=False)
         size = write_file(bitstream, path, parts=segment_parts(bitstream) if chosen == STREAM else None)
-    return Restreamed(chosen, n_bytes, size)
+    return Restreamed(chosen, bitstream.n_bytes, size)
 
 
 def open(path: StrPath, *, unlimited: bool = False) -> Player:

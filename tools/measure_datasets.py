@@ -1,7 +1,7 @@
 """Measure data sets of short sequences: where the bytes of a file go, and how many sequences a second a shard gives.
 
-    python tools/measure_datasets.py sizes ../shared/data/*.npz --json docs/benchmarks/short_sequences.json
-    python tools/measure_datasets.py rates --json docs/benchmarks/shard_rates.json
+    python tools/measure_datasets.py sizes ../shared/data/*.npz --json docs/benchmarks/datasets/short_sequences.json
+    python tools/measure_datasets.py rates --json docs/benchmarks/datasets/shard_rates.json
     python tools/measure_datasets.py tables docs/benchmarks
 
 Sizes: each sequence is cut to 16 frames and encoded by codec ``auto`` in the bare layout, then changed to the plain one.

@@ -37,6 +37,7 @@ SHARED = {
     "gvpipe.connectivity.vertex_order": "REACH MAX_VERTICES",
     "gvpipe.connectivity.visit_symbols": "N_SYMBOLS",
     "gvpipe.connectivity.welded_mesh": "ADAPTIVE_MESH ADAPTIVE_ORDER",
+    "gvpipe.container.bare": "VERSION",
     "gvpipe.container.bitstream": "MAGIC VERSION MAX_SECTIONS MAX_NAME MAX_HEADER MAX_FRAMES MAX_VERTICES",
     "gvpipe.container.mp4": "BOX_UUID MAX_BOXES",
     "gvpipe.container.segments": "TINY HUGE SMALLEST_STEP LARGEST_STEP MAX_SEGMENT",

@@ -60,6 +60,8 @@ DICTIONARY = (
 def pack_bare(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
     """Return the payload of everything but the video; ``extra`` is the container's own part of the header."""
     values = header_values(bitstream, extra)
+    if not extra:
+        del values["container"]
     values[SECTIONS] = {name: len(data) for name, data in bitstream.sections.items()}
     deflater = zlib.compressobj(9, zlib.DEFLATED, RAW, zdict=DICTIONARY)
     text = json.dumps(values, separators=(",", ":"), allow_nan=False).encode()

@@ -143,7 +143,7 @@ def header_values(bitstream: Bitstream, extra: Mapping[str, Any]) -> dict[str, A
         "triangles": bitstream.n_triangles,
         "fps": bitstream.fps,
         **({"origin": list(bitstream.origin)} if bitstream.origin != NO_ORIGIN else {}),
-        **({"container": dict(extra)} if extra else {}),
+        "container": dict(extra),
         "settings": dict(bitstream.header),
     }
 

@@ -226,3 +226,9 @@ def test_damage_is_told_in_a_line(codec: str, wrong: dict[str, Any], tmp_path: P
     assert all(error.startswith(("corrupt: ", "unsupported: ")) and "\n" not in error for error in errors), errors
     assert errors[-1] == f"unsupported: level 9: there are levels 0..{1 if codec == 'pca' else 0}"
     assert all(np.isfinite(each["frames"]).all() for each in found if "frames" in each)
+
+
+def test_the_bare_layout_names_the_remedy(tmp_path: Path) -> None:
+    gvpipe.encode(patched(), tmp_path / "a.mp4", "pca", bare=True)
+    (found,) = load([{"path": str(tmp_path / "a.mp4"), "level": 0, "frames": [0]}], tmp_path)
+    assert found["error"] == "unsupported: it has the bare layout, of data sets; gvpipe restream makes a file of it that plays"

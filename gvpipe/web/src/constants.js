@@ -74,6 +74,9 @@ export const VISIT_SYMBOLS_N_SYMBOLS = 19;
 export const WELDED_MESH_ADAPTIVE_MESH = 1;
 export const WELDED_MESH_ADAPTIVE_ORDER = 2;
 
+// gvpipe.container.bare
+export const BARE_VERSION = 3;
+
 // gvpipe.container.bitstream
 export const BITSTREAM_MAGIC = [103, 118, 112, 105, 112, 101, 13, 10];
 export const BITSTREAM_VERSION = 1;

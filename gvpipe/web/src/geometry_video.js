@@ -26,7 +26,7 @@ const FROM_DISK = "pages opened from a disk may not fetch; open it from a web se
 
 export class GeometryVideo {
   /**
-   * Load a geometry video of codec `laplacian`, `mcgv` or `pca`, as `gvpipe encode` writes it.
+   * Load a geometry video, as `gvpipe encode` writes it.
    *
    * @param {string|URL|Blob|ArrayBuffer|Uint8Array} source an address, or the file itself
    * @param {{level?: number|"coarsest"}} [options] a level of detail above 0 is a coarser mesh, without attributes and fields

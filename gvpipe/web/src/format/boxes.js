@@ -4,6 +4,7 @@
  */
 
 import {
+  BARE_VERSION,
   BITSTREAM_VERSION as CONTAINER_VERSION,
   MP4_BOX_UUID as UUID,
   MP4_MAX_BOXES as MAX_BOXES,
@@ -92,7 +93,11 @@ export function findIndex(start) {
   return null;
 }
 
+/** The error for a container that is not read here. */
 export function newerContainer(version) {
+  if (Number(version) === BARE_VERSION) {
+    return new GeometryVideoError("unsupported", "it has the bare layout, of data sets; gvpipe restream makes a file of it that plays");
+  }
   return new GeometryVideoError(
     "newer",
     `container version ${version}, this player reads up to ${STREAM_VERSION}; a newer player is needed`,

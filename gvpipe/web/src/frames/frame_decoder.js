@@ -13,7 +13,6 @@ const AHEAD = 10; // s: a segment that begins later is not decoded ahead
 const CORRECTIONS = "corrections";
 
 /**
-/**
  * Readers by codec: `open(payload, kernels)` gives `faces`, `points`, `levels`, `segmentStart` and `read`; with several levels `levelFaces`;
  * where a segment is decoded ahead `prepare`; and where its frames come one after the other `extend(box, s)`, which has a box hold
  * the motion of segment s without decoding it.
