@@ -30,7 +30,7 @@ def part_of_the_error(sequence: MeshSequence, codec: str, quality: float) -> flo
     return 100 * root_mean_square(sequence, open_reader(bitstream)) / measure_spread(sequence) / error_of(quality)
 
 
-@pytest.mark.parametrize("quality", QUALITIES)
+@pytest.mark.parametrize("quality", [pytest.param(50, marks=pytest.mark.slow), 75, pytest.param(90, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", MADE)
 @pytest.mark.parametrize("codec", codec_ids())
 def test_made_sequences_have_the_error_of_their_quality(codec: str, name: str, quality: float) -> None:

@@ -34,18 +34,22 @@ PLAIN: list[tuple[str, dict[str, Any]]] = [
 ]
 PICTURES: list[tuple[str, dict[str, Any]]] = [
     ("mcgv", {"placement": "tiles"}),
+    ("mcgv", {"prediction": "affine"}),
+]
+MORE_PICTURES: list[tuple[str, dict[str, Any]]] = [  # in the slow run
     ("mcgv", {"placement": "charts", "image": "jpeg"}),
     ("mcgv", {"placement": "tiles", "profile": "precise"}),
-    ("mcgv", {"prediction": "affine"}),
     ("mcgv", {"prediction": "blended", "transform": "klt"}),
 ]
+SLOW_PICTURES = [pytest.param(*each, marks=pytest.mark.slow) for each in MORE_PICTURES]
 
 
 def with_each(name: str, values: tuple[Any, Any]) -> pytest.MarkDecorator:
     """All codecs, in several profiles, each with one of two values; with the other one in the slow run."""
+    n_quick = len(PLAIN + PICTURES)
     cases = [
-        pytest.param(codec, settings, value, marks=[] if i % 2 == j else pytest.mark.slow)
-        for (i, (codec, settings)), (j, value) in product(enumerate(PLAIN + PICTURES), enumerate(values))
+        pytest.param(codec, settings, value, marks=[] if i % 2 == j and i < n_quick else pytest.mark.slow)
+        for (i, (codec, settings)), (j, value) in product(enumerate(PLAIN + PICTURES + MORE_PICTURES), enumerate(values))
     ]
     return pytest.mark.parametrize(("codec", "settings", name), cases, ids=str)
 
@@ -144,7 +148,7 @@ def test_awkward_inputs(codec: str, settings: dict[str, Any], name: str, few: st
     assert np.abs(decoded.astype(np.float64) - frames).max() <= 0.02 * extent + 1e-6 * np.abs(frames).max()
 
 
-@pytest.mark.parametrize(("codec", "settings"), PICTURES)
+@pytest.mark.parametrize(("codec", "settings"), [*PICTURES, *SLOW_PICTURES])
 def test_pictures_are_of_distinct_frames(codec: str, settings: dict[str, Any], tmp_path: Path) -> None:
     """The video lacks repeated frames, and corrections, segments and groups of pictures are of distinct ones."""
     lengths = [2, 1, 7, 1, 1, 3, 1, 1, 4]
@@ -180,7 +184,7 @@ def test_files_without_stillness_keep_their_version(codec: str, settings: dict[s
     assert not {"still", "holds"} & set(bitstream.sections)
 
 
-@pytest.mark.parametrize(("codec", "settings"), PLAIN + PICTURES)
+@pytest.mark.parametrize(("codec", "settings"), [*PLAIN, *PICTURES, *SLOW_PICTURES])
 def test_nothing_moves_at_all(codec: str, settings: dict[str, Any], tmp_path: Path) -> None:
     """One distinct frame; and, where a codec is asked directly, nothing but still vertices."""
     sequence = held(waving(9, 1), [15])

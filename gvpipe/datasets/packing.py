@@ -30,7 +30,7 @@ from gvpipe.io.numbering import natural_key
 SHARD_BYTES = 1_000_000_000
 BLOCK = tarfile.BLOCKSIZE
 END = 2 * BLOCK  # bytes that mark the end of a shard, before it is filled up
-NUMBER = re.compile(r"%0?\d*d")
+NUMBER = re.compile(r"%0?\d{0,2}d")
 MAX_DESCRIPTION = 1 << 20  # bytes of a file's own JSON
 
 

@@ -96,8 +96,12 @@ def test_title_is_text(video: Path, tmp_path: Path) -> None:
     ("settings", "kind"),
     [
         ({"profile": "precise"}, "mcgv, profile h264-10"),
-        ({"image": "jpeg"}, "mcgv, profile jpeg"),
-        ({"prediction": "blended", "transform": "klt", "profile": "precise"}, "mcgv, transform klt, profile h264-10"),
+        pytest.param({"image": "jpeg"}, "mcgv, profile jpeg", marks=pytest.mark.slow),
+        pytest.param(
+            {"prediction": "blended", "transform": "klt", "profile": "precise"},
+            "mcgv, transform klt, profile h264-10",
+            marks=pytest.mark.slow,
+        ),
         ({"codec": "laplacian"}, "laplacian"),
     ],
     ids=str,

@@ -98,8 +98,8 @@ def test_frames_of_what_never_moves_equal_pythons(kind: str, module: Callable[..
     check_frames(module, path)
 
 
-@pytest.mark.parametrize("lengths", [[1] * 60, [3, *[1] * 58, 5]], ids=["", "held"])
-@pytest.mark.parametrize("settings", [{}, {"segment": 25, "reorder": True}], ids=str)
+@pytest.mark.parametrize("lengths", [pytest.param([1] * 60, marks=slow), [3, *[1] * 58, 5]], ids=["", "held"])
+@pytest.mark.parametrize("settings", [pytest.param({}, marks=slow), {"segment": 25, "reorder": True}], ids=str)
 def test_frames_without_pictures_equal_pythons(
     settings: dict[str, Any], lengths: list[int], module: Callable[..., Any], site: tuple[Path, str]
 ) -> None:
@@ -121,7 +121,9 @@ def test_a_file_without_pictures_plays(module: Callable[..., Any], site: tuple[P
     assert shown == sorted(shown) and shown[0] == 0 and shown[-1] == 59
 
 
-@pytest.mark.parametrize("fps", [0.5, 12.0, 29.97, 59.94, 240.0])
+@pytest.mark.parametrize(
+    "fps", [pytest.param(fps, marks=[] if fps == 29.97 else slow) for fps in (0.5, 12.0, 29.97, 59.94, 240.0)]
+)
 def test_frames_at_any_rate(fps: float, module: Callable[..., Any], site: tuple[Path, str]) -> None:
     check_frames(module, encode_file(site, dataclasses.replace(waving(8, 30), fps=fps)))
 

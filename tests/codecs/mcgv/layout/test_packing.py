@@ -22,7 +22,7 @@ from gvpipe.errors import InputError
 
 
 @pytest.mark.parametrize("name", awkward_surfaces())
-@pytest.mark.parametrize("block", [8, 16])
+@pytest.mark.parametrize("block", [pytest.param(8, marks=pytest.mark.slow), 16])
 def test_layout_invariants(name: str, block: int) -> None:
     """Every vertex has a pixel of its own inside whole blocks; charts keep to one cluster, blocks to one chart; repeatable."""
     points, faces = awkward_surfaces()[name]

@@ -28,7 +28,7 @@ from gvpipe.registry import open_reader
 
 
 @pytest.mark.parametrize("name", awkward_surfaces())
-@pytest.mark.parametrize("block", [8, 16])
+@pytest.mark.parametrize("block", [pytest.param(8, marks=pytest.mark.slow), 16])
 def test_tiles_follow_their_description(name: str, block: int) -> None:
     """The same pixels as a recursion in Python's integers; one pixel each; few charts and many, tight planes and wide."""
     points = np.asarray(awkward_surfaces()[name][0])
@@ -133,6 +133,7 @@ def test_files_of_tiles_decode(settings: dict[str, Any], tmp_path: Path) -> None
     assert errors[0] < 1.2 * errors[1] < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sequence", awkward().values(), ids=lambda sequence: sequence.name)
 def test_awkward_sequences_as_tiles(sequence: gvpipe.MeshSequence, tmp_path: Path) -> None:
     gvpipe.encode(sequence, tmp_path / "a.mp4", prediction="blended", placement="tiles", preset="ultrafast")
