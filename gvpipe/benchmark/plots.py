@@ -9,12 +9,16 @@ from __future__ import annotations
 import csv
 import os
 from collections import defaultdict
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from gvpipe.atomic import output_error, unnamed_path
+from gvpipe.benchmark.pictures import draw_pictures
 from gvpipe.benchmark.report import BenchReport, Curve
 from gvpipe.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 AXES = {"kg": "KG error, %", "rmse_diag": "rmse, part of the diagonal", "sted": "STED"}
 PEER_COLUMNS = {"kg": "kg", "rmse_diag": "rmse_rel"}
@@ -31,27 +35,11 @@ def draw(report: BenchReport, folder: str | os.PathLike[str], peers: Peers | Non
         InputError: matplotlib is not installed, or the report has no curve.
         OutputError: a file cannot be written.
     """
-    try:
-        import matplotlib
-    except ImportError as exc:
-        raise InputError("plots need matplotlib, which is not installed; run: pip install 'gvpipe[plot]'") from exc
-    matplotlib.use("Agg")
     by_sequence: dict[str, list[Curve]] = defaultdict(list)
     for curve in report.curves:
         by_sequence[curve.sequence].append(curve)
-    if not by_sequence:
-        raise InputError("the report has no curve to draw; measure a sequence first")
-    try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
-    except OSError as exc:
-        raise output_error(folder, exc) from exc
-    paths = []
-    for name, curves in by_sequence.items():
-        path = Path(folder) / f"{name}.png"
-        with unnamed_path(path) as temporary:
-            _draw_sequence(name, curves, (peers or {}).get(name, {}), temporary)
-        paths.append(path)
-    return paths
+    drawn = {name: partial(_draw_sequence, name, curves, (peers or {}).get(name, {})) for name, curves in by_sequence.items()}
+    return draw_pictures(folder, drawn)
 
 
 def read_peers(path: str | os.PathLike[str]) -> Peers:
@@ -77,7 +65,7 @@ def read_peers(path: str | os.PathLike[str]) -> Peers:
     return peers
 
 
-def _draw_sequence(name: str, curves: list[Curve], peers: dict[str, list[dict[str, float]]], path: Path) -> None:
+def _draw_sequence(name: str, curves: list[Curve], peers: dict[str, list[dict[str, float]]]) -> Figure:
     from matplotlib import colormaps
     from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -103,7 +91,7 @@ def _draw_sequence(name: str, curves: list[Curve], peers: dict[str, list[dict[st
         panel.xaxis.set_minor_formatter(NullFormatter())
     figure.legend(list(labelled.values()), list(labelled), loc="outside lower center", ncols=LEGEND_COLUMNS, fontsize="small")
     figure.suptitle(f"{name}: {curves[0].vertices} vertices, {curves[0].frames} frames")
-    figure.savefig(path, format="png", dpi=100, metadata={"Software": None})
+    return figure
 
 
 def _number(text: str | None) -> float | None:

@@ -10,16 +10,12 @@ Units: ``bpvf`` bits per vertex and frame of the whole file, ``_s`` seconds, ``f
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from gvpipe.atomic import unnamed_path
-from gvpipe.errors import InputError
+from gvpipe.benchmark.json_results import NUMBER, checked, read_results, write_results
 
-NUMBER = int | float | None
 REPORT_TYPES = {"gvpipe": str, "machine": dict, "command": list, "curves": list}
 CURVE_TYPES = {
     "sequence": str,
@@ -70,50 +66,21 @@ class BenchReport:
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the JSON file; raises `OutputError` if that fails."""
-        with unnamed_path(path) as temporary:
-            temporary.write_text(json.dumps(self.to_json(), indent=1, allow_nan=False) + "\n", "utf-8")
+        write_results(path, self.to_json())
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> BenchReport:
         """Mirror of `write`; raises `InputError` for anything that it does not write."""
-        try:
-            return cls._parse(Path(path).read_text("utf-8"))
-        except OSError as exc:
-            raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check the path") from exc
-        except UnicodeDecodeError as exc:
-            raise _no_report(path, "it is no text") from exc
-        except json.JSONDecodeError as exc:
-            raise _no_report(path, f"line {exc.lineno} is no JSON") from exc
-        except _WrongValue as exc:
-            raise _no_report(path, str(exc)) from exc
+        return read_results(path, cls.parse)
 
     @classmethod
-    def _parse(cls, text: str) -> BenchReport:
-        values = _checked(json.loads(text), REPORT_TYPES, "the file")
+    def parse(cls, given: Any) -> BenchReport:
+        """Mirror of `to_json`; raises `WrongValue`."""
+        values = checked(given, REPORT_TYPES, "the file")
         curves = []
-        for i, given in enumerate(values["curves"]):
-            curve = _checked(given, CURVE_TYPES, f"curve {i}")
+        for i, one in enumerate(values["curves"]):
+            curve = checked(one, CURVE_TYPES, f"curve {i}")
             for k, point in enumerate(curve["points"]):
-                _checked(point, dict.fromkeys(POINT_KEYS, NUMBER), f"point {k} of curve {i}")
+                checked(point, dict.fromkeys(POINT_KEYS, NUMBER), f"point {k} of curve {i}")
             curves.append(Curve(**{key: curve[key] for key in CURVE_TYPES}))
         return cls(values["gvpipe"], values["machine"], values["command"], curves)
-
-
-class _WrongValue(ValueError):
-    """What a file lacks or holds that a report does not."""
-
-
-def _checked(values: Any, types: dict[str, Any], what: str) -> dict[str, Any]:
-    """Return an object of the file, whose values under the keys of ``types`` have those types; raises `_WrongValue`."""
-    if not isinstance(values, dict):
-        raise _WrongValue(f"{what} is no object")
-    for key, kind in types.items():
-        if key not in values:
-            raise _WrongValue(f"{what} has no {key}")
-        if not isinstance(values[key], kind):
-            raise _WrongValue(f"{what} has {key} of another type")
-    return values
-
-
-def _no_report(path: str | os.PathLike[str], why: str) -> InputError:
-    return InputError(f"{path} is not what `gvpipe bench --json` writes: {why}; give that file, or measure again")

@@ -25,6 +25,7 @@ import numpy as np
 import gvpipe
 from gvpipe import api, files
 from gvpipe.atomic import output_error
+from gvpipe.benchmark.memory import peak_mb
 from gvpipe.benchmark.report import BenchReport, Curve
 from gvpipe.codec import Progress
 from gvpipe.errors import GvpipeError, InputError
@@ -93,7 +94,7 @@ def measure_curve(source: str, codec: str, qualities: list[float], texts: dict[s
         paths = [Path(folder) / f"{i}.mp4" for i in range(len(settings))]
         for chosen, path in zip(settings, paths, strict=True):
             points.append(_time(sequence, chosen, path))
-        peak = _peak_mb()  # before the comparison, which has memory of its own
+        peak = peak_mb()  # before the comparison, which has memory of its own
         for point, path in zip(points, paths, strict=True):
             point.update(_verify(sequence, path))
     rest = {key: value for key, value in dataclasses.asdict(settings[0]).items() if key != "quality"}
@@ -167,13 +168,3 @@ def _verify(sequence: gvpipe.MeshSequence, path: Path) -> dict[str, Any]:
             raise GvpipeError(f"{sequence.name}: frame {frame} alone is not what decoding the whole gives; please report it")
     values = compare(sequence, decoded).to_json()  # raises unless vertices and triangles are the same
     return {**{key: values[key] for key in MEASURES}, "frame_ms": 1000 * float(np.median(seconds))}
-
-
-def _peak_mb() -> float | None:
-    """Peak resident memory of this process, 2**20 bytes."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return None
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / (1 << 20 if sys.platform == "darwin" else 1 << 10)

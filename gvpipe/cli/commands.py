@@ -14,17 +14,17 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from gvpipe import __version__
-from gvpipe.cli.console import Output, is_verbose, output_options, print_options, unlimited_option
+from gvpipe.cli.benchmarks import bench, plot
+from gvpipe.cli.console import Output, is_verbose, output_options, unlimited_option
 from gvpipe.cli.conversion import convert
 from gvpipe.cli.encode_all import encode_all
-from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_pairs, parse_settings
+from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_settings
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.cli.process import Ended, ending_by_exception, replace_closed_streams
 from gvpipe.errors import GvpipeError, InputError, TopologyChange
@@ -433,6 +433,8 @@ def _same_frames(read: Callable[..., MeshSequence], span: tuple[int, int | None]
 
 cli.add_command(convert)
 cli.add_command(encode_all)
+cli.add_command(bench)
+cli.add_command(plot)
 
 
 @cli.command("export-html")
@@ -535,75 +537,6 @@ def render(source: str, target: str, size: str, limits: str | None, frames: str 
 
 
 @cli.command()
-@click.argument("sources", metavar="SEQUENCES...", nargs=-1, required=True)
-@click.option(
-    "--codecs",
-    "codec_list",
-    metavar="ID,ID...",
-    help="What to measure, ID or ID:KEY=VALUE. [default: all, mcgv in 3 ways]",
-)
-@click.option("--qualities", metavar="Q,Q...", help="Qualities to measure. [default: 0,20,40,60,75,90,100]")
-@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting for all these codecs; repeat for more.")
-@click.option("--kg", default="1,0.3,0.1", show_default=True, metavar="KG,KG...", help="Errors at which to tell rates.")
-@click.option("--sted", metavar="STED,STED...", help="The same for this measure.")
-@click.option(
-    "--json",
-    "target",
-    is_flag=False,
-    flag_value=PIPE,
-    metavar="[OUT.json]",
-    help="Write all results to this file, or print one JSON object and nothing else.",
-)
-@print_options
-def bench(
-    sources: tuple[str, ...],
-    codec_list: str | None,
-    qualities: str | None,
-    pairs: tuple[str, ...],
-    kg: str,
-    sted: str | None,
-    target: str | None,
-    out: Output,
-) -> None:
-    """Measure rate, distortion, times and memory of codecs, every round trip verified; `gvpipe plot` draws the results.
-
-    \b
-    gvpipe bench a.npz b.npz --json out.json
-    gvpipe bench a.npz --codecs mcgv,mcgv:prediction=affine,pca
-    """
-    from gvpipe.benchmark import sweep
-    from gvpipe.benchmark.tables import tables
-
-    if target not in (None, PIPE) and not target.lower().endswith(".json"):  # a sequence behind --json is not overwritten
-        raise click.UsageError(f"--json {target}: the results' file ends in .json; put --json last to print them")
-    out = replace(out, as_json=target == PIPE)
-    chosen = [name.strip() for name in codec_list.split(",")] if codec_list else sweep.default_codecs()
-    wanted = _parse_numbers("--qualities", qualities) if qualities else list(sweep.QUALITIES)
-    levels = {"kg": _parse_numbers("--kg", kg), **({"sted": _parse_numbers("--sted", sted)} if sted else {})}
-    with out.progress() as progress:
-        made = sweep.run(sources, chosen, wanted, parse_pairs(pairs), progress)
-    if target not in (None, PIPE):
-        made.write(target)
-    out.json(made.to_json())
-    out.text(tables(made.curves, levels))
-
-
-@cli.command()
-@click.argument("report", metavar="REPORT.json")
-@click.argument("folder", metavar="FOLDER")
-@click.option("--peers", metavar="RESULTS.csv", help="Other codecs' results to draw beside, dashed.")
-@output_options
-def plot(report: str, folder: str, peers: str | None, out: Output) -> None:
-    """Draw what `gvpipe bench --json REPORT.json` measured: one picture per sequence, into FOLDER."""
-    from gvpipe.benchmark import plots
-    from gvpipe.benchmark.report import BenchReport
-
-    drawn = plots.draw(BenchReport.read(report), folder, plots.read_peers(peers) if peers else None)
-    out.json({"plots": [str(path) for path in drawn]})
-    out.text("\n".join(map(str, drawn)))
-
-
-@cli.command()
 @output_options
 def codecs(out: Output) -> None:
     """List the codecs and their settings, and the settings that --codec auto tries beside the defaults."""
@@ -644,13 +577,6 @@ def warmup(installed: bool, portable: bool, out: Output) -> None:
     out.text(
         f"{found.folder}: {found.files} files of machine code, {found.new} new, {_size(found.size)}; {found.seconds:.1f} s"
     )
-
-
-def _parse_numbers(option: str, text: str) -> list[float]:
-    try:
-        return [float(number) for number in text.split(",")]
-    except ValueError as exc:
-        raise click.UsageError(f"{option} {text}: numbers with commas between are needed") from exc
 
 
 def _tell_conversion(out: Output, report: ExportReport) -> None:
