@@ -227,5 +227,13 @@ def test_counts_are_refused_before_allocation(counts: tuple[int, int, int, int])
 def test_draco_counts_are_refused_before_allocation() -> None:
     many = b"\xff\xff\xff\xff\x07"
     draco = base_mesh.DRACO_PREFIX + b"\0" + many + many + bytes(40)
-    with pytest.raises(CorruptFile, match="elements in"):
+    with pytest.raises(CorruptFile, match="vertices in Draco's stream; at most"):
         decode_base(base_mesh.HEADER.pack(len(draco), 0, 0, 0) + draco, b"")
+
+
+def test_many_triangles_in_few_bytes_are_allowed() -> None:
+    """A regular mesh of two million triangles takes 1.7 kB."""
+    header = base_mesh.DRACO_PREFIX + b"\0" + bytes.fromhex("c0843d80897a") + bytes(40)  # 1,000,000 and 2,000,000
+    base_mesh.check_draco_header(header, 2_000_000)
+    with pytest.raises(CorruptFile, match="2000000 faces in Draco's stream; at most 1999999"):
+        base_mesh.check_draco_header(header, 1_999_999)

@@ -24,7 +24,7 @@ export async function decodeAdaptiveMesh(kernels, stream, most) {
   const nPoints = cursor.varint(Math.min(MAX_POINTS, most.vertices), "the number of points");
   const [draco, merges, loose] = [cursor.block(), cursor.block(), cursor.block()];
   const nLoose = cursor.varint(Math.min(MAX_PER_BYTE * stream.length, most.triangles), "the number of loose triangles");
-  const faces = await decodeTriangles(draco, merges, loose, nLoose, nPoints);
+  const faces = await decodeTriangles(draco, merges, loose, nLoose, nPoints, most.triangles);
   return { points: decodePositions(kernels, cursor, faces, nPoints), faces };
 }
 

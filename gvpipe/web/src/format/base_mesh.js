@@ -44,7 +44,7 @@ async function decodeMesh(mesh, most) {
     throw cursor.corrupt(`${looseVertices} loose vertices and ${looseFaces} loose triangles, more than the header says`);
   }
   const draco = cursor.take(bytesDraco);
-  const carried = bytesDraco ? merge(await decodeDraco(draco)) : { points: [], faces: [] };
+  const carried = bytesDraco ? merge(await decodeDraco(draco, most.triangles)) : { points: [], faces: [] };
   const points = join(Int32Array, carried.points, await decodeTable(cursor.take(bytesVertices), looseVertices));
   const faces = join(Uint32Array, carried.faces, await decodeTable(cursor.rest(), looseFaces));
   const n = points.length / 3;

@@ -3,7 +3,7 @@
  * as `gvpipe.connectivity.base_mesh` wrote them.
  */
 
-import { BASE_MESH_DRACO_PREFIX as PREFIX, BASE_MESH_MAX_PER_BYTE as MAX_PER_BYTE } from "../constants.js";
+import { BASE_MESH_DRACO_PREFIX as PREFIX } from "../constants.js";
 import createDraco from "draco3d/draco_decoder_nodejs.js";
 import wasmBinary from "draco3d/draco_decoder.wasm";
 import { inflated } from "../wasm/inflated.js";
@@ -21,25 +21,26 @@ export function useDraco(bytes) {
 }
 
 /**
- * @param {Uint8Array} stream
+ * @param {Uint8Array} stream @param {number} triangles at most
  * @returns {Promise<{keys: Int32Array, faces: Uint32Array}>} (n, 4) positions and occurrence numbers of Draco's points, and
  *   (t, 3) triangles over them, flat
  */
-export function decodeDraco(stream) {
-  return decodeMesh(stream, (...parts) => ({ keys: readKeys(...parts), faces: readFaces(...parts) }));
+export function decodeDraco(stream, triangles) {
+  return decodeMesh(stream, triangles, (...parts) => ({ keys: readKeys(...parts), faces: readFaces(...parts) }));
 }
 
 /**
  * The same without positions, which mean nothing.
  *
- * @param {Uint8Array} stream @returns {Promise<{nVertices: number, faces: Uint32Array}>}
+ * @param {Uint8Array} stream @param {number} triangles at most
+ * @returns {Promise<{nVertices: number, faces: Uint32Array}>}
  */
-export function decodeDracoTriangles(stream) {
-  return decodeMesh(stream, (...parts) => ({ nVertices: parts[2].num_points(), faces: readFaces(...parts) }));
+export function decodeDracoTriangles(stream, triangles) {
+  return decodeMesh(stream, triangles, (...parts) => ({ nVertices: parts[2].num_points(), faces: readFaces(...parts) }));
 }
 
-async function decodeMesh(stream, read) {
-  checkHeader(stream);
+async function decodeMesh(stream, triangles, read) {
+  checkHeader(stream, triangles);
   draco ??= inflated(binary).then((wasmBinary) => createDraco({ wasmBinary }));
   const module = await draco;
   const decoder = new module.Decoder();
@@ -104,13 +105,13 @@ function readFaces(module, decoder, mesh) {
   }
 }
 
-/** Refuse counts that the stream cannot hold before Draco allocates for them. */
-function checkHeader(stream) {
+/** Refuse counts that a mesh of so many triangles cannot have before Draco allocates for them. */
+function checkHeader(stream, triangles) {
   if (!PREFIX.every((byte, i) => stream[i] === byte)) {
     throw corrupt("mesh", "not the kind of Draco stream that is written here");
   }
   let position = PREFIX.length + 1; // skip the traversal type
-  for (const what of ["vertices", "triangles"]) {
+  for (const [what, most] of [["vertices", 3 * triangles], ["triangles", triangles]]) {
     let count = 0;
     let byte = 128;
     for (let shift = 0; byte >= 128; shift += 7) {
@@ -118,6 +119,6 @@ function checkHeader(stream) {
       byte = stream[position++];
       count += (byte & 127) * 2 ** shift;
     }
-    if (count > MAX_PER_BYTE * stream.length) throw corrupt("mesh", `${count} ${what} in ${stream.length} bytes`);
+    if (count > most) throw corrupt("mesh", `${count} ${what} in Draco's stream; at most ${most} fit the header`);
   }
 }

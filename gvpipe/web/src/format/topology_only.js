@@ -26,7 +26,7 @@ export async function decodeTopology(kernels, mesh, order, { vertices, triangles
     throw cursor.corrupt(`${pointCount} points and ${nLoose} loose triangles in ${mesh.length} bytes`);
   }
   const parts = [draco, merges, loose].map((length) => cursor.take(length));
-  const pointFaces = await decodeTriangles(...parts, nLoose, pointCount);
+  const pointFaces = await decodeTriangles(...parts, nLoose, pointCount, triangles);
   const { faces, point } = decodeCopies(kernels, cursor.take(counts), cursor.rest(), order, pointFaces, pointCount, false, false);
   if (point.length !== vertices || faces.length !== 3 * triangles) {
     const found = `${point.length} vertices and ${faces.length / 3} triangles`;
@@ -38,10 +38,11 @@ export async function decodeTopology(kernels, mesh, order, { vertices, triangles
 /**
  * @param {Uint8Array} draco @param {Uint8Array} merges @param {Uint8Array} loose streams
  * @param {number} nLoose triangles in the last @param {number} nPoints P
+ * @param {number} most triangles
  * @returns {Promise<Uint32Array>} (T, 3), flat: Draco's with its split vertices merged, smallest point first, then the loose ones
  */
-export async function decodeTriangles(draco, merges, loose, nLoose, nPoints) {
-  const carried = draco.length ? await decodeDracoTriangles(draco) : { nVertices: 0, faces: new Uint32Array(0) };
+export async function decodeTriangles(draco, merges, loose, nLoose, nPoints, most) {
+  const carried = draco.length ? await decodeDracoTriangles(draco, most) : { nVertices: 0, faces: new Uint32Array(0) };
   const merged = smallestFirst(merge(carried, merges));
   const others = await decodeTable(loose, nLoose);
   const faces = new Uint32Array(merged.length + others.length);
