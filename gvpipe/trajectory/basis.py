@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,6 +45,7 @@ PER_OCTAVE = 8
 ROOTS = np.array([math.isqrt(math.isqrt(math.isqrt(1 << (8 * 60 + i)))) / 2**60 for i in range(PER_OCTAVE)])  # 2 ** (i / 8)
 PER_STEP_OCTAVE = 1024  # steps are 0.07 % apart
 BLOCK = 1024  # vertices rebuilt at a time
+LARGE_BLOCK = 1 << 16  # vertices centred at a time
 RIDGE, LEAST = 1e-9, 1e-12  # on the diagonal of a basis' Gram matrix: a vector of a tiny segment may decode to zero
 LEAST_OUTSIDE = 0.2  # part of a basis' errors that is taken to lie outside its span, at least
 
@@ -132,16 +133,18 @@ def find_principal(trajectories: Float64, error: float) -> Principal:
     took minutes, this takes a fraction of a second for 400 frames.
     """
     mean = trajectories.mean(axis=0)
-    centred = trajectories - mean
-    tall = is_tall(centred)
-    gram = smaller_gram(centred)
+    tall = is_tall(trajectories)
+    if tall:  # by blocks: a copy of a million vertices' trajectories is large
+        gram = np.sum([smaller_gram(trajectories[rows] - mean) for rows in _row_blocks(len(trajectories))], axis=0)
+    else:
+        gram = smaller_gram(trajectories - mean)
     total = float(np.trace(gram))
     least = max(NEGLIGIBLE * error / len(gram), ROUNDING * total)
     if not total > least:
-        return Principal(mean, np.zeros(0), np.zeros((centred.shape[1], 0)), total)
+        return Principal(mean, np.zeros(0), np.zeros((len(mean), 0)), total)
     energies, vectors = descending_eigenvectors(gram, least)
     if not tall:
-        vectors = (centred.T @ vectors) / np.sqrt(energies)
+        vectors = ((trajectories - mean).T @ vectors) / np.sqrt(energies)
     return Principal(mean, energies, np.ascontiguousarray(vectors), max(0.0, total - float(energies.sum())))
 
 
@@ -249,7 +252,8 @@ def fit_coefficients(trajectories: Float64, basis: Basis) -> Float64:
 
     if not basis.vectors.shape[1]:
         return np.zeros((len(trajectories), 0))
-    projected = (trajectories - basis.mean) @ basis.vectors  # (V, R)
+    blocks = [(trajectories[rows] - basis.mean) @ basis.vectors for rows in _row_blocks(len(trajectories))]
+    projected = np.concatenate(blocks)  # (V, R)
     gram = basis.vectors.T @ basis.vectors
     gram[np.diag_indices_from(gram)] *= 1 + RIDGE
     gram[np.diag_indices_from(gram)] += LEAST
@@ -265,6 +269,12 @@ def squared_errors(trajectories: Float64, basis: Basis, coefficients: Float64) -
         left = trajectories[block] - basis.mean - coefficients[block] @ basis.vectors.T
         result[block] = np.einsum("vf,vf->v", left, left)
     return result
+
+
+def _row_blocks(n_rows: int) -> Iterator[slice]:
+    """Rows of a tall matrix, of which copies are made one after the other; one block at least."""
+    for first in range(0, max(n_rows, 1), LARGE_BLOCK):
+        yield slice(first, first + LARGE_BLOCK)
 
 
 def _scales(levels: Int64, n_points: int, step: float) -> Float64:

@@ -60,7 +60,7 @@ def encode_vectors(
     residuals = np.zeros((len(causal.order), target.shape[1]), np.int64)
     decoded = np.zeros(target.shape) if given is None else given.copy()
     predict_vectors(causal, step, residuals, decoded, target, predictor, beta)
-    largest = int(np.abs(residuals).max(initial=0))
+    largest = max(int(residuals.max(initial=0)), -int(residuals.min(initial=0)))
     if largest >= LARGEST:
         raise InputError(f"a residual has {largest} quantisation steps, at most {LARGEST} fit; ask for a lower quality")
     means = np.abs(residuals).sum(axis=0) * ONE // max(1, len(residuals))

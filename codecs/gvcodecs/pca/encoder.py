@@ -136,9 +136,10 @@ def _code_segment(segments: _Segments, span: tuple[int, int]) -> _Segment:
     """Code the frames of a span."""
     codec, still = segments.codec, segments.still
     start, stop = span
-    trajectories = read_trajectories(segments.sequence, start, stop, segments.moving)
     error = (segments.target_error / LEFT) ** 2 * still.n_moving * (stop - start)
-    reduced = reduce_trajectories(trajectories, error, codec.components, most=still.most_components)
+    reduced = reduce_trajectories(
+        read_trajectories(segments.sequence, start, stop, segments.moving), error, codec.components, most=still.most_components
+    )  # the trajectories go: what follows needs as much memory again
     return _Segment(reduced.step, reduced.basis, _encode_coefficients(codec, reduced, still, segments.causal))
 
 
