@@ -24,9 +24,10 @@ import numpy as np
 from scipy import sparse
 
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
-from gvpipe.arrays import Float64, Int32, Integers
+from gvpipe.arrays import Float64, Int32, Int64, Integers
 from gvpipe.mesh.topology import k_ring
 from gvpipe.sequence import MeshSequence
+from gvpipe.trajectory.gram import descending_eigenvectors, smaller_gram
 
 RING = 3  # order of the neighbourhood, the paper's
 DIMENSIONS = 40  # principal coordinates of the motion vectors that k-means sees
@@ -36,6 +37,7 @@ RESTARTS = 4  # of k-means; the best is kept
 SEED = 2007
 REFINE_ROUNDS = 5
 REFINE_FRAMES = 160  # frames, evenly spaced, that refinement looks at
+LARGE = 1 << 16  # points whose motion vectors are held at a time; the principal axes of more are those of so many
 CHUNK_FLOATS = 8 << 20  # motion coefficients held at a time
 
 
@@ -116,6 +118,19 @@ def local_motions(base: Float64, ring: sparse.csr_array, columns: Float64) -> Fl
     """
     centre, scale = (base.min(axis=0) + base.max(axis=0)) / 2, max(float(np.ptp(base, axis=0).max()), 1e-30)
     unit, moved = (base - centre) / scale, columns / scale
+    if len(base) <= LARGE:
+        return _principal_coordinates(_motion_rows(unit, moved, ring, np.arange(len(base))))
+    some = np.arange(0, len(base), -(-len(base) // LARGE))
+    axes = descending_eigenvectors(smaller_gram(_motion_rows(unit, moved, ring, some)))[1][:, :DIMENSIONS]
+    blocks = (np.arange(first, min(first + LARGE, len(base))) for first in range(0, len(base), LARGE))
+    return np.concatenate([_motion_rows(unit, moved, ring, block) @ axes for block in blocks])
+
+
+def _motion_rows(unit: Float64, moved: Float64, ring: sparse.csr_array, points: Int64) -> Float64:
+    """Motion vectors ``(n, 4m)`` of some ``points (n,)``: linear part and translation."""
+    ring = ring[points]
+    near = np.unique(ring.indices)
+    ring, unit, moved = ring[:, near], unit[near], moved[near]
     size = np.asarray(ring.sum(axis=1)).ravel()[:, None]
     mean, shift = (ring @ unit) / size, (ring @ moved) / size
     outer = (unit[:, :, None] * unit[:, None, :]).reshape(-1, 9)
@@ -123,10 +138,10 @@ def local_motions(base: Float64, ring: sparse.csr_array, columns: Float64) -> Fl
     ridge = RIDGE * np.trace(spread, axis1=1, axis2=2) + 1e-12
     cross = np.stack(
         [ring @ (unit[:, i, None] * moved) - size * mean[:, i, None] * shift for i in range(3)], axis=1
-    )  # (P, 3, m)
+    )  # (n, 3, m)
     linear = np.linalg.inv(spread + ridge[:, None, None] * np.eye(3)) @ cross
     translation = shift - np.einsum("pi,pim->pm", mean, linear)
-    return _principal_coordinates(np.concatenate([linear.reshape(len(base), -1), translation], axis=1))
+    return np.concatenate([linear.reshape(len(points), -1), translation], axis=1)
 
 
 def refine(sequence: MeshSequence, base: Float64, ring: sparse.csr_array, clusters: Int32) -> Int32:
