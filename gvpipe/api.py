@@ -33,6 +33,7 @@ from gvpipe.rate_control.trials import Trial
 from gvpipe.registry import check_mapped, encode_sequence, make_codec, segment_parts
 from gvpipe.rendering.poster import poster_of
 from gvpipe.segment_map import segments_mapped_by
+from gvpipe.segment_memory import fit_segments
 from gvpipe.sequence import MeshSequence
 from gvpipe.tasks.choice import open_executor
 from gvpipe.tasks.executor import Executor
@@ -48,9 +49,9 @@ if TYPE_CHECKING:
 
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
 ASSET = ("attributes", "fields", "textures", "clip", "mesh", "frames", "unlimited")
-ELSEWHERE = ("workers", "scheduler")
+RUNNING = ("memory", "workers", "scheduler")
 LAYOUTS = ("stream", "bare")
-KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", *LAYOUTS, *ASSET, *ELSEWHERE)  # of `encode`
+KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", *LAYOUTS, *ASSET, *RUNNING)  # of `encode`
 
 
 @dataclass(frozen=True)
@@ -195,6 +196,7 @@ def encode(
     stream: bool = False,
     bare: bool = False,
     unlimited: bool = False,
+    memory: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     **settings: Any,
@@ -225,6 +227,7 @@ def encode(
         clip, mesh, frames, unlimited: as for `read`.
         stream: write the stream layout, which plays over HTTP while it loads (`restream`).
         bare: write the bare layout, for data sets: without poster and what else only players need.
+        memory: bytes that encoding may take, about, in each process: segments are as short as it needs. Codec ``mcgv`` cannot.
         workers: code segments in so many processes of this machine, with the same bytes. Codec ``mcgv`` cannot.
         scheduler: code them on the Dask cluster of this address, such as ``"tcp://host:8786"``, whose workers read ``source``
             at the same path (extra ``cluster``).
@@ -245,6 +248,8 @@ def encode(
     with open_executor(scheduler, workers) as executor:
         options = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited}
         sequence = _open_source(source, path, fps, options)
+        if memory is not None:
+            given = fit_segments(given, sequence.n_vertices, memory)
         target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
         asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
         with _segments_coded_by(executor, sequence, source, {"fps": fps, **options}):

@@ -152,6 +152,7 @@ class Codec(Protocol):
     lengths around it code them (`gvpipe.repeated_frames`). Its ``version`` then knows of them; ``holds_version`` names an older
     one that does, too. A class attribute ``same_bits = False`` says that machines may decode slightly different positions, and
     ``maps_segments = True`` that segments are coded by `gvpipe.segment_map.map_segments`, which may do it elsewhere.
+    ``memory_factor`` is the memory that a segment takes, for each byte of its positions (`gvpipe.segment_memory`).
     """
 
     id: ClassVar[str]

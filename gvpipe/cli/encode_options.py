@@ -37,6 +37,7 @@ OPTIONS = (
     click.option("--max-error", metavar="E", help="Bound for every vertex: model units, or 0.05% of the diagonal."),
     click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the codec; repeat for more."),
     click.option("--segment", type=int, help="Most frames per segment. [default: 500]"),
+    click.option("--memory", metavar="BYTES", help="Take about so much memory, by shorter segments: 2GB. Not for codec mcgv."),
     click.option("--fps", type=float, help="Frames per second, instead of the input's."),
     click.option("--reorder", is_flag=True, help="Let the codec choose the vertex order: smaller."),
     click.option(
@@ -106,7 +107,7 @@ def parse_encoding(options: dict[str, Any]) -> Encoding:
         click.UsageError: options that do not go together, or that are not of their form.
         SettingError: no such codec or setting, or a value out of its range.
     """
-    from gvpipe.cli.choices import parse_frames
+    from gvpipe.cli.choices import parse_bytes, parse_frames
     from gvpipe.rate_control.purposes import candidates
     from gvpipe.registry import codec_class
 
@@ -122,6 +123,7 @@ def parse_encoding(options: dict[str, Any]) -> Encoding:
     )
     reading = {name: options[name] for name in ("fps", "clip", "mesh")} | {"frames": parse_frames(options["frames"])}
     making = {**targets, "textures": options["textures"], "stream": options["stream"], "bare": options["bare"]}
+    making["memory"] = None if options["memory"] is None else parse_bytes("--memory", options["memory"])
     making["attributes"] = _parse_bounds("--attribute", options["attributes"])
     making["fields"] = _parse_bounds("--field", options["fields"])
     return Encoding(codec, reading, making, options["unlimited"])

@@ -74,6 +74,7 @@ class Laplacian(BaseCodec):
     summary: ClassVar[str] = "trajectory PCA through geometric Laplacians: smallest files at equal perceived distortion"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
     maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.segment_map`)
+    memory_factor: ClassVar[float] = 11.0  # of a segment's positions as float32 (`gvpipe.segment_memory`)
 
     quality: float = 75.0  # 0..100, higher is better
     operator: str = "mean-value"  # mean-value, cotangent or tutte

@@ -53,6 +53,7 @@ class Pca(BaseCodec):
     summary: ClassVar[str] = "trajectory PCA with geometric predictors: smallest files, levels of detail"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
     maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.segment_map`)
+    memory_factor: ClassVar[float] = 5.0  # of a segment's positions as float32 (`gvpipe.segment_memory`)
 
     quality: float = 75.0  # 0..100, higher is better
     predictor: str = "kalman"  # kalman, or the paper's rbf, lsp, navg

@@ -62,6 +62,7 @@ class Pdct(BaseCodec):
     summary: ClassVar[str] = "predictive DCT in local coordinate frames: streams frame by frame, short clips"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
     maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.segment_map`)
+    memory_factor: ClassVar[float] = 7.0  # of a segment's positions as float32 (`gvpipe.segment_memory`)
 
     quality: float = 75.0  # 0..100, higher is better
     clusters: int = 0  # N, seed triangles per clip, 1..1024; 0: one per 200 vertices, 20..64
