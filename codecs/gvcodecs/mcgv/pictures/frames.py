@@ -18,6 +18,7 @@ from gvcodecs.mcgv.pictures.quantiser import ImageQuantiser, Magnitudes, choose_
 from gvpipe.arrays import Float64
 from gvpipe.media.video import B_FRAMES, Plane, Profile, VideoWriter
 
+PIXELS = 1 << 21  # of pictures that are made at a time: they may be many times as large as positions
 SMALL = 60, 2000  # bytes a frame, and of a file's own: B-frames save a third of the pictures' at best, and cost 8 each
 
 Residuals = Iterator[tuple[int, Float64]]
@@ -71,9 +72,11 @@ def _write_video(job: Job, padding: Padding, quantiser: ImageQuantiser, residual
     settings, profile, layout = job.settings, job.settings.video_profile, padding.layout
     width, height, fps = layout.width, 3 * layout.height, job.sequence.fps
     with VideoWriter(profile, width, height, fps, quantiser.level, settings.gop, settings.preset, b_frames) as writer:
+        n = max(1, PIXELS // (width * height))  # frames at a time
         for _, residual in residuals:
-            for picture in _pictures(residual, padding, profile, quantiser.step):
-                writer.add(picture)
+            for first in range(0, len(residual), n):
+                for picture in _pictures(residual[first : first + n], padding, profile, quantiser.step):
+                    writer.add(picture)
         return writer.finish()
 
 
