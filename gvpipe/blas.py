@@ -19,6 +19,7 @@ def one_blas_thread(function: Callable[Arguments, Result]) -> Callable[Arguments
 
     @functools.wraps(function)
     def limited(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+        import scipy.linalg  # noqa: F401  # SciPy has a BLAS of its own, which is limited once it is loaded
         from threadpoolctl import threadpool_limits
 
         with threadpool_limits(1, user_api="blas"):

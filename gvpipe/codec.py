@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Protocol, Self, TypeVar, cast, runtime_checkab
 
 from gvpipe.arguments import did_you_mean
 from gvpipe.arrays import Float32, Int32, Integers
+from gvpipe.blas import one_blas_thread
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import SettingError
 from gvpipe.sequence import MeshSequence
@@ -217,6 +218,7 @@ class Settings:
 class BaseCodec(Settings):
     """Base of codecs' dataclasses: the first and the last step of every encode."""
 
+    @one_blas_thread  # quicker, and the same bytes whatever the number of cores
     def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Encoded:
         """Code a sequence; see `Codec.encode`."""
         return self._encode(sequence, progress or _silent, memo or Memo(is_shared=False))

@@ -101,7 +101,7 @@ def _measure(codec: str, size: Size, source: Path, limit: float | None) -> Scale
         encode_cpu_s=encoded.cpu_seconds,
         encode_peak_mb=encoded.peak_mb,
     )
-    cost = measure_command(["decode", str(video), str(decoded), "--quiet"], limit)
+    cost = measure_command(["decode", str(video), str(decoded), "--quiet", "--unlimited"], limit)
     decoded.unlink(missing_ok=True)
     if cost is None:
         return point

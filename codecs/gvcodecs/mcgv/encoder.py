@@ -22,7 +22,6 @@ from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.target_search import encode_to_target
 from gvcodecs.mcgv.reader_choice import open_reader, segment_parts
 from gvcodecs.mcgv.settings import Settings
-from gvpipe.blas import one_blas_thread
 from gvpipe.codec import Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import SegmentParts
@@ -37,7 +36,6 @@ class Mcgv(Settings):
         SettingError: a value out of its range.
     """
 
-    @one_blas_thread
     def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         return encode_to_target(Job(self, sequence, memo, report))
 
