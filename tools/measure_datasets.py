@@ -2,39 +2,50 @@
 
     python tools/measure_datasets.py sizes ../shared/data/*.npz --json docs/benchmarks/datasets/short_sequences.json
     python tools/measure_datasets.py rates --json docs/benchmarks/datasets/shard_rates.json
-    python tools/measure_datasets.py tables docs/benchmarks
+    python tools/measure_datasets.py tables docs/benchmarks/datasets
 
 Sizes: each sequence is cut to 16 frames and encoded by codec ``auto`` in the bare layout, then changed to the plain one.
 Rates: sequences of one connectivity, made here, 45 x 45 vertices and 16 frames, are packed and read at random by one process;
-seconds are of its processor time.
+seconds are of its processor time. The same sequences lie in tar files in other ways, too: as .npz, .npz compressed by zstd
+(package ``zstandard``, or Python 3.14), and Draco, a stream a frame, whose step keeps the same bound.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import io
 import json
 import math
 import platform
 import sys
+import tarfile
 import tempfile
 import time
 from collections.abc import Callable
 from functools import partial
+from importlib.metadata import PackageNotFoundError, version
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 import gvpipe
 from gvpipe import datasets
+from gvpipe.arrays import Float32
+from gvpipe.benchmark.sweep import describe_machine
+from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.sequence import MeshSequence
+
+Storage = tuple[Callable[[MeshSequence], bytes], Callable[[bytes], Float32]]  # a sequence to bytes, and to positions
 
 N_FRAMES = 16
 MAX_ERROR = "0.1%"
 SIDE = 45  # vertices of a side
 N_SEQUENCES = 24
-SECONDS = 2.0  # of processor time, of a rate
+SPANS, SECONDS = 5, 0.5  # of a rate: how many, and processor time of each
 PARTS = {
     "mesh": ("mesh",),
     "order": ("order",),
@@ -50,6 +61,8 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "pdct": {"codec": "pdct"},
 }
 LEVELS = (2, 5, 100)
+ZSTD_LEVEL = 3
+DRACO_LEVELS = (7, 10)  # that of Draco's own command, and the smallest files
 
 
 def main() -> None:
@@ -65,6 +78,8 @@ def main() -> None:
         print(*tables(options.paths[0]), sep="\n")
         return
     found: dict[str, Any] = {"gvpipe": gvpipe.__version__, "python": platform.python_version(), "machine": platform.machine()}
+    if options.command == "rates":
+        found |= {"cpu": describe_machine(), "libraries": _versions()}
     found["results"] = measure_sizes(options.paths) if options.command == "sizes" else measure_rates()
     text = json.dumps(found, indent=1)
     print(text)
@@ -102,28 +117,37 @@ def measure_sizes(paths: list[Path]) -> list[dict[str, Any]]:
 
 
 def measure_rates() -> list[dict[str, Any]]:
-    """Sequences per second of processor time, read from shards and from other files."""
+    """Sequences per second of processor time, read from shards and from tar files of other files."""
     sequences = [make_sequence(k) for k in range(N_SEQUENCES)]
     results = []
     with tempfile.TemporaryDirectory() as name:
         for label, settings in SETTINGS.items():
             folder = Path(name, label.replace(" ", "").replace(",", "-"))
             folder.mkdir()
-            for k, sequence in enumerate(sequences):
-                gvpipe.encode(sequence, folder / f"{k}.mp4", max_error=MAX_ERROR, bare=True, **settings)
-            datasets.pack(folder, folder / "shard.tar")
-            dataset = datasets.open(folder / "shard.tar")
-            sizes = sum(path.stat().st_size for path in folder.glob("*.mp4"))
-            found = {"label": label, "bytes": sizes / N_SEQUENCES, "whole": rate(dataset.read)}
-            found["alone"] = rate(partial(_read_alone, dataset))
-            if len(dataset.open(0).levels) > 1:
-                found |= {f"lod {lod}": rate(partial(dataset.read, lod=lod)) for lod in LEVELS}
-            results.append(found)
-            print(json.dumps(found), file=sys.stderr, flush=True)
-    for label, save in (("npz", np.savez), ("npz, compressed", np.savez_compressed)):
-        files = [_saved(save, sequence) for sequence in sequences]
-        results.append({"label": label, "bytes": sum(map(len, files)) / N_SEQUENCES, "whole": rate(partial(_load, files))})
+            results.append({"label": label, **_rates_of_shard(sequences, folder, settings)})
+            print(json.dumps(results[-1]), file=sys.stderr, flush=True)
+        for label, storage in storages().items():
+            results.append({"label": label, **_rates_of_tar(sequences, Path(name, "other.tar"), storage)})
+            print(json.dumps(results[-1]), file=sys.stderr, flush=True)
     return results
+
+
+def storages() -> dict[str, Storage]:
+    """Other ways to store a sequence, by label; zstd is left out where nothing has it."""
+    found: dict[str, Storage] = {
+        "npz": (partial(_save_npz, np.savez), _load_npz),
+        "npz, compressed": (partial(_save_npz, np.savez_compressed), _load_npz),
+    }
+    zstd = _find_zstd()
+    if zstd is None:
+        print("no zstd: pip install zstandard", file=sys.stderr)
+    else:
+        pack, unpack = zstd
+        found[f"npz, zstd {ZSTD_LEVEL}"] = (
+            lambda sequence: pack(_save_npz(np.savez, sequence)),
+            lambda data: _load_npz(unpack(data)),
+        )
+    return found | {f"Draco, level {level}": (partial(_save_draco, level), _load_draco) for level in DRACO_LEVELS}
 
 
 def make_sequence(seed: int) -> MeshSequence:
@@ -142,13 +166,30 @@ def make_sequence(seed: int) -> MeshSequence:
 
 
 def rate(read: Callable[[int], Any]) -> float:
-    """Calls a second of processor time, with the numbers of all sequences in turn; the first calls compile and warm up."""
-    read(0), read(1)
-    count, started = 0, time.process_time()
-    while time.process_time() - started < SECONDS:
-        read(count % N_SEQUENCES)
-        count += 1
-    return count / (time.process_time() - started)
+    """Calls a second of processor time, the median of some spans, with the numbers of all sequences in a random order."""
+    order = np.random.default_rng(0).permutation(N_SEQUENCES).tolist()
+    read(0), read(1)  # compile and warm up
+    rates, count = [], 0
+    for _ in range(SPANS):
+        first, started = count, time.process_time()
+        while time.process_time() - started < SECONDS:
+            read(order[count % N_SEQUENCES])
+            count += 1
+        rates.append((count - first) / (time.process_time() - started))
+    return float(np.median(rates))
+
+
+def largest_error(sequences: list[MeshSequence], read: Callable[[int], Float32]) -> float:
+    """Of all vertices, as a part of frame 0's diagonal; vertices are matched by their paths, since Draco numbers them anew."""
+    errors = []
+    for k, sequence in enumerate(sequences):
+        positions, found = sequence.positions[:].astype(float), read(k).astype(float)
+        paths, found_paths = (np.concatenate(list(frames), axis=1) for frames in (positions, found))  # (V, 3 F)
+        order = cKDTree(paths).query(found_paths)[1]
+        if len(np.unique(order)) != sequence.n_vertices:
+            raise SystemExit(f"sequence {k}: its vertices cannot be told apart")
+        errors.append(np.linalg.norm(found - positions[:, order], axis=2).max() / frame_diagonal(sequence))
+    return float(max(errors))
 
 
 def tables(folder: Path) -> list[str]:
@@ -165,17 +206,26 @@ def tables(folder: Path) -> list[str]:
     lines.append(f"| geometric mean |{' |' * (len(PARTS) + 3)} {means[0]:.1f} | {means[1]:.1f} |")
     rates = json.loads((folder / "shard_rates.json").read_text())["results"]
     columns = ["whole", "alone", *(f"lod {lod}" for lod in LEVELS)]
-    lines += ["", f"| file | bytes | {' | '.join(columns)} |", "|" + " --- |" * (len(columns) + 2)]
+    lines += ["", f"| file | bytes | largest error | {' | '.join(columns)} |", "|" + " --- |" * (len(columns) + 3)]
     for row in rates:
         cells = [f"{row[name]:.0f}" if name in row else "" for name in columns]
-        lines.append(f"| {row['label']} | {row['bytes']:.0f} | {' | '.join(cells)} |")
+        error = f"{100 * row['max_diag']:.3f} %" if row["max_diag"] else "0"
+        lines.append(f"| {row['label']} | {row['bytes']:.0f} | {error} | {' | '.join(cells)} |")
     return lines
 
 
-def _saved(save: Callable[..., None], sequence: MeshSequence) -> bytes:
-    file = io.BytesIO()
-    save(file, vertices=sequence.positions[:], faces=sequence.faces)
-    return file.getvalue()
+def _rates_of_shard(sequences: list[MeshSequence], folder: Path, settings: dict[str, Any]) -> dict[str, Any]:
+    """Bytes, largest error and rates of gvpipe's files."""
+    for k, sequence in enumerate(sequences):
+        gvpipe.encode(sequence, folder / f"{k}.mp4", max_error=MAX_ERROR, bare=True, **settings)
+    datasets.pack(folder, folder / "shard.tar")
+    dataset = datasets.open(folder / "shard.tar")
+    sizes = sum(path.stat().st_size for path in folder.glob("*.mp4"))
+    found = {"bytes": sizes / N_SEQUENCES, "max_diag": largest_error(sequences, dataset.read), "whole": rate(dataset.read)}
+    found["alone"] = rate(partial(_read_alone, dataset))
+    if len(dataset.open(0).levels) > 1:
+        found |= {f"lod {lod}": rate(partial(dataset.read, lod=lod)) for lod in LEVELS}
+    return found
 
 
 def _read_alone(dataset: datasets.Dataset, k: int) -> Any:
@@ -183,9 +233,78 @@ def _read_alone(dataset: datasets.Dataset, k: int) -> Any:
     return dataset.open(k)[:]
 
 
-def _load(files: list[bytes], k: int) -> Any:
-    with np.load(io.BytesIO(files[k])) as found:
-        return found["vertices"]
+def _rates_of_tar(sequences: list[MeshSequence], path: Path, storage: Storage) -> dict[str, Any]:
+    """Bytes, largest error and rate of other files; where each lies is read once, as of a shard."""
+    save, load = storage
+    with tarfile.open(path, "w") as archive:
+        for k, sequence in enumerate(sequences):
+            data = save(sequence)
+            member = tarfile.TarInfo(str(k))
+            member.size = len(data)
+            archive.addfile(member, io.BytesIO(data))
+    with tarfile.open(path) as archive:
+        places = [(member.offset_data, member.size) for member in archive.getmembers()]
+
+    def read(k: int) -> Float32:
+        with path.open("rb") as file:
+            file.seek(places[k][0])
+            return load(file.read(places[k][1]))
+
+    sizes = sum(size for _, size in places)
+    return {"bytes": sizes / N_SEQUENCES, "max_diag": largest_error(sequences, read), "whole": rate(read)}
+
+
+def _save_npz(save: Callable[..., None], sequence: MeshSequence) -> bytes:
+    file = io.BytesIO()
+    save(file, vertices=sequence.positions[:], faces=sequence.faces)
+    return file.getvalue()
+
+
+def _load_npz(data: bytes) -> Float32:
+    with np.load(io.BytesIO(data)) as found:
+        positions: Float32 = found["vertices"]
+    return positions
+
+
+def _find_zstd() -> tuple[Callable[[bytes], bytes], Callable[[bytes], bytes]] | None:
+    """What compresses and what decompresses, of the package or of Python; None if there is neither."""
+    for name in ("zstandard", "compression.zstd"):
+        try:
+            zstd = importlib.import_module(name)
+        except ImportError:
+            continue
+        return partial(zstd.compress, level=ZSTD_LEVEL), zstd.decompress
+    return None
+
+
+def _save_draco(level: int, sequence: MeshSequence) -> bytes:
+    """Lengths of the frames' streams as uint32, then the streams; the step is the largest whose cells keep the bound."""
+    import DracoPy
+
+    step = 0.9999 * 2 / math.sqrt(3) * float(MAX_ERROR.rstrip("%")) / 100 * frame_diagonal(sequence)  # less rounding to float32
+    streams = []
+    for points in sequence.positions[:]:
+        bits = math.ceil(math.log2(float(np.ptp(points, axis=0).max()) / step + 1))
+        box = {"quantization_range": step * (2**bits - 1), "quantization_origin": points.min(axis=0)}
+        streams.append(DracoPy.encode(points, sequence.faces, quantization_bits=bits, compression_level=level, **box))
+    return b"".join([np.array(list(map(len, streams)), "<u4").tobytes(), *streams])
+
+
+def _load_draco(data: bytes) -> Float32:
+    import DracoPy
+
+    ends = np.cumsum([4 * N_FRAMES, *np.frombuffer(data, "<u4", N_FRAMES)]).tolist()
+    return np.stack([DracoPy.decode(data[start:end]).points for start, end in pairwise(ends)])
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in ("numpy", "DracoPy", "zstandard"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
 
 
 if __name__ == "__main__":
