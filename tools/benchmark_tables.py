@@ -1,12 +1,14 @@
 """Writes the tables of the benchmark pages from the results in ``docs/benchmarks``.
 
     python tools/benchmark_tables.py                    # the tables between markers, in all pages
+    python tools/benchmark_tables.py plots              # the pictures of docs/scale.md
     python tools/benchmark_tables.py points FILE.json   # every point of one file, to standard output
 
 A table stands between ``<!-- table: NAME -->`` and ``<!-- end -->``, NAME one of `TABLES`. Results have the shape that
 `gvpipe bench --json` writes (`gvpipe.benchmark.report.BenchReport`). A file may add to it: ``rates`` and
 ``kg_differences``, ``sted_differences`` where its points are rounded, ``targets`` (encodes to a given error), ``vdmc`` (the
-rates of another codec). What is null was not recorded.
+rates of another codec). What is null was not recorded. The folder ``scale`` has what `gvpipe bench --scale` writes
+(`gvpipe.benchmark.scale_report.ScaleReport`), and ``plan.json`` of ``tools/measure_plan.py``.
 """
 
 from __future__ import annotations
@@ -21,10 +23,19 @@ from typing import Any
 
 from gvpipe.benchmark.bd_rate import average_rate_difference, rate_at
 from gvpipe.benchmark.report import BenchReport
+from gvpipe.benchmark.scale import exponents
+from gvpipe.benchmark.scale_plots import draw, row_of
+from gvpipe.benchmark.scale_report import ScalePoint, ScaleReport
+from gvpipe.benchmark.scale_report import table as scale_table
 from gvpipe.benchmark.tables import tables
 
 DOCS = Path(__file__).parents[1] / "docs"
-PAGES = (DOCS / "benchmarks.md", DOCS / "codecs" / "mcgv.md", DOCS / "experiments" / "benchmark-curves-version-2.md")
+PAGES = (
+    DOCS / "benchmarks.md",
+    DOCS / "scale.md",
+    DOCS / "codecs" / "mcgv.md",
+    DOCS / "experiments" / "benchmark-curves-version-2.md",
+)
 CURVES, QUALITY, BOUND = "curves-version-2", "quality-75", "bound-0.1-percent"  # files of results
 MARKED = re.compile(r"(<!-- table: ([\w.-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 NAMES = {
@@ -33,6 +44,9 @@ NAMES = {
     "mcgv:prediction=blended": "`mcgv` blended",
     "mcgv:prediction=blended:transform=klt": "`mcgv` klt",
 }  # others: their own
+SCALES = ("mcgv", "mcgv-affine", "pca", "laplacian", "pdct")  # files of scale/
+COSTS = {"encode_cpu_s": "encode", "decode_cpu_s": "decode"}
+CAPTURE = 20_000, 10 * 3600 * 30  # vertices, and frames: ten hours at 30 frames a second
 DEFAULT, PUBLISHED, ANCHOR = "mcgv", "mcgv:prediction=affine", "pca"
 
 Points = list[dict[str, Any]]
@@ -138,6 +152,71 @@ def mean_difference(differences: list[float]) -> float | None:
     return 100 * math.expm1(sum(logarithms) / len(logarithms)) if logarithms else None
 
 
+def scale_report() -> ScaleReport:
+    """The scale reports of all codecs as one."""
+    reports = [ScaleReport.read(DOCS / "benchmarks" / "scale" / f"{name}.json") for name in SCALES]
+    points = [point for report in reports for point in report.scale]
+    return ScaleReport(reports[0].gvpipe, reports[0].machine, reports[0].command, points)
+
+
+def growth() -> list[str]:
+    """For each codec, how processor time grows in either row, and what the largest size takes."""
+    heads = ["codec", "row", "largest size", *(f"{name}, exponents" for name in COSTS.values())]
+    heads += [f"{name}, million vertex-frames a second" for name in COSTS.values()]
+    rows = []
+    for grows in ("vertices", "frames"):
+        row = row_of(scale_report().scale, grows)
+        for codec in dict.fromkeys(point.codec for point in row):
+            own = [point for point in row if point.codec == codec and point.encode_cpu_s]
+            last = own[-1]
+            powers = (", ".join(f"{power:.2f}" for power in exponents(own, key)) for key in COSTS)
+            rates = (number(rate_of(last, key), ".2f") for key in COSTS)
+            rows.append((name_of(codec), grows, f"{last.vertices:,} x {last.frames:,}", *powers, *rates))
+    return table(heads, rows)
+
+
+def memory() -> list[str]:
+    """Peak memory at the largest sizes, beside 300 MB and six times the longest segment."""
+    heads = ("codec", "vertices x frames", "segment, frames", "encode, MB", "decode, MB", "300 MB + 6 x segment")
+    rows = []
+    for grows in ("vertices", "frames"):
+        row = row_of(scale_report().scale, grows)
+        for codec in dict.fromkeys(point.codec for point in row):
+            last = [point for point in row if point.codec == codec and point.encode_peak_mb][-1]
+            size = f"{last.vertices:,} x {last.frames:,}"
+            peaks = (number(last.encode_peak_mb, ",.0f"), number(last.decode_peak_mb, ",.0f"))
+            rows.append((name_of(codec), size, f"{last.segment_frames}", *peaks, f"{300 + 6 * last.segment_mb:,.0f}"))
+    return table(heads, rows)
+
+
+def rate_of(point: ScalePoint, key: str) -> float | None:
+    """Million vertex-frames a second of processor time."""
+    seconds = getattr(point, key)
+    return point.vertices * point.frames / 1e6 / seconds if seconds else None
+
+
+def plan() -> list[str]:
+    """What a million short sequences and a capture of ten hours come to, by the rates of real sequences."""
+    results = load("scale/plan")["results"]
+    rows = []
+    for what, kind, count in (
+        ("10^6 sequences of 16 frames, as the ten", "short", 1e6 / len(results)),
+        ("10 hours, 20,000 vertices, 30 frames a second", "whole", 0.0),
+    ):
+        own = [result[kind] for result in results]
+        times = count or CAPTURE[0] * CAPTURE[1] / sum(one["vertices"] * one["frames"] for one in own)
+        raw = 12 * times * sum(one["vertices"] * one["frames"] for one in own)
+        hours = [times * sum(one[key] for one in own) / 3600 for key in COSTS]
+        size = times * sum(one["bytes"] for one in own)
+        rows.append((what, f"{raw / 1e9:,.0f} GB", f"{size / 1e9:.2f} GB", *(f"{hour:,.1f}" for hour in hours)))
+    return table(("what", "float32", "files", "encode, core hours", "decode, core hours"), rows)
+
+
+def name_of(codec: str) -> str:
+    """A codec's name in tables."""
+    return NAMES.get(codec, f"`{codec}`")
+
+
 TABLES: dict[str, Callable[[], list[str]]] = {
     "default-against-published": default_against_published,
     "errors-at-quality-75": errors_at_quality,
@@ -147,12 +226,16 @@ TABLES: dict[str, Callable[[], list[str]]] = {
     "rates-at-bound": rates_at_bound,
     "differences-kg": lambda: differences("kg"),
     "differences-sted": lambda: differences("sted"),
+    "scale-growth": growth,
+    "scale-memory": memory,
+    "scale-points": lambda: scale_table(scale_report().scale).splitlines(),
+    "scale-plan": plan,
 }
 
 
 def heads_of(found: dict[str, dict[str, Points]]) -> list[str]:
     """Column heads of the codecs."""
-    return [NAMES.get(codec, f"`{codec}`") for codec in next(iter(found.values()))]
+    return [name_of(codec) for codec in next(iter(found.values()))]
 
 
 def number(value: float | None, form: str, unit: str = "") -> str:
@@ -177,9 +260,13 @@ def main() -> None:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     points = commands.add_parser("points", help="print every point of a file of results")
     points.add_argument("file", metavar="FILE.json")
+    commands.add_parser("plots", help="draw the pictures of docs/scale.md")
     options = parser.parse_args()
     if options.command == "points":
         print(tables(BenchReport.read(options.file).curves))
+        return
+    if options.command == "plots":
+        draw(scale_report(), DOCS / "plots")
         return
     for page in PAGES:
         page.write_text(fill(page.read_text("utf-8")), "utf-8")
