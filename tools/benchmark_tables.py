@@ -212,6 +212,15 @@ def plan() -> list[str]:
     return table(("what", "float32", "files", "encode, core hours", "decode, core hours"), rows)
 
 
+def cluster() -> list[str]:
+    """Seconds of each way to encode a sequence, and whether its bytes are the first one's."""
+    rows = [
+        (run["what"], f"{run['seconds']:.1f}", f"{run['cpu_seconds']:.1f}", "yes" if run["same_bytes"] else "no")
+        for run in load("scale/cluster")["runs"]
+    ]
+    return table(("run", "seconds", "processor time, s", "same bytes"), rows)
+
+
 def name_of(codec: str) -> str:
     """A codec's name in tables."""
     return NAMES.get(codec, f"`{codec}`")
@@ -229,6 +238,7 @@ TABLES: dict[str, Callable[[], list[str]]] = {
     "scale-growth": growth,
     "scale-memory": memory,
     "scale-points": lambda: scale_table(scale_report().scale).splitlines(),
+    "scale-cluster": cluster,
     "scale-plan": plan,
 }
 
