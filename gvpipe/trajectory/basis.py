@@ -135,7 +135,8 @@ def find_principal(trajectories: Float64, error: float) -> Principal:
     mean = trajectories.mean(axis=0)
     tall = is_tall(trajectories)
     if tall:  # by blocks: a copy of a million vertices' trajectories is large
-        gram = np.sum([smaller_gram(trajectories[rows] - mean) for rows in _row_blocks(len(trajectories))], axis=0)
+        blocks = (trajectories[rows] - mean for rows in _row_blocks(len(trajectories)))
+        gram = np.sum([block.T @ block for block in blocks], axis=0)
     else:
         gram = smaller_gram(trajectories - mean)
     total = float(np.trace(gram))

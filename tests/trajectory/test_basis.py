@@ -6,10 +6,20 @@ import functools
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gvpipe.trajectory.basis import Principal, choose_step, count_components, expected_error
+from gvpipe.trajectory import basis
+from gvpipe.trajectory.basis import (
+    Basis,
+    Principal,
+    choose_step,
+    count_components,
+    expected_error,
+    find_principal,
+    fit_coefficients,
+)
 
 N_POINTS, N_ROWS = 700, 90
 
@@ -62,3 +72,15 @@ def test_steps_do_not_hang_on_the_last_bits_of_eigenvalues() -> None:
         assert choose_step(principal, error, count, left) == choose_step(
             other, error, functools.partial(count_components, other, N_POINTS), left
         )
+
+
+def test_blocks_of_points_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    trajectories = np.cumsum(np.random.default_rng(3).standard_normal((200, 30)), axis=1)
+    at_once = find_principal(trajectories, 1e-3)
+    coefficients = fit_coefficients(trajectories, Basis(at_once.mean, at_once.vectors))
+    monkeypatch.setattr(basis, "LARGE_BLOCK", 32)
+    by_blocks = find_principal(trajectories, 1e-3)
+    np.testing.assert_allclose(by_blocks.energies, at_once.energies, rtol=1e-9)
+    np.testing.assert_allclose(np.abs((by_blocks.vectors * at_once.vectors).sum(axis=0)), 1, atol=1e-6)
+    np.testing.assert_allclose(fit_coefficients(trajectories, Basis(at_once.mean, at_once.vectors)), coefficients, atol=1e-9)
+    assert find_principal(np.zeros((100, 6)), 1e-3).vectors.shape == (6, 0)

@@ -7,8 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from surfaces import affine_maps, bumpy_sheet
 
+from gvcodecs.mcgv.motion import segmentation
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
-from gvcodecs.mcgv.motion.segmentation import LocalAffineFit, segment
+from gvcodecs.mcgv.motion.segmentation import LocalAffineFit, local_motions, segment
 from gvpipe.mesh.topology import adjacency, k_ring
 from gvpipe.sequence import MeshSequence
 
@@ -48,6 +49,20 @@ def test_local_motion_is_the_ridge_regression() -> None:
             wanted, *_ = np.linalg.lstsq(rows, np.vstack([(frame - points)[ring], np.zeros((3, 3))]), rcond=None)
             wanted[3] -= points[ring].mean(axis=0) @ wanted[:3]  # back from the ring's mean to the origin
             np.testing.assert_allclose(motion[v, i], wanted, atol=1e-8)
+
+
+def test_motions_of_large_meshes_keep_distances(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Block by block, on the axes of some points, as at once on the axes of all."""
+    points, faces = bumpy_sheet(20)
+    ring = k_ring(adjacency(faces, len(points)), 3)
+    moved = np.einsum("vi,nij->vnj", points, affine_maps(3)[0]).reshape(len(points), -1)
+    moved += np.random.default_rng(5).normal(0, 1e-4, moved.shape)
+    at_once = local_motions(points, ring, moved)
+    monkeypatch.setattr(segmentation, "LARGE", 150)
+    by_blocks = local_motions(points, ring, moved)
+    distances = [np.linalg.norm(rows[:-1] - rows[1:], axis=1) for rows in (at_once, by_blocks)]
+    assert by_blocks.shape == (len(points), 4 * moved.shape[1])
+    np.testing.assert_allclose(*distances, rtol=1e-6)
 
 
 def two_halves(n_frames: int = 6) -> tuple[MeshSequence, NDArray[np.bool_]]:
