@@ -60,9 +60,9 @@ def test_motions_of_large_meshes_keep_distances(monkeypatch: pytest.MonkeyPatch)
     at_once = local_motions(points, ring, moved)
     monkeypatch.setattr(segmentation, "LARGE", 150)
     by_blocks = local_motions(points, ring, moved)
-    distances = [np.linalg.norm(rows[:-1] - rows[1:], axis=1) for rows in (at_once, by_blocks)]
+    near, far = (np.linalg.norm(rows[:-1] - rows[1:], axis=1) for rows in (at_once, by_blocks))
     assert by_blocks.shape == (len(points), 4 * moved.shape[1])
-    np.testing.assert_allclose(*distances, rtol=1e-6)
+    np.testing.assert_allclose(far, near, rtol=1e-6)
 
 
 def two_halves(n_frames: int = 6) -> tuple[MeshSequence, NDArray[np.bool_]]:
