@@ -23,7 +23,7 @@ from typing import Any
 
 from gvpipe.benchmark.bd_rate import average_rate_difference, rate_at
 from gvpipe.benchmark.report import BenchReport
-from gvpipe.benchmark.scale import exponents
+from gvpipe.benchmark.scale import FEW_FRAMES, exponents
 from gvpipe.benchmark.scale_plots import draw, row_of
 from gvpipe.benchmark.scale_report import ScalePoint, ScaleReport
 from gvpipe.benchmark.scale_report import table as scale_table
@@ -168,6 +168,7 @@ def growth() -> list[str]:
         row = row_of(scale_report().scale, grows)
         for codec in dict.fromkeys(point.codec for point in row):
             own = [point for point in row if point.codec == codec and point.encode_cpu_s]
+            own = [point for point in own if grows == "vertices" or point.frames != FEW_FRAMES]  # that one is of the other row
             last = own[-1]
             powers = (", ".join(f"{power:.2f}" for power in exponents(own, key)) for key in COSTS)
             rates = (number(rate_of(last, key), ".2f") for key in COSTS)

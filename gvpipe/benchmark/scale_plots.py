@@ -1,4 +1,4 @@
-"""Time and memory against vertices and against frames, from a scale report alone, log axes.
+"""Processor time and memory against vertices and against frames, from a scale report alone, log axes.
 
 A grey line through the largest size shows what would grow as vertices times frames do. Dotted: memory of 300 MB and six times
 the longest segment's positions as float32.
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 ROWS = {"vertices": "frames", "frames": "vertices"}  # what grows, and what stays
 PANELS = {
-    "encode_s": "encode, s",
-    "decode_s": "decode, s",
+    "encode_cpu_s": "encode, processor time, s",
+    "decode_cpu_s": "decode, processor time, s",
     "encode_peak_mb": "encode, peak MB",
     "decode_peak_mb": "decode, peak MB",
 }
