@@ -461,7 +461,10 @@ def checked_keywords(codec: str | Codec | Sequence[Codec] | None = None, **keywo
     settings = {name: value for name, value in keywords.items() if name not in KEYWORDS}
     others = {name: value for name, value in keywords.items() if name in KEYWORDS}
     _check_wanted([others.get(name) for name in TARGETS], *(others.get(name, False) for name in LAYOUTS))
-    return {**others, "codec": _candidates(codec, settings, others.get("purpose"))}
+    given = _candidates(codec, settings, others.get("purpose"))
+    if others.get("memory") is not None:
+        fit_segments(given, 1, others["memory"])
+    return {**others, "codec": given}
 
 
 def _check_wanted(values: Sequence[float | str | None], stream: bool, bare: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import replace
 from types import TracebackType
@@ -13,6 +14,7 @@ from gvpipe.arguments import StrPath
 from gvpipe.arrays import Array, Float32, Integers
 from gvpipe.codec import Codec, LiveCoder
 from gvpipe.container.live_writer import LiveWriter
+from gvpipe.container.segments import MAX_SEGMENT
 from gvpipe.container.sources import check_video_target
 from gvpipe.errors import InputError, SettingError
 from gvpipe.origin import narrow
@@ -20,6 +22,7 @@ from gvpipe.registry import make_codec
 from gvpipe.rendering.poster import make_poster
 from gvpipe.sequence import MeshSequence, check_finite
 
+FRAMES = "the frames"  # their name in messages
 CLIP_SECONDS = 1.0  # of a clip, unless its frames are set: who watches is at most two clips behind
 
 
@@ -32,7 +35,7 @@ class LiveEncoder:
     Memory is that of one clip. The frame that completes a clip waits until the clip is coded and on the disk.
 
     Args:
-        path: the ``.mp4`` to write; an older file is replaced when the first frame comes.
+        path: the ``.mp4`` to write, a new name: it is written in place from the first frame on, so no older file would be safe.
         faces: ``(T, 3)`` triangles.
         fps: frames per second.
         codec: id of one that can code frames as they come: ``"pdct"``.
@@ -40,11 +43,13 @@ class LiveEncoder:
 
     Raises:
         SettingError: a setting is out of range, or the codec cannot do this.
+        InputError: the path is taken, or the frame rate is no positive number.
     """
 
     def __init__(self, path: StrPath, faces: Integers, fps: float = 30.0, codec: str = "pdct", **settings: Any) -> None:
         check_video_target(path, "the file to write")
-        self.path, self.fps = os.fspath(path), float(fps)
+        self.path, self.fps = os.fspath(path), _checked_fps(fps)
+        _check_free(self.path)
         self._faces: Any = faces
         self._codec = _live_codec(codec, self.fps, settings)
         self._coder: LiveCoder | None = None
@@ -107,7 +112,8 @@ class LiveEncoder:
         """Write the file up to its first clip."""
         if positions.ndim != 2:
             raise InputError(f"frame 0 has shape {positions.shape}; (vertices >= 1, 3) is needed")
-        first = MeshSequence(positions[None], self._faces, self.fps, name="frame 0")
+        _check_free(self.path)
+        first = MeshSequence(positions[None], self._faces, self.fps, name=FRAMES)
         frame = first.read(0, 1)[0]
         start: Any = self._codec
         coder: LiveCoder = start.start_live(frame, first.faces, self.fps)
@@ -130,11 +136,14 @@ class LiveEncoder:
                 f"frame {self.n_frames} has shape {positions.shape}, frame 0 has {wanted}; the mesh must not change"
             )
         if self.n_frames >= self._coder.most_clips * self.clip_frames:
-            raise InputError(f"{self.path} is full: {self._coder.most_clips} clips; close it, and open another for more frames")
+            raise InputError(
+                f"{self.path} is full: {self._coder.most_clips} clips of {self.clip_frames} frames; go on in another file, or "
+                "start with longer clips (segment)"
+            )
         if positions.dtype.kind not in "fiu":
             raise InputError(f"frame {self.n_frames} has type {positions.dtype}; numbers are needed")
         frame = narrow(positions[None], self._first.origin)
-        check_finite(frame, "live", self.n_frames)
+        check_finite(frame, FRAMES, self.n_frames)
         result: Float32 = frame[0]
         return result
 
@@ -157,8 +166,20 @@ def open_live(path: StrPath, faces: Integers, fps: float = 30.0, codec: str = "p
 
 def _live_codec(codec: str, fps: float, settings: dict[str, Any]) -> Codec:
     if "clip" not in settings and "segment" not in settings:
-        settings = {**settings, "segment": max(1, round(CLIP_SECONDS * fps))}
+        settings = {**settings, "segment": min(max(1, round(CLIP_SECONDS * fps)), MAX_SEGMENT)}
     made = make_codec(codec, settings, ("path", "faces", "fps", "codec"))
     if not hasattr(made, "start_live"):
         raise SettingError(f"codec {codec} needs all frames at once; pdct codes them as they come")
     return made
+
+
+def _checked_fps(fps: float) -> float:
+    if isinstance(fps, bool) or not isinstance(fps, int | float) or not 0 < fps < math.inf:
+        raise InputError(f"fps is {fps!r}; a positive number is needed")
+    return float(fps)
+
+
+def _check_free(path: str) -> None:
+    """Refuse a path where something is already: a failed or killed capture would have destroyed it."""
+    if os.path.lexists(path):
+        raise InputError(f"{path} is there already, and a live file is written in place; give a new name, or remove it")

@@ -39,14 +39,15 @@ def _fit(codec: Codec, n_vertices: int, memory: int) -> Codec:
     if factor is None:
         others = " or ".join(name for name in codec_ids() if hasattr(codec_class(name), "memory_factor"))
         raise SettingError(
-            f"codec {codec.id} fits all frames together, so shorter segments save no memory; choose codec {others}"
+            f"codec {codec.id} fits all frames together, so shorter segments save no memory; leave memory out, or choose "
+            f"{others}"
         )
     per_frame = factor * PER_POSITION * n_vertices
     longest = int((memory - FIXED - PER_VERTEX * n_vertices) / per_frame)
     if longest < 1:
         least = (FIXED + PER_VERTEX * n_vertices + per_frame) / MEGABYTE
         raise SettingError(
-            f"{memory / MEGABYTE:.0f} MB of memory are too little for {n_vertices} vertices: codec {codec.id} takes about "
+            f"{memory / MEGABYTE:.4g} MB of memory are too little for {n_vertices} vertices: codec {codec.id} takes about "
             f"{least:.0f} MB for one frame; allow more, or encode parts of the mesh"
         )
     names = [name for name in ("segment", "clip") if getattr(codec, name, 0)]

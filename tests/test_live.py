@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -164,7 +165,7 @@ def test_what_cannot_be_appended(tmp_path: Path) -> None:
     live = gvpipe.open_live(path, SEQUENCE.faces, segment=2)
     frame = SEQUENCE.read(0, 1)[0]
     for wrong in (frame[:4], np.zeros(3), np.full_like(frame, np.nan)):
-        with pytest.raises(InputError, match="frame 0"):
+        with pytest.raises(InputError, match="the frames: |frame 0 has"):
             live.append(wrong)
     assert not path.exists()
     live.append(frame)
@@ -202,16 +203,38 @@ def test_what_cannot_be_started(tmp_path: Path) -> None:
     assert not (tmp_path / "a.mp4").exists()
 
 
-def test_clips_last_a_second_and_an_older_file_stays_until_a_frame_comes(tmp_path: Path) -> None:
+def test_clips_last_a_second_and_the_file_is_finished_whatever_happens(tmp_path: Path) -> None:
     path = tmp_path / "a.mp4"
-    path.write_bytes(b"older")
     live = gvpipe.open_live(path, SEQUENCE.faces, fps=24)
-    assert live.clip_frames == 24 and path.read_bytes() == b"older"
+    assert live.clip_frames == 24
     with pytest.raises(ZeroDivisionError), live:
         live.append(SEQUENCE.read(0, 1)[0])
-        assert path.read_bytes() != b"older"
         raise ZeroDivisionError
-    assert len(gvpipe.open(path)) == 1  # finished all the same
+    assert len(gvpipe.open(path)) == 1
+
+
+def test_an_older_file_stays(tmp_path: Path) -> None:
+    """A capture that fails or is killed would have destroyed it; and two captures of one name are one too many."""
+    path = tmp_path / "a.mp4"
+    path.write_bytes(b"older")
+    with pytest.raises(InputError, match=r"a\.mp4 is there already.*give a new name, or remove it"):
+        gvpipe.open_live(path, SEQUENCE.faces)
+    assert path.read_bytes() == b"older"
+    path.unlink()
+    first, second = (gvpipe.open_live(path, SEQUENCE.faces) for _ in range(2))
+    first.append(SEQUENCE.read(0, 1)[0])
+    with pytest.raises(InputError, match="is there already"):
+        second.append(SEQUENCE.read(0, 1)[0])
+    second.close()
+    first.close()
+    assert len(gvpipe.open(path)) == 1
+
+
+@pytest.mark.parametrize("fps", [0, -3, float("nan"), float("inf"), True, "30", None])
+def test_frame_rates_that_are_none(fps: Any, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"fps is .*; a positive number is needed"):
+        gvpipe.open_live(tmp_path / "a.mp4", SEQUENCE.faces, fps)
+    assert gvpipe.open_live(tmp_path / "a.mp4", SEQUENCE.faces, 1e9).clip_frames == 100_000
 
 
 def test_positions_far_from_the_origin(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ def test_too_little_memory_names_what_is_needed() -> None:
         SettingError, match=r"500 MB of memory are too little for 1000000 vertices.*about 1160 MB for one frame"
     ):
         fit_segments(make_codec("pca", {}), 1_000_000, 500_000_000)
-    with pytest.raises(SettingError, match="codec mcgv fits all frames together.*choose codec laplacian or pca or pdct"):
+    with pytest.raises(SettingError, match="codec mcgv fits all frames.*leave memory out, or choose laplacian or pca or pdct"):
         fit_segments([make_codec("pca", {}), make_codec("mcgv", {})], 1000, 10**9)
 
 

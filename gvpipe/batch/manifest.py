@@ -108,7 +108,8 @@ def open_manifest(folder: Path, settings: Mapping[str, Any]) -> Iterator[Manifes
         entries = {}
         for number, line in enumerate(whole.splitlines(), 1):
             entry = _parse(line, f"{path}, line {number}")
-            _check_settings(entry.settings, settings, path)
+            if entry.error is None:  # what failed leaves no file of its settings
+                _check_settings(entry.settings, settings, path)
             entries[entry.output] = entry
         if len(whole) < len(data):
             _check_cut(data[len(whole) :], path)

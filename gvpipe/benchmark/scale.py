@@ -18,7 +18,7 @@ import gvpipe
 from gvpipe import api, files
 from gvpipe.benchmark.own_process import measure_command
 from gvpipe.benchmark.scale_report import ScalePoint, ScaleReport
-from gvpipe.benchmark.sweep import describe_machine
+from gvpipe.benchmark.sweep import describe_machine, settings_of
 from gvpipe.benchmark.torus import make_torus
 from gvpipe.codec import Progress
 from gvpipe.container.segments import count_longest
@@ -51,6 +51,8 @@ def run(
     Raises:
         InputError: a codec, a setting or a size cannot be used, or a command failed.
     """
+    for codec in codecs:  # before hours of work, not after
+        settings_of(codec, [75], {})
     rows = [[(each, FEW_FRAMES) for each in sorted(vertices)], [(FEW_VERTICES, each) for each in sorted(frames)]]
     points = []
     n_all, n_done = len(codecs) * sum(map(len, rows)), 0

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gvpipe.benchmark.json_results import NUMBER, checked, read_results, write_results
+from gvpipe.benchmark.json_results import NUMBER, WrongValue, checked, read_results, write_results
 
 REPORT_TYPES = {"gvpipe": str, "machine": dict, "command": list, "scale": list}
 BYTES_PER_POSITION = 12  # three float32
@@ -85,6 +85,8 @@ class ScaleReport:
         """Mirror of `to_json`; raises `WrongValue`."""
         values = checked(given, REPORT_TYPES, "the file")
         points = [checked(point, POINT_TYPES, f"point {i}") for i, point in enumerate(values["scale"])]
+        if any(min(point["vertices"], point["frames"]) < 1 for point in points):
+            raise WrongValue("a point has no vertex or no frame")
         scale = [ScalePoint(**{key: point[key] for key in POINT_TYPES}) for point in points]
         return cls(values["gvpipe"], values["machine"], values["command"], scale)
 

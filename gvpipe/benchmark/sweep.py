@@ -72,7 +72,7 @@ def run(
     """
     texts = dict(texts or {})
     for codec in codecs:  # before hours of work, not after
-        _settings(codec, qualities, texts)
+        settings_of(codec, qualities, texts)
     curves: list[Curve] = []
     for source in sources:
         for codec in codecs:
@@ -85,7 +85,7 @@ def run(
 def measure_curve(source: str, codec: str, qualities: list[float], texts: dict[str, str]) -> Curve:
     """Measure one codec on one sequence, in this process."""
     sequence = files.read(source)
-    settings = _settings(codec, sorted(qualities), texts)
+    settings = settings_of(codec, sorted(qualities), texts)
     points = []
     with tempfile.TemporaryDirectory() as folder:
         warm = Path(folder) / "warm.mp4"
@@ -118,7 +118,7 @@ def name_of(source: str) -> str:
     return Path(source).stem or source
 
 
-def _settings(codec: str, qualities: Sequence[float], texts: Mapping[str, str]) -> list[Any]:
+def settings_of(codec: str, qualities: Sequence[float], texts: Mapping[str, str]) -> list[Any]:
     """A codec's settings at each quality; raises `InputError` for what it does not have."""
     name, *pairs = codec.split(":")
     if any("=" not in pair for pair in pairs):

@@ -85,6 +85,8 @@ def _check_options(sources: tuple[str, ...], scale: bool, options: dict[str, Any
     if strange:
         name = "--set" if strange == "pairs" else f"--{strange}"
         raise click.UsageError(f"{name} is {'not for --scale, which has default settings' if scale else 'for --scale alone'}")
+    if options["limit"] is not None and not options["limit"] < float("inf"):
+        raise click.UsageError(f"--limit {options['limit']}: a number of seconds is needed")
     if scale and sources:
         raise click.UsageError(f"--scale makes its own sequences; leave {' '.join(sources)} out")
     if not scale and not sources:

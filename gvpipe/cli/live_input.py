@@ -66,9 +66,15 @@ def encode_live(
     sequence = read(mesh)
     made = codec_class(codec or CODEC).from_texts(settings)
     given: dict[str, Any] = {key: getattr(made, key) for key in settings}
-    with open_live(target, sequence.faces, fps or sequence.fps, codec or CODEC, **given) as live:
-        for frame in read_frames(sys.stdin.buffer, sequence.n_vertices):
-            live.append(frame)
+    live = open_live(target, sequence.faces, sequence.fps if fps is None else fps, codec or CODEC, **given)
+    try:
+        with live:
+            for frame in read_frames(sys.stdin.buffer, sequence.n_vertices):
+                live.append(frame)
+    except InputError as exc:
+        if not live.n_written:
+            raise
+        raise InputError(f"{exc}; {target} is finished, with the {live.n_written} frames before") from exc
     if not live.n_frames:
         raise InputError(f"{STDIN} is empty; pipe frames into it, {BYTES_PER_VERTEX * sequence.n_vertices} bytes each")
     counts = (sequence.n_vertices, len(sequence.faces), live.n_frames, live.fps)
@@ -81,7 +87,7 @@ def read_frames(file: IO[bytes], n_vertices: int) -> Iterator[Float32]:
     while data := file.read(size):
         if len(data) < size:
             raise InputError(
-                f"{STDIN} ends after {len(data)} of the {size} bytes of frame {count}; the file has the frames before"
+                f"{STDIN} ends after {len(data)} of the {size} bytes of frame {count}: {n_vertices} vertices, as --mesh has"
             )
         yield np.frombuffer(data, "<f4").reshape(n_vertices, 3)
         count += 1

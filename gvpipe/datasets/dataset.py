@@ -40,7 +40,7 @@ class Dataset:
         unlimited: as for `gvpipe.open`, of every file in it.
 
     Raises:
-        InputError: there is no such shard, or two samples have one key.
+        InputError: there is no such shard, no sample, or two samples have one key.
         FormatError: a shard is cut or damaged; the message names shard, sample and byte.
     """
 
@@ -56,6 +56,8 @@ class Dataset:
             first = self._numbers.setdefault(sample.key, number)
             if first != number:
                 raise InputError(f"sample {sample.key!r} is in {self.shards[self._places[first][0]]} and in {self.shards[k]}")
+        if not self._places:
+            raise InputError(f"{', '.join(self.shards)}: no sample is in it (NAME.mp4); gvpipe pack makes shards")
         self._shared = SharedParts()
 
     def __len__(self) -> int:
@@ -63,6 +65,9 @@ class Dataset:
 
     def __getitem__(self, sample: int | str) -> Any:
         return self.samples()[sample]
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._numbers
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         return iter(self.samples())

@@ -21,7 +21,7 @@ def open(shards: StrPath | Sequence[StrPath], *, unlimited: bool = False) -> Dat
         unlimited: as for `gvpipe.open`, of every file in it.
 
     Raises:
-        InputError: there is no such shard, or two samples have one key.
+        InputError: there is no such shard, no sample, or two samples have one key.
         FormatError: a shard is cut or damaged; the message names shard, sample and byte.
         TypeError: it is no path.
     """
@@ -35,6 +35,8 @@ def find_shards(shards: StrPath | Sequence[StrPath]) -> list[str]:
     for one in given:
         path = os.fspath(check_path(one, "the shards", "a list of paths or "))
         check_source(path)
+        if os.path.isdir(path):
+            raise InputError(f"{path} is a folder; give its shards, such as {os.path.join(path, '*.tar')}")
         matches = [path] if os.path.exists(path) else sorted(glob.glob(path), key=natural_key)
         if not matches:
             raise InputError(f"{path}: no such shard; check the path")

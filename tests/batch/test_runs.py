@@ -111,10 +111,18 @@ def test_refused_before_anything_runs(tmp_path: Path) -> None:
         with pytest.raises(SettingError, match=words):
             encode_all("in", "out", **options)
     assert not (tmp_path / "out").exists()
+    with pytest.raises(SettingError, match="shorter segments save no memory"):
+        encode_all("in", "out", "mcgv", memory=10**9)
+    assert not (tmp_path / "out").exists()
+
+
+def test_other_settings_are_refused_where_files_have_those(inputs: Path, tmp_path: Path) -> None:
     (tmp_path / "bad.npz").write_text("")
-    encode_all("bad.npz", "out", "pca")
+    assert encode_all("bad.npz", "out", "pca", workers=1).failed
+    assert encode_all("bad.npz", "out", "pdct", workers=1).failed  # no file is of the first settings
+    assert encode_all("in", "out", "pdct", workers=1).encoded
     with pytest.raises(InputError, match="other settings"):
-        encode_all("in", "out", "pdct")
+        encode_all("in", "out", "pca", workers=1)
 
 
 def test_hashes_cover_all_frames_and_the_mesh(tmp_path: Path) -> None:

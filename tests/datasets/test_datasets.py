@@ -205,7 +205,8 @@ def test_names_that_lead_out_are_refused(name: str, tmp_path: Path) -> None:
 
 
 def test_hostile_members(tmp_path: Path) -> None:
-    assert len(datasets.open(_write(tmp_path / "a.tar", ("a.mp4", b"", _link), ("b.txt", b"x", _keep)))) == 0
+    with pytest.raises(InputError, match=r"a\.tar: no sample is in it"):
+        datasets.open(_write(tmp_path / "a.tar", ("a.mp4", b"", _link), ("b.txt", b"x", _keep)))
     with pytest.raises(CorruptFile, match="'a.mp4' at byte .* occurs twice"):
         datasets.open(_write(tmp_path / "b.tar", ("a.mp4", b"x", _keep), ("a.mp4", b"y", _keep)))
     huge = bytearray(_write(tmp_path / "c.tar", ("a.mp4", b"", _keep)).read_bytes())
@@ -234,6 +235,13 @@ def test_one_key_in_two_shards_is_refused(shards: Path, tmp_path: Path) -> None:
         datasets.open([shards / "set-001.tar", tmp_path / "set.tar"])
     with pytest.raises(InputError, match="no such shard"):
         datasets.open(tmp_path / "none-*.tar")
+    with pytest.raises(InputError, match=r"is a folder; give its shards, such as .*\*\.tar"):
+        datasets.open(tmp_path)
+
+
+def test_keys_are_in_it(shards: Path) -> None:
+    data = datasets.open(shards / "set-001.tar")
+    assert "s10" in data and "none" not in data and 0 not in data
 
 
 def test_pack_refuses(folder: Path, shards: Path, tmp_path: Path) -> None:
