@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gvpipe.arguments import StrPath, check_path
+from gvpipe.batch.manifest import NAME
 from gvpipe.container.sources import check_source, check_target
 from gvpipe.errors import InputError
 from gvpipe.io import READERS
@@ -69,15 +70,16 @@ def find_jobs(sources: Sequence[StrPath], folder: StrPath) -> Found:
         n_before = len(jobs) + len(left_out)
         root, files = _list(source)
         for file in files:
-            if file.lower().endswith(VIDEO_SUFFIXES) and os.path.realpath(file).startswith(own + os.sep):
-                continue  # an output of another run
+            if file.lower().endswith((*VIDEO_SUFFIXES, NAME)) and os.path.realpath(file).startswith(own + os.sep):
+                continue  # an output of another run, or its manifest
             job = _job(root, file)
             if job is None:
                 left_out.append(file)
             else:
                 _add(jobs, job, own)
         if len(jobs) + len(left_out) == n_before and not files:
-            raise InputError(f"{source}: no file matches; check the path and put it in quotes")
+            remedy = "give a folder with sequences" if os.path.isdir(source) else "check the path and put it in quotes"
+            raise InputError(f"{source}: no file {'is in it' if os.path.isdir(source) else 'matches'}; {remedy}")
     if not jobs:
         raise InputError(f"{', '.join(map(str, sources))}: no sequence among {len(left_out)} files{_names(left_out)}")
     return Found(sorted(jobs.values()), left_out)

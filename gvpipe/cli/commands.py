@@ -279,6 +279,7 @@ def pack(folder: str, target: str, shard_size: str, shard_count: int | None, unl
     """
     from gvpipe import datasets
     from gvpipe.cli.choices import parse_bytes
+    from gvpipe.notes import count
 
     limit = parse_bytes("--shard-size", shard_size)
     with out.progress() as progress:
@@ -288,8 +289,8 @@ def pack(folder: str, target: str, shard_size: str, shard_count: int | None, unl
     out.json(packed.to_json())
     for reason in packed.left_out.values():
         out.note(f"left out: {reason}")
-    shards = f"{len(packed.shards)} shard{'s' if len(packed.shards) != 1 else ''}"
-    out.text(f"{folder} -> {target} ({packed.sequences} sequences, {shards}, {_size(packed.bytes)})")
+    counts = f"{count(packed.sequences, 'sequence')}, {count(len(packed.shards), 'shard')}"
+    out.text(f"{folder} -> {target} ({counts}, {_size(packed.bytes)})")
     if packed.left_out:
         raise InputError(f"{len(packed.left_out)} files of {folder} are left out; {next(iter(packed.left_out.values()))}")
 

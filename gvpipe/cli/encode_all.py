@@ -27,18 +27,19 @@ def encode_all(
     that fails is listed in the end, and the exit status is 1.
     """
     from gvpipe.batch.runs import encode_all
+    from gvpipe.notes import count
 
     asked = parse_encoding(options)
 
     with out.progress() as progress:
         report = encode_all(sources, folder, asked.codec, progress, workers=workers, scheduler=scheduler, **asked.keywords)
-    for note, count in report.notes.items():
-        out.note(f"{note} ({count} of {report.sequences} sequences)")
+    for note, number in report.notes.items():
+        out.note(f"{note} ({number} of {count(report.sequences, 'sequence')})")
     if report.left_out:
-        out.note(f"{report.left_out} files are of no format that gvpipe reads, and were left out")
+        out.note(f"left out, of no format that gvpipe reads: {count(report.left_out, 'file')}")
     out.json(report.to_json())
     counts = f"{report.encoded} encoded, {report.skipped} were done, {len(report.failed)} failed"
-    out.text(f"{report.sequences} sequences: {counts}; {report.bytes / 1e6:.2f} MB in {report.seconds:.1f} s")
+    out.text(f"{count(report.sequences, 'sequence')}: {counts}; {report.bytes / 1e6:.2f} MB in {report.seconds:.1f} s")
     out.text(f"manifest: {report.manifest}")
     for failed in report.failed:
         name, error = failed["input"], failed["error"]

@@ -8,13 +8,14 @@ from gvpipe.cli.console import Output
 def show_shards(source: str, unlimited: bool, out: Output) -> None:
     """Sum up shards, and check every sample in them; raises as `gvpipe.datasets.summarise`."""
     from gvpipe.datasets.summary import summarise
+    from gvpipe.notes import count
 
     with out.progress() as progress:
         found = summarise(source, progress, unlimited=unlimited)
     out.json(found.to_json())
     n_shards = "" if found.shards == 1 else f" in {found.shards} shards"
-    codecs = ", ".join(f"{count} {name}" for name, count in found.codecs.items())
-    out.text(f"{source}: {found.sequences} sequences{n_shards} ({codecs})")
+    codecs = ", ".join(f"{number} {name}" for name, number in found.codecs.items())
+    out.text(f"{source}: {count(found.sequences, 'sequence')}{n_shards} ({codecs})")
     for name, counts in (("vertices", found.vertices), ("frames", found.frames)):
         out.text(f"{name}: {counts['least']} to {counts['most']}, {counts['all']} in all")
     out.text(f"triangles: {found.triangles} in all")

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from gvpipe.arguments import show
 from gvpipe.arrays import Float32, Int32
 from gvpipe.codec import ClosableReader, FrameReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
@@ -90,12 +91,16 @@ class Dataset:
 
         Raises:
             IndexError, KeyError: there is no such sample.
+            InputError: there is no such level.
+            TypeError: ``frames`` is no slice, or ``lod`` no integer.
             FormatError: the sample is cut or damaged.
         """
+        _check_view(frames, lod)
         return self._decode(self.number(sample), frames, lod, False)[0]
 
     def faces(self, sample: int | str, lod: int = 0) -> Int32:
         """Return the triangles of a sequence, ``(T, 3) int32``, at a level of detail as `read` takes it."""
+        _check_view(ALL, lod)
         return self._decode(self.number(sample), slice(0, 0), lod, True)[1]
 
     def description(self, sample: int | str) -> dict[str, Any]:
@@ -136,6 +141,8 @@ class Dataset:
         Raises:
             InputError: the size is below 1.
         """
+        if isinstance(size, bool) or not isinstance(size, int):
+            raise TypeError(f"the size of batches is {show(size)}; an integer is needed")
         if size < 1:
             raise InputError(f"a batch of {size} samples; give 1 or more")
         order = np.arange(len(self)) if seed is None else np.random.default_rng(seed).permutation(len(self))
@@ -200,6 +207,9 @@ class Samples:
     def __init__(
         self, dataset: Dataset, frames: slice = ALL, lod: int = 0, transform: Callable[[dict[str, Any]], Any] | None = None
     ) -> None:
+        _check_view(frames, lod)
+        if transform is not None and not callable(transform):
+            raise TypeError(f"transform is {show(transform)}; a function of a sample is needed")
         self._dataset, self._frames, self._lod, self._transform = dataset, frames, lod, transform
 
     def __len__(self) -> int:
@@ -223,9 +233,16 @@ def _source(path: str) -> FileSource:
         raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check the path and its permissions") from exc
 
 
-def _clip_level(reader: FrameReader, lod: int) -> int:
+def _check_view(frames: object, lod: object) -> None:
+    if not isinstance(frames, slice):
+        raise TypeError(f"frames are {show(frames)}; a slice is needed, such as slice(0, 8)")
+    if isinstance(lod, bool) or not isinstance(lod, int):
+        raise TypeError(f"lod is {show(lod)}; an integer is needed")
     if lod < 0:
         raise InputError(f"no level of detail {lod}; 0 is the mesh, higher ones are coarser")
+
+
+def _clip_level(reader: FrameReader, lod: int) -> int:
     return min(lod, len(reader.levels) - 1) if lod and isinstance(reader, LevelReader) else 0
 
 

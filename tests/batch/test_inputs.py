@@ -78,3 +78,16 @@ def test_refused_before_anything_runs(sources: list[str], folder: str, words: st
         return
     with pytest.raises(InputError, match=words):
         find_jobs(sources, folder)
+
+
+def test_what_an_earlier_run_wrote_is_no_input(tmp_path: Path) -> None:
+    own, out = tmp_path / "own", tmp_path / "own" / "out"
+    out.mkdir(parents=True)
+    (own / "a.npz").write_text("")
+    for name in ("a.mp4", "manifest.jsonl"):
+        (out / name).write_text("")
+    found = find_jobs([str(own)], out)
+    assert len(found.jobs) == 1 and found.left_out == []
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="empty: no file is in it; give a folder with sequences"):
+        find_jobs([str(tmp_path / "empty")], out)

@@ -148,7 +148,7 @@ def test_command(inputs: Path, tmp_path: Path, run: Run) -> None:
     (inputs / "bad.npz").unlink()
     (inputs / "notes.txt").touch()
     second = run("encode-all", "in", "out", *options)
-    assert (second.status, second.err) == (0, "Note: 1 files are of no format that gvpipe reads, and were left out\n")
+    assert (second.status, second.err) == (0, "Note: left out, of no format that gvpipe reads: 1 file\n")
     assert "2 sequences: 0 encoded, 2 were done, 0 failed" in second.out
     assert run("encode-all", "in", "out", "--codec", "pca", "--quality", "5").err.count("other settings") == 1
 

@@ -24,7 +24,7 @@ def test_pack_and_info(tmp_path: Path) -> None:
     packed = run.invoke(cli, ["pack", str(folder), target, "--shard-size", "1MB", "--json"], catch_exceptions=False)
     assert json.loads(packed.stdout)["shards"] == [str(tmp_path / "set-00.tar")]
     text = run.invoke(cli, ["info", str(tmp_path / "set-*.tar")], catch_exceptions=False).stdout
-    assert "1 sequences (1 pca)" in text and "vertices: 25 to 25" in text and "worst max_diag: 0.0005, sample a" in text
+    assert "1 sequence (1 pca)" in text and "vertices: 25 to 25" in text and "worst max_diag: 0.0005, sample a" in text
     (folder / "b.mp4").write_bytes(b"no video")
     left = run.invoke(cli, ["pack", str(folder), str(tmp_path / "more.tar")])
     assert isinstance(left.exception, InputError) and "1 files of" in str(left.exception) and "b.mp4" in str(left.exception)

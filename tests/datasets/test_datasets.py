@@ -10,7 +10,7 @@ import tarfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -267,3 +267,19 @@ def test_summary(shards: Path) -> None:
     assert found.worst == {"max_diag": {"value": 0.001, "sample": "s2"}}
     assert found.bytes == sum(path.stat().st_size for path in shards.glob("*.tar"))
     assert found.ratio == pytest.approx(12 * 81 * 18 / found.video_bytes)
+
+
+def test_wrong_types_are_named(shards: Path) -> None:
+    data = datasets.open(shards / "set-001.tar")
+    wrong: Any = 3
+    for call, message in (
+        (lambda: data.read(0, frames=wrong), r"frames are .*; a slice is needed"),
+        (lambda: data.read(0, lod=cast("Any", "2")), r"lod is .*; an integer is needed"),
+        (lambda: data.samples(lod=cast("Any", 1.5)), r"lod is .*; an integer is needed"),
+        (lambda: data.samples(transform=wrong), r"transform is .*; a function"),
+        (lambda: data.batches(cast("Any", "2")), r"the size of batches is .*; an integer"),
+    ):
+        with pytest.raises(TypeError, match=message):
+            call()
+    with pytest.raises(InputError, match="no level of detail -1"):
+        data.samples(lod=-1)
