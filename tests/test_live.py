@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from clips import coded_stream
 from file_server import serving
 from sequences import waving
@@ -17,11 +18,13 @@ from fuzz.live import join_live, split_live
 from fuzz.videos import FILE
 from gvcodecs.pdct import StreamReader
 from gvcodecs.pdct.encoder import ClipCoder
+from gvpipe.cli.commands import cli
 from gvpipe.container import mp4
 from gvpipe.container.bitstream import HEADER
 from gvpipe.container.live_writer import LiveWriter
 from gvpipe.container.stream_layout import INDEX_UUID, ROOM_UUID
 from gvpipe.errors import CorruptFile, FormatError, InputError, OutputError, SettingError, TruncatedFile
+from gvpipe.player import UNFINISHED
 from gvpipe.registry import open_reader
 
 CLIP, N_FRAMES = 4, 11
@@ -277,3 +280,10 @@ def test_a_clip_that_cannot_be_coded_is_left_out(tmp_path: Path, monkeypatch: py
     live.append(frames[4])
     live.close()
     assert len(gvpipe.open(tmp_path / "a.mp4")) == 3
+
+
+@pytest.mark.parametrize("lod", [(), ("--lod", "0")])
+def test_decoding_an_unfinished_file_says_so(lod: tuple[str, ...], states: list[bytes], tmp_path: Path) -> None:
+    (tmp_path / "a.mp4").write_bytes(states[CLIP])
+    words = ["decode", str(tmp_path / "a.mp4"), str(tmp_path / "a.npz"), "--json", *lod]
+    assert json.loads(CliRunner().invoke(cli, words).stdout)["notes"] == [UNFINISHED]

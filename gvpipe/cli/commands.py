@@ -224,6 +224,7 @@ def decode(
     """
     from gvpipe import api, files, notes
     from gvpipe.cli.choices import chosen, chosen_frames
+    from gvpipe.player import UNFINISHED
 
     out = out.carrying(target)
     first, last = chosen_frames(start, stop, frames)
@@ -235,6 +236,7 @@ def decode(
         noticed = files.write(sequence.local() if local else sequence, path, start)
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
     noticed += level.notes if lod else ()
+    noticed += [UNFINISHED] if player.bitstream.is_unfinished and UNFINISHED not in noticed else []
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
