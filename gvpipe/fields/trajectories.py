@@ -19,7 +19,7 @@ import numpy as np
 from gvpipe.arrays import Float64
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block
-from gvpipe.container.segments import LARGEST_STEP
+from gvpipe.container.segments import LARGEST_STEP, SMALLEST_STEP
 from gvpipe.fields.residual_coding import LARGEST, decode_residuals, encode_residuals
 from gvpipe.trajectory.basis import Basis, decode_basis, reduce_trajectories
 from gvpipe.trajectory.causal_order import CausalOrder
@@ -73,7 +73,7 @@ def decode_trajectories(
     n_frames, n_axes = shape
     cursor = Cursor(data, name)
     (step,) = cursor.struct(STEP)
-    if not 0 < step <= LARGEST_STEP:  # NaN neither
+    if not SMALLEST_STEP <= step <= LARGEST_STEP:  # NaN neither; the square of a smaller one may be 0, by which weights divide
         raise cursor.corrupt(f"a step of coefficients is {step}")
     n_rows = len(causal.order)
     basis = decode_basis(cursor.block(), n_frames, n_rows, step, name, n_axes, budget=budget)

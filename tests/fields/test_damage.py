@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from gvpipe.container.cursor import varint
 from gvpipe.errors import CorruptFile
 from gvpipe.fields.reader import FieldReader
 from gvpipe.fields.segment import MODES
+from gvpipe.fields.trajectories import STEP, decode_trajectories
 from gvpipe.fields.values import FieldBound
 
 VALUES = wave(n_frames=10, n_components=2)
@@ -65,3 +67,11 @@ def test_a_small_file_asks_for_little() -> None:
     with pytest.raises(CorruptFile):
         FieldReader(bytes([1, 0]) + varint(1) + varint(1) + bytes(100), 1 << 24, MESH, "field")
     assert time.monotonic() - start < 5
+
+
+@pytest.mark.parametrize("step", [0.0, -1.0, 5e-324, 1e-180, 1e39, float("nan"), float("inf")])
+def test_steps_of_coefficients_have_squares(step: float) -> None:
+    """Weights divide by the square of one."""
+    unused: Any = None
+    with pytest.raises(CorruptFile, match="a step of coefficients is"):
+        decode_trajectories(STEP.pack(step), (4, 1), unused, "field")

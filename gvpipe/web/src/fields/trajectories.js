@@ -1,6 +1,6 @@
 /** Values of a field from principal trajectories. Mirrors `gvpipe.fields.trajectories`. */
 
-import { SEGMENTS_LARGEST_STEP as LARGEST_STEP } from "../constants.js";
+import { SEGMENTS_LARGEST_STEP as LARGEST_STEP, SEGMENTS_SMALLEST_STEP as SMALLEST_STEP } from "../constants.js";
 import { decodeBasis } from "../trajectory/basis.js";
 import { Cursor } from "../format/cursor.js";
 import { inBlocks } from "../trajectory/coefficient_coding.js";
@@ -13,7 +13,7 @@ import { decodeResiduals } from "./residual_coding.js";
 export function decodeTrajectories(data, [frames, components], { kernels, causal, name }) {
   const cursor = new Cursor(data, name);
   const step = cursor.f64();
-  if (!(step > 0 && step <= LARGEST_STEP)) throw cursor.corrupt(`a step of coefficients is ${step}`);
+  if (!(step >= SMALLEST_STEP && step <= LARGEST_STEP)) throw cursor.corrupt(`a step of coefficients is ${step}`);
   const rows = causal[0].shape[0];
   const basis = decodeBasis(kernels, cursor.block(), frames, rows, step, name, components);
   const count = basis.components;
