@@ -27,6 +27,7 @@ from gvpipe.io import library_process
 LOADED = (
     "gvpipe.io.alembic.reader",
     "gvpipe.attributes.normal_kernels",
+    "gvpipe.io.fbx.reader",
     "gvpipe.io.fbx.evaluator",
     "gvpipe.io.usd.reader",
     "gvpipe.io.simulation.meshio_files",
@@ -62,8 +63,9 @@ class ForkedProcess:
             seconds, memory = ANSWER.unpack(_server().recv(ANSWER.size))
             _cost[:] = _cost[0] + seconds, max(_cost[1], memory)
 
-    def wait(self) -> None:
+    def wait(self, timeout: float | None = None) -> int:
         """The server does."""
+        return 0
 
 
 def fork_library_processes() -> None:

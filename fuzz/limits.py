@@ -16,7 +16,7 @@ from fuzz.library_processes import library_cost
 from fuzz.parts import BrokenPromise, Target
 from fuzz.results import check_text
 
-LEAST_SECONDS, SECONDS_PER_BYTE = 2.0, 20e-6  # of processor time, for a file
+SECONDS_PER_BYTE = 20e-6  # of processor time
 MEMORY_PER_BYTE = 2000  # bytes, above what any file may cost
 PEAK = re.compile(rb"VmHWM:\s+(\d+) kB")
 RESIDENT = re.compile(rb"VmRSS:\s+(\d+) kB")
@@ -52,7 +52,7 @@ def judge(target: Target, path: Path, size: int) -> Verdict:
         return Verdict(
             LARGE, target.name, f"{cost.memory >> 20} MB for {size} bytes; {allowed >> 20} MB are allowed ({verdict.detail})"
         )
-    allowed_seconds = max(LEAST_SECONDS, SECONDS_PER_BYTE * size)
+    allowed_seconds = max(target.seconds, SECONDS_PER_BYTE * size)
     if cost.seconds > allowed_seconds:
         return Verdict(
             SLOW, target.name, f"{cost.seconds:.1f} s for {size} bytes; {allowed_seconds:.1f} s are allowed ({verdict.detail})"

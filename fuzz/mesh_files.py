@@ -14,12 +14,13 @@ from fuzz.mutation import Change, Rng, mutate_bytes, mutate_json, mutate_text
 from fuzz.parts import Parts, Seed, Target
 from fuzz.results import check_asset, check_faces, check_positions
 from gvpipe.errors import InputError
-from gvpipe.io.library_worker import LEAST_MEMORY
+from gvpipe.io.library_worker import LEAST_MEMORY, LEAST_SECONDS
 
 MESH = "mesh.obj"  # what a point cache belongs to
 CACHES = (".pc2", ".mdd", ".npy")
 MOST_VALUES = 1 << 22
 MEMORY = LEAST_MEMORY + (256 << 20)  # bytes: the limit of libraries' processes, and what they have before that
+LIMITED = ("usd", "abc")  # formats whose library's process has a limit of time
 INSIDE = "|"  # between a file's name and the name of what it holds
 GLTF_JSON = 0x4E4F534A  # kind of a chunk
 TEXTS = (b"ply\n", b"v ", b"#", b"solid", b"OFF", b"<?xml", b"<", b"FORMAT", b"; FBX", b"{", b"$", b"*")
@@ -37,6 +38,7 @@ def mesh_targets(seeds: dict[str, tuple[Seed, ...]]) -> list[Target]:
             parse_mesh,
             (InputError,),
             MEMORY,
+            *((LEAST_SECONDS + 1,) if name.startswith(LIMITED) else ()),  # the system ends a process after a whole second
         )
         for name, group in seeds.items()
     ]

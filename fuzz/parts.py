@@ -38,6 +38,7 @@ class Target:
         parse: reads a file, and everything in it. Raises what a user would see.
         refusal: the only exceptions that it may raise.
         memory: bytes that any file may cost, however small.
+        seconds: of the processor, as well.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Target:
     parse: Callable[[Path], None]
     refusal: tuple[type[Exception], ...]
     memory: int = 64 << 20
+    seconds: float = 2.0
 
     def case(self, run_seed: int, number: int) -> tuple[Seed, Parts]:
         """The seed and the parts of case ``number``; the first cases are the seeds themselves."""

@@ -20,9 +20,10 @@ from typing import Any
 from gvpipe.errors import InputError, TopologyChange, printable
 from gvpipe.forks import ForkLock, renew_after_fork
 from gvpipe.io.damage import unreadable
-from gvpipe.io.library_worker import CHANGED, REFUSED
+from gvpipe.io.library_worker import CHANGED, REFUSED, TOO_LONG
 
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # numpy loads 10 to 20 ms earlier, and has no large products here
+LONGEST_END = 10.0  # seconds until a process that has closed its pipe has ended
 MOST_RUNNING = 16  # processes at a time: of more files, those that were asked longest ago wait until they are asked again
 
 
@@ -114,7 +115,7 @@ class LibraryProcess:
         try:
             state, result = pickle.load(process.stdout)
         except (EOFError, OSError, pickle.UnpicklingError) as exc:
-            raise unreadable(self._path, self._kind, self._died) from exc
+            raise unreadable(self._path, self._kind, self._end_of(process)) from exc
         if state == CHANGED:
             raise TopologyChange(*result)
         if state == REFUSED:
@@ -123,6 +124,13 @@ class LibraryProcess:
                 raise InputError(said)
             raise unreadable(self._path, self._kind, said)
         return result
+
+    def _end_of(self, process: subprocess.Popen[bytes]) -> str:
+        """Why it has ended."""
+        with contextlib.suppress(subprocess.TimeoutExpired):  # it has closed its pipe, and lives
+            if TOO_LONG and process.wait(LONGEST_END) == TOO_LONG:
+                return "its library took more time than its size allows; if you trust it, use --unlimited (unlimited=True)"
+        return self._died
 
 
 _running: weakref.WeakSet[LibraryProcess] = weakref.WeakSet()

@@ -1,16 +1,20 @@
-"""What runs in a process of `gvpipe.io.library_process`: it answers requests, with a limit of memory.
+"""What runs in a process of `gvpipe.io.library_process`: it answers requests, with limits of memory and time.
 
 `limit_memory` lets the system refuse the process more memory than follows from the size of what it reads. The library then
-raises an error or dies, which is one line either way. Linux alone has such a limit.
+raises an error or dies, which is one line either way. Linux alone has such a limit. `limited_time` has the system end the
+process when the library takes too long.
 """
 
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import pickle
+import signal
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +23,8 @@ from gvpipe.io.damage import LONGEST
 
 DONE, REFUSED, CHANGED = "done", "refused", "changed"  # states of an answer
 LEAST_MEMORY, MEMORY_PER_BYTE = 1 << 30, 200  # bytes that the process may take in any case, and for each byte that it reads
+LEAST_SECONDS, SECONDS_PER_BYTE = 5.0, 20e-6  # of the processor, to open a file
+TOO_LONG = -getattr(signal, "SIGXCPU", 0)  # status of a process that took more
 MOST_LISTED = 10_000  # entries of folders that are looked at
 
 
@@ -33,6 +39,23 @@ def limit_memory(n_bytes: int) -> None:
     limits = [now + max(LEAST_MEMORY, MEMORY_PER_BYTE * n_bytes), *resource.getrlimit(resource.RLIMIT_DATA)]
     least = min(each for each in limits if each != resource.RLIM_INFINITY)
     resource.setrlimit(resource.RLIMIT_DATA, (least, limits[-1]))
+
+
+@contextlib.contextmanager
+def limited_time(n_bytes: int) -> Iterator[None]:
+    """End the process when what runs inside takes max(`LEAST_SECONDS`, `SECONDS_PER_BYTE` x n_bytes) of the processor."""
+    if sys.platform == "win32":  # it has no such limit
+        yield
+        return
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    limits = [math.ceil(time.process_time() + max(LEAST_SECONDS, SECONDS_PER_BYTE * n_bytes)), soft, hard]
+    resource.setrlimit(resource.RLIMIT_CPU, (min(each for each in limits if each != resource.RLIM_INFINITY), hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
 
 
 def bytes_below(folder: Path, suffixes: tuple[str, ...]) -> int:

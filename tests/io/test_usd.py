@@ -455,6 +455,32 @@ def test_library_that_dies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         io.read(path)
 
 
+SLOW = """
+from gvpipe.io import library_worker
+library_worker.LEAST_SECONDS = 0.0
+
+def answer(name, arguments):
+    with library_worker.limited_time(0):
+        pass
+    with library_worker.limited_time(0):
+        while True:
+            pass
+
+library_worker.serve(answer)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the system has no such limit")
+@pytest.mark.usefixtures("new_processes")
+def test_library_that_takes_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "slow.py").write_text(SLOW)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr("gvpipe.io.usd.process.WORKER", "slow")
+    path = stage(tmp_path, f'def Mesh "m" {{ {TRIANGLE} }}')
+    with pytest.raises(InputError, match=r"a\.usda cannot be read as USD: its library took more time .* use --unlimited"):
+        io.read(path)
+
+
 def many_copies(folder: Path, copies: int) -> Path:
     """A small file that asks for much memory: copies of a mesh of 4,900 vertices."""
     side = 70

@@ -1,9 +1,23 @@
-"""The process that runs Alembic's library."""
+"""The process that runs Alembic's library, with a limit of time that follows from the size of the file."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from gvpipe.io.alembic.reader import read_archive
+from gvpipe.io.library_worker import limited_time
+from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_worker import serve_scene
+from gvpipe.sequence import MeshSequence
+
+
+def read_limited(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
+    """Read as `read_archive` does."""
+    if options.unlimited:
+        return read_archive(path, options)
+    with limited_time(path.stat().st_size):
+        return read_archive(path, options)
+
 
 if __name__ == "__main__":
-    serve_scene(read_archive)
+    serve_scene(read_limited)

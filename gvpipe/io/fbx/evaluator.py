@@ -1,59 +1,34 @@
-"""A loaded FBX scene, and its meshes at a time, evaluated by ufbx."""
+"""A loaded FBX scene, and its meshes at a time, evaluated by ufbx. It runs without NumPy, see `gvpipe.io.fbx.answers`."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
-from gvpipe.arrays import Array, Float64
-from gvpipe.asset.material import Image, Material
 from gvpipe.errors import InputError
-from gvpipe.io.fbx.library import columns, hold, listed, numbers, square
-from gvpipe.io.fbx.materials import read_material
-from gvpipe.io.fbx.textures import Textures
-from gvpipe.io.scene_mesh import Layer, SceneMesh
+from gvpipe.io.fbx.answers import Described, Map, Mesh, Picture, Placed, Posed, Shown, Table, Take
+from gvpipe.io.fbx.library import columns, hold, integers, listed, vectors
 from gvpipe.io.simulation.side_files import side_file
 
 UP = {0: "x", 1: "x", 2: "y", 3: "y", 4: "z", 5: "z"}
-
-
-class Take(NamedTuple):
-    """An animation of the file; times in seconds."""
-
-    name: str
-    start: float
-    stop: float
-
-
-class Described(NamedTuple):
-    """What an FBX file holds beside motion.
-
-    Args:
-        meshes: of the nodes that show one, with their layers.
-        n_hidden: nodes whose mesh is hidden, which were left out.
-        materials, images: of the scene.
-        fps, unit, up, creator: of the scene; the unit in metres.
-        notes: what was left out, a line each.
-    """
-
-    meshes: list[SceneMesh]
-    n_hidden: int
-    materials: tuple[Material, ...]
-    images: tuple[Image, ...]
-    fps: float
-    unit: float
-    up: str
-    creator: str
-    notes: list[str]
+MAPS = (
+    "base_color",
+    "base_factor",
+    "opacity",
+    "emission_color",
+    "emission_factor",
+    "normal_map",
+    "ambient_occlusion",
+    "metalness",
+    "roughness",
+)
 
 
 class FbxScene:
     """A loaded file; raises `InputError` or the library's errors."""
 
     def __init__(self, ufbx: Any, path: Path) -> None:
-        self._ufbx, self._path = ufbx, path
+        self._ufbx = ufbx
         self._scene = _load(ufbx, path)
         self._nodes = listed(self._scene.nodes)
         self._shown, self._n_hidden = _with_mesh(self._nodes)
@@ -71,34 +46,27 @@ class FbxScene:
     def describe(self, time: float) -> Described:
         """Everything but motion; normals are those at a time, seconds."""
         settings = hold(self._scene.settings)
-        nodes = [self._nodes[index] for index in self._shown]
-        textures, uv_names = Textures(self._path), _uv_names(nodes)
-        found = listed(self._scene.materials)
-        materials = tuple(read_material(material, textures, uv_names) for material in found)
-        by_id = {int(material.typed_id): number for number, material in enumerate(found)}
+        contents: dict[str, bytes] = {}
+        materials = [_material(material, contents) for material in listed(self._scene.materials)]
         now, posed = self._evaluate(time)
-        meshes = [_read_mesh(node, posed[index], by_id) for node, index in zip(nodes, self._shown, strict=True)]
+        meshes = [_mesh(self._nodes[index], posed[index]) for index in self._shown]
         now.free()
         return Described(
             meshes,
             self._n_hidden,
             materials,
-            tuple(textures.images),
+            contents,
             float(settings.frames_per_second),
             float(settings.unit_meters),
             UP.get(int(hold(settings.axes).up), ""),
             str(hold(self._scene.metadata).creator),
-            textures.notes,
         )
 
-    def positions(self, time: float) -> list[Array]:
-        """``(n, 3)`` of each mesh in world space at a time, seconds."""
+    def positions(self, time: float) -> list[Posed]:
+        """Positions of each mesh at a time, seconds."""
         now, posed = self._evaluate(time)
-        result = []
-        for index in self._shown:
-            values = numbers(hold(hold(posed[index].mesh).skinned_position).values, np.float64).reshape(-1, 3)
-            matrix = _to_world(posed[index])
-            result.append(values @ matrix[:3] + matrix[3])
+        nodes = [posed[index] for index in self._shown]
+        result = [Posed(vectors(hold(hold(node.mesh).skinned_position).values), _placed(node)) for node in nodes]
         now.free()
         return result
 
@@ -147,77 +115,59 @@ def _with_mesh(nodes: list[Any]) -> tuple[list[int], int]:
     return (visible, len(found) - len(visible)) if visible else (found, 0)
 
 
-def _to_world(node: Any) -> Float64:
-    """``(4, 3)`` the transform of a node's evaluated positions to the world.
-
-    A skin puts its mesh into the world. Where several nodes show a skinned mesh, each node moves what the skin gives,
-    relative to where the mesh was bound; Maya does so.
-    """
-    mesh = hold(node.mesh)
+def _placed(node: Any) -> Placed:
+    mesh, to_world = hold(node.mesh), columns(node.geometry_to_world)
     if mesh.skinned_is_local:
-        return columns(node)
+        return Placed(to_world, True, None)
     skins = listed(mesh.skin_deformers)
     clusters = listed(skins[0].clusters) if skins else []
     if len(hold(mesh.instances)) < 2 or not clusters:
-        return np.eye(4, 3)
-    bound = square(clusters[0].geometry_to_bone) @ square(clusters[0].bind_to_world)
-    return np.asarray((np.linalg.pinv(bound) @ square(node.geometry_to_world))[:, :3])
+        return Placed(to_world, False, None)
+    return Placed(to_world, False, (columns(clusters[0].geometry_to_bone), columns(clusters[0].bind_to_world)))
 
 
-def _uv_names(nodes: list[Any]) -> dict[str, str]:
-    """Names of attributes by the names of uv sets: the first of each mesh is ``uv``, the second ``uv1``."""
-    names: dict[str, str] = {}
-    for node in nodes:
-        for number, held in enumerate(listed(hold(node.mesh).uv_sets)):
-            names.setdefault(str(held.name), "uv" if number == 0 else f"uv{number}")
-    return names
-
-
-def _read_mesh(node: Any, posed: Any, materials: dict[int, int]) -> SceneMesh:
-    """A node's mesh; normals are those of the posed node."""
-    mesh = hold(node.mesh)
-    faces = numbers(mesh.faces, np.int64).reshape(-1, 2)  # first corner and number of corners
-    counts = faces[:, 1]
-    take = np.repeat(faces[:, 0], counts) + np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    bound = tuple(materials.get(int(each.typed_id)) for each in listed(node.materials))
-    groups = numbers(mesh.face_material, np.int64)
-    if len(groups) != len(counts) or groups.max(initial=0) >= len(bound):
-        groups, bound = np.zeros(len(counts), np.int64), bound[:1] or (None,)
-    parent = hold(node.parent)
-    is_mirrored = bool(np.linalg.det(_to_world(posed)[:3]) < 0)
-    return SceneMesh(
+def _mesh(node: Any, posed: Any) -> Mesh:
+    """A node's mesh; normals and place are those of the posed node."""
+    mesh, parent = hold(node.mesh), hold(node.parent)
+    normals = hold(hold(posed.mesh).skinned_normal)
+    return Mesh(
         str(node.name) or str(mesh.name),
         "" if parent is None or parent.is_root else str(parent.name),
         int(mesh.num_vertices),
-        counts,
-        numbers(mesh.vertex_indices, np.int64)[take],
-        groups,
-        bound,
-        is_mirrored,
-        (*_sets(mesh.uv_sets, "uv", take), *_sets(mesh.color_sets, "color", take), *_normals(posed, take)),
+        vectors(mesh.faces),
+        integers(mesh.vertex_indices),
+        integers(mesh.face_material),
+        tuple(int(each.typed_id) for each in listed(node.materials)),
+        [_table(each.name, each.vertex_uv) for each in listed(mesh.uv_sets)],
+        [_table(each.name, each.vertex_color) for each in listed(mesh.color_sets)],
+        _table("normal", normals) if normals.exists else None,
+        _placed(posed),
     )
 
 
-def _sets(held: Any, kind: str, take: Array) -> list[Layer]:
-    """Texture coordinates or colours of the polygons' corners."""
-    layers = []
-    for number, one in enumerate(listed(held)):
-        values = hold(one.vertex_uv if kind == "uv" else one.vertex_color)
-        table = numbers(values.values, np.float32).reshape(-1, 2 if kind == "uv" else 4)
-        if len(table):
-            name = kind if number == 0 else f"{kind}{number}"
-            layers.append(Layer(name, kind, "corner", table, numbers(values.indices, np.int64)[take]))
-    return layers
+def _table(name: Any, found: Any) -> Table:
+    held = hold(found)
+    return Table(str(name), vectors(held.values), integers(held.indices))
 
 
-def _normals(posed: Any, take: Array) -> list[Layer]:
-    """Unit normals of the polygons' corners in world space."""
-    mesh = hold(posed.mesh)
-    held = hold(mesh.skinned_normal)
-    if not held.exists:
-        return []
-    values = numbers(held.values, np.float64).reshape(-1, 3)
-    values = values @ np.linalg.pinv(_to_world(posed)[:3]).T
-    length = np.linalg.norm(values, axis=1, keepdims=True)
-    unit = np.where(length > 0, values / np.where(length > 0, length, 1), [0.0, 0.0, 1.0])
-    return [Layer("normal", "normal", "corner", unit.astype(np.float32), numbers(held.indices, np.int64)[take])]
+def _material(material: Any, contents: dict[str, bytes]) -> Shown:
+    """A material; what its pictures hold is added to ``contents``."""
+    held = hold(material.pbr)
+    maps = {name: _map(getattr(held, name), contents) for name in MAPS}
+    double_sided = bool(hold(hold(material.features).double_sided).enabled)
+    return Shown(int(material.typed_id), str(material.name), maps, double_sided)
+
+
+def _map(found: Any, contents: dict[str, bytes]) -> Map:
+    held = hold(found)
+    value = tuple(map(float, hold(held.value_vec4))) if held.has_value else None
+    texture = hold(held.texture)
+    return Map(value, _picture(texture, contents) if texture is not None and held.texture_enabled else None)  # type: ignore[arg-type]  # four
+
+
+def _picture(texture: Any, contents: dict[str, bytes]) -> Picture:
+    key = str(texture.relative_filename or texture.filename or texture.name)
+    if key not in contents:
+        contents[key] = bytes(texture.content or b"")
+    wrap = int(texture.wrap_u), int(texture.wrap_v)
+    return Picture(key, str(texture.name), str(texture.relative_filename or ""), wrap, str(texture.uv_set))

@@ -7,11 +7,10 @@ what is still in use, and the process dies. So every object gets a reference tha
 from __future__ import annotations
 
 import ctypes
+from array import array
 from typing import Any
 
-import numpy as np
-
-from gvpipe.arrays import Array, Float64
+from gvpipe.io.fbx.answers import Numbers
 
 _keep = ctypes.pythonapi.Py_IncRef
 _keep.argtypes, _keep.restype = [ctypes.py_object], None
@@ -30,19 +29,21 @@ def listed(found: Any) -> list[Any]:
     return [hold(found[number]) for number in range(len(found))]
 
 
-def numbers(found: Any, dtype: Any) -> Array:
-    """The numbers of one of its lists."""
+def vectors(found: Any) -> Numbers:
+    """The numbers of one of its lists of faces or vectors, row after row."""
     hold(found)
-    return np.array(found, dtype) if len(found) else np.zeros(0, dtype)
+    if not len(found):  # a look at an empty one ends the process
+        return Numbers("d", b"")
+    view = memoryview(found)
+    return Numbers(view.format, view.tobytes())
 
 
-def columns(node: Any) -> Float64:
-    """``(4, 3)`` the columns of the transform from a node's geometry to the world."""
-    return np.array(hold(node.geometry_to_world), np.float64)
+def integers(found: Any) -> Numbers:
+    """The numbers of one of its lists of indices."""
+    hold(found)
+    return Numbers("I", array("I", found).tobytes() if len(found) else b"")
 
 
-def square(matrix: Any) -> Float64:
-    """``(4, 4)`` a transform, for rows of coordinates."""
-    result = np.eye(4)
-    result[:, :3] = np.array(hold(matrix), np.float64)
-    return result
+def columns(matrix: Any) -> tuple[float, ...]:
+    """The 12 numbers of a transform, column after column."""
+    return tuple(float(value) for column in hold(matrix) for value in column)

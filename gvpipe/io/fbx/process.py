@@ -11,7 +11,7 @@ from gvpipe.io.library_process import LibraryProcess
 from gvpipe.io.options import ReadOptions
 
 if TYPE_CHECKING:
-    from gvpipe.io.fbx.evaluator import Take
+    from gvpipe.io.fbx.answers import Take
     from gvpipe.sequence import MeshSequence
 
 

@@ -10,7 +10,10 @@ from gvpipe.arrays import Array, Float64
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
 from gvpipe.io.damage import reading, unknown_name
-from gvpipe.io.fbx.evaluator import Described, Take
+from gvpipe.io.fbx.answers import Described, Take
+from gvpipe.io.fbx.materials import read_material
+from gvpipe.io.fbx.meshes import scene_mesh, uv_names, world_positions
+from gvpipe.io.fbx.textures import Textures
 from gvpipe.io.library_process import LibraryProcess
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_frames import SceneFrames, frame_times
@@ -32,7 +35,7 @@ class _Poses:
 
     def at(self, time: float) -> list[Array]:
         if self._time != time:
-            self._now, self._time = self._process.ask("positions", time), time
+            self._now, self._time = list(map(world_positions, self._process.ask("positions", time))), time
         return self._now
 
 
@@ -72,16 +75,18 @@ def _read_by(process: LibraryProcess, path: Path, options: ReadOptions) -> MeshS
     held: Described = process.ask("describe", take.start if take else 0.0)
     if not held.meshes:
         raise InputError(f"{where} has no polygon mesh; a mesh with triangles is needed")
+    names, textures = uv_names(held.meshes), Textures(path, held.contents)
+    materials = tuple(read_material(each, textures, names) for each in held.materials)
+    by_id = {each.id: number for number, each in enumerate(held.materials)}
+    meshes = [scene_mesh(each, by_id) for each in held.meshes]
     fps = options.fps or (held.fps if np.isfinite(held.fps) and held.fps > 0 else DEFAULT_RATE)
     times = _times(take, fps, where)
     start, stop = options.span(len(times), where)
     times, poses = times[start:stop], _Poses(process)
-    motions = [
-        FbxMotion(poses, number, mesh.name, mesh.n_vertices, take is not None) for number, mesh in enumerate(held.meshes)
-    ]
+    motions = [FbxMotion(poses, number, mesh.name, mesh.n_vertices, take is not None) for number, mesh in enumerate(meshes)]
     frames = SceneFrames(motions, times, where, "second")
-    joined = join(held.meshes, where)
-    attributes, layer_notes = join_layers(held.meshes, joined.fans, frames.first)
+    joined = join(meshes, where)
+    attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
     hidden = (f"{held.n_hidden} meshes are hidden; they were left out",) if held.n_hidden else ()
     texts = {"fbx creator": held.creator} | ({"fbx take": take.name} if take else {})
     unit = held.unit if np.isfinite(held.unit) and held.unit > 0 else None
@@ -92,11 +97,11 @@ def _read_by(process: LibraryProcess, path: Path, options: ReadOptions) -> MeshS
         attributes,
         where,
         frames.origin,
-        (*hidden, *take_notes, *held.notes, *layer_notes, EXPERIMENTAL),
+        (*hidden, *take_notes, *textures.notes, *layer_notes, EXPERIMENTAL),
         parts=joined.parts,
         polygons=joined.polygons,
-        materials=held.materials,
-        images=held.images,
+        materials=materials,
+        images=tuple(textures.images),
         metadata=Metadata(held.up, unit, float(times[0]), path.name, texts),
     )
 

@@ -1,11 +1,11 @@
-"""The process that runs OpenUSD, with a limit of memory that follows from the size of what it reads."""
+"""The process that runs OpenUSD, with limits of memory and time that follow from the size of what it reads."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
-from gvpipe.io.library_worker import bytes_below, limit_memory
+from gvpipe.io.library_worker import bytes_below, limit_memory, limited_time
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_worker import serve_scene
 from gvpipe.io.usd.reader import read_stage
@@ -20,9 +20,12 @@ def read_limited(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
     os.environ.setdefault("PXR_WORK_THREAD_LIMIT", str(THREADS))
     import pxr.UsdSkel  # noqa: F401  libraries of code do not count
 
-    if not options.unlimited:
-        limit_memory(max(path.stat().st_size, bytes_below(path.absolute().parent, tuple(SIGNATURES))))
-    return read_stage(path, options)
+    if options.unlimited:
+        return read_stage(path, options)
+    n_bytes = max(path.stat().st_size, bytes_below(path.absolute().parent, tuple(SIGNATURES)))
+    limit_memory(n_bytes)
+    with limited_time(n_bytes):
+        return read_stage(path, options)
 
 
 if __name__ == "__main__":
