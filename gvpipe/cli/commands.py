@@ -7,8 +7,6 @@ Exit status: 0 done, 1 one clear line on standard error, 2 wrong usage, 130 inte
 
 from __future__ import annotations
 
-import atexit
-import gc
 import os
 import signal
 import sys
@@ -26,7 +24,7 @@ from gvpipe.cli.conversion import convert
 from gvpipe.cli.encode_all import encode_all
 from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_settings
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
-from gvpipe.cli.process import Ended, ending_by_exception, replace_closed_streams
+from gvpipe.cli.process import Ended, collect_seldom, ending_by_exception, replace_closed_streams
 from gvpipe.errors import GvpipeError, InputError, TopologyChange
 
 if TYPE_CHECKING:
@@ -36,13 +34,11 @@ if TYPE_CHECKING:
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 LIVE_OPTIONS = {"mesh", "fps", "codec", "quality", "segment", "reorder", "pairs"}  # that `encode --live` knows
-COLLECTED = 100_000  # objects made between garbage collections: a command makes cycles by imports, hardly by its work
 
 
 def main() -> None:
     """Run the command line and exit."""
-    gc.set_threshold(COLLECTED)
-    atexit.register(gc.freeze)  # what the process takes along when it ends need not be looked through
+    collect_seldom()
     replace_closed_streams()
     try:
         with ending_by_exception():
@@ -115,7 +111,7 @@ def encode(
     'walk/$F4.obj'), a geometry video, or - for an .npz or a geometry video on standard input. OUTPUT - is standard output.
     """
     from gvpipe import api, files
-    from gvpipe.cli.process import give_back_large_arrays
+    from gvpipe.cli.process import give_back_memory
     from gvpipe.cli.splitting import write_runs
 
     if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
@@ -132,7 +128,7 @@ def encode(
         message = "--workers and --scheduler read INPUT by its path, as a whole; leave out --split, and name no -"
         raise click.UsageError(message, click.get_current_context())
     asked = parse_encoding(options)
-    give_back_large_arrays()
+    give_back_memory()
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
         if split:

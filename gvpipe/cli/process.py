@@ -7,8 +7,10 @@ that are freed go back to the system.
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import errno
+import gc
 import io
 import os
 import signal
@@ -18,6 +20,7 @@ from collections.abc import Iterator
 from types import FrameType
 from typing import Any, NoReturn, TextIO, cast
 
+COLLECTED, USUAL = 100_000, gc.get_threshold()  # objects made between garbage collections
 LARGE = 8 << 20  # bytes of an array that is given back; asking the system anew costs time, so smaller ones are kept
 MMAP_THRESHOLD = -3  # M_MMAP_THRESHOLD of glibc's mallopt
 ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))  # Windows has no SIGHUP
@@ -51,11 +54,19 @@ def ending_by_exception() -> Iterator[None]:
             signal.signal(number, signal.SIG_DFL)
 
 
-def give_back_large_arrays() -> None:
-    """Let the C library return large arrays to the system when they are freed; glibc keeps those of up to 32 MB for later.
+def collect_seldom() -> None:
+    """Look for objects in cycles seldom: a short command makes them by imports, hardly by its work."""
+    gc.set_threshold(COLLECTED)
+    atexit.register(gc.freeze)  # what the process takes along when it ends need not be looked through
 
-    Linux with glibc alone; elsewhere nothing happens. ``MALLOC_MMAP_THRESHOLD_`` in the environment stands.
+
+def give_back_memory() -> None:
+    """For a command that works long: look for cycles often, as compiling makes large ones, and give back large arrays.
+
+    glibc keeps freed arrays of up to 32 MB for later. Linux with glibc alone; elsewhere that stays.
+    ``MALLOC_MMAP_THRESHOLD_`` in the environment stands.
     """
+    gc.set_threshold(*USUAL)
     if not sys.platform.startswith("linux") or "MALLOC_MMAP_THRESHOLD_" in os.environ:
         return
     import ctypes

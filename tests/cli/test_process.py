@@ -87,10 +87,10 @@ def _waiting_for_input(video: bytes, folder: Path, before: str = "") -> subproce
 FREED = """
 import numpy as np
 from pathlib import Path
-from gvpipe.cli.process import give_back_large_arrays
+from gvpipe.cli.process import give_back_memory
 def resident():
     return int(Path("/proc/self/statm").read_text().split()[1]) << 12
-give_back_large_arrays()
+give_back_memory()
 before = resident()
 for _ in range(3):
     array, after = np.ones(3 << 20), np.ones(1 << 10)
