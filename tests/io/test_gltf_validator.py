@@ -1,0 +1,73 @@
+"""Khronos's glTF validator finds no error in what is written."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from asset_scene import scene
+from folders import DATA, ROOT
+
+import gvpipe
+
+VALIDATOR = ROOT / "tests" / "web" / "npm" / "node_modules" / "gltf-validator"
+SOURCES = (
+    "gltf/CesiumMan_Binary/CesiumMan.glb",
+    "gltf/CesiumMilkTruck_Binary/CesiumMilkTruck.glb",
+    "usd/arm_blendshapes/arm.blendshapes.usda",
+    "abc/Bottle_multi/Bottle.abc",
+    "fbx/maya_blend_inbetween/maya_blend_inbetween_7500_binary.fbx",
+    "sim/can_vtkhdf/can-vtu.hdf",
+)
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("node") is None or not VALIDATOR.exists(), reason="no gltf-validator; npm ci in tests/web/npm"
+)
+
+
+def reports(*files: Path) -> list[dict[str, Any]]:
+    """What the validator says of each file."""
+    command = ["node", str(ROOT / "tests" / "validate_gltf.mjs"), str(VALIDATOR), *map(str, files)]
+    found: list[dict[str, Any]] = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
+    return found
+
+
+def faults(report: dict[str, Any]) -> list[str]:
+    """Errors (severity 0) and warnings (1) of a report."""
+    messages = report["issues"]["messages"]
+    return [f"{each['code']} at {each.get('pointer')}: {each['message']}" for each in messages if each["severity"] < 2]
+
+
+def test_a_damaged_file_has_errors(tmp_path: Path) -> None:
+    gvpipe.write(scene(), tmp_path / "a.glb")
+    data = (tmp_path / "a.glb").read_bytes()
+    (tmp_path / "b.glb").write_bytes(data.replace(b'"VEC3"', b'"VEC2"'))
+    (report,) = reports(tmp_path / "b.glb")
+    assert report["issues"]["numErrors"] and faults(report)
+
+
+def test_no_error_in_animations_and_single_frames(tmp_path: Path) -> None:
+    """Of a scene with everything, of what a video of it decodes to, and of its frames one by one."""
+    source = scene()
+    gvpipe.encode(source, tmp_path / "a.mp4", "pca")
+    gvpipe.write(source, tmp_path / "source.glb")
+    gvpipe.write(gvpipe.decode(tmp_path / "a.mp4"), tmp_path / "decoded.glb")
+    gvpipe.write(source.part(0, 2), tmp_path / "frames" / "%02d.glb")
+    files = [tmp_path / "source.glb", tmp_path / "decoded.glb", *sorted((tmp_path / "frames").glob("*.glb"))]
+    found = reports(*files)
+    assert len(found) == 4 and [report["info"]["animationCount"] for report in found] == [1, 1, 0, 0]
+    assert [faults(report) for report in found] == [[]] * 4
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_no_error_of_real_assets(tmp_path: Path, source: str) -> None:
+    if not (DATA / "assets" / source).exists():
+        pytest.skip("the shared data are not there")
+    read = gvpipe.read(DATA / "assets" / source)
+    gvpipe.write(read.part(0, min(len(read), 6)), tmp_path / "a.glb")
+    (report,) = reports(tmp_path / "a.glb")
+    assert faults(report) == []
