@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -377,7 +377,7 @@ class _FragmentPackets:
 
     def __init__(self, fragments: Fragments, demux: Callable[[bytes], Demuxed], is_alone: bool) -> None:
         self._fragments, self._demux = fragments, demux
-        self._starts = np.concatenate([[0], np.cumsum(fragments.counts)]).tolist()
+        self._starts = list(accumulate(fragments.counts, initial=0))
         starts = list(range(self._starts[-1] + 1)) if is_alone else self._starts
         if len(starts) < 2:
             raise corrupt("the video has no pictures")

@@ -257,3 +257,21 @@ def test_hostile_data(profile: Profile, capfd: pytest.CaptureFixture[str]) -> No
         damaged[int(random.integers(len(data)))] ^= int(random.integers(1, 256))
         decode_or_refuse(bytes(damaged), profile, n)
     capfd.readouterr()
+
+
+class NoFragments:
+    """A video in fragments that has none."""
+
+    head, n_bytes = b"", 0
+
+    def __init__(self) -> None:
+        self.counts: list[int] = []
+
+    def read(self, number: int) -> bytes:
+        raise AssertionError(number)
+
+
+@pytest.mark.parametrize("profile", PROFILES.values(), ids=lambda profile: profile.name)
+def test_no_fragments(profile: Profile) -> None:
+    with pytest.raises(CorruptFile, match="the video has no pictures"):
+        VideoReader(NoFragments(), profile, 16, 16)

@@ -6,7 +6,6 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.media.video import PROFILES
 
 VERSION = 5  # the highest that gvpipe/web/src/mcgv reads
-TRAJECTORIES = "h264-8"  # the profile of trajectory images that it reads
 
 
 def browser_obstacle(bitstream: Bitstream) -> str:
@@ -14,7 +13,6 @@ def browser_obstacle(bitstream: Bitstream) -> str:
     header = bitstream.header
     if bitstream.version > VERSION:
         return f"{bitstream.codec}, version {bitstream.version}"
-    profiles = PROFILES if "transform" not in header else (TRAJECTORIES,)
-    if header.get("pictures") is False or header.get("profile") in profiles:
+    if header.get("pictures") is False or header.get("profile") in PROFILES:
         return ""
-    return ", ".join([bitstream.codec, *(f"{key} {header[key]}" for key in ("transform", "profile") if key in header)])
+    return f"{bitstream.codec}, profile {header.get('profile')}"

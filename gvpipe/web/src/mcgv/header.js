@@ -23,7 +23,7 @@ export { VERSION, PLANES };
 
 export const CODEC = "mcgv";
 
-const WEB = "h264-8"; // profile of trajectory images, and of files without pictures: that of their zero level
+const WEB = "h264-8"; // profile of files without pictures: that of their zero level
 
 /**
  * How planes become pictures, as `gvpipe.media.video.Profile` says.
@@ -115,9 +115,7 @@ function readImages({ version, frames, settings }, segments, prediction) {
   if (transform !== "klt" || version === 1 || prediction !== "blended") {
     throw corrupt("header", `transform is ${quote(transform)}, prediction ${quote(prediction)}`);
   }
-  if (profile !== WEB) {
-    throw new GeometryVideoError("unsupported", `its trajectory images have profile ${profile}; gvpipe export-html converts them`);
-  }
+  if (PROFILES.get(profile).codec !== "h264") throw corrupt("header", `profile is ${quote(profile)} beside transform`);
   if (!Array.isArray(components) || components.length !== segments) throw corrupt("header", `components is ${quote(components)}`);
   const most = Math.min(MAX_COMPONENTS, 3 * Math.ceil(frames / segments));
   for (const s of components.keys()) checkInteger(components, s, 0, most);

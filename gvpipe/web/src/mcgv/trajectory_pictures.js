@@ -27,10 +27,11 @@ export function withPictures(source, payload) {
   let turn = Promise.resolve(); // one segment after the other
 
   async function decode(s) {
-    payload.budget.ask(`pictures of segment ${s}`, pixels * counts[s]);
+    const Levels = header.profile.depth > 8 ? Uint16Array : Uint8Array;
+    payload.budget.ask(`pictures of segment ${s}`, Levels.BYTES_PER_ELEMENT * pixels * counts[s]);
     pictures ??= open(source, payload.header, size, header.profile, all);
     const decoder = await pictures;
-    const levels = new Uint8Array(pixels * counts[s]);
+    const levels = new Levels(pixels * counts[s]);
     for (let i = 0; i < counts[s]; i++) {
       await decoder.seek(firsts[s] + i);
       levels.set(decoder.levels(), pixels * i);
