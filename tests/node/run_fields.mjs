@@ -16,7 +16,8 @@ const parts = [];
 const started = performance.now();
 for (const { entry, isOctahedral, data: section, rows, frames, probe } of fields) {
   try {
-    const field = new CodedField(entry, isOctahedral, bytes(section), frameCount, rows, host);
+    const payload = { late: new Map(), section: () => bytes(section) };
+    const field = new CodedField(entry, isOctahedral, frameCount, rows, host, payload);
     for (const frame of frames) {
       const values = await field.frame(frame);
       parts.push(Buffer.from(values.buffer));

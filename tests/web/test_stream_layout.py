@@ -188,3 +188,34 @@ def test_damage_is_one_clear_error(module: Callable[..., Any], site: tuple[Path,
     for (name, (kind, _)), (found, message) in zip(damaged.items(), outcomes, strict=True):
         assert found == kind, (name, found, message)
         assert "\n" not in message
+
+
+FIELD = """const values = await window.video.fields.get(args[0]).frame(args[1]);
+return [...values];"""
+TRY_FIELD = f"return (async () => {{ {FIELD} }})().then(() => 'loaded', (error) => error.kind);"
+
+
+def test_a_field_is_fetched_when_it_is_shown(module: Callable[..., Any], tmp_path: Path) -> None:
+    """It comes on its own; what fails is tried again; derived ones follow from positions that are fetched meanwhile."""
+    path = tmp_path / "a.mp4"
+    noise = np.random.default_rng(1).random((120, 400), np.float32)
+    sequence = waving(20, 120)
+    speed = np.linalg.norm(sequence.read(0, 120), axis=2)
+    sequence = dataclasses.replace(sequence, fields={"noise": noise, "speed": speed})
+    settings: dict[str, Any] = {"preset": "ultrafast", "gop": 16, "segment": 20, "clusters": 2, "quality": 80}
+    gvpipe.encode(sequence, path, stream=True, fields={"noise": "exact", "speed": 0.01}, **settings)
+    with gvpipe.open(path) as video, serving(path.read_bytes()) as (url, served):
+        found = module(JUMP, url, 70)
+        assert np.array_equal(np.array(found, np.float32).reshape(-1, 3), video[70])
+        before = served.n_sent
+        assert before < path.stat().st_size / 2  # noise is most of the file
+        served.status = 404
+        assert module(TRY_FIELD, "noise", 3) == "load"
+        served.status = 0
+        for name, k in (("noise", 3), ("speed", 119), ("noise", 90)):
+            values = np.array(module(FIELD, name, k), np.float32)
+            assert np.array_equal(values, video.fields[name].read(k, k + 1)[0].reshape(-1)), (name, k)
+        assert served.n_sent > before + len(noise.tobytes()) / 2
+        served.data = served.data[: -len(noise.tobytes()) // 4] + bytes(len(noise.tobytes()) // 4)
+        module(JUMP, url, 0)
+        assert module(TRY_FIELD, "noise", 3) == "corrupt" or module(TRY_FIELD, "speed", 3) == "corrupt"

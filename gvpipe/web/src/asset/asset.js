@@ -171,9 +171,8 @@ function readFields(list, payload, { frameCount, vertexCount, triangleCount, hos
       section: entry.text("section"),
     };
     const rows = checked.domain === "vertex" ? vertexCount : triangleCount;
-    const data = payload.section(checked.section);
     const fullScale = FULL_SCALES[checked.type] ?? 1;
-    fields.set(name, new CodedField({ ...checked, fullScale }, coding === OCTAHEDRAL, data, frameCount, rows, host));
+    fields.set(name, new CodedField({ ...checked, fullScale }, coding === OCTAHEDRAL, frameCount, rows, host, payload));
   }
   return fields;
 }

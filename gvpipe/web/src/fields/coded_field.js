@@ -8,7 +8,9 @@ const KEPT_BYTES = 64 * 2 ** 20; // of decoded segments
 const KEPT_SEGMENTS = 2; // at least: the one shown and the next
 
 export class CodedField {
-  #head;
+  #head = null; // once its section is here
+  #opening = null; // promise of that
+  #fetch;
   #host;
   #isOctahedral;
   #segments = new Map(); // number -> values (n, R, C), the one used last at the end
@@ -16,10 +18,10 @@ export class CodedField {
 
   /**
    * @param {object} entry of section `asset`, checked @param {boolean} isOctahedral whether its vectors are coded as two coordinates
-   * @param {Uint8Array} data its section @param {number} frameCount F @param {number} rowCount R
-   * @param {import("./field_host.js").FieldHost} host
+   * @param {number} frameCount F @param {number} rowCount R
+   * @param {import("./field_host.js").FieldHost} host @param {import("../format/payload.js").Payload} payload with its section, or to load it from
    */
-  constructor(entry, isOctahedral, data, frameCount, rowCount, host) {
+  constructor(entry, isOctahedral, frameCount, rowCount, host, payload) {
     this.name = entry.name;
     this.kind = entry.kind;
     this.domain = entry.domain;
@@ -39,16 +41,14 @@ export class CodedField {
     this.largest = 0;
     this.#host = host;
     this.#isOctahedral = isOctahedral;
-    this.#head = readHead(data, frameCount, rowCount, entry.section);
-    const { components, type } = this.#head;
-    if (components !== (isOctahedral ? 2 : this.components) || type !== entry.type) {
-      throw corrupt(entry.section, "it does not hold what section 'asset' lists");
-    }
+    this.#fetch = payload.late.get(entry.section);
+    if (!this.#fetch) this.#take(payload.section(entry.section));
   }
 
   /** A promise of frame k: (R, C) values in an array of the field's type, NaN for holes. @returns {Promise<Float32Array|Int32Array>} */
   async frame(k) {
     if (!Number.isInteger(k) || k < 0 || k >= this.frameCount) throw new RangeError(`frame ${k}: there are ${this.frameCount}`);
+    await this.#opened();
     const number = this.#numberOf(k);
     return this.#frameOf(await this.#load(number), k, number).slice();
   }
@@ -58,6 +58,7 @@ export class CodedField {
    * @returns {boolean} whether it was
    */
   read(k, values) {
+    if (!this.#head) return false;
     const number = this.#numberOf(k);
     const segment = this.#segments.get(number);
     if (!segment) return false;
@@ -71,7 +72,25 @@ export class CodedField {
 
   /** A promise that frame k is in memory. */
   async load(k) {
+    await this.#opened();
     await this.#load(this.#numberOf(k));
+  }
+
+  /** Have the section here, which may have to be fetched; what fails is tried again by the next call. */
+  async #opened() {
+    if (this.#head) return;
+    this.#opening ??= this.#fetch()
+      .then((data) => this.#take(data))
+      .finally(() => (this.#opening = null));
+    await this.#opening;
+  }
+
+  #take(data) {
+    const head = readHead(data, this.frameCount, this.rowCount, this.section);
+    if (head.components !== (this.#isOctahedral ? 2 : this.components) || head.type !== this.type) {
+      throw corrupt(this.section, "it does not hold what section 'asset' lists");
+    }
+    this.#head = head;
   }
 
   /** The segment that has frame k. */

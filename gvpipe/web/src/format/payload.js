@@ -20,10 +20,12 @@ const LIMITS = { version: [1, 1 << 16], frames: [1, MAX_FRAMES], vertices: [1, M
 
 /** A geometry video's header and sections, and what reading them may cost. */
 export class Payload {
-  constructor(header, sections, budget) {
+  /** @param {Map<string, () => Promise<Uint8Array>>} [late] what fetches sections that are not here, by name */
+  constructor(header, sections, budget, late = new Map()) {
     this.header = header;
     this.sections = sections;
     this.budget = budget;
+    this.late = late;
   }
 
   /** @returns {Uint8Array} */
@@ -49,7 +51,7 @@ export async function readPayload(container) {
   }
   const budget = new Budget(container.bytes);
   budget.keepMesh(header);
-  return new Payload(header, sections, budget);
+  return new Payload(header, sections, budget, container.late);
 }
 
 function readPayloadSections(payload) {

@@ -26,8 +26,8 @@ const LOOKS = 120;
 export class StreamFile {
   /**
    * @param {string|URL} url
-   * @returns {Promise<StreamFile|Uint8Array|null>} the whole file where it has the plain layout or fields, where nothing belongs to
-   *   segments, and of pictures where there is no WebCodecs; null where the server refuses
+   * @returns {Promise<StreamFile|Uint8Array|null>} the whole file where it has the plain layout, where nothing belongs to segments, and
+   *   of pictures where there is no WebCodecs; null where the server refuses
    * @throws {GeometryVideoError} the index is damaged
    */
   static async open(url) {
@@ -97,7 +97,8 @@ export class StreamFile {
 
   /** What `readContainer` gives of a whole file. */
   get container() {
-    return { sections: this.sections, bytes: this.received, id: this.id, frames: this.live?.frames };
+    const late = new Map(this.names.filter((name) => OF_FIELDS.test(name)).map((name) => [name, () => this.#fetchSection(name)]));
+    return { sections: this.sections, bytes: this.received, id: this.id, frames: this.live?.frames, late };
   }
 
   /** Number of the segment that is shown first: of a file that is still written, the latest. */
@@ -175,7 +176,7 @@ export class StreamFile {
   async #begin(data, box) {
     const { entries, fragments, size, headSize, headChecksum } = readIndex(data.subarray(box.start, box.end));
     const names = entries.map(({ name }) => name);
-    if (names.some((name) => OF_FIELDS.test(name)) || !names.some((name) => OF_SEGMENTS.test(name))) return false;
+    if (!names.some((name) => OF_SEGMENTS.test(name))) return false;
     if (names.some((name) => OF_PICTURES.test(name)) && typeof VideoDecoder !== "function") return false;
     this.head = checkHead(data, headSize, headChecksum);
     this.id = readTag(this.head)?.[2] ?? "";
@@ -188,7 +189,7 @@ export class StreamFile {
       const number = OF_SEGMENTS.exec(name)?.[2];
       if (number) this.segments.set(number, [...(this.segments.get(number) ?? []), name]);
     }
-    const shared = entries.filter(({ name }) => !OF_SEGMENTS.test(name));
+    const shared = entries.filter(({ name }) => !OF_SEGMENTS.test(name) && !OF_FIELDS.test(name));
     const start = Math.min(...shared.map(({ offset }) => offset));
     const end = Math.max(...shared.map(({ offset, length }) => offset + length));
     if (end > size) throw new GeometryVideoError("corrupt", `the index names places outside of the file; ${AGAIN}`);
@@ -231,6 +232,12 @@ export class StreamFile {
     this.start = null;
   }
 
+  /** A section that is not kept here. */
+  async #fetchSection(name) {
+    const place = this.places.get(name);
+    return checked(name, await this.#fetch(place.offset, place.length), place);
+  }
+
   /** Forget segments that were not asked for lately. */
   #drop() {
     const size = (number) => this.segments.get(number).reduce((sum, name) => sum + this.places.get(name).length, 0);
@@ -263,10 +270,8 @@ export class StreamFile {
   /** Keep sections of these names, of bytes that start at an offset of the file. */
   #take(names, bytes, start) {
     for (const name of names) {
-      const { offset, length, checksum } = this.places.get(name);
-      const data = bytes.slice(offset - start, offset - start + length);
-      if (crc32(data) !== checksum) throw corrupt(name, "its checksum does not match");
-      this.sections.set(name, data);
+      const place = this.places.get(name);
+      this.sections.set(name, checked(name, bytes.slice(place.offset - start, place.offset - start + place.length), place));
     }
   }
 
@@ -297,6 +302,11 @@ export class StreamFile {
     this.received = this.incoming.received;
     return data;
   }
+}
+
+function checked(name, data, { checksum }) {
+  if (crc32(data) !== checksum) throw corrupt(name, "its checksum does not match");
+  return data;
 }
 
 function checkLength(data, length, wanted) {
