@@ -28,7 +28,7 @@ from gvpipe.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
 from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
 from gvpipe.rate_control.search import meet
-from gvpipe.rate_control.targets import Target, parse_bound
+from gvpipe.rate_control.targets import Target, parse_bound, read_bound
 from gvpipe.rate_control.trials import Trial
 from gvpipe.registry import check_mapped, encode_sequence, make_codec, segment_parts
 from gvpipe.rendering.poster import poster_of
@@ -461,6 +461,8 @@ def checked_keywords(codec: str | Codec | Sequence[Codec] | None = None, **keywo
     settings = {name: value for name, value in keywords.items() if name not in KEYWORDS}
     others = {name: value for name, value in keywords.items() if name in KEYWORDS}
     _check_wanted([others.get(name) for name in TARGETS], *(others.get(name, False) for name in LAYOUTS))
+    if others.get("max_error") is not None:
+        read_bound(others["max_error"])
     given = _candidates(codec, settings, others.get("purpose"))
     if others.get("memory") is not None:
         fit_segments(given, 1, others["memory"])

@@ -24,14 +24,23 @@ MEGABYTE = 1e6
 
 
 def fit_segments(codecs: Codec | Sequence[Codec], n_vertices: int, memory: int) -> Codec | list[Codec]:
-    """Return settings with segments that are short enough for so many bytes of memory.
+    """Return settings with segments that are short enough for so many bytes of memory; of several, those that can be so.
 
     Raises:
-        SettingError: a codec takes all frames at a time, or a segment of one frame takes more.
+        SettingError: a codec (of several, each) takes all frames at a time, or a segment of one frame takes more.
     """
     if isinstance(codecs, Codec):
         return _fit(codecs, n_vertices, memory)
-    return [_fit(codec, n_vertices, memory) for codec in codecs]
+    fitting: list[Codec] = []
+    refused: list[SettingError] = []
+    for codec in codecs:
+        try:
+            fitting.append(_fit(codec, n_vertices, memory))
+        except SettingError as exc:
+            refused.append(exc)
+    if not fitting:
+        raise refused[-1]
+    return fitting
 
 
 def _fit(codec: Codec, n_vertices: int, memory: int) -> Codec:

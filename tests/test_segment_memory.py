@@ -38,7 +38,13 @@ def test_too_little_memory_names_what_is_needed() -> None:
     ):
         fit_segments(make_codec("pca", {}), 1_000_000, 500_000_000)
     with pytest.raises(SettingError, match="codec mcgv fits all frames.*leave memory out, or choose laplacian or pca or pdct"):
-        fit_segments([make_codec("pca", {}), make_codec("mcgv", {})], 1000, 10**9)
+        fit_segments([make_codec("mcgv", {})], 1000, 10**9)
+
+
+def test_of_several_those_that_can_are_shortened() -> None:
+    several = [make_codec(name, {}) for name in ("pca", "mcgv", "pdct")]
+    fitted: Any = fit_segments(several, 1_000_000, 2_000_000_000)
+    assert [each.id for each in fitted] == ["pca", "pdct"]
 
 
 def test_files_have_such_segments(tmp_path: Path) -> None:

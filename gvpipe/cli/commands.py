@@ -51,10 +51,10 @@ def main() -> None:
     except click.ClickException as exc:
         exc.show()
         status = 1
-    except (click.Abort, KeyboardInterrupt):
-        status = _fail("interrupted; no file is left half written", 130)
+    except (click.Abort, KeyboardInterrupt) as exc:
+        status = _fail(f"interrupted; {_left(exc.__cause__ or exc)}", 130)
     except Ended as exc:
-        status = _fail(f"ended by {signal.Signals(exc.number).name}; no file is left half written", 128 + exc.number)
+        status = _fail(f"ended by {signal.Signals(exc.number).name}; {_left(exc)}", 128 + exc.number)
     except MemoryError:
         status = _fail(
             "not enough memory; take fewer frames at a time (encode: --frames or --segment, decode: --start and --stop)", 1
@@ -604,6 +604,11 @@ def _print_sections(out: Output, sections: dict[str, int], n_samples: int) -> No
 
 def _size(count: int) -> str:
     return f"{count / 1e6:.2f} MB" if count >= 1e6 else f"{count / 1e3:.1f} kB"
+
+
+def _left(exc: BaseException) -> str:
+    """What an end in the middle leaves, which a command may have noted."""
+    return "; ".join(getattr(exc, "__notes__", ())) or "no file is left half written"
 
 
 def _one_line(exc: Exception) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from gvpipe.arrays import Float32
 from gvpipe.cli.pipes import PIPE, STDIN
+from gvpipe.cli.process import Ended
 from gvpipe.errors import InputError
 
 BYTES_PER_VERTEX = 12
@@ -75,6 +76,10 @@ def encode_live(
         if not live.n_written:
             raise
         raise InputError(f"{exc}; {target} is finished, with the {live.n_written} frames before") from exc
+    except (KeyboardInterrupt, Ended) as exc:
+        if live.n_written:
+            exc.add_note(f"{target} is finished, with the {live.n_written} frames before")
+        raise
     if not live.n_frames:
         raise InputError(f"{STDIN} is empty; pipe frames into it, {BYTES_PER_VERTEX * sequence.n_vertices} bytes each")
     counts = (sequence.n_vertices, len(sequence.faces), live.n_frames, live.fps)

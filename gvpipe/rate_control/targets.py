@@ -59,13 +59,21 @@ def parse_bound(bound: float | str, sequence: MeshSequence) -> float:
     Raises:
         SettingError: no positive number, or a part of a diagonal that is 0.
     """
+    value, is_part = read_bound(bound)
+    if is_part:
+        value *= frame_diagonal(sequence) / 100
+    if not 0 < value < math.inf:
+        raise SettingError(f"max error is {bound!r}, which is no length above 0 here; give one in model units")
+    return value
+
+
+def read_bound(bound: float | str) -> tuple[float, bool]:
+    """The number of a largest error, and whether it is percents of a diagonal; raises `SettingError` for none above 0."""
     text = str(bound).strip()
     try:
         value = float(text.removesuffix("%"))
     except ValueError as exc:
         raise SettingError(f"max error is {bound!r}; a length such as 0.01, or a part of the diagonal such as 0.05%") from exc
-    if text.endswith("%"):
-        value *= frame_diagonal(sequence) / 100
     if not 0 < value < math.inf:
-        raise SettingError(f"max error is {bound!r}, which is no length above 0 here; give one in model units")
-    return value
+        raise SettingError(f"max error is {bound!r}; a number above 0 is needed")
+    return value, text.endswith("%")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 import time
@@ -91,3 +92,23 @@ def test_what_is_refused(mesh: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="10 of the 432 bytes of frame 7: 36 vertices.*a.mp4 is finished, with the 7 frames"):
         run("--mesh", mesh, "-", path, data=FRAMES + b"1234567890")
     assert len(gvpipe.open(path)) == 7
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the system has no such signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_has_come_is_kept_when_the_command_is_ended(mesh: Path, tmp_path: Path, number: int) -> None:
+    path = tmp_path / "a.mp4"
+    command = [sys.executable, "-m", "gvpipe", "encode", "--live", "--mesh", str(mesh), "--segment", "2", "-", str(path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdin is not None
+        process.stdin.write(FRAMES[: len(FRAMES) // 7 * 5])
+        process.stdin.flush()
+        end = time.monotonic() + 60
+        while count(path) < 4 and time.monotonic() < end:
+            time.sleep(0.05)
+        process.send_signal(number)
+        process.wait(60)
+        assert process.stderr is not None
+        error = process.stderr.read().decode().strip().splitlines()[-1]
+    assert process.returncode == 128 + number
+    assert error.endswith(f"; {path} is finished, with the {count(path)} frames before") and count(path) in (4, 5), error
