@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64, Integers
+from gvpipe.arrays import Int64, Integers, UInt8
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy import parametric_tables
 from gvpipe.entropy.grouping import group_by_context
@@ -39,7 +39,7 @@ class BlockEncoder:
 
     def __init__(self, n_contexts: int) -> None:
         self._n_contexts = n_contexts
-        self._blocks: list[tuple[list[tuple[int, Int64]], Int64, Int64]] = []
+        self._blocks: list[tuple[list[tuple[int, UInt8]], Int64, UInt8]] = []
         self._counts = np.zeros((n_contexts, MAX_TOKENS), np.int64)
 
     def add(self, values: Integers, contexts: Integers) -> None:
@@ -47,10 +47,11 @@ class BlockEncoder:
         tokens, low, n_low = tokenise(values.astype(np.int64))
         groups = []
         for context, where in group_by_context(contexts):
-            groups.append((context, tokens[where]))
-            self._counts[context] += np.bincount(tokens[where], minlength=MAX_TOKENS)
+            found = tokens[where]
+            groups.append((context, found.astype(np.uint8)))  # kept until all blocks are there
+            self._counts[context] += np.bincount(found, minlength=MAX_TOKENS)
         has_low = n_low > 0
-        self._blocks.append((groups, low[has_low], n_low[has_low]))
+        self._blocks.append((groups, low[has_low], n_low[has_low].astype(np.uint8)))
 
     def finish(self) -> bytes:
         """Return the stream of all blocks."""
@@ -70,7 +71,7 @@ class BlockEncoder:
                 more = n_low > shift
                 if not more.any():
                     break
-                sizes = 1 << np.minimum(n_low[more] - shift, CHUNK)
+                sizes = 1 << np.minimum(n_low[more].astype(np.int64) - shift, CHUNK)
                 pieces = (low[more] >> shift) & (sizes - 1)
                 coder.encode(pieces.astype(np.int32), constriction.stream.model.Uniform(), sizes.astype(np.int32))
         return b"".join([*head, coder.get_compressed().astype("<u4").tobytes()])

@@ -253,13 +253,14 @@ def fit_coefficients(trajectories: Float64, basis: Basis) -> Float64:
 
     if not basis.vectors.shape[1]:
         return np.zeros((len(trajectories), 0))
-    blocks = [(trajectories[rows] - basis.mean) @ basis.vectors for rows in _row_blocks(len(trajectories))]
-    projected = np.concatenate(blocks)  # (V, R)
     gram = basis.vectors.T @ basis.vectors
     gram[np.diag_indices_from(gram)] *= 1 + RIDGE
     gram[np.diag_indices_from(gram)] += LEAST
-    fitted: Float64 = cho_solve(cho_factor(gram), projected.T).T
-    return np.ascontiguousarray(fitted)
+    factor = cho_factor(gram)
+    fitted = np.empty((len(trajectories), len(gram)))
+    for rows in _row_blocks(len(trajectories)):  # as many copies of a million vertices' coefficients would be large
+        fitted[rows] = cho_solve(factor, ((trajectories[rows] - basis.mean) @ basis.vectors).T).T
+    return fitted
 
 
 def squared_errors(trajectories: Float64, basis: Basis, coefficients: Float64) -> Float64:

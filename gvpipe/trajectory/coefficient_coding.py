@@ -63,7 +63,8 @@ def encode_vectors(
     largest = max(int(residuals.max(initial=0)), -int(residuals.min(initial=0)))
     if largest >= LARGEST:
         raise InputError(f"a residual has {largest} quantisation steps, at most {LARGEST} fit; ask for a lower quality")
-    means = np.abs(residuals).sum(axis=0) * ONE // max(1, len(residuals))
+    sums = np.array([np.abs(column).sum() for column in residuals.T], np.int64)  # one at a time: a copy may be large
+    means = sums * ONE // max(1, len(residuals))
     levels = np.searchsorted(level_bounds(), means + 1, side="right") - 1
     contexts = find_all_contexts(residuals, context_inputs(causal, len(target), levels, len(causal.blocks) - 1))
     coder = BlockEncoder(N_CONTEXTS)

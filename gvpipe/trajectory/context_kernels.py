@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64
+from gvpipe.arrays import Int64, UInt8
 from gvpipe.compiled import compiled
 from gvpipe.entropy.block_kernels import OUT_OF_RANGE, BlockStream, take_block
 from gvpipe.trajectory.contexts import (
@@ -98,9 +98,9 @@ def _mean_magnitudes(residuals: Int64, first: int, end: int, means: Int64) -> No
 
 
 @compiled
-def find_all_contexts(residuals: Int64, inputs: ContextInputs) -> Int64:
+def find_all_contexts(residuals: Int64, inputs: ContextInputs) -> UInt8:
     """``(m, R)`` contexts of ``residuals (m, R)`` by rank, all of which there are."""
-    contexts = np.zeros(residuals.shape, np.int64)
+    contexts = np.zeros(residuals.shape, np.uint8)
     before = inputs.usual.copy()
     for b in range(len(inputs.blocks) - 1):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
