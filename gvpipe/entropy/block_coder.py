@@ -20,9 +20,8 @@ import numpy as np
 from gvpipe.arrays import Int64, Integers, UInt8
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy import parametric_tables
-from gvpipe.entropy.grouping import group_by_context
 from gvpipe.entropy.open_stream import open_stream
-from gvpipe.entropy.tokens import CHUNK, MAX_BITS, MAX_TOKENS, TABLE_TOTAL, model, tokenise
+from gvpipe.entropy.tokens import CHUNK, MAX_BITS, MAX_TOKENS, TABLE_TOTAL, check_sizes, model
 
 PARAMETRIC = 1  # kind of a table that two numbers describe
 
@@ -44,14 +43,12 @@ class BlockEncoder:
 
     def add(self, values: Integers, contexts: Integers) -> None:
         """Append a block of ``values (n,)``, magnitude below 2**39, in ``contexts (n,)``, 0..C-1."""
-        tokens, low, n_low = tokenise(values.astype(np.int64))
-        groups = []
-        for context, where in group_by_context(contexts):
-            found = tokens[where]
-            groups.append((context, found.astype(np.uint8)))  # kept until all blocks are there
-            self._counts[context] += np.bincount(found, minlength=MAX_TOKENS)
-        has_low = n_low > 0
-        self._blocks.append((groups, low[has_low], n_low[has_low].astype(np.uint8)))
+        from gvpipe.entropy.block_kernels import sort_tokens
+
+        check_sizes(values)
+        tokens, ends, low, n_low = sort_tokens(values.astype(np.int64), contexts.astype(np.int64), self._counts)
+        groups = [(context, tokens[ends[context] : ends[context + 1]]) for context in np.flatnonzero(np.diff(ends)).tolist()]
+        self._blocks.append((groups, low, n_low))
 
     def finish(self) -> bytes:
         """Return the stream of all blocks."""

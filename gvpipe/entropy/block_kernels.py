@@ -1,4 +1,4 @@
-"""Kernel of `gvpipe.entropy.block_coder`: a block's integers from range-coded words."""
+"""Kernels of `gvpipe.entropy.block_coder`: a block's integers as tokens, and from range-coded words."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int64, UInt32, UInt64
+from gvpipe.arrays import Int64, UInt8, UInt32, UInt64
 from gvpipe.compiled import compiled
 from gvpipe.entropy.range_decoder import decode_bits, decode_symbol
 from gvpipe.entropy.tokens import CHUNK, DIRECT
@@ -28,6 +28,42 @@ class BlockStream(NamedTuple):
     words: UInt32
     edges: UInt64
     sizes: Int64
+
+
+@compiled
+def sort_tokens(values: Int64, contexts: Int64, counts: Int64) -> tuple[UInt8, Int64, Int64, UInt8]:
+    """Fold a block's ``values (n,)``, magnitudes below 2**39, to tokens, as `gvpipe.entropy.tokens.tokenise` does.
+
+    Args:
+        values, contexts: ``(n,)``; contexts 0..C-1.
+        counts: ``(C, N)`` of each context's tokens; those of the block are added.
+
+    Returns:
+        The tokens ``(n,)``, context after context, each context's in order; where each context's begin ``(C + 1,)``; of the
+        values that have any, in order, the low bits and how many there are.
+    """
+    n = len(values)
+    ends = np.zeros(len(counts) + 1, np.int64)
+    for i in range(n):
+        ends[contexts[i] + 1] += 1
+    for context in range(len(counts)):
+        ends[context + 1] += ends[context]
+    place = ends[:-1].copy()
+    tokens, low, n_low = np.empty(n, np.uint8), np.empty(n, np.int64), np.empty(n, np.uint8)
+    n_long = 0
+    for i in range(n):
+        token = 2 * values[i] if values[i] >= 0 else -2 * values[i] - 1
+        if token >= DIRECT:
+            width = 0
+            while token >> (width + 2):
+                width += 1
+            low[n_long], n_low[n_long] = token & ((1 << width) - 1), width
+            n_long += 1
+            token = DIRECT + 2 * (width - 3) + (token >> width) - 2
+        tokens[place[contexts[i]]] = token
+        place[contexts[i]] += 1
+        counts[contexts[i], token] += 1
+    return tokens, ends, low[:n_long].copy(), n_low[:n_long].copy()
 
 
 @compiled

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Int64
+from gvpipe.arrays import Int64, Integers
 from gvpipe.container.cursor import Cursor
 
 DIRECT = 16  # values of u that are tokens of their own
@@ -28,15 +28,21 @@ def model(table: Int64) -> Any:
     return constriction.stream.model.Categorical(table.astype(np.float64) / float(table.sum()), perfect=False)
 
 
+def check_sizes(values: Integers) -> None:
+    """Raise `ValueError` if a value is too large."""
+    most = 1 << (MAX_BITS - 1)
+    if values.size and not (-most <= int(values.min()) and int(values.max()) < most):
+        raise ValueError(f"a value of {int(np.abs(values).max())} does not fit the entropy coder ({MAX_BITS - 1} bits)")
+
+
 def tokenise(values: Int64) -> tuple[Int64, Int64, Int64]:
     """Tokens of ``values (n,)``, the low bits that they leave out, and how many these are.
 
     Raises:
         ValueError: a value is too large.
     """
+    check_sizes(values)
     u = np.where(values >= 0, 2 * values, -2 * values - 1)
-    if u.size and int(u.max()) >= 1 << MAX_BITS:
-        raise ValueError(f"a value of {int(np.abs(values).max())} does not fit the entropy coder ({MAX_BITS - 1} bits)")
     bits = np.frexp(u.astype(np.float64))[1].astype(np.int64)  # exact: u < 2**53
     n_extra = np.where(u < DIRECT, 0, bits - 2)
     second = (u >> n_extra) & 1

@@ -23,7 +23,7 @@ from gvpipe.arrays import Float64, Integers
 BENDING = 0.1  # squared relative length error that a squared radian weighs as much as
 SHORTEST = 2e-2  # least length that divides, in mean edge lengths
 FLATTEST = 1e-2  # least height over edge of a face that divides
-MAX_STEPS = 4  # factorisations, which take nearly all of the time; more save the codec no bits
+MAX_STEPS = 3  # factorisations, which take nearly all of the time; more save the codec no bits
 GAIN = 0.02  # part of its squared error by which a component must still improve for another step to follow
 EXACT = 1e-12  # squared error of an edge that is none: a sequence that does not move starts there
 DAMPING, RELAX, TIGHTEN = 1e-3, 0.1, 10.0  # first damping, in diagonal entries, and its factors after a step taken or refused
