@@ -1,7 +1,7 @@
 """How fast browsers decode: ``python tools/measure_browsers.py FILE.mp4... [--browser chromium] [--loops 2]``.
 
-A page in each browser that is installed loads each file and asks for all frames in order, without drawing. Prints a line each: seconds from
-the request to the first frame, and frames per second after that, through all loops.
+A page in each browser that is installed loads each file and asks for all frames in order, without drawing. Prints a line
+each: seconds from the request to the first frame, and frames per second after that, through all loops.
 """
 
 from __future__ import annotations
