@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gvpipe.arguments import StrPath, check_path, show
-from gvpipe.container.sources import VIDEO_SUFFIXES, is_url
+from gvpipe.container.sources import VIDEO_SUFFIXES, is_remote
 from gvpipe.errors import InputError
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def read(
             return read_sequence(path, fps, clip, mesh, frames, unlimited)
         path = path[0]
     one = check_path(path, "what gvpipe.read is given", "a list of frame files or ")
-    if Path(one).suffix.lower() not in VIDEO_SUFFIXES and not is_url(one):
+    if Path(one).suffix.lower() not in VIDEO_SUFFIXES and not is_remote(one):
         return read_sequence(one, fps, clip, mesh, frames, unlimited)
     if clip is not None:
         raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")

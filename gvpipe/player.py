@@ -25,7 +25,7 @@ from gvpipe.coarse_asset import add_asset
 from gvpipe.codec import GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_bytes, read_file
-from gvpipe.container.sources import is_url
+from gvpipe.container.sources import is_remote
 from gvpipe.errors import InputError, in_file, printable
 from gvpipe.frame_cache import FrameCache
 from gvpipe.registry import open_reader
@@ -59,7 +59,7 @@ class Player:
         check_path(path, "the geometry video")
         self.path = os.fspath(path)
         # another process may have another working directory
-        self._absolute = self.path if data is not None or is_url(self.path) else os.path.abspath(self.path)
+        self._absolute = self.path if data is not None or is_remote(self.path) else os.path.abspath(self.path)
         self._unlimited, self._data = unlimited, data
         self.bitstream: Bitstream = read_file(path, unlimited) if data is None else read_bytes(data, self.path, unlimited)
         with in_file(self.path):

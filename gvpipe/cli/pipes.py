@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator
 
 from gvpipe.atomic import output_error, temporary_folder
-from gvpipe.container.sources import is_url
+from gvpipe.container.sources import is_remote
 from gvpipe.errors import GvpipeError, InputError, OutputError
 
 PIPE = "-"
@@ -70,7 +70,7 @@ def shown(name: str, pipe: str) -> str:
 
 def is_video(path: str) -> bool:
     """Whether a path is that of an MP4 file, by its name or its first bytes, or an address; it need not be there."""
-    if is_url(path):
+    if is_remote(path):
         return True
     if path.lower().endswith(VIDEO_SUFFIXES) or not os.path.isfile(path):
         return path.lower().endswith(VIDEO_SUFFIXES)

@@ -20,7 +20,7 @@ import struct
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import IO
+from typing import IO, TYPE_CHECKING
 from uuid import UUID
 
 from gvpipe.atomic import unnamed_path
@@ -32,11 +32,15 @@ from gvpipe.container.json_object import JsonObject
 from gvpipe.container.live_layout import read_live
 from gvpipe.container.sample_tables import check_tables
 from gvpipe.container.segments import SegmentParts
-from gvpipe.container.sources import DOWNLOAD_FIRST, BytesSource, FileSource, Source, check_source, is_url
+from gvpipe.container.sources import DOWNLOAD_FIRST, BytesSource, FileSource, Source, check_source, is_remote, is_url
 from gvpipe.container.stream_layout import ROOM_UUID, find_index, pack_stream, read_stream
 from gvpipe.container.stream_layout import VERSION as STREAM_VERSION
 from gvpipe.container.track import TAG_PREFIX, Track, inspect, remux, remux_fragments
 from gvpipe.errors import REMEDY, FormatError, InputError, NewerVersion, NotGeometryVideo, StrippedFile, TruncatedFile, corrupt
+
+if TYPE_CHECKING:
+    from gvpipe.container.http_source import HttpSource
+    from gvpipe.container.store_source import StoreSource
 
 BOX_UUID = UUID("6a1f0c52-3d7b-4e0e-9c55-67e4f0a7d1b9")
 ENCODE_FIRST = "encode the sequence first: gvpipe encode INPUT OUTPUT.mp4"
@@ -86,15 +90,15 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False) -> Bitstrea
     """Read and check the bitstream of an MP4 file; in the stream layout, its sections and pictures are read later.
 
     Args:
-        path: of the file, or its address (``https://...``).
+        path: of the file, or its address (``https://...``, with fsspec also ``s3://...`` and others).
         unlimited: let it take whatever memory and work it asks for; by default its size limits both (`gvpipe.budget`).
 
     Raises:
         InputError: there is no such file, or it cannot be read.
         NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile, OverBudget: see `gvpipe.errors`.
     """
-    if is_url(path):
-        return _read_url(str(path), unlimited)
+    if is_remote(path):
+        return _read_address(str(path), unlimited)
     check_source(path)
     path = Path(path)
     try:
@@ -176,13 +180,11 @@ def _pack_bare(bitstream: Bitstream) -> Iterable[bytes]:
     return video, uuid_head(BOX_UUID, len(payload)), payload
 
 
-def _read_url(url: str, unlimited: bool) -> Bitstream:
+def _read_address(url: str, unlimited: bool) -> Bitstream:
     """As `read_file`; the budget is that of the bytes that have come so far, since a server may claim any size."""
-    from gvpipe.container.http_source import HttpSource  # urllib takes as long to load as all the rest
-
     budget = Budget(None if unlimited else 0)
     try:
-        source = HttpSource(url, budget.grow)
+        source = _source_at(url, budget)
         index = find_index(source)
         if index is not None:
             return _read_parts(source, index, budget)
@@ -192,6 +194,17 @@ def _read_url(url: str, unlimited: bool) -> Bitstream:
         raise NotGeometryVideo(f"{url}: {str(exc).replace(ENCODE_FIRST, DOWNLOAD_FIRST)}") from exc
     except FormatError as exc:
         raise type(exc)(f"{url}: {exc}") from exc
+
+
+def _source_at(url: str, budget: Budget) -> HttpSource | StoreSource:
+    """The bytes at an address; modules load late, since urllib takes as long as all the rest."""
+    if is_url(url):
+        from gvpipe.container.http_source import HttpSource
+
+        return HttpSource(url, budget.grow)
+    from gvpipe.container.store_source import StoreSource
+
+    return StoreSource(url, budget.grow)
 
 
 def _read_parts(source: Source, index: Box, budget: Budget) -> Bitstream:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import stat
@@ -15,12 +16,26 @@ SCHEMES = ("http://", "https://")
 ADDRESS = re.compile(r"([a-z][a-z0-9+.-]+:)/", re.IGNORECASE)  # two letters or more: C:/ is a drive
 NO_FILE = "is no ordinary file, but a pipe or a device; write what it gives to a file first"
 VIDEO_SUFFIXES = (".mp4", ".m4v")
+STORE = re.compile(r"([a-z][a-z0-9+.-]+)://", re.IGNORECASE)  # addresses that fsspec may know
+ON_DISK = ("file", "local")  # schemes that are no store
 DOWNLOAD_FIRST = "mesh sequences are read from disk; download it first"
 
 
 def is_url(path: object) -> bool:
     """Whether a path is the address of a file on a web server."""
     return isinstance(path, str) and path.lower().startswith(SCHEMES)
+
+
+def is_remote(path: object) -> bool:
+    """Whether a path is the address of a geometry video on a web server, or in a store that fsspec knows if it is there."""
+    if is_url(path):
+        return True
+    found = STORE.match(path) if isinstance(path, str) and path.lower().endswith(VIDEO_SUFFIXES) else None
+    if found is None or found[1].lower() in ON_DISK or importlib.util.find_spec("fsspec") is None:
+        return False
+    from gvpipe.container.store_source import knows
+
+    return knows(found[1].lower())
 
 
 def check_source(path: str | os.PathLike[str]) -> None:
@@ -30,7 +45,8 @@ def check_source(path: str | os.PathLike[str]) -> None:
     if is_url(path):
         raise InputError(f"{path} is an address; {DOWNLOAD_FIRST}")
     if _is_address(path):
-        raise InputError(f"{path} is an address; give a path on disk, or http:// or https:// of a geometry video")
+        others = "" if importlib.util.find_spec("fsspec") else "; stores such as s3:// need: pip install 'gvpipe[remote]'"
+        raise InputError(f"{path} is an address; give a path on disk, or http:// or https:// of a geometry video{others}")
 
 
 def check_target(path: str | os.PathLike[str]) -> None:

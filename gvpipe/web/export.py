@@ -23,7 +23,7 @@ from gvpipe.atomic import unnamed_path
 from gvpipe.codec import Progress
 from gvpipe.container.bitstream import BARE, STREAM, Bitstream
 from gvpipe.container.mp4 import file_bytes
-from gvpipe.container.sources import check_target, is_url
+from gvpipe.container.sources import check_target, is_remote
 from gvpipe.errors import InputError, OutputError
 from gvpipe.player import Player
 from gvpipe.quality_scale import error_of, quality_of
@@ -106,7 +106,9 @@ def export_html(
         up = player.metadata.up_axis if player.metadata.up_axis in AXES else "y"
     obstacle = browser_obstacle(player.bitstream)
     if not obstacle and not convert:
-        data = Path(player.path).read_bytes() if player.bitstream.layout != BARE and not is_url(player.path) else _plain(player)
+        data = (
+            Path(player.path).read_bytes() if player.bitstream.layout != BARE and not is_remote(player.path) else _plain(player)
+        )
         return _write_page(player.path, data, target, up)
     trial = _convert(player, QUALITY if quality is None else quality, progress)
     remaining = browser_obstacle(trial.bitstream)
