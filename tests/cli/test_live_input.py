@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -54,8 +56,17 @@ def test_a_pipe_becomes_a_file(mesh: Path, tmp_path: Path) -> None:
 
 def test_the_file_grows_while_the_pipe_is_open(mesh: Path, tmp_path: Path) -> None:
     path = tmp_path / "a.mp4"
+    with begun(mesh, path) as process:
+        process.terminate()
+        assert process.wait() == 128 + 15
+    assert count(path) in (4, 5) and gvpipe.open(path).bitstream.layout == "stream"  # it was finished
+
+
+@contextlib.contextmanager
+def begun(mesh: Path, path: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """A command to which five frames were written, once two clips of two are in its file."""
     command = [sys.executable, "-m", "gvpipe", "encode", "--live", "--mesh", str(mesh), "--segment", "2", "-", str(path)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE) as process:
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdin is not None
         process.stdin.write(FRAMES[: len(FRAMES) // 7 * 5])
         process.stdin.flush()
@@ -63,9 +74,7 @@ def test_the_file_grows_while_the_pipe_is_open(mesh: Path, tmp_path: Path) -> No
         while count(path) < 4 and time.monotonic() < end:
             time.sleep(0.05)
         assert count(path) == 4
-        process.terminate()
-        assert process.wait() == 128 + 15
-    assert count(path) in (4, 5) and gvpipe.open(path).bitstream.layout == "stream"  # it was finished
+        yield process
 
 
 def count(path: Path) -> int:
@@ -98,14 +107,7 @@ def test_what_is_refused(mesh: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_what_has_come_is_kept_when_the_command_is_ended(mesh: Path, tmp_path: Path, number: int) -> None:
     path = tmp_path / "a.mp4"
-    command = [sys.executable, "-m", "gvpipe", "encode", "--live", "--mesh", str(mesh), "--segment", "2", "-", str(path)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        assert process.stdin is not None
-        process.stdin.write(FRAMES[: len(FRAMES) // 7 * 5])
-        process.stdin.flush()
-        end = time.monotonic() + 60
-        while count(path) < 4 and time.monotonic() < end:
-            time.sleep(0.05)
+    with begun(mesh, path) as process:
         process.send_signal(number)
         process.wait(60)
         assert process.stderr is not None
