@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import gvpipe
-from fuzz.limits import SECONDS_PER_BYTE
 from fuzz.live import live_target
 from fuzz.parts import BrokenPromise, Seed, Target
 from fuzz.streams import stream_target
 from fuzz.videos import JSON, video_targets
+from gvpipe.budget import LEAST_SECONDS, SECONDS_PER_BYTE
 from gvpipe.container.bitstream import HEADER
 
 SCRIPT = Path(__file__).with_name("browser.mjs")
@@ -58,7 +58,7 @@ class Node:
             raise BrokenPromise(answer["text"])
         if grown > MOST_MEMORY:
             raise MemoryError(f"{grown >> 20} MB for {size} bytes")
-        if answer["seconds"] > max(Target.seconds, SECONDS_PER_BYTE * size):
+        if answer["seconds"] > max(LEAST_SECONDS, SECONDS_PER_BYTE * size):
             raise BrokenPromise(f"too slow: {answer['seconds']} s for {size} bytes")
         if answer["kind"] == "refused":
             text = answer["text"].encode("unicode_escape").decode()  # pages show any text as it is

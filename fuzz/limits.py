@@ -15,9 +15,8 @@ from pathlib import Path
 from fuzz.library_processes import library_cost
 from fuzz.parts import BrokenPromise, Target
 from fuzz.results import check_text
+from gvpipe.budget import BYTES_PER_BYTE, SECONDS_PER_BYTE
 
-SECONDS_PER_BYTE = 20e-6  # of processor time
-MEMORY_PER_BYTE = 2000  # bytes, above what any file may cost
 PEAK = re.compile(rb"VmHWM:\s+(\d+) kB")
 RESIDENT = re.compile(rb"VmRSS:\s+(\d+) kB")
 
@@ -47,7 +46,7 @@ def judge(target: Target, path: Path, size: int) -> Verdict:
         verdict = _parse(target, path)
     if verdict.kind not in (ACCEPTED, REFUSED):
         return verdict
-    allowed = max(target.memory, MEMORY_PER_BYTE * size)
+    allowed = max(target.memory, BYTES_PER_BYTE * size)
     if cost.memory > allowed:
         return Verdict(
             LARGE, target.name, f"{cost.memory >> 20} MB for {size} bytes; {allowed >> 20} MB are allowed ({verdict.detail})"

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gvpipe.budget import LEAST_BYTES, LEAST_SECONDS
+
 Parts = dict[str, bytes]  # a file taken apart; checksums and lengths are made when it is put together
 Mutate = Callable[[Parts, np.random.Generator, "tuple[Seed, ...]"], Parts]
 
@@ -47,8 +49,8 @@ class Target:
     join: Callable[[Parts], dict[str, bytes]]
     parse: Callable[[Path], None]
     refusal: tuple[type[Exception], ...]
-    memory: int = 64 << 20
-    seconds: float = 2.0
+    memory: int = LEAST_BYTES
+    seconds: float = LEAST_SECONDS
 
     def case(self, run_seed: int, number: int) -> tuple[Seed, Parts]:
         """The seed and the parts of case ``number``; the first cases are the seeds themselves."""

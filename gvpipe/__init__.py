@@ -14,6 +14,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from gvpipe.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from gvpipe.api import Info, Report, Restreamed, decode, encode, info, open, render, restream
     from gvpipe.asset.attribute import Attribute
@@ -31,8 +33,6 @@ if TYPE_CHECKING:
     from gvpipe.rasterizer.renderer import Renderer
     from gvpipe.sequence import MeshSequence
     from gvpipe.web import ExportReport, export_html
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Attribute",

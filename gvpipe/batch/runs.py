@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import gvpipe
 from gvpipe.api import checked_keywords
 from gvpipe.arguments import StrPath, check_path
 from gvpipe.atomic import output_error
@@ -24,6 +23,7 @@ from gvpipe.codec import Codec, Progress
 from gvpipe.rate_control.purposes import own_settings
 from gvpipe.tasks.choice import open_executor
 from gvpipe.tasks.executor import Executor, Outcome, WorkerDied
+from gvpipe.version import __version__
 
 STAGE = "sequences"
 
@@ -157,9 +157,7 @@ def _encode(
     for outcome in executor.run(prepare, pickle.dumps(dict(keywords)), tasks):
         job, done = jobs[outcome.index], _done(outcome)
         error = done.error and done.error.replace(tasks[outcome.index].source, job.source)
-        entry = Entry(
-            job.source, done.hash, job.output, error, done.bytes, round(done.seconds, 3), gvpipe.__version__, settings
-        )
+        entry = Entry(job.source, done.hash, job.output, error, done.bytes, round(done.seconds, 3), __version__, settings)
         if done.is_new:
             manifest.add(entry)
         yield entry, done

@@ -18,12 +18,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from gvpipe.budget import SECONDS_PER_BYTE
 from gvpipe.errors import InputError, TopologyChange
 from gvpipe.io.damage import LONGEST
 
 DONE, REFUSED, CHANGED = "done", "refused", "changed"  # states of an answer
 LEAST_MEMORY, MEMORY_PER_BYTE = 1 << 30, 200  # bytes that the process may take in any case, and for each byte that it reads
-LEAST_SECONDS, SECONDS_PER_BYTE = 5.0, 20e-6  # of the processor, to open a file
+LEAST_SECONDS = 5.0  # of the processor, to open a file; the time for each byte is that of geometry videos
 TOO_LONG = -getattr(signal, "SIGXCPU", 0)  # status of a process that took more
 MOST_LISTED = 10_000  # entries of folders that are looked at
 
