@@ -3,6 +3,9 @@
  *
  * A picture is shown for one frame or more (`format/repeated_frames.js`). Every picture has its number, so seeking and looping are exact in every browser. The clock stands still while a picture that
  * is due is not there yet; a page too slow for every picture gets those that are due, and none is queued.
+ *
+ * What is kept of a picture are the levels of its samples. Where positions are made of them elsewhere, pictures are *finished* just
+ * before they are due: positions take more memory than levels.
  */
 
 import { AGAIN, GeometryVideoError } from "./format/errors.js";
@@ -10,11 +13,16 @@ import { pictureDecoder } from "./picture_decoder.js";
 import { readTrack } from "./track.js";
 
 const KEPT_BYTES = 64 * 2 ** 20; // of decoded levels
+const FINISHED = 4; // pictures that are kept finished: the one shown, the next two, and one asked for too many
 const KEPT_GROUPS = 3; // at least: what is shown, what comes next, and one of before
 const AHEAD = 1; // s, decoded ahead of what plays
 const BEHIND = 1.25; // clips of a file that is still written: what is left behind is not played
 const EDGE = 1e-3; // frames before the end of such a file, where the clock waits
 const LONGEST_STEP = 1000; // ms that the clock goes on at once: a hidden page is asked for nothing
+
+/**
+ * @typedef {(picture: number, levels: Uint8Array|Uint16Array) => Promise<object>} Finish what is to be shown of a picture
+ */
 
 /** The clock of pages: one tick before each repaint. */
 export const nextRepaint = (tick) => requestAnimationFrame(tick);
@@ -23,18 +31,18 @@ export class DecodedPictures {
   /**
    * @param {Uint8Array} file @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated
    * @param {import("./mcgv/reader.js").Planes} planes
-   * @param {number} [checksum] `track_crc32` of the header
+   * @param {{checksum?: number, finish?: Finish|null}} [options] `checksum` is the header's `track_crc32`
    * @returns {Promise<DecodedPictures>} its first group decoded
    * @throws {GeometryVideoError} kind "unsupported": this browser's WebCodecs cannot decode it
    */
-  static async open(file, fps, repeated, planes, checksum) {
+  static async open(file, fps, repeated, planes, { checksum, finish } = {}) {
     const track = readTrack(file, checksum);
     const found = track.groups.reduce((sum, group) => sum + group.length, 0);
     if (found !== repeated.distinct) {
       throw new GeometryVideoError("corrupt", `its video has ${found} pictures in place of ${repeated.distinct}; ${AGAIN}`);
     }
     const groupBytes = (planes.samples.length * repeated.distinct) / track.groups.length;
-    return DecodedPictures.of(track.groups, groupBytes, fps, repeated, pictureDecoder(track, planes));
+    return DecodedPictures.of(track.groups, groupBytes, fps, repeated, pictureDecoder(track, planes), { finish });
   }
 
   /**
@@ -44,11 +52,11 @@ export class DecodedPictures {
    * @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated
    * @param {{decode: (group: object[], give: (picture: number, shown: object) => void) => Promise<void>, close: () => void,
    *   isConcurrent?: boolean}} decoder `isConcurrent`: it takes a group while it decodes others
-   * @param {number} [frame] shown first
+   * @param {{frame?: number, finish?: Finish|null}} [options] `frame` is shown first
    * @returns {Promise<DecodedPictures>}
    */
-  static async of(groups, groupBytes, fps, repeated, decoder, frame = 0) {
-    const pictures = new DecodedPictures(groups, groupBytes, fps, repeated, decoder);
+  static async of(groups, groupBytes, fps, repeated, decoder, { frame = 0, finish = null } = {}) {
+    const pictures = new DecodedPictures(groups, groupBytes, fps, repeated, decoder, finish);
     try {
       await pictures.seek(frame);
     } catch (error) {
@@ -59,14 +67,14 @@ export class DecodedPictures {
   }
 
   /**
-   * The same of a file in parts: a group is a fragment, fetched when it is decoded with the sections that its frames need.
+   * The same of a file in parts: a group is a fragment, fetched when it is decoded.
    *
    * @param {import("./format/stream_file.js").StreamFile} file @param {number} fps
    * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {import("./mcgv/reader.js").Planes} planes
-   * @param {(first: number, last: number) => Promise<unknown>} load as for `without`
+   * @param {{prepare?: (picture: number) => void, finish?: Finish|null}} [options] `prepare` is told of the first picture of what is fetched
    * @returns {Promise<DecodedPictures>}
    */
-  static async inParts(file, fps, repeated, planes, load) {
+  static async inParts(file, fps, repeated, planes, { prepare = () => {}, finish } = {}) {
     if (file.pictures !== repeated.distinct) {
       throw new GeometryVideoError("corrupt", `its video has ${file.pictures} pictures in place of ${repeated.distinct}; ${AGAIN}`);
     }
@@ -75,38 +83,23 @@ export class DecodedPictures {
     );
     const inner = pictureDecoder(file.description, planes);
     const decode = async (group, give) => {
-      const [coded] = await Promise.all([file.samples(group[0].fragment), load(group[0].picture, group.at(-1).picture)]);
-      await inner.decode(coded, give);
+      prepare(group[0].picture);
+      await inner.decode(await file.samples(group[0].fragment), give);
     };
     const groupBytes = (planes.samples.length * repeated.distinct) / groups.length;
-    return DecodedPictures.of(groups, groupBytes, fps, repeated, { decode, close: () => inner.close() });
+    return DecodedPictures.of(groups, groupBytes, fps, repeated, { decode, close: () => inner.close() }, { finish });
   }
 
-  /**
-   * The same clock for a file without pictures, whose frames all have the levels of no residual.
-   *
-   * @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {Uint8Array} levels
-   * @param {number[]} starts the first picture of each segment, and the number of pictures
-   * @param {(first: number, last: number) => Promise<unknown>} load has the sections here that pictures need
-   * @returns {Promise<DecodedPictures>}
-   */
-  static async without(fps, repeated, levels, starts, load) {
-    const groups = starts
-      .slice(1)
-      .map((stop, s) => Array.from({ length: stop - starts[s] }, (_, i) => ({ picture: starts[s] + i })));
-    const decode = async (samples, add) => {
-      await load(samples[0].picture, samples.at(-1).picture);
-      samples.forEach(({ picture }) => add(picture, levels));
-    };
-    return DecodedPictures.of(groups, 0, fps, repeated, { decode, close() {} });
-  }
-
-  constructor(groups, groupBytes, fps, repeated, decoder) {
+  constructor(groups, groupBytes, fps, repeated, decoder, finish) {
     this.fps = fps;
     this.repeated = repeated;
     /** The frame shown. */
     this.shown = -1;
+    /** Of the frame shown what the decoder gave for its picture: levels (S, 3), or what `finish` made of them. */
+    this.current = null;
     this.decoder = decoder;
+    this.finish = finish;
+    this.finished = new Map(); // picture -> Finished, the one asked for last at the end
     this.groupBytes = groupBytes;
     this.samples = groups;
     this.grow();
@@ -126,11 +119,6 @@ export class DecodedPictures {
     return this.repeated.frames;
   }
 
-  /** `Uint8Array` (V, 3): the levels of the frame shown. */
-  levels() {
-    return this.current;
-  }
-
   /** The pictures that are decoded and kept: spans `[first, last + 1]`, ascending. */
   spans() {
     const done = [...this.kept].filter(([, { isDone, error }]) => isDone && !error).map(([number]) => number);
@@ -147,7 +135,13 @@ export class DecodedPictures {
   async seek(frame) {
     this.pause();
     if (this.shown === frame) return;
-    this.current = await this.#picture(this.repeated.distinctOf(frame));
+    const picture = this.repeated.distinctOf(frame);
+    const levels = await this.#picture(picture);
+    if (this.finished.get(picture)?.error) this.finished.delete(picture); // it is tried again
+    const finished = this.#finished(picture, levels);
+    await finished.done;
+    if (finished.error) throw finished.error;
+    this.current = finished.contents;
     this.shown = frame;
   }
 
@@ -179,17 +173,19 @@ export class DecodedPictures {
       const frame = loop ? Math.floor(next) % this.frames : Math.min(Math.floor(next), this.frames - 1);
       const picture = this.repeated.distinctOf(frame);
       const group = this.#group(this.groupOf[picture]);
-      if (group.error) {
+      const levels = group.levels.get(picture);
+      const finished = levels && this.#finished(picture, levels);
+      const error = group.error ?? finished?.error;
+      if (error) {
         this.pause();
-        failed(group.error);
+        failed(error);
         return;
       }
-      const levels = group.levels.get(picture);
-      ticked?.(now, Boolean(levels));
-      if (levels) {
+      ticked?.(now, Boolean(finished?.contents));
+      if (finished?.contents) {
         position = loop ? next % this.frames : next;
         if (frame !== this.shown) {
-          [this.shown, this.current] = [frame, levels];
+          [this.shown, this.current] = [frame, finished.contents];
           show(frame);
         }
         if (isOver && this.playing === playing) {
@@ -198,6 +194,8 @@ export class DecodedPictures {
           return;
         }
         this.#decodeAhead(this.groupOf[picture], AHEAD * this.fps * rate);
+        const soon = Math.floor(next + (step * rate * this.fps) / 1000);
+        for (const k of [soon, soon + 1]) this.#finishAhead(loop ? k % this.frames : Math.min(k, this.frames - 1));
       }
       nextTick(tick);
     };
@@ -214,6 +212,7 @@ export class DecodedPictures {
     this.isClosed = true;
     this.decoder.close();
     this.kept.clear();
+    this.finished.clear();
   }
 
   /** Have the groups decoded that follow one: the next, and more up to so many pictures and half of what is kept. */
@@ -225,6 +224,24 @@ export class DecodedPictures {
       this.#group(next);
       ahead += this.samples[next].length;
     }
+  }
+
+  /** What is shown of a picture; where that is still to be made of its levels, it is under way. @returns {Finished} */
+  #finished(picture, levels) {
+    if (!this.finish) return { contents: levels };
+    let finished = this.finished.get(picture);
+    this.finished.delete(picture);
+    finished ??= new Finished(this.finish(picture, levels));
+    if (this.finished.size === FINISHED) this.finished.delete(this.finished.keys().next().value);
+    this.finished.set(picture, finished);
+    return finished;
+  }
+
+  /** Have a frame's picture finished that is due soon, if its levels are there. */
+  #finishAhead(frame) {
+    const picture = this.repeated.distinctOf(frame);
+    const levels = this.kept.get(this.groupOf[picture])?.levels.get(picture);
+    if (levels) this.#finished(picture, levels);
   }
 
   /** A picture's levels, when they are there. What could not be fetched is tried again. */
@@ -264,6 +281,19 @@ export class DecodedPictures {
     if (this.decoder.isConcurrent) decode();
     else this.turn = this.turn.then(decode);
     return group;
+  }
+}
+
+/** What `finish` makes of a picture's levels: `contents` or `error` once it is `done`. */
+class Finished {
+  contents = null;
+  error = null;
+
+  constructor(promise) {
+    this.done = promise.then(
+      (contents) => (this.contents = contents),
+      (error) => (this.error = error),
+    );
   }
 }
 

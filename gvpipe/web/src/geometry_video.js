@@ -298,9 +298,7 @@ export class GeometryVideo {
     const result = this.#queueBeside.then(async () => {
       const pictures = await this.#beside;
       await pictures.seek(k);
-      const positions = new Float32Array(3 * reader.vertexCount);
-      reader.rebuild(this.#repeated.distinctOf(k), pictures.levels(), positions);
-      return positions;
+      return pictures.current.slice();
     });
     this.#queueBeside = result.catch(() => {});
     return result;
@@ -321,7 +319,7 @@ export class GeometryVideo {
 
   #read(k, positions) {
     this.#shown = k;
-    this.#reader.rebuild(this.#repeated.distinctOf(k), this.#pictures.levels(), positions);
+    positions.set(this.#pictures.current);
     return positions;
   }
 }

@@ -20,10 +20,11 @@ export class VideoPictures {
   /**
    * @param {Uint8Array} file @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated
    * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
+   * @param {import("./decoded_pictures.js").Finish|null} finish
    * @returns {Promise<VideoPictures>}
    */
-  static async open(file, fps, repeated, size, samples) {
-    const pictures = new VideoPictures(file, fps, repeated, size, samples);
+  static async open(file, fps, repeated, size, samples, finish) {
+    const pictures = new VideoPictures(file, fps, repeated, size, samples, finish);
     try {
       await pictures.#load();
     } catch (error) {
@@ -33,7 +34,7 @@ export class VideoPictures {
     return pictures;
   }
 
-  constructor(file, fps, repeated, [width, height], samples) {
+  constructor(file, fps, repeated, [width, height], samples, finish) {
     this.fps = fps;
     this.repeated = repeated;
     this.frames = repeated.frames;
@@ -43,7 +44,9 @@ export class VideoPictures {
     this.width = width;
     this.height = height;
     this.samples = samples;
-    this.read = new Uint8Array(samples.length);
+    this.finish = finish;
+    /** Of the frame shown the levels of its picture (S, 3), or what `finish` made of them. */
+    this.current = null;
     /** The picture that the video shows; -1: not known. A video that has loaded may have nothing to draw yet. */
     this.shown = -1;
     this.url = URL.createObjectURL(new Blob([file], { type: "video/mp4" }));
@@ -86,6 +89,13 @@ export class VideoPictures {
     this.frame = frame;
     const picture = this.repeated.distinctOf(frame);
     if (this.shown !== picture) await this.#reach(picture);
+    await this.#take(picture);
+  }
+
+  /** Have what is shown of the picture that the video shows now. */
+  async #take(picture) {
+    const levels = this.#levels();
+    this.current = this.finish ? await this.finish(picture, levels) : levels;
   }
 
   async #reach(picture) {
@@ -152,7 +162,7 @@ export class VideoPictures {
     }
     video.playbackRate = rate;
     this.shown = -1;
-    const next = (_, { mediaTime }) => {
+    const next = async (_, { mediaTime }) => {
       if (this.playing !== playing) return;
       const frame = Math.min(this.frames - 1, this.#pictureAt(mediaTime));
       if (frame > 0) this.tellsFrames ??= this.#tellsFrames();
@@ -163,11 +173,13 @@ export class VideoPictures {
       }
       if (frame !== this.shown) {
         this.shown = frame;
-        this.context.drawImage(video, 0, 0);
+        await this.#take(frame);
+        if (this.playing !== playing) return;
         on.show(frame);
       }
-      video.requestVideoFrameCallback(next);
+      video.requestVideoFrameCallback(showNext);
     };
+    const showNext = (...shown) => next(...shown).catch((error) => this.playing === playing && on.failed(error));
     video.onended = () => {
       if (this.playing !== playing || this.tellsFrames === false) return;
       if (loop) {
@@ -178,7 +190,7 @@ export class VideoPictures {
       this.pause();
       on.ended();
     };
-    video.requestVideoFrameCallback(next);
+    video.requestVideoFrameCallback(showNext);
     await video.play();
   }
 
@@ -196,7 +208,8 @@ export class VideoPictures {
           await this.#reach(picture);
           if (this.playing !== playing) return;
         }
-        this.context.drawImage(this.video, 0, 0);
+        await this.#take(picture);
+        if (this.playing !== playing) return;
         this.frame = before = frame;
         show(frame);
       }
@@ -232,20 +245,21 @@ export class VideoPictures {
     return Math.floor(time * this.fps + 0.25);
   }
 
-  /** `Uint8Array` (V, 3): the levels of the frame shown. */
-  levels() {
-    if (!this.playing) this.context.drawImage(this.video, 0, 0); // else it is drawn already
+  /** `Uint8Array` (S, 3): the levels of the picture that the video shows now. */
+  #levels() {
+    this.context.drawImage(this.video, 0, 0);
+    const levels = new Uint8Array(this.samples.length);
     const { data } = this.context.getImageData(0, 0, this.width, this.height);
     let lowest = 255;
-    for (let i = 0; i < this.samples.length; i++) {
-      this.read[i] = OF_GREY[data[4 * this.samples[i]]];
-      lowest = Math.min(lowest, this.read[i]);
+    for (let i = 0; i < levels.length; i++) {
+      levels[i] = OF_GREY[data[4 * this.samples[i]]];
+      lowest = Math.min(lowest, levels[i]);
     }
     if (lowest === 0) {
       const message = "this browser changes the colours of a video, and has no WebCodecs to read them by; use a newer one";
       throw new GeometryVideoError("unsupported", message);
     }
-    return this.read;
+    return levels;
   }
 
   close() {

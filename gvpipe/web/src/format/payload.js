@@ -20,6 +20,8 @@ const LIMITS = { version: [1, 1 << 16], frames: [1, MAX_FRAMES], vertices: [1, M
 
 /** A geometry video's header and sections, and what reading them may cost. */
 export class Payload {
+  isWhole = true; // all of the file is here
+
   /** @param {Map<string, () => Promise<Uint8Array>>} [late] what fetches sections that are not here, by name */
   constructor(header, sections, budget, late = new Map()) {
     this.header = header;

@@ -1,4 +1,4 @@
-/** Rows of integers as points: which rows are equal. */
+/** Points: which rows of integers are equal, and boxes. */
 
 /**
  * @param {ArrayLike<number>} rows n rows, flat
@@ -25,4 +25,16 @@ export function previousEqual(rows, width) {
 function equal(rows, width, a, b) {
   for (let i = 0; i < width; i++) if (rows[a * width + i] !== rows[b * width + i]) return false;
   return true;
+}
+
+/** Make a box hold positions (V, 3), flat; it is not finite if one of them is not. */
+export function stretch({ min, max }, positions) {
+  for (let axis = 0; axis < 3; axis++) {
+    let [low, high] = [min[axis], max[axis]];
+    for (let i = axis; i < positions.length; i += 3) {
+      if (!(positions[i] >= low)) low = positions[i]; // NaN too
+      if (!(positions[i] <= high)) high = positions[i];
+    }
+    [min[axis], max[axis]] = [low, high];
+  }
 }

@@ -1,9 +1,11 @@
-/** Frames of codecs without pictures, and of trajectory images, decoded by Python's kernels: in a worker, or on the page where there is none. */
+/** Frames of all codecs, decoded by Python's kernels: in a worker, or on the page where there is none. Pictures are decoded by the page. */
 
 import { Displacements } from "../format/displacements.js";
 import { GeometryVideoError, corrupt } from "../format/errors.js";
+import { stretch } from "../format/points.js";
 import { LaplacianReader, VERSION as LAPLACIAN_VERSION } from "../laplacian/reader.js";
-import { TrajectoryReader, VERSION as MCGV_VERSION } from "../mcgv/trajectory_reader.js";
+import { McgvReader, VERSION as MCGV_VERSION } from "../mcgv/reader.js";
+import { TrajectoryReader } from "../mcgv/trajectory_reader.js";
 import { PcaReader, VERSION as PCA_VERSION } from "../pca/reader.js";
 import { PdctReader, VERSION as PDCT_VERSION } from "../pdct/reader.js";
 import { Kernels } from "../wasm/kernels.js";
@@ -13,13 +15,13 @@ const AHEAD = 10; // s: a segment that begins later is not decoded ahead
 const CORRECTIONS = "corrections";
 
 /**
- * Readers by codec: `open(payload, kernels)` gives `faces`, `points`, `levels`, `segmentStart` and `read`; with several levels `levelFaces`;
- * where a segment is decoded ahead `prepare`; and where its frames come one after the other `extend(box, s)`, which has a box hold
- * the motion of segment s without decoding it.
+ * Readers by codec: `open(payload, kernels)` gives `faces`, `points` or `basePoints`, `levels`, `segmentStart` and `read`; with several
+ * levels `levelFaces`; where a segment is decoded ahead `prepare`; where pictures are read `planes`, whose levels are handed to `read`;
+ * and where a box can hold the motion of segment s without its frames `extend(box, s)`.
  */
 const READERS = {
   laplacian: { version: LAPLACIAN_VERSION, reader: LaplacianReader },
-  mcgv: { version: MCGV_VERSION, reader: TrajectoryReader }, // of trajectory images
+  mcgv: { version: MCGV_VERSION, reader: { open: (payload, kernels) => mcgvReader(payload).open(payload, kernels) } },
   pca: { version: PCA_VERSION, reader: PcaReader },
   pdct: { version: PDCT_VERSION, reader: PdctReader },
 };
@@ -27,6 +29,11 @@ const READERS = {
 /** The highest version of a codec that is read here; 0: none. */
 export function readableVersion(codec) {
   return Object.hasOwn(READERS, codec) ? READERS[codec].version : 0;
+}
+
+/** Whether pictures are trajectories, or frames. */
+function mcgvReader({ header }) {
+  return "transform" in header.settings ? TrajectoryReader : McgvReader;
 }
 
 export class FrameDecoder {
@@ -59,8 +66,8 @@ export class FrameDecoder {
    * What a page must know of the mesh at a level of detail.
    *
    * @param {number|"coarsest"} wanted
-   * @returns {Promise<{level: number, faces: Uint32Array, points: Int32Array, levels: number[]}>} triangles (T, 3), flat; the point of
-   *   each vertex; vertices of each level
+   * @returns {Promise<{level: number, levels: number[], faces: Uint32Array, basePoints: Int32Array, planes: import("../mcgv/reader.js").Planes|null}>} vertices of
+   *   each level; triangles (T, 3), flat; rows (V, 3), flat, that are equal where vertices are one point; what is read of pictures
    * @throws {GeometryVideoError} there is no such level
    */
   async describe(wanted) {
@@ -70,19 +77,21 @@ export class FrameDecoder {
     if (!(level >= 0 && level < levels.length)) {
       throw new GeometryVideoError("unsupported", `level ${level}: there are levels 0..${levels.length - 1}`);
     }
-    if (level === 0) return { level, levels, faces: reader.faces, points: reader.points };
-    return { level, levels, faces: reader.levelFaces(level), points: Int32Array.from({ length: levels[level] }, (_, v) => v) };
+    const planes = reader.planes ?? null;
+    if (level === 0) return { level, levels, faces: reader.faces, basePoints: reader.basePoints ?? rowsOf(reader.points), planes };
+    return { level, levels, faces: reader.levelFaces(level), basePoints: rowsOf([...Array(levels[level]).keys()]), planes };
   }
 
   /**
    * Distinct frames `start` to `stop` of a level.
    *
    * @param {boolean} [goesOn] whether the frames behind them are likely to be next: their segment is then decoded ahead
+   * @param {Uint8Array|Uint16Array|null} [picture] of one frame, where pictures are read: the levels of `planes.samples`
    * @returns {Promise<{positions: Float32Array, bounds: {min: number[], max: number[]}}>} (stop - start, V, 3), model units; the box of
    *   the motion so far: of the frames that were read, and of evenly spaced ones of their segments
    */
-  async read(start, stop, level, goesOn = false) {
-    const positions = await this.#frames(start, stop, level);
+  async read(start, stop, level, goesOn = false, picture = null) {
+    const positions = await this.#frames(start, stop, level, picture);
     stretch(this.#bounds, positions);
     const s = this.#segmentOf(stop - 1);
     const looked = this.#look(s, level);
@@ -91,14 +100,19 @@ export class FrameDecoder {
     return { positions, bounds: structuredClone(this.#bounds) };
   }
 
+  /** Have the segment of a frame decoded. What goes wrong is told when the frame is read. */
+  async prepare(frame) {
+    await this.#reader.prepare?.(this.#segmentOf(frame)).catch(() => {});
+  }
+
   #segmentOf(frame) {
     let s = 0;
     while (this.#reader.segmentStart(s + 1) <= frame) s++;
     return s;
   }
 
-  async #frames(start, stop, level) {
-    const frames = await guarded("coefficients", () => this.#reader.read(start, stop, level));
+  async #frames(start, stop, level, picture = null) {
+    const frames = await guarded("coefficients", () => this.#reader.read(start, stop, level, picture));
     const size = frames.length / (stop - start);
     for (let k = start; k < stop && this.#corrections && level === 0; k++) {
       this.#corrections.apply(k, frames.subarray((k - start) * size, (k - start + 1) * size));
@@ -139,14 +153,9 @@ async function guarded(name, work) {
   }
 }
 
-/** Make a box hold `positions (V, 3)`. */
-function stretch({ min, max }, positions) {
-  for (let axis = 0; axis < 3; axis++) {
-    let [low, high] = [min[axis], max[axis]];
-    for (let i = axis; i < positions.length; i += 3) {
-      if (positions[i] < low) low = positions[i];
-      if (positions[i] > high) high = positions[i];
-    }
-    [min[axis], max[axis]] = [low, high];
-  }
+/** Rows (V, 3), flat, that are equal where points are. */
+function rowsOf(points) {
+  const rows = new Int32Array(3 * points.length);
+  points.forEach((point, v) => (rows[3 * v] = point));
+  return rows;
 }

@@ -1,5 +1,5 @@
 /**
- * Where frames of codecs without pictures are decoded: in a worker, so that the page goes on; on the page itself where it may have
+ * Where frames are decoded: in a worker, so that the page goes on; on the page itself where it may have
  * none (as in Node). The worker asks for sections when it needs them.
  */
 
@@ -25,7 +25,7 @@ export class FrameHost {
   constructor(payload, code) {
     this.#payload = payload;
     const { header, sections, budget } = payload;
-    this.#setUp = { task: "frames", header, names: [...sections.keys()], bytes: budget.bytes, code, draco: dracoBinary };
+    this.#setUp = { task: "frames", header, isWhole: payload.isWhole, names: [...sections.keys()], bytes: budget.bytes, code, draco: dracoBinary };
     try {
       const address = URL.createObjectURL(new Blob([WORKER_SOURCE], { type: "text/javascript" }));
       this.#worker = new Worker(address);
@@ -47,6 +47,11 @@ export class FrameHost {
     const { positions, bounds } = await this.#ask({ method: "read", given });
     this.bounds = bounds;
     return positions;
+  }
+
+  /** As `FrameDecoder.prepare`. */
+  prepare(frame) {
+    return this.#ask({ method: "prepare", given: [frame] });
   }
 
   /** That the file has so many frames by now. */
@@ -101,9 +106,9 @@ export class FrameHost {
   }
 }
 
-/** The clock's decoder: frames are asked for at once, and the worker answers in turn. A segment that is not decoded holds up its own alone. */
+/** Frames of a level, for the clock. The worker answers in turn; a segment that is not decoded holds up its own frames alone. */
 export class FrameSource {
-  isConcurrent = true;
+  isConcurrent = true; // frames are asked for at once
   #host;
   #level;
   #before = -2; // the frame asked for last; none yet
@@ -114,11 +119,16 @@ export class FrameSource {
     this.#level = level;
   }
 
-  /** As `GroupDecoder.decode`, with positions (V, 3) in place of levels. */
+  /** As `GroupDecoder.decode`, with positions (V, 3) in place of levels: of files without pictures, whose groups are a frame each. */
   async decode([{ picture }], give) {
+    give(picture, await this.finish(picture));
+  }
+
+  /** Positions (V, 3) of a frame. @param {Uint8Array|Uint16Array|null} [levels] of its picture, where pictures are read */
+  finish(picture, levels = null) {
     const isNext = picture === this.#before + 1;
     this.#before = picture;
-    give(picture, await this.#host.read(picture, picture + 1, this.#level, isNext));
+    return this.#host.read(picture, picture + 1, this.#level, isNext, levels);
   }
 
   close() {}

@@ -6,9 +6,9 @@ import { FrameDecoder } from "./frame_decoder.js";
 import { RemotePayload } from "./remote_payload.js";
 
 /** @returns {(message: object) => void} what takes the messages after the first */
-export function serveFrames({ header, names, bytes, code, draco }) {
+export function serveFrames({ header, isWhole, names, bytes, code, draco }) {
   useDraco(draco);
-  const payload = new RemotePayload(header, names, bytes);
+  const payload = new RemotePayload(header, isWhole, names, bytes);
   const decoder = FrameDecoder.open(payload, code);
   decoder.catch(() => {}); // reported by what is asked
   return async ({ number, method, given, grown, ...answer }) => {

@@ -5,6 +5,7 @@ import { AGAIN, GeometryVideoError } from "../format/errors.js";
 const KEPT_BYTES = 32 * 2 ** 20; // of sections of segments, as they are in the file
 
 export class PartPayload {
+  isWhole = false;
   #file;
 
   /**

@@ -6,9 +6,10 @@ import { AGAIN, GeometryVideoError } from "../format/errors.js";
 export class RemotePayload {
   #waiting = new Map(); // name -> what to call with its bytes
 
-  /** @param {object} header @param {string[]} names of sections @param {number} bytes of the file */
-  constructor(header, names, bytes) {
+  /** @param {object} header @param {boolean} isWhole the file is all there @param {string[]} names of sections @param {number} bytes of the file */
+  constructor(header, isWhole, names, bytes) {
     this.header = header;
+    this.isWhole = isWhole;
     this.sections = new Set(names);
     this.budget = new Budget(bytes);
     this.budget.keepMesh(header);

@@ -1,36 +1,33 @@
 /** The published prediction: one affine transform per cluster and frame. Mirrors `gvcodecs.mcgv.motion.affine`. */
 
-import { Segments } from "./contract.js";
 import { AffinePredictor } from "./affine_fit.js";
 import { decodeTransforms } from "./affine_coding.js";
 
 /** @implements {import("./contract.js").Motion} */
 export class AffineMotion {
+  #predictor;
+  #step;
+
   /**
-   * @param {import("../format/payload.js").Payload} payload
    * @param {import("./header.js").Header} header
    * @param {import("./surface.js").Surface} surface of the base frame
    * @param {Uint16Array} clusters (S)
    */
-  constructor(payload, header, surface, clusters) {
-    this.predictor = new AffinePredictor(surface.base, clusters, header.clusters);
-    const { rest } = this.predictor;
-    this.segments = new Segments(
-      payload.header.frames,
-      header.segments,
-      (name, frames) =>
-      decodeTransforms(payload.section(name), frames, rest, header.transformStep, name),
-      payload.sections,
-    );
+  constructor(header, surface, clusters) {
+    this.#predictor = new AffinePredictor(surface.base, clusters, header.clusters);
+    this.#step = header.transformStep;
   }
 
-  predict(frame, predicted) {
-    const [transforms, place] = this.segments.locate(frame);
-    const size = this.predictor.rest.length;
-    this.predictor.predict(transforms.subarray(place * size, (place + 1) * size), predicted);
+  decode(data, name, frames) {
+    return decodeTransforms(data, frames, this.#predictor.rest, this.#step, name);
   }
 
-  extend(box) {
-    for (const s of this.segments.here()) this.predictor.extend(box, this.segments.get(s));
+  predict(transforms, place, predicted) {
+    const size = this.#predictor.rest.length;
+    this.#predictor.predict(transforms.subarray(place * size, (place + 1) * size), predicted);
+  }
+
+  extend(box, transforms) {
+    this.#predictor.extend(box, transforms);
   }
 }

@@ -1,37 +1,44 @@
 /** Blended prediction: weights once, transforms as trajectories. Mirrors `gvcodecs.mcgv.motion.blended`. */
 
+import { stretch } from "../format/points.js";
 import { Blend } from "./skinning.js";
-import { Segments } from "./contract.js";
 import { Trajectories } from "./skinning_coding.js";
 import { decodeWeights } from "./weight_coding.js";
 
-const LOOKS = 2 ** 24; // products that a look at the whole motion may take: some hundredths of a second
-
 /** @implements {import("./contract.js").Motion} */
 export class BlendedMotion {
+  #kernels;
+  #header;
+  #budget;
+  #blend;
+  #point;
+  #moved; // (P, 3) of the frame last asked for
+
   /**
-   * @param {import("../format/payload.js").Payload} payload
+   * @param {import("../wasm/kernels.js").Kernels} kernels
+   * @param {Uint8Array} data section `weights`
    * @param {import("./header.js").Header} header
-   * @param {import("./surface.js").Surface} surface of the base frame @param {import("../wasm/kernels.js").Kernels} kernels
+   * @param {import("./surface.js").Surface} surface of the base frame @param {import("../format/budget.js").Budget} budget of the file
    */
-  constructor(payload, header, { base, point, members, points }, kernels) {
-    const weights = decodeWeights(kernels, payload.section("weights"), points.causalNeighbours(), header.clusters);
+  constructor(kernels, data, header, { base, point, members, points }, budget) {
+    const weights = decodeWeights(kernels, data, points.causalNeighbours(), header.clusters);
     const own = Float64Array.from({ length: 3 * members.length }, (_, i) => base[3 * members[Math.floor(i / 3)] + (i % 3)]);
-    this.blend = new Blend(own, weights, header.clusters);
-    this.point = point;
-    this.moved = new Float64Array(own.length); // (P, 3) of the frame last asked for
-    this.segments = new Segments(
-      payload.header.frames,
-      header.segments,
-      (name, frames) =>
-        new Trajectories(kernels.fresh(), payload.section(name), header.clusters, frames, header.transformStep, name, payload.budget),
-      payload.sections,
-    );
+    this.#kernels = kernels;
+    this.#header = header;
+    this.#budget = budget;
+    this.#blend = new Blend(own, weights, header.clusters);
+    this.#point = point;
+    this.#moved = new Float64Array(own.length);
   }
 
-  predict(frame, predicted) {
-    const { point, moved } = this;
-    this.#move(frame);
+  decode(data, name, frames) {
+    const { clusters, transformStep } = this.#header;
+    return new Trajectories(this.#kernels.fresh(), data, clusters, frames, transformStep, name, this.#budget);
+  }
+
+  predict(trajectories, place, predicted) {
+    const [point, moved] = [this.#point, this.#moved];
+    this.#move(trajectories, place);
     for (let slot = 0, i = 0; slot < point.length; slot++, i += 3) {
       const p = 3 * point[slot];
       predicted[i] = moved[p];
@@ -40,38 +47,17 @@ export class BlendedMotion {
     }
   }
 
-  /** Looks at every frame, or at as many, evenly spaced, as `LOOKS` allows; all segments that are here are decoded. */
-  extend(box) {
-    const { segments, moved } = this;
-    for (const s of segments.here()) {
-      const { n, basis } = segments.get(s);
-      const frames = segments.start(s + 1) - segments.start(s);
-      const products = segments.count * (3 * n * basis.components + 8 * moved.length); // of a frame
-      const looks = Math.min(frames, Math.max(2, Math.floor(LOOKS / products)));
-      for (let i = 0; i < looks; i++) {
-        this.#move(segments.start(s) + Math.floor((i * (frames - 1)) / Math.max(1, looks - 1)));
-        stretch(box, moved);
-      }
+  /** Looks at every frame, or at as many, evenly spaced, as `looks` allows. */
+  extend(box, trajectories, frames, looks) {
+    const products = 3 * trajectories.n * trajectories.basis.components + 8 * this.#moved.length; // of a frame
+    const count = Math.min(frames, Math.max(2, Math.floor(looks / products)));
+    for (let i = 0; i < count; i++) {
+      this.#move(trajectories, Math.floor((i * (frames - 1)) / Math.max(1, count - 1)));
+      stretch(box, this.#moved);
     }
   }
 
-  /** Fill `moved` with a frame's points. */
-  #move(frame) {
-    const [trajectories, place] = this.segments.locate(frame);
-    this.blend.predict(this.blend.transforms(trajectories.rows(place)), this.moved);
-  }
-}
-
-/** Make a box hold points (P, 3), flat. */
-function stretch({ min, max }, points) {
-  for (let axis = 0; axis < 3; axis++) {
-    let low = min[axis];
-    let high = max[axis];
-    for (let i = axis; i < points.length; i += 3) {
-      if (!(points[i] >= low)) low = points[i]; // NaN too
-      if (!(points[i] <= high)) high = points[i];
-    }
-    min[axis] = low;
-    max[axis] = high;
+  #move(trajectories, place) {
+    this.#blend.predict(this.#blend.transforms(trajectories.rows(place)), this.#moved);
   }
 }

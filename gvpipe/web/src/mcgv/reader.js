@@ -1,18 +1,26 @@
 /**
  * From an `mcgv` bitstream and the levels of its pictures to positions, any frame in any order. Mirrors the codec's reader.
  * Frames are distinct ones here (`format/repeated_frames.js`).
+ *
+ * It runs beside the page, which alone can decode pictures, and hands in their levels.
  */
 
-import { AGAIN, GeometryVideoError, corrupt } from "../format/errors.js";
 import { Displacements } from "../format/displacements.js";
-import { Kernels } from "../wasm/kernels.js";
+import { AGAIN, GeometryVideoError, corrupt } from "../format/errors.js";
+import { Recent } from "../format/recent.js";
 import { AffineMotion } from "./affine.js";
 import { BlendedMotion } from "./blended.js";
-import { readHeader } from "./header.js";
+import { VERSION, readHeader } from "./header.js";
 import { decodeClusters, decodePixels, decodeSlotClusters } from "./layout_coding.js";
 import { place } from "./kd_tree.js";
 import { SECTIONS, placeSlots } from "./placement.js";
 import { readSurface } from "./surface.js";
+
+export { VERSION };
+
+const OUTLIERS = "outliers"; // what the pictures cannot hold
+const LOOKS = 2 ** 24; // products that a look at the motion may take: some hundredths of a second
+const SEGMENTS_LOOKED_AT = 8; // of a whole file, at first
 
 /**
  * What is read of pictures.
@@ -23,117 +31,153 @@ import { readSurface } from "./surface.js";
  */
 
 export class McgvReader {
-  /** @param {import("../format/payload.js").Payload} payload @param {Uint8Array} code of kernels @returns {Promise<McgvReader>} */
-  static async open(payload, code) {
+  #payload;
+  #header;
+  #surface;
+  #motion;
+  #outliers;
+  #segments;
+  #predicted; // (S, 3)
+  #placed;
+  #looked = new Set(); // segments that a box holds
+
+  /** @type {Planes|null} the x, y and z planes of a picture, one below the other; null without pictures */
+  planes;
+
+  /**
+   * @param {import("../format/payload.js").Payload} payload `section` may return promises
+   * @param {import("../wasm/kernels.js").Kernels} kernels
+   * @returns {Promise<McgvReader>}
+   * @throws {GeometryVideoError} a section is not as gvpipe writes it, or takes more than its file may
+   */
+  static async open(payload, kernels) {
     const header = readHeader(payload.header);
-    const kernels = await Kernels.open(code);
-    return new McgvReader(payload, header, await readSurface(payload, header, kernels), kernels);
-  }
-
-  constructor(payload, header, surface, kernels) {
-    this.header = header;
-    /** The level of a zero residual. */
-    this.zero = 2 ** (header.profile.depth - 1);
-    this.surface = surface;
-    const { pixels, motion } = decodeMotion(payload, header, surface, kernels);
-    this.motion = motion;
-    if (header.outliers !== payload.sections.has("outliers")) {
-      throw new GeometryVideoError("corrupt", `its header and its section 'outliers' do not fit; ${AGAIN}`);
+    if (header.outliers !== payload.sections.has(OUTLIERS)) {
+      throw new GeometryVideoError("corrupt", `its header and its section '${OUTLIERS}' do not fit; ${AGAIN}`);
     }
-    const displacementsOf = (name, n) =>
-      payload.sections.has(name) ? [new Displacements(payload.section(name), payload.header.frames, n, name)] : [];
-    /** What the pictures cannot hold. */
-    this.outliers = displacementsOf("outliers", surface.nSlots);
-    /** What a bound on every vertex needs. */
-    this.corrections = displacementsOf("corrections", surface.slot.length);
-    const plane = header.width * header.height;
-    /** (S, 3) which sample of a picture carries each coordinate; null without pictures. */
-    this.samples = pixels && new Uint32Array(3 * surface.nSlots);
-    pixels?.forEach((pixel, slot) => this.samples.set([pixel, pixel + plane, pixel + 2 * plane], 3 * slot));
-    this.predicted = new Float64Array(3 * surface.nSlots);
-    this.placed = new Float32Array(3 * surface.nSlots);
+    const surface = await readSurface(payload, header, kernels);
+    const { pixels, motion } = await readMotion(payload, header, surface, kernels);
+    const data = header.outliers ? await payload.section(OUTLIERS) : null;
+    const outliers = data && new Displacements(data, payload.header.frames, surface.nSlots, OUTLIERS);
+    outliers?.check();
+    return new McgvReader(payload, header, surface, pixels, motion, outliers);
   }
 
+  constructor(payload, header, surface, pixels, motion, outliers) {
+    this.#payload = payload;
+    this.#header = header;
+    this.#surface = surface;
+    this.#motion = motion;
+    this.#outliers = outliers;
+    this.#segments = new Recent((s) => this.#decode(s));
+    this.#predicted = new Float64Array(3 * surface.nSlots);
+    this.#placed = new Float32Array(3 * surface.nSlots);
+    const { width, height, profile } = header;
+    const samples = new Uint32Array(pixels ? 3 * surface.nSlots : 0); // which one of a picture carries each coordinate
+    pixels?.forEach((pixel, slot) => samples.set([pixel, pixel + width * height, pixel + 2 * width * height], 3 * slot));
+    this.planes = pixels && { size: [width, 3 * height], samples, profile };
+  }
+
+  /** `Uint32Array` (T, 3): triangles, flat. */
   get faces() {
-    return this.surface.faces;
+    return this.#surface.faces;
   }
 
+  /** `Int32Array` (V, 3): the base frame, lattice units, flat. */
   get basePoints() {
-    return this.surface.basePoints;
+    return this.#surface.basePoints;
   }
 
-  /** `Uint8Array` (S, 3): the levels of a frame without a residual. */
-  get zeroLevels() {
-    return new Uint8Array(3 * this.surface.nSlots).fill(this.zero);
+  /** Vertex counts of the levels of detail: the whole mesh alone. */
+  get levels() {
+    return [this.#surface.slot.length];
   }
 
-  /** @returns {Planes} of a picture: the x, y and z planes, one below the other */
-  get planes() {
-    return { size: [this.header.width, 3 * this.header.height], samples: this.samples, profile: this.header.profile };
-  }
-
-  /** First frame of every segment, and their number at the end. */
-  get segmentStarts() {
-    const { segments } = this.motion;
-    return Array.from({ length: segments.count + 1 }, (_, s) => segments.start(s));
-  }
-
-  /** The names of the sections that frames `first` to `last` need beside what all share. */
-  sectionsOf(first, last) {
-    return this.motion.segments.names(first, last);
+  /** First frame of segment s; F for the one after the last. */
+  segmentStart(s) {
+    return Math.floor((s * this.#payload.header.frames) / this.#header.segments);
   }
 
   /**
-   * @param {number} frame
-   * @param {Uint8Array|Uint16Array} levels (S, 3) of the picture's `samples`
-   * @param {Float32Array} positions (V, 3) filled, model units
-   * @throws {GeometryVideoError} one of them is not finite
+   * Frame `start`.
+   *
+   * @param {number} start @param {number} stop start + 1 @param {number} level 0
+   * @param {Uint8Array|Uint16Array|null} levels (S, 3) of its picture's `planes.samples`; null without pictures
+   * @returns {Promise<Float32Array>} (V, 3), model units
+   * @throws {GeometryVideoError} its segment does not decode, or a position is not finite
    */
-  rebuild(frame, levels, positions) {
-    const { predicted, placed, zero } = this;
-    const step = this.header.residualStep;
-    this.motion.predict(frame, predicted);
-    for (let i = 0; i < placed.length; i++) placed[i] = predicted[i] + step * (levels[i] - zero); // rounded once
-    for (const moves of this.outliers) moves.apply(frame, placed);
-    this.surface.spread(placed, positions);
-    for (const moves of this.corrections) moves.apply(frame, positions);
+  async read(start, stop, level, levels) {
+    const s = this.#segmentOf(start);
+    const segment = await this.#segments.get(s);
+    const [predicted, placed] = [this.#predicted, this.#placed];
+    this.#motion.predict(segment, start - this.segmentStart(s), predicted);
+    const step = this.#header.residualStep;
+    const zero = 2 ** (this.#header.profile.depth - 1); // the level of no residual
+    for (let i = 0; i < placed.length; i++) placed[i] = predicted[i] + step * (levels ? levels[i] - zero : 0); // rounded once
+    this.#outliers?.apply(start, placed);
+    const positions = new Float32Array(this.#surface.basePoints.length);
+    this.#surface.spread(placed, positions);
     let sum = 0; // finite numbers of 32 bits have a finite sum in 64
     for (let i = 0; i < positions.length; i++) sum += positions[i];
     if (!Number.isFinite(sum)) {
-      throw new GeometryVideoError("corrupt", `frame ${frame} does not decode to finite positions; ${AGAIN}`);
+      throw new GeometryVideoError("corrupt", `frame ${start} does not decode to finite positions; ${AGAIN}`);
     }
+    return positions;
+  }
+
+  /** Have segment s decoded. @throws {GeometryVideoError} it does not decode */
+  async prepare(s) {
+    await this.#segments.get(s);
   }
 
   /**
-   * The box that the whole motion stays in, but for residuals; model units. Decodes, and so checks, all transforms and
-   * moves; of a file that comes in parts, those of the segments that are here.
+   * Have a box hold the motion of segment s, but for residuals; of a file that is here as a whole the first call looks at others as well,
+   * so that a page can frame the whole motion.
+   *
+   * @throws {GeometryVideoError} one of them does not decode, or moves too far; the box is as before
    */
-  bounds() {
-    for (const moves of [...this.outliers, ...this.corrections]) moves.check();
-    const box = { min: [Infinity, Infinity, Infinity], max: [-Infinity, -Infinity, -Infinity] };
-    this.motion.extend(box);
-    this.surface.extend(box);
-    if (![...box.min, ...box.max].every(Number.isFinite)) {
+  async extend(box, s) {
+    const wider = structuredClone(box);
+    const { segments } = this.#header;
+    const isFirst = this.#payload.isWhole && !this.#looked.size;
+    const most = isFirst ? Math.min(segments, SEGMENTS_LOOKED_AT) : 0;
+    const numbers = [s, ...Array.from({ length: most }, (_, i) => Math.floor((i * segments) / most))];
+    this.#surface.extend(wider);
+    for (const number of numbers) {
+      if (this.#looked.has(number)) continue;
+      this.#looked.add(number);
+      const frames = this.segmentStart(number + 1) - this.segmentStart(number);
+      this.#motion.extend(wider, await this.#segments.get(number), frames, LOOKS / Math.max(1, most));
+    }
+    if (![...wider.min, ...wider.max].every(Number.isFinite)) {
       throw new GeometryVideoError("corrupt", `its motion leaves all bounds; ${AGAIN}`);
     }
-    return box;
+    Object.assign(box, wider);
+  }
+
+  #segmentOf(frame) {
+    return Math.floor(((frame + 1) * this.#header.segments - 1) / this.#payload.header.frames);
+  }
+
+  async #decode(s) {
+    const name = `transforms.${s}`;
+    return this.#motion.decode(await this.#payload.section(name), name, this.segmentStart(s + 1) - this.segmentStart(s));
   }
 }
 
 /** The slots' pixels, and how they move: clusters or pixels, whichever follows from the other, come second. */
-function decodeMotion(payload, header, surface, kernels) {
-  const { lattice, visits, nSlots } = surface;
-  if (!header.pictures) return { pixels: null, motion: new BlendedMotion(payload, header, surface, kernels) };
+async function readMotion(payload, header, surface, kernels) {
+  const blended = async () => new BlendedMotion(kernels, await payload.section("weights"), header, surface, payload.budget);
+  if (!header.pictures) return { pixels: null, motion: await blended() };
   if (header.prediction === "blended") {
     const placement = SECTIONS[header.placement];
-    const pixels = placeSlots(placement ? payload.section(placement) : null, header, surface);
-    return { pixels, motion: new BlendedMotion(payload, header, surface, kernels) };
+    return { pixels: placeSlots(placement ? await payload.section(placement) : null, header, surface), motion: await blended() };
   }
+  const { lattice, visits, nSlots } = surface;
   const { width, height } = header;
   if (width * height < nSlots) throw corrupt("header", `planes of ${width}x${height} do not hold ${nSlots} samples`);
-  const charts = header.placement === "charts" ? decodePixels(payload.section("pixels"), visits, header) : null;
-  const data = payload.section("clusters");
+  const charts = header.placement === "charts" ? decodePixels(await payload.section("pixels"), visits, header) : null;
+  const data = await payload.section("clusters");
   const clusters = charts ? decodeClusters(data, charts, header) : decodeSlotClusters(data, visits, header);
-  const pixels = charts ?? place(lattice, clusters, header);
-  return { pixels, motion: new AffineMotion(payload, header, surface, clusters) };
+  return { pixels: charts ?? place(lattice, clusters, header), motion: new AffineMotion(header, surface, clusters) };
 }

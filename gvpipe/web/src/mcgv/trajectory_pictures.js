@@ -34,7 +34,7 @@ export function withPictures(source, payload) {
     const levels = new Levels(pixels * counts[s]);
     for (let i = 0; i < counts[s]; i++) {
       await decoder.seek(firsts[s] + i);
-      levels.set(decoder.levels(), pixels * i);
+      levels.set(decoder.current, pixels * i);
     }
     return levels;
   }
@@ -55,6 +55,6 @@ export function withPictures(source, payload) {
 function open(source, { fps, container }, size, profile, count) {
   const repeated = new RepeatedFrames(count);
   const planes = { size, samples: Uint32Array.from({ length: size[0] * size[1] }, (_, pixel) => pixel), profile };
-  if (source instanceof Uint8Array) return openPictures(source, fps, repeated, planes, container.track_crc32);
-  return DecodedPictures.inParts(source, fps, repeated, planes, () => Promise.resolve());
+  if (source instanceof Uint8Array) return openPictures(source, fps, repeated, planes, { checksum: container.track_crc32 });
+  return DecodedPictures.inParts(source, fps, repeated, planes);
 }

@@ -11,18 +11,15 @@ import {
   TRAJECTORY_READER_SECONDS_PER_SAMPLE as SECONDS_PER_SAMPLE,
 } from "../constants.js";
 import { AGAIN, GeometryVideoError, corrupt } from "../format/errors.js";
-import { previousEqual } from "../format/points.js";
 import { Recent } from "../format/recent.js";
 import { MAX_VALUES } from "../trajectory/coefficient_coding.js";
 import { Segment } from "../trajectory/segment.js";
-import { PLANES, VERSION, countPictures, readHeader } from "./header.js";
+import { PLANES, countPictures, readHeader } from "./header.js";
 import { SECTIONS, placeSlots } from "./placement.js";
 import { homogeneous } from "./skinning.js";
 import { readSurface } from "./surface.js";
 import { decodeSegment } from "./trajectory_coding.js";
 import { decodeWeights } from "./weight_coding.js";
-
-export { VERSION };
 
 const KEPT = 2; // segments: the one shown and the next
 
@@ -71,12 +68,9 @@ export class TrajectoryReader {
     return this.#surface.faces;
   }
 
-  /** `Int32Array` (V): the point of the base frame that each vertex lies at. */
-  get points() {
-    const { basePoints } = this.#surface;
-    const point = new Int32Array(basePoints.length / 3);
-    previousEqual(basePoints, 3).forEach((previous, v) => (point[v] = previous < 0 ? v : point[previous]));
-    return point;
+  /** `Int32Array` (V, 3): the base frame, lattice units, flat. */
+  get basePoints() {
+    return this.#surface.basePoints;
   }
 
   /** Vertex counts of the levels of detail: the whole mesh alone. */

@@ -9,6 +9,7 @@
  * the frame's number), `levelchange` (detail: the level of detail that is shown); `error` has a `GeometryVideoError` as its detail.
  */
 
+import { breathe } from "../breathe.js";
 import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
 import { FASTEST, SLOWEST, checkRate, checkSeconds } from "../playback.js";
 import { COLORMAPS } from "../three/colormaps.js";
@@ -18,7 +19,7 @@ import { actionOf } from "./keys.js";
 import { Legend } from "./legend.js";
 import { isFullscreen, save, toggleFullscreen } from "./outside.js";
 import { Panel } from "./panel.js";
-import { Stage } from "./stage.js";
+import { Stage, probeGpu } from "./stage.js";
 import style from "./style.css";
 import { TimeRanges } from "./time_ranges.js";
 
@@ -256,13 +257,22 @@ export class GeometryVideoElement extends HTMLElement {
       const file = typeof source === "string" && source[0] === "#" ? embedded(source) : source;
       const level = this.lod === "auto" ? "coarsest" : this.lod || "coarsest"; // shown at once
       loaded = GeometryVideo.load(file, { level });
-      this.#stage ??= openStage(this.shadowRoot.querySelector("canvas")); // while a worker decodes
+      loaded.catch(() => {}); // looked at below
+      await breathe();
+      probeGpu(); // while a worker decodes
+      await breathe();
+      if (loading === this.#loading) this.#stage ??= openStage(this.shadowRoot.querySelector("canvas"));
       video = await loaded;
+      if (loading !== this.#loading) return video.close();
+      await breathe();
       if (loading !== this.#loading) return video.close();
       await this.#stage.setMesh(video, this.getAttribute("up") ?? (video.metadata.up_axis === "z" ? "z" : "y"));
       if (loading !== this.#loading) return video.close();
       if (video.level) this.#tell("levelchange", video.level);
+      await breathe();
+      if (loading !== this.#loading) return video.close();
       if (level === "coarsest" && video.level) await this.#stage.mesh.setLevel(0);
+      await breathe();
       if (loading !== this.#loading) return video.close();
     } catch (error) {
       loaded?.then((late) => late.close(), () => {});
@@ -272,6 +282,8 @@ export class GeometryVideoElement extends HTMLElement {
     this.video = video;
     this.#say("");
     this.#openMesh();
+    await breathe();
+    if (loading !== this.#loading) return undefined;
     await this.#showField();
     if (loading !== this.#loading) return undefined;
     this.#bar.setEnabled(true);

@@ -281,8 +281,15 @@ export class Stage {
   }
 }
 
+let found = null; // what `probeGpu` has found
+
 /** Whether WebGL is drawn by hardware, by the name that the browser gives its renderer. */
-function probeGpu() {
+export function probeGpu() {
+  found ??= probe();
+  return found;
+}
+
+function probe() {
   const context = document.createElement("canvas").getContext("webgl2");
   if (!context) return false;
   const named = context.getExtension("WEBGL_debug_renderer_info");
