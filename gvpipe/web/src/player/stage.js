@@ -50,6 +50,7 @@ export class Stage {
     this.mesh = null;
     this.turn = 0; // counts meshes, so that a late one does not replace its successor
     this.pending = 0;
+    this.size = ""; // of the picture, as it is
     this.observer = new ResizeObserver(() => this.#resize());
     this.observer.observe(canvas);
   }
@@ -269,8 +270,11 @@ export class Stage {
     const { clientWidth: width, clientHeight: height } = this.renderer.domElement;
     if (!width || !height) return;
     const most = this.hasGpu ? MAX_PIXEL_RATIO : Math.min(1, Math.sqrt(MAX_SOFTWARE_PIXELS / (width * height)));
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, most));
-    this.renderer.setSize(width, height, false);
+    const ratio = Math.min(devicePixelRatio, most);
+    const size = `${width} ${height} ${ratio}`;
+    if (size === this.size) return; // to set it, even to what it was, takes time
+    this.size = size;
+    this.renderer.setDrawingBufferSize(width, height, ratio);
     const aspect = width / height;
     this.camera.aspect = aspect;
     const shorter = Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
