@@ -28,6 +28,7 @@ class Served:
         held: what lies behind so many bytes is sent once ``go`` is set.
         go: see ``held``.
         sent: ``(offset, bytes)`` of each answer.
+        n_refused: answers that were a status.
     """
 
     data: bytes
@@ -40,6 +41,7 @@ class Served:
     held: int = 1 << 62
     go: threading.Event = field(default_factory=threading.Event)
     sent: list[tuple[int, int]] = field(default_factory=list)
+    n_refused: int = 0
 
     @property
     def n_sent(self) -> int:
@@ -82,6 +84,7 @@ def answer(handler: http.server.BaseHTTPRequestHandler, served: Served) -> None:
     """Send the file, the part of it that is asked for, or an error."""
     wanted, size = handler.headers.get("Range"), len(served.data)
     if served.status:
+        served.n_refused += 1
         handler.send_error(served.status)
         return
     start, stop = 0, size

@@ -579,7 +579,9 @@ def warmup(installed: bool, portable: bool, out: Output) -> None:
 
 
 def _tell_conversion(out: Output, report: ExportReport) -> None:
-    """Say on standard error what the page shows instead of the file's own frames."""
+    """Say on standard error what the page shows instead of the file's own frames, or of those that come later."""
+    if report.unfinished:
+        out.note("the file is still written: the page has the frames that are there by now")
     if report.converted:
         values = (report.rmse_diag, report.max_diag, report.kg)
         rmse, largest, kg = ("not defined" if v is None else f"{v:.1e}" for v in values)

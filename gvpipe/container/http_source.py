@@ -25,6 +25,8 @@ KEPT_BLOCKS = 512  # 32 MB
 TIMEOUT = 30.0  # seconds without a byte
 CONTENT_RANGE = re.compile(r"bytes (\d{1,18})-(\d{1,18})/(\d{1,18})")
 OPEN_AGAIN = "open it again"
+IDENTITY = "identity"  # a body that is the file itself
+OUTAGE = 500  # from this status on, a server may come back
 
 
 class HttpSource:
@@ -135,10 +137,15 @@ class HttpSource:
             return self._body(answer, length)
 
     def _request(self, offset: int, length: int | None) -> Any:
-        headers = {"Accept-Encoding": "identity", "User-Agent": "gvpipe"}
+        headers = {"Accept-Encoding": IDENTITY, "User-Agent": "gvpipe"}
         if length is not None:
             headers["Range"] = f"bytes={offset}-{offset + length - 1}"
-        return urllib.request.urlopen(urllib.request.Request(self._url, headers=headers), timeout=TIMEOUT)
+        answer = urllib.request.urlopen(urllib.request.Request(self._url, headers=headers), timeout=TIMEOUT)
+        coding = answer.headers.get("Content-Encoding", IDENTITY)
+        if coding.strip().lower() not in ("", IDENTITY):
+            answer.close()
+            raise InputError(f"the server sends the file with Content-Encoding {quote(coding)}; have it send .mp4 as it is")
+        return answer
 
     def _body(self, answer: Any, length: int) -> bytes:
         data = bytes(answer.read(length))
@@ -209,4 +216,5 @@ def _validators(headers: Any) -> tuple[str, ...]:
 def _refused(url: str, status: int, reason: str) -> InputError:
     if status == 416:
         return InputError(f"{url}: the server answers 416: the file is empty, or shorter than it was; {OPEN_AGAIN}")
-    return InputError(f"{url}: the server answers {status} {printable(str(reason), 60)}; check the address")
+    remedy = "try again later" if status >= OUTAGE else "check the address"
+    return InputError(f"{url}: the server answers {status} {printable(str(reason), 60)}; {remedy}")

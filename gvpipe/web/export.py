@@ -54,6 +54,7 @@ class ExportReport:
             one, None if the diagonal is 0.
         max_diag: the same of the largest error.
         kg: the same as Karni-Gotsman error, percent; None if the file's frames are a point each.
+        unfinished: whether the file is still written; the page has what is there.
     """
 
     bytes: int
@@ -62,6 +63,7 @@ class ExportReport:
     rmse_diag: float | None = 0.0
     max_diag: float | None = 0.0
     kg: float | None = 0.0
+    unfinished: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values."""
@@ -111,7 +113,7 @@ def export_html(
         data = (
             Path(player.path).read_bytes() if player.bitstream.layout != BARE and not is_remote(player.path) else _plain(player)
         )
-        return _write_page(player.path, data, target, up)
+        return replace(_write_page(player.path, data, target, up), unfinished=player.bitstream.is_unfinished)
     trial = _convert(player, QUALITY if quality is None else quality, progress)
     remaining = browser_obstacle(trial.bitstream)
     if remaining:

@@ -85,7 +85,7 @@ const commands = {
   },
   /** Sections that a file keeps when it has loaded these, at most so many bytes of segments. */
   async keep({ url, names, most }) {
-    const file = await StreamFile.open(url);
+    const file = await StreamFile.open(url, new AbortController().signal);
     file.mostKept = most;
     for (const name of names) await file.load(name);
     return [...file.sections.keys()];

@@ -202,10 +202,10 @@ def test_what_cannot_be_loaded(page: Run, folder: Path) -> None:
         const delta = (() => { try { mesh.update() } catch (error) { return error.message } })();
         mesh.dispose();
         mesh.dispose();
-        await mesh.play();
+        const played = await mesh.play().catch((error) => error.name);
         await mesh.seek(3);
-        return [kinds, log, rate, delta, mesh.paused];"""
+        return [kinds, log, rate, delta, mesh.paused, played];"""
     )
     assert found[0] == [[True, "load"], [True, "not-geometry-video"]]
     assert found[1] == ["./nothing.mp4", "./text.mp4"]
-    assert found[2:] == ["NotSupportedError", "delta is undefined; a number of seconds is needed", True]
+    assert found[2:] == ["NotSupportedError", "delta is undefined; a number of seconds is needed", True, "AbortError"]

@@ -9,6 +9,7 @@
  */
 
 import { AGAIN, GeometryVideoError } from "./format/errors.js";
+import { closed } from "./format/request.js";
 import { pictureDecoder } from "./picture_decoder.js";
 import { readTrack } from "./track.js";
 
@@ -18,6 +19,7 @@ const KEPT_GROUPS = 3; // at least: what is shown, what comes next, and one of b
 const AHEAD = 1; // s, decoded ahead of what plays
 const BEHIND = 1.25; // clips of a file that is still written: what is left behind is not played
 const EDGE = 1e-3; // frames before the end of such a file, where the clock waits
+const STALLED = 500; // ms without the frame that is due: then it says that it waits
 const LONGEST_STEP = 1000; // ms that the clock goes on at once: a hidden page is asked for nothing
 
 /**
@@ -99,6 +101,7 @@ export class DecodedPictures {
     this.current = null;
     this.decoder = decoder;
     this.finish = finish;
+    this.failure = null; // an error: what was to be decoded ahead is not tried until something is asked for
     this.finished = new Map(); // picture -> Finished, the one asked for last at the end
     this.groupBytes = groupBytes;
     this.samples = groups;
@@ -135,9 +138,9 @@ export class DecodedPictures {
   async seek(frame) {
     this.pause();
     if (this.shown === frame) return;
+    this.#forgetFailures();
     const picture = this.repeated.distinctOf(frame);
     const levels = await this.#picture(picture);
-    if (this.finished.get(picture)?.error) this.finished.delete(picture); // it is tried again
     const finished = this.#finished(picture, levels);
     await finished.done;
     if (finished.error) throw finished.error;
@@ -148,17 +151,19 @@ export class DecodedPictures {
   /**
    * Play on from here, `rate` times as fast; calls `show(frame)` for each frame that is due, `ended()` at the end if it does
    * not loop, `failed(error)` if it cannot go on. `nextTick(tick)` has `tick(ms)` called at the next step of the clock;
-   * `ticked(ms, isThere)` is called then, with whether the frame that is due is there. At the end of a file that is still written
-   * it waits for more, and `waits(isWaiting)` says so. Played from its last two clips on, it never falls behind them.
+   * `ticked(ms, isThere)` is called then, with whether the frame that is due is there. It waits for a frame that is on its way, and
+   * for more at the end of a file that is still written; `waits(isWaiting)` says so. Played from its last two clips on, it never falls behind them.
    */
   async play({ show, ended, failed, nextTick = nextRepaint, ticked, waits }, rate, loop) {
     const playing = (this.playing = {});
     let position = Math.max(0, this.shown); // frames since the start
     let before = null;
+    let missing = 0; // ms without the frame that is due
     let isWaiting = false;
     const { repeated } = this;
     const follows = position >= this.frames - 2 * repeated.clip && rate >= 1;
     this.shown = -1; // it is shown again, at once
+    this.#forgetFailures();
     await this.#picture(this.repeated.distinctOf(Math.floor(position)));
     const tick = (now) => {
       if (this.playing !== playing) return;
@@ -167,8 +172,8 @@ export class DecodedPictures {
       if (isLive && follows && this.frames - position > BEHIND * repeated.clip) position = this.frames - repeated.clip;
       let next = position + (step * rate * this.fps) / 1000;
       before = now;
-      if ((isLive && next >= this.frames) !== isWaiting) waits?.((isWaiting = !isWaiting));
-      if (isWaiting) next = this.frames - EDGE;
+      const isAtEnd = isLive && next >= this.frames;
+      if (isAtEnd) next = this.frames - EDGE;
       const isOver = !loop && next >= this.frames;
       const frame = loop ? Math.floor(next) % this.frames : Math.min(Math.floor(next), this.frames - 1);
       const picture = this.repeated.distinctOf(frame);
@@ -181,8 +186,12 @@ export class DecodedPictures {
         failed(error);
         return;
       }
-      ticked?.(now, Boolean(finished?.contents));
-      if (finished?.contents) {
+      const isThere = Boolean(finished?.contents);
+      ticked?.(now, isThere);
+      if (finished && !isThere && !missing) before = now - step; // it is being finished: no time is lost
+      missing = isThere ? 0 : missing + step + 1;
+      if ((isAtEnd || missing > STALLED) !== isWaiting) waits?.((isWaiting = !isWaiting));
+      if (isThere) {
         position = loop ? next % this.frames : next;
         if (frame !== this.shown) {
           [this.shown, this.current] = [frame, finished.contents];
@@ -194,9 +203,9 @@ export class DecodedPictures {
           return;
         }
         this.#decodeAhead(this.groupOf[picture], AHEAD * this.fps * rate);
-        const soon = Math.floor(next + (step * rate * this.fps) / 1000);
-        for (const k of [soon, soon + 1]) this.#finishAhead(loop ? k % this.frames : Math.min(k, this.frames - 1));
       }
+      const soon = Math.floor(next + (isThere ? (step * rate * this.fps) / 1000 : 0));
+      for (const k of [soon, soon + 1]) this.#finishAhead(loop ? k % this.frames : Math.min(k, this.frames - 1));
       nextTick(tick);
     };
     if (this.playing === playing) nextTick(tick); // not paused since
@@ -211,12 +220,14 @@ export class DecodedPictures {
     this.playing = null;
     this.isClosed = true;
     this.decoder.close();
+    for (const group of this.kept.values()) group.fail(closed());
     this.kept.clear();
     this.finished.clear();
   }
 
   /** Have the groups decoded that follow one: the next, and more up to so many pictures and half of what is kept. */
   #decodeAhead(group, pictures) {
+    if (this.failure) return;
     const most = Math.min(this.samples.length - 1, KEPT_BYTES / 2 / this.groupBytes);
     for (let i = 1, ahead = 0; i === 1 || (i <= most && ahead < pictures); i++) {
       if (this.repeated.clip && group + i >= this.samples.length) break; // more will come
@@ -239,16 +250,24 @@ export class DecodedPictures {
 
   /** Have a frame's picture finished that is due soon, if its levels are there. */
   #finishAhead(frame) {
+    const pending = [...this.finished.values()].filter(({ contents, error }) => !contents && !error);
+    if (!this.finish || pending.length > 1) return; // slower than they are due: none is queued
     const picture = this.repeated.distinctOf(frame);
     const levels = this.kept.get(this.groupOf[picture])?.levels.get(picture);
     if (levels) this.#finished(picture, levels);
   }
 
-  /** A picture's levels, when they are there. What could not be fetched is tried again. */
+  /** What could not be fetched is tried again when it is asked for. */
+  #forgetFailures() {
+    this.failure = null;
+    for (const jobs of [this.kept, this.finished]) {
+      for (const [key, { error }] of jobs) if (error?.kind === "load") jobs.delete(key);
+    }
+  }
+
+  /** A picture's levels, when they are there. */
   #picture(picture) {
-    const group = this.groupOf[picture];
-    if (this.kept.get(group)?.error?.kind === "load") this.kept.delete(group);
-    return this.#group(group).picture(picture);
+    return this.#group(this.groupOf[picture]).picture(picture);
   }
 
   /** A group that is decoded, or will be. */
@@ -270,13 +289,15 @@ export class DecodedPictures {
   #decode(number) {
     const group = new Group();
     const decode = async () => {
-      if (this.isClosed) return;
+      if (this.isClosed || this.failure) return group.fail(this.failure ?? closed());
       try {
         await this.decoder.decode(this.samples[number], (picture, levels) => group.add(picture, levels));
       } catch (error) {
+        this.failure = error;
         group.fail(error);
       }
       group.isDone = true;
+      return undefined;
     };
     if (this.decoder.isConcurrent) decode();
     else this.turn = this.turn.then(decode);

@@ -12,7 +12,9 @@ import { readContainer } from "./format/boxes.js";
 import { GeometryVideoError } from "./format/errors.js";
 import { readRepeatedFrames } from "./format/repeated_frames.js";
 import { readPayload } from "./format/payload.js";
+import { OUTAGE, closed, request } from "./format/request.js";
 import { StreamFile } from "./format/stream_file.js";
+import { checkRate } from "./playback_rate.js";
 
 export { GeometryVideoError };
 
@@ -21,7 +23,8 @@ const LOOKS_PER_CLIP = 4; // at a file that is still written
 const SOONEST = 100; // ms between two of them
 const LATEST = 1000; // while clips come
 const IDLE = 5000; // while none does
-const TRIES = 5; // of a look that fails
+const TRIES = 5; // of a look that the server refuses
+const PATIENCE = 30_000; // ms, with an outage
 const FROM_DISK = "pages opened from a disk may not fetch; open it from a web server, or make a page with gvpipe export-html";
 
 export class GeometryVideo {
@@ -29,25 +32,44 @@ export class GeometryVideo {
    * Load a geometry video, as `gvpipe encode` writes it.
    *
    * @param {string|URL|Blob|ArrayBuffer|Uint8Array} source an address, or the file itself
-   * @param {{level?: number|"coarsest"}} [options] a level of detail above 0 is a coarser mesh, without attributes and fields
+   * @param {{level?: number|"coarsest", signal?: AbortSignal}} [options] a level of detail above 0 is a coarser mesh, without attributes
+   *   and fields; `signal` ends loading
    * @returns {Promise<GeometryVideo>}
    * @throws {GeometryVideoError} it cannot be fetched, it is no geometry video, it is damaged, or not one for browsers
+   * @throws {TypeError} the source is none of these
+   * @throws {unknown} the signal's reason
    */
-  static async load(source, { level = 0 } = {}) {
-    const parts = await openParts(source);
-    const file = parts instanceof StreamFile ? null : (parts ?? (await fetchBytes(source)));
+  static async load(source, { level = 0, signal = null } = {}) {
+    checkSource(source);
+    const closing = new AbortController();
+    const follow = () => closing.abort(signal.reason);
+    if (signal?.aborted) follow();
+    signal?.addEventListener("abort", follow);
+    try {
+      return await GeometryVideo.#load(source, level, closing);
+    } finally {
+      signal?.removeEventListener("abort", follow);
+    }
+  }
+
+  static async #load(source, level, closing) {
+    const parts = await openParts(source, closing.signal);
+    const file = parts instanceof StreamFile ? null : (parts ?? (await fetchBytes(source, closing.signal)));
     let [pictures, reader] = [null, null];
     try {
+      closing.signal.throwIfAborted();
       const payload = await readPayload(file ? readContainer(file) : parts.container);
       const repeated = readRepeatedFrames(payload);
       reader = await openCodec(file ?? parts, payload, repeated, level);
       const start = file ? 0 : parts.startFrame;
       if (parts?.isGrowing) repeated.grow(parts.live.frames, parts.live.clip);
+      closing.signal.throwIfAborted();
       pictures = await reader.openPictures(start);
+      closing.signal.throwIfAborted();
       const video = new GeometryVideo(payload.header, file?.length ?? parts.size, repeated, reader, pictures);
       video.startFrame = start;
       video.#isInParts = !file;
-      video.#closeFile = () => parts?.close?.();
+      video.#closeFile = () => closing.abort(closed());
       video.#payload = payload;
       video.#takeAsset(reader.level ? await readCoarseAsset(payload) : await video.#readAsset(video, reader));
       if (parts?.isGrowing) video.#follow(parts);
@@ -56,6 +78,8 @@ export class GeometryVideo {
       pictures?.close();
       reader?.close();
       parts?.close?.();
+      closing.signal.throwIfAborted();
+      closing.abort(closed());
       if (!(error instanceof RangeError)) throw error; // an array that the browser cannot give
       throw new GeometryVideoError("unsupported", "it needs more memory than this browser has for a page");
     }
@@ -131,10 +155,16 @@ export class GeometryVideo {
    * @param {number} k 0..frameCount - 1
    * @param {Float32Array} [positions] to fill, instead of a new array
    * @returns {Promise<Float32Array>} (V, 3), model units
+   * @throws {RangeError} there is no such frame, or `positions` is too short
+   * @throws {DOMException} AbortError: the video is closed
    */
   frame(k, positions = null) {
     if (!Number.isInteger(k) || k < 0 || k >= this.frameCount) {
       return Promise.reject(new RangeError(`frame ${k}: there are ${this.frameCount}`));
+    }
+    const size = 3 * this.vertexCount;
+    if (positions && !(positions instanceof Float32Array && positions.length >= size)) {
+      return Promise.reject(new RangeError(`positions: a Float32Array of ${size} numbers is needed`));
     }
     return this.#queued(async () => {
       this.pause();
@@ -149,11 +179,13 @@ export class GeometryVideo {
    * @param {(positions: Float32Array, k: number) => void} show called for each frame; the array is used again for the next
    * @param {{rate?: number, loop?: boolean, ended?: () => void, failed?: (error: Error) => void,
    *   nextTick?: (tick: (now: number) => void) => void, ticked?: (now: number, isThere: boolean) => void,
-   *   waits?: (isWaiting: boolean) => void}} [options] `rate` 1 is the video's own speed; `waits` is called when it waits for frames of a
-   *   file that is still written, and when it goes on; `failed` is called if a frame later on cannot be decoded; `nextTick` is a clock in place of the page's: it
+   *   waits?: (isWaiting: boolean) => void}} [options] `rate` 1 is the video's own speed; `waits` is called when it waits for frames
+   *   that are on their way or not yet written, and when it goes on; `failed` is called if a frame later on cannot be decoded; `nextTick` is a clock in place of the page's: it
    *   calls `tick` at its next step, with ms; `ticked` is called at each step, with whether the frame that is due was there
+   * @throws {DOMException} NotSupportedError: no browser plays at this rate; AbortError: the video is closed
    */
   async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {}, nextTick, ticked, waits } = {}) {
+    checkRate(rate);
     await this.#queue;
     this.#playing = { show, ended, failed, nextTick, ticked, waits, rate, loop };
     await this.#start();
@@ -173,6 +205,7 @@ export class GeometryVideo {
   }
 
   async #change(level) {
+    if (this.#isClosed) throw closed();
     const reader = await this.#reader.at(level);
     if (reader.level === this.level) return;
     const pictures = await reader.openPictures(this.#shown);
@@ -212,9 +245,9 @@ export class GeometryVideo {
   /** Look for frames that come, until the end is there: a few times per clip, and seldom while nothing comes. */
   async #follow(file) {
     const soonest = Math.min(Math.max(SOONEST, (1000 * file.live.clip) / this.fps / LOOKS_PER_CLIP), LATEST);
-    let [since, tries] = [performance.now(), 0];
+    let [since, answered, tries, outages] = [performance.now(), performance.now(), 0, 0];
     while (this.isLive && !this.#isClosed) {
-      const wait = Math.min(Math.max(soonest, (performance.now() - since) / (2 * LOOKS_PER_CLIP)), IDLE);
+      const wait = Math.min(Math.max(soonest, (performance.now() - since) / (2 * LOOKS_PER_CLIP), soonest * 2 ** outages), IDLE);
       await new Promise((resolve) => {
         this.#wake = resolve;
         setTimeout(resolve, wait);
@@ -222,12 +255,15 @@ export class GeometryVideo {
       if (this.#isClosed) return;
       try {
         if (await file.poll()) since = performance.now();
-        tries = 0;
+        tries = outages = 0;
+        answered = performance.now();
         if (!this.#isClosed) this.#grow(file);
       } catch (error) {
         tries++;
         if (this.#isClosed) return;
-        if (error.kind === "load" && tries < TRIES) continue;
+        const isRefusal = error.status < OUTAGE;
+        outages = error.kind !== "load" || isRefusal ? 0 : outages + 1;
+        if (isRefusal ? tries < TRIES : outages && performance.now() - answered < PATIENCE) continue;
         this.lost(error);
         return;
       }
@@ -306,12 +342,16 @@ export class GeometryVideo {
 
   /** What `work` gives, once the calls before are answered. */
   #queued(work) {
-    const result = this.#queue.then(work);
+    const result = this.#queue.then(() => {
+      if (this.#isClosed) throw closed();
+      return work();
+    });
     this.#queue = result.catch(() => {});
     return result;
   }
 
   async #start() {
+    if (this.#isClosed) throw closed();
     const { show, rate, loop, ...on } = this.#playing;
     const positions = new Float32Array(3 * this.vertexCount);
     await this.#pictures.play({ ...on, show: (k) => show(this.#read(k, positions), k) }, rate, loop);
@@ -324,29 +364,35 @@ export class GeometryVideo {
   }
 }
 
-/** The file in parts, where it is on a web server and in the stream layout; else null, or all of it where it has come. */
-async function openParts(source) {
-  if (!(typeof source === "string" || source instanceof URL)) return null;
-  if (!/^https?:$/.test(new URL(source, location.href).protocol)) return null;
-  try {
-    return await StreamFile.open(source);
-  } catch (error) {
-    if (error instanceof GeometryVideoError) throw error;
-    return null; // `fetchBytes` says what is wrong
-  }
+/** @throws {TypeError} it is nothing that can be loaded */
+function checkSource(source) {
+  const isText = typeof source === "string" ? source !== "" : source instanceof URL;
+  if (isText || source instanceof Blob || source instanceof ArrayBuffer || ArrayBuffer.isView(source)) return;
+  const found = source === "" ? "empty" : Object.prototype.toString.call(source).slice(8, -1);
+  throw new TypeError(`the source is ${found}; an address, a Blob or bytes are needed`);
 }
 
-async function fetchBytes(source) {
-  if (source instanceof Uint8Array) return source;
+/** The file in parts, where it is on a web server and in the stream layout; else null, or all of it where it has come. */
+async function openParts(source, signal) {
+  if (!(typeof source === "string" || source instanceof URL)) return null;
+  return /^https?:$/.test(addressOf(source).protocol) ? StreamFile.open(source, signal) : null;
+}
+
+async function fetchBytes(source, signal) {
+  if (ArrayBuffer.isView(source)) return new Uint8Array(source.buffer, source.byteOffset, source.byteLength);
   if (source instanceof ArrayBuffer) return new Uint8Array(source);
   if (source instanceof Blob) return new Uint8Array(await source.arrayBuffer());
-  let response;
+  const remedy = location.protocol === "file:" ? FROM_DISK : "try again";
+  const asked = await request(source, signal, { remedy });
+  if (asked.response.ok) return asked.bytes();
+  throw asked.refused();
+}
+
+/** @throws {GeometryVideoError} it is no address */
+function addressOf(source) {
   try {
-    response = await fetch(source);
-  } catch (error) {
-    const remedy = location.protocol === "file:" ? `; ${FROM_DISK}` : "";
-    throw new GeometryVideoError("load", `${source} cannot be fetched: ${error.message}${remedy}`);
+    return new URL(source, location.href);
+  } catch {
+    throw new GeometryVideoError("load", `${source} is no address`);
   }
-  if (!response.ok) throw new GeometryVideoError("load", `${source} cannot be fetched: status ${response.status}`);
-  return new Uint8Array(await response.arrayBuffer());
 }

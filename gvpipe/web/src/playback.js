@@ -5,17 +5,10 @@
  */
 
 import { LevelChooser } from "./level_chooser.js";
+import { closed } from "./format/request.js";
+import { checkRate } from "./playback_rate.js";
 
 const ROUNDING = 1e-4; // of a frame: k / fps * fps may be a little less than k
-export const SLOWEST = 0.0625; // what browsers play
-export const FASTEST = 16;
-
-/** A rate that browsers play. @throws {DOMException} it is another one */
-export function checkRate(rate) {
-  if (rate >= SLOWEST && rate <= FASTEST) return rate;
-  throw new DOMException(`playbackRate is ${rate}; ${SLOWEST} to ${FASTEST} are possible`, "NotSupportedError");
-}
-
 /** Seconds, as a number. @throws {TypeError} it is none */
 export function checkSeconds(value, name) {
   if (Number.isFinite(Number(value))) return Number(value);
@@ -32,6 +25,8 @@ export class Playback {
   #rate = 1;
   #loops = false;
   #isClosed = false;
+  #error = null; // that ended it last
+  #beginning = null; // a promise that it plays
   #chooser = null; // LevelChooser, where levels are chosen here
   #isChanging = false; // to the level that it wants
 
@@ -93,8 +88,9 @@ export class Playback {
   }
 
   set playbackRate(rate) {
-    if (this.#rate === checkRate(rate)) return;
-    this.#rate = rate;
+    const wanted = checkRate(rate);
+    if (this.#rate === wanted) return;
+    this.#rate = wanted;
     this.#on.tell("ratechange");
     this.#playAnew();
   }
@@ -122,13 +118,25 @@ export class Playback {
     return positions.length === 3 * this.#video.vertexCount;
   }
 
-  /** Play on from the frame shown; from the start if that is the last. */
+  /**
+   * Play on from the frame shown; from the start if that is the last.
+   *
+   * @throws {Error} what ended it before it played; an AbortError: it was paused
+   */
   async play() {
-    if (!this.paused || this.#isClosed) return;
+    if (this.#isClosed) throw closed();
+    if (!this.paused) return this.#beginning;
     this.paused = false;
+    this.#error = null;
     this.#on.tell("play");
     if (this.aim === this.#video.frameCount - 1 && !this.#video.isLive) this.#request(0);
+    this.#beginning = this.#begin();
+    return this.#beginning;
+  }
+
+  async #begin() {
     await (this.#seeking ?? this.#start());
+    if (this.paused && !this.ended) throw this.#error ?? new DOMException("it was paused before it played", "AbortError");
   }
 
   pause() {
@@ -181,10 +189,11 @@ export class Playback {
 
   /** With a new rate or `loop`. */
   #playAnew() {
-    if (!this.paused && !this.#seeking) this.#start();
+    if (!this.paused && !this.#seeking) this.#start(false);
   }
 
-  async #start() {
+  /** @param {boolean} [isNew] whether it did not play before */
+  async #start(isNew = true) {
     const on = {
       rate: this.#rate,
       loop: this.#loops,
@@ -197,7 +206,7 @@ export class Playback {
     try {
       await this.#video.play((positions, k) => this.#show(positions, k), on);
       if (this.paused) this.#video.pause(); // since
-      else this.#on.tell("playing");
+      else if (isNew) this.#on.tell("playing");
     } catch (error) {
       if (error.name === "AbortError") return; // paused before the browser had begun
       if (error.name === "NotAllowedError") this.pause();
@@ -238,7 +247,8 @@ export class Playback {
 
   #fail(error) {
     if (this.#isClosed) return;
-    this.paused = true;
+    this.#error = error;
+    if (!this.paused) this.pause();
     this.#on.fail(error);
   }
 }

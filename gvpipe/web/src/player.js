@@ -5,4 +5,4 @@ import { GeometryVideoElement } from "./player/element.js";
 export { GeometryVideo, GeometryVideoError } from "./geometry_video.js";
 export { GeometryVideoElement };
 
-customElements.define("geometry-video", GeometryVideoElement);
+globalThis.customElements?.define("geometry-video", GeometryVideoElement);

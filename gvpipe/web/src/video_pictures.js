@@ -12,6 +12,7 @@
 
 import { nextRepaint } from "./decoded_pictures.js";
 import { GeometryVideoError } from "./format/errors.js";
+import { closed } from "./format/request.js";
 import { OF_GREY } from "./levels.js";
 
 const SHOWN_WITHIN = 1000; // ms after `seeked` in which the browser says what it shows; in a hidden page it never does
@@ -123,9 +124,11 @@ export class VideoPictures {
         video.cancelVideoFrameCallback(handle);
         video.removeEventListener("seeked", seeked);
         video.removeEventListener("error", failed);
+        video.removeEventListener("emptied", emptied);
         settle(value);
       };
       const failed = () => finish(reject, this.#failure());
+      const emptied = () => finish(reject, closed());
       const seeked = () => {
         arrived = true;
         if (shown === picture) return finish(resolve, picture);
@@ -142,6 +145,7 @@ export class VideoPictures {
       handle = video.requestVideoFrameCallback(presented);
       video.addEventListener("seeked", seeked);
       video.addEventListener("error", failed);
+      video.addEventListener("emptied", emptied);
       video.currentTime = time;
     });
   }

@@ -4,15 +4,15 @@ import type { GeometryVideo, Source } from "./geometry-video.js";
 
 export * from "./geometry-video.js";
 
-export interface GeometryVideoElementEventMap extends HTMLElementEventMap {
+export interface GeometryVideoElementEventMap extends Omit<HTMLElementEventMap, "error"> {
   /** All is there to play. */
   ready: CustomEvent<null>;
   /** The number of the frame that is shown. */
   frame: CustomEvent<number>;
   /** The level of detail that is shown. */
   levelchange: CustomEvent<number>;
-  /** `detail` is a `GeometryVideoError` if the file is at fault. */
-  error: CustomEvent<Error> & ErrorEvent;
+  /** `detail` is a `GeometryVideoError` if the file or its server is at fault. */
+  error: CustomEvent<Error>;
 }
 
 /** Stretches of time, in seconds. */
@@ -46,23 +46,23 @@ export class GeometryVideoElement extends HTMLElement {
   readonly seeking: boolean;
   readonly buffered: TimeRangesLike;
   readonly seekable: TimeRangesLike;
-  /** 0: nothing is there, 1: metadata, 4: all. */
+  /** 0: nothing is there, 1: metadata, 4: it can play. */
   readonly readyState: number;
   readonly error: Error | null;
-  /** While a file loads, it waits for it. */
+  /** Until a file is loaded, it waits for it. Rejects with an AbortError if it is paused before it plays. */
   play(): Promise<void>;
   pause(): void;
   load(source?: Source): Promise<void>;
 
   readonly video: GeometryVideo | null;
   readonly currentFrame: number;
-  /** Shows frame k, and pauses. Of many calls in a row the last counts. */
+  /** Shows frame k, and pauses; while a file loads, once it is there. Of many calls in a row the last counts. */
   seek(k: number): Promise<void>;
   readonly colormap: string;
   readonly range: [number, number] | null;
   readonly hiddenParts: Set<string>;
   /** Hides the parts of these names, and shows all others. */
-  hide(names: Iterable<string>): void;
+  hide(names: string | Iterable<string>): void;
   /** (4, 4) by columns: from model units to clip space. */
   readonly projection: number[] | null;
   /** The picture as a PNG file. */
@@ -74,6 +74,12 @@ export class GeometryVideoElement extends HTMLElement {
     options?: boolean | AddEventListenerOptions,
   ): void;
   addEventListener(type: string, listener: EventListenerOrEventListenerObject, options?: boolean | AddEventListenerOptions): void;
+  removeEventListener<K extends keyof GeometryVideoElementEventMap>(
+    type: K,
+    listener: (this: GeometryVideoElement, event: GeometryVideoElementEventMap[K]) => unknown,
+    options?: boolean | EventListenerOptions,
+  ): void;
+  removeEventListener(type: string, listener: EventListenerOrEventListenerObject, options?: boolean | EventListenerOptions): void;
 }
 
 declare global {

@@ -27,7 +27,7 @@ export interface GeometryVideoMeshEvents extends Object3DEventMap {
   seeking: {};
   seeked: {};
   timeupdate: {};
-  /** It waits for frames of a file that is still written. */
+  /** It waits for frames that are on their way, or not yet written. */
   waiting: {};
   /** Such frames have come. */
   progress: {};
@@ -44,8 +44,11 @@ export interface GeometryVideoMeshEvents extends Object3DEventMap {
   error: { error: Error };
 }
 
+type PlainMesh = Mesh<BufferGeometry, ThreeMaterial | ThreeMaterial[], GeometryVideoMeshEvents>;
+declare const MeshOfVideo: new () => Omit<PlainMesh, "clone">;
+
 /** A video as a mesh: its geometry follows what plays. Vertices are split where attributes need it. */
-export class GeometryVideoMesh extends Mesh<BufferGeometry, ThreeMaterial | ThreeMaterial[], GeometryVideoMeshEvents> {
+export class GeometryVideoMesh extends MeshOfVideo {
   private constructor();
   /** The video is closed with the mesh. */
   static create(video: GeometryVideo, options?: GeometryVideoMeshOptions): Promise<GeometryVideoMesh>;
@@ -79,13 +82,15 @@ export class GeometryVideoMesh extends Mesh<BufferGeometry, ThreeMaterial | Thre
   playbackRate: number;
   readonly partNames: string[];
   /** Hides the parts of these names, and shows all others. */
-  hide(names: Iterable<string>): void;
+  hide(names: string | Iterable<string>): void;
   setWireframe(visible: boolean): void;
   /** Shows a field in colours; null: the materials. A promise of the range; null if another call came since. */
   showField(
     name: string | null,
     options?: { colormap?: "viridis" | "magma" | "coolwarm" | "gray"; range?: [number, number] | null },
   ): Promise<[number, number] | null>;
+  /** A mesh that shares geometry and materials, and so moves with this one. */
+  clone(recursive?: boolean): Mesh;
   /** Frees the video, and what the GPU has of it. */
   dispose(): void;
 }

@@ -1,6 +1,7 @@
 /** Where fields are decoded: in a worker, so that the page goes on; on the page itself where it may have none (as in Node). */
 
 import { GeometryVideoError } from "../format/errors.js";
+import { closed } from "../format/request.js";
 import { FieldDecoder } from "./field_decoder.js";
 
 export class FieldHost {
@@ -31,6 +32,7 @@ export class FieldHost {
 
   close() {
     this.#worker?.terminate();
+    for (const { reject } of this.#jobs.values()) reject(closed());
     this.#jobs.clear();
   }
 

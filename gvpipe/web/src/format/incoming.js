@@ -1,22 +1,20 @@
 /** The whole of a file as it comes from a web server that knows no Range: parts can be read once they are here. */
 
-import { GeometryVideoError } from "./errors.js";
-
 const LEAST_BYTES = 1 << 16;
 
 export class Incoming {
   #data = new Uint8Array(LEAST_BYTES);
-  #ended = null; // "" once all is here, or what went wrong
+  #ended = false;
+  #error = null; // what went wrong
   #waiting = []; // {end, resolve}
-  #body;
+  #asked;
 
   /** Bytes that are here. */
   received = 0;
 
-  /** @param {Response} response @param {string|URL} url for messages */
-  constructor(response, url) {
-    this.url = url;
-    this.#body = response.body.getReader();
+  /** @param {Awaited<ReturnType<typeof import("./request.js").request>>} asked what `request` gave */
+  constructor(asked) {
+    this.#asked = asked;
     this.#take();
   }
 
@@ -28,8 +26,8 @@ export class Incoming {
    */
   async read(offset, length) {
     const end = offset + length;
-    if (this.received < end && this.#ended === null) await new Promise((resolve) => this.#waiting.push({ end, resolve }));
-    if (this.received < end && this.#ended) throw new GeometryVideoError("load", `${this.url} cannot be fetched: ${this.#ended}; try again`);
+    if (this.received < end && !this.#ended) await new Promise((resolve) => this.#waiting.push({ end, resolve }));
+    if (this.received < end && this.#error) throw this.#error;
     return this.#data.slice(offset, Math.min(end, this.received));
   }
 
@@ -40,21 +38,19 @@ export class Incoming {
 
   /** End the connection. */
   close() {
-    this.#body.cancel().catch(() => {});
+    this.#asked.close();
   }
 
   async #take() {
     try {
-      for (;;) {
-        const { done, value } = await this.#body.read();
-        if (done) break;
-        this.#keep(value);
+      for (let bytes = await this.#asked.read(); bytes; bytes = await this.#asked.read()) {
+        this.#keep(bytes);
         this.#tell();
       }
-      this.#ended = "";
     } catch (error) {
-      this.#ended = error.message || error.name;
+      this.#error = error;
     }
+    this.#ended = true;
     this.#tell();
   }
 
@@ -70,7 +66,7 @@ export class Incoming {
   }
 
   #tell() {
-    const isDue = ({ end }) => end <= this.received || this.#ended !== null;
+    const isDue = ({ end }) => end <= this.received || this.#ended;
     const due = this.#waiting.filter(isDue);
     this.#waiting = this.#waiting.filter((each) => !isDue(each));
     for (const { resolve } of due) resolve();

@@ -11,6 +11,7 @@ import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
 import { Incoming } from "./incoming.js";
 import { liveSize, placeClips, readLive, readRows, ROW_BYTES } from "./live_layout.js";
 import { clipName, readHeader } from "./payload.js";
+import { joined, request } from "./request.js";
 import { checkHead, readIndex } from "./stream_layout.js";
 
 const FIRST = 1 << 16; // bytes of the first request
@@ -18,6 +19,7 @@ const OF_SEGMENTS = /^(transforms|trajectories|basis|coefficients|anchors|deltas
 const OF_PICTURES = /^(transforms|trajectories)\./; // whose fragments need WebCodecs
 const OF_FIELDS = /^field\./;
 const PARTIAL = 206;
+const UNSATISFIABLE = 416;
 const FIRST_LIVE = 1 << 17; // bytes of the second request, of a file that is still written
 const ROWS = 64; // of the table of clips, asked for at once
 const LOOK_AGAIN = 500; // ms between looks for a first clip
@@ -25,32 +27,37 @@ const LOOKS = 120;
 
 export class StreamFile {
   /**
-   * @param {string|URL} url
+   * @param {string|URL} url @param {AbortSignal} signal ends its requests
    * @returns {Promise<StreamFile|Uint8Array|null>} the whole file where it has the plain layout, where nothing belongs to segments, and
-   *   of pictures where there is no WebCodecs; null where the server refuses
-   * @throws {GeometryVideoError} the index is damaged
+   *   of pictures where there is no WebCodecs; null where the server refuses a part
+   * @throws {GeometryVideoError} it cannot be fetched, or the index is damaged
    */
-  static async open(url) {
-    const response = await fetch(url, { headers: { Range: `bytes=0-${FIRST - 1}` } });
-    if (!response.ok) return null;
-    const incoming = response.status === PARTIAL ? null : new Incoming(response, url);
-    const start = incoming ? await incoming.read(0, FIRST) : new Uint8Array(await response.arrayBuffer());
+  static async open(url, signal) {
+    const asked = await request(url, signal, { init: { headers: { Range: `bytes=0-${FIRST - 1}` } } });
+    const { response } = asked;
+    if (response.status === UNSATISFIABLE) return null; // an empty file
+    if (!response.ok) {
+      throw asked.refused();
+    }
+    const incoming = response.status === PARTIAL ? null : new Incoming(asked);
+    const start = incoming ? await incoming.read(0, FIRST) : await asked.bytes();
     if (start.length < FIRST) return start;
-    const rest = (data) => incoming?.whole() ?? fetchRest(url, data);
+    const rest = (data) => incoming?.whole() ?? fetchRest(url, signal, data);
     const box = findIndex(start);
     if (!box) return rest(start);
-    if (box.isRoom) return StreamFile.#openLive(url, start.length, box.end, incoming);
-    const file = new StreamFile(url, start.length, incoming);
+    if (box.isRoom) return StreamFile.#openLive(url, signal, start.length, box.end, incoming);
+    const file = new StreamFile(url, signal, start.length, incoming);
+    file.total = totalOf(response);
     const more = Math.max(0, box.end - start.length);
-    const data = more ? join(start, await file.#fetch(start.length, more)) : start;
+    const data = more ? joined([start, await file.#fetch(start.length, more)]) : start;
     return (await file.#begin(data, box)) ? file : rest(data);
   }
 
   /** A file that is still written, once a clip is there. @param {number} place behind the room for the index */
-  static async #openLive(url, received, place, incoming) {
+  static async #openLive(url, signal, received, place, incoming) {
     incoming?.close();
     if (incoming) throw new GeometryVideoError("load", `${url} is still written, and its server knows no Range; try again when it is finished`);
-    const file = new StreamFile(url, received, null);
+    const file = new StreamFile(url, signal, received, null);
     for (let i = 0; i < LOOKS; i++) {
       if (await file.#beginLive(place)) return file;
       await new Promise((resolve) => setTimeout(resolve, LOOK_AGAIN));
@@ -58,8 +65,10 @@ export class StreamFile {
     throw new GeometryVideoError("load", `${url} is still written, and nothing comes; try again`);
   }
 
-  constructor(url, received, incoming) {
+  constructor(url, signal, received, incoming) {
     this.url = url;
+    this.signal = signal;
+    this.total = ""; // bytes of the whole file, as its server says at first
     /** Bytes that have come so far. */
     this.received = received;
     this.incoming = incoming; // where the server knows no Range
@@ -128,7 +137,7 @@ export class StreamFile {
     const found = readRows(await this.#fetch(start, Math.min(ROW_BYTES * ROWS, tableEnd - start)));
     const [same, before] = [found.rows[0], rows.at(-1)];
     if (!same || ["length", "checksum", "frames"].some((field) => same[field] !== before[field])) {
-      throw new GeometryVideoError("corrupt", `${this.url} has another file by now; load the page again`);
+      throw this.#isAnother();
     }
     this.#addClips(found.rows.slice(1));
     this.live.hasEnded = found.hasEnded || start + ROW_BYTES >= tableEnd;
@@ -139,7 +148,7 @@ export class StreamFile {
     this.live = { rows: [] }; // nothing of it comes from a cache
     let data = await this.#fetch(place, FIRST_LIVE, true);
     const fill = async (size) => {
-      if (size > data.length) data = join(data, await this.#fetch(place + data.length, size - data.length));
+      if (size > data.length) data = joined([data, await this.#fetch(place + data.length, size - data.length)]);
     };
     const size = liveSize(data);
     await fill(size);
@@ -194,7 +203,7 @@ export class StreamFile {
     const end = Math.max(...shared.map(({ offset, length }) => offset + length));
     if (end > size) throw new GeometryVideoError("corrupt", `the index names places outside of the file; ${AGAIN}`);
     const more = Math.max(0, end - data.length);
-    this.start = more ? join(data, await this.#fetch(data.length, more)) : data;
+    this.start = more ? joined([data, await this.#fetch(data.length, more)]) : data;
     this.#take(shared.map(({ name }) => name), this.start.subarray(start, end), start);
     return true;
   }
@@ -279,21 +288,20 @@ export class StreamFile {
   async #fetch(offset, length, mayEnd = false) {
     if (offset + length <= this.start?.length) return this.start.subarray(offset, offset + length);
     const wanted = `bytes ${offset} to ${offset + length - 1} of ${this.url}`;
-    let response;
-    let data;
     if (this.incoming) return this.#await(offset, length, wanted);
-    try {
-      const cache = this.live ? "no-store" : "default";
-      response = await fetch(this.url, { cache, headers: { Range: `bytes=${offset}-${offset + length - 1}` } });
-      if (response.status === PARTIAL) data = new Uint8Array(await response.arrayBuffer());
-      else await response.body?.cancel(); // 200: the whole file would come
-    } catch (error) {
-      throw new GeometryVideoError("load", `${wanted} cannot be fetched: ${error.message}; try again`);
-    }
-    if (!data) throw new GeometryVideoError("load", `${wanted} cannot be fetched: status ${response.status}; load the page again`);
+    const init = { cache: this.live ? "no-store" : "default", headers: { Range: `bytes=${offset}-${offset + length - 1}` } };
+    const asked = await request(this.url, this.signal, { what: wanted, init });
+    const { response } = asked;
+    if (response.status !== PARTIAL) throw asked.refused(); // 200: the whole file would come
+    const data = await asked.bytes();
+    if (this.total && totalOf(response) && totalOf(response) !== this.total) throw this.#isAnother();
     if (!mayEnd || data.length > length) checkLength(data, length, wanted);
     this.received += data.length;
     return data;
+  }
+
+  #isAnother() {
+    return new GeometryVideoError("corrupt", `${this.url} has another file by now; load the page again`);
   }
 
   async #await(offset, length, wanted) {
@@ -315,14 +323,14 @@ function checkLength(data, length, wanted) {
 }
 
 /** All of a file whose start is here; null if the server refuses. */
-async function fetchRest(url, start) {
-  const response = await fetch(url, { headers: { Range: `bytes=${start.length}-` } });
-  return response.status === PARTIAL ? join(start, new Uint8Array(await response.arrayBuffer())) : null;
+async function fetchRest(url, signal, start) {
+  const asked = await request(url, signal, { init: { headers: { Range: `bytes=${start.length}-` } } });
+  if (asked.response.status === PARTIAL) return joined([start, await asked.bytes()]);
+  asked.close();
+  return null;
 }
 
-function join(start, rest) {
-  const data = new Uint8Array(start.length + rest.length);
-  data.set(start);
-  data.set(rest, start.length);
-  return data;
+/** Bytes of the whole file, of an answer with a part; "" where the server does not say it, or not to other sites. */
+function totalOf(response) {
+  return /\/(\d+)$/.exec(response.headers.get("Content-Range") ?? "")?.[1] ?? "";
 }

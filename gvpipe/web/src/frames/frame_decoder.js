@@ -1,7 +1,7 @@
 /** Frames of all codecs, decoded by Python's kernels: in a worker, or on the page where there is none. Pictures are decoded by the page. */
 
 import { Displacements } from "../format/displacements.js";
-import { GeometryVideoError, corrupt } from "../format/errors.js";
+import { GeometryVideoError, corrupt, quote } from "../format/errors.js";
 import { stretch } from "../format/points.js";
 import { LaplacianReader, VERSION as LAPLACIAN_VERSION } from "../laplacian/reader.js";
 import { McgvReader, VERSION as MCGV_VERSION } from "../mcgv/reader.js";
@@ -74,8 +74,8 @@ export class FrameDecoder {
     const reader = this.#reader;
     const { levels } = reader;
     const level = wanted === "coarsest" ? levels.length - 1 : wanted;
-    if (!(level >= 0 && level < levels.length)) {
-      throw new GeometryVideoError("unsupported", `level ${level}: there are levels 0..${levels.length - 1}`);
+    if (!(Number.isInteger(level) && level >= 0 && level < levels.length)) {
+      throw new GeometryVideoError("unsupported", `level ${quote(level)}: there are levels 0..${levels.length - 1}`);
     }
     const planes = reader.planes ?? null;
     if (level === 0) return { level, levels, faces: reader.faces, basePoints: reader.basePoints ?? rowsOf(reader.points), planes };

@@ -5,6 +5,7 @@
 
 import { dracoBinary } from "../format/draco.js";
 import { GeometryVideoError } from "../format/errors.js";
+import { closed } from "../format/request.js";
 import { FrameDecoder } from "./frame_decoder.js";
 
 export class FrameHost {
@@ -14,6 +15,7 @@ export class FrameHost {
   #jobs = new Map(); // number -> what is not answered yet
   #count = 0;
   #setUp;
+  #isClosed = false;
 
   /** `{min, max}`: the box of the motion, of the segments read so far; null: of none. */
   bounds = null;
@@ -51,7 +53,7 @@ export class FrameHost {
 
   /** As `FrameDecoder.prepare`. */
   prepare(frame) {
-    return this.#ask({ method: "prepare", given: [frame] });
+    this.#ask({ method: "prepare", given: [frame] }).catch(() => {});
   }
 
   /** That the file has so many frames by now. */
@@ -61,11 +63,14 @@ export class FrameHost {
   }
 
   close() {
+    this.#isClosed = true;
     this.#worker?.terminate();
+    for (const { reject } of this.#jobs.values()) reject(closed());
     this.#jobs.clear();
   }
 
   #ask(job) {
+    if (this.#isClosed) return Promise.reject(closed());
     if (this.#decoder) return this.#run(job);
     return new Promise((resolve, reject) => {
       const number = this.#count++;

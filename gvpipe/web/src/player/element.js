@@ -11,7 +11,8 @@
 
 import { breathe } from "../breathe.js";
 import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
-import { FASTEST, SLOWEST, checkRate, checkSeconds } from "../playback.js";
+import { checkSeconds } from "../playback.js";
+import { FASTEST, SLOWEST, checkRate } from "../playback_rate.js";
 import { COLORMAPS } from "../three/colormaps.js";
 import { Bar, nextSpeed } from "./bar.js";
 import { embedded } from "./embedded.js";
@@ -34,10 +35,14 @@ const MARKUP = `<style>${style}</style>
   <div class="bar" part="bar" role="group" aria-label="Playback"></div>`;
 const TURN = Math.PI / 18; // by one press of a key
 const ZOOM = 1.15;
+const LOST = "The browser took the picture's WebGL away, as it does when a page has many: remove some.";
 const READY = { nothing: 0, metadata: 1, enough: 4 }; // `readyState`, as in HTMLMediaElement
 const MEDIA_EVENTS = ["play", "playing", "pause", "seeking", "seeked", "timeupdate", "waiting", "ended", "ratechange"];
 
-export class GeometryVideoElement extends HTMLElement {
+/** Where there are no pages, modules that name the element can still be loaded. */
+const Base = globalThis.HTMLElement ?? class {};
+
+export class GeometryVideoElement extends Base {
   static observedAttributes = ["src", "loop", "wireframe", "follow", "speed", "field", "colormap", "range", "lod"];
 
   #stage = null;
@@ -47,6 +52,8 @@ export class GeometryVideoElement extends HTMLElement {
   #message;
   #loading = 0; // counts loads, so that a late one does not replace its successor
   #loaded = null; // promise, while a file is loaded
+  #ending = null; // AbortController of what is loading
+  #wanted = null; // what was asked for while nothing was there: true, to play; false, to pause
   #startTime = 0; // s, set before a file is there
   #resume = false; // whether to play on when the slider is let go
   #showing = null; // counts changes of the field
@@ -88,15 +95,24 @@ export class GeometryVideoElement extends HTMLElement {
   }
 
   disconnectedCallback() {
+    queueMicrotask(() => !this.isConnected && this.#leave()); // else it was moved
+  }
+
+  #leave() {
     this.#unload();
-    this.#stage?.close();
+    this.#closeStage();
+  }
+
+  #closeStage() {
+    if (!this.#stage) return;
+    this.#stage.close();
     this.#stage = null;
     const canvas = this.shadowRoot.querySelector("canvas");
     canvas.replaceWith(canvas.cloneNode()); // its WebGL context is gone for good
   }
 
   attributeChangedCallback(name, before, value) {
-    if (name === "src" && before !== value && this.isConnected && value !== null) this.load(value);
+    if (name === "src" && this.isConnected && value !== null && (before !== value || this.error)) this.load(value);
     if (["loop", "wireframe", "follow"].includes(name)) this.#bar.setPressed(name, value !== null);
     if (name === "wireframe") this.#stage?.setWireframe(value !== null);
     if (name === "follow") this.#stage?.setFollowing(value !== null);
@@ -179,7 +195,7 @@ export class GeometryVideoElement extends HTMLElement {
   }
 
   get paused() {
-    return this.#mesh?.paused ?? true;
+    return this.#mesh?.paused ?? this.#wanted !== true;
   }
 
   get ended() {
@@ -226,9 +242,9 @@ export class GeometryVideoElement extends HTMLElement {
     return new Set(this.#hidden);
   }
 
-  /** Hide the parts of these names, and show all others. @param {Iterable<string>} names */
+  /** Hide the parts of these names, and show all others. @param {string|Iterable<string>} names */
   hide(names) {
-    this.#hidden = new Set(names);
+    this.#hidden = new Set(typeof names === "string" ? [names] : names);
     if (!this.video) return;
     this.#stage?.setHidden(this.#hidden);
     this.#panel.setHidden(this.#hidden);
@@ -250,52 +266,71 @@ export class GeometryVideoElement extends HTMLElement {
 
   async #load(source) {
     const loading = this.#loading;
+    const isLate = () => loading !== this.#loading; // another is asked for, or the element is gone
     this.#say("Loading …");
     this.#tell("loadstart");
+    if (isLate()) return undefined; // by a listener
+    const { signal } = (this.#ending = new AbortController());
     let [loaded, video] = [null, null];
     try {
       const file = typeof source === "string" && source[0] === "#" ? embedded(source) : source;
       const level = this.lod === "auto" ? "coarsest" : this.lod || "coarsest"; // shown at once
-      loaded = GeometryVideo.load(file, { level });
+      loaded = GeometryVideo.load(file, { level, signal });
       loaded.catch(() => {}); // looked at below
       await breathe();
       probeGpu(); // while a worker decodes
       await breathe();
-      if (loading === this.#loading) this.#stage ??= openStage(this.shadowRoot.querySelector("canvas"));
+      if (!isLate()) this.#stage ??= this.#openStage();
       video = await loaded;
-      if (loading !== this.#loading) return video.close();
+      if (isLate()) return video.close();
       await breathe();
-      if (loading !== this.#loading) return video.close();
+      if (isLate()) return video.close();
       await this.#stage.setMesh(video, this.getAttribute("up") ?? (video.metadata.up_axis === "z" ? "z" : "y"));
-      if (loading !== this.#loading) return video.close();
+      if (isLate()) return video.close();
       if (video.level) this.#tell("levelchange", video.level);
       await breathe();
-      if (loading !== this.#loading) return video.close();
+      if (isLate()) return video.close();
       if (level === "coarsest" && video.level) await this.#stage.mesh.setLevel(0);
       await breathe();
-      if (loading !== this.#loading) return video.close();
+      if (isLate()) return video.close();
     } catch (error) {
       loaded?.then((late) => late.close(), () => {});
-      if (loading === this.#loading) this.#fail(error);
+      if (!isLate()) this.#fail(error);
       return undefined;
     }
     this.video = video;
     this.#say("");
     this.#openMesh();
     await breathe();
-    if (loading !== this.#loading) return undefined;
+    if (isLate()) return undefined;
     await this.#showField();
-    if (loading !== this.#loading) return undefined;
+    if (isLate()) return undefined;
     this.#bar.setEnabled(true);
-    this.#setReady(READY.metadata, "durationchange", "loadedmetadata");
     this.#bar.setFrame(this.currentFrame);
-    this.#tell("frame", this.currentFrame);
-    this.#setReady(READY.enough, "loadeddata", "progress", "canplay", "canplaythrough", "ready");
-    if (loading !== this.#loading) return undefined; // a listener has loaded another
+    const states = [
+      [READY.metadata, ["durationchange", "loadedmetadata"]],
+      [READY.enough, ["frame", "loadeddata", "progress", "canplay", "canplaythrough", "ready"]],
+    ];
+    for (const [state, events] of states) {
+      this.readyState = state;
+      for (const event of events) {
+        this.#tell(event, event === "frame" ? this.currentFrame : null);
+        if (isLate()) return undefined; // by a listener
+      }
+    }
     if (this.#startTime) this.#mesh.currentTime = this.#startTime;
     this.#startTime = 0;
-    if (this.autoplay && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.play();
+    const plays = this.#wanted ?? (this.autoplay && !matchMedia("(prefers-reduced-motion: reduce)").matches);
+    this.#wanted = null;
+    if (plays) this.#mesh.play().catch(() => {}); // told by events
     return undefined;
+  }
+
+  #openStage() {
+    const canvas = this.shadowRoot.querySelector("canvas");
+    canvas.addEventListener("webglcontextlost", () => this.#stage?.hasMesh && this.#say(LOST, "alert"));
+    canvas.addEventListener("webglcontextrestored", () => this.#say(""));
+    return openStage(canvas);
   }
 
   #openMesh() {
@@ -323,7 +358,9 @@ export class GeometryVideoElement extends HTMLElement {
         this.#tell(name);
       });
     }
-    mesh.addEventListener("error", ({ error }) => this.#fail(error));
+    mesh.addEventListener("waiting", () => this.video.isLive || this.#say("Waiting for the file …"));
+    for (const name of ["playing", "seeked"]) mesh.addEventListener(name, () => this.error || this.#say(""));
+    mesh.addEventListener("error", ({ error }) => this.#interrupt(error));
     this.#bar.setVideo(this.video);
     this.#bar.setNotes(mesh.notes);
     this.#panel.setVideo(this.video, mesh.partNames);
@@ -331,25 +368,48 @@ export class GeometryVideoElement extends HTMLElement {
   }
 
   /**
-   * Play on from the frame shown, from the start if that is the last; a promise that it plays. While a file loads, it waits.
+   * Play on from the frame shown, from the start if that is the last; a promise that it plays. Until a file is there, it waits.
+   * After an error in mid-play it tries again.
    *
-   * @throws {GeometryVideoError|DOMException} the file cannot be played; another file was asked for meanwhile
+   * @throws {GeometryVideoError|DOMException} the file cannot be played; an AbortError: it was paused, or another file was asked for
    */
   async play() {
+    if (!this.#mesh && this.error) throw this.error;
+    if (!this.#mesh) await this.#awaitMesh();
+    this.#resumeAfterError();
+    await this.#mesh.play();
+  }
+
+  /** Until a file is loaded that is to play. */
+  async #awaitMesh() {
+    this.#wanted = true;
+    if (!this.#loaded) await new Promise((resolve) => this.addEventListener("loadstart", resolve, { once: true }));
     const loaded = this.#loaded;
-    if (!this.#mesh) await loaded;
+    await loaded;
     if (this.error) throw this.error;
     if (loaded !== this.#loaded) throw new DOMException("another file was asked for", "AbortError");
-    await this.#mesh?.play();
+    if (this.paused) throw new DOMException("it was paused before it played", "AbortError");
   }
 
   pause() {
+    if (!this.#mesh) this.#wanted = false;
     this.#mesh?.pause();
   }
 
-  /** Show a frame, and pause. Of many calls in a row the last counts. */
-  seek(frame) {
-    return this.#mesh?.seek(frame) ?? Promise.resolve();
+  /** Show a frame, and pause; while a file loads, once it is there. Of many calls in a row the last counts. */
+  async seek(frame) {
+    if (!this.#mesh) {
+      this.#wanted = false;
+      await this.#loaded;
+    }
+    this.#resumeAfterError();
+    await this.#mesh?.seek(frame);
+  }
+
+  #resumeAfterError() {
+    if (!this.error || !this.#mesh) return;
+    this.error = null;
+    this.#say("");
   }
 
   /** Show the field of attribute `field`, if the video has it, or else the materials. */
@@ -363,7 +423,7 @@ export class GeometryVideoElement extends HTMLElement {
     try {
       range = await this.#stage.showField(field && field.name, { colormap: this.colormap, range: this.range });
     } catch (error) {
-      if (video === this.video) this.#fail(error);
+      if (video === this.video) this.#interrupt(error);
       return;
     }
     if (showing !== this.#showing || !this.#mesh) return;
@@ -376,7 +436,7 @@ export class GeometryVideoElement extends HTMLElement {
 
   /** Steps in a row add up, however fast they come. */
   #step(by) {
-    this.seek(this.#mesh.soughtFrame + by);
+    return this.seek(this.#mesh.soughtFrame + by);
   }
 
   #scrub(frame, done) {
@@ -384,7 +444,7 @@ export class GeometryVideoElement extends HTMLElement {
     const sought = this.seek(frame);
     if (!done || !this.#resume) return;
     this.#resume = false;
-    sought.then(() => this.play());
+    sought.then(() => this.play()).catch(() => {});
   }
 
   /** The picture as it is now, without its backdrop: a promise of a PNG file as `Blob`, null while there is none. */
@@ -399,7 +459,7 @@ export class GeometryVideoElement extends HTMLElement {
 
   #act(name) {
     const actions = {
-      play: () => (this.paused ? this.play() : this.pause()),
+      play: () => (this.paused ? this.play().catch(() => {}) : this.pause()),
       back: () => this.#step(-1),
       forward: () => this.#step(1),
       first: () => this.seek(0),
@@ -429,17 +489,18 @@ export class GeometryVideoElement extends HTMLElement {
     this.#act(action);
   }
 
-  #setReady(state, ...events) {
-    this.readyState = state;
-    for (const event of events) this.#tell(event);
-  }
-
   #tell(event, detail = null) {
     this.dispatchEvent(new CustomEvent(event, { detail }));
   }
 
+  /** Of a file that cannot be shown at all. */
   #fail(error) {
     this.#unload();
+    this.#interrupt(error);
+  }
+
+  /** Of what is shown: the frame stays, and whoever asks for another tries again. */
+  #interrupt(error) {
     const known = error instanceof GeometryVideoError;
     this.#say(known ? `Cannot play this file: ${error.message}.` : `The player failed: ${error.message}`, "alert");
     this.error = error;
@@ -454,7 +515,10 @@ export class GeometryVideoElement extends HTMLElement {
   #unload() {
     const wasLoaded = this.video !== null;
     this.#loading++;
+    if (this.#loaded) this.#wanted = null; // it was about the file before
     this.#loaded = null;
+    this.#ending?.abort(new DOMException("another file was asked for", "AbortError"));
+    this.#ending = null;
     this.#showing = null;
     this.video?.close();
     this.video = null;

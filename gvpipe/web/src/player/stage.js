@@ -80,6 +80,10 @@ export class Stage {
     return undefined;
   }
 
+  get hasMesh() {
+    return this.mesh !== null;
+  }
+
   /** (4, 4) by columns: from model units to clip space. */
   get projection() {
     const { centre, scale, camera } = this;

@@ -190,9 +190,9 @@ export class GeometryVideoMesh extends Mesh {
     return this.#parts.names;
   }
 
-  /** Hide the parts of these names, and show all others. @param {Iterable<string>} names */
+  /** Hide the parts of these names, and show all others. @param {string|Iterable<string>} names */
   hide(names) {
-    this.#parts.hide(new Set(names));
+    this.#parts.hide(new Set(typeof names === "string" ? [names] : names));
     if (this.video.triangleCount) this.#parts.fill(this.geometry, this.#render.index);
   }
 

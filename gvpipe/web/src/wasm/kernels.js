@@ -10,6 +10,7 @@
  * item, data, shape and strides. Pointers have 32 bits, other integers 64.
  */
 
+import { GeometryVideoError } from "../format/errors.js";
 import { SIGNATURES } from "./signatures.js";
 
 const TYPES = {
@@ -36,11 +37,17 @@ const modules = new WeakMap(); // bytes -> promise of what they compile to: inst
  * @typedef {{type: string, shape: number[], pointer: number, owner?: number}} KernelArray
  */
 
+/** By the page, most likely: the code is the same for all. */
+function refused(error) {
+  const remedy = "let script-src of its Content-Security-Policy have 'wasm-unsafe-eval'";
+  return new GeometryVideoError("unsupported", `this page runs no WebAssembly (${error.message}); ${remedy}`);
+}
+
 /** Kernels with a memory of their own, which is freed as a whole: with this object. */
 export class Kernels {
   /** @param {Uint8Array} bytes of `kernels.wasm` @returns {Promise<Kernels>} */
   static async open(bytes) {
-    if (!modules.has(bytes)) modules.set(bytes, WebAssembly.compile(bytes));
+    if (!modules.has(bytes)) modules.set(bytes, WebAssembly.compile(bytes).catch((error) => Promise.reject(refused(error))));
     return new Kernels(await modules.get(bytes));
   }
 

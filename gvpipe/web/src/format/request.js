@@ -1,0 +1,78 @@
+/** Requests to web servers, which end when nothing comes for a while, or when what asked for them is closed. */
+
+import { GeometryVideoError } from "./errors.js";
+
+const PATIENCE = 30; // s without a byte
+
+/** From this status on, a server may come back. */
+export const OUTAGE = 500;
+
+/** What a promise is rejected with that a closed video leaves open. */
+export function closed() {
+  return new DOMException("the video was closed", "AbortError");
+}
+
+/**
+ * @param {string|URL} url
+ * @param {AbortSignal} signal ends it
+ * @param {{what?: string, remedy?: string, init?: RequestInit}} [options] `what` is asked for, and what helps if it does not come: for messages
+ * @returns {Promise<{response: Response, read: () => Promise<Uint8Array|null>, bytes: () => Promise<Uint8Array>, close: () => void,
+ *   refused: () => GeometryVideoError}>} `read`: the next bytes, null at the end; `bytes`: all of them; `refused`: an error of this status
+ * @throws {GeometryVideoError} kind "load": the connection fails; of `read` and `bytes`, too
+ * @throws {unknown} the signal's reason
+ */
+export async function request(url, signal, { what = String(url), remedy = "try again", init = {} } = {}) {
+  const own = new AbortController();
+  const follow = () => own.abort(signal.reason);
+  const end = () => signal.removeEventListener("abort", follow);
+  signal.throwIfAborted();
+  signal.addEventListener("abort", follow);
+
+  async function watched(promise) {
+    const timer = setTimeout(() => own.abort(new Error(`nothing came for ${PATIENCE} s`)), 1000 * PATIENCE);
+    try {
+      return await promise;
+    } catch (error) {
+      end();
+      signal.throwIfAborted();
+      throw new GeometryVideoError("load", `${what} cannot be fetched: ${error.message || error.name}; ${remedy}`);
+    } finally {
+      clearTimeout(timer);
+    }
+  }
+
+  const response = await watched(fetch(url, { ...init, signal: own.signal }));
+  const body = response.body?.getReader();
+  async function read() {
+    const { done, value } = body ? await watched(body.read()) : { done: true };
+    if (done) end();
+    return done ? null : value;
+  }
+  async function bytes() {
+    const parts = [];
+    for (let part = await read(); part; part = await read()) parts.push(part);
+    return joined(parts);
+  }
+  function close() {
+    end();
+    own.abort(closed());
+    body?.cancel().catch(() => {});
+  }
+  function refused() {
+    close();
+    const error = new GeometryVideoError("load", `${what} cannot be fetched: status ${response.status}${response.status < OUTAGE ? "" : `; ${remedy}`}`);
+    return Object.assign(error, { status: response.status });
+  }
+  return { response, read, bytes, close, refused };
+}
+
+/** Bytes one after the other. @param {Uint8Array[]} parts @returns {Uint8Array} */
+export function joined(parts) {
+  const data = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
+  let end = 0;
+  for (const part of parts) {
+    data.set(part, end);
+    end += part.length;
+  }
+  return data;
+}
