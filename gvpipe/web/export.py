@@ -1,8 +1,8 @@
 """A geometry video and its player as one HTML file that needs no network.
 
 What: page = ``page.html`` with the player's bundle (deflated, in digits of base 85) and the MP4 file as base64 text, so that it
-opens from a disk. Why: browsers load no modules and fetch no files for a page that is itself a file. Base 85 takes a fifteenth less
-than base 64, which the element knows (``src="#id"``).
+opens from a disk. Why: browsers load no modules and fetch no files for a page that is itself a file. Base 85 takes a fifteenth
+less than base 64, which the element knows (``src="#id"``).
 
 A codec knows which of its files browsers play (`gvpipe.registry.browser_obstacle`). Any other file, and one for which that is
 asked, is decoded and encoded anew at a Karni-Gotsman error that is small beside that of files. The error that this adds is

@@ -163,7 +163,7 @@ export class GeometryVideo {
       return Promise.reject(new RangeError(`frame ${k}: there are ${this.frameCount}`));
     }
     const size = 3 * this.vertexCount;
-    if (positions && !(positions instanceof Float32Array && positions.length >= size)) {
+    if (positions && !(positions[Symbol.toStringTag] === "Float32Array" && positions.length >= size)) {
       return Promise.reject(new RangeError(`positions: a Float32Array of ${size} numbers is needed`));
     }
     return this.#queued(async () => {
