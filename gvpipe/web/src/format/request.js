@@ -3,6 +3,7 @@
 import { GeometryVideoError } from "./errors.js";
 
 const PATIENCE = 30; // s without a byte
+const SLOWEST = 4096; // bytes a second, where bytes are not seen as they come
 
 /** From this status on, a server may come back. */
 export const OUTAGE = 500;
@@ -28,8 +29,8 @@ export async function request(url, signal, { what = String(url), remedy = "try a
   signal.throwIfAborted();
   signal.addEventListener("abort", follow);
 
-  async function watched(promise) {
-    const timer = setTimeout(() => own.abort(new Error(`nothing came for ${PATIENCE} s`)), 1000 * PATIENCE);
+  async function watched(promise, seconds = PATIENCE) {
+    const timer = setTimeout(() => own.abort(new Error(`it did not come in ${seconds.toFixed(0)} s`)), 1000 * seconds);
     try {
       return await promise;
     } catch (error) {
@@ -42,13 +43,20 @@ export async function request(url, signal, { what = String(url), remedy = "try a
   }
 
   const response = await watched(fetch(url, { ...init, signal: own.signal }));
-  const body = response.body?.getReader();
+  let body = null;
   async function read() {
+    body ??= response.body?.getReader();
     const { done, value } = body ? await watched(body.read()) : { done: true };
     if (done) end();
     return done ? null : value;
   }
   async function bytes() {
+    const length = Number(response.headers.get("Content-Length"));
+    if (length) {
+      const data = await watched(response.arrayBuffer(), PATIENCE + length / SLOWEST); // takes less memory than a reader
+      end();
+      return new Uint8Array(data);
+    }
     const parts = [];
     for (let part = await read(); part; part = await read()) parts.push(part);
     return joined(parts);
@@ -56,7 +64,6 @@ export async function request(url, signal, { what = String(url), remedy = "try a
   function close() {
     end();
     own.abort(closed());
-    body?.cancel().catch(() => {});
   }
   function refused() {
     close();
