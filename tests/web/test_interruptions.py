@@ -118,6 +118,47 @@ def test_pause_and_play_while_a_file_loads(player: Run, site: tuple[Path, str]) 
     ) == [True, True]
 
 
+def test_asked_for_in_a_row_the_last_counts(player: Run, site: tuple[Path, str]) -> None:
+    pages.encode_file(site, waving(10, 24))
+    assert player(
+        f"""{WAIT} element.src = "x.mp4"; element.seek(20); await element.play();
+        const first = [element.paused, element.currentFrame >= 20];
+        element.src = "x.mp4#2"; const lost = element.seek(7); element.src = "x.mp4#3"; await lost; {READY}
+        const kept = element.currentFrame; const lone = document.createElement("geometry-video");
+        const never = lone.play().catch({NAME}); lone.pause();
+        const again = element.play().catch({NAME}); element.pause();
+        return [first, kept, await never, await again];"""
+    ) == [[False, True], 0, "AbortError", "AbortError"]
+
+
+def test_pause_in_a_listener_counts(player: Run, site: tuple[Path, str]) -> None:
+    pages.encode_file(site, waving(10, 24))
+    for event in ("loadstart", "loadedmetadata", "canplay", "ready"):
+        assert player(
+            f"""{WAIT} element.autoplay = true; element.addEventListener(args[0], () => element.pause(), {{ once: true }});
+            element.src = `x.mp4#${{args[0]}}`; {READY} await wait(200); const found = [element.paused, element.currentFrame];
+            element.src = ""; return found;""",
+            event,
+        ) == [True, 0], event
+
+
+def test_an_element_without_webcodecs(player: Run, site: tuple[Path, str]) -> None:
+    pages.encode_file(site, waving(10, 24))
+    last, bounds = player(
+        f"""{UNTIL} delete window.VideoDecoder; element.src = "x.mp4"; {READY} await element.play();
+        await until(() => element.ended); return [element.currentFrame, element.video.bounds.max.every(Number.isFinite)];"""
+    )
+    assert last == 23 and bounds
+
+
+def test_a_level_that_is_left_is_no_error(player: Run, site: tuple[Path, str]) -> None:
+    gvpipe.encode(waving(40, 24), site[0] / "p.mp4", codec="pca")
+    assert player(
+        f"""{WAIT} element.src = "p.mp4"; {READY} element.lod = 1; element.src = "p.mp4#again"; await element.play();
+        await wait(200); return [element.error, element.paused];"""
+    ) == [None, False]
+
+
 def test_an_element_that_is_moved_goes_on(player: Run, site: tuple[Path, str]) -> None:
     pages.encode_file(site, waving(10, 24))
     assert player(

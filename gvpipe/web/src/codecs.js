@@ -25,11 +25,11 @@ const BYTES_PER_FRAME = 160; // that a clock keeps
  *
  * @param {Uint8Array|import("./format/stream_file.js").StreamFile} source the file, or its parts
  * @param {import("./format/payload.js").Payload} payload
- * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {number|"coarsest"} level of detail
+ * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {number|"coarsest"} level of detail @param {AbortSignal} signal closes it
  * @returns {Promise<Playable>}
  * @throws {GeometryVideoError} it is damaged, or this player or browser cannot read it
  */
-export async function openCodec(source, payload, repeated, level) {
+export async function openCodec(source, payload, repeated, level, signal) {
   const { codec, version } = payload.header;
   const newest = readableVersion(codec);
   if (!newest) throw new GeometryVideoError("unsupported", `it was coded by ${quote(codec)}; gvpipe export-html converts it`);
@@ -44,16 +44,17 @@ export async function openCodec(source, payload, repeated, level) {
   const distinct = repeated.distinctPayload(payload);
   const sections = source instanceof Uint8Array ? distinct : new PartPayload(distinct, source);
   const hasTrajectories = codec === MCGV && "transform" in payload.header.settings;
-  return openFrames(code, source, hasTrajectories ? withPictures(source, sections) : sections, repeated, level);
+  return openFrames(code, source, hasTrajectories ? withPictures(source, sections) : sections, repeated, level, signal);
 }
 
-async function openFrames(code, source, payload, repeated, level) {
+async function openFrames(code, source, payload, repeated, level, signal) {
   const { fps, container } = payload.header;
   const host = new FrameHost(payload, code);
   const close = () => {
     host.close();
     payload.close?.();
   };
+  signal.addEventListener("abort", close, { once: true });
   const frames = []; // where there are no pictures, for the clock
   const have = (count) => {
     payload.budget.ask(`${count} frames`, BYTES_PER_FRAME * count);

@@ -5,7 +5,8 @@
  * is due is not there yet; a page too slow for every picture gets those that are due, and none is queued.
  *
  * What is kept of a picture are the levels of its samples. Where positions are made of them elsewhere, pictures are *finished* just
- * before they are due: positions take more memory than levels.
+ * before they are due: positions take more memory than levels. A frame that is not finished in time gives way to the latest one
+ * before it that is.
  */
 
 import { AGAIN, GeometryVideoError } from "./format/errors.js";
@@ -15,6 +16,8 @@ import { readTrack } from "./track.js";
 
 const KEPT_BYTES = 64 * 2 ** 20; // of decoded levels
 const FINISHED = 4; // pictures that are kept finished: the one shown, the next two, and one asked for too many
+const FINISHING = 2; // at once, while it plays
+const LATE = 250; // ms that the clock goes on while the frame that is due is being finished
 const KEPT_GROUPS = 3; // at least: what is shown, what comes next, and one of before
 const AHEAD = 1; // s, decoded ahead of what plays
 const BEHIND = 1.25; // clips of a file that is still written: what is left behind is not played
@@ -102,6 +105,7 @@ export class DecodedPictures {
     this.decoder = decoder;
     this.finish = finish;
     this.failure = null; // an error: what was to be decoded ahead is not tried until something is asked for
+    this.finishing = 0; // pictures
     this.finished = new Map(); // picture -> Finished, the one asked for last at the end
     this.groupBytes = groupBytes;
     this.samples = groups;
@@ -141,7 +145,7 @@ export class DecodedPictures {
     this.#forgetFailures();
     const picture = this.repeated.distinctOf(frame);
     const levels = await this.#picture(picture);
-    const finished = this.#finished(picture, levels);
+    const finished = this.#finished(frame, levels);
     await finished.done;
     if (finished.error) throw finished.error;
     this.current = finished.contents;
@@ -158,7 +162,7 @@ export class DecodedPictures {
     const playing = (this.playing = {});
     let position = Math.max(0, this.shown); // frames since the start
     let before = null;
-    let missing = 0; // ms without the frame that is due
+    let missing = 0; // ms without a frame that may be shown
     let isWaiting = false;
     const { repeated } = this;
     const follows = position >= this.frames - 2 * repeated.clip && rate >= 1;
@@ -178,8 +182,7 @@ export class DecodedPictures {
       const frame = loop ? Math.floor(next) % this.frames : Math.min(Math.floor(next), this.frames - 1);
       const picture = this.repeated.distinctOf(frame);
       const group = this.#group(this.groupOf[picture]);
-      const levels = group.levels.get(picture);
-      const finished = levels && this.#finished(picture, levels);
+      const finished = this.#finishSoon(frame);
       const error = group.error ?? finished?.error;
       if (error) {
         this.pause();
@@ -187,25 +190,25 @@ export class DecodedPictures {
         return;
       }
       const isThere = Boolean(finished?.contents);
+      const best = isThere ? { frame, contents: finished.contents } : this.#latest(Math.floor(position), frame);
       ticked?.(now, isThere);
-      if (finished && !isThere && !missing) before = now - step; // it is being finished: no time is lost
-      missing = isThere ? 0 : missing + step + 1;
+      missing = best ? 0 : missing + step;
       if ((isAtEnd || missing > STALLED) !== isWaiting) waits?.((isWaiting = !isWaiting));
-      if (isThere) {
-        position = loop ? next % this.frames : next;
-        if (frame !== this.shown) {
-          [this.shown, this.current] = [frame, finished.contents];
-          show(frame);
-        }
-        if (isOver && this.playing === playing) {
-          this.pause();
-          ended();
-          return;
-        }
-        this.#decodeAhead(this.groupOf[picture], AHEAD * this.fps * rate);
+      if (best && best.frame !== this.shown) {
+        [this.shown, this.current] = [best.frame, best.contents];
+        show(best.frame);
       }
-      const soon = Math.floor(next + (isThere ? (step * rate * this.fps) / 1000 : 0));
-      for (const k of [soon, soon + 1]) this.#finishAhead(loop ? k % this.frames : Math.min(k, this.frames - 1));
+      if (isThere && isOver && this.playing === playing) {
+        this.pause();
+        ended();
+        return;
+      }
+      if (isThere || (group.levels.has(picture) && missing < LATE)) {
+        position = loop ? next % this.frames : Math.min(next, this.frames);
+        this.#decodeAhead(this.groupOf[picture], AHEAD * this.fps * rate);
+        const soon = Math.floor(next + (step * rate * this.fps) / 1000);
+        for (const k of [soon, soon + 1]) this.#finishSoon(loop ? k % this.frames : Math.min(k, this.frames - 1));
+      }
       nextTick(tick);
     };
     if (this.playing === playing) nextTick(tick); // not paused since
@@ -237,24 +240,35 @@ export class DecodedPictures {
     }
   }
 
-  /** What is shown of a picture; where that is still to be made of its levels, it is under way. @returns {Finished} */
-  #finished(picture, levels) {
+  /** What is shown of a frame's picture; where that is still to be made of its levels, it is under way. @returns {Finished} */
+  #finished(frame, levels) {
     if (!this.finish) return { contents: levels };
+    const picture = this.repeated.distinctOf(frame);
     let finished = this.finished.get(picture);
     this.finished.delete(picture);
-    finished ??= new Finished(this.finish(picture, levels));
+    if (!finished) {
+      finished = new Finished(frame, this.finish(picture, levels));
+      this.finishing++;
+      finished.done.then(() => this.finishing--);
+    }
     if (this.finished.size === FINISHED) this.finished.delete(this.finished.keys().next().value);
     this.finished.set(picture, finished);
     return finished;
   }
 
-  /** Have a frame's picture finished that is due soon, if its levels are there. */
-  #finishAhead(frame) {
-    const pending = [...this.finished.values()].filter(({ contents, error }) => !contents && !error);
-    if (!this.finish || pending.length > 1) return; // slower than they are due: none is queued
+  /** The same while it plays: null where its levels are not there, or too many are under way. @returns {Finished|null} */
+  #finishSoon(frame) {
     const picture = this.repeated.distinctOf(frame);
     const levels = this.kept.get(this.groupOf[picture])?.levels.get(picture);
-    if (levels) this.#finished(picture, levels);
+    const isKnown = !this.finish || this.finished.has(picture);
+    return levels && (isKnown || this.finishing < FINISHING) ? this.#finished(frame, levels) : null;
+  }
+
+  /** The latest finished frame between the one that was due before and the one that is due now, or null. */
+  #latest(before, due) {
+    const ahead = (frame) => (frame - before + this.frames) % this.frames;
+    const found = [...this.finished.values()].filter(({ contents, frame }) => contents && ahead(frame) <= ahead(due) && frame !== this.shown);
+    return found.sort((a, b) => ahead(a.frame) - ahead(b.frame)).at(-1) ?? null;
   }
 
   /** What could not be fetched is tried again when it is asked for. */
@@ -289,7 +303,11 @@ export class DecodedPictures {
   #decode(number) {
     const group = new Group();
     const decode = async () => {
-      if (this.isClosed || this.failure) return group.fail(this.failure ?? closed());
+      if (this.isClosed || this.failure) {
+        group.fail(this.failure ?? closed());
+        if (this.kept.get(number) === group) this.kept.delete(number); // it was not tried
+        return;
+      }
       try {
         await this.decoder.decode(this.samples[number], (picture, levels) => group.add(picture, levels));
       } catch (error) {
@@ -297,7 +315,6 @@ export class DecodedPictures {
         group.fail(error);
       }
       group.isDone = true;
-      return undefined;
     };
     if (this.decoder.isConcurrent) decode();
     else this.turn = this.turn.then(decode);
@@ -310,7 +327,8 @@ class Finished {
   contents = null;
   error = null;
 
-  constructor(promise) {
+  constructor(frame, promise) {
+    this.frame = frame;
     this.done = promise.then(
       (contents) => (this.contents = contents),
       (error) => (this.error = error),

@@ -60,7 +60,7 @@ export class GeometryVideo {
       closing.signal.throwIfAborted();
       const payload = await readPayload(file ? readContainer(file) : parts.container);
       const repeated = readRepeatedFrames(payload);
-      reader = await openCodec(file ?? parts, payload, repeated, level);
+      reader = await openCodec(file ?? parts, payload, repeated, level, closing.signal);
       const start = file ? 0 : parts.startFrame;
       if (parts?.isGrowing) repeated.grow(parts.live.frames, parts.live.clip);
       closing.signal.throwIfAborted();

@@ -9,6 +9,11 @@ import { closed } from "./format/request.js";
 import { checkRate } from "./playback_rate.js";
 
 const ROUNDING = 1e-4; // of a frame: k / fps * fps may be a little less than k
+/** What `play` is rejected with. */
+export function paused() {
+  return new DOMException("it was paused before it played", "AbortError");
+}
+
 /** Seconds, as a number. @throws {TypeError} it is none */
 export function checkSeconds(value, name) {
   if (Number.isFinite(Number(value))) return Number(value);
@@ -27,6 +32,9 @@ export class Playback {
   #isClosed = false;
   #error = null; // that ended it last
   #beginning = null; // a promise that it plays
+  #giveUp = () => {}; // rejects it
+  #starting = null; // what `#start` is for
+  #plays = false; // whether `playing` was told since it last did not
   #chooser = null; // LevelChooser, where levels are chosen here
   #isChanging = false; // to the level that it wants
 
@@ -130,19 +138,24 @@ export class Playback {
     this.#error = null;
     this.#on.tell("play");
     if (this.aim === this.#video.frameCount - 1 && !this.#video.isLive) this.#request(0);
-    this.#beginning = this.#begin();
+    this.#beginning = new Promise((resolve, reject) => {
+      this.#giveUp = reject;
+      this.#begin().then(resolve, reject);
+    });
     return this.#beginning;
   }
 
   async #begin() {
     await (this.#seeking ?? this.#start());
-    if (this.paused && !this.ended) throw this.#error ?? new DOMException("it was paused before it played", "AbortError");
+    if (this.paused && !this.ended) throw this.#error ?? paused();
   }
 
   pause() {
     this.#video.pause();
     if (this.paused) return;
     this.paused = true;
+    this.#plays = false;
+    this.#giveUp(this.#error ?? paused());
     this.#on.tell("pause");
   }
 
@@ -155,6 +168,7 @@ export class Playback {
   close() {
     this.#isClosed = true;
     this.paused = true;
+    this.#giveUp(closed());
     this.#wanted = null;
   }
 
@@ -163,6 +177,7 @@ export class Playback {
     this.ended = false;
     this.#aim = this.#wanted = Math.max(0, Math.min(this.#video.frameCount - 1, k || 0));
     this.#seeking ??= this.#seekWanted();
+    this.#plays = false;
     this.#on.tell("seeking");
     return this.#seeking;
   }
@@ -189,11 +204,10 @@ export class Playback {
 
   /** With a new rate or `loop`. */
   #playAnew() {
-    if (!this.paused && !this.#seeking) this.#start(false);
+    if (!this.paused && !this.#seeking) this.#start();
   }
 
-  /** @param {boolean} [isNew] whether it did not play before */
-  async #start(isNew = true) {
+  async #start() {
     const on = {
       rate: this.#rate,
       loop: this.#loops,
@@ -201,17 +215,31 @@ export class Playback {
       failed: (error) => this.#fail(error),
       nextTick: this.#nextTick,
       ticked: (now, isThere) => this.#chooseLevel(now, isThere),
-      waits: (isWaiting) => this.#on.tell(isWaiting ? "waiting" : "playing"),
+      waits: (isWaiting) => this.#tellWaiting(isWaiting),
     };
+    const starting = (this.#starting = {});
     try {
       await this.#video.play((positions, k) => this.#show(positions, k), on);
+      if (this.#starting !== starting) return; // it was started again
       if (this.paused) this.#video.pause(); // since
-      else if (isNew) this.#on.tell("playing");
+      else this.#tellPlaying();
     } catch (error) {
       if (error.name === "AbortError") return; // paused before the browser had begun
       if (error.name === "NotAllowedError") this.pause();
       else this.#fail(error);
     }
+  }
+
+  #tellWaiting(isWaiting) {
+    if (!isWaiting) return this.#tellPlaying();
+    this.#plays = false;
+    return this.#on.tell("waiting");
+  }
+
+  #tellPlaying() {
+    if (this.#plays) return;
+    this.#plays = true;
+    this.#on.tell("playing");
   }
 
   #chooseLevel(now, isThere) {
@@ -241,6 +269,7 @@ export class Playback {
 
   #end() {
     this.paused = true;
+    this.#plays = false;
     this.ended = true;
     for (const event of ["timeupdate", "pause", "ended"]) this.#on.tell(event);
   }

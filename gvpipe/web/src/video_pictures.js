@@ -28,6 +28,7 @@ export class VideoPictures {
     const pictures = new VideoPictures(file, fps, repeated, size, samples, finish);
     try {
       await pictures.#load();
+      await pictures.seek(0);
     } catch (error) {
       pictures.close();
       throw error;
@@ -166,7 +167,18 @@ export class VideoPictures {
     }
     video.playbackRate = rate;
     this.shown = -1;
-    const next = async (_, { mediaTime }) => {
+    let latest = null; // {frame, levels} that the video has shown last, and that is not shown yet
+    let working = null; // a promise
+    const fail = (error) => this.playing === playing && on.failed(error);
+    const work = async () => {
+      while (latest && this.playing === playing) {
+        const { frame, levels } = latest;
+        latest = null;
+        this.current = this.finish ? await this.finish(frame, levels) : levels;
+        if (this.playing === playing) on.show(frame);
+      }
+    };
+    const next = (_, { mediaTime }) => {
       if (this.playing !== playing) return;
       const frame = Math.min(this.frames - 1, this.#pictureAt(mediaTime));
       if (frame > 0) this.tellsFrames ??= this.#tellsFrames();
@@ -177,14 +189,20 @@ export class VideoPictures {
       }
       if (frame !== this.shown) {
         this.shown = frame;
-        await this.#take(frame);
-        if (this.playing !== playing) return;
-        on.show(frame);
+        try {
+          latest = { frame, levels: this.#levels() };
+        } catch (error) {
+          fail(error);
+          return;
+        }
+        working ??= work()
+          .catch(fail)
+          .finally(() => (working = null));
       }
-      video.requestVideoFrameCallback(showNext);
+      video.requestVideoFrameCallback(next);
     };
-    const showNext = (...shown) => next(...shown).catch((error) => this.playing === playing && on.failed(error));
-    video.onended = () => {
+    video.onended = async () => {
+      await working;
       if (this.playing !== playing || this.tellsFrames === false) return;
       if (loop) {
         video.currentTime = 0;
@@ -194,7 +212,7 @@ export class VideoPictures {
       this.pause();
       on.ended();
     };
-    video.requestVideoFrameCallback(showNext);
+    video.requestVideoFrameCallback(next);
     await video.play();
   }
 

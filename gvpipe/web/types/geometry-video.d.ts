@@ -33,7 +33,7 @@ export interface PlayOptions {
   nextTick?: (tick: (now: number) => void) => void;
   /** Called at each step of the clock, with whether the frame that is due was there. */
   ticked?: (now: number, isThere: boolean) => void;
-  /** Called when it waits for frames of a file that is still written, and when it goes on. */
+  /** Called when it waits for frames that are on their way or not yet written, and when it goes on. */
   waits?: (isWaiting: boolean) => void;
 }
 
@@ -122,9 +122,9 @@ export class GeometryVideo {
   private constructor();
   /**
    * Rejects with a `GeometryVideoError` if it cannot be fetched, or is no geometry video that browsers play. A `level` of detail above
-   * 0 is a coarser mesh, without attributes and fields.
+   * 0 is a coarser mesh, without attributes and fields. `signal` ends loading; then it rejects with the signal's reason.
    */
-  static load(source: Source, options?: { level?: number | "coarsest" }): Promise<GeometryVideo>;
+  static load(source: Source, options?: { level?: number | "coarsest"; signal?: AbortSignal }): Promise<GeometryVideo>;
   readonly frameCount: number;
   /** Frames per second. */
   readonly fps: number;
@@ -178,6 +178,6 @@ export class GeometryVideo {
   /** Plays on from the frame last shown. `show` gets (V, 3) in an array that is used again for the next frame. */
   play(show: (positions: Float32Array, k: number) => void, options?: PlayOptions): Promise<void>;
   pause(): void;
-  /** Frees it; it is of no use afterwards. */
+  /** Frees it; it is of no use afterwards. What is under way rejects with an `AbortError`. */
   close(): void;
 }

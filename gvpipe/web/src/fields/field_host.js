@@ -2,6 +2,7 @@
 
 import { GeometryVideoError } from "../format/errors.js";
 import { closed } from "../format/request.js";
+import { workerAddress } from "../frames/worker_address.js";
 import { FieldDecoder } from "./field_decoder.js";
 
 export class FieldHost {
@@ -38,8 +39,7 @@ export class FieldHost {
 
   #open() {
     try {
-      const address = URL.createObjectURL(new Blob([WORKER_SOURCE], { type: "text/javascript" }));
-      this.#worker = new Worker(address);
+      this.#worker = new Worker(workerAddress());
       this.#worker.onmessage = ({ data }) => this.#take(data);
       this.#worker.onerror = () => this.#goOnHere(); // pages may forbid workers
       this.#worker.postMessage(this.mesh);

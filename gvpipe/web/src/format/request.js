@@ -3,7 +3,7 @@
 import { GeometryVideoError } from "./errors.js";
 
 const PATIENCE = 30; // s without a byte
-const SLOWEST = 4096; // bytes a second, where bytes are not seen as they come
+const ROOM = 1 << 28; // bytes that are set aside because an answer says that so many come
 
 /** From this status on, a server may come back. */
 export const OUTAGE = 500;
@@ -29,8 +29,8 @@ export async function request(url, signal, { what = String(url), remedy = "try a
   signal.throwIfAborted();
   signal.addEventListener("abort", follow);
 
-  async function watched(promise, seconds = PATIENCE) {
-    const timer = setTimeout(() => own.abort(new Error(`it did not come in ${seconds.toFixed(0)} s`)), 1000 * seconds);
+  async function watched(promise) {
+    const timer = setTimeout(() => own.abort(new Error(`nothing came for ${PATIENCE} s`)), 1000 * PATIENCE);
     try {
       return await promise;
     } catch (error) {
@@ -52,14 +52,19 @@ export async function request(url, signal, { what = String(url), remedy = "try a
   }
   async function bytes() {
     const length = Number(response.headers.get("Content-Length"));
-    if (length) {
-      const data = await watched(response.arrayBuffer(), PATIENCE + length / SLOWEST); // takes less memory than a reader
-      end();
-      return new Uint8Array(data);
+    const room = new Uint8Array(length <= ROOM ? length : 0);
+    const parts = []; // behind the room
+    let filled = 0;
+    for (let part = await read(); part; part = await read()) {
+      if (!parts.length && filled + part.length <= room.length) {
+        room.set(part, filled);
+        filled += part.length;
+      } else {
+        parts.push(part);
+      }
     }
-    const parts = [];
-    for (let part = await read(); part; part = await read()) parts.push(part);
-    return joined(parts);
+    const data = room.subarray(0, filled);
+    return parts.length ? joined([data, ...parts]) : data;
   }
   function close() {
     end();

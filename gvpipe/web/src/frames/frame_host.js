@@ -7,6 +7,7 @@ import { dracoBinary } from "../format/draco.js";
 import { GeometryVideoError } from "../format/errors.js";
 import { closed } from "../format/request.js";
 import { FrameDecoder } from "./frame_decoder.js";
+import { workerAddress } from "./worker_address.js";
 
 export class FrameHost {
   #payload;
@@ -29,8 +30,7 @@ export class FrameHost {
     const { header, sections, budget } = payload;
     this.#setUp = { task: "frames", header, isWhole: payload.isWhole, names: [...sections.keys()], bytes: budget.bytes, code, draco: dracoBinary };
     try {
-      const address = URL.createObjectURL(new Blob([WORKER_SOURCE], { type: "text/javascript" }));
-      this.#worker = new Worker(address);
+      this.#worker = new Worker(workerAddress());
       this.#worker.onmessage = ({ data }) => this.#take(data);
       this.#worker.onerror = () => this.#goOnHere(); // pages may forbid workers
       this.#worker.postMessage(this.#setUp);

@@ -141,7 +141,7 @@ export class McgvReader {
     const { segments } = this.#header;
     const isFirst = this.#payload.isWhole && !this.#looked.size;
     const most = isFirst ? Math.min(segments, SEGMENTS_LOOKED_AT) : 0;
-    const numbers = [s, ...Array.from({ length: most }, (_, i) => Math.floor((i * segments) / most))];
+    const numbers = [s, ...Array.from({ length: most }, (_, i) => Math.floor((i * (segments - 1)) / Math.max(1, most - 1)))];
     this.#surface.extend(wider);
     for (const number of numbers) {
       if (this.#looked.has(number)) continue;

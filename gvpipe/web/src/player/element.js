@@ -11,7 +11,7 @@
 
 import { breathe } from "../breathe.js";
 import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
-import { checkSeconds } from "../playback.js";
+import { checkSeconds, paused } from "../playback.js";
 import { FASTEST, SLOWEST, checkRate } from "../playback_rate.js";
 import { COLORMAPS } from "../three/colormaps.js";
 import { Bar, nextSpeed } from "./bar.js";
@@ -53,8 +53,12 @@ export class GeometryVideoElement extends Base {
   #loading = 0; // counts loads, so that a late one does not replace its successor
   #loaded = null; // promise, while a file is loaded
   #ending = null; // AbortController of what is loading
-  #wanted = null; // what was asked for while nothing was there: true, to play; false, to pause
+  #wanted = null; // what was asked for last, of a file that may still load: true, to play; false, to pause
+  #isReady = false; // whether a file is loaded, and said to be
+  #giveUps = new Set(); // reject what waits for that to play
   #startTime = 0; // s, set before a file is there
+  #startFrame = null; // sought before it is there
+  #sought = null; // a promise that it is shown
   #resume = false; // whether to play on when the slider is let go
   #showing = null; // counts changes of the field
   #hidden = new Set(); // names of parts
@@ -99,7 +103,9 @@ export class GeometryVideoElement extends Base {
   }
 
   #leave() {
+    this.pause();
     this.#unload();
+    this.#wanted = null;
     this.#closeStage();
   }
 
@@ -185,6 +191,7 @@ export class GeometryVideoElement extends Base {
   }
 
   set currentTime(seconds) {
+    this.#resumeAfterError();
     if (this.#mesh) this.#mesh.currentTime = seconds;
     else this.#startTime = checkSeconds(seconds, "currentTime");
   }
@@ -195,7 +202,7 @@ export class GeometryVideoElement extends Base {
   }
 
   get paused() {
-    return this.#mesh?.paused ?? this.#wanted !== true;
+    return this.#isReady ? this.#mesh.paused : this.#wanted !== true;
   }
 
   get ended() {
@@ -259,8 +266,10 @@ export class GeometryVideoElement extends Base {
   load(source = this.src) {
     this.#unload();
     this.currentSrc = typeof source === "string" || source instanceof URL ? String(source) : "";
+    let end;
+    this.#loaded = new Promise((resolve) => (end = resolve)); // there before any listener is told
     const loaded = this.#load(source);
-    this.#loaded = loaded;
+    end(loaded);
     return loaded;
   }
 
@@ -318,10 +327,11 @@ export class GeometryVideoElement extends Base {
         if (isLate()) return undefined; // by a listener
       }
     }
-    if (this.#startTime) this.#mesh.currentTime = this.#startTime;
+    this.#isReady = true;
+    if (this.#startFrame !== null) this.#sought = this.#mesh.seek(this.#startFrame);
+    else if (this.#startTime) this.#mesh.currentTime = this.#startTime;
     this.#startTime = 0;
     const plays = this.#wanted ?? (this.autoplay && !matchMedia("(prefers-reduced-motion: reduce)").matches);
-    this.#wanted = null;
     if (plays) this.#mesh.play().catch(() => {}); // told by events
     return undefined;
   }
@@ -359,8 +369,8 @@ export class GeometryVideoElement extends Base {
       });
     }
     mesh.addEventListener("waiting", () => this.video.isLive || this.#say("Waiting for the file …"));
-    for (const name of ["playing", "seeked"]) mesh.addEventListener(name, () => this.error || this.#say(""));
-    mesh.addEventListener("error", ({ error }) => this.#interrupt(error));
+    for (const name of ["playing", "pause", "seeked"]) mesh.addEventListener(name, () => this.error || this.#say(""));
+    mesh.addEventListener("error", ({ error }) => mesh === this.#mesh && this.#interrupt(error));
     this.#bar.setVideo(this.video);
     this.#bar.setNotes(mesh.notes);
     this.#panel.setVideo(this.video, mesh.partNames);
@@ -375,6 +385,7 @@ export class GeometryVideoElement extends Base {
    */
   async play() {
     if (!this.#mesh && this.error) throw this.error;
+    this.#wanted = true;
     if (!this.#mesh) await this.#awaitMesh();
     this.#resumeAfterError();
     await this.#mesh.play();
@@ -382,28 +393,40 @@ export class GeometryVideoElement extends Base {
 
   /** Until a file is loaded that is to play. */
   async #awaitMesh() {
-    this.#wanted = true;
+    let giveUp;
+    const paused = new Promise((_, reject) => this.#giveUps.add((giveUp = reject)));
+    try {
+      await Promise.race([paused, this.#awaitLoad()]);
+    } finally {
+      this.#giveUps.delete(giveUp);
+    }
+  }
+
+  async #awaitLoad() {
     if (!this.#loaded) await new Promise((resolve) => this.addEventListener("loadstart", resolve, { once: true }));
     const loaded = this.#loaded;
     await loaded;
     if (this.error) throw this.error;
     if (loaded !== this.#loaded) throw new DOMException("another file was asked for", "AbortError");
-    if (this.paused) throw new DOMException("it was paused before it played", "AbortError");
   }
 
   pause() {
-    if (!this.#mesh) this.#wanted = false;
+    this.#wanted = false;
+    for (const giveUp of this.#giveUps) giveUp(paused());
     this.#mesh?.pause();
   }
 
   /** Show a frame, and pause; while a file loads, once it is there. Of many calls in a row the last counts. */
   async seek(frame) {
-    if (!this.#mesh) {
-      this.#wanted = false;
+    if (!this.#isReady) {
+      this.pause();
+      this.#startFrame = frame;
       await this.#loaded;
+      await this.#sought;
+      return;
     }
     this.#resumeAfterError();
-    await this.#mesh?.seek(frame);
+    await this.#mesh.seek(frame);
   }
 
   #resumeAfterError() {
@@ -515,7 +538,8 @@ export class GeometryVideoElement extends Base {
   #unload() {
     const wasLoaded = this.video !== null;
     this.#loading++;
-    if (this.#loaded) this.#wanted = null; // it was about the file before
+    if (this.#loaded) this.#wanted = this.#startFrame = null; // they were about the file before
+    this.#isReady = false;
     this.#loaded = null;
     this.#ending?.abort(new DOMException("another file was asked for", "AbortError"));
     this.#ending = null;

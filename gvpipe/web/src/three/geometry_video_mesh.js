@@ -176,7 +176,7 @@ export class GeometryVideoMesh extends Mesh {
 
   set lod(lod) {
     this.#playback.choosesLevel = lod === "auto";
-    if (lod !== "auto") this.setLevel(lod).catch((error) => this.dispatchEvent({ type: "error", error }));
+    if (lod !== "auto") this.setLevel(lod).catch((error) => this.#tellError(error));
   }
 
   /** Show another level of detail: a promise that it is shown. What plays goes on. @param {number|"coarsest"} level */
@@ -236,6 +236,11 @@ export class GeometryVideoMesh extends Mesh {
     this.video.close();
   }
 
+  /** Of what was asked for by the way. */
+  #tellError(error) {
+    if (!this.#isDisposed) this.dispatchEvent({ type: "error", error });
+  }
+
   #show(positions, k) {
     if (this.video.level === this.#level) {
       this.#place(positions);
@@ -278,7 +283,7 @@ export class GeometryVideoMesh extends Mesh {
     this.dispatchEvent({ type: "levelchange", level: video.level });
     const { field, ...options } = this.#wanted;
     if (field && video.fields.has(field.name)) {
-      this.showField(field.name, options).catch((error) => this.dispatchEvent({ type: "error", error }));
+      this.showField(field.name, options).catch((error) => this.#tellError(error));
     }
     if (!video.images.length || this.#textures.images === video.images) return;
     this.#opening = openTextures(video, this.#view.anisotropy).then((textures) => {
