@@ -1,7 +1,8 @@
 """How fast the web player is: ``python tools/measure_player.py FILE.mp4 [--size 512] [--seconds 5]``.
 
 Exports the file, opens the page in headless Chromium (no GPU: WebGL on the processor) and prints the numbers of docs/player.md:
-unique frames per second while playing, the longest time between two, milliseconds for a frame at random, and for loading.
+unique frames per second while playing, the longest time between two, milliseconds for a frame at random, and for loading; and
+how often and how long the page was busy for more than 50 ms at once, from its start to the end of playing.
 """
 
 from __future__ import annotations
@@ -19,9 +20,14 @@ from browsers import browser as running
 
 MEASURE = """
 const [size, seconds, done] = arguments;
-const element = document.querySelector("geometry-video");
-const canvas = element.shadowRoot.querySelector("canvas");
 (async () => {
+  await customElements.whenDefined("geometry-video");
+  const element = document.querySelector("geometry-video");
+  const canvas = element.shadowRoot.querySelector("canvas");
+  const busy = [];
+  const keep = ({ startTime, duration }) => busy.push([startTime, duration]);
+  const observer = new PerformanceObserver((list) => list.getEntries().forEach(keep));
+  observer.observe({ type: "longtask", buffered: true });
   if (!element.video) await new Promise((resolve) => element.addEventListener("ready", resolve, { once: true }));
   const loaded = performance.now();
   element.style.cssText = `width: ${size}px; height: ${size}px`;
@@ -32,6 +38,7 @@ const canvas = element.shadowRoot.querySelector("canvas");
   element.addEventListener("frame", record);
   await new Promise((resolve) => setTimeout(resolve, 1000 * seconds));
   element.removeEventListener("frame", record);
+  observer.disconnect();
   const frames = element.video.frameCount;
   let milliseconds = 0;
   for (let i = 0; i < 40; i++) {
@@ -40,7 +47,7 @@ const canvas = element.shadowRoot.querySelector("canvas");
     milliseconds += performance.now() - start;
   }
   const gaps = times.slice(1).map((time, i) => time - times[i]);
-  done([canvas.clientWidth, canvas.clientHeight, times.length / seconds, Math.max(...gaps), milliseconds / 40, loaded]);
+  done([canvas.clientWidth, canvas.clientHeight, times.length / seconds, Math.max(...gaps), milliseconds / 40, loaded, busy]);
 })();
 """
 
@@ -57,13 +64,14 @@ def main() -> None:
         report = gvpipe.export_html(options.file, folder / "page.html")
         with running("chromium", folder / "profile", (options.size + 100, options.size + 300)) as browser:
             browser.get((folder / "page.html").as_uri())
-            width, height, rate, gap, seek, load = browser.execute_async_script(MEASURE, options.size, options.seconds)
+            width, height, rate, gap, seek, load, busy = browser.execute_async_script(MEASURE, options.size, options.seconds)
     finally:
         shutil.rmtree(folder)
     size = options.file.stat().st_size
-    print(f"page: {report.bytes} bytes; 1.4 x file + 1.5 MB = {1.4 * size + 1.5e6:.0f}")
+    print(f"page: {report.bytes} bytes; 1.35 x file + 0.7 MB = {1.35 * size + 0.7e6:.0f}")
     print(f"playing at {width}x{height}: {rate:.1f} unique frames/s, longest gap {gap:.0f} ms")
     print(f"random frame: {seek:.1f} ms; page ready after {load:.0f} ms")
+    print("busy for more than 50 ms:", ", ".join(f"{length:.0f} ms at {at:.0f}" for at, length in busy) or "never")
 
 
 if __name__ == "__main__":
