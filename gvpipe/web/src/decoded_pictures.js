@@ -161,6 +161,7 @@ export class DecodedPictures {
   async play({ show, ended, failed, nextTick = nextRepaint, ticked, waits }, rate, loop) {
     const playing = (this.playing = {});
     let position = Math.max(0, this.shown); // frames since the start
+    let since = Math.floor(position); // the frame shown last, or first
     let before = null;
     let missing = 0; // ms without a frame that may be shown
     let isWaiting = false;
@@ -190,11 +191,12 @@ export class DecodedPictures {
         return;
       }
       const isThere = Boolean(finished?.contents);
-      const best = isThere ? { frame, contents: finished.contents } : this.#latest(Math.floor(position), frame);
+      const best = isThere ? { frame, contents: finished.contents } : this.#latest(since, frame);
       ticked?.(now, isThere);
       missing = best ? 0 : missing + step;
       if ((isAtEnd || missing > STALLED) !== isWaiting) waits?.((isWaiting = !isWaiting));
       if (best && best.frame !== this.shown) {
+        since = best.frame;
         [this.shown, this.current] = [best.frame, best.contents];
         show(best.frame);
       }
@@ -251,7 +253,10 @@ export class DecodedPictures {
       this.finishing++;
       finished.done.then(() => this.finishing--);
     }
-    if (this.finished.size === FINISHED) this.finished.delete(this.finished.keys().next().value);
+    if (this.finished.size === FINISHED) {
+      const done = [...this.finished].find(([, { contents, error }]) => contents || error);
+      this.finished.delete(done ? done[0] : this.finished.keys().next().value);
+    }
     this.finished.set(picture, finished);
     return finished;
   }
@@ -264,10 +269,11 @@ export class DecodedPictures {
     return levels && (isKnown || this.finishing < FINISHING) ? this.#finished(frame, levels) : null;
   }
 
-  /** The latest finished frame between the one that was due before and the one that is due now, or null. */
-  #latest(before, due) {
-    const ahead = (frame) => (frame - before + this.frames) % this.frames;
-    const found = [...this.finished.values()].filter(({ contents, frame }) => contents && ahead(frame) <= ahead(due) && frame !== this.shown);
+  /** The latest finished frame between the one shown last and the one that is due now, or null. */
+  #latest(since, due) {
+    const ahead = (frame) => (frame - since + this.frames) % this.frames;
+    const isDue = ({ contents, frame }) => contents && ahead(frame) <= ahead(due) && frame !== this.shown;
+    const found = [...this.finished.values()].filter(isDue);
     return found.sort((a, b) => ahead(a.frame) - ahead(b.frame)).at(-1) ?? null;
   }
 
