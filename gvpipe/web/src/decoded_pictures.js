@@ -210,6 +210,8 @@ export class DecodedPictures {
         this.#decodeAhead(this.groupOf[picture], AHEAD * this.fps * rate);
         const soon = Math.floor(next + (step * rate * this.fps) / 1000);
         for (const k of [soon, soon + 1]) this.#finishSoon(loop ? k % this.frames : Math.min(k, this.frames - 1));
+      } else if (best) {
+        position = best.frame; // the clock is never before what is shown
       }
       nextTick(tick);
     };
