@@ -128,7 +128,7 @@ def _read_all(video: Player) -> None:
         check_faces(coarse.faces, count)
         check_positions(coarse.read(0, 1), (1, count, 3))
     check_asset(video.sequence())
-    video.list_asset()
+    video.outline()
     for note in video.notes:
         check_text(note)
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from gvpipe.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from gvpipe.api import Info, Report, Restreamed, decode, encode, info, open, render, restream
+    from gvpipe.api import Report, Restreamed, decode, encode, open, render, restream
     from gvpipe.asset.attribute import Attribute
     from gvpipe.asset.field import Field
     from gvpipe.asset.material import Image, Material, Texture
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from gvpipe.rasterizer.camera import Camera
     from gvpipe.rasterizer.renderer import Renderer
     from gvpipe.sequence import MeshSequence
+    from gvpipe.video_info import Info, info
     from gvpipe.web import ExportReport, export_html
 
 __all__ = [
@@ -69,7 +70,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "gvpipe.api": ("Info", "Report", "Restreamed", "decode", "encode", "info", "open", "render", "restream"),
+    "gvpipe.api": ("Report", "Restreamed", "decode", "encode", "open", "render", "restream"),
     "gvpipe.asset.attribute": ("Attribute",),
     "gvpipe.asset.field": ("Field",),
     "gvpipe.asset.material": ("Image", "Material", "Texture"),
@@ -84,6 +85,7 @@ _HOMES = {
     "gvpipe.rasterizer.camera": ("Camera",),
     "gvpipe.rasterizer.renderer": ("Renderer",),
     "gvpipe.sequence": ("MeshSequence",),
+    "gvpipe.video_info": ("Info", "info"),
     "gvpipe.web": ("ExportReport", "export_html"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

@@ -89,56 +89,6 @@ class Report:
 
 
 @dataclass(frozen=True)
-class Info:
-    """What a geometry video is.
-
-    Args:
-        bounding_box: frame 0's corners, model units, relative to ``origin``.
-        bpvf: bits per vertex and frame of the whole file.
-        sections: bytes of every part of the file, which add up to ``bytes``.
-        levels: vertex counts of the levels of detail, the mesh itself first.
-        settings: the bitstream's header.
-        layout: ``plain``, ``stream`` (`restream`), or ``live``: still written, or left unfinished (`gvpipe.live`).
-        origin: to add to positions, model units.
-        parts: name, ranges of vertices and triangles, name of the material, parent.
-        attributes: name, kind, domain, components, type, unit, bound (degrees for normals) and bytes of each.
-        fields: the same, with range.
-        polygons: how many faces have each number of corners.
-        materials: names.
-        images: name, media type, width, height and bytes.
-        metadata: up axis, unit, start time, source, texts.
-        notes: what a user should know, a line each.
-    """
-
-    codec: str
-    version: int
-    vertices: int
-    triangles: int
-    frames: int
-    fps: float
-    bounding_box: dict[str, list[float]]
-    bytes: int
-    bpvf: float
-    sections: dict[str, int]
-    levels: list[int]
-    settings: dict[str, Any]
-    layout: str
-    origin: list[float]
-    parts: list[dict[str, Any]]
-    attributes: list[dict[str, Any]]
-    fields: list[dict[str, Any]]
-    polygons: dict[str, int]
-    materials: list[str]
-    images: list[dict[str, Any]]
-    metadata: dict[str, Any]
-    notes: list[str]
-
-    def to_json(self) -> dict[str, Any]:
-        """The information as JSON values."""
-        return dataclasses.asdict(self)
-
-
-@dataclass(frozen=True)
 class Restreamed:
     """What `restream` did.
 
@@ -318,8 +268,9 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
     bitstream = read_file(check_path(source, "the geometry video"), unlimited)
     chosen = layout or (STREAM if bitstream.layout in (PLAIN, LIVE) else PLAIN)
     if bitstream.layout in (BARE, LIVE):  # which have no poster, or none that is read
-        video = bitstream.video or poster_of(Player(source, unlimited=unlimited).sequence())
-        bitstream = dataclasses.replace(bitstream, video=video, is_bare=False)
+        player = Player(source, unlimited=unlimited)
+        video = bitstream.video or poster_of(player.sequence())
+        bitstream = dataclasses.replace(bitstream, video=video, is_bare=False, outline=player.outline())
     with in_file(os.fspath(source)):
         size = write_file(bitstream, path, parts=segment_parts(bitstream) if chosen == STREAM else None)
     return Restreamed(chosen, bitstream.n_bytes, size)
@@ -420,36 +371,6 @@ def render(
     else:
         sequence = read(source, fps, clip, mesh, frames, unlimited=unlimited)
     return list(dict.fromkeys([*sequence.notes, *write_pictures(sequence, target, options, reference, progress)]))
-
-
-def info(path: StrPath, *, unlimited: bool = False) -> Info:
-    """Return what a geometry video is and where its bytes go; ``unlimited`` as for `Player`.
-
-    Raises:
-        InputError: no such file.
-        FormatError: not a geometry video, or a damaged one.
-    """
-    player = Player(path, unlimited=unlimited)
-    bitstream = player.bitstream
-    first = player[0]
-    size = bitstream.n_bytes
-    return Info(
-        codec=bitstream.codec,
-        version=bitstream.version,
-        layout=bitstream.layout,
-        vertices=bitstream.n_vertices,
-        triangles=bitstream.n_triangles,
-        frames=bitstream.n_frames,
-        fps=bitstream.fps,
-        bounding_box={"min": first.min(axis=0).tolist(), "max": first.max(axis=0).tolist()},
-        bytes=size,
-        bpvf=8 * size / (bitstream.n_vertices * bitstream.n_frames),
-        sections=bytes_by_part(bitstream, size),
-        levels=player.levels,
-        settings=dict(bitstream.header),
-        origin=list(bitstream.origin),
-        **player.list_asset(),
-    )
 
 
 def checked_keywords(codec: str | Codec | Sequence[Codec] | None = None, **keywords: Any) -> dict[str, Any]:

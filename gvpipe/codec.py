@@ -15,6 +15,7 @@ from gvpipe.arguments import did_you_mean
 from gvpipe.arrays import Float32, Int32, Integers
 from gvpipe.blas import one_blas_thread
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.outline import Outline
 from gvpipe.errors import SettingError
 from gvpipe.sequence import MeshSequence
 
@@ -233,8 +234,16 @@ class BaseCodec(Settings):
         sections: Mapping[str, bytes],
         video: bytes = b"",
         version: int | None = None,
+        levels: tuple[int, ...] = (),
     ) -> Bitstream:
-        """The bitstream of a sequence; ``version`` is the oldest that reads it, None for the codec's own."""
+        """The bitstream of a sequence.
+
+        Args:
+            sequence: that is coded.
+            header, sections, video: as of `Bitstream`.
+            version: the oldest that reads it, None for the codec's own.
+            levels: vertex counts of the levels of detail from level 1 on.
+        """
         codec = cast("type[Codec]", type(self))
         return Bitstream(
             codec=codec.id,
@@ -245,6 +254,7 @@ class BaseCodec(Settings):
             fps=float(sequence.fps),
             header=dict(header),
             sections=dict(sections),
+            outline=Outline.around(sequence.read(0, 1)[0], levels),
             video=video,
         )
 

@@ -15,24 +15,23 @@ from gvpipe.arguments import check_path
 from gvpipe.arrays import Float32, Float64, Int32
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
+from gvpipe.asset.listing import count_polygons
 from gvpipe.asset.material import Image, Material
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
-from gvpipe.asset_coding.directory import Directory
-from gvpipe.asset_coding.listing import list_asset
+from gvpipe.asset_coding.directory import Directory, file_notes
 from gvpipe.asset_coding.reader import AssetReader
 from gvpipe.coarse_asset import add_asset
 from gvpipe.codec import GroupReader, LevelReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_bytes, read_file
+from gvpipe.container.outline import Outline
 from gvpipe.container.sources import is_remote
-from gvpipe.errors import InputError, in_file, printable
+from gvpipe.errors import InputError, in_file
 from gvpipe.frame_cache import FrameCache
 from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence, describe, numbers_of
 from gvpipe.shared_reader import SharedReader
-
-UNFINISHED = "the file is not finished: open it again for frames that come later, or make a file of these by gvpipe restream"
 
 
 class Player:
@@ -121,16 +120,15 @@ class Player:
         """Section ``asset`` of the file."""
         return self._asset.directory
 
-    def list_asset(self) -> dict[str, Any]:
-        """What it holds beside positions, as JSON values (`gvpipe.Info`)."""
-        with in_file(self.path):
-            return {**list_asset(self._asset, self.bitstream), "notes": list(self.notes)}
+    def outline(self) -> Outline:
+        """What `gvpipe.info` tells of the mesh, from what is decoded."""
+        triangles = tuple(part.triangles[1] - part.triangles[0] for part in self.parts)
+        return Outline(Outline.around(self[0]).box, tuple(self.levels[1:]), triangles, count_polygons(self.polygons))
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What a user should know of the file, a line each."""
-        unfinished = (UNFINISHED,) if self.bitstream.is_unfinished else ()
-        return (*unfinished, *map(printable, self._asset.notes))
+        return file_notes(self.directory, self.bitstream)
 
     @property
     def fps(self) -> float:

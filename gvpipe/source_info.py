@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gvpipe.arguments import StrPath
-from gvpipe.asset.listing import Things, list_things
+from gvpipe.asset.listing import Things, count_polygons, list_things
 from gvpipe.io import read
 from gvpipe.io.clips import list_clips
 from gvpipe.sequence import MeshSequence
@@ -73,7 +73,8 @@ def source_info(
     sequence = read(name, fps, clip, mesh, frames, unlimited)
     first = sequence[0]
     clips = list_clips(name)
-    things = Things(sequence.parts, sequence.polygons, sequence.materials, sequence.images, sequence.metadata)
+    polygons = count_polygons(sequence.polygons)
+    things = Things(sequence.parts, polygons, sequence.materials, sequence.images, sequence.metadata)
     return SourceInfo(
         vertices=sequence.n_vertices,
         triangles=len(sequence.faces),

@@ -88,6 +88,7 @@ def header_of(bitstream: Bitstream) -> dict[str, Any]:
         "triangles": bitstream.n_triangles,
         "fps": bitstream.fps,
         "origin": list(bitstream.origin),
+        **({"outline": bitstream.outline.to_json()} if bitstream.outline else {}),
         "container": {"id": "x", "video_crc32": 1},
         "settings": dict(bitstream.header),
     }

@@ -18,13 +18,13 @@ from fuzz.live import join_live, split_live
 from fuzz.videos import FILE
 from gvcodecs.pdct import StreamReader
 from gvcodecs.pdct.encoder import ClipCoder
+from gvpipe.asset_coding.directory import UNFINISHED
 from gvpipe.cli.commands import cli
 from gvpipe.container import mp4
 from gvpipe.container.bitstream import HEADER
 from gvpipe.container.live_writer import LiveWriter
 from gvpipe.container.stream_layout import INDEX_UUID, ROOM_UUID
 from gvpipe.errors import CorruptFile, FormatError, InputError, OutputError, SettingError, TruncatedFile
-from gvpipe.player import UNFINISHED
 from gvpipe.registry import open_reader
 
 CLIP, N_FRAMES = 4, 11

@@ -246,7 +246,7 @@ def test_unexpected_errors(run: Run, video: Path, monkeypatch: pytest.MonkeyPatc
     def fail(path: str, **_: object) -> None:
         raise ZeroDivisionError("of\nall")
 
-    monkeypatch.setattr("gvpipe.api.info", fail)
+    monkeypatch.setattr("gvpipe.video_info.info", fail)
     ended = run("info", video)
     assert ended.status == 1 and ended.err == "Error: unexpected ZeroDivisionError: of all; report what --verbose prints\n"
     told = run("info", video, "--verbose")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,19 +15,29 @@ from gvpipe.asset.part import Part
 
 
 class Things(NamedTuple):
-    """What is listed; all as in `gvpipe.MeshSequence`."""
+    """What is listed, all but ``polygons`` as in `gvpipe.MeshSequence`.
+
+    Args:
+        polygons: how many faces have each number of corners (`count_polygons`).
+    """
 
     parts: Sequence[Part]
-    polygons: Int32 | None
+    polygons: Mapping[int, int]
     materials: Sequence[Material]
     images: Sequence[Image]
     metadata: Metadata
 
 
+def count_polygons(polygons: Int32 | None) -> dict[int, int]:
+    """How many of the polygons ``(P,)`` have each number of corners, least first; none if all are triangles."""
+    if polygons is None:
+        return {}
+    corners, counts = np.unique(polygons, return_counts=True)
+    return dict(zip(corners.tolist(), counts.tolist(), strict=True))
+
+
 def list_things(things: Things) -> dict[str, Any]:
     """Keys ``parts``, ``polygons``, ``materials``, ``images`` and ``metadata`` of `gvpipe.Info`."""
-    polygons = things.polygons
-    counts = {} if polygons is None else dict(zip(*np.unique(polygons, return_counts=True), strict=True))
     return {
         "parts": [
             {
@@ -39,7 +49,7 @@ def list_things(things: Things) -> dict[str, Any]:
             }
             for part in things.parts
         ],
-        "polygons": {str(corners): int(count) for corners, count in counts.items()},
+        "polygons": {str(corners): count for corners, count in things.polygons.items()},
         "materials": [material.name for material in things.materials],
         "images": [
             {"name": image.name, "media_type": image.media_type, "size": _size(image.data), "bytes": len(image.data)}

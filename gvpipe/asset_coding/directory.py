@@ -20,19 +20,21 @@ import numpy as np
 from gvpipe.arrays import Int64
 from gvpipe.asset.attribute import DOMAINS, KINDS, MAX_COMPONENTS
 from gvpipe.asset.field import DOMAINS as FIELD_DOMAINS
-from gvpipe.asset.material import Material, check_materials
+from gvpipe.asset.material import Image, Material, check_materials
 from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part
 from gvpipe.asset.plain import from_plain, to_plain
 from gvpipe.budget import UNLIMITED, Budget
+from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.json_object import JsonObject, pack_json, unpack_json
-from gvpipe.errors import InputError
+from gvpipe.errors import InputError, corrupt_section, printable
 
 SECTION, ARRANGEMENT = "asset", "arrangement"
 CODED, SURFACE, OCTAHEDRAL = 1, 2, 3  # codings of fields; attributes have the first
 VERSION = 1
 MOST = 1 << 16  # parts, materials, images, attributes or fields
 MAX_BYTES = 1 << 26  # of the JSON, inflated
+UNFINISHED = "the file is not finished: open it again for frames that come later, or make a file of these by gvpipe restream"
 HUGE = 3.5e38  # above float32's largest number
 DTYPES = ("float32", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64")
 
@@ -87,6 +89,15 @@ class Directory:
     metadata: Metadata = NO_METADATA
     version: int = field(default=VERSION, compare=False)
 
+    @property
+    def skipped(self) -> tuple[str, ...]:
+        """What of it this version of gvpipe does not read."""
+        if self.version > VERSION:
+            return ("all of it",)
+        attributes = [each.name for each in self.attributes if each.coding == CODED]
+        known = {*attributes, *(each.name for each in self.fields if is_known(each))}
+        return tuple(each.name for each in (*self.attributes, *self.fields) if each.name not in known)
+
 
 def pack_directory(directory: Directory) -> bytes:
     """Return the section."""
@@ -128,6 +139,36 @@ def unpack_directory(data: bytes, n_vertices: int, budget: Budget = UNLIMITED) -
         images=images,
         metadata=_from_plain(Metadata, values.object("metadata")),
     )
+
+
+def read_directory(bitstream: Bitstream) -> Directory:
+    """The directory of a bitstream, empty if it has positions alone; raises `CorruptFile`, `OverBudget`."""
+    if SECTION not in bitstream.sections:
+        return Directory()
+    return unpack_directory(bitstream.section(SECTION), bitstream.n_vertices, bitstream.budget)
+
+
+def read_images(directory: Directory, bitstream: Bitstream) -> tuple[Image, ...]:
+    """The images that a directory lists; raises `CorruptFile`."""
+    try:
+        return tuple(Image(each.name, each.media_type, bitstream.section(each.section)) for each in directory.images)
+    except InputError as exc:
+        raise corrupt_section(SECTION, str(exc)) from exc
+
+
+def is_known(listed: Listed) -> bool:
+    """Whether this version reads a field's coding."""
+    if listed.coding in (SURFACE, OCTAHEDRAL):
+        return listed.kind == "normal" and listed.components == 3 and listed.domain in ("vertex", "triangle")
+    return listed.coding == CODED
+
+
+def file_notes(directory: Directory, bitstream: Bitstream) -> tuple[str, ...]:
+    """What a user should know of a file, a line each."""
+    unfinished = (UNFINISHED,) if bitstream.is_unfinished else ()
+    skipped = directory.skipped
+    newer = f"a newer gvpipe wrote beside the positions what this one skips: {', '.join(skipped)}"
+    return (*unfinished, *((printable(newer),) if skipped else ()))
 
 
 def vertex_starts(parts: tuple[Part, ...], n_vertices: int) -> Int64 | None:

@@ -16,6 +16,7 @@ import numpy as np
 from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
+from gvpipe.asset.listing import count_polygons
 from gvpipe.asset.material import Image, image_size
 from gvpipe.asset.metadata import NO_METADATA
 from gvpipe.asset.part import Part
@@ -42,6 +43,7 @@ from gvpipe.attributes.surface import Surface
 from gvpipe.attributes.triangle_order import Arrangement, SourceCorners, encode_arrangement
 from gvpipe.codec import Codec, Encoded, FrameReader
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.outline import Outline
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.octahedral import angular_bound, to_octahedral
@@ -165,7 +167,11 @@ class AssetCoder:
             images=tuple(images),
             metadata=self._sequence.metadata,
         )
-        return dataclasses.replace(encoded.bitstream, sections={**sections, SECTION: pack_directory(directory)})
+        return dataclasses.replace(
+            encoded.bitstream,
+            sections={**sections, SECTION: pack_directory(directory)},
+            outline=_with_counts(encoded.bitstream.outline, arrangement, len(parts)),
+        )
 
     def _arrange(self, decoded: Int32, place: Int32, parts: tuple[Part, ...]) -> tuple[bytes, Arrangement, SourceCorners]:
         sequence = self._sequence
@@ -262,6 +268,14 @@ def _listed(
     coding: int = CODED,
 ) -> Listed:
     return Listed(name, given.kind, given.domain, components, given.dtype.name, given.unit, bound, coding, section, span)
+
+
+def _with_counts(outline: Outline | None, arrangement: Arrangement, n_parts: int) -> Outline | None:
+    """The outline with the triangles of each part, and the polygons."""
+    if outline is None:
+        return None
+    triangles = tuple(np.diff(arrangement.part_starts).tolist()) if n_parts else ()
+    return dataclasses.replace(outline, part_triangles=triangles, polygons=count_polygons(arrangement.polygons))
 
 
 def _placed(part: Part, faces: Int32, place: Int32) -> Part:

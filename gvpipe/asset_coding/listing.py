@@ -2,28 +2,47 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 from collections.abc import Iterable
 from typing import Any
 
 from gvpipe.asset.listing import Things, list_things
-from gvpipe.asset_coding.directory import Listed
-from gvpipe.asset_coding.reader import AssetReader
+from gvpipe.asset.part import Part
+from gvpipe.asset_coding.directory import Directory, Listed, file_notes, read_images
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.outline import Outline
+from gvpipe.errors import corrupt
 
 
-def list_asset(asset: AssetReader, bitstream: Bitstream) -> dict[str, Any]:
-    """Parts, attributes, fields, polygons, materials, images, metadata and notes, each with its bytes where it has some."""
-    directory = asset.directory
-    things = list_things(Things(asset.parts, asset.polygons, asset.materials, asset.images, asset.metadata))
+def list_asset(directory: Directory, outline: Outline, bitstream: Bitstream) -> dict[str, Any]:
+    """Parts, attributes, fields, polygons, materials, images, metadata and notes, each with its bytes where it has some.
+
+    Args:
+        directory, outline: of the bitstream.
+        bitstream: whose images are read.
+
+    Raises:
+        CorruptFile: the outline counts other parts than the directory has, or an image is none.
+    """
+    parts, images = _parts(directory.parts, outline.part_triangles), read_images(directory, bitstream)
     return {
-        **things,
+        **list_things(Things(parts, outline.polygons, directory.materials, images, directory.metadata)),
         "attributes": _listed(directory.attributes, bitstream),
         "fields": [
             {**values, "range": listed.range and list(listed.range)}
             for values, listed in zip(_listed(directory.fields, bitstream), directory.fields, strict=True)
         ],
-        "notes": list(asset.notes),
+        "notes": list(file_notes(directory, bitstream)),
     }
+
+
+def _parts(parts: tuple[Part, ...], counts: tuple[int, ...]) -> list[Part]:
+    """The parts with their triangles, which follow each other."""
+    if len(parts) != len(counts):
+        raise corrupt(f"its outline counts the triangles of {len(counts)} parts, and it has {len(parts)}")
+    bounds = itertools.accumulate(counts, initial=0)
+    return [dataclasses.replace(part, triangles=span) for part, span in zip(parts, itertools.pairwise(bounds), strict=True)]
 
 
 def _listed(things: Iterable[Listed], bitstream: Bitstream) -> list[dict[str, Any]]:

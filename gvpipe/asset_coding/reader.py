@@ -26,9 +26,10 @@ from gvpipe.asset_coding.directory import (
     SECTION,
     SURFACE,
     VERSION,
-    Directory,
     Listed,
-    unpack_directory,
+    is_known,
+    read_directory,
+    read_images,
     vertex_starts,
 )
 from gvpipe.budget import Budget
@@ -67,16 +68,10 @@ class AssetReader:
         self._read = read or reader.read
         self._lock = ForkLock()
         self._meshes: dict[str, FieldMesh] = {}
-        self.directory = Directory()
-        if SECTION in bitstream.sections:
-            self.directory = unpack_directory(bitstream.section(SECTION), bitstream.n_vertices, bitstream.budget)
-        attributes = {each.name: each for each in self.directory.attributes if each.coding == CODED}
-        fields = {each.name: each for each in self.directory.fields if _is_known(each)}
-        known = {*attributes, *fields}
-        newer = [each.name for each in (*self.directory.attributes, *self.directory.fields) if each.name not in known]
-        self.skipped = ("all of it",) if self.directory.version > VERSION else tuple(newer)
-        self._attributes, self._made_attributes = attributes, dict[str, Attribute]()
-        self._fields, self._made_fields = fields, dict[str, Field]()
+        self.directory = read_directory(bitstream)
+        self._attributes = {each.name: each for each in self.directory.attributes if each.coding == CODED}
+        self._fields = {each.name: each for each in self.directory.fields if is_known(each)}
+        self._made_attributes, self._made_fields = dict[str, Attribute](), dict[str, Field]()
 
     @property
     def attributes(self) -> Mapping[str, Attribute]:
@@ -93,13 +88,6 @@ class AssetReader:
         with self._lock:
             self._made_attributes.clear()
             self._made_fields.clear()
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What this version of gvpipe skips, a line."""
-        if not self.skipped:
-            return ()
-        return (f"a newer gvpipe wrote beside the positions what this one skips: {', '.join(self.skipped)}",)
 
     @cached_property
     def _arrangement(self) -> Arrangement:
@@ -149,12 +137,7 @@ class AssetReader:
     @cached_property
     def images(self) -> tuple[Image, ...]:
         """What the materials' textures show."""
-        try:
-            return tuple(
-                Image(each.name, each.media_type, self._bitstream.section(each.section)) for each in self.directory.images
-            )
-        except InputError as exc:
-            raise corrupt_section(SECTION, str(exc)) from exc
+        return read_images(self.directory, self._bitstream)
 
     @property
     def metadata(self) -> Metadata:
@@ -265,13 +248,6 @@ class _FieldValues:
 def _keep_rows(budget: Budget, domain: str, n_vertices: int, n_triangles: int) -> None:
     """Check that a file may take the hierarchy of a field's rows; triangles' rows have about twice as many of their own."""
     keep_hierarchy(budget, *((n_vertices, n_triangles) if domain == "vertex" else (n_triangles, 2 * n_triangles)))
-
-
-def _is_known(listed: Listed) -> bool:
-    """Whether this version reads a field's coding."""
-    if listed.coding in (SURFACE, OCTAHEDRAL):
-        return listed.kind == "normal" and listed.components == 3 and listed.domain in ("vertex", "triangle")
-    return listed.coding == CODED
 
 
 def _of_two(coordinates: Array, listed: Listed) -> Array:

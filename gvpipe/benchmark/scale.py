@@ -15,13 +15,14 @@ from itertools import pairwise
 from pathlib import Path
 
 import gvpipe
-from gvpipe import api, files
+from gvpipe import files
 from gvpipe.benchmark.own_process import measure_command
 from gvpipe.benchmark.scale_report import ScalePoint, ScaleReport
 from gvpipe.benchmark.sweep import describe_machine, settings_of
 from gvpipe.benchmark.torus import make_torus
 from gvpipe.codec import Progress
 from gvpipe.container.segments import count_longest
+from gvpipe.video_info import info
 
 CODECS = ("mcgv", "mcgv:prediction=affine", "pca", "laplacian", "pdct")
 VERTICES = (1_000, 10_000, 100_000, 1_000_000)  # each in FEW_FRAMES
@@ -94,7 +95,7 @@ def _measure(codec: str, size: Size, source: Path, limit: float | None) -> Scale
     encoded = measure_command(["encode", str(source), str(video), "--codec", name, *settings, "--quiet"], limit)
     if encoded is None:
         return point
-    header = api.info(video).settings
+    header = info(video).settings
     point = replace(
         point,
         bytes=video.stat().st_size,

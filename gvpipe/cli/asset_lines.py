@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gvpipe.api import Info
     from gvpipe.source_info import SourceInfo
+    from gvpipe.video_info import Info
 
 MOST = 12  # names in a line
 

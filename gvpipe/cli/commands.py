@@ -219,8 +219,8 @@ def decode(
     .glb, .vtp), or - for an .npz on standard output. FILE - is a geometry video on standard input.
     """
     from gvpipe import api, files, notes
+    from gvpipe.asset_coding.directory import UNFINISHED
     from gvpipe.cli.choices import chosen, chosen_frames
-    from gvpipe.player import UNFINISHED
 
     out = out.carrying(target)
     first, last = chosen_frames(start, stop, frames)
@@ -314,12 +314,13 @@ def info(
 
     Of shards (shard.tar, 'shard-*.tar') it sums up the sequences, and checks each.
     """
-    from gvpipe import api
+    from gvpipe import video_info
     from gvpipe.cli.asset_lines import asset_lines, shape_lines
     from gvpipe.cli.choices import parse_frames
-    from gvpipe.cli.shards import show_shards
 
     if source.lower().endswith(".tar"):
+        from gvpipe.cli.shards import show_shards
+
         if any(value is not None for value in (clip, mesh, frames, fps)):
             raise click.UsageError("--clip, --mesh, --frames and --fps are for sources; shards are summed up whole")
         show_shards(source, unlimited, out)
@@ -331,7 +332,7 @@ def info(
             return
         if any(each is not None for each in (clip, mesh, frames, fps)):
             raise click.UsageError("--clip, --mesh, --frames and --fps are for sources; a geometry video is shown whole")
-        found = api.info(path, unlimited=unlimited)
+        found = video_info.info(path, unlimited=unlimited)
     out.json(found.to_json())
     layout = "" if found.layout == "plain" else f", {found.layout} layout"
     out.text(f"{shown(source, STDIN)}: {found.codec} version {found.version}{layout}")

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.json_object import JsonObject, unpack_json
+from gvpipe.container.outline import KEY, Outline
 from gvpipe.errors import CorruptFile, NewerVersion, TruncatedFile, corrupt, corrupt_section
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ class Bitstream:
         header: what else the codec's reader must know, as JSON values.
         sections: the codec's binary data by name.
         origin: what to add to positions, model units (`gvpipe.origin`); the same for every codec.
+        outline: what `gvpipe.info` tells of the mesh; None: not known before it is decoded.
         video: an MP4 file whose one track holds the codec's images; empty for codecs that have none, whose files show a
             poster (`gvpipe.rendering.poster`) instead.
         fragments: in place of ``video``, of a file in the stream layout (`gvpipe.container.stream_layout`).
@@ -86,6 +88,7 @@ class Bitstream:
     sections: Mapping[str, bytes] = field(default_factory=dict)
     video: bytes = b""
     origin: tuple[float, float, float] = NO_ORIGIN
+    outline: Outline | None = field(default=None, compare=False)
     fragments: Fragments | None = field(default=None, compare=False, repr=False)
     is_bare: bool = field(default=False, compare=False)
     n_bytes: int = field(default=0, compare=False)
@@ -143,6 +146,7 @@ def header_values(bitstream: Bitstream, extra: Mapping[str, Any]) -> dict[str, A
         "triangles": bitstream.n_triangles,
         "fps": bitstream.fps,
         **({"origin": list(bitstream.origin)} if bitstream.origin != NO_ORIGIN else {}),
+        **({KEY: bitstream.outline.to_json()} if bitstream.outline is not None and not bitstream.is_bare else {}),
         "container": dict(extra),
         "settings": dict(bitstream.header),
     }
@@ -243,14 +247,18 @@ def read_header(section: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstream, 
 def parse_header(header: JsonObject, budget: Budget = UNLIMITED) -> Bitstream:
     """Mirror of `header_values`: a bitstream without sections; raises `CorruptFile`."""
     x, y, z = header.numbers("origin", 3, -MAX_ORIGIN, MAX_ORIGIN, NO_ORIGIN)
+    codec, version = header.text("codec"), header.integer("version", 1, 1 << 16)
+    n_vertices = header.integer("vertices", 1, MAX_VERTICES)
+    n_triangles = header.integer("triangles", 0, 2 * MAX_VERTICES)
     return Bitstream(
-        codec=header.text("codec"),
-        version=header.integer("version", 1, 1 << 16),
+        codec=codec,
+        version=version,
         n_frames=header.integer("frames", 1, MAX_FRAMES),
-        n_vertices=header.integer("vertices", 1, MAX_VERTICES),
-        n_triangles=header.integer("triangles", 0, 2 * MAX_VERTICES),
+        n_vertices=n_vertices,
+        n_triangles=n_triangles,
         fps=header.number("fps", SLOWEST, FASTEST),
         header=header.object("settings").plain,
         origin=(x, y, z),
+        outline=Outline.of(header.object(KEY), n_vertices, n_triangles) if KEY in header else None,
         budget=budget,
     )

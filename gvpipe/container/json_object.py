@@ -90,6 +90,13 @@ class JsonObject:
         """Return ``count`` integers in ``low..high``."""
         return tuple(self._integer(key, value, low, high) for value in self._list(key, None, count))
 
+    def integers_up_to(self, key: str, most: int, low: int, high: int) -> tuple[int, ...]:
+        """Return at most ``most`` integers in ``low..high``; none where the key is missing."""
+        given = self._values.get(key, [])
+        if not isinstance(given, list) or len(given) > most:
+            raise self.wrong(key, f"a list of at most {most}")
+        return tuple(self._integer(key, value, low, high) for value in given)
+
     def object(self, key: str) -> JsonObject:
         """Return the object of a key."""
         return JsonObject(self._values.get(key), self.section)

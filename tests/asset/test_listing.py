@@ -6,7 +6,7 @@ import json
 import numpy as np
 from PIL import Image as Pillow
 
-from gvpipe.asset.listing import Things, list_things
+from gvpipe.asset.listing import Things, count_polygons, list_things
 from gvpipe.asset.material import Image, Material
 from gvpipe.asset.metadata import NO_METADATA
 from gvpipe.asset.part import Part
@@ -22,7 +22,7 @@ def test_all_things_are_json() -> None:
     parts = (Part("leg", (0, 5), (0, 3), 1, "body"), Part("arm", (5, 8), (3, 4)))
     images = (Image("a", "image/png", png()),)
     polygons = np.array([4, 3, 3], np.int32)
-    values = list_things(Things(parts, polygons, (Material("wood"), Material("iron")), images, NO_METADATA))
+    values = list_things(Things(parts, count_polygons(polygons), (Material("wood"), Material("iron")), images, NO_METADATA))
     assert json.loads(json.dumps(values)) == values
     assert values["parts"] == [
         {"name": "leg", "vertices": [0, 5], "triangles": [0, 3], "material": "iron", "parent": "body"},

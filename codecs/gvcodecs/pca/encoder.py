@@ -19,12 +19,13 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from gvcodecs.pca.header import MAX_SEGMENTS, VERSION_STILL, Header
-from gvcodecs.pca.reader import PcaReader, causal_order
+from gvcodecs.pca.reader import PcaReader, causal_order, coarse_levels
 from gvpipe.arrays import Int64
 from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_parts
 from gvpipe.mesh.hierarchy import build_hierarchy
+from gvpipe.mesh.hierarchy_kernels import Hierarchy
 from gvpipe.segment_map import map_segments
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory.basis import MAX_COMPONENTS, Reduced, reduce_trajectories
@@ -72,7 +73,7 @@ class Pca(BaseCodec):
     def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         shared = code_connectivity(sequence, self.reorder, memo, report)
         mesh, target_error = shared.mesh, shared.target_error(self.quality)
-        causal = memo("order", lambda: causal_order(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor))
+        causal, levels = memo("order", lambda: _order(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor))
         data, still = code_still(sequence, shared, target_error, memo)
         causal, moving = leave_out(causal, still.flags), shared.members[~still.flags]
         bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
@@ -86,7 +87,7 @@ class Pca(BaseCodec):
         report("segments", 1)
         steps = tuple(each.step for each in coded)
         header = Header(self.predictor, float(self.beta), n_segments, steps or (1.0,) * n_segments)
-        bitstream = self._bitstream(sequence, header.to_json(), sections, version=None if data else 1)
+        bitstream = self._bitstream(sequence, header.to_json(), sections, version=None if data else 1, levels=levels)
         return Encoded(bitstream, shared.coded.permutation)
 
     @classmethod
@@ -103,6 +104,11 @@ class Pca(BaseCodec):
     def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
         """What each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
         return numbered_parts(("basis", "coefficients"), Header.of(bitstream).segments)
+
+
+def _order(hierarchy: Hierarchy, predictor: str) -> tuple[CausalOrder, tuple[int, ...]]:
+    """The order of points, and the vertex counts of the coarse levels; the hierarchy itself may go."""
+    return causal_order(hierarchy, predictor), coarse_levels(hierarchy)
 
 
 class _Segments(NamedTuple):

@@ -60,7 +60,7 @@ class PcaReader:
     @property
     def levels(self) -> list[int]:
         """Vertex counts of the levels of detail, level 0 first."""
-        return [self._bitstream.n_vertices, *(int(n) for n in self._hierarchy.blocks[-2:0:-1])]
+        return [self._bitstream.n_vertices, *coarse_levels(self._hierarchy)]
 
     def level_faces(self, lod: int) -> Int32:
         """Return the triangles ``(n, 3) int32`` of a level, in the order of the vertices that `read` returns for it."""
@@ -151,6 +151,11 @@ def _read_connectivity(bitstream: Bitstream, predictor: str) -> tuple[Topology, 
     found = bitstream.shared(f"pca {predictor}", (bitstream.section("mesh"), bitstream.section("order")), read)
     bitstream.check_size(len(found[0].points), len(found[0].faces))
     return found
+
+
+def coarse_levels(hierarchy: Hierarchy) -> tuple[int, ...]:
+    """Vertex counts of the levels of detail, from level 1 on."""
+    return tuple(int(n) for n in hierarchy.blocks[-2:0:-1])
 
 
 def causal_order(hierarchy: Hierarchy, predictor: str) -> CausalOrder:
