@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int64
+from gvpipe.arrays import Float64, Floats, Int64
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
@@ -135,7 +135,7 @@ def find_principal(trajectories: Float64, error: float) -> Principal:
     mean = trajectories.mean(axis=0)
     tall = is_tall(trajectories)
     if tall:  # by blocks: a copy of a million vertices' trajectories is large
-        blocks = (trajectories[rows] - mean for rows in _row_blocks(len(trajectories)))
+        blocks = (trajectories[rows] - mean for rows in row_blocks(len(trajectories)))
         gram = np.sum([block.T @ block for block in blocks], axis=0)
     else:
         gram = smaller_gram(trajectories - mean)
@@ -258,12 +258,12 @@ def fit_coefficients(trajectories: Float64, basis: Basis) -> Float64:
     gram[np.diag_indices_from(gram)] += LEAST
     factor = cho_factor(gram)
     fitted = np.empty((len(trajectories), len(gram)))
-    for rows in _row_blocks(len(trajectories)):  # as many copies of a million vertices' coefficients would be large
+    for rows in row_blocks(len(trajectories)):  # as many copies of a million vertices' coefficients would be large
         fitted[rows] = cho_solve(factor, ((trajectories[rows] - basis.mean) @ basis.vectors).T).T
     return fitted
 
 
-def squared_errors(trajectories: Float64, basis: Basis, coefficients: Float64) -> Float64:
+def squared_errors(trajectories: Floats, basis: Basis, coefficients: Float64) -> Float64:
     """Squared errors ``(V,)``, summed over frames, of ``trajectories (V, 3F)`` from a basis and ``coefficients (V, R)``."""
     result = np.empty(len(trajectories))
     for first in range(0, len(result), BLOCK):
@@ -273,7 +273,7 @@ def squared_errors(trajectories: Float64, basis: Basis, coefficients: Float64) -
     return result
 
 
-def _row_blocks(n_rows: int) -> Iterator[slice]:
+def row_blocks(n_rows: int) -> Iterator[slice]:
     """Rows of a tall matrix, of which copies are made one after the other; one block at least."""
     for first in range(0, max(n_rows, 1), LARGE_BLOCK):
         yield slice(first, first + LARGE_BLOCK)

@@ -16,6 +16,7 @@ from gvpipe.connectivity.topology_only import Topology, encode_mesh
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of
 from gvpipe.sequence import MeshSequence
+from gvpipe.trajectory.basis import Basis, row_blocks, squared_errors
 from gvpipe.trajectory.welding import find_points
 
 
@@ -57,3 +58,27 @@ def read_trajectories(sequence: MeshSequence, start: int, stop: int, members: In
     for first, block in sequence.chunks(start, stop):
         result[:, first - start : first - start + len(block)] = block[:, members].swapaxes(0, 1)
     return result.reshape(len(members), -1)  # (P, n, 3) -> (P, 3n)
+
+
+def sum_squared_errors(
+    sequence: MeshSequence, span: tuple[int, int], members: Int64, copies: Int64, basis: Basis, coefficients: Float64
+) -> float:
+    """Squared error of a segment's vertices, summed over its frames, squared model units, a block of points at a time.
+
+    Args:
+        sequence: that is coded.
+        span: first frame, and the one after the last.
+        members: ``(P,)`` a vertex of each point.
+        copies: ``(P,)`` how many vertices each point has.
+        basis: decoded, of the segment's frames.
+        coefficients: ``(P, R)`` decoded.
+    """
+    start, stop = span
+    total = 0.0
+    for first, block in sequence.chunks(start, stop):
+        axes = slice(3 * (first - start), 3 * (first - start + len(block)))
+        part = Basis(basis.mean[axes], basis.vectors[axes])
+        for points in row_blocks(len(members)):
+            trajectories = block[:, members[points]].swapaxes(0, 1).reshape(-1, 3 * len(block))
+            total += float(squared_errors(trajectories, part, coefficients[points]) @ copies[points])
+    return total

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Int32
+from gvpipe.arrays import Bool, Float64, Int32
 from gvpipe.trajectory.causal_order import CausalOrder
 
 if TYPE_CHECKING:
@@ -41,6 +41,12 @@ class Anchors:
     is_free: Bool
     has_deltas: Bool
 
+    def select(self, vectors: Float64) -> Float64:
+        """The anchors' of all points' vectors ``(P, R)``; the same array where all points are anchors in their order."""
+        if len(self.points) == len(vectors) and (np.diff(self.points) == 1).all():
+            return vectors
+        return vectors[self.points]
+
 
 def choose_anchors(
     choice: str,
@@ -62,7 +68,9 @@ def choose_anchors(
     """
     from gvcodecs.laplacian.anchor_kernels import select_anchors
 
-    is_still = np.zeros(len(component_of), bool) if is_still is None else is_still
-    walks = choice == "walk"
+    n_points, walks = len(component_of), choice == "walk"
+    is_still = np.zeros(n_points, bool) if is_still is None else is_still
+    if spacing == 1 and not walks and not is_still.any():  # all are anchors, and keep their numbers: their order needs no copy
+        return Anchors(np.arange(n_points, dtype=np.int32), causal, np.ones(n_points, bool), np.zeros(n_points, bool))
     points, chosen, has_deltas = select_anchors(spacing, walks, hierarchy, causal, traversal, component_of, is_still)
     return Anchors(points, chosen, ~is_still[points], has_deltas)

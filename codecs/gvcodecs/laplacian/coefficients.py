@@ -20,7 +20,10 @@ def encode_coefficients(
     """
     target = domain.system.deltas(coefficients)[domain.delta_points]
     deltas, rounded = encode_vectors(target, step, domain.deltas, _predictor(coding))
-    anchored = domain.system.fit_anchors(domain.delta_points, rounded, coefficients)
+    if len(target):
+        anchored = domain.system.fit_anchors(domain.delta_points, rounded, coefficients)
+    else:  # nothing was rounded
+        anchored = domain.anchors.select(coefficients)
     anchors, sent = encode_vectors(
         anchored, step * coding.anchor_ratio, domain.anchors.causal, given=_of_anchors(given, domain)
     )

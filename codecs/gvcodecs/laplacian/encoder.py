@@ -48,8 +48,8 @@ from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_p
 from gvpipe.rate_control.step_search import NEAR, Anchor, StepTrial, find_step, first_step, step_between
 from gvpipe.segment_map import map_segments
 from gvpipe.sequence import MeshSequence
-from gvpipe.trajectory.basis import MAX_COMPONENTS, reduce_trajectories, squared_errors
-from gvpipe.trajectory.coded_points import CodedConnectivity, code_connectivity, read_trajectories
+from gvpipe.trajectory.basis import MAX_COMPONENTS, reduce_trajectories
+from gvpipe.trajectory.coded_points import CodedConnectivity, code_connectivity, read_trajectories, sum_squared_errors
 from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
 
 FIRST = 1.0  # of the target error, asked of `reduce_trajectories` in a first encode, before drift is known
@@ -224,15 +224,23 @@ def _code_segment(segments: _Segments, span: tuple[int, int]) -> _Segment:
     """Code the frames of a span."""
     codec, start, still = segments.codec, segments.start, segments.start.still
     first, stop = span
-    trajectories = read_trajectories(segments.sequence, first, stop, start.shared.members[~still.flags])
+    moving = start.shared.members[~still.flags]
     error = segments.asked**2 * still.n_moving * (stop - first)
-    most = still.most_components
-    reduced = reduce_trajectories(trajectories, error, codec.components, codec.basis_ratio, POINT_COST, ROW_COST, NOISE, most)
+    reduced = reduce_trajectories(
+        read_trajectories(segments.sequence, first, stop, moving),
+        error,
+        codec.components,
+        codec.basis_ratio,
+        POINT_COST,
+        ROW_COST,
+        NOISE,
+        still.most_components,
+    )  # the trajectories go: what follows needs as much memory again
     given = still.given(reduced.decoded)
     coefficients = still.join(reduced.coefficients, given)
     anchors, deltas, decoded = encode_coefficients(coefficients, reduced.step, start.domain, start.coding, given)
-    errors = squared_errors(trajectories, reduced.decoded, decoded[~still.flags])
-    squared = float(errors @ start.copies[~still.flags])
+    copies = start.copies[~still.flags]
+    squared = sum_squared_errors(segments.sequence, span, moving, copies, reduced.decoded, decoded[~still.flags])
     return _Segment(reduced.step, reduced.basis, anchors, deltas, squared)
 
 

@@ -105,4 +105,4 @@ class ExtendedLaplacian:
 
     def _gather(self, solution: Float64) -> Float64:
         """The transpose of `_spread`: ``(P, R)`` to ``(A, R)``."""
-        return self._squared_weight * self.equations.solve(solution)[self._anchors]
+        return self._squared_weight * self.equations.solve(solution.copy())[self._anchors]

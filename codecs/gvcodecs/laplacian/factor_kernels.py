@@ -111,7 +111,7 @@ def factorise(matrix: Lower, bounds: Int64, found: Int32) -> tuple[Factors, int]
 
 @compiled
 def solve_columns(factors: Factors, order: Int32, right: Float64, solved: Float64, first: int, end: int) -> None:
-    """Fill columns ``first`` to ``end`` of solutions ``(n, R)`` for right-hand sides ``(n, R)``.
+    """Fill columns ``first`` to ``end`` of solutions ``(n, R)`` for right-hand sides ``(n, R)``, which may be the same array.
 
     Args:
         order: ``(n,)`` the unknown of each row of the factors.

@@ -27,6 +27,7 @@ COLUMNS = 32  # solved at once: more do not fit the cache
 FREE_PRODUCTS = 1 << 27  # that any system may take
 STEPS = 3 << 26  # of an encoder's search for an order: a second, of the two that any file may take
 PRODUCTS = 512  # that P points may take beside, times P sqrt(P): 7 times what a square grid of 100,000 points needs
+FEW_COLUMNS = 4  # where each unknown has an equation of its own: their copies take memory, and gain nothing
 NO_LIMIT = 1 << 62
 BYTES_PER_PAIR, SECONDS_PER_PAIR = 20, 15e-9  # of points that a row couples
 BYTES_PER_ENTRY, SECONDS_PER_ENTRY = 12, 20e-9  # of a factor
@@ -128,14 +129,14 @@ class NormalEquations:
         return multiply_transposed(self._rows, points, np.ascontiguousarray(vectors))
 
     def solve(self, right: Float64) -> Float64:
-        """Solutions ``(P, R)`` for right-hand sides ``(P, R)``."""
+        """Turn right-hand sides ``(P, R)`` into solutions, in place, and return them."""
         from gvcodecs.laplacian.factor_kernels import solve_columns
 
         n_columns = right.shape[1]
-        solved = np.empty_like(right)
-        for first in range(0, n_columns, COLUMNS):
-            solve_columns(self._factors, self._order, right, solved, first, min(first + COLUMNS, n_columns))
-        return solved
+        at_once = COLUMNS if self.fill.entries else FEW_COLUMNS
+        for first in range(0, n_columns, at_once):
+            solve_columns(self._factors, self._order, right, right, first, min(first + at_once, n_columns))
+        return right
 
 
 def _eliminate(rows: Rows, transposed: Rows, limit: int, most_steps: int) -> tuple[Int32, Int32, Fill]:
