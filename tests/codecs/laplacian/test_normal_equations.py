@@ -59,7 +59,7 @@ def test_solutions_are_those_of_a_dense_solver_and_the_count_of_fill_bounds_the_
     equations = NormalEquations(operator, weights)
     right = np.random.default_rng(1).standard_normal((n, 40))
     dense = (matrix.T @ matrix).toarray() + np.diag(weights)
-    assert np.allclose(equations.solve(right), np.linalg.solve(dense, right), rtol=1e-7, atol=1e-7)
+    assert np.allclose(equations.solve(right.copy()), np.linalg.solve(dense, right), rtol=1e-7, atol=1e-7)
     assert np.allclose(equations.multiply(right), matrix @ right)
     some = np.arange(0, n, 3, dtype=np.int32)
     assert np.allclose(equations.multiply_transposed(some, right[some]), matrix[some].T @ right[some])
