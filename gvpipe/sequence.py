@@ -304,8 +304,12 @@ class MeshSequence:
 
     def sample(self, most: int, vertices: Integers | slice = slice(None)) -> Float64:
         """Return vertices of at most ``most`` frames, evenly spaced from first to last: ``(n, vertices, 3)``, model units."""
-        picked = np.unique(np.linspace(0, self.n_frames - 1, most).astype(int))
-        return np.concatenate([self.read(i, i + 1)[:, vertices] for i in picked]).astype(np.float64)
+        return np.stack([frame[vertices] for frame in self.sampled_frames(most)]).astype(np.float64)
+
+    def sampled_frames(self, most: int) -> Iterator[Float32]:
+        """Yield the same frames one by one: ``(V, 3) float32``."""
+        for i in np.unique(np.linspace(0, self.n_frames - 1, most).astype(int)):
+            yield self.read(i, i + 1)[0]
 
 
 def describe(sequence: MeshSequence) -> str:

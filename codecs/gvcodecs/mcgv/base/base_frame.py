@@ -11,7 +11,7 @@ from gvcodecs.mcgv.base.welded_points import Points
 from gvcodecs.mcgv.encode_job import Job
 from gvpipe.arrays import Bool, Float64, Int32, Int64
 from gvpipe.connectivity.base_mesh import EncodedMesh
-from gvpipe.connectivity.welded_mesh import encode_points
+from gvpipe.connectivity.welded_mesh import WeldedMesh, encode_points
 from gvpipe.container.segments import cut
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.sequence import MeshSequence
@@ -87,10 +87,12 @@ def begin(job: Job, step: float, target_error: float, before: Start | None = Non
     members = np.unique(point, return_index=True)[1]
     lattice = choose_lattice(settings, first[members], min(base_step(step, given.n_frames), target_error))
     positions = quantise_base(settings, lattice, first[members])
-    coded, mesh = job.memo(
-        f"base {lattice.step} {len(members)}",
-        lambda: encode_points(positions, given.faces, point, settings.reorder, True, adaptive),
-    )
+    bases, key = job.memo("bases", dict[tuple[float, int], tuple[EncodedMesh, WeldedMesh]]), (lattice.step, len(members))
+    if key not in bases:
+        if job.is_large:  # those before would take more memory than coding one of them again takes time
+            bases.clear()
+        bases[key] = encode_points(positions, given.faces, point, settings.reorder, True, adaptive)
+    coded, mesh = bases[key]
     sources = coded.permutation[mesh.members]  # the given vertex of each point
     is_still = still[sources].copy()
     if is_still.all():  # one point at least has samples

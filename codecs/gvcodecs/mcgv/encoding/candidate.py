@@ -10,8 +10,8 @@ import numpy as np
 from gvcodecs.mcgv.base.base_frame import Start, begin
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.encode_job import Job
+from gvcodecs.mcgv.motion.blend_problem import Fitted
 from gvcodecs.mcgv.motion.skinning import Weights
-from gvcodecs.mcgv.motion.skinning_fit import Fitted
 from gvpipe.rate_control.step_search import Anchor, StepTrial
 
 

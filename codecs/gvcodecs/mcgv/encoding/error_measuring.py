@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from itertools import pairwise
 
 import numpy as np
 
 from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.encode_job import Job
+from gvcodecs.mcgv.motion.contract import predicted_chunks
 from gvcodecs.mcgv.reader_choice import open_reader
 from gvpipe.arrays import Float64
 from gvpipe.container.bitstream import Bitstream
@@ -28,8 +28,7 @@ def measure_predicted(job: Job, start: Start, predict: Callable[[int, int], Floa
     job.report("measure", 0)
     vertices, points = start.moving()
     given, total = job.sequence, job.sequence.n_frames * start.still_error
-    for begin, end in pairwise(start.bounds):
-        for first, block in given.chunks(begin, end):
-            off = block[:, vertices] - predict(first, first + len(block))[:, points]
-            total += float(np.vdot(off, off))
+    for _, block, predicted in predicted_chunks(given, start.bounds, predict):
+        off = block[:, vertices] - predicted[:, points]
+        total += float(np.vdot(off, off))
     return math.sqrt(total / (given.n_frames * given.n_vertices))

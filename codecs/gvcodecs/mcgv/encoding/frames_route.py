@@ -6,8 +6,8 @@ from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.coded_route import Coded
 from gvcodecs.mcgv.encoding.placement import chart_sections, lay_out_blended
+from gvcodecs.mcgv.motion.blend_problem import Fitted
 from gvcodecs.mcgv.motion.blended import code_blended
-from gvcodecs.mcgv.motion.skinning_fit import Fitted
 from gvcodecs.mcgv.pictures.frames import code_frames, measure_residuals
 
 

@@ -8,7 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.tile_charts import charts_of, motions_of
-from gvcodecs.mcgv.motion.skinning_fit import Fitted, fit_blend
+from gvcodecs.mcgv.motion.blend_problem import Fitted
+from gvcodecs.mcgv.motion.skinning_fit import fit_blend
 
 
 def fit_skinning(job: Job, start: Start, target_error: float) -> tuple[Fitted, float]:

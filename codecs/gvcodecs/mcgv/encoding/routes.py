@@ -9,7 +9,7 @@ from gvcodecs.mcgv.encoding.coded_route import Coded
 from gvcodecs.mcgv.encoding.frames_route import code_frame_pictures
 from gvcodecs.mcgv.encoding.skinning_route import code_skinning_alone
 from gvcodecs.mcgv.encoding.trajectory_route import code_trajectory_pictures
-from gvcodecs.mcgv.motion.skinning_fit import Fitted
+from gvcodecs.mcgv.motion.blend_problem import Fitted
 
 
 def code(job: Job, start: Start, fitted: Fitted | None) -> Coded:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.coded_route import Coded
+from gvcodecs.mcgv.motion.blend_problem import Fitted
 from gvcodecs.mcgv.motion.blended import code_blended
-from gvcodecs.mcgv.motion.skinning_fit import Fitted
 
 
 def code_skinning_alone(job: Job, start: Start, fitted: Fitted) -> Coded:

@@ -6,18 +6,18 @@ from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.layout.chart_coding import number_charts
 from gvcodecs.mcgv.layout.chart_parameterization import parameterize
-from gvcodecs.mcgv.motion.skinning_fit import Motions
+from gvcodecs.mcgv.motion.point_motions import Motions, SampledMotions, find_motions
 from gvpipe.arrays import Int64
 
 PART = 250  # points of a part by motion that charts refine: xatlas takes more than ten times as long per point for all at once
 
 
-def motions_of(job: Job, start: Start) -> Motions:
+def motions_of(job: Job, start: Start) -> Motions | SampledMotions:
     """The points' motions over all frames; those of the last start alone are kept."""
-    kept = job.memo("motions", dict[str, Motions])
+    kept = job.memo("motions", dict[str, Motions | SampledMotions])
     if start.key not in kept:
         kept.clear()  # first: of 10,000 points they take 50 MB
-        kept[start.key] = Motions(start.sequence, start.base, start.points.neighbours)
+        kept[start.key] = find_motions(start.sequence, start.base, start.points.neighbours)
     return kept[start.key]
 
 
@@ -26,7 +26,7 @@ def charts_of(job: Job, start: Start) -> Int64:
 
     def find() -> Int64:
         n_parts = max(1, start.points.n_points // PART)
-        parts = motions_of(job, start).clustering.start(n_parts).weights.clusters[:, 0]
+        parts = motions_of(job, start).start(n_parts).weights.clusters[:, 0]
         return number_charts(parameterize(start.base, start.points.faces, parts).chart)
 
     return job.memo(f"charts {start.key}", find)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 
 from gvcodecs.mcgv.base.base_lattice import AFFINE_BITS, base_step
+from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.bitstream_sizes import cost, count_bytes, count_picture_bytes
 from gvcodecs.mcgv.encoding.candidate import Candidate, CandidateAnchor, rebase
 from gvcodecs.mcgv.encoding.initial_skinning import fit_skinning
@@ -76,13 +77,22 @@ def refine(trials: StepTrials, trial: StepTrial) -> StepTrial:
     if fine_error >= trial.error:
         return trial
     step = trial.step * (fine_error / trial.error) ** (1 / SLOPE)
-    bases = [rebase(job, candidate, step, part * fine_error) for part in FINE_LATTICES]
-    finer = StepTrials(job, min(bases, key=lambda based: len(based.start.coded.mesh)))
+    finer = StepTrials(job, _smallest_base(job, candidate, step, fine_error))
     most = cost(trial, FINE_WORTH)
     if cost(finer(step), FINE_WORTH) > most:
         return trial
     fine = find_step(finer, step, fine_error, FINE_BAND, SLOPE, MAX_ROUNDS)
     return fine if fine.error <= fine_error and cost(fine, FINE_WORTH) <= most else trial
+
+
+def _smallest_base(job: Job, candidate: Candidate, step: float, fine_error: float) -> Candidate:
+    """A candidate on the base frame, of those whose lattices leave about ``fine_error``, model units, whose mesh is smallest.
+
+    On smooth surfaces that is the coarsest; the others of a large sequence are not tried.
+    """
+    parts = FINE_LATTICES[-1:] if job.is_large else FINE_LATTICES
+    bases = (rebase(job, candidate, step, part * fine_error) for part in parts)
+    return min(bases, key=lambda based: len(based.start.coded.mesh))
 
 
 def _are_pictures_dear(trials: StepTrials, step: float, target_error: float) -> bool:

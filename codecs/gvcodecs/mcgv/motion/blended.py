@@ -11,15 +11,15 @@ from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.base.surface import DecodedBase
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.layout import Layout
+from gvcodecs.mcgv.motion.blend_problem import Fitted
 from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
 from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import Trajectories, decode_trajectories, encode_trajectories
-from gvcodecs.mcgv.motion.skinning_fit import Fitted
 from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
 from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.trajectory.sparse_rows import multiply
+from gvpipe.trajectory.sparse_rows import as_rows
 
 BYTES_PER_POINT, SECONDS_PER_POINT = 400, 1e-6
 CHUNK = 16  # frames whose transforms are made at a time
@@ -47,11 +47,13 @@ def code_blended(start: Start, fitted: Fitted, report: Progress) -> CodedMotion:
         coded[f"transforms.{s}"], decoded = encode_trajectories(transforms, start.step)
         segments.append(decoded)
         report("transforms", (s + 1) / (len(bounds) - 1))
-    matrix = fit.matrix  # the factors of its normal equations are needed no more
+    matrix = as_rows(fit.matrix)  # the factors of its normal equations are needed no more
 
     def predict(first: int, stop: int) -> Float64:
+        from gvpipe.trajectory.product_kernels import multiply
+
         s = locate(bounds, first)
-        moved = multiply(matrix, segments[s].rows(first - bounds[s], stop - bounds[s]))  # (P, 3n)
+        moved = multiply(matrix, np.ascontiguousarray(segments[s].rows(first - bounds[s], stop - bounds[s])))  # (P, 3n)
         return np.asarray(base + moved.reshape(len(moved), stop - first, 3).swapaxes(0, 1))
 
     return CodedMotion(fitted.n_clusters, start.step, coded, predict)

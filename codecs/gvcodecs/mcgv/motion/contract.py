@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -12,6 +13,9 @@ import numpy as np
 from gvcodecs.mcgv.base.surface import DecodedBase
 from gvcodecs.mcgv.layout.layout import Layout
 from gvpipe.arrays import Array, Float32, Float64, Int64
+from gvpipe.sequence import MeshSequence
+
+PREDICTED = 1 << 20  # vertices of all frames that are predicted at once: more are of no use, and take 100 bytes each
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,24 @@ class CodedMotion:
     step: float
     sections: dict[str, bytes]
     predict: Callable[[int, int], Float64]
+
+
+def predicted_chunks(
+    sequence: MeshSequence, bounds: list[int], predict: Callable[[int, int], Float64]
+) -> Iterator[tuple[int, Float32, Float64]]:
+    """Yield a first frame, frames ``(n, V, 3)`` from there on, and their prediction ``(n, S, 3)``: few of large ones.
+
+    Args:
+        sequence: whose frames are read.
+        bounds: first frame of every segment, and F.
+        predict: as of `CodedMotion`.
+    """
+    n = max(1, PREDICTED // sequence.n_vertices)
+    for begin, end in pairwise(bounds):
+        for first, block in sequence.chunks(begin, end):
+            for k in range(0, len(block), n):
+                part = block[k : k + n]
+                yield first + k, part, predict(first + k, first + k + len(part))
 
 
 class Motion(Protocol):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding import Padding
-from gvcodecs.mcgv.motion.contract import CodedMotion
+from gvcodecs.mcgv.motion.contract import CodedMotion, predicted_chunks
 from gvcodecs.mcgv.pictures.outliers import OutlierWriter
 from gvcodecs.mcgv.pictures.quantiser import ImageQuantiser, Magnitudes, choose_quantiser
 from gvpipe.arrays import Float64
@@ -82,9 +81,8 @@ def _write_video(job: Job, padding: Padding, quantiser: ImageQuantiser, residual
 
 def _residuals(start: Start, motion: CodedMotion) -> Residuals:
     """Yield the residuals of all frames (equation 4)."""
-    for begin, end in pairwise(start.bounds):
-        for first, block in start.sequence.chunks(begin, end):
-            yield first, block - motion.predict(first, first + len(block))
+    for first, block, predicted in predicted_chunks(start.sequence, start.bounds, motion.predict):
+        yield first, block - predicted
 
 
 def _pictures(residual: Float64, padding: Padding, profile: Profile, step: float) -> Iterator[Plane]:

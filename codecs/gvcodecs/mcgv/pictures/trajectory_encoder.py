@@ -18,8 +18,8 @@ from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding import Padding
+from gvcodecs.mcgv.motion.blend_problem import Fitted
 from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
-from gvcodecs.mcgv.motion.skinning_fit import Fitted
 from gvcodecs.mcgv.motion.weight_coding import encode_weights
 from gvcodecs.mcgv.pictures.trajectories import PLANES, count_pictures, encode_segment
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader

@@ -7,8 +7,9 @@ from blends import apply_weights, blended, check_weights
 from sequences import waving
 
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
+from gvcodecs.mcgv.motion.point_motions import find_motions
 from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit, Weights, homogeneous
-from gvcodecs.mcgv.motion.skinning_fit import Motions, fit_blend
+from gvcodecs.mcgv.motion.skinning_fit import fit_blend
 from gvcodecs.mcgv.motion.weight_coding import encode_weights, guess_prices
 from gvcodecs.mcgv.motion.weight_fit_kernels import Transforms
 from gvcodecs.mcgv.motion.weight_selection import PointMotions, Ring, choose
@@ -43,7 +44,7 @@ def test_dearer_bits_make_smaller_sections() -> None:
     neighbours = adjacency(sequence.faces, len(base))
     sizes = []
     for step in (1e-4, 1e-2):
-        fitted, fitted_step = fit_blend(Motions(sequence, base, neighbours), step, 6)
+        fitted, fitted_step = fit_blend(find_motions(sequence, base, neighbours), step, 6)
         assert fitted_step == step
         check_weights(fitted.weights, fitted.n_clusters)
         sizes.append(len(encode_weights(fitted.weights, causal_neighbours(neighbours))))
@@ -55,7 +56,7 @@ def test_as_many_clusters_as_pay() -> None:
     sequence = waving(16, 30)
     base = np.asarray(sequence.read(0, 1)[0], np.float64)
     neighbours = adjacency(sequence.faces, len(base))
-    motions = Motions(sequence, base, neighbours)
+    motions = find_motions(sequence, base, neighbours)
     counts = [fit_blend(motions, step, 0)[0].n_clusters for step in (100.0, 0.02, 5e-4)]
     assert counts == sorted(counts) and counts[0] <= 8 < counts[-1]
 
@@ -83,5 +84,5 @@ def test_a_cluster_of_simple_motion_costs_the_same_in_any_number_of_frames() -> 
         lift = np.sin(np.arange(n_frames) / 5)[:, None] * base[:, 0]
         frames = base + lift[:, :, None] * (0, 0, 1)
         sequence = MeshSequence(frames.astype(np.float32), still.faces, 30.0)
-        prices.append(Motions(sequence, base, neighbours).problem(0.01).cluster_price)
+        prices.append(find_motions(sequence, base, neighbours).problem(0.01).cluster_price)
     assert prices[0] == prices[1]
