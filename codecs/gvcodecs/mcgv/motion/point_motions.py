@@ -3,9 +3,9 @@
 Displacements from the base frame are turned to their principal coordinates: squared errors, least squares and local affine
 motions are the same in these, and a tenth of the numbers tell nearly all.
 
-How many clusters a motion needs does not depend on how finely its surface is cut into triangles. So a surface of more than
-`MOST_FITTED` points has a *coarse* one of so many: every so many-th point, as the codec walks over the surface, stands for the
-points nearest to it, and is joined with those whose points touch its own.
+How many clusters a motion needs does not depend on how finely its surface is cut into triangles. So clusters,
+transforms and first weights of a large surface are found on a *coarse* one: every so many-th point, as the codec walks over
+the surface, stands for the points nearest to it, and is joined with those whose points touch its own.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ from gvpipe.trajectory.gram import descending_eigenvectors, is_tall, smaller_gra
 
 RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`
 FRAMES = 192  # frames, evenly spaced, that fitting looks at
-MOST_FITTED = 1 << 17  # points: of more, some stand for all until the number of clusters and their transforms are found
+LARGE = 1 << 16  # points: surfaces of more have a coarse one; that of a smaller one would carry too few clusters
+SPACING, MOST_SITES = 4, 1 << 17  # points that one of the coarse surface stands for, least; points of it, most
 DIMENSIONS = 40  # principal coordinates of motions that clusters start from
 ROUNDED = 0.025  # squared steps that rounding a number of the transforms leaves: many are of components too small to be coded
 PICTURED = 0.45  # steps, root mean square, that pictures leave of a point's residual
@@ -136,7 +137,7 @@ def find_motions(sequence: MeshSequence, base: Float64, neighbours: sparse.csr_a
         base: ``(P, 3)`` their decoded base positions, model units.
         neighbours: their adjacency ``(P, P)``.
     """
-    if len(base) > MOST_FITTED:
+    if spacing(len(base)) > 1:
         return SampledMotions(sequence, base, neighbours)
     return Motions(_displacements(sequence.sample(FRAMES), base), base, neighbours, sequence.n_frames)
 
@@ -200,11 +201,16 @@ def _principal(columns: Float64) -> tuple[Float64, Float64, Float64]:
     return np.ascontiguousarray(coordinates), energies, vectors
 
 
+def spacing(n_points: int) -> int:
+    """How many of a surface's points one stands for in its coarse surface."""
+    return max(SPACING, -(-n_points // MOST_SITES)) if n_points > LARGE else 1
+
+
 def _choose_sites(neighbours: sparse.csr_array) -> tuple[Int64, Int64]:
     """Points ``(Q,)`` that stand for others, some of every piece, and which of them ``(P,)`` stands for each point."""
     n_points = neighbours.shape[0]
     firsts = np.unique(components(neighbours)[1], return_index=True)[1]
-    sites = np.union1d(np.arange(0, n_points, -(-n_points // MOST_FITTED)), firsts)
+    sites = np.union1d(np.arange(0, n_points, spacing(n_points)), firsts)
     nearest = np.full(n_points, -1)
     nearest[sites] = np.arange(len(sites))
     edges = neighbours.tocoo()
