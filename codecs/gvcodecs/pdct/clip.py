@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -47,6 +48,7 @@ BYTES_PER_POINT, SECONDS_PER_POINT = 160, 0.4e-6  # of a frame
 BYTES_PER_NUMBER = 64  # of seeds
 SECONDS_PER_FRAME = 0.6e-3
 TOGETHER = 16  # frames decoded and rebuilt at once, an even number
+LOCAL = 1 << 20  # vertices of all frames whose coordinates are transformed at once
 RIDGE = 1e-6  # of the affine fit
 LAMBDA = 0.14  # squared steps that a bit is worth; 0.1155 by theory at a high rate
 
@@ -68,9 +70,7 @@ def encode_clip(frames: Float32, surface: BaseFrame, quantiser: DeltaQuantiser, 
     if dictionary is None:
         raise InputError(f"the clip moves within {lattice.step} x 2**{seed_bits}, far from frame 0; subtract its origin")
     seed_points = np.rint((frames[:, seeds].astype(np.float64) - lattice.origin) / lattice.step).astype(np.int64)
-    members = dictionary.members.vertices
-    local = dictionary.to_local(frames[:, members].astype(np.float64), frames_of(seed_points, dictionary.lattice))
-    signals = dictionary.transform(local - dictionary.shape.rest) / quantiser.step
+    signals = _signals(frames, dictionary, seed_points, quantiser.step)
     blocks = [
         encode_integers(np.diff(seeds.ravel(), prepend=0)),
         encode_labels(labels[surface.traversal], len(seeds)),
@@ -167,6 +167,19 @@ def _encode_deltas(signals: Float64, dictionary: Dictionary, quantiser: DeltaQua
     return coder.finish()
 
 
+def _signals(frames: Float32, dictionary: Dictionary, seed_points: Int64, step: float) -> Float64:
+    """DCT coefficients ``(n, 3, N)``, in steps, of how ``frames (n, V, 3)`` differ from the base in local coordinates."""
+    members = dictionary.members.vertices
+    signals = np.empty((len(frames), 3, len(members)))
+    few = max(1, LOCAL // max(1, len(members)))
+    for first in range(0, len(frames), few):  # a copy of all frames' coordinates would be large
+        block = slice(first, first + few)
+        axes = frames_of(seed_points[block], dictionary.lattice)
+        local = dictionary.to_local(frames[block, members].astype(np.float64), axes)
+        signals[block] = dictionary.transform(local - dictionary.shape.rest) / step
+    return signals
+
+
 def _drop_small(coefficients: Float64, dictionary: Dictionary, kept: float) -> None:
     """Zero all but the largest part ``kept`` of each cluster's coefficients, axis by axis (section 4.5)."""
     for where in dictionary.slices:
@@ -207,5 +220,8 @@ def _project(signals: Float64, projections: Float64, bounds: Int64) -> Float64:
 
 def _expand(coefficients: Float64, shapes: Float64, sizes: Int64) -> Float64:
     """Mirror of `_project`: ``(3, 4 K) -> (3, N)``."""
-    per_cluster = coefficients.reshape(3, len(sizes), 4)
-    return np.asarray(np.einsum("anj,jn->an", np.repeat(per_cluster, sizes, axis=1), shapes))
+    result = np.empty((3, shapes.shape[1]))
+    bounds = np.concatenate([[0], np.cumsum(sizes)])
+    for k, (start, stop) in enumerate(pairwise(bounds)):
+        result[:, start:stop] = np.einsum("aj,jn->an", coefficients[:, 4 * k : 4 * k + 4], shapes[:, start:stop])
+    return result

@@ -37,21 +37,21 @@ def find_clusters(frames: Float32, faces: Int32, n_clusters: int) -> Clusters:
     return Clusters(seeds, cluster(sampled, seeds))
 
 
-def sample_frames(frames: Float32) -> Float64:
-    """Return at most `SAMPLES` evenly spaced frames of ``frames (n, V, 3)``, first and last included."""
+def sample_frames(frames: Float32) -> Float32:
+    """Return at most `SAMPLES` evenly spaced frames of ``frames (n, V, 3)``, first and last included; few are not copied."""
     picked = np.unique(np.linspace(0, len(frames) - 1, SAMPLES).astype(int))
-    return np.asarray(frames[picked], np.float64)
+    return frames if len(picked) == len(frames) else frames[picked]
 
 
-def find_seeds(sampled: Float64, faces: Int32, n_clusters: int) -> Int64:
+def find_seeds(sampled: Float32, faces: Int32, n_clusters: int) -> Int64:
     """Return ``(K, 3)`` vertices of the seed triangles, 1 <= K <= ``n_clusters``.
 
     Args:
-        sampled: ``(n, V, 3)`` frames, model units; distances are those of the first.
+        sampled: ``(n, V, 3)`` frames, model units, each made float64 when it is looked at; distances are those of the first.
         faces: ``(T, 3)`` triangles.
         n_clusters: how many seeds are wanted.
     """
-    points = sampled[0]
+    points = sampled[0].astype(np.float64)
     triangle = _largest_triangle(sampled, faces)
     candidates = np.flatnonzero(triangle >= 0)
     if not len(candidates):
@@ -68,14 +68,14 @@ def find_seeds(sampled: Float64, faces: Int32, n_clusters: int) -> Int64:
     return np.asarray(faces[np.unique(triangle[seeds])], np.int64)
 
 
-def cluster(sampled: Float64, seeds: Int64) -> Int64:
+def cluster(sampled: Float32, seeds: Int64) -> Int64:
     """Return ``(V,)`` the seed in whose frame each vertex moves least; ``sampled (n, V, 3)``, ``seeds (K, 3)``."""
-    origins, axes = local_frames(sampled[:, seeds])
+    origins, axes = local_frames(sampled[:, seeds].astype(np.float64))
     if len(sampled) == 1:
-        return np.asarray(_nearest(sampled[0], origins[0]))
+        return np.asarray(_nearest(sampled[0].astype(np.float64), origins[0]))
     labels = np.empty(sampled.shape[1], np.int64)
     for first in range(0, len(labels), BLOCK):
-        block = sampled[:, first : first + BLOCK]
+        block = sampled[:, first : first + BLOCK].astype(np.float64)
         # |T_f (p_f - o_f) - T_g (p_g - o_g)|^2, summed; one product per seed carries all frames
         motion = np.empty((len(seeds), block.shape[1]))
         for k in range(len(seeds)):
@@ -92,14 +92,16 @@ def _nearest(points: Float64, origins: Float64) -> Int64:
     return np.asarray(KDTree(origins).query(points)[1], np.int64)
 
 
-def _largest_triangle(sampled: Float64, faces: Int32) -> Int64:
+def _largest_triangle(sampled: Float32, faces: Int32) -> Int64:
     """The incident triangle of each vertex whose least area over the frames is largest; -1 where none is proper."""
     best = np.full(sampled.shape[1], -1, np.int64)
     if not len(faces):
         return best
     least = np.full(len(faces), np.inf)
-    scale = float(np.abs(sampled - sampled[:1, :1]).max()) or 1.0
-    for points in sampled:
+    corner = sampled[0, 0].astype(np.float64)
+    scale = max(float(np.abs(frame - corner).max()) for frame in sampled) or 1.0
+    for frame in sampled:
+        points = frame.astype(np.float64)
         corners = (points[faces] - points[0]) / scale  # (T, 3, 3)
         edges = np.roll(corners, -1, axis=1) - corners
         area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)

@@ -22,6 +22,6 @@ def test_rigid_parts_are_found() -> None:
 def test_seeds_avoid_degenerate_triangles() -> None:
     points, faces = grid(6)
     thin = np.concatenate([np.repeat(faces[:, :1], 3, axis=1), faces])
-    seeds = find_seeds(points[None], thin.astype(np.int32), 12)
+    seeds = find_seeds(points[None].astype(np.float32), thin.astype(np.int32), 12)
     edges = points[seeds[:, 1:]] - points[seeds[:, :1]]
     assert (np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) > 1e-3).all()
