@@ -34,9 +34,8 @@ def encode_average(points: Float64, surface: Surface, coding: CoefficientCoding)
     unit = unit or float(np.abs(points).max(initial=0)) or 1.0
     own = _own_coding(coding)
     domain = build_domain(surface, None, own)
-    anchors, deltas, _ = encode_coefficients((points - points.mean(axis=0)) / unit, coding.average_step, domain, own)
-    data = pack_block(anchors) + deltas
-    return data, decode_average(data, surface, coding)
+    anchors, deltas, decoded = encode_coefficients((points - points.mean(axis=0)) / unit, coding.average_step, domain, own)
+    return pack_block(anchors) + deltas, decoded
 
 
 def decode_average(data: bytes, surface: Surface, coding: CoefficientCoding, budget: Budget = UNLIMITED) -> Float64:
