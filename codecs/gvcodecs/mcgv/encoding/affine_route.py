@@ -6,6 +6,7 @@ Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007. The target error
 from __future__ import annotations
 
 import dataclasses
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -35,8 +36,10 @@ def _predict(job: Job, start: Start) -> tuple[CodedMotion, Layout]:
     step = _extent(job, start) / 2**job.settings.transform_bits
     job.report("segment", 0)
     clusters = segment(start.sequence, start.base, start.points.neighbours, job.settings.clusters or CLUSTERS)
-    layout = lay_out(job, start, clusters, clusters)
-    motion = code_affine(start, clusters, step, job.report)
+    with ThreadPoolExecutor(1) as pool:  # xatlas, in a process of its own, beside the transforms
+        placed = pool.submit(lay_out, job, start, clusters, clusters)
+        motion = code_affine(start, clusters, step, job.report)
+        layout = placed.result()
     if start.placement == "halves":
         section = encode_slot_clusters(clusters)
     else:

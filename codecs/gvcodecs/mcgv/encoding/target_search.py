@@ -24,7 +24,7 @@ from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.quality_scale import error_of
 from gvpipe.rate_control.step_search import SLOPE, StepTrial, find_step, nearest
 
-GUESS = {"blended": 3.5, "affine": 2.5}  # steps by the error that they leave, root mean square over vertices
+GUESS = {"blended": 3.5, "affine": 1.65}  # steps by the error that they leave, root mean square over vertices
 BAND = {"blended": (0.9, 0.99), "affine": (1.0, 1.1)}  # of the target error: the published mode is no finer than asked
 FINE = 0.81  # part of the target error, from which on the first encode of a large sequence is kept
 FAR = 0.75, 1.4  # of the target error: what a blend is kept for
