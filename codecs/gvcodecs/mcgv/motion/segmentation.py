@@ -38,6 +38,7 @@ SEED = 2007
 REFINE_ROUNDS = 5
 REFINE_FRAMES = 160  # frames, evenly spaced, that refinement looks at
 LARGE = 1 << 16  # points whose motion vectors are held at a time; the principal axes of more are those of so many
+CLUSTERED = 1 << 14  # points of more than LARGE that k-means sees
 CACHED = 8  # frames fitted at once: of 70, what is between takes three times as long to write and read
 CHUNK_FLOATS = 8 << 20  # motion coefficients held at a time
 
@@ -171,8 +172,14 @@ def _principal_coordinates(rows: Float64) -> Float64:
 
 
 def _k_means(features: Float64, n_clusters: int) -> Int32:
-    from scipy.cluster.vq import kmeans2
+    """Labels ``(P,)``; more points than `LARGE` go to the nearest of the centres that some of them have."""
+    from scipy.cluster.vq import kmeans2, vq
 
+    if len(features) > LARGE:
+        some = features[:: -(-len(features) // CLUSTERED)]
+        labels = _k_means(some, n_clusters)
+        centres = np.array([some[labels == k].mean(axis=0) for k in range(int(labels.max()) + 1)])
+        return _relabel(vq(features, centres)[0])
     n_clusters = min(n_clusters, len(np.unique(np.round(features, 9), axis=0)))
     best, best_cost = np.zeros(len(features), np.int32), np.inf
     for restart in range(RESTARTS if n_clusters > 1 else 0):

@@ -105,3 +105,14 @@ def test_segmentation_numbers_its_clusters(n_clusters: int) -> None:
         clusters = segment(sequence, points, adjacency(triangles, 25), n_clusters)
         assert clusters.shape == (25,) and set(clusters.tolist()) == set(range(int(clusters.max()) + 1))
         assert clusters.max() < n_clusters
+
+
+def test_points_beyond_a_number_go_to_the_nearest_centre(monkeypatch: pytest.MonkeyPatch) -> None:
+    draw = np.random.default_rng(3)
+    own = draw.integers(0, 4, 900)
+    features = 10.0 * np.eye(4)[own] + draw.normal(0, 0.1, (900, 4))
+    whole = segmentation._k_means(features, 4)
+    monkeypatch.setattr(segmentation, "LARGE", 500)
+    monkeypatch.setattr(segmentation, "CLUSTERED", 100)
+    some = segmentation._k_means(features, 4)
+    assert len(set(zip(own, whole, strict=True))) == len(set(zip(own, some, strict=True))) == 4
