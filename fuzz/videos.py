@@ -18,6 +18,7 @@ from fuzz.boxes import Box, mutate_boxes, parse_boxes
 from fuzz.mutation import mutate_bytes, mutate_json
 from fuzz.parts import Parts, Seed, Target
 from fuzz.results import check_asset, check_faces, check_positions, check_text
+from gvpipe.asset_coding.listing import list_asset
 from gvpipe.container.bitstream import CHECKSUM, ENTRY, HEADER, MAGIC, PREFIX, VERSION
 from gvpipe.container.mp4 import BOX_UUID
 from gvpipe.errors import FormatError
@@ -128,7 +129,7 @@ def _read_all(video: Player) -> None:
         check_faces(coarse.faces, count)
         check_positions(coarse.read(0, 1), (1, count, 3))
     check_asset(video.sequence())
-    video.outline()
+    list_asset(video.directory, video.bitstream.outline or video.outline(), video.bitstream)
     for note in video.notes:
         check_text(note)
 

@@ -268,9 +268,10 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
     bitstream = read_file(check_path(source, "the geometry video"), unlimited)
     chosen = layout or (STREAM if bitstream.layout in (PLAIN, LIVE) else PLAIN)
     if bitstream.layout in (BARE, LIVE):  # which have no poster, or none that is read
-        player = Player(source, unlimited=unlimited)
-        video = bitstream.video or poster_of(player.sequence())
-        bitstream = dataclasses.replace(bitstream, video=video, is_bare=False, outline=player.outline())
+        bitstream = dataclasses.replace(bitstream, is_bare=False)
+        if not bitstream.video:
+            with Player(source, unlimited=unlimited) as player:
+                bitstream = dataclasses.replace(bitstream, video=poster_of(player.sequence()), outline=player.outline())
     with in_file(os.fspath(source)):
         size = write_file(bitstream, path, parts=segment_parts(bitstream) if chosen == STREAM else None)
     return Restreamed(chosen, bitstream.n_bytes, size)

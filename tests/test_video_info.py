@@ -15,7 +15,8 @@ from asset_scene import scene
 from odd_headers import header_of, payload_of
 
 import gvpipe
-from gvpipe.container.bitstream import unpack_payload
+from gvpipe.container.bitstream import Bitstream, pack_header, read_header, unpack_payload
+from gvpipe.container.json_object import pack_json
 from gvpipe.container.mp4 import read_file, write_file
 from gvpipe.container.outline import Outline
 from gvpipe.errors import CorruptFile
@@ -71,6 +72,20 @@ def test_files_of_earlier_versions_are_decoded(tmp_path: Path) -> None:
     gvpipe.encode(scene(), tmp_path / "now.mp4", "pca")
     write_file(dataclasses.replace(read_file(tmp_path / "now.mp4"), outline=None), tmp_path / "before.mp4")
     assert without_box(gvpipe.info(tmp_path / "now.mp4")) == without_box(gvpipe.info(tmp_path / "before.mp4"))
+
+
+def test_an_asset_of_a_newer_version_is_told_and_not_listed(tmp_path: Path) -> None:
+    gvpipe.encode(scene(), tmp_path / "a.mp4", "pca")
+    bitstream = read_file(tmp_path / "a.mp4")
+    newer = {**bitstream.sections, "asset": pack_json({"version": 2, "parts": []})}
+    write_file(dataclasses.replace(bitstream, sections=newer), tmp_path / "b.mp4")
+    found = gvpipe.info(tmp_path / "b.mp4")
+    assert found.parts == [] and found.polygons == {} and "all of it" in found.notes[0]
+
+
+def test_of_very_many_parts_a_header_says_nothing() -> None:
+    many = Bitstream("pca", 1, 1, 9, 1 << 20, 30.0, outline=Outline((0.0,) * 6, part_triangles=(1,) * 20_000))
+    assert read_header(pack_header(many, {}))[0].outline is None
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from typing import Any
 
 from gvpipe.asset.listing import Things, list_things
 from gvpipe.asset.part import Part
-from gvpipe.asset_coding.directory import Directory, Listed, file_notes, read_images
+from gvpipe.asset_coding.directory import VERSION, Directory, Listed, file_notes, read_images
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.outline import Outline
 from gvpipe.errors import corrupt
@@ -25,9 +25,11 @@ def list_asset(directory: Directory, outline: Outline, bitstream: Bitstream) -> 
     Raises:
         CorruptFile: the outline counts other parts than the directory has, or an image is none.
     """
-    parts, images = _parts(directory.parts, outline.part_triangles), read_images(directory, bitstream)
+    is_read = directory.version <= VERSION  # else parts and polygons are not read either
+    parts = _parts(directory.parts, outline.part_triangles) if is_read else []
+    polygons = outline.polygons if is_read else {}
     return {
-        **list_things(Things(parts, outline.polygons, directory.materials, images, directory.metadata)),
+        **list_things(Things(parts, polygons, directory.materials, read_images(directory, bitstream), directory.metadata)),
         "attributes": _listed(directory.attributes, bitstream),
         "fields": [
             {**values, "range": listed.range and list(listed.range)}

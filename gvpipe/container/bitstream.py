@@ -138,6 +138,7 @@ class Bitstream:
 
 def header_values(bitstream: Bitstream, extra: Mapping[str, Any]) -> dict[str, Any]:
     """The header as JSON values; ``extra`` is the container's own part of it."""
+    outline = None if bitstream.is_bare else bitstream.outline
     return {
         "codec": bitstream.codec,
         "version": bitstream.version,
@@ -146,7 +147,7 @@ def header_values(bitstream: Bitstream, extra: Mapping[str, Any]) -> dict[str, A
         "triangles": bitstream.n_triangles,
         "fps": bitstream.fps,
         **({"origin": list(bitstream.origin)} if bitstream.origin != NO_ORIGIN else {}),
-        **({KEY: bitstream.outline.to_json()} if bitstream.outline is not None and not bitstream.is_bare else {}),
+        **({KEY: outline.to_json()} if outline and outline.is_short else {}),
         "container": dict(extra),
         "settings": dict(bitstream.header),
     }

@@ -19,7 +19,7 @@ from gvpipe.container.json_object import JsonObject
 KEY = "outline"
 LARGEST = 3.5e38  # above float32's largest number
 MAX_LEVELS = 64
-MOST = 1 << 22  # parts, or kinds of polygons
+MOST = 1 << 14  # parts, or kinds of polygons: of more, a file says nothing, since headers are limited
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,11 @@ class Outline:
             values.integers_up_to("triangles", MOST, 0, n_triangles),
             dict(zip(pairs[::2], pairs[1::2], strict=True)),
         )
+
+    @property
+    def is_short(self) -> bool:
+        """Whether it goes into a header."""
+        return max(len(self.part_triangles), len(self.polygons)) <= MOST
 
     def to_json(self) -> dict[str, Any]:
         """The value of the header's key."""

@@ -24,10 +24,12 @@ from gvpipe.errors import InputError
 from gvpipe.io.damage import reading
 from gvpipe.io.mesh import as_color
 from gvpipe.io.npz_asset import USUAL, asset_members, meta_units, read_asset
-from gvpipe.io.npz_fields import WRITE_AGAIN, NpzField, write_field
+from gvpipe.io.npz_fields import WRITE_AGAIN, NpzFrames, write_field
 from gvpipe.io.npz_odd import FIELD, is_known, odd_notes
 from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS
 from gvpipe.sequence import MeshSequence
+
+LARGE = 64 << 20  # bytes of positions that are read from a temporary file, frame by frame, in place of being kept in memory
 
 
 def write_npz(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
@@ -66,8 +68,9 @@ def read_npz(path: Path, fps: float | None = None) -> MeshSequence:
         if key not in arrays:
             held = ", ".join(members) or "nothing"
             raise InputError(f"{path} has no array {key!r} (it holds {held}); 'vertices' and 'faces' are needed")
-    vertices, faces = _as_vertices(arrays["vertices"], path), arrays["faces"]
-    is_assumed = fps is None and "fps" not in arrays and len(vertices) > 1
+    given = arrays["vertices"]
+    vertices, faces = given if isinstance(given, NpzFrames) else _as_vertices(given, path), arrays["faces"]
+    is_assumed = fps is None and "fps" not in arrays and vertices.shape[0] > 1
     if not faces.size:
         raise InputError(f"{path}: 'faces' has no triangle; a mesh with triangles is needed")
     asset: dict[str, Any] = {}
@@ -91,8 +94,11 @@ def read_npz(path: Path, fps: float | None = None) -> MeshSequence:
     )
 
 
-def _load(path: Path) -> tuple[dict[str, NDArray[Any]], list[str], list[str]]:
-    """The arrays that are understood, names of fields, which are not loaded, and names of all members."""
+def _load(path: Path) -> tuple[dict[str, Any], list[str], list[str]]:
+    """The arrays that are understood, names of fields, which are not loaded, and names of all members.
+
+    ``vertices`` of more than `LARGE` bytes are not loaded either, if they need no more than to be read.
+    """
     # opened here because `numpy.load` leaves damaged files open
     with reading(path, ".npz", remedy=WRITE_AGAIN), open(path, "rb") as file:
         if not zipfile.is_zipfile(file):
@@ -101,9 +107,23 @@ def _load(path: Path) -> tuple[dict[str, NDArray[Any]], list[str], list[str]]:
         with np.load(file, allow_pickle=False) as archive:
             if len(set(archive.files)) < len(archive.files):
                 raise InputError(f"{path} has two members of one name; {WRITE_AGAIN}")
-            arrays = {key: _array(archive, key) for key in archive.files if is_known(key)}
+            large = _large_vertices(path, archive)
+            arrays: dict[str, Any] = {key: _array(archive, key) for key in archive.files if is_known(key) and key not in large}
+            arrays |= large
             fields = [key.removeprefix(FIELD) for key in archive.files if key.startswith(FIELD) and key != FIELD]
             return arrays, fields, list(archive.files)
+
+
+def _large_vertices(path: Path, archive: NpzFile) -> dict[str, NpzFrames]:
+    """The member ``vertices``, frame 0 of it read, where its positions are many and float32; else nothing."""
+    sizes = {entry.filename: entry.file_size for entry in archive.zip.infolist()} if archive.zip else {}
+    if sizes.get("vertices.npy", 0) <= LARGE:
+        return {}
+    frames = NpzFrames(path, "vertices")
+    if frames.dtype != np.float32 or len(frames.shape) != 3 or frames.shape[2] != 3 or not frames.shape[0]:
+        return {}
+    frames[0:1]  # from now on it lies in a temporary file, whatever becomes of the archive
+    return {"vertices": frames}
 
 
 def _array(archive: NpzFile, key: str) -> NDArray[Any]:
@@ -122,7 +142,7 @@ def _fields(
     """The fields, not loaded yet; what the description does not name is guessed from the shape."""
     made: dict[str, Field] = {}
     for name in names:
-        values, label = NpzField(path, f"field_{name}"), f"{path}: field {name!r}"
+        values, label = NpzFrames(path, f"field_{name}"), f"{path}: field {name!r}"
         one = described.get(name)
         if one is None:
             domain = "triangle" if values.shape[1] == rows["triangle"] != rows["vertex"] else "vertex"

@@ -1,4 +1,4 @@
-"""Animated fields in NumPy archives, written and read some frames at a time.
+"""Animated fields, and positions, in NumPy archives, written and read some frames at a time.
 
 A member of an archive is one deflated stream, so that frames in its middle cannot be had alone. It is inflated when the first
 frame is asked for, into an unnamed temporary file, which then gives any frames. A member in Fortran order, whose time runs
@@ -38,7 +38,7 @@ def write_field(file: IO[bytes], field: Field) -> None:
         file.write(np.ascontiguousarray(field.read(start, min(start + step, len(field))), kind).data)
 
 
-class NpzField:
+class NpzFrames:
     """A member ``(F, R)`` or ``(F, R, C)`` of an archive, inflated when it is first sliced.
 
     Args:
@@ -65,6 +65,9 @@ class NpzField:
         self._bytes_frame = int(np.prod(self.shape[1:], dtype=object)) * self.dtype.itemsize
         if n_bytes != self._bytes_frame * self.shape[0]:
             raise InputError(f"{path}: {member!r} has {n_bytes} bytes, its shape {self.shape} needs others; write it again")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return NpzFrames, (self._path.absolute(), self._member)
 
     def after_fork(self) -> None:
         """Inflate anew in a forked child: it would share the position in the file with its parent."""

@@ -20,7 +20,7 @@ from gvcodecs.laplacian.mesh_scale import edge_lengths
 from gvpipe.arrays import Float64
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block
-from gvpipe.errors import corrupt_section
+from gvpipe.errors import InputError, corrupt_section
 
 NAME = "average"
 SPACING = 256  # points per anchor
@@ -28,13 +28,21 @@ FARTHEST = 1e9  # mean edge lengths: what a decoded coordinate may have
 
 
 def encode_average(points: Float64, surface: Surface, coding: CoefficientCoding) -> tuple[bytes, Float64]:
-    """Code ``points (P, 3)``, model units; return the bytes and the decoded points in mean edge lengths."""
+    """Code ``points (P, 3)``, model units; return the bytes and the decoded points in mean edge lengths.
+
+    Raises:
+        InputError: a point lies too far from the others.
+    """
     lengths = edge_lengths(points, surface.edges)
     unit = float(lengths.mean()) if len(lengths) else 0.0
     unit = unit or float(np.abs(points).max(initial=0)) or 1.0
     own = _own_coding(coding)
     domain = build_domain(surface, None, own)
     anchors, deltas, decoded = encode_coefficients((points - points.mean(axis=0)) / unit, coding.average_step, domain, own)
+    if not _is_near(decoded):
+        raise InputError(
+            f"the mesh reaches over {FARTHEST:.0e} mean edge lengths or more, too far for laplacian; encode it as pca"
+        )
     return pack_block(anchors) + deltas, decoded
 
 
@@ -52,9 +60,14 @@ def decode_average(data: bytes, surface: Surface, coding: CoefficientCoding, bud
         domain = build_domain(surface, None, own, budget=budget)
         domain.system.equations.ask_to_solve(3)
     points = decode_coefficients(anchors, cursor.rest(), 3, coding.average_step, domain, own, (NAME, NAME))
-    if not np.abs(points).max(initial=0) < FARTHEST:
+    if not _is_near(points):
         raise corrupt_section(NAME, "a position is out of range")
     return points
+
+
+def _is_near(points: Float64) -> bool:
+    """Whether coordinates, mean edge lengths, are within what is decoded."""
+    return bool(np.abs(points).max(initial=0) < FARTHEST)
 
 
 def _own_coding(coding: CoefficientCoding) -> CoefficientCoding:

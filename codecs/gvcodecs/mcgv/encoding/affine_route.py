@@ -36,8 +36,11 @@ def _predict(job: Job, start: Start) -> tuple[CodedMotion, Layout]:
     step = _extent(job, start) / 2**job.settings.transform_bits
     job.report("segment", 0)
     clusters = segment(start.sequence, start.base, start.points.neighbours, job.settings.clusters or CLUSTERS)
+    quiet = dataclasses.replace(job, report=lambda stage, done: None)  # one thread alone reports
+    if start.placement == "charts":
+        job.report("parameterize", 0)
     with ThreadPoolExecutor(1) as pool:  # xatlas, in a process of its own, beside the transforms
-        placed = pool.submit(lay_out, job, start, clusters, clusters)
+        placed = pool.submit(lay_out, quiet, start, clusters, clusters)
         motion = code_affine(start, clusters, step, job.report)
         layout = placed.result()
     if start.placement == "halves":

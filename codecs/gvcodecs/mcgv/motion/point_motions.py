@@ -30,7 +30,7 @@ from gvpipe.trajectory.gram import descending_eigenvectors, is_tall, smaller_gra
 RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`
 FRAMES = 192  # frames, evenly spaced, that fitting looks at
 LARGE = 1 << 16  # points: surfaces of more have a coarse one; that of a smaller one would carry too few clusters
-SPACING, MOST_SITES = 4, 1 << 17  # points that one of the coarse surface stands for, least; points of it, most
+SPACING, MOST_SITES = 4, 1 << 17  # points that a coarse one stands for, least; coarse ones, most, beside one a piece
 DIMENSIONS = 40  # principal coordinates of motions that clusters start from
 ROUNDED = 0.025  # squared steps that rounding a number of the transforms leaves: many are of components too small to be coded
 PICTURED = 0.45  # steps, root mean square, that pictures leave of a point's residual
