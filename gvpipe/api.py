@@ -41,7 +41,8 @@ from gvpipe.tasks.segments import RemoteSegments
 
 COSTLY_VERTEX = 400  # bytes of memory, with its triangles: less than any codec takes
 COSTLY_ATTRIBUTES = 4000  # bytes of memory, of a vertex with attributes of 40 components in all
-SLOW_VERTEX = 20e-6  # seconds: less than `laplacian` takes where others take memory
+SLOW_VERTEX = {"laplacian": 20e-6}  # seconds that a reader asks for: less than `laplacian` takes where others take memory
+USUAL_VERTEX = 12e-6  # of other codecs, about what they take of a few frames
 
 if TYPE_CHECKING:
     from gvpipe.asset_coding.encoder import AssetCoder
@@ -528,7 +529,8 @@ def _refusal(path: StrPath, bitstream: Bitstream, size: int) -> list[str]:
     """A note if the file that was written is refused without ``unlimited``; looked at where vertices are many for its size."""
     budget, n_vertices = Budget(size), bitstream.n_vertices
     costly = COSTLY_ATTRIBUTES if ASSET_SECTION in bitstream.sections else COSTLY_VERTEX
-    if costly * n_vertices < budget.memory and SLOW_VERTEX * n_vertices < budget.seconds:
+    slow = SLOW_VERTEX.get(bitstream.codec, USUAL_VERTEX)
+    if costly * n_vertices < budget.memory and slow * n_vertices < budget.seconds:
         return []
     try:
         with Player(path) as video:
