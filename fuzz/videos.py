@@ -18,11 +18,11 @@ from fuzz.boxes import Box, mutate_boxes, parse_boxes
 from fuzz.mutation import mutate_bytes, mutate_json
 from fuzz.parts import Parts, Seed, Target
 from fuzz.results import check_asset, check_faces, check_positions, check_text
-from gvpipe.asset_coding.listing import list_asset
 from gvpipe.container.bitstream import CHECKSUM, ENTRY, HEADER, MAGIC, PREFIX, VERSION
 from gvpipe.container.mp4 import BOX_UUID
 from gvpipe.errors import FormatError
 from gvpipe.player import Player
+from gvpipe.video_info import info
 
 FILE = "case.mp4"
 VIDEO = "(video)"
@@ -107,7 +107,7 @@ def _target(name: str, seeds: tuple[Seed, ...], mutate: Callable[..., Parts]) ->
 
 
 def parse_video(path: Path) -> None:
-    """Open a file and read all of it that a player reads; of very large ones the ends.
+    """Open a file and read all of it that a player reads, and what it says of itself; of very large ones the ends.
 
     Raises:
         FormatError: it is refused.
@@ -115,6 +115,7 @@ def parse_video(path: Path) -> None:
     """
     with Player(path) as video:
         _read_all(video)
+    info(path)
 
 
 def _read_all(video: Player) -> None:
@@ -129,7 +130,6 @@ def _read_all(video: Player) -> None:
         check_faces(coarse.faces, count)
         check_positions(coarse.read(0, 1), (1, count, 3))
     check_asset(video.sequence())
-    list_asset(video.directory, video.bitstream.outline or video.outline(), video.bitstream)
     for note in video.notes:
         check_text(note)
 
