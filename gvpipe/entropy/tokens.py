@@ -56,6 +56,9 @@ def untokenise(tokens: Int64, cursor: Cursor) -> Int64:
     Raises:
         CorruptFile: the low bits have another length.
     """
+    if tokens.max(initial=0) < DIRECT:
+        cursor.end()
+        return (tokens >> 1) ^ -(tokens & 1)
     bits = (tokens - DIRECT) // 2 + 5
     n_extra = np.where(tokens < DIRECT, 0, bits - 2)
     total = int(n_extra.sum())

@@ -29,30 +29,52 @@ from gvpipe.trajectory.contexts import (
 
 @compiled
 def _log(value: int, inputs: ContextInputs) -> int:
-    """Logarithm to base two, in 1 / PER_OCTAVE, rounded down; of 0 as of 1/64."""
-    if 0 <= value < len(inputs.logs):
-        return int(inputs.logs[value])
-    x = 64 * max(value, 0) + 1
-    octave = 0
-    while x >> (octave + 1):
-        octave += 1
-    low, high = PER_OCTAVE * octave, PER_OCTAVE * octave + PER_OCTAVE - 1
-    while low < high:
-        middle = (low + high + 1) // 2
-        if inputs.roots[middle] <= x:
-            low = middle
-        else:
-            high = middle - 1
-    return low - 6 * PER_OCTAVE
+    """Logarithm of ``value >= 0`` to base two, in 1 / PER_OCTAVE, rounded down; of 0 as of 1/64."""
+    if value < len(inputs.logs):
+        return inputs.logs[value]  # type: ignore[no-any-return]
+    return _log_of_large(value, inputs)
 
 
 @compiled
-def _find_contexts(first: int, end: int, c: int, residuals: Int64, inputs: ContextInputs, before: Int64) -> Int64:
+def _log_of_large(value: int, inputs: ContextInputs) -> int:
+    """The same of what is not looked up: of a kernel's own, so that `_log` is small enough to be inlined."""
+    leading, shift = value, 0
+    while leading >= len(inputs.logs):
+        leading >>= 7
+        shift += 7
+    found = inputs.logs[leading] + PER_OCTAVE * (shift + 6)  # of 64 times the value; off by one at most
+    x = 64 * value + 1
+    while inputs.roots[found] > x:
+        found -= 1
+    while inputs.roots[found + 1] <= x:
+        found += 1
+    return found - 6 * PER_OCTAVE  # type: ignore[no-any-return]
+
+
+@compiled
+def _find_near(first: int, end: int, inputs: ContextInputs) -> Int64:
+    """``(end - first, N_NEAR + 1)``: how many causal neighbours count, 1 at least; ranks of those before ``first``, then -1."""
+    near = np.full((end - first, N_NEAR + 1), -1, np.int64)
+    for i in range(first, end):
+        count = min(inputs.ring_sizes[i], inputs.starts[i + 1] - inputs.starts[i], N_NEAR)
+        near[i - first, 0] = max(count, 1)
+        found = 0
+        for j in range(inputs.starts[i], inputs.starts[i] + count):
+            rank = inputs.rank[inputs.neighbours[j]]
+            if rank < first:
+                found += 1
+                near[i - first, found] = rank
+    return near
+
+
+@compiled
+def _find_contexts(first: int, end: int, c: int, residuals: Int64, inputs: ContextInputs, before: Int64, near: Int64) -> Int64:
     """``(end - first,)`` contexts of component c in the block of ranks ``first`` to ``end``.
 
     Args:
         residuals: ``(m, R)`` by rank, decoded for the blocks before and for this block's components before c.
         before: ``(R,)`` mean magnitudes of the block before, in 1 / ONE.
+        near: of the block (`_find_near`).
     """
     contexts = np.empty(end - first, np.int64)
     usual = inputs.usual
@@ -65,22 +87,23 @@ def _find_contexts(first: int, end: int, c: int, residuals: Int64, inputs: Conte
     fixed = POWERS[0] * _log(usual[c], inputs) + POWERS[1] * _log(before[c], inputs)
     fixed -= POWERS[3] * _log(usual_short + FLOOR_SPAN, inputs) + POWERS[4] * _log(usual_long + FLOOR_SPAN, inputs)
     for i in range(first, end):
-        near = usual[c]
+        around = usual[c]
         if first > 0:
-            count = min(inputs.ring_sizes[i], inputs.starts[i + 1] - inputs.starts[i], N_NEAR)
-            total = 0
-            for j in range(inputs.starts[i], inputs.starts[i] + count):
-                rank = inputs.rank[inputs.neighbours[j]]
-                if rank < first:
-                    total += ONE * abs(residuals[rank, c])
-            near = total // max(count, 1)
+            around = 0
+            for j in range(1, N_NEAR + 1):
+                rank = near[i - first, j]
+                if rank < 0:
+                    break
+                around += ONE * abs(residuals[rank, c])
+            if around:  # most are 0, and divisions are slow
+                around //= near[i - first, 0]
         short = long = 0
         for k in range(long_from, c):
             magnitude = ONE * abs(residuals[i, k])
             long += magnitude * LONG[c - 1 - k]
             if k >= short_from:
                 short += magnitude * SHORT[c - 1 - k]
-        forecast = fixed + POWERS[2] * _log(near + FLOOR_NEAR, inputs)
+        forecast = fixed + POWERS[2] * _log(around + FLOOR_NEAR, inputs)
         forecast += POWERS[3] * _log(short + FLOOR_SPAN, inputs) + POWERS[4] * _log(long + FLOOR_SPAN, inputs)
         octaves = forecast // POWER_ONE - 6 * PER_OCTAVE  # ONE is six octaves
         contexts[i - first] = min(max(octaves // (PER_OCTAVE // 2), LOWEST), HIGHEST) - LOWEST
@@ -104,8 +127,9 @@ def find_all_contexts(residuals: Int64, inputs: ContextInputs) -> UInt8:
     before = inputs.usual.copy()
     for b in range(len(inputs.blocks) - 1):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
+        near = _find_near(first, end, inputs)
         for c in range(residuals.shape[1]):
-            contexts[first:end, c] = _find_contexts(first, end, c, residuals, inputs, before)
+            contexts[first:end, c] = _find_contexts(first, end, c, residuals, inputs, before, near)
         _mean_magnitudes(residuals, first, end, before)
     return contexts
 
@@ -126,8 +150,9 @@ def decode_residuals(
     """
     for b in range(first_block, end_block):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
+        near = _find_near(first, end, inputs)
         for c in range(residuals.shape[1]):
-            contexts = _find_contexts(first, end, c, residuals, inputs, before)
+            contexts = _find_contexts(first, end, c, residuals, inputs, before, near)
             values, status = take_block(stream, contexts)
             if status:
                 return status

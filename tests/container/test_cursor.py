@@ -22,11 +22,18 @@ def test_varints(values: list[int]) -> None:
     cursor = Cursor(data, "x")
     assert [cursor.varint(2**64 - 1) for _ in values] == values and cursor.left == 0
     cursor.end()
+    at_once = Cursor(data, "x")
+    assert at_once.varints(len(values), 2**64 - 1) == values and at_once.left == 0
     if values:
         with pytest.raises(CorruptFile, match="section 'x'"):
             short = Cursor(data[:-1], "x")
             for _ in values:
                 short.varint(2**64 - 1)
+        with pytest.raises(CorruptFile, match="section 'x'"):
+            Cursor(data[:-1], "x").varints(len(values), 2**64 - 1)
+    if max(values, default=0):
+        with pytest.raises(CorruptFile, match=f"a length is {max(values)}, above its limit"):
+            Cursor(data, "x").varints(len(values), max(values) - 1, "a length")
 
 
 def test_cursor_checks_every_read() -> None:
@@ -35,6 +42,8 @@ def test_cursor_checks_every_read() -> None:
         lambda c: c.array("<u2", 2),
         lambda c: c.array("<f8", 1 << 62),
         lambda c: c.varint(0x81),
+        lambda c: c.varints(2, 0x81),
+        lambda c: c.varints(3, 0x82),
         lambda c: c.end(),
         lambda c: c.struct(ENTRY),
     ]

@@ -37,3 +37,26 @@ def test_compiled_range_decoder_reads_what_the_library_writes(seed: int) -> None
             assert range_decoder.decode_symbol(state, words, range_decoder.edges_of(table)) == value
     assert range_decoder.may_be_exhausted(state, words)
     assert len(words) < 3 or not range_decoder.may_be_exhausted(range_decoder.start(words), words)
+
+
+def test_symbols_of_one_model_at_once() -> None:
+    """As one after another, and nothing is lost between two models; words that no encoder writes are refused."""
+    constriction = pytest.importorskip("constriction")
+    rng = np.random.default_rng(1)
+    coder = constriction.stream.queue.RangeEncoder()
+    runs = []
+    for size in (2, 40, 88, 3):
+        counts = rng.integers(0, 4097, size) + 1
+        symbols = rng.choice(size, int(rng.integers(0, 900)), p=counts / counts.sum())
+        runs.append((counts, symbols))
+        model = constriction.stream.model.Categorical(counts.astype(float) / float(counts.sum()), perfect=False)
+        coder.encode(symbols.astype(np.int32), model)
+    words = coder.get_compressed().astype(np.uint32)
+    state = range_decoder.start(words)
+    for counts, symbols in runs:
+        found = np.zeros(len(symbols), np.int64)
+        assert range_decoder.decode_symbols(state, words, range_decoder.edges_of(counts), found)
+        assert (found == symbols).all()
+    assert range_decoder.may_be_exhausted(state, words)
+    state = np.array([1 << 63, 1 << 33, 2], np.uint64)  # beyond the range
+    assert not range_decoder.decode_symbols(state, words, range_decoder.edges_of(runs[0][0]), np.zeros(1, np.int64))
