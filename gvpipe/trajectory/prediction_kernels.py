@@ -162,43 +162,49 @@ def _sum_covariances(spread: Float64, n: int, covariances: Float64) -> float:
 
 @compiled
 def _predict_many(coding: VectorCoding, begin: int, end: int, most: int) -> None:
-    """Predict by the covariances of the neighbours' weights: of R components in 2 n**2 R products."""
-    causal, decoded = coding.causal, coding.decoded
-    weights, values, direction = np.zeros(most), np.zeros(most), np.zeros(most)
-    covariance = np.zeros((most, most))
-    noise = coding.step * coding.step
+    """Predict by the covariances of the neighbours' weights: of R components in 2 n**2 R products.
+
+    A component's update of the covariances, ``gains * directions'``, waits for the next component, whose products with them
+    take the same loop.
+    """
+    causal, decoded, noise = coding.causal, coding.decoded, coding.step * coding.step
+    memory, covariances = np.zeros((5, most)), np.zeros((most, most))
     for i in range(begin, end):
         first = causal.starts[i]
         n = causal.starts[i + 1] - first
+        weights, values, directions = memory[0][:n], memory[1][:n], memory[2][:n]
+        gains, products = memory[3][:n], memory[4][:n]
         total = 0.0
         for j in range(n):
             weights[j] = causal.weights[first + j]
             total += causal.variances[first + j]
         for j in range(n):
+            directions[j] = gains[j] = 0.0
             for k in range(n):
-                covariance[j, k] = 0.0
-            covariance[j, j] = causal.variances[first + j]
+                covariances[j, k] = 0.0
+            covariances[j, j] = causal.variances[first + j]
             if causal.affine:  # condition on the sum of the weights
                 for k in range(n):
-                    covariance[j, k] -= causal.variances[first + j] * causal.variances[first + k] / total
+                    covariances[j, k] -= causal.variances[first + j] * causal.variances[first + k] / total
         for c in range(decoded.shape[1]):
             guess = 0.0
             for j in range(n):
                 values[j] = decoded[causal.neighbours[first + j], c]
                 guess += weights[j] * values[j]
+                products[j] = 0.0
             change = _code(coding, i, c, guess)
+            for k in range(n):
+                row, direction, value = covariances[k][:n], directions[k], values[k]
+                for j in range(len(row)):
+                    row[j] -= gains[j] * direction
+                    products[j] += row[j] * value
             variance = noise  # of the component's prediction
             for j in range(n):
-                total = 0.0
-                for k in range(n):
-                    total += covariance[j, k] * values[k]
-                direction[j] = total
-                variance += (1 + DOUBT) * total * values[j]
+                directions[j] = products[j]
+                variance += (1 + DOUBT) * directions[j] * values[j]
             for j in range(n):
-                gain = direction[j] / variance
-                weights[j] += gain * change
-                for k in range(n):
-                    covariance[j, k] -= gain * direction[k]
+                gains[j] = directions[j] / variance
+                weights[j] += gains[j] * change
 
 
 @compiled
