@@ -219,7 +219,7 @@ def _find_ear(size: int, lists: CornerLists, hole: Hole) -> int:
     """The place in the polygon whose ear costs least, of those whose cut is no edge yet; -1 if there is none."""
     best, best_cost = -1, 0
     for i in range(size):
-        a, b, c = hole.polygon[(i - 1) % size], hole.polygon[i], hole.polygon[(i + 1) % size]
+        a, b, c = hole.polygon[i - 1 if i else size - 1], hole.polygon[i], hole.polygon[i + 1 if i + 1 < size else 0]
         rise = 2 * hole.excess[a] + 2 * hole.excess[c] - 2 * hole.excess[b]
         if best >= 0 and rise >= best_cost:
             continue
@@ -233,8 +233,9 @@ def _find_ear(size: int, lists: CornerLists, hole: Hole) -> int:
 def _cut_ear(place: int, size: int, count: int, hole: Hole) -> None:
     """Make triangle ``count`` of the polygon's vertex at ``place`` and its two neighbours, and take that vertex out."""
     polygon = hole.polygon
+    before, after = place - 1 if place else size - 1, place + 1 if place + 1 < size else 0  # divisions are slow
     for k in range(3):
-        corner = polygon[(place + k - 1) % size]
+        corner = polygon[before if k == 0 else place if k == 1 else after]
         hole.triangles[count, k] = hole.ring[corner]
         hole.excess[corner] += 1
     for i in range(place, size - 1):

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Int32, Int64
+from gvpipe.arrays import Int32, Int64
 from gvpipe.compiled import compiled
 from gvpipe.mesh.corner_lists import CornerLists, Hole, empty_hole, fill_hole, find_ring, link, link_corners, unlink
 
@@ -27,7 +27,6 @@ MAX_RING = 12  # most neighbours of a vertex that is removed
 MAX_NEIGHBOURS = 20  # most vertices kept about a vertex: its ring, then what lies across the ring, then what touches the ring
 MIN_COARSE = 16  # vertices; decimation stops here at the latest
 REGULAR, REGULAR_BOUNDARY = 6, 3  # triangles around a vertex
-NEVER = 1 << 40  # the cost of what cannot be removed
 
 
 class Decimation(NamedTuple):
@@ -60,13 +59,11 @@ def decimate(faces: Int32, n_vertices: int, max_waves: int) -> Decimation:
     waves, starts = np.zeros(max_waves + 1, np.int32), np.zeros(n_vertices + 1, np.int32)
     neighbours = np.empty((n_vertices + 1) * MAX_NEIGHBOURS + 2 * MAX_RING, np.int32)
     locked = np.full(n_vertices, -1, np.int32)  # the last wave that touched a vertex
-    is_gone = np.zeros(n_vertices, np.bool_)
     n_gone, n_waves = 0, 0
     while n_waves < max_waves and n_vertices - n_gone > MIN_COARSE:
-        costs, n_candidates = _removal_costs(is_gone, lists, regular, hole)
-        by_cost = np.argsort(costs, kind="mergesort")
-        for i in range(n_candidates):
-            v = by_cost[i]
+        candidates, costs = _removal_costs(lists, regular, hole)
+        for i in np.argsort(costs, kind="mergesort"):
+            v = candidates[i]
             if n_vertices - n_gone <= MIN_COARSE:
                 break
             if locked[v] == n_waves:
@@ -83,7 +80,6 @@ def decimate(faces: Int32, n_vertices: int, max_waves: int) -> Decimation:
             start = starts[n_gone]
             starts[n_gone + 1] = start + _list_neighbours(size, closed, lists, hole, neighbours[start : start + MAX_NEIGHBOURS])
             _add_triangles(n_new, lists, hole, freed)
-            is_gone[v] = True
             order[n_gone] = v
             rings[n_gone] = size if closed else -size
             n_gone += 1
@@ -113,12 +109,12 @@ def _regular_degrees(n_vertices: int, lists: CornerLists, hole: Hole) -> Int32:
 
 
 @compiled
-def _removal_costs(is_gone: Bool, lists: CornerLists, regular: Int32, hole: Hole) -> tuple[Int64, int]:
-    """``(V,)`` what each vertex' removal costs, and how many vertices can be removed."""
-    costs = np.full(len(is_gone), NEVER, np.int64)
-    n_candidates = 0
-    for v in range(len(is_gone)):
-        if is_gone[v] or lists.head[v] < 0:
+def _removal_costs(lists: CornerLists, regular: Int32, hole: Hole) -> tuple[Int32, Int64]:
+    """The n vertices that can be removed, ascending, and what the removal of each costs."""
+    candidates, costs = np.empty(len(regular), np.int32), np.empty(len(regular), np.int64)
+    n = 0
+    for v in range(len(regular)):
+        if lists.head[v] < 0:  # it is gone, or has no triangle
             continue
         size, closed = find_ring(v, lists, hole)
         if size < 2:
@@ -126,9 +122,9 @@ def _removal_costs(is_gone: Bool, lists: CornerLists, regular: Int32, hole: Hole
         n_new, cost = fill_hole(size, closed, lists, regular, hole)
         if n_new >= 0:
             own = lists.degree[v] - regular[v]
-            costs[v] = cost - own * own
-            n_candidates += 1
-    return costs, n_candidates
+            candidates[n], costs[n] = v, cost - own * own
+            n += 1
+    return candidates[:n], costs[:n]
 
 
 @compiled
