@@ -38,7 +38,7 @@ BARE: dict[str, Any] = {
     "materials": (),
     "images": (),
 }
-CHUNK_BYTES = 16 << 20  # positions handed out at a time by `chunks`: large enough to vectorise, small beside any budget
+CHUNK_BYTES = 4 << 20  # positions handed out at a time by `chunks`: large enough to vectorise, small beside any budget
 
 
 @dataclass(frozen=True, eq=False, repr=False)

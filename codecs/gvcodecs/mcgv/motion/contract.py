@@ -15,7 +15,7 @@ from gvcodecs.mcgv.layout.layout import Layout
 from gvpipe.arrays import Array, Float32, Float64, Int64
 from gvpipe.sequence import MeshSequence
 
-PREDICTED = 1 << 20  # vertices of all frames that are predicted at once: more are of no use, and take 100 bytes each
+PREDICTED = 1 << 18  # vertices of all frames that are predicted at once: more are of no use, and take 100 bytes each
 
 
 @dataclass(frozen=True)

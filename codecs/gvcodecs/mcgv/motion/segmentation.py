@@ -27,7 +27,7 @@ from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
 from gvpipe.arrays import Float64, Int32, Int64, Integers
 from gvpipe.mesh.topology import k_ring
 from gvpipe.sequence import MeshSequence
-from gvpipe.trajectory.gram import descending_eigenvectors, smaller_gram
+from gvpipe.trajectory.gram import descending_eigenvectors
 
 RING = 3  # order of the neighbourhood, the paper's
 DIMENSIONS = 40  # principal coordinates of the motion vectors that k-means sees
@@ -37,10 +37,12 @@ RESTARTS = 4  # of k-means; the best is kept
 SEED = 2007
 REFINE_ROUNDS = 5
 REFINE_FRAMES = 160  # frames, evenly spaced, that refinement looks at
-LARGE = 1 << 16  # points whose motion vectors are held at a time; the principal axes of more are those of so many
+LARGE = 1 << 16  # points whose motion vectors are held at once; the principal axes of more are those of so many
+BLOCK = 1 << 13  # points whose motion vectors are worked out at a time
 CLUSTERED = 1 << 14  # points of more than LARGE that k-means sees
 CACHED = 8  # frames fitted at once: of 70, what is between takes three times as long to write and read
 CHUNK_FLOATS = 8 << 20  # motion coefficients held at a time
+FITTED_FLOATS = 2 << 20  # the same, fitted at once where points are many
 
 
 def segment(sequence: MeshSequence, base: Float64, neighbours: sparse.csr_array, n_clusters: int) -> Int32:
@@ -68,11 +70,16 @@ def motion_features(sequence: MeshSequence, base: Float64, ring: sparse.csr_arra
     fit = LocalAffineFit(unit, ring)
     features: Float64 = np.zeros((len(base), 0))
     step = max(1, CHUNK_FLOATS // (12 * len(base)))
+    together = max(1, min(CACHED, FITTED_FLOATS // (12 * len(base))))
     for first in range(0, sequence.n_frames, step):
-        frames = sequence.read(first, min(first + step, sequence.n_frames)).astype(np.float64)
-        blocks = [(frames[k : k + CACHED] - centre) / scale for k in range(0, len(frames), CACHED)]
-        motion = np.concatenate([fit.motion(block) for block in blocks], axis=1)  # (P, n, 4, 3)
-        features = _principal_coordinates(np.hstack([features, motion.reshape(len(base), -1)]))
+        frames = sequence.read(first, min(first + step, sequence.n_frames))
+        rows = np.empty((len(base), features.shape[1] + 12 * len(frames)))
+        rows[:, : features.shape[1]] = features
+        motions = rows[:, features.shape[1] :]
+        for k in range(0, len(frames), together):
+            motion = fit.motion((frames[k : k + together].astype(np.float64) - centre) / scale)  # (P, n, 4, 3)
+            motions[:, 12 * k : 12 * (k + together)] = motion.reshape(len(base), -1)
+        features = _principal_coordinates(rows)
     return features
 
 
@@ -121,12 +128,21 @@ def local_motions(base: Float64, ring: sparse.csr_array, columns: Float64) -> Fl
     """
     centre, scale = (base.min(axis=0) + base.max(axis=0)) / 2, max(float(np.ptp(base, axis=0).max()), 1e-30)
     unit, moved = (base - centre) / scale, columns / scale
+    everyone = np.arange(len(base))
     if len(base) <= LARGE:
-        return _principal_coordinates(_motion_rows(unit, moved, ring, np.arange(len(base))))
-    some = np.arange(0, len(base), -(-len(base) // LARGE))
-    axes = descending_eigenvectors(smaller_gram(_motion_rows(unit, moved, ring, some)))[1][:, :DIMENSIONS]
-    blocks = (np.arange(first, min(first + LARGE, len(base))) for first in range(0, len(base), LARGE))
-    return np.concatenate([_motion_rows(unit, moved, ring, block) @ axes for block in blocks])
+        rows = np.empty((len(base), 4 * columns.shape[1]))
+        for block in _blocks(everyone):
+            rows[block] = _motion_rows(unit, moved, ring, block)
+        return _principal_coordinates(rows)
+    some = everyone[:: -(-len(base) // LARGE)]
+    gram = sum(rows.T @ rows for rows in (_motion_rows(unit, moved, ring, block) for block in _blocks(some)))
+    axes = descending_eigenvectors(np.asarray(gram))[1][:, :DIMENSIONS]
+    return np.concatenate([_motion_rows(unit, moved, ring, block) @ axes for block in _blocks(everyone)])
+
+
+def _blocks(points: Int64) -> list[Int64]:
+    """Points in parts of `BLOCK`."""
+    return [points[first : first + BLOCK] for first in range(0, len(points), BLOCK)]
 
 
 def _motion_rows(unit: Float64, moved: Float64, ring: sparse.csr_array, points: Int64) -> Float64:
@@ -139,12 +155,13 @@ def _motion_rows(unit: Float64, moved: Float64, ring: sparse.csr_array, points: 
     outer = (unit[:, :, None] * unit[:, None, :]).reshape(-1, 9)
     spread = (ring @ outer).reshape(-1, 3, 3) - size[:, :, None] * (mean[:, :, None] * mean[:, None, :])
     ridge = RIDGE * np.trace(spread, axis1=1, axis2=2) + 1e-12
-    cross = np.stack(
-        [ring @ (unit[:, i, None] * moved) - size * mean[:, i, None] * shift for i in range(3)], axis=1
-    )  # (n, 3, m)
-    linear = np.linalg.inv(spread + ridge[:, None, None] * np.eye(3)) @ cross
-    translation = shift - np.einsum("pi,pim->pm", mean, linear)
-    return np.concatenate([linear.reshape(len(points), -1), translation], axis=1)
+    rows = np.empty((len(points), 4, moved.shape[1]))
+    linear = rows[:, :3]
+    for i in range(3):
+        linear[:, i] = ring @ (unit[:, i, None] * moved) - size * mean[:, i, None] * shift
+    linear[:] = np.linalg.inv(spread + ridge[:, None, None] * np.eye(3)) @ linear
+    rows[:, 3] = shift - np.einsum("pi,pim->pm", mean, linear)
+    return rows.reshape(len(points), -1)
 
 
 def refine(sequence: MeshSequence, base: Float64, ring: sparse.csr_array, clusters: Int32) -> Int32:
@@ -165,8 +182,8 @@ def _principal_coordinates(rows: Float64) -> Float64:
         u, s, _ = np.linalg.svd(rows, full_matrices=False)
         return np.asarray((u * s)[:, :DIMENSIONS])
     probe = np.random.default_rng(SEED).standard_normal((rows.shape[1], DIMENSIONS + OVERSAMPLING))
-    basis = np.linalg.qr(rows @ probe)[0]
-    basis = np.linalg.qr(rows @ (rows.T @ basis))[0]
+    turned = rows.T @ np.linalg.qr(rows @ probe)[0]  # (n, m): of the tall matrices only one is held at a time
+    basis = np.linalg.qr(rows @ turned)[0]
     u, s, _ = np.linalg.svd(basis.T @ rows, full_matrices=False)
     return np.asarray((basis @ (u * s))[:, :DIMENSIONS])
 
