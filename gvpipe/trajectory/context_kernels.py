@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64, UInt8
+from gvpipe.arrays import Int32, Int64, UInt8
 from gvpipe.compiled import compiled
 from gvpipe.entropy.block_kernels import OUT_OF_RANGE, BlockStream, take_block
 from gvpipe.trajectory.contexts import (
@@ -29,9 +29,9 @@ from gvpipe.trajectory.contexts import (
 
 @compiled
 def _log(value: int, inputs: ContextInputs) -> int:
-    """Logarithm of ``value >= 0`` to base two, in 1 / PER_OCTAVE, rounded down; of 0 as of 1/64."""
+    """Logarithm to base two, in 1 / PER_OCTAVE, rounded down; of 0, and of sums of a hostile file that overflow, as of 1/64."""
     if value < len(inputs.logs):
-        return inputs.logs[value]  # type: ignore[no-any-return]
+        return inputs.logs[max(value, 0)]  # type: ignore[no-any-return]
     return _log_of_large(value, inputs)
 
 
@@ -52,9 +52,14 @@ def _log_of_large(value: int, inputs: ContextInputs) -> int:
 
 
 @compiled
-def _find_near(first: int, end: int, inputs: ContextInputs) -> Int64:
-    """``(end - first, N_NEAR + 1)``: how many causal neighbours count, 1 at least; ranks of those before ``first``, then -1."""
-    near = np.full((end - first, N_NEAR + 1), -1, np.int64)
+def _find_near(first: int, end: int, inputs: ContextInputs) -> Int32:
+    """``(end - first, N_NEAR + 1)``: how many causal neighbours count, 1 at least; ranks of those before ``first``, then -1.
+
+    None of the first block, which may be large, and has nothing before it.
+    """
+    near = np.full((end - first if first else 0, N_NEAR + 1), -1, np.int32)
+    if first == 0:
+        return near
     for i in range(first, end):
         count = min(inputs.ring_sizes[i], inputs.starts[i + 1] - inputs.starts[i], N_NEAR)
         near[i - first, 0] = max(count, 1)
@@ -68,7 +73,7 @@ def _find_near(first: int, end: int, inputs: ContextInputs) -> Int64:
 
 
 @compiled
-def _find_contexts(first: int, end: int, c: int, residuals: Int64, inputs: ContextInputs, before: Int64, near: Int64) -> Int64:
+def _find_contexts(first: int, end: int, c: int, residuals: Int64, inputs: ContextInputs, before: Int64, near: Int32) -> Int64:
     """``(end - first,)`` contexts of component c in the block of ranks ``first`` to ``end``.
 
     Args:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int32, Int64
+from gvpipe.arrays import Float32, Float64, Int32, Int64
 from gvpipe.compiled import compiled
 
 BLOCK = 1024  # columns at a time: a block of four vectors stays in the cache
@@ -55,6 +55,24 @@ def weighted_sums(weights: Float64, vectors: Float64) -> Float64:
                 for p in range(len(sums)):
                     sums[p] += u * a[p]
     return result
+
+
+@compiled
+def place_points(points: Float64, vertices: Int64, largest: float, frames: Float32) -> int:
+    """Give each vertex of ``frames (n, V, 3)`` its point of ``points (n, 3, P)``; return the first frame not to have it, or n.
+
+    Args:
+        vertices: ``(V,)`` their points.
+        largest: coordinates beyond it, and NaN, end the work.
+    """
+    for i in range(len(frames)):
+        frame, x, y, z = frames[i], points[i, 0], points[i, 1], points[i, 2]
+        for v in range(len(frame)):
+            point = vertices[v]
+            if not (abs(x[point]) <= largest and abs(y[point]) <= largest and abs(z[point]) <= largest):
+                return i
+            frame[v, 0], frame[v, 1], frame[v, 2] = x[point], y[point], z[point]
+    return len(frames)
 
 
 @compiled

@@ -45,8 +45,9 @@ def read_frames(start: int, stop: int, bounds: list[int], points: Integers, deco
     Raises:
         CorruptFile: a position is not finite in float32, or a segment does not decode.
     """
-    result = np.empty((stop - start, len(points), 3), np.float32)
-    buffer = np.empty((3, len(points)))
+    from gvpipe.trajectory.product_kernels import place_points
+
+    result, vertices = np.empty((stop - start, len(points), 3), np.float32), np.asarray(points, np.int64)
     for s, (begin, end) in enumerate(pairwise(bounds)):
         first, last = max(start, begin), min(stop, end)
         if first >= last:
@@ -54,9 +55,7 @@ def read_frames(start: int, stop: int, bounds: list[int], points: Integers, deco
         segment = decode(s)
         for frame in range(first, last, TOGETHER):
             positions = segment.positions(frame - begin, min(frame + TOGETHER, last) - begin)  # (n, 3, P)
-            for i in range(len(positions)):
-                np.take(positions[i], points, axis=1, out=buffer)
-                if not np.abs(buffer).max(initial=0) <= MAX_FLOAT32:
-                    raise corrupt(f"frame {frame + i} does not decode to finite positions")
-                result[frame + i - start] = buffer.T
+            n = place_points(positions, vertices, MAX_FLOAT32, result[frame - start : frame - start + len(positions)])
+            if n < len(positions):
+                raise corrupt(f"frame {frame + n} does not decode to finite positions")
     return result

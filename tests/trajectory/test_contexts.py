@@ -23,3 +23,11 @@ def test_logarithms_are_exact() -> None:
             n = _log(int(value), inputs) + 6 * PER_OCTAVE
             power = (64 * int(value) + 2) ** PER_OCTAVE  # in whole numbers: 2 ** (n / 16) < x + 1 <= 2 ** ((n + 1) / 16)
             assert 1 << n < power <= 1 << (n + 1)
+
+
+def test_sums_that_overflow_are_looked_up_within_the_table() -> None:
+    """Millions of the largest residuals in a block wrap around; the next block's contexts are contexts all the same."""
+    none = np.zeros(0, np.int32)
+    causal = CausalOrder(none, np.zeros(1, np.int32), none, np.zeros(0), np.zeros(0), none, np.zeros(1, np.int32), True)
+    inputs = context_inputs(causal, 0, np.zeros(0, np.int64), 0)
+    assert _log(-(1 << 42), inputs) == _log(0, inputs) < _log(1, inputs)
