@@ -11,8 +11,8 @@ Predictors, after Vasa and Skala, "Geometry-Driven Local Neighbourhood Based Pre
 ``rbf``     interpolation by radial functions r**beta with a constant and its side condition (section 3.5), distances growing
             with every component; ``lsp`` in the coarsest mesh.
 ``kalman``  the section's idea as Bayes has it, and the default. Weights have a prior mean (``navg``'s) and covariance, which
-            each decoded component updates, at the price of a matrix-vector product at most. It never degenerates. So it uses many
-            more neighbours than the ring, and large components may come first.
+            each decoded component updates, at the price of one matrix-vector product at most. It never degenerates. So it
+            can use many more neighbours than the ring, and large components may come first.
 
 One body predicts in encoder and decoder, so that the two cannot differ but by rounding. Rounding moves a value by as little and
 never a residual, since these are integers. What decoded values decide is which of two forms of ``kalman`` works out the same
