@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,8 @@ BOUNDS = [0, 10, 13]
 
 def test_vertices_get_their_points_from_any_segment() -> None:
     segments, points = _segments(), np.array([2, 0, 0, 3, 1])
-    whole = np.concatenate([segment.positions(0, end - begin) for segment, begin, end in zip(segments, BOUNDS, BOUNDS[1:])])
+    spans = zip(segments, pairwise(BOUNDS), strict=True)
+    whole = np.concatenate([segment.positions(0, end - begin) for segment, (begin, end) in spans])
     expected = whole.astype(np.float32)[:, :, points].swapaxes(1, 2)
     for start, stop in ((0, 13), (3, 4), (9, 12), (5, 5)):
         assert np.array_equal(read_frames(start, stop, BOUNDS, points, lambda s: segments[s]), expected[start:stop])
