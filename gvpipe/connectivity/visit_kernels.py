@@ -9,7 +9,7 @@ import numpy as np
 from gvpipe.arrays import Bool, Int64, UInt32, UInt64
 from gvpipe.compiled import compiled
 from gvpipe.connectivity.visit_symbols import ESCAPE, EXACT_RANKS
-from gvpipe.entropy.range_decoder import decode_symbol, decode_uniform
+from gvpipe.entropy.range_decoder import decode_symbols, decode_uniform
 
 SHORT_LIST = 64  # neighbours that are sorted by insertion
 
@@ -51,10 +51,8 @@ def decode_ranks(state: UInt64, words: UInt32, edges: UInt64, coded: CodedVisits
     """
     ranks, jumps = coded.ranks, coded.jumps
     n_vertices = len(ranks)
-    for v in range(n_vertices):
-        ranks[v] = decode_symbol(state, words, edges)
-        if ranks[v] < 0:
-            return False
+    if not decode_symbols(state, words, edges, ranks):
+        return False
     for v in range(n_vertices):
         symbol, low = ranks[v], 0
         above = max(symbol - EXACT_RANKS, 0)

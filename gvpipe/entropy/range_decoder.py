@@ -87,9 +87,9 @@ def decode_symbol(state: UInt64, words: UInt32, edges: UInt64) -> int:
 def decode_symbols(state: UInt64, words: UInt32, edges: UInt64, symbols: Int64) -> bool:
     """Fill ``symbols (n,)`` with the next of a model with these edges; False where the words are not what an encoder writes.
 
-    The body of `decode_symbol` with the state in registers: three times as fast where many symbols have one model.
+    The state stays in registers: three times as fast as one `decode_symbol` after another.
     """
-    point, extent, place, n_words = state[0], state[1], np.int64(state[2]), len(words)
+    point, extent, place = state[0], state[1], state[2]
     for i in range(len(symbols)):
         scale = extent >> SHIFT
         quantile = point // scale
@@ -100,15 +100,10 @@ def decode_symbols(state: UInt64, words: UInt32, edges: UInt64, symbols: Int64) 
             symbol += 1
             left, right = right, edges[symbol + 1]
         symbols[i] = symbol
-        point -= scale * left
-        extent = scale * (right - left)
+        point, extent = point - scale * left, scale * (right - left)
         if extent >> WORD == 0:
-            extent <<= WORD
-            point <<= WORD
-            if place < n_words:
-                point |= np.uint64(words[place])
-                place += 1
-    state[0], state[1], state[2] = point, extent, np.uint64(place)
+            point, extent, place = _next_word(point, extent, place, words)
+    state[0], state[1], state[2] = point, extent, place
     return True
 
 
@@ -141,11 +136,18 @@ def decode_uniform(state: UInt64, words: UInt32, size: int) -> int | np.int64:
 
 @compiled
 def _advance(state: UInt64, words: UInt32, scale: np.uint64, left: np.uint64, probability: np.uint64) -> None:
+    """Take the symbol whose share of 2**24 begins at ``left`` out of the state."""
     state[0] -= scale * left
     state[1] = scale * probability
     if state[1] >> WORD == 0:
-        state[1] <<= WORD
-        state[0] <<= WORD
-        if state[2] < np.uint64(len(words)):
-            state[0] |= np.uint64(words[state[2]])
-            state[2] += ONE
+        state[0], state[1], state[2] = _next_word(state[0], state[1], state[2], words)
+
+
+@compiled
+def _next_word(point: np.uint64, extent: np.uint64, place: np.uint64, words: UInt32) -> tuple[np.uint64, np.uint64, np.uint64]:
+    """The state's three numbers, of a range that has room for the next word."""
+    point, extent = point << WORD, extent << WORD
+    if place < np.uint64(len(words)):
+        point |= np.uint64(words[place])
+        place += ONE
+    return point, extent, place

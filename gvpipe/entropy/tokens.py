@@ -58,7 +58,7 @@ def untokenise(tokens: Int64, cursor: Cursor) -> Int64:
     """
     if tokens.max(initial=0) < DIRECT:
         cursor.end()
-        return (tokens >> 1) ^ -(tokens & 1)
+        return _unfold(tokens)
     bits = (tokens - DIRECT) // 2 + 5
     n_extra = np.where(tokens < DIRECT, 0, bits - 2)
     total = int(n_extra.sum())
@@ -73,4 +73,9 @@ def untokenise(tokens: Int64, cursor: Cursor) -> Int64:
     eight = raw[(start >> 3)[:, None] + np.arange(8)].view(">u8")[:, 0].astype(np.uint64)  # from each value's first byte on
     bits_left = (64 - (start & 7) - width).astype(np.uint64)
     u[large] |= (eight >> bits_left).astype(np.int64) & ((1 << width) - 1)
-    return np.where(u & 1, -((u + 1) >> 1), u >> 1)
+    return _unfold(u)
+
+
+def _unfold(u: Int64) -> Int64:
+    """The signed values of folded ones."""
+    return (u >> 1) ^ -(u & 1)

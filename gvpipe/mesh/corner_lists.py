@@ -219,7 +219,8 @@ def _find_ear(size: int, lists: CornerLists, hole: Hole) -> int:
     """The place in the polygon whose ear costs least, of those whose cut is no edge yet; -1 if there is none."""
     best, best_cost = -1, 0
     for i in range(size):
-        a, b, c = hole.polygon[i - 1 if i else size - 1], hole.polygon[i], hole.polygon[i + 1 if i + 1 < size else 0]
+        before, after = _beside(i, size)
+        a, b, c = hole.polygon[before], hole.polygon[i], hole.polygon[after]
         rise = 2 * hole.excess[a] + 2 * hole.excess[c] - 2 * hole.excess[b]
         if best >= 0 and rise >= best_cost:
             continue
@@ -233,10 +234,16 @@ def _find_ear(size: int, lists: CornerLists, hole: Hole) -> int:
 def _cut_ear(place: int, size: int, count: int, hole: Hole) -> None:
     """Make triangle ``count`` of the polygon's vertex at ``place`` and its two neighbours, and take that vertex out."""
     polygon = hole.polygon
-    before, after = place - 1 if place else size - 1, place + 1 if place + 1 < size else 0  # divisions are slow
-    for k in range(3):
-        corner = polygon[before if k == 0 else place if k == 1 else after]
+    before, after = _beside(place, size)
+    for k, own in enumerate((before, place, after)):
+        corner = polygon[own]
         hole.triangles[count, k] = hole.ring[corner]
         hole.excess[corner] += 1
     for i in range(place, size - 1):
         polygon[i] = polygon[i + 1]
+
+
+@compiled
+def _beside(place: int, size: int) -> tuple[int, int]:
+    """The places before and after one of a polygon; without remainders, whose divisions are slow."""
+    return place - 1 if place else size - 1, place + 1 if place + 1 < size else 0

@@ -273,10 +273,10 @@ def squared_errors(trajectories: Floats, basis: Basis, coefficients: Float64) ->
     return result
 
 
-def row_blocks(n_rows: int) -> Iterator[slice]:
-    """Rows of a tall matrix, of which copies are made one after the other; one block at least."""
-    for first in range(0, max(n_rows, 1), LARGE_BLOCK):
-        yield slice(first, first + LARGE_BLOCK)
+def row_blocks(n_rows: int, size: int = LARGE_BLOCK) -> Iterator[slice]:
+    """Rows of a tall matrix, of which copies are made one after the other, ``size`` at a time; one block at least."""
+    for first in range(0, max(n_rows, 1), size):
+        yield slice(first, first + size)
 
 
 def _scales(levels: Int64, n_points: int, step: float) -> Float64:

@@ -80,16 +80,16 @@ def predict_kalman(coding: VectorCoding, begin: int, end: int) -> None:
     """
     most = _most_neighbours(coding)
     if coding.decoded.shape[1] <= 2 * most:
-        _predict_few(coding, begin, end, most, MAX_SPREAD)
+        _predict_few(coding, begin, end, most)
     else:
         _predict_many(coding, begin, end, most)
 
 
 @compiled
-def _predict_few(coding: VectorCoding, begin: int, end: int, most: int, max_spread: float) -> None:
+def _predict_few(coding: VectorCoding, begin: int, end: int, most: int) -> None:
     """Predict by the components' covariances: an LDL' factorisation, of R components in n R**2 / 2 + R**3 / 6 products.
 
-    Vectors whose neighbours are further apart than ``max_spread``, in squared steps, go to `_predict_many`.
+    Vectors whose neighbours are further apart than `MAX_SPREAD` go to `_predict_many`.
     """
     n_components, noise = coding.decoded.shape[1], coding.step * coding.step
     guesses, changes, inverses = np.zeros(n_components), np.zeros(n_components), np.zeros(n_components)
@@ -97,7 +97,7 @@ def _predict_few(coding: VectorCoding, begin: int, end: int, most: int, max_spre
     covariances, factors = np.zeros((n_components, n_components)), np.zeros((n_components, n_components))
     for i in range(begin, end):
         n = _spread_neighbours(coding, i, guesses, spread)
-        if _sum_covariances(spread, n, covariances) > max_spread * noise:
+        if _sum_covariances(spread, n, covariances) > MAX_SPREAD * noise:
             _predict_many(coding, i, i + 1, most)
             continue
         for c in range(n_components):

@@ -36,7 +36,7 @@ def test_both_forms_of_kalman_predict_the_same(n_components: int, step: float, a
     most = int(np.diff(causal.starts).max())
     residuals, coded, decoded = np.zeros(target.shape, np.int64), np.zeros(target.shape), np.zeros(target.shape)
     coding = VectorCoding(causal, step, residuals, coded, target)
-    prediction_kernels._predict_few(coding, 0, len(target), most, prediction_kernels.MAX_SPREAD)
+    prediction_kernels._predict_few(coding, 0, len(target), most)
     prediction_kernels._predict_many(coding._replace(decoded=decoded, target=np.zeros((0, 0))), 0, len(target), most)
     assert np.abs(residuals).max() > 10
     assert np.allclose(coded, decoded, rtol=0, atol=0.01 * step)

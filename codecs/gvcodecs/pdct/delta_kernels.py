@@ -11,7 +11,7 @@ import numpy as np
 
 from gvpipe.arrays import Int64, UInt8, UInt32, UInt64
 from gvpipe.compiled import compiled
-from gvpipe.entropy.range_decoder import TOTAL, decode_symbol
+from gvpipe.entropy.range_decoder import TOTAL, decode_symbols
 from gvpipe.entropy.tokens import DIRECT
 
 MAX_BITS = 36  # bit length of the largest folded value
@@ -224,23 +224,16 @@ def _take_axis(counts: Int64, stream: DeltaStream, contexts: Int64, values: Int6
         ends[contexts[i] + 1] += 1
     for context in range(N_CONTEXTS):
         ends[context + 1] += ends[context]
-    order = np.empty(n, np.int64)
+    edges, tokens = np.zeros(N_TOKENS + 1, np.uint64), np.empty(n, np.int64)  # context after context
+    for context in range(N_CONTEXTS):
+        start, end = ends[context], ends[context + 1]
+        if start < end:
+            _find_edges(counts[context], edges)
+            if not decode_symbols(stream.state, stream.words, edges, tokens[start:end]):
+                return NO_DATA
     for i in range(n):
-        order[ends[contexts[i]]] = i
+        u = tokens[ends[contexts[i]]]
         ends[contexts[i]] += 1
-    edges = np.zeros(N_TOKENS + 1, np.uint64)
-    latest = -1
-    for k in range(n):
-        i = order[k]
-        if contexts[i] != latest:
-            latest = contexts[i]
-            _find_edges(counts[latest], edges)
-        token = decode_symbol(stream.state, stream.words, edges)
-        if token < 0:
-            return NO_DATA
-        values[i] = token
-    for i in range(n):
-        u = values[i]
         if u >= DIRECT:
             width = (u - DIRECT) // 2 + 3
             u = 2 + (u & 1)

@@ -27,6 +27,7 @@ from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
 from gvpipe.arrays import Float64, Int32, Int64, Integers
 from gvpipe.mesh.topology import k_ring
 from gvpipe.sequence import MeshSequence
+from gvpipe.trajectory.basis import row_blocks
 from gvpipe.trajectory.gram import descending_eigenvectors
 
 RING = 3  # order of the neighbourhood, the paper's
@@ -131,18 +132,14 @@ def local_motions(base: Float64, ring: sparse.csr_array, columns: Float64) -> Fl
     everyone = np.arange(len(base))
     if len(base) <= LARGE:
         rows = np.empty((len(base), 4 * columns.shape[1]))
-        for block in _blocks(everyone):
-            rows[block] = _motion_rows(unit, moved, ring, block)
+        for block in row_blocks(len(base), BLOCK):
+            rows[block] = _motion_rows(unit, moved, ring, everyone[block])
         return _principal_coordinates(rows)
     some = everyone[:: -(-len(base) // LARGE)]
-    gram = sum(rows.T @ rows for rows in (_motion_rows(unit, moved, ring, block) for block in _blocks(some)))
-    axes = descending_eigenvectors(np.asarray(gram))[1][:, :DIMENSIONS]
-    return np.concatenate([_motion_rows(unit, moved, ring, block) @ axes for block in _blocks(everyone)])
-
-
-def _blocks(points: Int64) -> list[Int64]:
-    """Points in parts of `BLOCK`."""
-    return [points[first : first + BLOCK] for first in range(0, len(points), BLOCK)]
+    parts = (_motion_rows(unit, moved, ring, some[block]) for block in row_blocks(len(some), BLOCK))
+    axes = descending_eigenvectors(np.asarray(sum(rows.T @ rows for rows in parts)))[1][:, :DIMENSIONS]
+    blocks = row_blocks(len(base), BLOCK)
+    return np.concatenate([_motion_rows(unit, moved, ring, everyone[block]) @ axes for block in blocks])
 
 
 def _motion_rows(unit: Float64, moved: Float64, ring: sparse.csr_array, points: Int64) -> Float64:
