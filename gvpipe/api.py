@@ -20,7 +20,7 @@ from gvpipe.budget import Budget
 from gvpipe.codec import Codec, Encoded, Progress
 from gvpipe.container.bitstream import BARE, LIVE, PLAIN, STREAM, Bitstream
 from gvpipe.container.mp4 import bytes_by_part, read_file, write_file
-from gvpipe.container.sources import check_target, check_video_target, is_remote
+from gvpipe.container.sources import check_target, check_video_target, is_remote, is_stored
 from gvpipe.errors import InputError, OverBudget, SettingError, in_file
 from gvpipe.files import Source, frame_range, read
 from gvpipe.metrics.vertex_errors import frame_diagonal
@@ -464,7 +464,7 @@ def _absolute(source: Source) -> Source:
     if isinstance(source, list | tuple):
         return [os.path.abspath(one) for one in source]
     one = check_path(source, "the input")
-    return one if is_remote(one) else os.path.abspath(one)
+    return one if is_remote(one) or is_stored(one) else os.path.abspath(one)
 
 
 def _target(

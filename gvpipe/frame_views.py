@@ -1,8 +1,9 @@
-"""Frames of a sequence seen otherwise, loaded when they are read: in another order, some, as float32, shifted, watched."""
+"""Frames of a sequence seen otherwise, loaded when they are read: permuted, some, as float32, shifted, watched, guarded."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 
 import numpy as np
 
@@ -47,6 +48,19 @@ class Watched:
         start, stop, _ = key.indices(self.shape[0])
         self._told(stop)
         return self._read(start, stop)
+
+
+class Guarded:
+    """The same frames, each read inside the context that ``guard`` makes."""
+
+    def __init__(self, read: Read, n_frames: int, n_vertices: int, guard: Callable[[], AbstractContextManager[None]]) -> None:
+        self._read, self._guard = read, guard
+        self.shape: tuple[int, ...] = (n_frames, n_vertices, 3)
+
+    def __getitem__(self, key: slice, /) -> Floats:
+        start, stop, _ = key.indices(self.shape[0])
+        with self._guard():
+            return self._read(start, stop)
 
 
 class Narrowed:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -26,7 +27,7 @@ from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part, check_parts
 from gvpipe.asset.polygons import as_polygons
 from gvpipe.errors import InputError, printable
-from gvpipe.frame_views import Narrowed, Permuted, Shifted, Span, Watched
+from gvpipe.frame_views import Guarded, Narrowed, Permuted, Shifted, Span, Watched
 from gvpipe.notes import ASSUMED_FPS, count, show_origin
 from gvpipe.origin import as_origin, choose_origin, narrow, rounding
 
@@ -281,6 +282,14 @@ class MeshSequence:
         size = self.n_frames, self.n_vertices
         exact = None if self._exact is None else Watched(self.read_absolute, *size, told)
         return self._derived(Watched(self.read, *size, told), exact)
+
+    def guarded(self, guard: Callable[[], AbstractContextManager[None]], **changes: Any) -> MeshSequence:
+        """Return the same sequence with other notes, say; frames that are not in memory are read inside ``guard()``."""
+        if type(self.positions) is np.ndarray:
+            return self._derived(self.positions, self._exact, **changes)
+        size = self.n_frames, self.n_vertices
+        exact = None if self._exact is None else Guarded(self.read_absolute, *size, guard)
+        return self._derived(Guarded(self.read, *size, guard), exact, **changes)
 
     def _derived(self, positions: Frames, exact: Frames | None, **changes: Any) -> MeshSequence:
         result = replace(self, positions=positions, **changes)

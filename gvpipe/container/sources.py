@@ -28,9 +28,12 @@ def is_url(path: object) -> bool:
 
 def is_remote(path: object) -> bool:
     """Whether a path is the address of a geometry video on a web server, or in a store that fsspec knows if it is there."""
-    if is_url(path):
-        return True
-    found = STORE.match(path) if isinstance(path, str) and path.lower().endswith(VIDEO_SUFFIXES) else None
+    return is_url(path) or (isinstance(path, str) and path.lower().endswith(VIDEO_SUFFIXES) and is_stored(path))
+
+
+def is_stored(path: object) -> bool:
+    """Whether a path is an address in a store that fsspec knows if it is there, which web servers are not."""
+    found = STORE.match(path) if isinstance(path, str) and not is_url(path) else None
     if found is None or found[1].lower() in ON_DISK or importlib.util.find_spec("fsspec") is None:
         return False
     from gvpipe.container.store_source import knows

@@ -7,16 +7,19 @@ Files on web servers are read by `gvpipe.container.http_source`.
 from __future__ import annotations
 
 import contextlib
+import errno
+import tempfile
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import fsspec
 
-from gvpipe.errors import REMEDY, CorruptFile, InputError, TruncatedFile, printable
+from gvpipe.errors import REMEDY, CorruptFile, GvpipeError, InputError, TruncatedFile, printable
 from gvpipe.forks import renew_after_fork
 
 FIRST = 1 << 16  # bytes that are fetched at first and kept: headers and the index of most files
 LONGEST = 200  # characters of a reason
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 STATE = ("ETag", "etag", "mtime", "LastModified", "updated", "last_modified")  # what stores call a version of a file
 
 
@@ -34,7 +37,7 @@ class StoreSource:
     def __init__(self, url: str, received: Callable[[int], None] = lambda count: None) -> None:
         self._url, self._tell, self._received = url, received, 0
         self._may_grow = False
-        with self._asking():
+        with asking(url):
             self._system, self._path = fsspec.core.url_to_fs(url)
             found = self._system.info(self._path)
             self.size, self._state = int(found["size"] or 0), _state(found)
@@ -69,7 +72,7 @@ class StoreSource:
         return self.read(0, self.size)
 
     def _fetch(self, offset: int, length: int) -> bytes:
-        with self._asking():
+        with asking(self._url):
             data: bytes = self._system.cat_file(self._path, start=offset, end=offset + length) if length else b""
             if not self._may_grow and _state(self._system.info(self._path)) != self._state:
                 raise CorruptFile("the store has another file by now; open it again")
@@ -79,18 +82,25 @@ class StoreSource:
             raise TruncatedFile(f"the store gave {len(data)} bytes in place of {length} from {offset} on; {REMEDY}")
         return data
 
-    @contextlib.contextmanager
-    def _asking(self) -> Iterator[None]:
-        """Stores raise what their libraries do; here all becomes one line."""
-        try:
-            yield
-        except CorruptFile:
-            raise
-        except FileNotFoundError as exc:
-            raise InputError(f"{self._url}: no such file; check the address") from exc
-        except Exception as exc:
-            reason = printable(" ".join(str(exc).split())[:LONGEST] or type(exc).__name__)
-            raise InputError(f"{self._url} cannot be read: {reason}; check the address, and what its store needs") from exc
+
+@contextlib.contextmanager
+def asking(url: str) -> Iterator[None]:
+    """Stores raise what their libraries do; here all becomes one line.
+
+    Raises:
+        InputError: something else than a `GvpipeError` is raised inside.
+    """
+    try:
+        yield
+    except GvpipeError:
+        raise
+    except FileNotFoundError as exc:
+        raise InputError(f"{url}: no such file; check the address") from exc
+    except Exception as exc:
+        if isinstance(exc, OSError) and exc.errno in NO_ROOM:
+            raise InputError(f"{url}: no room for a copy in {tempfile.gettempdir()}; free some, or set TMPDIR") from exc
+        reason = printable(" ".join(str(exc).split())[:LONGEST] or type(exc).__name__)
+        raise InputError(f"{url} cannot be read: {reason}; check the address, and what its store needs") from exc
 
 
 def knows(scheme: str) -> bool:

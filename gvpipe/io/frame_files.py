@@ -15,6 +15,7 @@ import numpy as np
 from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.errors import InputError, TopologyChange
 from gvpipe.io.damage import FRAME_AGAIN, check_file, reading
+from gvpipe.io.fetching import borrowed
 from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.mesh import Loader, Mesh
 from gvpipe.io.spool import Spool
@@ -135,8 +136,9 @@ def load_mesh(loader: Loader, path: Path, frame: int) -> Mesh:
     Raises:
         InputError: it cannot be read; the message names the file and, for a coordinate, frame and vertex.
     """
-    check_file(path)
-    with reading(path, path.suffix[1:].upper(), remedy=FRAME_AGAIN):
-        mesh = loader(path)
+    with borrowed(path):
+        check_file(path)
+        with reading(path, path.suffix[1:].upper(), remedy=FRAME_AGAIN):
+            mesh = loader(path)
     check_finite(narrow(mesh.positions[None], np.zeros(3)), str(path), frame)
     return mesh

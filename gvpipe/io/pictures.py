@@ -13,6 +13,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from gvpipe.asset.material import Image
 from gvpipe.errors import InputError
+from gvpipe.io.fetching import fetch
 
 MAX_BYTES = 1 << 29  # of a picture file
 UNSAFE = re.compile(r"[^\w. ()-]+")
@@ -94,6 +95,7 @@ def find_beside(folder: Path, named: str) -> Path:
     if PurePosixPath(named).is_absolute() or PureWindowsPath(named).anchor or ".." in parts or "\0" in named:
         raise InputError(f"{named!r} lies outside of the folder {folder}; copy it there and name it without a path")
     path = folder
+    fetch(folder.joinpath(*parts))
     for part in parts:
         path = _same_name(path, part)
     root = folder.resolve()

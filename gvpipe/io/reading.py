@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gvpipe.container.sources import check_source
+from gvpipe.container.sources import check_source, is_stored
 from gvpipe.errors import InputError
 from gvpipe.io.cut_pictures import cut_notes
 from gvpipe.io.damage import check_file, reading
@@ -47,7 +47,13 @@ def read(
         InputError: the path or what it holds cannot be used. Frame files after the first are read, and may raise it,
             when their positions are.
     """
-    sequence = _read(path, ReadOptions(fps, clip, mesh, frames, unlimited))
+    options = ReadOptions(fps, clip, mesh, frames, unlimited)
+    if isinstance(path, str) and is_stored(path):
+        from gvpipe.io.store_files import read_stored
+
+        sequence = read_stored(path, lambda copy: _read(copy, options))
+    else:
+        sequence = _read(path, options)
     cut = cut_notes(sequence.images)
     return replace(sequence, notes=(*sequence.notes, *cut)) if cut else sequence
 

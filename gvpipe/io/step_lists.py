@@ -40,7 +40,7 @@ def read_step_list(path: Path, options: ReadOptions) -> MeshSequence:
         listed = _read_list(path)
         start, stop = options.span(len(listed), str(path))
         listed = listed[start:stop]
-        files = [side_file(path, name, "step") for _, name in listed]
+        files = [side_file(path, name, "step", later=True) for _, name in listed]
     return read_listed(files, np.array([time for time, _ in listed], np.float64), path, options, start)
 
 

@@ -19,10 +19,12 @@ from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import Any, Self
 
+from gvpipe.atomic import temporary_folder
 from gvpipe.tasks.executor import ATTEMPTS, Outcome, Prepare, WorkerDied
 from gvpipe.tasks.worker import PREPARE, PROTOCOL, TASK, receive, send
 
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1")
+TEMPORARY = ("TMPDIR", "TEMP", "TMP")  # where programs put temporary files; processes that are killed leave theirs
 PATIENCE = 0.5  # seconds between looks at signals, which Windows passes on only then
 
 
@@ -34,14 +36,18 @@ class Processes:
     """
 
     def __init__(self, count: int) -> None:
-        self._slots = [_Slot() for _ in range(count)]
+        self._count, self._slots = count, list[_Slot]()
+        self._stack = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
+        folder = self._stack.enter_context(temporary_folder())
+        self._slots = [_Slot(folder) for _ in range(self._count)]
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         for slot in self._slots:
             slot.close()
+        self._stack.close()
 
     def run(self, prepare: Prepare, data: bytes, tasks: Sequence[Any]) -> Iterator[Outcome]:
         """Do tasks; see `gvpipe.tasks.executor.Executor`. Each process has one at a time."""
@@ -69,9 +75,10 @@ class Processes:
 
 
 class _Slot:
-    """A place for one process."""
+    """A place for one process, whose temporary files lie in a folder."""
 
-    def __init__(self) -> None:
+    def __init__(self, folder: str) -> None:
+        self._folder = folder
         self._process: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
         self._is_closed = False
@@ -94,7 +101,7 @@ class _Slot:
         with self._lock:
             if self._is_closed:
                 raise WorkerDied("nobody wants its answer")
-            process = self._process = self._process or _start()
+            process = self._process = self._process or _start(self._folder)
         with contextlib.suppress(OSError, ValueError):  # it has died, which the missing answer says
             if process.stdin is not None:
                 send(process.stdin, message)
@@ -156,13 +163,13 @@ def _outcome(index: int, answer: bytes) -> Outcome:
     return Outcome(index, value, error)
 
 
-def _start() -> subprocess.Popen[bytes]:
+def _start(folder: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         [sys.executable, "-m", "gvpipe.tasks.worker"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **ONE_THREAD},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **ONE_THREAD, **dict.fromkeys(TEMPORARY, folder)},
     )
 
 

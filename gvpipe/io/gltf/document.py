@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
+from gvpipe.io.fetching import fetch
 from gvpipe.io.gltf.json_fields import Json, child, integer, objects, text
 
 MAGIC = b"glTF"
@@ -122,6 +123,7 @@ class Document:
         target = (folder / name).resolve()
         if not target.is_relative_to(folder):
             raise ValueError(f"{where} is at {name!r}, outside the folder of the glTF file; put it inside")
+        fetch(target)
         if not target.is_file():
             raise MissingFile(f"{where} is missing: there is no file {name!r} beside it")
         data = target.read_bytes()
