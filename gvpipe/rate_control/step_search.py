@@ -84,18 +84,19 @@ def find_step(
         rounds: most encodes.
     """
     middle = target_error * math.sqrt(band[0] * band[1])
-    tried: list[StepTrial] = []
+    best: StepTrial | None = None  # alone kept: an encode takes memory
+    before: tuple[float, float] | None = None
     for _ in range(rounds):
         trial = attempt(step)
         trial = StepTrial(trial.encoded, step, max(trial.error, LEAST_ERROR))
-        if tried and trial.step != tried[-1].step:
-            slope = _slope(tried[-1], trial)
-        tried.append(trial)
+        if before and step != before[0]:
+            slope = _slope(before, (step, trial.error))
+        before = step, trial.error
+        best = min(best or trial, trial, key=lambda one: abs(math.log(one.error) - math.log(middle)))
         if band[0] <= trial.error / target_error <= band[1]:
             break
         step *= _change(trial.error, middle, slope)
-    best = min(tried, key=lambda trial: abs(math.log(trial.error) - math.log(middle)))
-    return dataclasses.replace(best, slope=slope)
+    return dataclasses.replace(best, slope=slope) if best else attempt(step)
 
 
 def step_between(anchors: Sequence[Anchor], target_error: float) -> float | None:
@@ -137,9 +138,9 @@ def root_mean_square(sequence: MeshSequence, reader: FrameReader) -> float:
     return math.sqrt(total / (sequence.n_frames * sequence.n_vertices))
 
 
-def _slope(before: StepTrial, after: StepTrial) -> float:
-    """Of the error's logarithm over the step's, so far as it is believed."""
-    slope = math.log(after.error / before.error) / math.log(after.step / before.step)
+def _slope(before: tuple[float, float], after: tuple[float, float]) -> float:
+    """Of the error's logarithm over the step's, so far as it is believed; given are steps and errors."""
+    slope = math.log(after[1] / before[1]) / math.log(after[0] / before[0])
     return min(max(slope, SLOPES[0]), SLOPES[1])
 
 

@@ -35,6 +35,7 @@ class StepTrials:
                 error = measure_predicted(self.job, start, coded.predict)
             else:
                 error = measure_decoded(self.job, start, encoded.bitstream)
+                self._done.clear()  # the published mode asks for no step twice, and its files may be as large as the sequence
             self._done[step] = StepTrial(encoded, step, error)
         return self._done[step]
 

@@ -20,6 +20,7 @@ from gvcodecs.mcgv.layout.xatlas_process import run_xatlas
 from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.mesh.topology import adjacency
 
+PATCH = 1 << 13  # triangles that xatlas gets at once: its time grows with their square
 SMALL_CHART = 12  # points; a chart below dissolves into a neighbour
 UNASSIGNED = 0xFFFFFFFF
 
@@ -67,21 +68,27 @@ def parameterize(base: Float64, faces: Int32, clusters: Int32) -> Atlas:
 
 def _xatlas(unit: Float64, faces: Int32, clusters: Int32, n_clusters: int) -> tuple[Int64, Float64]:
     """Return ``(P,)`` charts, -1 where there is none, and ``(P, 2)`` places."""
-    sources, meshes = [], []
+    sources: list[tuple[int, Int32, float]] = []
+    meshes = []
     corners = unit[faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     solid = faces[area > 0]
     for k in range(n_clusters):
         touching = solid[(clusters[solid] == k).any(axis=1)]
-        if len(touching):
-            points, indices = np.unique(touching, return_inverse=True)
-            meshes.append((unit[points].astype(np.float32), indices.reshape(-1, 3).astype(np.uint32)))
-            sources.append((k, points))
+        is_cut = len(touching) > PATCH
+        for patch in _patches(unit, touching):
+            points, indices = np.unique(patch, return_inverse=True)
+            places, extent = unit[points], 1.0
+            if is_cut:  # xatlas drops triangles of less than 1e-7 square units
+                extent = float(np.ptp(places, axis=0).max())
+                places = (places - places.min(axis=0)) / extent
+            meshes.append((places.astype(np.float32), indices.reshape(-1, 3).astype(np.uint32)))
+            sources.append((k, points, extent))
     chart, uv = np.full(len(unit), -1, np.int64), np.zeros((len(unit), 2))
     if not sources:
         return chart, uv
     first = 0
-    for (k, points), (vertex, indices, places, own) in zip(sources, run_xatlas(meshes), strict=True):
+    for (k, points, extent), (vertex, indices, places, own) in zip(sources, run_xatlas(meshes), strict=True):
         own = np.asarray(own, np.int64)
         point = points[np.asarray(vertex, np.int64)]
         own = np.where(own == UNASSIGNED, -1, own)
@@ -92,9 +99,20 @@ def _xatlas(unit: Float64, faces: Int32, clusters: Int32, n_clusters: int) -> tu
         order = np.flatnonzero(usable)
         order = order[np.argsort(n_triangles[own[order]], kind="stable")]
         chart[point[order]] = first + own[order]
-        uv[point[order]] = places[order]
+        uv[point[order]] = extent * places[order]
         first += int(own.max()) + 1
     return chart, uv
+
+
+def _patches(unit: Float64, faces: Int32) -> list[Int32]:
+    """Cut triangles ``(m, 3)`` into halves of like size across their longest side, until none has more than `PATCH`."""
+    if len(faces) <= PATCH:
+        return [faces] if len(faces) else []
+    centres = unit[faces].mean(axis=1)
+    along = centres[:, int(np.ptp(centres, axis=0).argmax())]
+    order = np.argsort(along, kind="stable")
+    half = len(faces) // 2
+    return [part for side in (order[:half], order[half:]) for part in _patches(unit, faces[np.sort(side)])]
 
 
 def _absorb(chart: Int64, uv: Float64, neighbours: sparse.csr_array, clusters: Int32) -> tuple[Int64, Float64]:

@@ -23,6 +23,8 @@ from gvpipe.arrays import Bool, Float64, Int64
 from gvpipe.errors import InputError
 
 WINDOWS = (1, 2, 4, 8, 16)  # half-widths of the window of pixels that a vertex may take, tried in turn
+SQUARES = (1, 2, 4, 8, 16, 32)  # sides of squares whose points are counted
+CROWDED = 0.9  # points on so many pixels are too many
 SLACK = 0.35  # part of a block that a chart gives up rather than open another row of blocks
 FIT_ROUNDS = 8  # densities tried to fit a given image size
 
@@ -88,7 +90,41 @@ def _place(uv: Float64, fill: float, block: int, density: float) -> Int64:
 
 
 def _assign(wanted: Float64, size: Int64, half: int) -> Int64 | None:
-    """Assign ``wanted (n, 2)`` to distinct pixels inside ``size``, each within ``half`` of its nearest; None if too crowded."""
+    """Assign ``wanted (n, 2)`` to distinct pixels inside ``size``; None if windows of ``half`` are too crowded.
+
+    The choice is made among twice as wide windows: just wide enough, it takes up to a hundred times as long.
+    """
+    if not _is_roomy(wanted, size, half):
+        return None
+    columns, graph = _choices(wanted, size, min(2 * half, WINDOWS[-1]))
+    try:
+        rows, matched = csgraph.min_weight_full_bipartite_matching(graph)
+    except ValueError:  # there is none
+        return None
+    result = np.empty((len(wanted), 2), np.int64)
+    result[rows] = np.column_stack([columns[matched] % size[0], columns[matched] // size[0]])
+    return result
+
+
+def _is_roomy(wanted: Float64, size: Int64, half: int) -> bool:
+    """Whether the points of every square have pixels enough within ``half`` of it, so that most likely all find one."""
+    nearest = np.rint(wanted).astype(np.int64)
+    counts = np.zeros((size[1] + 1, size[0] + 1), np.int64)
+    np.add.at(counts, (nearest[:, 1] + 1, nearest[:, 0] + 1), 1)
+    sums = counts.cumsum(axis=0).cumsum(axis=1)
+    for side in SQUARES:
+        low = [np.arange(max(1, length - side + 1)) for length in size]
+        high = [np.minimum(first + side, length) for first, length in zip(low, size, strict=True)]
+        reach = [np.minimum(b + half, n) - np.maximum(a - half, 0) for a, b, n in zip(low, high, size, strict=True)]
+        (left, top), (right, bottom) = low, high
+        inside = sums[bottom][:, right] - sums[bottom][:, left] - sums[top][:, right] + sums[top][:, left]
+        if (inside > CROWDED * np.outer(reach[1], reach[0])).any():
+            return False
+    return True
+
+
+def _choices(wanted: Float64, size: Int64, half: int) -> tuple[Int64, sparse.csr_array]:
+    """The pixels within ``half`` of the nearest of any, ``(m,)``, and the cost ``(n, m)`` of each that may be taken."""
     nearest = np.rint(wanted).astype(np.int64)
     offsets = np.stack(np.meshgrid(np.arange(-half, half + 1), np.arange(-half, half + 1)), axis=-1).reshape(-1, 2)
     candidates = nearest[:, None] + offsets
@@ -97,15 +133,7 @@ def _assign(wanted: Float64, size: Int64, half: int) -> Int64 | None:
     pixel = candidates[vertex, choice]
     cost = ((pixel - wanted[vertex]) ** 2).sum(axis=1) + 1e-3  # a stored zero would count as no edge
     columns, column = np.unique(pixel[:, 1] * size[0] + pixel[:, 0], return_inverse=True)
-    graph = sparse.csr_array((cost, (vertex, column.ravel())), shape=(len(wanted), len(columns)))
-    if len(columns) < len(wanted):
-        return None
-    if (csgraph.maximum_bipartite_matching(graph, perm_type="column") < 0).any():
-        return None
-    rows, matched = csgraph.min_weight_full_bipartite_matching(graph)
-    result = np.empty((len(wanted), 2), np.int64)
-    result[rows] = np.column_stack([columns[matched] % size[0], columns[matched] // size[0]])
-    return result
+    return columns, sparse.csr_array((cost, (vertex, column.ravel())), shape=(len(wanted), len(columns)))
 
 
 def _lay(pieces: list[Int64], parts: list[NDArray[np.intp]], block: int, size: tuple[int, int] | None) -> Layout | None:

@@ -8,7 +8,7 @@ Mamou, Zaharia and Preteux 2007, section 3.3: a block's roughness sums the squar
 
 The paper writes 8 for n_p, the number of p's neighbours inside the block: it is 8 inside, 5 at an edge and 3 at a corner,
 where 8 would pull the border towards zero. The sparse matrix depends on the layout alone and falls apart into one small
-system per block; each is inverted once, and what is left per frame and axis is one product per block.
+system per block; each is factored once (`padding_kernels`), and what is left per frame and axis is two passes over a band.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from gvcodecs.mcgv.layout.layout import Layout
+from gvcodecs.mcgv.layout.padding_kernels import factor_blocks, fill_blocks
 from gvpipe.arrays import Float64, Floats, Int64
 
 
@@ -23,35 +24,27 @@ class Padding:
     """The linear map from vertex values to whole planes, for one layout."""
 
     def __init__(self, layout: Layout, block: int) -> None:
-        self.layout = layout
-        laplacian = _laplacian(block)
+        self.layout, self._block = layout, block
         pixels = _pixels_by_block(layout.width, layout.height, block)  # (blocks, block**2)
-        vertex = np.full(layout.width * layout.height, -1)
-        vertex[layout.pixel] = np.arange(len(layout.pixel))
-        self._blocks = []
-        for own in pixels[(vertex[pixels] >= 0).any(axis=1)]:
-            fixed = vertex[own] >= 0
-            weights = -np.linalg.solve(laplacian[np.ix_(~fixed, ~fixed)], laplacian[np.ix_(~fixed, fixed)])
-            self._blocks.append((own[~fixed], vertex[own[fixed]], weights))
+        is_vertex = np.zeros(layout.width * layout.height, np.bool_)
+        is_vertex[layout.pixel] = True
+        self._pixels = pixels[is_vertex[pixels].any(axis=1)]
+        self._fixed = is_vertex[self._pixels]
+        n_free = (~self._fixed).sum(axis=1)
+        self._first = np.cumsum(n_free) - n_free
+        self._factors = np.empty((int(n_free.sum()), block + 2))
+        factor_blocks(self._fixed, block, self._first, self._factors)
 
     def fill(self, values: Floats, background: float) -> Float64:
         """Return planes ``(n, height, width)`` for vertex values ``(n, V)``; blocks without a vertex are ``background``."""
-        columns = np.ascontiguousarray(values.T, dtype=np.float64)  # (V, n): a block's vertices are rows
-        planes = np.full((self.layout.width * self.layout.height, len(values)), background)
-        planes[self.layout.pixel] = columns
-        for free, vertices, weights in self._blocks:
-            planes[free] = weights @ columns[vertices]
-        return planes.T.reshape(len(values), self.layout.height, self.layout.width)
+        n = len(values)
+        planes = np.full((self.layout.width * self.layout.height, 3 * -(-n // 3)), background)
+        planes[self.layout.pixel, :n] = values.T
+        fill_blocks(planes, self._pixels, self._fixed, self._block, self._first, self._factors)
+        return planes.T[:n].reshape(n, self.layout.height, self.layout.width)
 
 
 def _pixels_by_block(width: int, height: int, block: int) -> Int64:
     """Row-major pixel indices ``(blocks, block**2)``."""
     index = np.arange(width * height).reshape(height // block, block, width // block, block)
     return index.swapaxes(1, 2).reshape(-1, block * block)
-
-
-def _laplacian(block: int) -> Float64:
-    """The matrix ``(block**2, block**2)`` of psi: neighbour counts on the diagonal, -1 for neighbours."""
-    y, x = np.divmod(np.arange(block * block), block)
-    near = np.maximum(np.abs(y[:, None] - y), np.abs(x[:, None] - x)) == 1  # 8-connectivity
-    return np.asarray(np.diag(near.sum(axis=1)) - near.astype(np.float64))

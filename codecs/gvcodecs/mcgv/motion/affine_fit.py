@@ -19,7 +19,9 @@ from functools import cached_property
 import numpy as np
 
 from gvpipe.arrays import Float64, Floats, Int32
+from gvpipe.trajectory.basis import row_blocks
 
+ROWS = 1 << 16  # vertices whose products with all transforms are held at a time
 FLAT = 1e-4  # a cluster thinner than this part of its radius counts as flat: that direction stays unused
 
 
@@ -69,10 +71,14 @@ class AffinePredictor:
         moved = np.moveaxis(frames, 1, 0)[self._order].reshape(len(self._order), -1)  # (V, 3n), cluster after cluster
         for k, part in enumerate(self._slices):
             if part.stop > part.start:
-                inverse = np.linalg.pinv(self._coordinates[part], rcond=FLAT)
                 still = np.tile(self._coordinates[part] @ self._rest[k], len(frames))
-                result[:, k] += (inverse @ (moved[part] - still)).reshape(4, len(frames), 3).swapaxes(0, 1)
+                result[:, k] += (self._inverses[k] @ (moved[part] - still)).reshape(4, len(frames), 3).swapaxes(0, 1)
         return result
+
+    @cached_property
+    def _inverses(self) -> list[Float64]:
+        """Pseudo-inverses ``(4, m)`` of the clusters' coordinates."""
+        return [np.asarray(np.linalg.pinv(self._coordinates[part], rcond=FLAT)) for part in self._slices]
 
     def predict(self, transforms: Float64) -> Float64:
         """Equation 3: ``(n, V, 3)`` predicted positions for ``transforms (n, K, 4, 3)``, model units."""
@@ -90,14 +96,18 @@ class AffinePredictor:
 
         ``|x - Y h|^2`` is expanded, so that the cost is one product of all positions with all transforms.
         """
-        moved = np.moveaxis(frames, 1, 0).reshape(frames.shape[1], -1)  # (V, 3n)
         rows = transforms.transpose(1, 2, 0, 3).reshape(4 * self.n_clusters, -1)  # (4K, 3n)
-        products = (moved @ rows.T).reshape(len(moved), self.n_clusters, 4)
-        errors = np.empty((len(moved), self.n_clusters))
-        for k, block in enumerate(np.split(rows, self.n_clusters)):
-            local = self._local(k, self._base)
-            errors[:, k] = ((local @ (block @ block.T) - 2 * products[:, k]) * local).sum(axis=1)
-        return np.asarray(np.maximum(errors + np.square(moved).sum(axis=1)[:, None], 0))
+        blocks = np.split(rows, self.n_clusters)
+        squares = [block @ block.T for block in blocks]
+        errors = np.empty((frames.shape[1], self.n_clusters))
+        for some in row_blocks(len(errors), ROWS):
+            moved = np.moveaxis(frames[:, some], 1, 0).reshape(frames[:, some].shape[1], -1)  # (m, 3n)
+            products = (moved @ rows.T).reshape(len(moved), self.n_clusters, 4)
+            for k, square in enumerate(squares):
+                local = self._local(k, self._base[some])
+                errors[some, k] = ((local @ square - 2 * products[:, k]) * local).sum(axis=1)
+            errors[some] += np.square(moved).sum(axis=1)[:, None]
+        return np.asarray(np.maximum(errors, 0))
 
     def _local(self, k: int, points: Float64) -> Float64:
         """Homogeneous coordinates ``(m, 4)`` in the cluster's frame."""

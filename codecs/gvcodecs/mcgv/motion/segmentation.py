@@ -19,9 +19,11 @@ best, and refits, a few times. It lowers the residual by a tenth (cow) to a thir
 from __future__ import annotations
 
 import warnings
+from itertools import islice
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import KDTree
 
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
 from gvpipe.arrays import Float64, Int32, Int64, Integers
@@ -38,9 +40,11 @@ RESTARTS = 4  # of k-means; the best is kept
 SEED = 2007
 REFINE_ROUNDS = 5
 REFINE_FRAMES = 160  # frames, evenly spaced, that refinement looks at
+REFINE_FLOATS = 12 << 20  # their coordinates held at a time
+REFINED = 1 << 23, 8  # points in all frames that it looks at, about, and frames at least
 LARGE = 1 << 16  # points whose motion vectors are held at once; the principal axes of more are those of so many
 BLOCK = 1 << 13  # points whose motion vectors are worked out at a time
-CLUSTERED = 1 << 14  # points of more than LARGE that k-means sees
+SEGMENTED = 1 << 15  # points of more than LARGE that the partition begins with
 CACHED = 8  # frames fitted at once: of 70, what is between takes three times as long to write and read
 CHUNK_FLOATS = 8 << 20  # motion coefficients held at a time
 FITTED_FLOATS = 2 << 20  # the same, fitted at once where points are many
@@ -60,32 +64,54 @@ def segment(sequence: MeshSequence, base: Float64, neighbours: sparse.csr_array,
     """
     if n_clusters == 1 or sequence.n_frames == 1:
         return np.zeros(len(base), np.int32)
-    clusters = _k_means(motion_features(sequence, base, k_ring(neighbours, RING)), n_clusters)
-    return refine(sequence, base, k_ring(neighbours, 1), clusters)
+    one_ring = k_ring(neighbours, 1)
+    if len(base) <= LARGE:
+        clusters = _k_means(motion_features(sequence, base, k_ring(neighbours, RING)), n_clusters)
+    else:
+        clusters = _segment_some(sequence, base, one_ring, n_clusters)
+    return refine(sequence, base, one_ring, clusters)
+
+
+def _segment_some(sequence: MeshSequence, base: Float64, one_ring: sparse.csr_array, n_clusters: int) -> Int32:
+    """Clusters of evenly chosen points; the others take that of the nearest, in space."""
+    some = np.arange(0, len(base), -(-len(base) // SEGMENTED))
+    ring = one_ring[some]
+    for _ in range(RING - 1):
+        ring = sparse.csr_array(ring @ one_ring)
+        ring.data[:] = 1.0
+    labels = _k_means(motion_features(sequence, base, ring), n_clusters)
+    return np.asarray(labels[KDTree(base[some]).query(base)[1]], np.int32)
 
 
 def motion_features(sequence: MeshSequence, base: Float64, ring: sparse.csr_array) -> Float64:
-    """Return ``(P, <= DIMENSIONS)`` principal coordinates of the motion vectors (distances are kept, up to truncation)."""
+    """Return ``(R, <= DIMENSIONS)`` principal coordinates of motion vectors (distances are kept, up to truncation).
+
+    Args:
+        sequence: the points' animation.
+        base: ``(P, 3)`` the points in the base frame, model units.
+        ring: ``(R, P)`` a neighbourhood for each motion vector.
+    """
     centre, scale = (base.min(axis=0) + base.max(axis=0)) / 2, max(float(np.ptp(base, axis=0).max()), 1e-30)
-    unit = (base - centre) / scale
-    fit = LocalAffineFit(unit, ring)
-    features: Float64 = np.zeros((len(base), 0))
-    step = max(1, CHUNK_FLOATS // (12 * len(base)))
-    together = max(1, min(CACHED, FITTED_FLOATS // (12 * len(base))))
+    near, n_rows = np.unique(ring.indices), ring.shape[0]
+    fit = LocalAffineFit(((base - centre) / scale)[near], ring[:, near])
+    features: Float64 = np.zeros((n_rows, 0))
+    step = max(1, CHUNK_FLOATS // (12 * n_rows))
+    together = max(1, min(CACHED, FITTED_FLOATS // (12 * len(near))))
     for first in range(0, sequence.n_frames, step):
-        frames = sequence.read(first, min(first + step, sequence.n_frames))
-        rows = np.empty((len(base), features.shape[1] + 12 * len(frames)))
+        frames = range(first, min(first + step, sequence.n_frames))
+        rows = np.empty((n_rows, features.shape[1] + 12 * len(frames)))
         rows[:, : features.shape[1]] = features
         motions = rows[:, features.shape[1] :]
         for k in range(0, len(frames), together):
-            motion = fit.motion((frames[k : k + together].astype(np.float64) - centre) / scale)  # (P, n, 4, 3)
-            motions[:, 12 * k : 12 * (k + together)] = motion.reshape(len(base), -1)
+            moved = sequence.read(frames[k], frames[k:][:together][-1] + 1)[:, near]
+            motion = fit.motion((moved.astype(np.float64) - centre) / scale)  # (R, n, 4, 3)
+            motions[:, 12 * k : 12 * (k + together)] = motion.reshape(n_rows, -1)
         features = _principal_coordinates(rows)
     return features
 
 
 class LocalAffineFit:
-    """Equation 1 for all points: the neighbourhoods' normal matrices are inverted once, then serve every frame."""
+    """Equation 1 for neighbourhoods ``ring (R, P)``: their normal matrices are inverted once, then serve every frame."""
 
     def __init__(self, base: Float64, ring: sparse.csr_array) -> None:
         self._ring = ring
@@ -100,17 +126,17 @@ class LocalAffineFit:
         self._inverse = np.linalg.inv(spread + ridge[:, None, None] * np.eye(3))
 
     def motion(self, frames: Float64) -> Float64:
-        """Return ``(P, n, 4, 3)`` for ``frames (n, P, 3)``: rows 0..2 the linear part less identity, row 3 the translation.
+        """Return ``(R, n, 4, 3)`` for ``frames (n, P, 3)``: rows 0..2 the linear part less identity, row 3 the translation.
 
         Points are row vectors: ``x_i = x_0 + x_0 @ motion[:3] + motion[3]``.
         """
         moved = np.moveaxis(frames, 0, 1)  # (n, P, 3) -> (P, n, 3)
         n_points, n = moved.shape[:2]
-        mean = (self._ring @ moved.reshape(n_points, -1)).reshape(n_points, n, 3) / self._size[:, None, None]
+        mean = (self._ring @ moved.reshape(n_points, -1)).reshape(-1, n, 3) / self._size[:, None, None]
         # displacement from the base, so that the ridge pulls towards "unchanged", not towards zero size
         shift = moved - self._base[:, None, :]
         products = (self._base[:, None, :, None] * shift[:, :, None, :]).reshape(n_points, -1)  # (P, n 3 3)
-        cross = (self._ring @ products).reshape(n_points, n, 3, 3)
+        cross = (self._ring @ products).reshape(-1, n, 3, 3)
         mean_shift = mean - self._mean[:, None, :]
         cross -= self._size[:, None, None, None] * (self._mean[:, None, :, None] * mean_shift[:, :, None, :])
         linear = np.einsum("pij,pnjk->pnik", self._inverse, cross)
@@ -163,10 +189,16 @@ def _motion_rows(unit: Float64, moved: Float64, ring: sparse.csr_array, points: 
 
 def refine(sequence: MeshSequence, base: Float64, ring: sparse.csr_array, clusters: Int32) -> Int32:
     """Move points to the cluster that predicts their neighbourhood ``ring (P, P)`` with the least squared error."""
-    frames = sequence.sample(REFINE_FRAMES)
+    n_frames = min(REFINE_FRAMES, max(REFINED[1], REFINED[0] // len(base)))
+    together = max(1, REFINE_FLOATS // (3 * len(base)))
     for _ in range(REFINE_ROUNDS):
         predictor = AffinePredictor(base, clusters, int(clusters.max()) + 1)
-        moved = _relabel((ring @ predictor.squared_errors(frames, predictor.fit(frames))).argmin(axis=1))
+        errors = np.zeros((len(base), predictor.n_clusters))
+        left = sequence.sampled_frames(n_frames)
+        while group := list(islice(left, together)):
+            frames = np.stack(group).astype(np.float64)
+            errors += predictor.squared_errors(frames, predictor.fit(frames))
+        moved = _relabel((ring @ errors).argmin(axis=1))
         if np.array_equal(moved, clusters):
             break
         clusters = moved
@@ -186,14 +218,9 @@ def _principal_coordinates(rows: Float64) -> Float64:
 
 
 def _k_means(features: Float64, n_clusters: int) -> Int32:
-    """Labels ``(P,)``; more points than `LARGE` go to the nearest of the centres that some of them have."""
-    from scipy.cluster.vq import kmeans2, vq
+    """Labels ``(P,)``."""
+    from scipy.cluster.vq import kmeans2
 
-    if len(features) > LARGE:
-        some = features[:: -(-len(features) // CLUSTERED)]
-        labels = _k_means(some, n_clusters)
-        centres = np.array([some[labels == k].mean(axis=0) for k in range(int(labels.max()) + 1)])
-        return _relabel(vq(features, centres)[0])
     n_clusters = min(n_clusters, len(np.unique(np.round(features, 9), axis=0)))
     best, best_cost = np.zeros(len(features), np.int32), np.inf
     for restart in range(RESTARTS if n_clusters > 1 else 0):

@@ -17,7 +17,7 @@ from gvcodecs.mcgv.pictures.quantiser import ImageQuantiser, Magnitudes, choose_
 from gvpipe.arrays import Float64
 from gvpipe.media.video import B_FRAMES, Plane, Profile, VideoWriter
 
-PIXELS = 1 << 21  # of pictures that are made at a time: they may be many times as large as positions
+PIXELS = 1 << 20  # of pictures that are made at a time: they may be many times as large as positions
 SMALL = 60, 2000  # bytes a frame, and of a file's own: B-frames save a third of the pictures' at best, and cost 8 each
 
 Residuals = Iterator[tuple[int, Float64]]
@@ -88,6 +88,9 @@ def _residuals(start: Start, motion: CodedMotion) -> Residuals:
 def _pictures(residual: Float64, padding: Padding, profile: Profile, step: float) -> Iterator[Plane]:
     """Yield one picture per frame: the padded x, y and z planes, one below the other."""
     values = residual.swapaxes(1, 2).reshape(3 * len(residual), -1)  # (n, P, 3) -> (3n, P)
-    levels = np.rint(padding.fill(values / step, 0.0)) + profile.middle
-    planes = np.clip(levels, profile.low, profile.high).astype(profile.dtype)
+    levels = padding.fill(values / step, 0.0)
+    np.rint(levels, out=levels)
+    levels += profile.middle
+    planes = np.clip(levels, profile.low, profile.high, out=levels).astype(profile.dtype)
+    del levels
     yield from planes.reshape(len(residual), -1, planes.shape[2])

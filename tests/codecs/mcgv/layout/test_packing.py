@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from surfaces import awkward_surfaces, bumpy_sheet, check_layout
 
+from gvcodecs.mcgv.layout import chart_parameterization, packing
 from gvcodecs.mcgv.layout.chart_parameterization import Atlas, parameterize
 from gvcodecs.mcgv.layout.coding import (
     decode_clusters,
@@ -68,3 +69,32 @@ def test_points_at_one_place_of_a_chart_get_pixels_of_their_own() -> None:
     uv = np.repeat(np.array([[0.0, 0], [1, 0], [0, 1]]), [1, 40, 1], axis=0)
     layout = pack(Atlas(np.zeros(42, np.int32), uv, np.array([0.5])), 8, 1.5, None)
     check_layout(layout, np.zeros(42), 8)
+
+
+def test_clusters_of_many_triangles_are_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Patches of a cluster have charts of their own, as large as the surface, and leave no point out."""
+    points, faces = bumpy_sheet(30)
+    points = points * 1e-3  # triangles so small that xatlas would drop them in the model's unit
+    far = np.append(points, [[1000.0, 0, 0]], axis=0)
+    monkeypatch.setattr(chart_parameterization, "PATCH", 400)
+    atlas = parameterize(far, faces, np.zeros(len(far), np.int32))
+    sizes = np.bincount(atlas.chart[:-1])
+    assert 2 <= (sizes > 0).sum() <= 30
+    inside = faces[(atlas.chart[faces] == atlas.chart[faces[:, :1]]).all(axis=1)]
+    assert len(inside) > 0.7 * len(faces)
+    lengths = np.linalg.norm(atlas.uv[inside[:, 0]] - atlas.uv[inside[:, 1]], axis=1)
+    wanted = np.linalg.norm(far[inside[:, 0]] - far[inside[:, 1]], axis=1) / 1000
+    assert 0.5 < np.median(lengths / wanted) < 1.5
+    check_layout(pack(atlas, 16, 1.5, None), atlas.chart, 16)
+
+
+def test_crowded_places_get_wider_windows() -> None:
+    """Squares are counted: what has room takes near pixels, a heap wider windows, more points than pixels none."""
+    grid = np.stack(np.meshgrid(np.arange(32.0), np.arange(32.0)), axis=-1).reshape(-1, 2)
+    size = np.array([40, 40])
+    assert packing._is_roomy(1.25 * grid, size, 1)
+    heap = np.tile([[20.0, 20.0]], (200, 1))
+    assert [packing._is_roomy(heap, size, half) for half in (1, 2, 4, 8)] == [False, False, False, True]
+    assert not packing._is_roomy(np.tile([[20.0, 20.0]], (1601, 1)), size, 64)
+    places = packing._assign(heap, size, 8)
+    assert places is not None and len(np.unique(places, axis=0)) == 200 and np.abs(places - 20).max() <= 9

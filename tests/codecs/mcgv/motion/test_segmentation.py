@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from surfaces import affine_maps, bumpy_sheet
 
-from gvcodecs.mcgv.motion import segmentation
+from gvcodecs.mcgv.motion import affine_fit, segmentation
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
 from gvcodecs.mcgv.motion.segmentation import LocalAffineFit, local_motions, segment
 from gvpipe.mesh.topology import adjacency, k_ring
@@ -107,12 +107,28 @@ def test_segmentation_numbers_its_clusters(n_clusters: int) -> None:
         assert clusters.max() < n_clusters
 
 
-def test_points_beyond_a_number_go_to_the_nearest_centre(monkeypatch: pytest.MonkeyPatch) -> None:
-    draw = np.random.default_rng(3)
-    own = draw.integers(0, 4, 900)
-    features = 10.0 * np.eye(4)[own] + draw.normal(0, 0.1, (900, 4))
-    whole = segmentation._k_means(features, 4)
-    monkeypatch.setattr(segmentation, "LARGE", 500)
-    monkeypatch.setattr(segmentation, "CLUSTERED", 100)
-    some = segmentation._k_means(features, 4)
-    assert len(set(zip(own, whole, strict=True))) == len(set(zip(own, some, strict=True))) == 4
+def test_large_meshes_begin_with_some_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A partition that begins with a quarter of the points, and looks at two frames at a time, finds the halves too."""
+    sequence, right = two_halves(8)
+    base = sequence.read(0, 1)[0].astype(float)
+    torn = sequence.faces[right[sequence.faces].all(axis=1) | ~right[sequence.faces].any(axis=1)]
+    neighbours = adjacency(torn, len(base))
+    monkeypatch.setattr(segmentation, "LARGE", 100)
+    monkeypatch.setattr(segmentation, "SEGMENTED", len(base) // 4)
+    monkeypatch.setattr(segmentation, "REFINE_FLOATS", 6 * len(base))
+    monkeypatch.setattr(affine_fit, "ROWS", 50)
+    clusters = segment(sequence, base, neighbours, 2)
+    assert np.array_equal(clusters == clusters[13], right)
+
+
+def test_errors_add_up_block_by_block(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Squared errors of a few frames and points at a time are those of all at once."""
+    sequence, right = two_halves()
+    frames = sequence.read(0, 6).astype(float)
+    predictor = AffinePredictor(frames[0], right.astype(np.int32), 2)
+    at_once = predictor.squared_errors(frames, predictor.fit(frames))
+    monkeypatch.setattr(affine_fit, "ROWS", 37)
+    groups = [frames[:2], frames[2:]]
+    np.testing.assert_allclose(
+        sum(predictor.squared_errors(group, predictor.fit(group)) for group in groups), at_once, atol=1e-9
+    )
