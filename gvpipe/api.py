@@ -30,14 +30,14 @@ from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
 from gvpipe.rate_control.search import meet
 from gvpipe.rate_control.targets import Target, parse_bound, read_bound
 from gvpipe.rate_control.trials import Trial
-from gvpipe.registry import check_mapped, encode_sequence, make_codec, segment_parts
+from gvpipe.registry import check_mapped, encode_sequence, is_mapped, make_codec, segment_parts
 from gvpipe.rendering.poster import poster_of
 from gvpipe.segment_map import segments_mapped_by
 from gvpipe.segment_memory import fit_segments
 from gvpipe.sequence import MeshSequence
-from gvpipe.tasks.choice import open_executor
+from gvpipe.tasks.choice import AUTO_WORKERS, count_cores, open_executor
 from gvpipe.tasks.executor import Executor
-from gvpipe.tasks.segments import RemoteSegments
+from gvpipe.tasks.segments import RemoteSegments, SharedSegments
 
 COSTLY_VERTEX = 400  # bytes of memory, with its triangles: less than any codec takes
 COSTLY_ATTRIBUTES = 4000  # bytes of memory, of a vertex with attributes of 40 components in all
@@ -148,7 +148,7 @@ def encode(
     bare: bool = False,
     unlimited: bool = False,
     memory: int | None = None,
-    workers: int | None = None,
+    workers: int | str | None = None,
     scheduler: str | None = None,
     **settings: Any,
 ) -> Report:
@@ -179,7 +179,8 @@ def encode(
         stream: write the stream layout, which plays over HTTP while it loads (`restream`).
         bare: write the bare layout, for data sets: without poster and what else only players need.
         memory: bytes that encoding may take, about, in each process: segments are as short as it needs. Codec ``mcgv`` cannot.
-        workers: code segments in so many processes of this machine, with the same bytes. Codec ``mcgv`` cannot.
+        workers: code segments in so many processes of this machine, with the same bytes. Codec ``mcgv`` cannot. ``"auto"``: in
+            one for each core, once a minute of work is left; None: here.
         scheduler: code them on the Dask cluster of this address, such as ``"tcp://host:8786"``, whose workers read ``source``
             at the same path (extra ``cluster``).
 
@@ -193,7 +194,10 @@ def encode(
     check_video_target(path, "gvpipe.encode's path")
     _check_wanted((target_rmse, target_kg, target_bpvf, max_error), stream, bare)
     given = _candidates(codec, settings, purpose)
-    if workers is not None or scheduler is not None:
+    is_shared = workers == AUTO_WORKERS and scheduler is None
+    if workers == AUTO_WORKERS:
+        workers = count_cores() if is_shared and _may_share(given, source) else None
+    if scheduler is not None or not (workers is None or is_shared):
         check_mapped(given)
     clock = _StageClock(progress)
     with open_executor(scheduler, workers) as executor:
@@ -203,7 +207,7 @@ def encode(
             given = fit_segments(given, sequence.n_vertices, memory)
         target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
         asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
-        with _segments_coded_by(executor, sequence, source, {"fps": fps, **options}):
+        with _segments_coded_by(executor, sequence, source, {"fps": fps, **options}, is_shared):
             coded = _code(sequence, given, target, asset, clock)
     size, bitstream = _write(sequence, coded, path, clock, STREAM if stream else BARE if bare else PLAIN)
     clock("", 1.0)
@@ -446,17 +450,26 @@ def _open_source(
 
 @contextlib.contextmanager
 def _segments_coded_by(
-    executor: Executor | None, sequence: MeshSequence, source: MeshSequence | Source, options: dict[str, Any]
+    executor: Executor | None, sequence: MeshSequence, source: MeshSequence | Source, options: dict[str, Any], is_shared: bool
 ) -> Iterator[None]:
-    """Let an executor code segments of a sequence that was read from ``source`` with the ``options`` of `read`."""
+    """Let an executor code segments of a sequence that was read from ``source`` with the ``options`` of `read`.
+
+    ``is_shared``: not before they prove to be much work.
+    """
     if executor is None:
         yield
         return
     reopen = None if isinstance(source, MeshSequence) else partial(read, _absolute(source), **options)
     if reopen and options["mesh"] is not None:
         reopen = partial(reopen, mesh=_absolute(options["mesh"]))
-    with segments_mapped_by(RemoteSegments(executor, sequence, reopen)):
+    remote = RemoteSegments(executor, sequence, reopen)
+    with segments_mapped_by(SharedSegments(remote) if is_shared else remote):
         yield
+
+
+def _may_share(given: Codec | Sequence[Codec], source: MeshSequence | Source) -> bool:
+    """Whether workers may code segments: of a source that they can read, by a codec whose segments are independent."""
+    return isinstance(given, Codec) and is_mapped(given) and not isinstance(source, MeshSequence) and count_cores() > 1
 
 
 def _absolute(source: Source) -> Source:

@@ -129,10 +129,15 @@ def encode_sequence(
     return Encoded(add_repeated_frames(encoded.bitstream, holds, version), encoded.permutation)
 
 
+def is_mapped(codec: Codec) -> bool:
+    """Whether a codec's segments can be coded elsewhere (`gvpipe.segment_map`)."""
+    return bool(getattr(codec, "maps_segments", False))
+
+
 def check_mapped(codecs: Codec | Sequence[Codec]) -> None:
     """Raise `SettingError` unless the segments of all these codecs can be coded elsewhere (`gvpipe.segment_map`)."""
     for codec in [codecs] if isinstance(codecs, Codec) else codecs:
-        if not getattr(codec, "maps_segments", False):
+        if not is_mapped(codec):
             others = [name for name in codec_ids() if getattr(codec_class(name), "maps_segments", False)]
             raise SettingError(
                 f"codec {codec.id} fits all frames together, so workers cannot share them; choose codec {' or '.join(others)}, "

@@ -21,7 +21,7 @@ from gvpipe.batch.inputs import Job, find_jobs
 from gvpipe.batch.manifest import Entry, Manifest, open_manifest
 from gvpipe.codec import Codec, Progress
 from gvpipe.rate_control.purposes import own_settings
-from gvpipe.tasks.choice import open_executor
+from gvpipe.tasks.choice import count_cores, open_executor
 from gvpipe.tasks.executor import Executor, Outcome, WorkerDied
 from gvpipe.version import __version__
 
@@ -132,13 +132,6 @@ def settings_json(keywords: Mapping[str, Any]) -> dict[str, Any]:
     others = {name: value for name, value in keywords.items() if name != "codec" and value not in (None, False, {}, ())}
     values: dict[str, Any] = json.loads(json.dumps({"codecs": codecs, **others}, default=str))
     return values
-
-
-def count_cores() -> int:
-    """How many cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _make(folder: Path) -> None:

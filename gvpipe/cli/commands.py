@@ -90,7 +90,12 @@ def cli() -> None:
     is_flag=True,
     help="Write the file while frames come on standard input, float32 positions each; --mesh has the triangles.",
 )
-@click.option("--workers", type=int, metavar="N", help="Code segments in N processes: same bytes. Not for codec mcgv.")
+@click.option(
+    "--workers",
+    type=int,
+    metavar="N",
+    help="Code segments in N processes: same bytes. Not for codec mcgv. [default: a minute of work gets one for each core]",
+)
 @click.option("--scheduler", metavar="ADDRESS", help="Code them on a Dask cluster, such as tcp://host:8786.")
 @output_options
 def encode(
@@ -137,7 +142,8 @@ def encode(
                 runs, target, lambda run, own: api.encode(run.sequence, own, asked.codec, progress, **asked.making)
             )
         else:
-            report = api.encode(source, path, asked.codec, progress, **asked.keywords, workers=workers, scheduler=scheduler)
+            shared = "auto" if workers is None and PIPE not in sources else workers
+            report = api.encode(source, path, asked.codec, progress, **asked.keywords, workers=shared, scheduler=scheduler)
     out = out.carrying(target)
     name = shown(sources[0], STDIN) + (f" and {len(sources) - 1} more" if len(sources) > 1 else "")
     if not split:

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Iterator
 
 from gvpipe.errors import SettingError
 from gvpipe.tasks.executor import Executor
 
 MOST_WORKERS = 1024
+AUTO_WORKERS = "auto"
+
+
+def count_cores() -> int:
+    """How many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 @contextlib.contextmanager
-def open_executor(scheduler: str | None, workers: int | None) -> Iterator[Executor | None]:
+def open_executor(scheduler: str | None, workers: int | str | None) -> Iterator[Executor | None]:
     """Give what does work elsewhere: a cluster, processes of this machine, or None where neither is asked for.
 
     Args:
@@ -26,7 +35,7 @@ def open_executor(scheduler: str | None, workers: int | None) -> Iterator[Execut
     if scheduler is not None and workers is not None:
         raise SettingError("workers are processes of this machine, and a scheduler has its own; give one of the two")
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or not 1 <= workers <= MOST_WORKERS):
-        raise SettingError(f"workers is {workers!r}; an integer in 1..{MOST_WORKERS} is needed")
+        raise SettingError(f"workers is {workers!r}; an integer in 1..{MOST_WORKERS}, or {AUTO_WORKERS!r}, is needed")
     if scheduler is not None:
         from gvpipe.tasks.cluster import connect
 

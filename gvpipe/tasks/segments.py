@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import pickle
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -19,6 +20,7 @@ from gvpipe.tasks.executor import Executor, Outcome, Work, WorkerDied
 
 PROTOCOL = 5  # of pickle
 SEQUENCE = "sequence"  # its name in pickles
+MUCH_WORK = 60.0  # seconds: it takes a second or two until processes code their first segment
 REMEDY = "give workers more memory, or take fewer frames per segment (--segment)"
 
 
@@ -59,6 +61,37 @@ class RemoteSegments:
         except (pickle.PicklingError, TypeError, AttributeError) as exc:
             raise InputError(f"{self.sequence.name}: its frames cannot be sent to workers; give its path instead") from exc
         return pickle.dumps((self.reopen, self.sequence.shape, stream.getvalue()), PROTOCOL)
+
+
+@dataclass(frozen=True)
+class SharedSegments:
+    """Codes segments here, and shares them out once they prove to be much work; as `gvpipe.segment_map.SegmentMap`.
+
+    Args:
+        remote: codes them elsewhere.
+        patience: seconds of work that are left at least when it does.
+    """
+
+    remote: RemoteSegments
+    patience: float = MUCH_WORK
+
+    def __call__(self, work: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any], report: Report) -> list[Any]:
+        """Return ``work(shared, task)`` of each task, in their order; raises `InputError` as `RemoteSegments` does."""
+        results: list[Any] = []
+        started = time.perf_counter()
+        for task in tasks:
+            if self._is_much(time.perf_counter() - started, len(results), len(tasks)):
+                break
+            results.append(work(shared, task))
+            report(len(results) / len(tasks))
+        n_done, n_left = len(results), len(tasks) - len(results)
+        if n_left:
+            results += self.remote(work, shared, tasks[n_done:], lambda done: report((n_done + done * n_left) / len(tasks)))
+        return results
+
+    def _is_much(self, seconds: float, n_done: int, n_tasks: int) -> bool:
+        """Whether what is left takes long, judged by the tasks that are done."""
+        return n_done > 0 and n_tasks - n_done > 1 and seconds / n_done * (n_tasks - n_done) > self.patience
 
 
 def prepare(data: bytes) -> Work:

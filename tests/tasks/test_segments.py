@@ -10,16 +10,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from sequences import held, partly_still, waving
 
 import gvpipe
 from gvpipe import files
 from gvpipe.budget import Budget
+from gvpipe.cli.commands import cli
 from gvpipe.errors import InputError, SettingError
 from gvpipe.segment_map import map_segments, segments_mapped_by
 from gvpipe.sequence import MeshSequence
 from gvpipe.tasks.executor import Outcome, Prepare, WorkerDied
-from gvpipe.tasks.segments import RemoteSegments
+from gvpipe.tasks.segments import RemoteSegments, SharedSegments
 
 
 class Here:
@@ -79,6 +81,45 @@ def test_processes_write_the_same_bytes(tmp_path: Path, monkeypatch: pytest.Monk
         gvpipe.encode(sequence, "memory.mp4", codec="pca", segment=4)
     files = [Path(name).read_bytes() for name in ("here.mp4", "there.mp4", "memory.mp4")]
     assert files[0] == files[1] == files[2]
+
+
+@pytest.mark.parametrize("patience", [0.0, 1e9])
+def test_much_work_is_shared_out(tmp_path: Path, patience: float) -> None:
+    """The first segment is coded here, the others by workers if they take long enough; progress goes on."""
+    gvpipe.write(waving(6, 20), tmp_path / "in.npz")
+    given, here, told = gvpipe.read(tmp_path / "in.npz"), Here(), list[tuple[str, float]]()
+    remote = RemoteSegments(here, given, partial(gvpipe.read, tmp_path / "in.npz"))
+    gvpipe.encode(given, tmp_path / "here.mp4", codec="pca", segment=4)
+    with segments_mapped_by(SharedSegments(remote, patience)):
+        gvpipe.encode(given, tmp_path / "there.mp4", "pca", lambda stage, done: told.append((stage, done)), segment=4)
+    assert (tmp_path / "there.mp4").read_bytes() == (tmp_path / "here.mp4").read_bytes()
+    assert here.n_tasks == ([] if patience else [4])
+    parts = [done for stage, done in told if stage == "segments"]
+    assert parts == sorted(parts) and (not parts or parts[-1] == 1.0)
+
+
+def test_workers_by_default(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command shares out much work; codecs that cannot and sequences in memory are coded here."""
+    gvpipe.write(waving(6, 20), tmp_path / "in.npz")
+    monkeypatch.setattr("gvpipe.api.count_cores", lambda: 2)
+    monkeypatch.setattr(SharedSegments, "__call__", shared := Recorded())
+    for codec in ("pca", "mcgv"):
+        result = CliRunner().invoke(cli, ["encode", str(tmp_path / "in.npz"), str(tmp_path / f"{codec}.mp4"), "--codec", codec])
+        assert result.exit_code == 0, result.output
+    gvpipe.encode(gvpipe.read(tmp_path / "in.npz"), tmp_path / "own.mp4", "pca", workers="auto")
+    assert shared.count == 1
+    with pytest.raises(SettingError, match="workers is 'many'; an integer"):
+        gvpipe.encode(tmp_path / "in.npz", tmp_path / "own.mp4", "pca", workers="many")
+
+
+class Recorded:
+    """Codes segments here, and counts how often it is asked."""
+
+    count = 0
+
+    def __call__(self, work: Any, shared: Any, tasks: Any, report: Any) -> list[Any]:
+        self.count += 1
+        return [work(shared, task) for task in tasks]
 
 
 def test_codecs_that_fit_all_frames_together_are_refused(sequence: MeshSequence, tmp_path: Path) -> None:
