@@ -16,7 +16,7 @@ Run = Callable[..., Any]
 
 
 @pytest.mark.parametrize(
-    "address", ["htp://x/walk.mp4", "file:///walk.mp4", "s3://x/walk.npz", "ftp://x/%04d.obj", "ftp://x/*.ply"]
+    "address", ["htp://x/walk.mp4", "file:///walk.mp4", "htp://x/walk.npz", "htp://x/%04d.obj", "htp://x/*.ply"]
 )
 def test_kinds_that_are_not_read(run: Run, address: str) -> None:
     ended = run("info", address)
@@ -32,6 +32,12 @@ def test_mesh_sequences_are_read_from_disk(run: Run, sequence: MeshSequence, tmp
     assert (ended.status, ended.out, ended.err) == (1, "", said)
     ended = run("encode", "http://x/a.obj", "http://x/b.obj", tmp_path / "walk.mp4")
     assert ended.status == 1 and "http://x/a.obj is an address; mesh sequences are read from disk" in ended.err
+
+
+def test_stores_that_cannot_be_asked(run: Run, tmp_path: Path) -> None:
+    ended = run("encode", "ftp://127.0.0.1:1/%04d.obj", tmp_path / "walk.mp4")
+    assert ended.status == 1 and list(tmp_path.iterdir()) == []
+    assert ended.err.startswith("Error: ftp://127.0.0.1:1/%04d.obj cannot be read: ") and "check the address" in ended.err
 
 
 @pytest.mark.parametrize(
