@@ -113,7 +113,8 @@ def encode(
     INPUT is an .npz (vertices (F,V,3), faces (T,3), fps), a scene (animated .glb or .gltf, .usd, .abc, .fbx), a simulation
     (.pvd, .vtkhdf, .xdmf, .exo, .case), a point cache (.pc2, .mdd, .npy; with --mesh), a folder of frame files (OBJ, PLY, STL,
     OFF, GLB, VTP, VTU), a glob ('walk/*.obj', or without the quotes), a pattern (walk/%04d.obj, walk/####.obj,
-    'walk/$F4.obj'), a geometry video, or - for an .npz or a geometry video on standard input. OUTPUT - is standard output.
+    'walk/$F4.obj'), a geometry video, or - for an .npz or a geometry video on standard input. Stores that fsspec knows are
+    read, too (s3://bucket/walk.npz). OUTPUT - is standard output.
     """
     from gvpipe import api, files
     from gvpipe.cli.process import give_back_memory
