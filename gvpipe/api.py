@@ -180,7 +180,7 @@ def encode(
         bare: write the bare layout, for data sets: without poster and what else only players need.
         memory: bytes that encoding may take, about, in each process: segments are as short as it needs. Codec ``mcgv`` cannot.
         workers: code segments in so many processes of this machine, with the same bytes. Codec ``mcgv`` cannot. ``"auto"``: in
-            one for each core, once a minute of work is left; None: here.
+            one for each core, once a minute of work is left and no ``memory`` is given; None: here.
         scheduler: code them on the Dask cluster of this address, such as ``"tcp://host:8786"``, whose workers read ``source``
             at the same path (extra ``cluster``).
 
@@ -196,7 +196,7 @@ def encode(
     given = _candidates(codec, settings, purpose)
     is_shared = workers == AUTO_WORKERS and scheduler is None
     if workers == AUTO_WORKERS:
-        workers = count_cores() if is_shared and _may_share(given, source) else None
+        workers = count_cores() if is_shared and memory is None and _may_share(given, source) else None
     if scheduler is not None or not (workers is None or is_shared):
         check_mapped(given)
     clock = _StageClock(progress)
@@ -475,9 +475,12 @@ def _may_share(given: Codec | Sequence[Codec], source: MeshSequence | Source) ->
 def _absolute(source: Source) -> Source:
     """The same paths for processes whose current folder is another."""
     if isinstance(source, list | tuple):
-        return [os.path.abspath(one) for one in source]
-    one = check_path(source, "the input")
-    return one if is_remote(one) or is_stored(one) else os.path.abspath(one)
+        return [_absolute_path(one) for one in source]
+    return _absolute_path(check_path(source, "the input"))
+
+
+def _absolute_path(path: StrPath) -> StrPath:
+    return path if is_remote(path) or is_stored(path) else os.path.abspath(path)
 
 
 def _target(

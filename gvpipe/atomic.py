@@ -132,7 +132,7 @@ def temporary_folder() -> Iterator[str]:
     Raises:
         OutputError: no folder can be made there.
     """
-    folder = _new_folder(PREFIX)
+    folder = new_folder(PREFIX)
     try:
         yield folder
     finally:
@@ -149,7 +149,7 @@ def lasting_folder() -> Iterator[str]:
         OutputError: no folder can be made there.
     """
     _remove_old_folders()
-    folder = _new_folder(LASTING_PREFIX)
+    folder = new_folder(LASTING_PREFIX)
     try:
         yield folder
     except BaseException:
@@ -163,7 +163,8 @@ def output_error(path: str | os.PathLike[str], exc: OSError) -> OutputError:
     return OutputError(f"cannot write {os.fspath(path)}: {exc.strerror or exc}; {remedy}")
 
 
-def _new_folder(prefix: str) -> str:
+def new_folder(prefix: str) -> str:
+    """Make a folder among the system's temporary files; raises `OutputError`."""
     try:
         return tempfile.mkdtemp(prefix=prefix)
     except OSError as exc:

@@ -51,11 +51,23 @@ class Watched:
 
 
 class Guarded:
-    """The same frames, each read inside the context that ``guard`` makes."""
+    """The same frames, each read inside the context that ``guard`` makes; ``rounding`` tells what reading rounded so far."""
 
-    def __init__(self, read: Read, n_frames: int, n_vertices: int, guard: Callable[[], AbstractContextManager[None]]) -> None:
-        self._read, self._guard = read, guard
+    def __init__(
+        self,
+        read: Read,
+        n_frames: int,
+        n_vertices: int,
+        guard: Callable[[], AbstractContextManager[None]],
+        rounding: Callable[[], float],
+    ) -> None:
+        self._read, self._guard, self._rounding = read, guard, rounding
         self.shape: tuple[int, ...] = (n_frames, n_vertices, 3)
+
+    @property
+    def rounding(self) -> float:
+        """The largest rounding of a coordinate, model units."""
+        return self._rounding()
 
     def __getitem__(self, key: slice, /) -> Floats:
         start, stop, _ = key.indices(self.shape[0])

@@ -287,9 +287,9 @@ class MeshSequence:
         """Return the same sequence with other notes, say; frames that are not in memory are read inside ``guard()``."""
         if type(self.positions) is np.ndarray:
             return self._derived(self.positions, self._exact, **changes)
-        size = self.n_frames, self.n_vertices
-        exact = None if self._exact is None else Guarded(self.read_absolute, *size, guard)
-        return self._derived(Guarded(self.read, *size, guard), exact, **changes)
+        given = self.n_frames, self.n_vertices, guard, lambda: self.rounding
+        exact = None if self._exact is None else Guarded(self.read_absolute, *given)
+        return self._derived(Guarded(self.read, *given), exact, **changes)
 
     def _derived(self, positions: Frames, exact: Frames | None, **changes: Any) -> MeshSequence:
         result = replace(self, positions=positions, **changes)

@@ -17,6 +17,7 @@ ADDRESS = re.compile(r"([a-z][a-z0-9+.-]+:)/", re.IGNORECASE)  # two letters or 
 NO_FILE = "is no ordinary file, but a pipe or a device; write what it gives to a file first"
 VIDEO_SUFFIXES = (".mp4", ".m4v")
 STORE = re.compile(r"([a-z][a-z0-9+.-]+)://", re.IGNORECASE)  # addresses that fsspec may know
+CHAINED = "::"  # in addresses of fsspec that lead from one store into another
 ON_DISK = ("file", "local")  # schemes that are no store
 DOWNLOAD_FIRST = "mesh sequences are read from disk; download it first"
 
@@ -33,12 +34,12 @@ def is_remote(path: object) -> bool:
 
 def is_stored(path: object) -> bool:
     """Whether a path is an address in a store that fsspec knows if it is there, which web servers are not."""
-    found = STORE.match(path) if isinstance(path, str) and not is_url(path) else None
+    found = STORE.match(path) if isinstance(path, str) and not is_url(path) and CHAINED not in path else None
     if found is None or found[1].lower() in ON_DISK or importlib.util.find_spec("fsspec") is None:
         return False
     from gvpipe.container.store_source import knows
 
-    return knows(found[1].lower())
+    return knows(found[1])
 
 
 def check_source(path: str | os.PathLike[str]) -> None:
@@ -47,6 +48,8 @@ def check_source(path: str | os.PathLike[str]) -> None:
         raise InputError("the input's name is empty; give a file or a folder")
     if is_url(path):
         raise InputError(f"{path} is an address; {DOWNLOAD_FIRST}")
+    if is_stored(path):
+        raise InputError(f"{path} is an address in a store, which `encode` reads as its only input; {DOWNLOAD_FIRST}")
     if _is_address(path):
         others = "" if importlib.util.find_spec("fsspec") else "; stores such as s3:// need: pip install 'gvpipe[remote]'"
         raise InputError(f"{path} is an address; give a path on disk, or http:// or https:// of a geometry video{others}")

@@ -98,6 +98,7 @@ def find_beside(folder: Path, named: str) -> Path:
     fetch(folder.joinpath(*parts))
     for part in parts:
         path = _same_name(path, part)
+    fetch(path)
     root = folder.resolve()
     try:
         is_inside, is_file = path.resolve().is_relative_to(root), path.is_file()

@@ -10,10 +10,10 @@ fsspec is an extra (``pip install 'gvpipe[remote]'``); most stores need a packag
 from __future__ import annotations
 
 import contextlib
+import errno
 import glob
 import os
 import shutil
-import tempfile
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -22,8 +22,9 @@ from typing import TYPE_CHECKING, Any
 
 import fsspec
 
+from gvpipe.atomic import new_folder
 from gvpipe.container.store_source import asking
-from gvpipe.errors import GvpipeError
+from gvpipe.errors import GvpipeError, InputError
 from gvpipe.forks import ForkLock
 from gvpipe.io.fetching import serve
 from gvpipe.io.pattern import match_pattern
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from gvpipe.sequence import MeshSequence
 
 PREFIX = "gvpipe-store-"  # of temporary folders
+NO_NAME = (errno.ENAMETOOLONG, errno.EEXIST, errno.ENOTDIR, errno.EISDIR, errno.EINVAL)  # of names that a disk cannot hold
 
 
 def read_stored(url: str, read: Callable[[str], MeshSequence]) -> MeshSequence:
@@ -69,22 +71,25 @@ class Mirror:
     """
 
     def __init__(self, url: str) -> None:
-        self._url, self._fetched = url.rstrip("/"), set[Path]()
+        self._url, self._fetched, self._owner = url.rstrip("/"), set[Path](), os.getpid()
         with asking(url):
             system, place = fsspec.core.url_to_fs(self._url)
             place = place.rstrip("/")
-            above, names = _list(system, place)
-        self._above = f"{above}/" if above else ""
+            above, names = _list(system, place, self._url)
+        self._above = f"{above}/" if above or place.startswith("/") else ""
         relative = place[len(self._above) :]
-        self._address = self._url[: len(self._url) - len(relative)].rstrip("/")
-        self.root = Path(os.path.realpath(tempfile.mkdtemp(prefix=PREFIX)))
-        weakref.finalize(self, _remove, self.root, os.getpid())
-        for name in names:
-            self._place(name[len(self._above) :])
-        self.path = os.path.join(self.root, *relative.split("/")) if relative else str(self.root)
+        self._address = self._url[: -len(relative) - 1] if relative else self._url
+        self.root = Path(os.path.realpath(new_folder(PREFIX)))
+        weakref.finalize(self, _remove, self.root, self._owner)
+        with asking(url):
+            for name in names:
+                self._place(name[len(self._above) :])
+        is_file = names == [place]
+        root = str(self.root) if is_file or not glob.has_magic(relative) else glob.escape(str(self.root))
+        self.path = os.path.join(root, *relative.split("/")) if relative else root
         self._lock = ForkLock()
         serve(self)
-        if names == [place]:
+        if is_file:
             self.fetch(Path(self.path))
 
     def mention(self, path: Path) -> None:
@@ -98,33 +103,41 @@ class Mirror:
         with self._lock:
             if path in self._fetched:
                 return
-            part = path.with_name(f"{path.name}.{os.getpid()}")
+            part = self.root / f".{os.getpid()}"
             try:
                 with asking(f"{self._address}/{name}"), contextlib.suppress(FileNotFoundError, IsADirectoryError):
-                    path.parent.mkdir(parents=True, exist_ok=True)
                     system, _ = fsspec.core.url_to_fs(self._url)
                     system.get_file(self._above + name, str(part))
-                    os.replace(part, path)
-                    self._fetched.add(path)
+                    if part.is_file():  # stores make a folder of one
+                        path.parent.mkdir(parents=True, exist_ok=True)
+                        os.replace(part, path)
+                        self._fetched.add(path)
             finally:
-                part.unlink(missing_ok=True)
+                part.rmdir() if part.is_dir() else part.unlink(missing_ok=True)
 
     @contextlib.contextmanager
     def borrowed(self, path: Path) -> Iterator[None]:
-        """Fetch a file, and empty it and what is fetched besides when the block ends."""
+        """Fetch a file, and empty it and what is fetched besides when the block ends; forked children leave them all.
+
+        Raises:
+            InputError: the store has none by now.
+        """
         with self._lock:
             before = set(self._fetched)
             try:
                 self.fetch(path)
+                if path not in self._fetched:
+                    raise InputError(f"{path}: no such file; check the address")
                 yield
             finally:
-                for one in self._fetched - before:
-                    _empty(one)
-                self._fetched = before
+                if os.getpid() == self._owner:
+                    for one in self._fetched - before:
+                        _empty(one)
+                    self._fetched = before
 
     def tell(self, text: str) -> str:
         """A text with addresses in place of paths on disk."""
-        return text.replace(str(self.root), self._address)
+        return text.replace(glob.escape(str(self.root)), self._address).replace(str(self.root), self._address)
 
     @contextlib.contextmanager
     def named(self) -> Iterator[None]:
@@ -136,10 +149,15 @@ class Mirror:
             raise
 
     def _place(self, name: str) -> None:
-        """Mention a file of the store; names that leave the folder are left out."""
+        """Mention a file of the store; names that leave the folder, or that the disk cannot hold, are left out."""
         parts = name.split("/")
-        if "\0" not in name and "\\" not in name and all(parts) and not {".", ".."} & set(parts):
+        if "\0" in name or "\\" in name or not all(parts) or {".", ".."} & set(parts):
+            return
+        try:
             self.mention(self.root.joinpath(*parts))
+        except OSError as exc:
+            if exc.errno not in NO_NAME:
+                raise
 
 
 class _Values:
@@ -154,10 +172,10 @@ class _Values:
             return self._values[key]
 
 
-def _list(system: Any, place: str) -> tuple[str, list[str]]:
+def _list(system: Any, place: str, url: str) -> tuple[str, list[str]]:
     """The folder that names of files are relative to, and the files; raises FileNotFoundError.
 
-    A glob begins below the folder before its first wildcard.
+    A glob begins below the folder before its first wildcard. Errors name ``url``.
     """
     if system.isfile(place):
         return place.rpartition("/")[0], [place]
@@ -167,9 +185,9 @@ def _list(system: Any, place: str) -> tuple[str, list[str]]:
         found = system.glob(place, detail=True)
         return above, sorted(name for name, each in found.items() if each["type"] == "file")
     above = place if system.isdir(place) else place.rpartition("/")[0]
-    if above != place and match_pattern(place) is None:
+    if above != place and match_pattern(url) is None:
         raise FileNotFoundError(place)
-    return above, sorted(each["name"] for each in system.ls(above, detail=True) if each["type"] == "file")
+    return above, sorted(each["name"] for each in system.ls(above or system.root_marker, detail=True) if each["type"] == "file")
 
 
 def _empty(path: Path) -> None:

@@ -40,8 +40,6 @@ class Processes:
         self._stack = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
-        folder = self._stack.enter_context(temporary_folder())
-        self._slots = [_Slot(folder) for _ in range(self._count)]
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -51,6 +49,9 @@ class Processes:
 
     def run(self, prepare: Prepare, data: bytes, tasks: Sequence[Any]) -> Iterator[Outcome]:
         """Do tasks; see `gvpipe.tasks.executor.Executor`. Each process has one at a time."""
+        if not self._slots:
+            folder = self._stack.enter_context(temporary_folder())
+            self._slots = [_Slot(folder) for _ in range(self._count)]
         waiting = deque(enumerate(tasks))
         ended: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
         first = pickle.dumps((PREPARE, prepare, data), PROTOCOL)

@@ -76,7 +76,7 @@ class SharedSegments:
     patience: float = MUCH_WORK
 
     def __call__(self, work: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any], report: Report) -> list[Any]:
-        """Return ``work(shared, task)`` of each task, in their order; raises `InputError` as `RemoteSegments` does."""
+        """Return ``work(shared, task)`` of each task, in their order; where workers cannot, they are done here."""
         results: list[Any] = []
         started = time.perf_counter()
         for task in tasks:
@@ -86,7 +86,11 @@ class SharedSegments:
             report(len(results) / len(tasks))
         n_done, n_left = len(results), len(tasks) - len(results)
         if n_left:
-            results += self.remote(work, shared, tasks[n_done:], lambda done: report((n_done + done * n_left) / len(tasks)))
+            try:
+                rest = self.remote(work, shared, tasks[n_done:], lambda done: report((n_done + done * n_left) / len(tasks)))
+            except GvpipeError:  # nobody asked for workers: one may have too little memory, or not find the input
+                rest = [work(shared, task) for task in tasks[n_done:]]
+            results += rest
         return results
 
     def _is_much(self, seconds: float, n_done: int, n_tasks: int) -> bool:

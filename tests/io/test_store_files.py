@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import io
 import json
+import multiprocessing
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,19 @@ from sequences import waving
 
 import gvpipe
 from gvpipe.cli.commands import cli
-from gvpipe.errors import InputError, TopologyChange
+from gvpipe.errors import InputError, OutputError, TopologyChange
 from gvpipe.io.fetching import fetch
 
 fsspec = pytest.importorskip("fsspec")
 WAVES = waving(5, 12)
+
+
+held: dict[str, gvpipe.MeshSequence] = {}
+
+
+def frame(number: int) -> Any:
+    """A frame of what is held, in a forked child."""
+    return held["walk"][number]
 
 
 @pytest.fixture
@@ -132,8 +141,10 @@ def test_errors_name_addresses(store: Any, tmp_path: Path) -> None:
     with pytest.raises(TopologyChange, match=r"f_03.obj has 3 vertices"):
         found[3]
     store.rm("/films/f_05.obj")
-    with pytest.raises(InputError, match="^memory://films/f_05.obj"):
+    with pytest.raises(InputError, match="^memory://films/f_05.obj: no such file"):
         found[5]
+    with pytest.raises(InputError, match="^memory://films/f_%d_%d.obj"):
+        gvpipe.read("memory://films/f_%d_%d.obj")
     with pytest.raises(InputError, match=r"frame 05 missing"):
         gvpipe.read("memory://films/*.obj")
     for name in ("none.npz", "none.usdc", "*.stl", "g_%04d.obj"):
@@ -142,6 +153,65 @@ def test_errors_name_addresses(store: Any, tmp_path: Path) -> None:
     store.pipe("/films/a.npz", b"PK nothing")
     with pytest.raises(InputError, match="^memory://films/a.npz"):
         gvpipe.read("memory://films/a.npz")
+
+
+def test_odd_names(store: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the disk cannot hold is left out, a folder is no texture, letters may differ, the temporary folder's may be odd."""
+    triangle = b"mtllib W.mtl\nusemtl r\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    picture = io.BytesIO()
+    PIL.Image.new("RGB", (2, 2)).save(picture, "PNG")
+    store.pipe("/films/w.mtl", b"newmtl r\nmap_Kd looks\nnewmtl s\nmap_Kd RED.png\n")
+    store.pipe("/films/looks/a.png", b"x")
+    store.pipe("/films/red.PNG", picture.getvalue())
+    store.pipe("/films/" + "x" * 300, b"a")
+    for number in range(3):
+        store.pipe(f"/films/w_{number}.obj", triangle)
+    found = gvpipe.read("memory://films/w_%d.obj")
+    assert found.shape == (3, 3, 3) and [one.name for one in found.materials] == ["r"]
+    assert "there is no 'looks' beside the mesh" in "".join(found.notes)
+    store.pipe("/films/w_0.obj", triangle.replace(b"usemtl r", b"usemtl s"))
+    assert [one.data for one in gvpipe.read("memory://films/w_%d.obj").images] == [picture.getvalue()]
+    (tmp_path / "t[x]").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "t[x]"))
+    assert len(gvpipe.read("memory://films/w_*.obj")) == 3
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "none"))
+    with pytest.raises(OutputError, match="none: No such file"):
+        gvpipe.read("memory://films/w_*.obj")
+
+
+def test_files_at_the_root(store: Any) -> None:
+    store.pipe("/films/a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    for number in range(2):
+        store.copy("/films/a.obj", f"/top_{number}.obj")
+    try:
+        for name, length in (("top_*.obj", 2), ("top_%d.obj", 2), ("top_1.obj", 1)):
+            found = gvpipe.read(f"memory://{name}")
+            assert (len(found), found.name) == (length, f"memory://{name}")
+    finally:
+        store.rm(["/top_0.obj", "/top_1.obj"])
+    with pytest.raises(InputError, match="is an address; give"):
+        gvpipe.read("zip://a.obj::memory://films/a.zip")
+
+
+def test_rounding_is_told(store: Any) -> None:
+    for number in range(3):
+        far = 4_000_000.123 * number
+        store.pipe(f"/films/f_{number}.obj", f"v {far} 0 0\nv {far + 1} 0 0\nv 0 1 0\nf 1 2 3\n".encode())
+    found = gvpipe.read("memory://films/f_%d.obj")
+    assert found.rounding < 1e-6
+    _ = found[2]
+    assert found.rounding > 0.05
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="the system does not fork")
+def test_forked_readers(store: Any, tmp_path: Path) -> None:
+    gvpipe.write(WAVES, tmp_path / "in" / "f_%02d.obj")
+    put(store, tmp_path / "in")
+    held["walk"] = gvpipe.read("memory://films/*.obj")
+    with multiprocessing.get_context("fork").Pool(3) as pool:
+        frames = pool.map(frame, [*range(12)] * 4)
+    del held["walk"]
+    assert np.allclose(frames, np.tile(WAVES[:], (4, 1, 1)), atol=1e-6)
 
 
 def test_names_that_leave_the_folder(store: Any, tmp_path: Path) -> None:
@@ -172,7 +242,7 @@ def test_workers_read_the_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     fsspec.config.set_conf_env(fsspec.config.conf)
     gvpipe.write(WAVES, tmp_path / "in" / "f_%02d.obj")
     try:
-        gvpipe.encode("dir://f_%02d.obj", tmp_path / "a.mp4", "pca", segment=4, workers=2)
+        gvpipe.encode(["dir://f_%02d.obj"], tmp_path / "a.mp4", "pca", segment=4, workers=2)
     finally:
         del fsspec.config.conf["dir"]
     gvpipe.encode(tmp_path / "in" / "f_%02d.obj", tmp_path / "b.mp4", "pca", segment=4)

@@ -98,6 +98,13 @@ def test_much_work_is_shared_out(tmp_path: Path, patience: float) -> None:
     assert parts == sorted(parts) and (not parts or parts[-1] == 1.0)
 
 
+def test_work_is_done_here_where_workers_cannot(sequence: MeshSequence) -> None:
+    """They were not asked for, so their errors are not the user's."""
+    remote = RemoteSegments(answering(WorkerDied("it died")), sequence, None)
+    told: list[float] = []
+    assert SharedSegments(remote, 0.0)(second, None, [3, 4, 5], told.append) == [3, 4, 5]
+
+
 def test_workers_by_default(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The command shares out much work; codecs that cannot and sequences in memory are coded here."""
     gvpipe.write(waving(6, 20), tmp_path / "in.npz")

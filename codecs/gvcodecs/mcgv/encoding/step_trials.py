@@ -20,7 +20,7 @@ IDLE_FRAMES = 24  # from which on pictures that change nothing take more bytes t
 
 
 class StepTrials:
-    """Codes a candidate and measures, once for each step."""
+    """Codes a candidate and measures, once for each step; in the published mode the last alone is kept."""
 
     def __init__(self, job: Job, candidate: Candidate) -> None:
         self.job, self.candidate = job, candidate

@@ -92,7 +92,7 @@ def _place(uv: Float64, fill: float, block: int, density: float) -> Int64:
 def _assign(wanted: Float64, size: Int64, half: int) -> Int64 | None:
     """Assign ``wanted (n, 2)`` to distinct pixels inside ``size``; None if windows of ``half`` are too crowded.
 
-    The choice is made among twice as wide windows: just wide enough, it takes up to a hundred times as long.
+    The choice is made among windows of ``2 half``, the widest at most: just wide enough takes up to a hundred times as long.
     """
     if not _is_roomy(wanted, size, half):
         return None
