@@ -107,8 +107,9 @@ def fill(cells: Cells, order: Int64, points: Int64, width: int, block: int, shif
         block: as in `place_points`.
         shift: of moments where cells turn as their points do; None: they keep their directions.
     """
+    order, points = order.copy(), np.ascontiguousarray(points)
     while (cells.side > 1).any():
-        cells, order = _halve(cells, order, points, shift, block)
+        cells = _halve(cells, order, points, shift, block)
     pixel = np.empty(len(points), np.int64)
     pixel[order] = cells.corner[:, 1] * width + cells.corner[:, 0]
     return pixel
@@ -129,15 +130,15 @@ def _spread(points: Int64, groups: Integers | None) -> Int64:
     return np.asarray(points - points.min(axis=0))
 
 
-def _halve(cells: Cells, order: Int64, points: Int64, shift: int | None, block: int) -> tuple[Cells, Int64]:
-    """Cut every cell of more than one pixel across its longer side, and its vertices with it."""
+def _halve(cells: Cells, order: Int64, points: Int64, shift: int | None, block: int) -> Cells:
+    """Cut every cell of more than one pixel across its longer side, and its vertices with it; ``order`` changes."""
+    from gvcodecs.mcgv.layout.kd_tree_kernels import sort_cells
+
     counts = np.diff(cells.starts)
     wide = cells.side[:, 0] >= cells.side[:, 1]
     longer = cells.side.max(axis=1)
     across, down = (cells.across, cells.down) if shift is None else _turn(cells, order, points, shift, wide)
-    direction = np.where(wide[:, None], across, down)
-    keys = np.einsum("vi,vi->v", points[order], np.repeat(direction, counts, axis=0))
-    order = order[np.lexsort((keys, np.repeat(np.arange(len(counts)), counts)))]
+    sort_cells(order, cells.starts, np.where(wide[:, None], across, down), points)
     first = np.where(longer >= 2 * block, longer // block // 2 * block, longer // 2)  # columns or rows of the first half
     first = np.where(longer == 1, 1, first)
     kept = (2 * counts * first + longer) // (2 * longer)  # rounded; no half overflows, since the whole did not
@@ -149,24 +150,26 @@ def _halve(cells: Cells, order: Int64, points: Int64, shift: int | None, block: 
     side[2 * rows + 1, axis] = longer - first
     ends = np.stack([cells.starts[:-1] + kept, cells.starts[1:]], axis=1).ravel()
     used = np.diff(ends, prepend=0) > 0
-    halves = Cells(
+    return Cells(
         starts=np.r_[0, ends[used]],
         corner=corner[used],
         side=side[used],
         across=np.repeat(across, 2, axis=0)[used],
         down=np.repeat(down, 2, axis=0)[used],
     )
-    return halves, order
 
 
 def _turn(cells: Cells, order: Int64, points: Int64, shift: int, wide: Bool) -> tuple[Int64, Int64]:
     """Return the cells' directions ``(n, 3)`` across and down, after a look at their points."""
+    from gvcodecs.mcgv.layout.kd_tree_kernels import add_moments
+
     across, down = cells.across.copy(), cells.down.copy()
     frames = np.flatnonzero((cells.side == FRAME).all(axis=1))
     larger = np.flatnonzero(cells.side.max(axis=1) > FRAME)
     if not len(frames) and not len(larger):
         return across, down
-    moments = second_moments(points[order], cells.starts, shift)
+    moments = np.empty((len(across), 6), np.int64)
+    add_moments(order, cells.starts, points, shift, moments)
     scores = spreads(moments[larger])
     best = _towards(DIRECTIONS[scores.argmax(axis=1)], np.where(wide[larger, None], across[larger], down[larger]))
     for target, chosen in ((across, wide[larger]), (down, ~wide[larger])):

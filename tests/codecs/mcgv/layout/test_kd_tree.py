@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from placing import halved
 from surfaces import awkward_surfaces, check_layout
 
-from gvcodecs.mcgv.layout.kd_tree import choose_size, place_points
+from gvcodecs.mcgv.layout.kd_tree import choose_size, place_points, second_moments
+from gvcodecs.mcgv.layout.kd_tree_kernels import add_moments, sort_cells
 from gvpipe.errors import CorruptFile, InputError
 from gvpipe.mesh.lattice import Lattice
 
@@ -68,3 +69,20 @@ def test_lattices_too_fine_for_halves_are_corrupt() -> None:
     assert sorted(place_points(points, None, 16, 16, 16).pixel) == sorted(set(place_points(points, None, 16, 16, 16).pixel))
     with pytest.raises(CorruptFile, match="too fine"):
         place_points(points + 1, None, 16, 16, 16)
+
+
+@pytest.mark.parametrize("n_cells", [1, 7, 300])
+def test_cells_are_sorted_and_measured(n_cells: int) -> None:
+    """The kernels give what NumPy does: a stable sort by cell and place, and second moments."""
+    draw = np.random.default_rng(n_cells)
+    points = draw.integers(0, 9, (2000, 3)) * draw.integers(1, 1 << 16)
+    starts = np.r_[0, np.sort(draw.choice(np.arange(1, 2000), n_cells - 1, replace=False)), 2000].astype(np.int64)
+    directions, order = draw.integers(-2, 3, (n_cells, 3)), draw.permutation(2000)
+    cell = np.repeat(np.arange(n_cells), np.diff(starts))
+    keys = (points[order] * directions[cell]).sum(axis=1)
+    wanted = order[np.lexsort((keys, cell))]
+    sort_cells(order, starts, directions, points)
+    assert np.array_equal(order, wanted)
+    moments = np.empty((n_cells, 6), np.int64)
+    add_moments(order, starts, points, 3, moments)
+    assert np.array_equal(moments, second_moments(points[order], starts, 3))

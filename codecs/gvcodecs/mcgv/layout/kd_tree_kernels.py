@@ -1,0 +1,96 @@
+"""Points of the cells of a k-d tree: sorted along their cell's direction, and their second moments."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gvpipe.arrays import Int64
+from gvpipe.compiled import compiled
+
+RUN = 12  # points that are sorted by insertion
+
+
+@compiled
+def sort_cells(order: Int64, starts: Int64, directions: Int64, points: Int64) -> None:
+    """Sort the vertices of each cell by their place along its direction; those of one place keep their order.
+
+    Args:
+        order: ``(V,)`` vertices, changed.
+        starts: ``(n + 1,)`` bounds of the cells in it.
+        directions: ``(n, 3)`` of the cells.
+        points: ``(V, 3)`` the vertices' coordinates.
+    """
+    keys, vertices = np.empty(len(order), np.int64), np.empty(len(order), np.int64)
+    other_keys = np.empty(len(order), np.int64)
+    for cell in range(len(directions)):
+        low, high = starts[cell], starts[cell + 1]
+        x, y, z = directions[cell, 0], directions[cell, 1], directions[cell, 2]
+        for i in range(low, high):
+            v = order[i]
+            key = x * points[v, 0] + y * points[v, 1] + z * points[v, 2]
+            k = i
+            first = low + (i - low) // RUN * RUN
+            while k > first and keys[k - 1] > key:
+                keys[k], order[k] = keys[k - 1], order[k - 1]
+                k -= 1
+            keys[k], order[k] = key, v
+        width = RUN
+        while width < high - low:
+            _merge_runs(keys, order, other_keys, vertices, low, high, width)
+            width *= 2
+
+
+@compiled
+def _merge_runs(keys: Int64, order: Int64, other_keys: Int64, vertices: Int64, low: int, high: int, width: int) -> None:
+    """Merge neighbouring sorted runs of ``width`` from ``low`` to ``high``; ``other_keys`` and ``vertices`` are for work."""
+    for start in range(low, high - width, 2 * width):
+        middle, end = start + width, min(start + 2 * width, high)
+        if keys[middle - 1] <= keys[middle]:
+            continue
+        for i in range(start, middle):
+            other_keys[i], vertices[i] = keys[i], order[i]
+        i, j, k = start, middle, start
+        while i < middle and j < end:
+            if keys[j] < other_keys[i]:
+                keys[k], order[k] = keys[j], order[j]
+                j += 1
+            else:
+                keys[k], order[k] = other_keys[i], vertices[i]
+                i += 1
+            k += 1
+        while i < middle:
+            keys[k], order[k] = other_keys[i], vertices[i]
+            i += 1
+            k += 1
+
+
+@compiled
+def add_moments(order: Int64, starts: Int64, points: Int64, shift: int, moments: Int64) -> None:
+    """Fill the second moments ``(n, 6)`` of the cells' points about their means: xx, yy, zz, xy, xz, yz.
+
+    Args:
+        order, starts, points: as in `sort_cells`; each cell has a point, and no coordinate is negative.
+        shift: bits that coordinates about the mean lose.
+    """
+    for cell in range(len(moments)):
+        low, high = starts[cell], starts[cell + 1]
+        a, b, c = 0, 0, 0
+        for i in range(low, high):
+            v = order[i]
+            a += points[v, 0]
+            b += points[v, 1]
+            c += points[v, 2]
+        n = high - low
+        a, b, c = a // n, b // n, c // n
+        xx, yy, zz, xy, xz, yz = 0, 0, 0, 0, 0, 0
+        for i in range(low, high):
+            v = order[i]
+            x, y, z = (points[v, 0] - a) >> shift, (points[v, 1] - b) >> shift, (points[v, 2] - c) >> shift
+            xx += x * x
+            yy += y * y
+            zz += z * z
+            xy += x * y
+            xz += x * z
+            yz += y * z
+        own = moments[cell]
+        own[0], own[1], own[2], own[3], own[4], own[5] = xx, yy, zz, xy, xz, yz
