@@ -93,9 +93,10 @@ class Mirror:
             self.fetch(Path(self.path))
 
     def mention(self, path: Path) -> None:
-        """Put an empty file there, to be fetched later."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _empty(path)
+        """Put an empty file there, to be fetched later; one that is here stays."""
+        if path not in self._fetched:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            _empty(path)
 
     def fetch(self, path: Path) -> None:
         """Copy a file that is not here yet; nothing if the store lacks it; raises `InputError`."""

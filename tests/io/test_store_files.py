@@ -128,6 +128,9 @@ def test_fields_and_lists(store: Any, tmp_path: Path) -> None:
     found = gvpipe.read("memory://films/a.pvd")
     assert np.allclose(found[:], WAVES[:], atol=1e-6)
     assert np.array_equal(found.fields["speed"][4:9], speed[4:9])
+    store.pipe("/films/b.pvd", store.cat("/films/a.pvd").replace(b"0001.vtp", b"none.vtp"))
+    with pytest.raises(InputError, match=r"^memory://films/.*none.vtp: no such file"):
+        gvpipe.read("memory://films/b.pvd")[1]
 
 
 def test_errors_name_addresses(store: Any, tmp_path: Path) -> None:
