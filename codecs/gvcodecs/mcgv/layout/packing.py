@@ -97,6 +97,8 @@ def _assign(wanted: Float64, size: Int64, half: int) -> Int64 | None:
     if not _is_roomy(wanted, size, half):
         return None
     columns, graph = _choices(wanted, size, min(2 * half, WINDOWS[-1]))
+    if len(columns) < len(wanted):  # SciPy would match the pixels instead
+        return None
     try:
         rows, matched = csgraph.min_weight_full_bipartite_matching(graph)
     except ValueError:  # there is none

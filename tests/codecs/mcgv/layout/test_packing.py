@@ -96,5 +96,9 @@ def test_crowded_places_get_wider_windows() -> None:
     heap = np.tile([[20.0, 20.0]], (200, 1))
     assert [packing._is_roomy(heap, size, half) for half in (1, 2, 4, 8)] == [False, False, False, True]
     assert not packing._is_roomy(np.tile([[20.0, 20.0]], (1601, 1)), size, 64)
+    assert packing._assign(np.tile([[8.0, 8.0]], (1000, 1)), np.array([17, 17]), 8) is None
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(packing, "_is_roomy", lambda *given: True)
+        assert packing._assign(heap, size, 1) is None and packing._assign(heap, size, 2) is None
     places = packing._assign(heap, size, 8)
     assert places is not None and len(np.unique(places, axis=0)) == 200 and np.abs(places - 20).max() <= 9
