@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import weakref
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Protocol
 
@@ -43,25 +42,24 @@ def serve(mirror: Mirror) -> None:
 
 def mention(path: Path) -> None:
     """Put an empty file in the place of one that `borrowed` will fetch."""
-    for mirror in _mirrors_of(path):
+    mirror = _mirror_of(path)
+    if mirror:
         mirror.mention(path)
 
 
 def fetch(path: Path) -> None:
     """Copy a file, for as long as its mirror lives; raises `InputError`."""
-    for mirror in _mirrors_of(path):
+    mirror = _mirror_of(path)
+    if mirror:
         mirror.fetch(path)
 
 
-@contextlib.contextmanager
-def borrowed(path: Path) -> Iterator[None]:
+def borrowed(path: Path) -> contextlib.AbstractContextManager[None]:
     """Copy a file for a while; raises `InputError`."""
-    with contextlib.ExitStack() as stack:
-        for mirror in _mirrors_of(path):
-            stack.enter_context(mirror.borrowed(path))
-        yield
+    mirror = _mirror_of(path)
+    return mirror.borrowed(path) if mirror else contextlib.nullcontext()
 
 
-def _mirrors_of(path: Path) -> list[Mirror]:
-    """The mirror that a path lies in, if it lies in one."""
-    return [mirror for mirror in list(_mirrors) if path.is_relative_to(mirror.root)]
+def _mirror_of(path: Path) -> Mirror | None:
+    """The mirror that a path lies in."""
+    return next((mirror for mirror in list(_mirrors) if path.is_relative_to(mirror.root)), None)

@@ -95,7 +95,6 @@ def find_beside(folder: Path, named: str) -> Path:
     if PurePosixPath(named).is_absolute() or PureWindowsPath(named).anchor or ".." in parts or "\0" in named:
         raise InputError(f"{named!r} lies outside of the folder {folder}; copy it there and name it without a path")
     path = folder
-    fetch(folder.joinpath(*parts))
     for part in parts:
         path = _same_name(path, part)
     fetch(path)

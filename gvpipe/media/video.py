@@ -96,6 +96,12 @@ class Profile:
         clipped: Integers = np.clip(samples, self.low, self.high)
         return clipped
 
+    def samples(self, levels: Float64) -> Plane:
+        """The samples nearest to ``levels`` above the middle, which are changed: they may be many."""
+        np.rint(levels, out=levels)
+        levels += self.middle
+        return np.clip(levels, self.low, self.high, out=levels).astype(self.dtype)
+
     @property
     def offsets(self) -> Float64:
         """Levels above the middle of every value that a sample's dtype can hold, clipped."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from gvpipe.arrays import Array, Int32, Int64
+from gvpipe.arrays import Array, Int32, Int64, Integers
 from gvpipe.mesh.unique_rows import row_ids
 
 
@@ -31,10 +31,10 @@ def adjacency(faces: Int32, n_vertices: int) -> sparse.csr_array:
     return sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n_vertices, n_vertices))
 
 
-def k_ring(neighbours: sparse.csr_array, k: int) -> sparse.csr_array:
-    """Return the ``(V, V)`` matrix whose row v holds 1 for every vertex of v's k-ring, v included."""
+def k_ring(neighbours: sparse.csr_array, k: int, some: Integers | None = None) -> sparse.csr_array:
+    """Return the ``(V, V)`` matrix whose row v holds 1 for every vertex of v's k-ring, v included; of ``some`` rows alone."""
     one_ring = neighbours + sparse.eye_array(neighbours.shape[0], format="csr")
-    ring = one_ring
+    ring = one_ring if some is None else one_ring[some]
     for _ in range(k - 1):
         ring = sparse.csr_array(ring @ one_ring)
         ring.data[:] = 1.0

@@ -161,15 +161,12 @@ def _halve(cells: Cells, order: Int64, points: Int64, shift: int | None, block: 
 
 def _turn(cells: Cells, order: Int64, points: Int64, shift: int, wide: Bool) -> tuple[Int64, Int64]:
     """Return the cells' directions ``(n, 3)`` across and down, after a look at their points."""
-    from gvcodecs.mcgv.layout.kd_tree_kernels import add_moments
-
     across, down = cells.across.copy(), cells.down.copy()
     frames = np.flatnonzero((cells.side == FRAME).all(axis=1))
     larger = np.flatnonzero(cells.side.max(axis=1) > FRAME)
     if not len(frames) and not len(larger):
         return across, down
-    moments = np.empty((len(across), 6), np.int64)
-    add_moments(order, cells.starts, points, shift, moments)
+    moments = second_moments(points, order, cells.starts, shift)
     scores = spreads(moments[larger])
     best = _towards(DIRECTIONS[scores.argmax(axis=1)], np.where(wide[larger, None], across[larger], down[larger]))
     for target, chosen in ((across, wide[larger]), (down, ~wide[larger])):
@@ -183,17 +180,16 @@ def _turn(cells: Cells, order: Int64, points: Int64, shift: int, wide: Bool) -> 
     return across, down
 
 
-def second_moments(points: Int64, starts: Int64, shift: int, counts: Int64 | None = None) -> Int64:
+def second_moments(points: Int64, order: Int64, starts: Int64, shift: int, counts: Int64 | None = None) -> Int64:
     """Second moments ``(n, 6)`` of the cells' points about their means: xx, yy, zz, xy, xz, yz.
 
-    Cell c has the points ``starts[c]`` to ``starts[c + 1]``, each of them ``counts`` times, or once.
+    Cell c has the points ``order[starts[c]:starts[c + 1]]``, each of them ``counts`` times, or once.
     """
-    times = np.ones(len(points), np.int64) if counts is None else counts
-    n = np.add.reduceat(times, starts[:-1])
-    means = np.add.reduceat(points * times[:, None], starts[:-1], axis=0) // n[:, None]
-    x, y, z = ((points - np.repeat(means, np.diff(starts), axis=0)) >> shift).T
-    products = np.stack([x * x, y * y, z * z, x * y, x * z, y * z], axis=1)
-    return np.asarray(np.add.reduceat(products * times[:, None], starts[:-1], axis=0))
+    from gvcodecs.mcgv.layout.kd_tree_kernels import add_moments
+
+    moments = np.empty((len(starts) - 1, 6), np.int64)
+    add_moments(points, order, starts, shift, np.ones(len(order), np.int64) if counts is None else counts, moments)
+    return moments
 
 
 def spreads(moments: Int64) -> Int64:

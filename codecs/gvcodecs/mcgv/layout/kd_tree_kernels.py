@@ -65,32 +65,35 @@ def _merge_runs(keys: Int64, order: Int64, other_keys: Int64, vertices: Int64, l
 
 
 @compiled
-def add_moments(order: Int64, starts: Int64, points: Int64, shift: int, moments: Int64) -> None:
+def add_moments(points: Int64, order: Int64, starts: Int64, shift: int, counts: Int64, moments: Int64) -> None:
     """Fill the second moments ``(n, 6)`` of the cells' points about their means: xx, yy, zz, xy, xz, yz.
 
     Args:
-        order, starts, points: as in `sort_cells`; each cell has a point, and no coordinate is negative.
+        points: ``(P, 3)`` coordinates, none of them negative.
+        order: ``(m,)`` the points of one cell after the other.
+        starts: ``(n + 1,)`` bounds of the cells in it; each has a point.
         shift: bits that coordinates about the mean lose.
+        counts: ``(m,)`` how often each point counts.
     """
     for cell in range(len(moments)):
         low, high = starts[cell], starts[cell + 1]
-        a, b, c = 0, 0, 0
+        n, a, b, c = 0, 0, 0, 0
         for i in range(low, high):
-            v = order[i]
-            a += points[v, 0]
-            b += points[v, 1]
-            c += points[v, 2]
-        n = high - low
+            v, times = order[i], counts[i]
+            n += times
+            a += times * points[v, 0]
+            b += times * points[v, 1]
+            c += times * points[v, 2]
         a, b, c = a // n, b // n, c // n
         xx, yy, zz, xy, xz, yz = 0, 0, 0, 0, 0, 0
         for i in range(low, high):
-            v = order[i]
+            v, times = order[i], counts[i]
             x, y, z = (points[v, 0] - a) >> shift, (points[v, 1] - b) >> shift, (points[v, 2] - c) >> shift
-            xx += x * x
-            yy += y * y
-            zz += z * z
-            xy += x * y
-            xz += x * z
-            yz += y * z
+            xx += times * x * x
+            yy += times * y * y
+            zz += times * z * z
+            xy += times * x * y
+            xz += times * x * z
+            yz += times * y * z
         own = moments[cell]
         own[0], own[1], own[2], own[3], own[4], own[5] = xx, yy, zz, xy, xz, yz

@@ -93,7 +93,7 @@ def _sort(cells: Cells, order: Int64, centres: Int64, charts: Integers, shift: i
     runs = np.flatnonzero(begins)
     counts, chart = np.diff(runs, append=len(order)), chart[runs]
     cell = np.searchsorted(cells.starts, runs, "right") - 1
-    moments = second_moments(centres[chart], np.searchsorted(runs, cells.starts), shift, counts)
+    moments = second_moments(centres, chart.astype(np.int64), np.searchsorted(runs, cells.starts), shift, counts)
     directions = DIRECTIONS[spreads(moments).argmax(axis=1)]
     keys = np.einsum("ri,ri->r", centres[chart], directions[cell])
     sorted_ = np.lexsort((chart, keys, cell))
@@ -141,6 +141,6 @@ def _cut(cells: Cells, cuts: _Cuts) -> Cells:
 
 def _direct(cells: Cells, points: Int64, shift: int) -> Cells:
     """Give cells the two directions in which their sorted ``points (V, 3)`` spread most, the first along the longer side."""
-    one, two = widest_pairs(spreads(second_moments(points, cells.starts, shift)))
+    one, two = widest_pairs(spreads(second_moments(points, np.arange(len(points)), cells.starts, shift)))
     wide = (cells.side[:, 0] >= cells.side[:, 1])[:, None]
     return replace(cells, across=np.where(wide, one, two), down=np.where(wide, two, one))

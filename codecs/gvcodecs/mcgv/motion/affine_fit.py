@@ -101,7 +101,7 @@ class AffinePredictor:
         squares = [block @ block.T for block in blocks]
         errors = np.empty((frames.shape[1], self.n_clusters))
         for some in row_blocks(len(errors), ROWS):
-            moved = np.moveaxis(frames[:, some], 1, 0).reshape(frames[:, some].shape[1], -1)  # (m, 3n)
+            moved = np.moveaxis(frames[:, some], 1, 0).reshape(len(errors[some]), -1)  # (m, 3n)
             products = (moved @ rows.T).reshape(len(moved), self.n_clusters, 4)
             for k, square in enumerate(squares):
                 local = self._local(k, self._base[some])

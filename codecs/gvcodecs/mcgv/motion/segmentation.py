@@ -64,22 +64,17 @@ def segment(sequence: MeshSequence, base: Float64, neighbours: sparse.csr_array,
     """
     if n_clusters == 1 or sequence.n_frames == 1:
         return np.zeros(len(base), np.int32)
-    one_ring = k_ring(neighbours, 1)
     if len(base) <= LARGE:
         clusters = _k_means(motion_features(sequence, base, k_ring(neighbours, RING)), n_clusters)
     else:
-        clusters = _segment_some(sequence, base, one_ring, n_clusters)
-    return refine(sequence, base, one_ring, clusters)
+        clusters = _segment_some(sequence, base, neighbours, n_clusters)
+    return refine(sequence, base, k_ring(neighbours, 1), clusters)
 
 
-def _segment_some(sequence: MeshSequence, base: Float64, one_ring: sparse.csr_array, n_clusters: int) -> Int32:
+def _segment_some(sequence: MeshSequence, base: Float64, neighbours: sparse.csr_array, n_clusters: int) -> Int32:
     """Clusters of evenly chosen points; the others take that of the nearest, in space."""
     some = np.arange(0, len(base), -(-len(base) // SEGMENTED))
-    ring = one_ring[some]
-    for _ in range(RING - 1):
-        ring = sparse.csr_array(ring @ one_ring)
-        ring.data[:] = 1.0
-    labels = _k_means(motion_features(sequence, base, ring), n_clusters)
+    labels = _k_means(motion_features(sequence, base, k_ring(neighbours, RING, some)), n_clusters)
     return np.asarray(labels[KDTree(base[some]).query(base)[1]], np.int32)
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
 from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.layout.layout import Layout
@@ -88,9 +86,5 @@ def _residuals(start: Start, motion: CodedMotion) -> Residuals:
 def _pictures(residual: Float64, padding: Padding, profile: Profile, step: float) -> Iterator[Plane]:
     """Yield one picture per frame: the padded x, y and z planes, one below the other."""
     values = residual.swapaxes(1, 2).reshape(3 * len(residual), -1)  # (n, P, 3) -> (3n, P)
-    levels = padding.fill(values / step, 0.0)
-    np.rint(levels, out=levels)
-    levels += profile.middle
-    planes = np.clip(levels, profile.low, profile.high, out=levels).astype(profile.dtype)
-    del levels
+    planes = profile.samples(padding.fill(values / step, 0.0))
     yield from planes.reshape(len(residual), -1, planes.shape[2])

@@ -87,5 +87,5 @@ def _pictures(levels: Float64, padding: Padding, profile: Profile) -> Iterator[P
         own = np.zeros((PLANES, levels.shape[1]))
         part = levels[PLANES * k : PLANES * (k + 1)]
         own[: len(part)] = np.clip(part, -profile.amplitude, profile.amplitude)
-        planes = np.clip(np.rint(padding.fill(own, 0.0)) + profile.middle, profile.low, profile.high).astype(profile.dtype)
+        planes = profile.samples(padding.fill(own, 0.0))
         yield planes.reshape(-1, planes.shape[2])

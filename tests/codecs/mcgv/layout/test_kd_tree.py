@@ -10,7 +10,7 @@ from placing import halved
 from surfaces import awkward_surfaces, check_layout
 
 from gvcodecs.mcgv.layout.kd_tree import choose_size, place_points, second_moments
-from gvcodecs.mcgv.layout.kd_tree_kernels import add_moments, sort_cells
+from gvcodecs.mcgv.layout.kd_tree_kernels import sort_cells
 from gvpipe.errors import CorruptFile, InputError
 from gvpipe.mesh.lattice import Lattice
 
@@ -83,6 +83,11 @@ def test_cells_are_sorted_and_measured(n_cells: int) -> None:
     wanted = order[np.lexsort((keys, cell))]
     sort_cells(order, starts, directions, points)
     assert np.array_equal(order, wanted)
-    moments = np.empty((n_cells, 6), np.int64)
-    add_moments(order, starts, points, 3, moments)
-    assert np.array_equal(moments, second_moments(points[order], starts, 3))
+    for counts in (None, draw.integers(1, 5, 2000)):
+        times = np.ones(2000, np.int64) if counts is None else counts
+        n = np.add.reduceat(times, starts[:-1])
+        means = np.add.reduceat(points[order] * times[:, None], starts[:-1], axis=0) // n[:, None]
+        x, y, z = ((points[order] - np.repeat(means, np.diff(starts), axis=0)) >> 3).T
+        products = np.stack([x * x, y * y, z * z, x * y, x * z, y * z], axis=1)
+        moments = np.add.reduceat(products * times[:, None], starts[:-1], axis=0)
+        assert np.array_equal(second_moments(points, order, starts, 3, counts), moments)
