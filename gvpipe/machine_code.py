@@ -259,7 +259,7 @@ def _value(value: Any, called: list[FunctionType]) -> str:
     if isinstance(function, FunctionType):
         if f"{function.__module__}.".startswith(PACKAGES) or function is not value:
             called.append(function)
-        return f"{function.__module__}.{function.__qualname__}"
+        return f"{function.__module__}.{function.__qualname__} {getattr(value, 'targetoptions', '')}"
     if isinstance(value, ModuleType):
         file = getattr(value, "__file__", None)
         ours = f"{value.__name__}.".startswith(PACKAGES) and file

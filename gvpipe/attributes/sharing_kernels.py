@@ -10,7 +10,7 @@ from gvpipe.arrays import Int32, Int64
 from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
 from gvpipe.mesh.corner_kernels import next_corner, previous_corner
-from gvpipe.mesh.corner_lists import link_corners
+from gvpipe.mesh.corner_lists import AFTER, link_corners
 
 SAME, NEW, OLDER = 0, 1, 2  # symbols; an older entry's number is added to the last
 UNLINKED, UNKNOWN, JOINED, CUT = 0, 1, 2, 3  # what is known of the edge between two corners of a fan
@@ -66,7 +66,7 @@ def code_sharing(coder: SerialCoder, mesh: Corners, n_vertices: int, entries: In
                 for i in range(size):
                     is_visited[fan.corners[i]] = True
                 n, cuts = _code_fan(coder, mesh, fan, (size, cuts, first, n), (given, coded, entries))
-            c = lists.after[c]
+            c = lists.corners[c, AFTER]
     return n
 
 

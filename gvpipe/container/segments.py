@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
@@ -55,6 +56,11 @@ def count_longest(n_frames: int, segments: int) -> int:
 def segment_starts(n_frames: int, segments: int) -> list[int]:
     """First frame of every segment, and F at the end: even cuts."""
     return [s * n_frames // segments for s in range(segments + 1)]
+
+
+def segments_between(start: int, stop: int, bounds: Sequence[int]) -> list[int]:
+    """Which segments frames ``start`` to ``stop`` lie in; ``bounds``: first frame of every segment, and F."""
+    return [s for s, (first, end) in enumerate(pairwise(bounds)) if max(start, first) < min(stop, end)]
 
 
 def cut(n_frames: int, longest: int, most: int) -> list[int]:

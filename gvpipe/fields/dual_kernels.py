@@ -6,7 +6,7 @@ import numpy as np
 
 from gvpipe.arrays import Int32
 from gvpipe.compiled import compiled
-from gvpipe.mesh.corner_lists import link_corners
+from gvpipe.mesh.corner_lists import AFTER, link_corners
 
 LARGEST_FAN = 64  # triangles; larger fans are left alone: chaining one is quadratic in its size
 
@@ -26,7 +26,7 @@ def find_dual(faces: Int32, n_vertices: int) -> Int32:
         while corner >= 0:
             around[n] = corner
             n += 1
-            corner = lists.after[corner]
+            corner = lists.corners[corner, AFTER]
         if _chain(faces, around, n, fan):
             n_dual = _add_strip(fan, n, dual, n_dual)
     return dual[:n_dual].copy()

@@ -17,9 +17,7 @@ from __future__ import annotations
 
 import io
 from bisect import bisect_right
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import accumulate, pairwise
@@ -29,32 +27,32 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gvpipe.ahead import run_ahead
 from gvpipe.arrays import Float64, Integers, UInt8
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.errors import CorruptFile, InputError, corrupt
-from gvpipe.forks import renew_after_fork
 from gvpipe.media.jpeg import decode_jpeg, encode_jpeg
 from gvpipe.media.picture_limits import BYTES_PER_PIXEL, picture_limits
 
 if TYPE_CHECKING:
     import av
 
-B_FRAMES = 8  # between two others, at most
-AHEAD = 2  # groups of pictures decoded ahead of the reader
+B_FRAMES = 3  # between two others
 SPARE_PIXELS = 1 << 16  # for margins that FFmpeg adds
 MAX_SIDE = 16384  # pixels, of a picture that is read
 SECONDS_PER_PIXEL = 3e-9  # of H.264 without residuals, the cheapest
 QP_RANGE = (1, 51)  # 0 would be lossless, which is another H.264 profile that browsers do not read
-# measured on chicken, cow and samba (docs/decisions/0094-mcgv-x264-settings.md): psycho-visual choices and the deblocking
-# filter only cost here, since blocks are separate charts; long pyramids of B-frames (`B_FRAMES`) suit residuals that change
-# slowly; nothing moves in the pictures, so neither partitions nor more references pay, and both cost decoding time
+# measured (docs/decisions/0094-mcgv-x264-settings.md, 0217-mcgv-three-b-frames.md): psycho-visual choices and the deblocking
+# filter only cost here, since blocks are separate charts; a pyramid of three B-frames (`B_FRAMES`) throughout beats what x264
+# finds by looking ahead, for which it holds 32 pictures; nothing moves in the pictures, so neither partitions nor more
+# references pay, and both cost decoding time
 X264 = {
     "no-psy": 1,
     "aq-mode": 0,
     "no-deblock": 1,
     "partitions": "none",
     "ref": 1,
-    "b-adapt": 2,
+    "b-adapt": 0,
     "scenecut": 0,
     "threads": 1,
     "log-level": 0,
@@ -128,8 +126,8 @@ class VideoWriter:
         quality: H.264: the quantisation parameter, 1..51 (10 bit: 1..63); JPEG: the quantisation step, 1..255 levels.
         gop: H.264: frames per group of pictures.
         preset: x264's.
-        b_frames: H.264: pictures predicted from both sides between two others, at most. They take fewer bits, but every
-            picture of the file then takes 8 bytes more in its tables.
+        b_frames: H.264: pictures predicted from both sides between two others. They take fewer bits, but every picture of
+            the file then takes 8 bytes more in its tables.
 
     Raises:
         InputError: H.264 is asked for, and this FFmpeg has no x264.
@@ -261,12 +259,6 @@ class VideoReader:
             self._packets = _FragmentPackets(data, demux, is_alone=profile.codec == "mjpeg")
         self._groups = self._packets.groups
         self._cached: tuple[int, list[Plane]] = (-1, [])
-        self._pool = ThreadPoolExecutor(AHEAD)
-        renew_after_fork(self)
-
-    def after_fork(self) -> None:
-        """Have threads in a forked child, too."""
-        self._pool = ThreadPoolExecutor(AHEAD)
 
     @property
     def n_frames(self) -> int:
@@ -278,9 +270,7 @@ class VideoReader:
         return self._groups[bisect_right(self._groups, (frame, self.n_frames)) - 1]
 
     def close(self) -> None:
-        """Let go of decoded pictures, and end the threads; both come back when they are needed."""
-        pool, self._pool = self._pool, ThreadPoolExecutor(AHEAD)
-        pool.shutdown(cancel_futures=True)
+        """Let go of decoded pictures; they come back when they are needed."""
         self._cached = (-1, [])
 
     def read(self, start: int, stop: int) -> Iterator[tuple[int, list[Plane]]]:
@@ -294,21 +284,14 @@ class VideoReader:
             CorruptFile: while iterating: a group does not decode to its number of planes.
         """
         wanted = [g for g, (first, last) in enumerate(self._groups) if first < stop and last > start]
-        ahead = AHEAD if len(wanted) > 1 else 0
-        pending = deque(self._pool.submit(self._decode, group) for group in wanted[:ahead])
-        return self._collect(start, stop, wanted, pending)
+        decoded = run_ahead(self._decode, wanted)
+        return (self._part(group, planes, start, stop) for group, planes in zip(wanted, decoded, strict=True))
 
-    def _collect(
-        self, start: int, stop: int, wanted: list[int], pending: deque[Future[list[Plane]]]
-    ) -> Iterator[tuple[int, list[Plane]]]:
-        ahead = len(pending)
-        for i, group in enumerate(wanted):
-            planes = pending.popleft().result() if ahead else self._decode(group)
-            if ahead and i + ahead < len(wanted):
-                pending.append(self._pool.submit(self._decode, wanted[i + ahead]))
-            first, last = self._groups[group]
-            low, high = max(start, first), min(stop, last)
-            yield low, planes[low - first : high - first]
+    def _part(self, group: int, planes: list[Plane], start: int, stop: int) -> tuple[int, list[Plane]]:
+        """The first frame of a group, and the planes, between ``start`` and ``stop``."""
+        first, last = self._groups[group]
+        low = max(start, first)
+        return low, planes[low - first : min(stop, last) - first]
 
     def _decode(self, group: int) -> list[Plane]:
         number, planes = self._cached

@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Int32
-from gvpipe.compiled import compiled
+from gvpipe.compiled import compiled, inlined
 
 HUB = 256  # triangles; an edge between two vertices that have more counts as there, unsearched
+AHEAD, BEHIND, AFTER, BEFORE = range(4)  # columns of `CornerLists.corners`
 
 
 class CornerLists(NamedTuple):
@@ -21,15 +22,15 @@ class CornerLists(NamedTuple):
     Args:
         triangles: ``(T, 3)`` vertices; the first one of a removed triangle is -1.
         head: ``(V,)`` the first corner at each vertex, -1 if there is none.
-        after, before: ``(3T,)`` the next and the previous corner at the same vertex, -1 at the ends.
         degree: ``(V,)`` triangles at each vertex.
+        corners: ``(3T, 4)`` what a walk around a vertex reads, side by side: the vertices ahead and behind in the corner's
+            triangle, and the corners after and before it at its own vertex, -1 at the ends.
     """
 
     triangles: Int32
     head: Int32
-    after: Int32
-    before: Int32
     degree: Int32
+    corners: Int32
 
 
 class Hole(NamedTuple):
@@ -53,44 +54,40 @@ class Hole(NamedTuple):
 @compiled
 def link_corners(triangles: Int32, n_vertices: int) -> CornerLists:
     """Build the lists of ``triangles (T, 3)`` over V vertices; at each vertex corners ascend."""
-    n_corners = 3 * len(triangles)
-    lists = CornerLists(
-        triangles,
-        np.full(n_vertices, -1, np.int32),
-        np.full(n_corners, -1, np.int32),
-        np.full(n_corners, -1, np.int32),
-        np.zeros(n_vertices, np.int32),
-    )
+    head, degree = np.full(n_vertices, -1, np.int32), np.zeros(n_vertices, np.int32)
+    lists = CornerLists(triangles, head, degree, np.empty((3 * len(triangles), 4), np.int32))
     for t in range(len(triangles) - 1, -1, -1):
         for k in range(2, -1, -1):
             link(lists, t, k)
     return lists
 
 
-@compiled
+@inlined
 def link(lists: CornerLists, t: int, k: int) -> None:
     """Put corner k of triangle t first in its vertex' list."""
     corner, vertex = 3 * t + k, lists.triangles[t, k]
     first = lists.head[vertex]
-    lists.after[corner] = first
-    lists.before[corner] = -1
+    lists.corners[corner, AHEAD] = lists.triangles[t, k + 1 if k < 2 else 0]
+    lists.corners[corner, BEHIND] = lists.triangles[t, k - 1 if k > 0 else 2]
+    lists.corners[corner, AFTER] = first
+    lists.corners[corner, BEFORE] = -1
     if first >= 0:
-        lists.before[first] = corner
+        lists.corners[first, BEFORE] = corner
     lists.head[vertex] = corner
     lists.degree[vertex] += 1
 
 
-@compiled
+@inlined
 def unlink(lists: CornerLists, t: int, k: int) -> None:
     """Take corner k of triangle t out of its vertex' list."""
     corner, vertex = 3 * t + k, lists.triangles[t, k]
-    before, after = lists.before[corner], lists.after[corner]
+    before, after = lists.corners[corner, BEFORE], lists.corners[corner, AFTER]
     if before >= 0:
-        lists.after[before] = after
+        lists.corners[before, AFTER] = after
     else:
         lists.head[vertex] = after
     if after >= 0:
-        lists.before[after] = before
+        lists.corners[after, BEFORE] = before
     lists.degree[vertex] -= 1
 
 
@@ -106,7 +103,7 @@ def empty_hole(size: int) -> Hole:
     )
 
 
-@compiled
+@inlined
 def find_ring(v: int, lists: CornerLists, hole: Hole) -> tuple[int, bool]:
     """Chain the far sides of v's triangles to its ring: how many vertices that has, and whether it closes.
 
@@ -118,53 +115,67 @@ def find_ring(v: int, lists: CornerLists, hole: Hole) -> tuple[int, bool]:
     while c >= 0:
         if n == len(ring):
             return 0, False
-        t, k = c // 3, c % 3
-        sides[n, 0] = lists.triangles[t, (k + 1) % 3]
-        sides[n, 1] = lists.triangles[t, (k + 2) % 3]
+        sides[n, 0], sides[n, 1] = lists.corners[c, AHEAD], lists.corners[c, BEHIND]
         n += 1
-        c = lists.after[c]
+        c = lists.corners[c, AFTER]
     if n == 0:
         return 0, False
-    first = 0
-    closed = True
+    if _chain_sides(0, n, hole) == ring[0]:
+        return n, True
+    first = _find_end(n, hole)
+    if first < 0 or n == len(ring):
+        return 0, False
+    last = _chain_sides(first, n, hole)
+    if last < 0:
+        return 0, False
+    for j in range(n):
+        if ring[j] == last:  # a vertex twice in the ring
+            return 0, False
+    ring[n] = last
+    return n + 1, False
+
+
+@inlined
+def _chain_sides(first: int, n: int, hole: Hole) -> int:
+    """Fill the ring with where n sides begin, one side after the other; return where the last one ends.
+
+    -1: a side is missing, or the chain is back at its first vertex too early. One that is back there after n sides has each of
+    them, and no vertex twice: what follows a vertex is always the same side.
+    """
+    ring, sides = hole.ring, hole.sides
+    at = sides[first, 0]
+    for i in range(n):
+        ring[i] = at
+        j = 0
+        while j < n and sides[j, 0] != at:
+            j += 1
+        if j == n:
+            return -1
+        at = sides[j, 1]
+        if at == ring[0]:
+            return at if i == n - 1 else -1
+    return int(at)
+
+
+@compiled
+def _find_end(n: int, hole: Hole) -> int:
+    """Which of n sides begins where none ends; -1 unless it is one alone, or if two begin at one vertex."""
+    sides, first = hole.sides, -1
     for i in range(n):
         is_end = True
         for j in range(n):
             if j != i and sides[j, 0] == sides[i, 0]:
-                return 0, False
+                return -1
             if sides[j, 1] == sides[i, 0]:
                 is_end = False
         if is_end:
-            if not closed:
-                return 0, False
-            first, closed = i, False
-    at = sides[first, 0]
-    size = 0
-    for i in range(n):
-        ring[size] = at
-        size += 1
-        found = False
-        for j in range(n):
-            if sides[j, 0] == at:
-                at = sides[j, 1]
-                found = True
-                break
-        if not found:
-            return 0, False
-        if closed and at == ring[0] and i < n - 1:
-            return 0, False
-    if closed:
-        return (size, True) if at == ring[0] else (0, False)
-    if size == len(ring):
-        return 0, False
-    for j in range(size):
-        if ring[j] == at:  # a vertex twice in the ring
-            return 0, False
-    ring[size] = at
-    return size + 1, False
+            if first >= 0:
+                return -1
+            first = i
+    return first
 
 
-@compiled
+@inlined
 def has_edge(a: int, b: int, lists: CornerLists) -> bool:
     """Whether a triangle uses the edge between a and b."""
     if min(lists.degree[a], lists.degree[b]) > HUB:
@@ -173,14 +184,13 @@ def has_edge(a: int, b: int, lists: CornerLists) -> bool:
         a, b = b, a
     c = lists.head[a]
     while c >= 0:
-        t, k = c // 3, c % 3
-        if lists.triangles[t, (k + 1) % 3] == b or lists.triangles[t, (k + 2) % 3] == b:
+        if lists.corners[c, AHEAD] == b or lists.corners[c, BEHIND] == b:
             return True
-        c = lists.after[c]
+        c = lists.corners[c, AFTER]
     return False
 
 
-@compiled
+@inlined
 def fill_hole(n: int, closed: bool, lists: CornerLists, regular: Int32, hole: Hole) -> tuple[int, int]:
     """Triangulate the hole inside a ring of n vertices by cutting ears, the one first that brings degrees closest to regular.
 
@@ -214,7 +224,7 @@ def fill_hole(n: int, closed: bool, lists: CornerLists, regular: Int32, hole: Ho
     return count, cost
 
 
-@compiled
+@inlined
 def _find_ear(size: int, lists: CornerLists, hole: Hole) -> int:
     """The place in the polygon whose ear costs least, of those whose cut is no edge yet; -1 if there is none."""
     best, best_cost = -1, 0
@@ -230,7 +240,7 @@ def _find_ear(size: int, lists: CornerLists, hole: Hole) -> int:
     return best
 
 
-@compiled
+@inlined
 def _cut_ear(place: int, size: int, count: int, hole: Hole) -> None:
     """Make triangle ``count`` of the polygon's vertex at ``place`` and its two neighbours, and take that vertex out."""
     polygon = hole.polygon
@@ -243,7 +253,7 @@ def _cut_ear(place: int, size: int, count: int, hole: Hole) -> None:
         polygon[i] = polygon[i + 1]
 
 
-@compiled
+@inlined
 def _beside(place: int, size: int) -> tuple[int, int]:
     """The places before and after one of a polygon; without remainders, whose divisions are slow."""
     return place - 1 if place else size - 1, place + 1 if place + 1 < size else 0

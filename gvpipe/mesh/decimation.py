@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Int32, Int64
-from gvpipe.compiled import compiled
-from gvpipe.mesh.corner_lists import CornerLists, Hole, empty_hole, fill_hole, find_ring, link, link_corners, unlink
+from gvpipe.compiled import compiled, inlined
+from gvpipe.mesh.corner_lists import AFTER, AHEAD, BEHIND, CornerLists, Hole, empty_hole, fill_hole, find_ring, link, link_corners, unlink
 
 MAX_RING = 12  # most neighbours of a vertex that is removed
 MAX_NEIGHBOURS = 20  # most vertices kept about a vertex: its ring, then what lies across the ring, then what touches the ring
@@ -127,7 +127,7 @@ def _removal_costs(lists: CornerLists, regular: Int32, hole: Hole) -> tuple[Int3
     return candidates[:n], costs[:n]
 
 
-@compiled
+@inlined
 def _remove_triangles(v: int, lists: CornerLists, freed: Int32) -> None:
     """Take out the triangles around v; ``freed`` gets their numbers."""
     n = 0
@@ -135,29 +135,30 @@ def _remove_triangles(v: int, lists: CornerLists, freed: Int32) -> None:
     while c >= 0:
         freed[n] = c // 3
         n += 1
-        c = lists.after[c]
+        c = lists.corners[c, AFTER]
     for i in range(n):
         for k in range(3):
             unlink(lists, freed[i], k)
         lists.triangles[freed[i], 0] = -1
 
 
-@compiled
+@inlined
 def _add_triangles(n_new: int, lists: CornerLists, hole: Hole, freed: Int32) -> None:
     """Put the triangles that fill the hole in the place of those that were freed."""
     for i in range(n_new):
         for k in range(3):
             lists.triangles[freed[i], k] = hole.triangles[i, k]
+        for k in range(3):
             link(lists, freed[i], k)
 
 
-@compiled
+@inlined
 def _list_neighbours(size: int, closed: bool, lists: CornerLists, hole: Hole, found: Int32) -> int:
     """Fill ``found`` with the ring, what lies across its sides, then what touches it; return how many these are.
 
     The vertex' own triangles are out of the lists already.
     """
-    ring, triangles = hole.ring, lists.triangles
+    ring, corners = hole.ring, lists.corners
     for i in range(size):
         found[i] = ring[i]
     n = size
@@ -166,22 +167,20 @@ def _list_neighbours(size: int, closed: bool, lists: CornerLists, hole: Hole, fo
         from_b = lists.degree[b] < lists.degree[a]  # the shorter list: a hub's would make this quadratic
         c = lists.head[b] if from_b else lists.head[a]
         while c >= 0:
-            t, k = c // 3, c % 3
-            if triangles[t, (k + 1) % 3] == a if from_b else triangles[t, (k + 2) % 3] == b:
-                n = _add_once(triangles[t, (k + 2) % 3] if from_b else triangles[t, (k + 1) % 3], found, n)
+            if corners[c, AHEAD] == a if from_b else corners[c, BEHIND] == b:
+                n = _add_once(corners[c, BEHIND] if from_b else corners[c, AHEAD], found, n)
                 break
-            c = lists.after[c]
+            c = corners[c, AFTER]
     for i in range(size):
         c = lists.head[ring[i]]
         while c >= 0 and n < MAX_NEIGHBOURS:
-            t, k = c // 3, c % 3
-            n = _add_once(triangles[t, (k + 1) % 3], found, n)
-            n = _add_once(triangles[t, (k + 2) % 3], found, n)
-            c = lists.after[c]
+            n = _add_once(corners[c, AHEAD], found, n)
+            n = _add_once(corners[c, BEHIND], found, n)
+            c = corners[c, AFTER]
     return n
 
 
-@compiled
+@inlined
 def _add_once(vertex: int, found: Int32, n: int) -> int:
     """Append a vertex to the n in ``found`` if there is room and it is not among them; return their number."""
     if n == MAX_NEIGHBOURS:

@@ -13,7 +13,7 @@ import numpy as np
 from gvpipe.arrays import Bool, Int32, Int64
 from gvpipe.compiled import compiled
 from gvpipe.mesh.corner_kernels import next_corner, previous_corner
-from gvpipe.mesh.corner_lists import link_corners
+from gvpipe.mesh.corner_lists import AFTER, link_corners
 
 LEVELS = 4  # entries that complete this many triangles less one, or more, are alike
 NONE = -1
@@ -67,14 +67,14 @@ def order_by_corners(triangles: Int32, opposite: Int64, n_entries: int) -> Entry
                     o = flat[opposite[c]] if opposite[c] >= 0 else NONE
                     _fill(gates, n_gates, a, b, (o if o >= 0 and is_done[o] else NONE, c))
                     n_gates += 1
-                c = lists.after[c]
+                c = lists.corners[c, AFTER]
             c = lists.head[entry] if n_gates == first else NONE
             while c >= 0:  # else whatever shares a triangle
                 a, b = flat[next_corner(c)], flat[previous_corner(c)]
                 if is_done[a] or is_done[b]:
                     _fill(gates, n_gates, a if is_done[a] else b, NONE, (NONE, c))
                     n_gates += 1
-                c = lists.after[c]
+                c = lists.corners[c, AFTER]
             order[n] = entry
             is_done[entry] = True
             n += 1
@@ -82,7 +82,7 @@ def order_by_corners(triangles: Int32, opposite: Int64, n_entries: int) -> Entry
             c = lists.head[entry]
             while c >= 0:
                 _push_neighbours(flat[next_corner(c)], flat[previous_corner(c)], is_done, completes, stacks)
-                c = lists.after[c]
+                c = lists.corners[c, AFTER]
             entry = _pop(is_done, stacks)
     return EntryOrder(order, starts, gates[:n_gates].copy())
 

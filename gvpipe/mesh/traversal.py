@@ -12,7 +12,7 @@ import numpy as np
 
 from gvpipe.arrays import Bool, Int32
 from gvpipe.compiled import compiled
-from gvpipe.mesh.corner_lists import CornerLists, link_corners
+from gvpipe.mesh.corner_lists import AFTER, AHEAD, BEHIND, CornerLists, link_corners
 
 
 class Traversal(NamedTuple):
@@ -100,7 +100,7 @@ def _append_around(v: int, tail: int, lists: CornerLists, queue: _Queue) -> int:
             queue.is_queued[c // 3] = True
             queue.triangles[tail] = c // 3
             tail += 1
-        c = lists.after[c]
+        c = lists.corners[c, AFTER]
     return tail
 
 
@@ -109,13 +109,12 @@ def _opposite(a: int, b: int, lists: CornerLists, is_done: Bool) -> int:
     """The third vertex of the first triangle at the edge a b of which that is done; -1 without one."""
     c = lists.head[a]
     while c >= 0:
-        t, k = c // 3, c % 3
         third = -1
-        if lists.triangles[t, (k + 1) % 3] == b:
-            third = lists.triangles[t, (k + 2) % 3]
-        elif lists.triangles[t, (k + 2) % 3] == b:
-            third = lists.triangles[t, (k + 1) % 3]
+        if lists.corners[c, AHEAD] == b:
+            third = lists.corners[c, BEHIND]
+        elif lists.corners[c, BEHIND] == b:
+            third = lists.corners[c, AHEAD]
         if third >= 0 and is_done[third]:
             return third
-        c = lists.after[c]
+        c = lists.corners[c, AFTER]
     return -1

@@ -87,7 +87,7 @@ class McgvReader:
         return self._video.group(frame)
 
     def close(self) -> None:
-        """Let go of decoded pictures, and of the threads that decode them; both come back when they are needed."""
+        """Let go of decoded pictures; they come back when they are needed."""
         self._video.close()
 
     def read(self, start: int, stop: int) -> Float32:

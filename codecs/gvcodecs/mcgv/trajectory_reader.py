@@ -101,7 +101,7 @@ class TrajectoryReader:
         return _Shared(np.ascontiguousarray(surface.base.T), layout, matrix)
 
     def close(self) -> None:
-        """Let go of decoded pictures, and of the threads that decode them; both come back when they are needed."""
+        """Let go of decoded pictures; they come back when they are needed."""
         self._video.close()
 
     def read(self, start: int, stop: int) -> Float32:

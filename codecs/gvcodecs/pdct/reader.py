@@ -6,13 +6,16 @@ from bisect import bisect_right
 
 import numpy as np
 
+from gvcodecs.pdct.clip import BYTES_PER_POINT as BYTES_PER_POSITION
 from gvcodecs.pdct.clip import decode_clip
 from gvcodecs.pdct.header import VERSION_POINTS, Header, surface_of, surface_of_points
 from gvcodecs.pdct.still_points import SECTION, decode_still
+from gvpipe.ahead import AHEAD, run_ahead
 from gvpipe.arrays import Float32, Int32, Int64
 from gvpipe.connectivity.base_mesh import read_base
 from gvpipe.connectivity.welded_mesh import read_points
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import segments_between
 
 BYTES_PER_POINT, SECONDS_PER_POINT = 200, 1e-6  # of the base frame, its traversal, still points
 
@@ -39,7 +42,7 @@ class PdctReader:
         n_points = len(surface.base)
         bitstream.budget.keep(f"{n_points} points", BYTES_PER_POINT * n_points, SECONDS_PER_POINT * n_points)
         self._bounds = header.starts(bitstream.n_frames)
-        self._clip: tuple[int, Float32] = (-1, np.zeros((0, 0, 3), np.float32))
+        self._kept: tuple[int, Float32] = (-1, np.zeros((0, 0, 3), np.float32))
 
     @property
     def n_frames(self) -> int:
@@ -63,17 +66,24 @@ class PdctReader:
             CorruptFile: a clip does not decode.
         """
         result = np.empty((stop - start, len(self._surface.base), 3), np.float32)
-        for c, (begin, end) in enumerate(zip(self._bounds[:-1], self._bounds[1:], strict=True)):
-            first, last = max(start, begin), min(stop, end)
-            if first < last and len(self._surface.traversal):
-                result[first - start : last - start] = self._decode(c)[first - begin : last - begin]
+        wanted = segments_between(start, stop, self._bounds) if len(self._surface.traversal) else []
+        for c, clip in zip(wanted, run_ahead(self._clip, wanted, AHEAD if self._has_room(wanted) else 0), strict=True):
+            begin, last = self._bounds[c], min(stop, self._bounds[c + 1])
+            first = max(start, begin)
+            result[first - start : last - start] = clip[first - begin : last - begin]
         if self._still is not None:
             result[:, self._still.points] = self._still.positions
         return result if self._point is None else np.ascontiguousarray(result[:, self._point])
 
-    def _decode(self, c: int) -> Float32:
-        if self._clip[0] != c:
-            name = f"clip.{c}"
-            n_frames = self._bounds[c + 1] - self._bounds[c]
-            self._clip = (c, decode_clip(self._bitstream.section(name), n_frames, self._surface, name, self._bitstream.budget))
-        return self._clip[1]
+    def _has_room(self, clips: list[int]) -> bool:
+        """Whether the file may take the memory of several of these clips at a time."""
+        longest = max((self._bounds[c + 1] - self._bounds[c] for c in clips), default=0)
+        return (AHEAD + 1) * BYTES_PER_POSITION * longest * len(self._surface.base) <= self._bitstream.budget.memory_left
+
+    def _clip(self, c: int) -> Float32:
+        number, clip = self._kept  # once: other threads decode, too
+        if number != c:
+            name, n_frames = f"clip.{c}", self._bounds[c + 1] - self._bounds[c]
+            clip = decode_clip(self._bitstream.section(name), n_frames, self._surface, name, self._bitstream.budget)
+            self._kept = c, clip
+        return clip
