@@ -21,7 +21,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvpipe.arrays import Float64
+from gvpipe.ahead import run_ahead
+from gvpipe.arrays import Float64, Int32
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.entropy.integers import decode_integers, encode_integers
@@ -31,6 +32,7 @@ from gvpipe.trajectory.contexts import LARGEST, MAX_LEVEL, N_CONTEXTS, ONE, cont
 from gvpipe.trajectory.prediction import predict_vectors
 
 MAX_VALUES = 1 << 27  # of a section: vectors times components
+PART = 4096  # vectors whose residuals are decoded before they are predicted, at least
 
 
 def encode_vectors(
@@ -112,8 +114,27 @@ def decode_vectors(
     residuals = np.zeros((int(causal.blocks[wanted]), n_components), np.int64)
     decoded = np.zeros((len(causal.order), n_components)) if given is None else given.copy()
     inputs = context_inputs(causal, len(decoded), levels, wanted)
-    coder.check(decode_residuals(residuals, inputs, coder.stream, inputs.usual.copy(), 0, wanted))
+    before = inputs.usual.copy()
+
+    def take(blocks: tuple[int, int]) -> tuple[int, int]:
+        """Decode the residuals of blocks; return which vectors these are."""
+        coder.check(decode_residuals(residuals, inputs, coder.stream, before, *blocks))
+        return int(causal.blocks[blocks[0]]), int(causal.blocks[blocks[1]])
+
+    for begin, end in run_ahead(take, _parts(causal.blocks[: wanted + 1]), 1):  # predict while the next ones are decoded
+        predict_vectors(causal, step, residuals, decoded, None, predictor, beta, begin, end)
     if n_blocks is None:
         coder.end()
-    predict_vectors(causal, step, residuals, decoded, None, predictor, beta)
     return decoded
+
+
+def _parts(bounds: Int32) -> list[tuple[int, int]]:
+    """Runs of blocks of `PART` vectors at least, but for the last; ``bounds (B + 1,)`` of blocks."""
+    parts: list[tuple[int, int]] = []
+    first, n_blocks = 0, len(bounds) - 1
+    while first < n_blocks:
+        last = max(first + 1, int(np.searchsorted(bounds, bounds[first] + PART)))
+        last = n_blocks if bounds[-1] - bounds[min(last, n_blocks)] < PART else last
+        parts.append((first, last))
+        first = last
+    return parts

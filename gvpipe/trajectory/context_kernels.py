@@ -26,6 +26,8 @@ from gvpipe.trajectory.contexts import (
     ContextInputs,
 )
 
+TOGETHER = 512  # vectors whose earlier components are summed up at once
+
 
 @compiled
 def _log(value: int, inputs: ContextInputs) -> int:
@@ -73,55 +75,68 @@ def _find_near(first: int, end: int, inputs: ContextInputs) -> Int32:
 
 
 @compiled
-def _find_contexts(first: int, end: int, c: int, residuals: Int64, inputs: ContextInputs, before: Int64, near: Int32) -> Int64:
+def _find_contexts(first: int, end: int, c: int, magnitudes: Int64, inputs: ContextInputs, before: Int64, near: Int32) -> Int64:
     """``(end - first,)`` contexts of component c in the block of ranks ``first`` to ``end``.
 
     Args:
-        residuals: ``(m, R)`` by rank, decoded for the blocks before and for this block's components before c.
+        magnitudes: ``(R, m)`` by rank, in 1 / ONE, of the blocks before and of this block's components before c.
         before: ``(R,)`` mean magnitudes of the block before, in 1 / ONE.
         near: of the block (`_find_near`).
     """
     contexts = np.empty(end - first, np.int64)
-    usual = inputs.usual
-    short_from, long_from = max(0, c - len(SHORT)), max(0, c - len(LONG))
+    usual, own = inputs.usual, magnitudes[c]
     usual_short = usual_long = 0
-    for k in range(long_from, c):
+    for k in range(max(0, c - len(LONG)), c):
         usual_long += usual[k] * LONG[c - 1 - k]
-        if k >= short_from:
+        if k >= c - len(SHORT):
             usual_short += usual[k] * SHORT[c - 1 - k]
     fixed = POWERS[0] * _log(usual[c], inputs) + POWERS[1] * _log(before[c], inputs)
     fixed -= POWERS[3] * _log(usual_short + FLOOR_SPAN, inputs) + POWERS[4] * _log(usual_long + FLOOR_SPAN, inputs)
-    for i in range(first, end):
-        around = usual[c]
-        if first > 0:
-            around = 0
-            for j in range(1, N_NEAR + 1):
-                rank = near[i - first, j]
-                if rank < 0:
-                    break
-                around += ONE * abs(residuals[rank, c])
-            if around:  # most are 0, and divisions are slow
-                around //= near[i - first, 0]
-        short = long = 0
-        for k in range(long_from, c):
-            magnitude = ONE * abs(residuals[i, k])
-            long += magnitude * LONG[c - 1 - k]
-            if k >= short_from:
-                short += magnitude * SHORT[c - 1 - k]
-        forecast = fixed + POWERS[2] * _log(around + FLOOR_NEAR, inputs)
-        forecast += POWERS[3] * _log(short + FLOOR_SPAN, inputs) + POWERS[4] * _log(long + FLOOR_SPAN, inputs)
-        octaves = forecast // POWER_ONE - 6 * PER_OCTAVE  # ONE is six octaves
-        contexts[i - first] = min(max(octaves // (PER_OCTAVE // 2), LOWEST), HIGHEST) - LOWEST
+    shorts, longs = np.empty(TOGETHER, np.int64), np.empty(TOGETHER, np.int64)
+    for begin in range(first, end, TOGETHER):
+        n = min(TOGETHER, end - begin)
+        _sum_spans(begin, n, c, magnitudes, shorts, longs)
+        for j in range(n):
+            i = begin + j
+            around = usual[c]
+            if first > 0:
+                around = 0
+                for place in range(1, N_NEAR + 1):
+                    rank = near[i - first, place]
+                    if rank < 0:
+                        break
+                    around += own[rank]
+                if around:  # most are 0, and divisions are slow
+                    around //= near[i - first, 0]
+            forecast = fixed + POWERS[2] * _log(around + FLOOR_NEAR, inputs)
+            forecast += POWERS[3] * _log(shorts[j] + FLOOR_SPAN, inputs) + POWERS[4] * _log(longs[j] + FLOOR_SPAN, inputs)
+            octaves = forecast // POWER_ONE - 6 * PER_OCTAVE  # ONE is six octaves
+            contexts[i - first] = min(max(octaves // (PER_OCTAVE // 2), LOWEST), HIGHEST) - LOWEST
     return contexts
 
 
 @compiled
-def _mean_magnitudes(residuals: Int64, first: int, end: int, means: Int64) -> None:
-    """Fill ``means (R,)`` of a block, in 1 / ONE, rounded up to one at least."""
-    for c in range(residuals.shape[1]):
+def _sum_spans(begin: int, n: int, c: int, magnitudes: Int64, shorts: Int64, longs: Int64) -> None:
+    """Fill ``shorts`` and ``longs`` of n ranks from ``begin`` on: weighted sums over the components before c."""
+    for j in range(n):
+        shorts[j] = longs[j] = 0
+    for k in range(max(0, c - len(LONG)), c):
+        values, weight = magnitudes[k][begin : begin + n], LONG[c - 1 - k]
+        for j in range(n):
+            longs[j] += values[j] * weight
+        if k >= c - len(SHORT):
+            weight = SHORT[c - 1 - k]
+            for j in range(n):
+                shorts[j] += values[j] * weight
+
+
+@compiled
+def _mean_magnitudes(magnitudes: Int64, first: int, end: int, means: Int64) -> None:
+    """Fill ``means (R,)`` of a block of ``magnitudes (R, m)``, in 1 / ONE, rounded up to one at least."""
+    for c in range(len(means)):
         total = 0
         for i in range(first, end):
-            total += ONE * abs(residuals[i, c])
+            total += magnitudes[c, i]
         means[c] = total // max(1, end - first) + 1
 
 
@@ -129,13 +144,17 @@ def _mean_magnitudes(residuals: Int64, first: int, end: int, means: Int64) -> No
 def find_all_contexts(residuals: Int64, inputs: ContextInputs) -> UInt8:
     """``(m, R)`` contexts of ``residuals (m, R)`` by rank, all of which there are."""
     contexts = np.zeros(residuals.shape, np.uint8)
+    magnitudes = np.empty((residuals.shape[1], len(residuals)), np.int64)
+    for i in range(len(residuals)):
+        for c in range(residuals.shape[1]):
+            magnitudes[c, i] = ONE * abs(residuals[i, c])
     before = inputs.usual.copy()
     for b in range(len(inputs.blocks) - 1):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
         near = _find_near(first, end, inputs)
         for c in range(residuals.shape[1]):
-            contexts[first:end, c] = _find_contexts(first, end, c, residuals, inputs, before, near)
-        _mean_magnitudes(residuals, first, end, before)
+            contexts[first:end, c] = _find_contexts(first, end, c, magnitudes, inputs, before, near)
+        _mean_magnitudes(magnitudes, first, end, before)
     return contexts
 
 
@@ -153,11 +172,15 @@ def decode_residuals(
     Returns:
         0, or what is wrong: as of `take_block`, or OUT_OF_RANGE.
     """
+    magnitudes = np.zeros((residuals.shape[1], len(residuals)), np.int64)
+    for i in range(inputs.blocks[first_block]):
+        for c in range(residuals.shape[1]):
+            magnitudes[c, i] = ONE * abs(residuals[i, c])
     for b in range(first_block, end_block):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
         near = _find_near(first, end, inputs)
         for c in range(residuals.shape[1]):
-            contexts = _find_contexts(first, end, c, residuals, inputs, before, near)
+            contexts = _find_contexts(first, end, c, magnitudes, inputs, before, near)
             values, status = take_block(stream, contexts)
             if status:
                 return status
@@ -165,5 +188,6 @@ def decode_residuals(
                 if abs(values[i]) >= LARGEST:
                     return OUT_OF_RANGE
                 residuals[first + i, c] = values[i]
-        _mean_magnitudes(residuals, first, end, before)
+                magnitudes[c, first + i] = ONE * abs(values[i])
+        _mean_magnitudes(magnitudes, first, end, before)
     return 0

@@ -30,7 +30,15 @@ PREDICTORS = ("navg", "lsp", "rbf", "kalman")
 
 
 def predict_vectors(
-    causal: CausalOrder, step: float, residuals: Int64, decoded: Float64, target: Float64 | None, predictor: str, beta: float
+    causal: CausalOrder,
+    step: float,
+    residuals: Int64,
+    decoded: Float64,
+    target: Float64 | None,
+    predictor: str,
+    beta: float,
+    begin: int = 0,
+    end: int | None = None,
 ) -> None:
     """Code vectors (``target`` given), filling ``residuals`` and ``decoded``, or fill ``decoded`` from ``residuals``.
 
@@ -39,11 +47,13 @@ def predict_vectors(
         target: ``(n, R)`` what to code, or None.
         predictor: one of `PREDICTORS`.
         beta: exponent of the radial function (rbf).
+        begin, end: which vectors of the order, those before ``begin`` being done; None: up to the last of ``residuals``.
     """
     from gvpipe.trajectory import prediction_kernels
 
     coding = prediction_kernels.VectorCoding(causal, step, residuals, decoded, np.zeros((0, 0)) if target is None else target)
+    stop = len(residuals) if end is None else end
     if predictor == "rbf":
-        prediction_kernels.predict_rbf(coding, 0, len(residuals), beta)
+        prediction_kernels.predict_rbf(coding, begin, stop, beta)
     else:
-        getattr(prediction_kernels, f"predict_{predictor}")(coding, 0, len(residuals))
+        getattr(prediction_kernels, f"predict_{predictor}")(coding, begin, stop)
