@@ -21,7 +21,19 @@ import numpy as np
 
 from gvpipe.arrays import Int32, Int64
 from gvpipe.compiled import compiled, inlined
-from gvpipe.mesh.corner_lists import AFTER, AHEAD, BEHIND, CornerLists, Hole, empty_hole, fill_hole, find_ring, link, link_corners, unlink
+from gvpipe.mesh.corner_lists import (
+    AFTER,
+    AHEAD,
+    BEHIND,
+    CornerLists,
+    Hole,
+    empty_hole,
+    fill_hole,
+    find_ring,
+    link,
+    link_corners,
+    unlink,
+)
 
 MAX_RING = 12  # most neighbours of a vertex that is removed
 MAX_NEIGHBOURS = 20  # most vertices kept about a vertex: its ring, then what lies across the ring, then what touches the ring
