@@ -149,9 +149,7 @@ def _alternate(problem: Problem, start: Fitted | Trial, passes: int) -> Fitted:
 
 def _choose_weights(points: PointMotions, transforms: Float64, prices: Prices, weights: Weights) -> Fitted:
     """Weights for ``transforms (K, 4, m)``, given those before; what the transforms are prepared into ends here."""
-    from gvcodecs.mcgv.motion.weight_fit_kernels import Transforms
+    from gvcodecs.mcgv.motion.weight_fit_kernels import prepare
     from gvcodecs.mcgv.motion.weight_selection import choose
 
-    flat = transforms.reshape(-1, transforms.shape[2])  # (K, 4, m) -> (4K, m)
-    prepared = Transforms(np.ascontiguousarray(transforms.swapaxes(1, 2)), flat @ flat.T)
-    return renumber(choose(points, prepared, prices, weights)[0])
+    return renumber(choose(points, prepare(transforms), prices, weights)[0])

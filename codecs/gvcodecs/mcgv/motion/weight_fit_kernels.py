@@ -19,6 +19,8 @@ from gvpipe.compiled import compiled
 MAX_CANDIDATES = 10  # clusters that a fit considers
 LEAST_GAIN = 1e-3  # of the error: a further cluster must gain this much to be tried
 RIDGE = 1e-7  # of a system's trace: clusters may move alike
+PAIRS = tuple((r, s) for r in range(4) for s in range(r, 4))  # of coordinates
+TOGETHER = 64  # transforms that are multiplied with the others at once
 
 
 class Transforms(NamedTuple):
@@ -26,7 +28,8 @@ class Transforms(NamedTuple):
 
     Args:
         columns: ``(K, m, 4)`` the transforms of homogeneous coordinates, number after number of a motion.
-        products: ``(4K, 4K)`` of the transforms' rows with one another.
+        products: ``(K (K + 1) / 2, 10)`` of the rows of every two transforms a >= b, at ``a (a + 1) / 2 + b``: the coefficients
+            by which the product of what they give depends on the products of two coordinates.
     """
 
     columns: Float64
@@ -61,6 +64,21 @@ class WeightFit(NamedTuple):
     differences: Float64
     gains: Float64
     system: Float64
+
+
+def prepare(transforms: Float64) -> Transforms:
+    """What fits read of ``transforms (K, 4, m)``."""
+    n_clusters, _, n = transforms.shape
+    flat = transforms.reshape(4 * n_clusters, n)
+    products = np.empty((n_clusters * (n_clusters + 1) // 2, len(PAIRS)))
+    for first in range(0, n_clusters, TOGETHER):
+        end = min(first + TOGETHER, n_clusters)
+        blocks = (flat[4 * first : 4 * end] @ flat[: 4 * end].T).reshape(end - first, 4, end, 4).swapaxes(1, 2)
+        own = np.stack([blocks[..., r, s] + (blocks[..., s, r] if r < s else 0) for r, s in PAIRS], axis=2)
+        for a in range(first, end):
+            start = a * (a + 1) // 2
+            products[start : start + a + 1] = own[a - first, : a + 1]
+    return Transforms(np.ascontiguousarray(transforms.swapaxes(1, 2)), products)
 
 
 def new_candidates() -> Candidates:
@@ -107,13 +125,11 @@ def fill_gram(start: int, stop: int, place: Float64, motion: Float64, transforms
             one += columns[i, 3] * motion[i]
         along[a] = place[0] * x + place[1] * y + place[2] * z + place[3] * one
         for b in range(a + 1):
-            total = 0.0
-            for r in range(4):
-                row = products[4 * clusters[a] + r]
-                first = 4 * clusters[b]
-                total += place[r] * (
-                    place[0] * row[first] + place[1] * row[first + 1] + place[2] * row[first + 2] + place[3] * row[first + 3]
-                )
+            high, low = max(clusters[a], clusters[b]), min(clusters[a], clusters[b])
+            row = products[high * (high + 1) // 2 + low]
+            total = place[0] * (place[0] * row[0] + place[1] * row[1] + place[2] * row[2] + place[3] * row[3])
+            total += place[1] * (place[1] * row[4] + place[2] * row[5] + place[3] * row[6])
+            total += place[2] * (place[2] * row[7] + place[3] * row[8]) + place[3] * place[3] * row[9]
             gram[a, b] = gram[b, a] = total - along[a] - along[b] + square
 
 

@@ -11,7 +11,7 @@ from gvcodecs.mcgv.motion.point_motions import find_motions
 from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit, Weights, homogeneous
 from gvcodecs.mcgv.motion.skinning_fit import fit_blend
 from gvcodecs.mcgv.motion.weight_coding import encode_weights, guess_prices
-from gvcodecs.mcgv.motion.weight_fit_kernels import Transforms
+from gvcodecs.mcgv.motion.weight_fit_kernels import prepare
 from gvcodecs.mcgv.motion.weight_selection import PointMotions, Ring, choose
 from gvpipe.mesh.topology import adjacency
 from gvpipe.sequence import MeshSequence
@@ -25,8 +25,7 @@ def test_choice_finds_the_weights_of_a_blend() -> None:
     found = Weights(weights.clusters, weights.weights[::-1].copy())
     ring = Ring(neighbours.indptr.astype(np.int64), neighbours.indices.astype(np.int64))
     points = homogeneous(base)
-    flat = transforms.reshape(-1, transforms.shape[2])
-    prepared = Transforms(np.ascontiguousarray(transforms.swapaxes(1, 2)), flat @ flat.T)
+    prepared = prepare(transforms)
     for price, most in ((0.0, 1.0), (1e-4, 2.0)):
         problem = PointMotions(causal_neighbours(neighbours), ring, points, motions, price)
         found, errors = choose(problem, prepared, guess_prices(), found)
