@@ -17,7 +17,7 @@ import numpy as np
 
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding_kernels import factor_blocks, fill_blocks
-from gvpipe.arrays import Float64, Floats, Int64
+from gvpipe.arrays import Float64, Floats, Int32
 
 
 class Padding:
@@ -32,7 +32,7 @@ class Padding:
         self._fixed = is_vertex[self._pixels]
         n_free = (~self._fixed).sum(axis=1)
         self._first = np.cumsum(n_free) - n_free
-        self._factors = np.empty((int(n_free.sum()), block + 2))
+        self._factors = np.empty((int(n_free.sum()), block + 2), np.float32)
         factor_blocks(self._fixed, block, self._first, self._factors)
 
     def fill(self, values: Floats, background: float) -> Float64:
@@ -44,7 +44,7 @@ class Padding:
         return planes.T[:n].reshape(n, self.layout.height, self.layout.width)
 
 
-def _pixels_by_block(width: int, height: int, block: int) -> Int64:
+def _pixels_by_block(width: int, height: int, block: int) -> Int32:
     """Row-major pixel indices ``(blocks, block**2)``."""
-    index = np.arange(width * height).reshape(height // block, block, width // block, block)
+    index = np.arange(width * height, dtype=np.int32).reshape(height // block, block, width // block, block)
     return index.swapaxes(1, 2).reshape(-1, block * block)

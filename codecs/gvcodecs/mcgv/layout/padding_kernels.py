@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float64, Int64
+from gvpipe.arrays import Bool, Float32, Float64, Int32, Int64
 from gvpipe.compiled import compiled
 
 
 @compiled
-def factor_blocks(fixed: Bool, block: int, first: Int64, factors: Float64) -> None:
+def factor_blocks(fixed: Bool, block: int, first: Int64, factors: Float32) -> None:
     """Factor the matrix of each block's free pixels: ``L L' = n_p on the diagonal, -1 for free neighbours``.
 
     Args:
@@ -20,11 +20,11 @@ def factor_blocks(fixed: Bool, block: int, first: Int64, factors: Float64) -> No
         block: pixels of a block's side.
         first: ``(B,)`` each block's first row of ``factors``.
         factors: ``(n, block + 2)``, filled: a row for each free pixel, column j the entry j pixels before it, 0 its inverse.
+            They are worked out in float64, and kept as float32: they take most of the memory, and pictures have 10 bits at most.
     """
     width = block + 2
-    number = np.empty(block * block, np.int64)
+    number, rows = np.empty(block * block, np.int64), np.empty((block * block, width))
     for k in range(len(fixed)):
-        rows = factors[first[k] :]
         count = 0
         for p in range(block * block):
             number[p] = -1
@@ -52,11 +52,12 @@ def factor_blocks(fixed: Bool, block: int, first: Int64, factors: Float64) -> No
             for i in range(1, min(width, count + 1)):
                 total -= row[i] * row[i]
             row[0] = 1.0 / np.sqrt(total)
+            factors[first[k] + count] = row
             count += 1
 
 
 @compiled
-def fill_blocks(planes: Float64, pixels: Int64, fixed: Bool, block: int, first: Int64, factors: Float64) -> None:
+def fill_blocks(planes: Float64, pixels: Int32, fixed: Bool, block: int, first: Int64, factors: Float32) -> None:
     """Give free pixels the values that minimise psi.
 
     Args:

@@ -10,6 +10,8 @@ from scipy.sparse.linalg import spsolve
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding import Padding
 
+CLOSE = 1e-4  # factors are float32; levels of pictures are 1 apart
+
 
 @pytest.mark.parametrize("block", [8, 16])
 def test_padding_minimises_psi(block: int) -> None:
@@ -44,9 +46,9 @@ def test_padding_minimises_psi(block: int) -> None:
     free_at = np.flatnonzero(free)
     system = sparse.csc_array(laplacian[free_at][:, free_at])
     wanted = spsolve(system, -(laplacian[free_at][:, pixel] @ values.T)).T
-    np.testing.assert_allclose(planes[:, free_at], wanted, atol=1e-9)
-    assert np.abs((laplacian @ planes.T)[free_at]).max() < 1e-9
-    assert planes[:, ~empty].max() <= values.max() + 1e-9 and planes[:, ~empty].min() >= values.min() - 1e-9
+    np.testing.assert_allclose(planes[:, free_at], wanted, atol=CLOSE)
+    assert np.abs((laplacian @ planes.T)[free_at]).max() < 10 * CLOSE  # of 8 neighbours
+    assert planes[:, ~empty].max() <= values.max() + CLOSE and planes[:, ~empty].min() >= values.min() - CLOSE
 
 
 def test_padding_of_full_and_single_blocks() -> None:
@@ -54,6 +56,4 @@ def test_padding_of_full_and_single_blocks() -> None:
     full = Padding(Layout(8, 8, np.random.default_rng(0).permutation(64)), 8)
     values = np.arange(64.0)[None]
     assert np.array_equal(np.sort(full.fill(values, 0.0).ravel()), values[0])
-    np.testing.assert_allclose(
-        Padding(Layout(16, 8, np.array([5])), 8).fill(np.array([[3.5]]), -1.0)[0, :, :8], 3.5, rtol=1e-12
-    )
+    np.testing.assert_allclose(Padding(Layout(16, 8, np.array([5])), 8).fill(np.array([[3.5]]), -1.0)[0, :, :8], 3.5, rtol=1e-6)
