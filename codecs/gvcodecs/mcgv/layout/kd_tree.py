@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvcodecs.mcgv.layout.layout import Layout
-from gvpipe.arrays import Bool, Int64, Integers
+from gvpipe.arrays import Int64, Integers
 from gvpipe.errors import CorruptFile, InputError
 
 COMMON = 90  # a multiple of every direction's squared length
@@ -107,11 +107,14 @@ def fill(cells: Cells, order: Int64, points: Int64, width: int, block: int, shif
         block: as in `place_points`.
         shift: of moments where cells turn as their points do; None: they keep their directions.
     """
+    from gvcodecs.mcgv.layout.kd_tree_kernels import place_cells
+
     order, points = order.copy(), np.ascontiguousarray(points)
-    while (cells.side > 1).any():
+    while (cells.side > FRAME).any():
         cells = _halve(cells, order, points, shift, block)
+    across, down = (cells.across, cells.down) if shift is None else _turn(cells, order, points, shift)
     pixel = np.empty(len(points), np.int64)
-    pixel[order] = cells.corner[:, 1] * width + cells.corner[:, 0]
+    place_cells(order, cells.starts, np.hstack([cells.corner, cells.side]), np.hstack([across, down]), points, width, pixel)
     return pixel
 
 
@@ -137,7 +140,7 @@ def _halve(cells: Cells, order: Int64, points: Int64, shift: int | None, block: 
     counts = np.diff(cells.starts)
     wide = cells.side[:, 0] >= cells.side[:, 1]
     longer = cells.side.max(axis=1)
-    across, down = (cells.across, cells.down) if shift is None else _turn(cells, order, points, shift, wide)
+    across, down = (cells.across, cells.down) if shift is None else _turn(cells, order, points, shift)
     sort_cells(order, cells.starts, np.where(wide[:, None], across, down), points)
     first = np.where(longer >= 2 * block, longer // block // 2 * block, longer // 2)  # columns or rows of the first half
     first = np.where(longer == 1, 1, first)
@@ -159,9 +162,9 @@ def _halve(cells: Cells, order: Int64, points: Int64, shift: int | None, block: 
     )
 
 
-def _turn(cells: Cells, order: Int64, points: Int64, shift: int, wide: Bool) -> tuple[Int64, Int64]:
+def _turn(cells: Cells, order: Int64, points: Int64, shift: int) -> tuple[Int64, Int64]:
     """Return the cells' directions ``(n, 3)`` across and down, after a look at their points."""
-    across, down = cells.across.copy(), cells.down.copy()
+    across, down, wide = cells.across.copy(), cells.down.copy(), cells.side[:, 0] >= cells.side[:, 1]
     frames = np.flatnonzero((cells.side == FRAME).all(axis=1))
     larger = np.flatnonzero(cells.side.max(axis=1) > FRAME)
     if not len(frames) and not len(larger):

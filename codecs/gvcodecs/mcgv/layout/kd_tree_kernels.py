@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gvpipe.arrays import Int64
-from gvpipe.compiled import compiled
+from gvpipe.compiled import compiled, inlined
 
 RUN = 12  # points that are sorted by insertion
 
@@ -97,3 +97,62 @@ def add_moments(points: Int64, order: Int64, starts: Int64, shift: int, counts: 
             yz += times * y * z
         own = moments[cell]
         own[0], own[1], own[2], own[3], own[4], own[5] = xx, yy, zz, xy, xz, yz
+
+
+@compiled
+def place_cells(
+    order: Int64, starts: Int64, rectangles: Int64, directions: Int64, points: Int64, width: int, pixel: Int64
+) -> None:
+    """Halve small cells that keep their directions down to single pixels, each cell by itself.
+
+    Args:
+        order: ``(V,)`` vertices; their order in a cell changes.
+        starts: ``(n + 1,)`` bounds of the cells in it.
+        rectangles: ``(n, 4)`` x, y, width and height of the cells, pixels.
+        directions: ``(n, 6)`` across and down.
+        points: ``(V, 3)`` the vertices' coordinates.
+        width: of the plane, pixels.
+        pixel: ``(V,)``, filled.
+    """
+    most = 1
+    for cell in range(len(rectangles)):
+        most = max(most, rectangles[cell, 2] * rectangles[cell, 3], starts[cell + 1] - starts[cell])
+    parts = np.empty((most, 6), np.int64)  # to be halved: bounds in `order`, x, y, width, height
+    keys = np.empty(most, np.int64)
+    for cell in range(len(rectangles)):
+        parts[0, 0], parts[0, 1] = starts[cell], starts[cell + 1]
+        for k in range(4):
+            parts[0, 2 + k] = rectangles[cell, k]
+        n = 1
+        while n > 0:
+            n -= 1
+            low, high, x, y, columns, rows = parts[n]
+            if columns * rows == 1:
+                for i in range(low, high):
+                    pixel[order[i]] = y * width + x
+                continue
+            is_wide, longer = columns >= rows, max(columns, rows)
+            _sort_few(order, low, high, directions[cell][0 if is_wide else 3 :], points, keys)
+            first = longer // 2
+            middle = low + (2 * (high - low) * first + longer) // (2 * longer)
+            for begin, end, is_second in ((low, middle, False), (middle, high, True)):
+                if begin == end:
+                    continue
+                size, skipped = (longer - first, first) if is_second else (first, 0)
+                parts[n, 0], parts[n, 1] = begin, end
+                parts[n, 2], parts[n, 3] = (x + skipped, y) if is_wide else (x, y + skipped)
+                parts[n, 4], parts[n, 5] = (size, rows) if is_wide else (columns, size)
+                n += 1
+
+
+@inlined
+def _sort_few(order: Int64, low: int, high: int, direction: Int64, points: Int64, keys: Int64) -> None:
+    """Sort the vertices from ``low`` to ``high`` by their place along a direction; those of one place keep their order."""
+    for i in range(low, high):
+        v = order[i]
+        key = direction[0] * points[v, 0] + direction[1] * points[v, 1] + direction[2] * points[v, 2]
+        k = i
+        while k > low and keys[k - 1 - low] > key:
+            keys[k - low], order[k] = keys[k - 1 - low], order[k - 1]
+            k -= 1
+        keys[k - low], order[k] = key, v

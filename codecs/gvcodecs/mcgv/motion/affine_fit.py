@@ -21,7 +21,7 @@ import numpy as np
 from gvpipe.arrays import Float64, Floats, Int32
 from gvpipe.trajectory.basis import row_blocks
 
-ROWS = 1 << 16  # vertices whose products with all transforms are held at a time
+ROWS = 1 << 14  # vertices whose products with all transforms are held at a time
 FLAT = 1e-4  # a cluster thinner than this part of its radius counts as flat: that direction stays unused
 
 

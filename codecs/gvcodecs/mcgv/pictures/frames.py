@@ -15,7 +15,7 @@ from gvcodecs.mcgv.pictures.quantiser import ImageQuantiser, Magnitudes, choose_
 from gvpipe.arrays import Float64
 from gvpipe.media.video import B_FRAMES, Plane, Profile, VideoWriter
 
-PIXELS = 1 << 20  # of pictures that are made at a time: they may be many times as large as positions
+PIXELS = 1 << 19  # of pictures that are made at a time: they may be many times as large as positions
 SMALL = 60, 2000  # bytes a frame, and of a file's own: B-frames save a third of the pictures' at best, and cost 8 each
 
 Residuals = Iterator[tuple[int, Float64]]
