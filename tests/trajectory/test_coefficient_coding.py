@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from gvpipe.errors import CorruptFile
+from gvpipe.trajectory import coefficient_coding
 from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
 from gvpipe.trajectory.temporal_neighbours import temporal_order
 
@@ -21,3 +24,18 @@ def test_rows_come_back_within_a_step_and_a_prefix_of_blocks_alone() -> None:
     known = causal.order[: causal.blocks[1]]
     assert np.allclose(part[known], decoded[known], atol=1e-9)
     assert 8 * len(data) < 0.6 * target.size * np.log2(np.abs(target).mean() / 0.01)
+
+
+def test_parts_that_are_decoded_ahead(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many vectors are decoded before they are predicted, the values are the same to the bit; damage is found."""
+    rng = np.random.default_rng(3)
+    causal = temporal_order(200)
+    target = rng.normal(0, 3, (600, 9)).cumsum(axis=0)
+    data, _ = encode_vectors(target, 0.01, causal)
+    whole = decode_vectors(data, 9, 0.01, causal, "x")
+    assert len(causal.blocks) > 4
+    for part in (1, 50, 130, 599):
+        monkeypatch.setattr(coefficient_coding, "PART", part)
+        assert np.array_equal(decode_vectors(data, 9, 0.01, causal, "x"), whole)
+        with pytest.raises(CorruptFile, match="'x'"):
+            decode_vectors(data[:-40], 9, 0.01, causal, "x")

@@ -20,7 +20,7 @@ def factor_blocks(fixed: Bool, block: int, first: Int64, factors: Float32) -> No
         block: pixels of a block's side.
         first: ``(B,)`` each block's first row of ``factors``.
         factors: ``(n, block + 2)``, filled: a row for each free pixel, column j the entry j pixels before it, 0 its inverse.
-            They are worked out in float64, and kept as float32: they take most of the memory, and pictures have 10 bits at most.
+            Worked out in float64, and kept as float32: they take most of the memory, and pictures have 10 bits at most.
     """
     width = block + 2
     number, rows = np.empty(block * block, np.int64), np.empty((block * block, width))

@@ -10,7 +10,8 @@ from placing import halved
 from surfaces import awkward_surfaces, check_layout
 
 from gvcodecs.mcgv.layout.kd_tree import choose_size, place_points, second_moments
-from gvcodecs.mcgv.layout.kd_tree_kernels import sort_cells
+from gvcodecs.mcgv.layout.kd_tree_kernels import place_cells, sort_cells
+from gvpipe.arrays import Int64
 from gvpipe.errors import CorruptFile, InputError
 from gvpipe.mesh.lattice import Lattice
 
@@ -91,3 +92,39 @@ def test_cells_are_sorted_and_measured(n_cells: int) -> None:
         products = np.stack([x * x, y * y, z * z, x * y, x * z, y * z], axis=1)
         moments = np.add.reduceat(products * times[:, None], starts[:-1], axis=0)
         assert np.array_equal(second_moments(points, order, starts, 3, counts), moments)
+
+
+def test_small_cells_are_halved_down_to_pixels() -> None:
+    """The kernel gives each vertex the pixel that cutting cell after cell does, sorted anew for every cut."""
+    draw = np.random.default_rng(3)
+    sides, x = [(4, 4), (4, 2), (1, 3), (3, 4), (1, 1), (4, 1), (2, 4)], 0
+    rectangles, starts = [], [0]
+    for width, height in sides:
+        rectangles.append((x, 5, width, height))
+        starts.append(starts[-1] + int(draw.integers(1, width * height + 1)))
+        x += width
+    points, order = draw.integers(0, 4, (starts[-1], 3)), draw.permutation(starts[-1])
+    directions = draw.integers(-2, 3, (len(sides), 6))
+    wanted = np.full(len(order), -1)
+
+    def halve(vertices: Int64, at: tuple[int, int], side: tuple[int, int], turned: Int64) -> None:
+        if not len(vertices):
+            return
+        if side == (1, 1):
+            wanted[vertices] = at[1] * 100 + at[0]
+            return
+        axis = 0 if side[0] >= side[1] else 1
+        vertices = vertices[np.argsort(points[vertices] @ turned[3 * axis : 3 * axis + 3], kind="stable")]
+        first = side[axis] // 2
+        kept = (2 * len(vertices) * first + side[axis]) // (2 * side[axis])
+        one, two, further = list(side), list(side), list(at)
+        one[axis], two[axis], further[axis] = first, side[axis] - first, at[axis] + first
+        halve(vertices[:kept], at, (one[0], one[1]), turned)
+        halve(vertices[kept:], (further[0], further[1]), (two[0], two[1]), turned)
+
+    for cell, (left, top, width, height) in enumerate(rectangles):
+        halve(order[starts[cell] : starts[cell + 1]], (left, top), (width, height), directions[cell])
+    pixel = np.empty(len(order), np.int64)
+    place_cells(order.copy(), np.array(starts), np.array(rectangles), directions, points, 100, pixel)
+    assert np.array_equal(pixel, wanted)
+    assert len(np.unique(pixel)) == len(pixel)

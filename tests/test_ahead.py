@@ -1,0 +1,51 @@
+"""Work ahead of its caller: the same results in the same order, on threads that end with it."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from gvpipe.ahead import run_ahead
+
+
+def test_results_come_in_order_from_other_threads() -> None:
+    def square(n: int) -> tuple[int, bool]:
+        time.sleep(0.02 if n % 2 == 0 else 0)  # later ones are done before
+        return n * n, threading.current_thread() is threading.main_thread()
+
+    assert list(run_ahead(square, range(7))) == [(n * n, False) for n in range(7)]
+    assert list(run_ahead(square, [3])) == [(9, True)]
+    assert list(run_ahead(square, [1, 2], 0)) == [(1, True), (4, True)]
+    assert list(run_ahead(square, [])) == []
+
+
+def test_no_more_is_begun_than_asked_for() -> None:
+    begun: list[int] = []
+
+    def begin(n: int) -> int:
+        begun.append(n)
+        return n
+
+    results = run_ahead(begin, range(100), 2)
+    assert next(results) == 0
+    time.sleep(0.05)
+    assert max(begun) <= 2  # the one returned, and two ahead
+    before = threading.active_count()
+    del results  # whoever asks for no more lets go of the threads
+    assert threading.active_count() < before
+    assert max(begun) <= 2
+
+
+def test_an_error_comes_in_the_place_of_its_result() -> None:
+    def fail(n: int) -> int:
+        if n >= 2:
+            raise ValueError(f"number {n}")
+        return n
+
+    results = run_ahead(fail, range(9), 2)
+    assert [next(results), next(results)] == [0, 1]
+    with pytest.raises(ValueError, match="number 2"):
+        next(results)
+    assert list(results) == []
