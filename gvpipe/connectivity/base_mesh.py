@@ -144,9 +144,9 @@ def _encode_mesh(points: Array, faces: Array, draco: bytes) -> tuple[bytes, Arra
     is_loose = np.ones(len(points), bool)
     is_loose[carried] = False
     permutation = np.concatenate([carried, np.flatnonzero(is_loose)])
-    codec_index = np.argsort(permutation)
+    codec_index = np.argsort(permutation).astype(np.int32)
 
-    loose_faces = left_out(smallest_first(codec_index[faces]), smallest_first(draco_faces))
+    loose_faces = left_out(smallest_first(codec_index[faces]), smallest_first(draco_faces.astype(np.int32))).astype(np.int64)
     loose_points = encode_table(points[is_loose])
     header = HEADER.pack(len(draco), int(is_loose.sum()), len(loose_faces), len(loose_points))
     mesh = header + draco + loose_points + encode_table(loose_faces)

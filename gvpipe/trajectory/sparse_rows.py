@@ -15,11 +15,12 @@ if TYPE_CHECKING:
 
 
 def as_rows(matrix: sparse.csr_array) -> Rows:
-    """A matrix by rows, columns ascending."""
+    """A matrix by rows, columns ascending; it may share the matrix' memory."""
     from gvpipe.trajectory.product_kernels import Rows
 
-    ordered = matrix.sorted_indices()
-    return Rows(ordered.indptr.astype(np.int64), ordered.indices.astype(np.int32), ordered.data.astype(np.float64))
+    ordered = matrix if matrix.has_sorted_indices else matrix.sorted_indices()
+    columns, values = ordered.indices.astype(np.int32, copy=False), ordered.data.astype(np.float64, copy=False)
+    return Rows(ordered.indptr.astype(np.int64), columns, values)
 
 
 def multiply(matrix: sparse.csr_array, vectors: Float64) -> Float64:
