@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.ahead import run_ahead
-from gvpipe.arrays import Float64, Integers, UInt8
+from gvpipe.arrays import Float64, Floats, Integers, UInt8
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.errors import CorruptFile, InputError, corrupt
 from gvpipe.media.jpeg import decode_jpeg, encode_jpeg
@@ -94,7 +94,7 @@ class Profile:
         clipped: Integers = np.clip(samples, self.low, self.high)
         return clipped
 
-    def samples(self, levels: Float64) -> Plane:
+    def samples(self, levels: Floats) -> Plane:
         """The samples nearest to ``levels`` above the middle, which are changed: they may be many."""
         np.rint(levels, out=levels)
         levels += self.middle

@@ -17,7 +17,7 @@ import numpy as np
 
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding_kernels import factor_blocks, fill_blocks
-from gvpipe.arrays import Float64, Floats, Int32
+from gvpipe.arrays import Float32, Floats, Int32
 
 
 class Padding:
@@ -35,10 +35,10 @@ class Padding:
         self._factors = np.empty((int(n_free.sum()), block + 2), np.float32)
         factor_blocks(self._fixed, block, self._first, self._factors)
 
-    def fill(self, values: Floats, background: float) -> Float64:
+    def fill(self, values: Floats, background: float) -> Float32:
         """Return planes ``(n, height, width)`` for vertex values ``(n, V)``; blocks without a vertex are ``background``."""
         n = len(values)
-        planes = np.full((self.layout.width * self.layout.height, 3 * -(-n // 3)), background)
+        planes = np.full((self.layout.width * self.layout.height, 3 * -(-n // 3)), background, np.float32)
         planes[self.layout.pixel, :n] = values.T
         fill_blocks(planes, self._pixels, self._fixed, self._block, self._first, self._factors)
         return planes.T[:n].reshape(n, self.layout.height, self.layout.width)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float32, Float64, Int32, Int64
+from gvpipe.arrays import Bool, Float32, Int32, Int64
 from gvpipe.compiled import compiled
 
 
@@ -57,7 +57,7 @@ def factor_blocks(fixed: Bool, block: int, first: Int64, factors: Float32) -> No
 
 
 @compiled
-def fill_blocks(planes: Float64, pixels: Int32, fixed: Bool, block: int, first: Int64, factors: Float32) -> None:
+def fill_blocks(planes: Float32, pixels: Int32, fixed: Bool, block: int, first: Int64, factors: Float32) -> None:
     """Give free pixels the values that minimise psi.
 
     Args:

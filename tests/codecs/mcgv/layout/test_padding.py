@@ -22,7 +22,7 @@ def test_padding_minimises_psi(block: int) -> None:
     used = used[(used // width // block != 1) | (used % width // block != 2)]  # one block stays empty
     pixel = np.concatenate([used[:40], [0, width - 1]])
     pixel = pixel[np.sort(np.unique(pixel, return_index=True)[1])]
-    values = random.normal(0, 50, (4, len(pixel)))
+    values = random.normal(0, 50, (4, len(pixel))).astype(np.float32)
     planes = Padding(Layout(width, height, pixel), block).fill(values, 7.25).reshape(4, -1)
     assert np.array_equal(planes[:, pixel], values)
     y, x = np.divmod(np.arange(width * height), width)
