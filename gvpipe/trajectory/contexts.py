@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int64
+from gvpipe.arrays import Int32, Int64
 from gvpipe.trajectory.causal_order import CausalOrder
 
 SHORT = (16, 10, 6, 4)  # weights of a vector's earlier components, the latest first
@@ -26,22 +26,22 @@ N_NEAR = 6  # causal neighbours that count
 
 
 class ContextInputs(NamedTuple):
-    """What contexts depend on beside residuals; kernels take it as it is. All are int64.
+    """What contexts depend on beside residuals; kernels take it as it is.
 
     Args:
-        blocks: ``(B + 1,)`` bounds of the blocks that are coded.
-        rank: ``(n,)`` of each vector in the order.
-        starts, neighbours, ring_sizes: of `gvpipe.trajectory.causal_order.CausalOrder`.
-        usual: ``(R,)`` mean magnitudes of the components, in 1 / ONE.
-        roots: ``2 ** (i / 16)`` rounded down.
-        logs: of the smallest numbers, in 1 / PER_OCTAVE: looked up, not searched for.
+        blocks: ``(B + 1,) int32`` bounds of the blocks that are coded.
+        rank: ``(n,) int32`` of each vector in the order.
+        starts, neighbours, ring_sizes: of `gvpipe.trajectory.causal_order.CausalOrder`, whose memory they share.
+        usual: ``(R,) int64`` mean magnitudes of the components, in 1 / ONE.
+        roots: int64, ``2 ** (i / 16)`` rounded down.
+        logs: int64, of the smallest numbers, in 1 / PER_OCTAVE: looked up, not searched for.
     """
 
-    blocks: Int64
-    rank: Int64
-    starts: Int64
-    neighbours: Int64
-    ring_sizes: Int64
+    blocks: Int32
+    rank: Int32
+    starts: Int32
+    neighbours: Int32
+    ring_sizes: Int32
     usual: Int64
     roots: Int64
     logs: Int64
@@ -56,19 +56,11 @@ def context_inputs(causal: CausalOrder, n_vectors: int, levels: Int64, n_blocks:
         levels: ``(R,)`` levels of the components' mean magnitudes (`level_bounds`).
         n_blocks: 0..B.
     """
-    rank = np.full(n_vectors, len(causal.order), np.int64)  # given vectors: behind all blocks, so that they count for 0
-    rank[causal.order] = np.arange(len(causal.order))
-    arrays = (
-        causal.blocks[: n_blocks + 1],
-        rank,
-        causal.starts,
-        causal.neighbours,
-        causal.ring_sizes,
-        level_bounds()[levels],
-        _roots(),
-        _logs(),
-    )
-    return ContextInputs(*(np.ascontiguousarray(array, np.int64) for array in arrays))
+    rank = np.full(n_vectors, len(causal.order), np.int32)  # given vectors: behind all blocks, so that they count for 0
+    rank[causal.order] = np.arange(len(causal.order), dtype=np.int32)
+    given = (causal.blocks[: n_blocks + 1], causal.starts, causal.neighbours, causal.ring_sizes)
+    blocks, starts, neighbours, ring_sizes = (np.ascontiguousarray(array, np.int32) for array in given)
+    return ContextInputs(blocks, rank, starts, neighbours, ring_sizes, level_bounds()[levels], _roots(), _logs())
 
 
 @functools.cache

@@ -65,7 +65,7 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
   const coding = [...causal, step, residuals, decoded, target];
   const last = predictor === "rbf" ? [beta] : [];
   yield* blockSteps(residuals.shape[0], (first, end) => kernels.call(`predict_${predictor}`, ...coding, first, end, ...last));
-  kernels.free(...inputs, ...stream.arrays, before, residuals, target);
+  kernels.free(...inputs.filter((array) => !causal.includes(array)), ...stream.arrays, before, residuals, target);
   return decoded;
 }
 
@@ -98,17 +98,16 @@ function finish(steps) {
   return step.value;
 }
 
-/** The members of Python's `ContextInputs`. */
+/** The members of Python's `ContextInputs`; three are arrays of `causal` themselves. */
 function contextInputs(kernels, [order, starts, neighbours, , , ringSizes, blocks], n, usual, wanted) {
   const ranks = new Int32Array(n).fill(order.shape[0]); // given vectors: behind all blocks
   kernels.view(order).forEach((vector, rank) => (ranks[vector] = rank));
-  const whole = (array, end) => kernels.whole(kernels.view(array).slice(0, end));
   return [
-    whole(blocks, wanted + 1),
-    kernels.whole(ranks),
-    whole(starts),
-    whole(neighbours),
-    whole(ringSizes),
+    kernels.array("int32", [wanted + 1], kernels.view(blocks).slice(0, wanted + 1)),
+    kernels.array("int32", [n], ranks),
+    starts,
+    neighbours,
+    ringSizes,
     kernels.array("int64", [usual.length], usual),
     kernels.array("int64", [tables.roots.length], tables.roots),
     kernels.array("int64", [MOST_LOGS], tables.logs),
