@@ -1,7 +1,7 @@
 """Work that other threads do before its results are asked for.
 
-For parts of a file that decode alone, as segments and groups of pictures do: kernels and FFmpeg let other threads run. Each
-call has threads of its own, which end with it, so nothing needs care when a process forks.
+For parts of a file that decode alone, as segments and groups of pictures do: kernels and FFmpeg let other threads run. Threads
+end when the iterator is used up or dropped; one that is half read does not go on in a forked child.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -21,24 +21,41 @@ def run_ahead(function: Callable[[Item], Result], items: Sequence[Item], ahead: 
     """Yield ``function(item)`` for each item in turn, worked out on up to ``ahead`` other threads, from the call on.
 
     One item alone, or all where ``ahead`` is 0, are worked out by the caller's thread when they are asked for. Errors of
-    ``function`` are raised in the place of its result; what follows is then not begun.
+    ``function`` are raised in the place of its result; nothing further is begun then.
     """
     if len(items) < 2 or ahead < 1:
         return map(function, items)
-    pool = ThreadPoolExecutor(ahead, "gvpipe-ahead")
-    pending = deque(pool.submit(function, item) for item in items[:ahead])
-    return _collect(pool, pending, function, items[ahead:])
+    return _Ahead(function, items, ahead)
 
 
-def _collect(
-    pool: ThreadPoolExecutor, pending: deque[Future[Result]], function: Callable[[Item], Result], rest: Sequence[Item]
-) -> Iterator[Result]:
-    try:
-        for item in rest:
-            result = pending.popleft().result()
-            pending.append(pool.submit(function, item))
-            yield result
-        while pending:
-            yield pending.popleft().result()
-    finally:
-        pool.shutdown(cancel_futures=True)  # waits for what has begun: it may read the caller's files
+class _Ahead(Generic[Item, Result]):
+    """Results in turn; who drops it waits for what has begun, since that may read the caller's files."""
+
+    def __init__(self, function: Callable[[Item], Result], items: Sequence[Item], ahead: int) -> None:
+        self._function, self._rest = function, iter(items[ahead:])
+        self._pool = ThreadPoolExecutor(ahead, "gvpipe-ahead")
+        self._pending: deque[Future[Result]] = deque(self._pool.submit(function, item) for item in items[:ahead])
+
+    def __iter__(self) -> Iterator[Result]:
+        return self
+
+    def __next__(self) -> Result:
+        if not self._pending:
+            self._end()
+            raise StopIteration
+        try:
+            result = self._pending.popleft().result()
+        except BaseException:
+            self._end()
+            raise
+        for item in self._rest:
+            self._pending.append(self._pool.submit(self._function, item))
+            break
+        return result
+
+    def __del__(self) -> None:
+        self._end()
+
+    def _end(self) -> None:
+        self._pending.clear()
+        self._pool.shutdown(cancel_futures=True)

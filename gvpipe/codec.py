@@ -117,10 +117,10 @@ class GroupReader(Protocol):
 
 @runtime_checkable
 class ClosableReader(Protocol):
-    """A frame reader that has threads."""
+    """A frame reader that keeps pictures."""
 
     def close(self) -> None:
-        """End the threads; they come back when they are needed."""
+        """Let go of decoded pictures; they come back when they are needed."""
         ...
 
 

@@ -48,7 +48,7 @@ class SharedReader:
             return self._reader.read(start, stop)
 
     def close(self) -> None:
-        """End the reader's threads; they come back when they are needed."""
+        """Let go of the reader's decoded pictures; they come back when they are needed."""
         with self._lock:
             if isinstance(self._reader, ClosableReader):
                 self._reader.close()

@@ -26,16 +26,34 @@ def test_no_more_is_begun_than_asked_for() -> None:
 
     def begin(n: int) -> int:
         begun.append(n)
+        time.sleep(0.05)
         return n
 
     results = run_ahead(begin, range(100), 2)
     assert next(results) == 0
-    time.sleep(0.05)
+    time.sleep(0.1)
     assert max(begun) <= 2  # the one returned, and two ahead
+
+
+@pytest.mark.parametrize("taken", [0, 1])
+def test_who_drops_results_waits_for_what_has_begun(taken: int) -> None:
+    ended: list[int] = []
+
+    def end(n: int) -> int:
+        time.sleep(0.05)
+        ended.append(n)
+        return n
+
     before = threading.active_count()
-    del results  # whoever asks for no more lets go of the threads
-    assert threading.active_count() < before
-    assert max(begun) <= 2
+    results = run_ahead(end, range(100), 2)
+    for _ in range(taken):
+        next(results)
+    del results
+    assert threading.active_count() == before
+    n = len(ended)
+    assert n <= 2 + taken
+    time.sleep(0.1)
+    assert len(ended) == n
 
 
 def test_an_error_comes_in_the_place_of_its_result() -> None:

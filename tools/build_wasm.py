@@ -43,6 +43,7 @@ INTS, LONGS, FLOATS, BYTES, FLAGS = (
 TRIANGLES, ROWS, NUMBERS, SCALAR = "int32[2]", "float64[2]", "int64[2]", "int64"
 CAUSAL = ("gvpipe.trajectory.causal_order.CausalOrder", [INTS, INTS, INTS, FLOATS, FLOATS, INTS, INTS, "bool"])
 HIERARCHY = ("gvpipe.mesh.hierarchy_kernels.Hierarchy", [INTS] * 6)
+RESIDUALS = ("gvpipe.trajectory.contexts.Residuals", [NUMBERS, NUMBERS, LONGS])
 INPUTS = ("gvpipe.trajectory.contexts.ContextInputs", [INTS] * 5 + [LONGS] * 3)
 STREAM = ("gvpipe.entropy.block_kernels.BlockStream", ["uint64[1]", "uint32[1]", "uint64[2]", LONGS])
 VECTORS = ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS])
@@ -160,7 +161,7 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
         SCALAR,
     ],
     "gvpipe.trajectory.causal_kernels.keep_ranks": [CAUSAL, FLAGS],
-    "gvpipe.trajectory.context_kernels.decode_residuals": [NUMBERS, INPUTS, STREAM, LONGS, SCALAR, SCALAR],
+    "gvpipe.trajectory.context_kernels.decode_residuals": [RESIDUALS, INPUTS, STREAM, SCALAR, SCALAR],
     "gvpipe.trajectory.prediction_kernels.predict_kalman": [VECTORS, SCALAR, SCALAR],
     "gvpipe.trajectory.prediction_kernels.predict_lsp": [VECTORS, SCALAR, SCALAR],
     "gvpipe.trajectory.prediction_kernels.predict_navg": [VECTORS, SCALAR, SCALAR],

@@ -13,7 +13,7 @@ from gvpipe.arrays import Int32
 from gvpipe.compiled import compiled, inlined
 
 HUB = 256  # triangles; an edge between two vertices that have more counts as there, unsearched
-AHEAD, BEHIND, AFTER, BEFORE = range(4)  # columns of `CornerLists.corners`
+NEXT_VERTEX, PREVIOUS_VERTEX, AFTER, BEFORE = range(4)  # columns of `CornerLists.corners`
 
 
 class CornerLists(NamedTuple):
@@ -23,7 +23,7 @@ class CornerLists(NamedTuple):
         triangles: ``(T, 3)`` vertices; the first one of a removed triangle is -1.
         head: ``(V,)`` the first corner at each vertex, -1 if there is none.
         degree: ``(V,)`` triangles at each vertex.
-        corners: ``(3T, 4)`` what a walk around a vertex reads, side by side: the vertices ahead and behind in the corner's
+        corners: ``(3T, 4)`` what a walk around a vertex reads, side by side: the next and the previous vertex of the corner's
             triangle, and the corners after and before it at its own vertex, -1 at the ends.
     """
 
@@ -67,8 +67,8 @@ def link(lists: CornerLists, t: int, k: int) -> None:
     """Put corner k of triangle t first in its vertex' list."""
     corner, vertex = 3 * t + k, lists.triangles[t, k]
     first = lists.head[vertex]
-    lists.corners[corner, AHEAD] = lists.triangles[t, k + 1 if k < 2 else 0]
-    lists.corners[corner, BEHIND] = lists.triangles[t, k - 1 if k > 0 else 2]
+    lists.corners[corner, NEXT_VERTEX] = lists.triangles[t, k + 1 if k < 2 else 0]
+    lists.corners[corner, PREVIOUS_VERTEX] = lists.triangles[t, k - 1 if k > 0 else 2]
     lists.corners[corner, AFTER] = first
     lists.corners[corner, BEFORE] = -1
     if first >= 0:
@@ -115,7 +115,7 @@ def find_ring(v: int, lists: CornerLists, hole: Hole) -> tuple[int, bool]:
     while c >= 0:
         if n == len(ring):
             return 0, False
-        sides[n, 0], sides[n, 1] = lists.corners[c, AHEAD], lists.corners[c, BEHIND]
+        sides[n, 0], sides[n, 1] = lists.corners[c, NEXT_VERTEX], lists.corners[c, PREVIOUS_VERTEX]
         n += 1
         c = lists.corners[c, AFTER]
     if n == 0:
@@ -184,7 +184,7 @@ def has_edge(a: int, b: int, lists: CornerLists) -> bool:
         a, b = b, a
     c = lists.head[a]
     while c >= 0:
-        if lists.corners[c, AHEAD] == b or lists.corners[c, BEHIND] == b:
+        if lists.corners[c, NEXT_VERTEX] == b or lists.corners[c, PREVIOUS_VERTEX] == b:
             return True
         c = lists.corners[c, AFTER]
     return False

@@ -23,8 +23,8 @@ from gvpipe.arrays import Int32, Int64
 from gvpipe.compiled import compiled, inlined
 from gvpipe.mesh.corner_lists import (
     AFTER,
-    AHEAD,
-    BEHIND,
+    NEXT_VERTEX,
+    PREVIOUS_VERTEX,
     CornerLists,
     Hole,
     empty_hole,
@@ -179,15 +179,15 @@ def _list_neighbours(size: int, closed: bool, lists: CornerLists, hole: Hole, fo
         from_b = lists.degree[b] < lists.degree[a]  # the shorter list: a hub's would make this quadratic
         c = lists.head[b] if from_b else lists.head[a]
         while c >= 0:
-            if corners[c, AHEAD] == a if from_b else corners[c, BEHIND] == b:
-                n = _add_once(corners[c, BEHIND] if from_b else corners[c, AHEAD], found, n)
+            if corners[c, NEXT_VERTEX] == a if from_b else corners[c, PREVIOUS_VERTEX] == b:
+                n = _add_once(corners[c, PREVIOUS_VERTEX] if from_b else corners[c, NEXT_VERTEX], found, n)
                 break
             c = corners[c, AFTER]
     for i in range(size):
         c = lists.head[ring[i]]
         while c >= 0 and n < MAX_NEIGHBOURS:
-            n = _add_once(corners[c, AHEAD], found, n)
-            n = _add_once(corners[c, BEHIND], found, n)
+            n = _add_once(corners[c, NEXT_VERTEX], found, n)
+            n = _add_once(corners[c, PREVIOUS_VERTEX], found, n)
             c = corners[c, AFTER]
     return n
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from gvpipe.arrays import Bool, Int32
 from gvpipe.compiled import compiled
-from gvpipe.mesh.corner_lists import AFTER, AHEAD, BEHIND, CornerLists, link_corners
+from gvpipe.mesh.corner_lists import AFTER, NEXT_VERTEX, PREVIOUS_VERTEX, CornerLists, link_corners
 
 
 class Traversal(NamedTuple):
@@ -110,10 +110,10 @@ def _opposite(a: int, b: int, lists: CornerLists, is_done: Bool) -> int:
     c = lists.head[a]
     while c >= 0:
         third = -1
-        if lists.corners[c, AHEAD] == b:
-            third = lists.corners[c, BEHIND]
-        elif lists.corners[c, BEHIND] == b:
-            third = lists.corners[c, AHEAD]
+        if lists.corners[c, NEXT_VERTEX] == b:
+            third = lists.corners[c, PREVIOUS_VERTEX]
+        elif lists.corners[c, PREVIOUS_VERTEX] == b:
+            third = lists.corners[c, NEXT_VERTEX]
         if third >= 0 and is_done[third]:
             return third
         c = lists.corners[c, AFTER]

@@ -28,7 +28,7 @@ from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import InputError
 from gvpipe.trajectory.causal_order import CausalOrder
-from gvpipe.trajectory.contexts import LARGEST, MAX_LEVEL, N_CONTEXTS, ONE, context_inputs, level_bounds
+from gvpipe.trajectory.contexts import LARGEST, MAX_LEVEL, N_CONTEXTS, ONE, Residuals, context_inputs, level_bounds
 from gvpipe.trajectory.prediction import predict_vectors
 
 MAX_VALUES = 1 << 27  # of a section: vectors times components
@@ -111,18 +111,19 @@ def decode_vectors(
         raise cursor.corrupt("a magnitude level is out of range")
     coder = BlockDecoder(cursor.rest(), N_CONTEXTS, name)
     wanted = len(causal.blocks) - 1 if n_blocks is None else n_blocks
-    residuals = np.zeros((int(causal.blocks[wanted]), n_components), np.int64)
+    n_vectors = int(causal.blocks[wanted])
     decoded = np.zeros((len(causal.order), n_components)) if given is None else given.copy()
     inputs = context_inputs(causal, len(decoded), levels, wanted)
-    before = inputs.usual.copy()
+    values, magnitudes = np.zeros((n_vectors, n_components), np.int64), np.zeros((n_components, n_vectors), np.int64)
+    residuals = Residuals(values, magnitudes, inputs.usual.copy())
 
     def take(blocks: tuple[int, int]) -> tuple[int, int]:
         """Decode the residuals of blocks; return which vectors these are."""
-        coder.check(decode_residuals(residuals, inputs, coder.stream, before, *blocks))
+        coder.check(decode_residuals(residuals, inputs, coder.stream, *blocks))
         return int(causal.blocks[blocks[0]]), int(causal.blocks[blocks[1]])
 
     for begin, end in run_ahead(take, _parts(causal.blocks[: wanted + 1]), 1):  # predict while the next ones are decoded
-        predict_vectors(causal, step, residuals, decoded, None, predictor, beta, begin, end)
+        predict_vectors(causal, step, values, decoded, None, predictor, beta, begin, end)
     if n_blocks is None:
         coder.end()
     return decoded

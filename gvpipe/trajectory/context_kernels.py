@@ -24,9 +24,10 @@ from gvpipe.trajectory.contexts import (
     POWERS,
     SHORT,
     ContextInputs,
+    Residuals,
 )
 
-TOGETHER = 512  # vectors whose earlier components are summed up at once
+TILE = 512  # vectors whose earlier components are summed up at once
 
 
 @compiled
@@ -92,9 +93,9 @@ def _find_contexts(first: int, end: int, c: int, magnitudes: Int64, inputs: Cont
             usual_short += usual[k] * SHORT[c - 1 - k]
     fixed = POWERS[0] * _log(usual[c], inputs) + POWERS[1] * _log(before[c], inputs)
     fixed -= POWERS[3] * _log(usual_short + FLOOR_SPAN, inputs) + POWERS[4] * _log(usual_long + FLOOR_SPAN, inputs)
-    shorts, longs = np.empty(TOGETHER, np.int64), np.empty(TOGETHER, np.int64)
-    for begin in range(first, end, TOGETHER):
-        n = min(TOGETHER, end - begin)
+    shorts, longs = np.empty(TILE, np.int64), np.empty(TILE, np.int64)
+    for begin in range(first, end, TILE):
+        n = min(TILE, end - begin)
         _sum_spans(begin, n, c, magnitudes, shorts, longs)
         for j in range(n):
             i = begin + j
@@ -159,35 +160,29 @@ def find_all_contexts(residuals: Int64, inputs: ContextInputs) -> UInt8:
 
 
 @compiled
-def decode_residuals(
-    residuals: Int64, inputs: ContextInputs, stream: BlockStream, before: Int64, first_block: int, end_block: int
-) -> int:
-    """Fill ``residuals (m, R)``, by rank, block by block and component by component.
+def decode_residuals(residuals: Residuals, inputs: ContextInputs, stream: BlockStream, first_block: int, end_block: int) -> int:
+    """Fill residuals block by block and component by component.
 
     Args:
         residuals, inputs, stream: all blocks up to ``first_block`` are decoded.
-        before: ``(R,)`` mean magnitudes of the block before, in 1 / ONE; of the first block ``inputs.usual``. It changes.
         first_block, end_block: which blocks to decode.
 
     Returns:
         0, or what is wrong: as of `take_block`, or OUT_OF_RANGE.
     """
-    magnitudes = np.zeros((residuals.shape[1], len(residuals)), np.int64)
-    for i in range(inputs.blocks[first_block]):
-        for c in range(residuals.shape[1]):
-            magnitudes[c, i] = ONE * abs(residuals[i, c])
+    decoded, magnitudes, means = residuals
     for b in range(first_block, end_block):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
         near = _find_near(first, end, inputs)
-        for c in range(residuals.shape[1]):
-            contexts = _find_contexts(first, end, c, magnitudes, inputs, before, near)
+        for c in range(decoded.shape[1]):
+            contexts = _find_contexts(first, end, c, magnitudes, inputs, means, near)
             values, status = take_block(stream, contexts)
             if status:
                 return status
             for i in range(len(values)):
                 if abs(values[i]) >= LARGEST:
                     return OUT_OF_RANGE
-                residuals[first + i, c] = values[i]
+                decoded[first + i, c] = values[i]
                 magnitudes[c, first + i] = ONE * abs(values[i])
-        _mean_magnitudes(magnitudes, first, end, before)
+        _mean_magnitudes(magnitudes, first, end, means)
     return 0

@@ -47,6 +47,20 @@ class ContextInputs(NamedTuple):
     logs: Int64
 
 
+class Residuals(NamedTuple):
+    """Residuals as far as they are decoded; kernels fill it block by block. All are int64, and 0 to begin with.
+
+    Args:
+        values: ``(m, R)`` by rank.
+        magnitudes: ``(R, m)`` in 1 / ONE, component by component: contexts read one of them at a time.
+        means: ``(R,)`` magnitudes of the last block, in 1 / ONE; before the first, `ContextInputs.usual`.
+    """
+
+    values: Int64
+    magnitudes: Int64
+    means: Int64
+
+
 def context_inputs(causal: CausalOrder, n_vectors: int, levels: Int64, n_blocks: int) -> ContextInputs:
     """Return the inputs for the first ``n_blocks`` blocks.
 

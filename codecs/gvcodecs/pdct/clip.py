@@ -95,7 +95,7 @@ def decode_clip(data: bytes, n_frames: int, surface: BaseFrame, name: str, budge
     """
     n_points = n_frames * len(surface.base)
     what = f"{name!r}, {n_frames} frames of {len(surface.base)} points,"
-    budget.ask(what, BYTES_PER_POINT * n_points, SECONDS_PER_FRAME * n_frames + SECONDS_PER_POINT * n_points)
+    budget.ask(what, count_bytes(n_frames, len(surface.base), 0), SECONDS_PER_FRAME * n_frames + SECONDS_PER_POINT * n_points)
     cursor = Cursor(data, name)
     *origin, seed_step, step, fineness = cursor.struct(HEAD)
     wrong = not all(abs(v) < HUGE for v in origin) or not all(TINY < v < HUGE for v in (seed_step, step))
@@ -104,8 +104,7 @@ def decode_clip(data: bytes, n_frames: int, surface: BaseFrame, name: str, budge
     lattice = Lattice((origin[0], origin[1], origin[2]), seed_step)
     n_vertices = len(surface.base)
     n_seeds = cursor.varint(min(MAX_CLUSTERS, n_vertices), "the number of clusters")
-    n_numbers = 9 * n_seeds * n_frames
-    budget.ask(what, BYTES_PER_POINT * n_points + BYTES_PER_NUMBER * n_numbers)
+    budget.ask(what, count_bytes(n_frames, n_vertices, n_seeds))
     if n_seeds < 1:
         raise cursor.corrupt("there is no cluster")
     blocks = [cursor.block() for _ in range(3)]
@@ -122,6 +121,12 @@ def decode_clip(data: bytes, n_frames: int, surface: BaseFrame, name: str, budge
     if not _decode_frames(cursor, dictionary, seeds, seed_points, step, positions):
         raise cursor.corrupt("a position is larger than float32 can hold")
     return positions
+
+
+def count_bytes(n_frames: int, n_vertices: int, n_clusters: int | None = None) -> int:
+    """Memory that a clip takes to decode; with the most clusters that it can have, where their number is not known."""
+    n_seeds = min(MAX_CLUSTERS, n_vertices) if n_clusters is None else n_clusters
+    return n_frames * (BYTES_PER_POINT * n_vertices + 9 * BYTES_PER_NUMBER * n_seeds)
 
 
 def _decode_frames(

@@ -6,8 +6,7 @@ from bisect import bisect_right
 
 import numpy as np
 
-from gvcodecs.pdct.clip import BYTES_PER_POINT as BYTES_PER_POSITION
-from gvcodecs.pdct.clip import decode_clip
+from gvcodecs.pdct.clip import count_bytes, decode_clip
 from gvcodecs.pdct.header import VERSION_POINTS, Header, surface_of, surface_of_points
 from gvcodecs.pdct.still_points import SECTION, decode_still
 from gvpipe.ahead import AHEAD, run_ahead
@@ -69,7 +68,7 @@ class PdctReader:
         wanted = segments_between(start, stop, self._bounds) if len(self._surface.traversal) else []
         for c, clip in zip(wanted, run_ahead(self._clip, wanted, AHEAD if self._has_room(wanted) else 0), strict=True):
             begin, last = self._bounds[c], min(stop, self._bounds[c + 1])
-            first = max(start, begin)
+            first, self._kept = max(start, begin), (c, clip)
             result[first - start : last - start] = clip[first - begin : last - begin]
         if self._still is not None:
             result[:, self._still.points] = self._still.positions
@@ -78,12 +77,11 @@ class PdctReader:
     def _has_room(self, clips: list[int]) -> bool:
         """Whether the file may take the memory of several of these clips at a time."""
         longest = max((self._bounds[c + 1] - self._bounds[c] for c in clips), default=0)
-        return (AHEAD + 1) * BYTES_PER_POSITION * longest * len(self._surface.base) <= self._bitstream.budget.memory_left
+        return (AHEAD + 1) * count_bytes(longest, len(self._surface.base)) <= self._bitstream.budget.memory_left
 
     def _clip(self, c: int) -> Float32:
-        number, clip = self._kept  # once: other threads decode, too
-        if number != c:
-            name, n_frames = f"clip.{c}", self._bounds[c + 1] - self._bounds[c]
-            clip = decode_clip(self._bitstream.section(name), n_frames, self._surface, name, self._bitstream.budget)
-            self._kept = c, clip
-        return clip
+        number, clip = self._kept
+        if number == c:
+            return clip
+        name, n_frames = f"clip.{c}", self._bounds[c + 1] - self._bounds[c]
+        return decode_clip(self._bitstream.section(name), n_frames, self._surface, name, self._bitstream.budget)

@@ -20,7 +20,7 @@ MAX_CANDIDATES = 10  # clusters that a fit considers
 LEAST_GAIN = 1e-3  # of the error: a further cluster must gain this much to be tried
 RIDGE = 1e-7  # of a system's trace: clusters may move alike
 PAIRS = tuple((r, s) for r in range(4) for s in range(r, 4))  # of coordinates
-TOGETHER = 64  # transforms that are multiplied with the others at once
+CLUSTERS_AT_ONCE = 64  # transforms that are multiplied with the others at once
 
 
 class Transforms(NamedTuple):
@@ -71,8 +71,8 @@ def prepare(transforms: Float64) -> Transforms:
     n_clusters, _, n = transforms.shape
     flat = transforms.reshape(4 * n_clusters, n)
     products = np.empty((n_clusters * (n_clusters + 1) // 2, len(PAIRS)))
-    for first in range(0, n_clusters, TOGETHER):
-        end = min(first + TOGETHER, n_clusters)
+    for first in range(0, n_clusters, CLUSTERS_AT_ONCE):
+        end = min(first + CLUSTERS_AT_ONCE, n_clusters)
         blocks = (flat[4 * first : 4 * end] @ flat[: 4 * end].T).reshape(end - first, 4, end, 4).swapaxes(1, 2)
         own = np.stack([blocks[..., r, s] + (blocks[..., s, r] if r < s else 0) for r, s in PAIRS], axis=2)
         for a in range(first, end):

@@ -54,10 +54,11 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
   const wanted = blocks ?? bounds.shape[0] - 1;
   const decoded = given ?? kernels.array("float64", [n, components]);
   const inputs = contextInputs(kernels, causal, decoded.shape[0], usual, wanted);
-  const residuals = kernels.array("int64", [kernels.view(bounds)[wanted], components]);
-  const before = kernels.array("int64", [components], usual);
+  const vectors = kernels.view(bounds)[wanted];
+  const residuals = kernels.array("int64", [vectors, components]);
+  const known = [residuals, kernels.array("int64", [components, vectors]), kernels.array("int64", [components], usual)];
   for (let b = 0; b < wanted; b++) {
-    stream.check(kernels.call("decode_residuals", residuals, ...inputs, ...stream.arrays, before, b, b + 1)[0]);
+    stream.check(kernels.call("decode_residuals", ...known, ...inputs, ...stream.arrays, b, b + 1)[0]);
     yield;
   }
   if (blocks === null) stream.end();
@@ -65,7 +66,7 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
   const coding = [...causal, step, residuals, decoded, target];
   const last = predictor === "rbf" ? [beta] : [];
   yield* blockSteps(residuals.shape[0], (first, end) => kernels.call(`predict_${predictor}`, ...coding, first, end, ...last));
-  kernels.free(...inputs.filter((array) => !causal.includes(array)), ...stream.arrays, before, residuals, target);
+  kernels.free(...inputs.filter((array) => !causal.includes(array)), ...stream.arrays, ...known, target);
   return decoded;
 }
 
