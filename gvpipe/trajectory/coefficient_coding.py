@@ -32,7 +32,7 @@ from gvpipe.trajectory.contexts import LARGEST, MAX_LEVEL, N_CONTEXTS, ONE, Resi
 from gvpipe.trajectory.prediction import predict_vectors
 
 MAX_VALUES = 1 << 27  # of a section: vectors times components
-PART = 4096  # vectors whose residuals are decoded before they are predicted, at least
+PART, MOST_PARTS = 4096, 16  # vectors whose residuals are decoded before they are predicted, at least; parts of all of them
 
 
 def encode_vectors(
@@ -130,12 +130,12 @@ def decode_vectors(
 
 
 def _parts(bounds: Int32) -> list[tuple[int, int]]:
-    """Runs of blocks of `PART` vectors at least, but for the last; ``bounds (B + 1,)`` of blocks."""
+    """Up to `MOST_PARTS` runs of blocks of `PART` vectors at least; ``bounds (B + 1,)`` of blocks."""
     parts: list[tuple[int, int]] = []
-    first, n_blocks = 0, len(bounds) - 1
+    first, n_blocks, least = 0, len(bounds) - 1, max(PART, int(bounds[-1]) // MOST_PARTS)
     while first < n_blocks:
-        last = max(first + 1, int(np.searchsorted(bounds, bounds[first] + PART)))
-        last = n_blocks if bounds[-1] - bounds[min(last, n_blocks)] < PART else last
+        last = max(first + 1, int(np.searchsorted(bounds, bounds[first] + least)))
+        last = n_blocks if bounds[-1] - bounds[min(last, n_blocks)] < least else last
         parts.append((first, last))
         first = last
     return parts

@@ -78,7 +78,7 @@ def predict_kalman(coding: VectorCoding, begin: int, end: int) -> None:
     u' P v. What a component is off by moves the others by its covariance with them over its variance. Of few components their
     own covariances are worked out, of many the weights' after each component: whichever costs less.
     """
-    most = _most_neighbours(coding, begin, end)
+    most = _most_neighbours(coding)
     if coding.decoded.shape[1] <= 2 * most:
         _predict_few(coding, begin, end, most)
     else:
@@ -210,7 +210,7 @@ def _predict_many(coding: VectorCoding, begin: int, end: int, most: int) -> None
 @compiled
 def predict_lsp(coding: VectorCoding, begin: int, end: int) -> None:
     """Predict by least squares over the components decoded so far."""
-    fit = _least_squares(_most_neighbours(coding, begin, end))
+    fit = _least_squares(_most_neighbours(coding))
     for i in range(begin, end):
         _predict_vector_lsp(coding, i, fit)
 
@@ -219,7 +219,7 @@ def predict_lsp(coding: VectorCoding, begin: int, end: int) -> None:
 def predict_rbf(coding: VectorCoding, begin: int, end: int, beta: float) -> None:
     """Predict by interpolation with radial functions, where a vector has a ring of two at least; else as `predict_lsp`."""
     causal, decoded = coding.causal, coding.decoded
-    most = _most_neighbours(coding, begin, end)
+    most = _most_neighbours(coding)
     fit = _least_squares(most)
     weights, values = np.zeros(most), np.zeros(most)
     squared, to_vector = np.zeros((most, most)), np.zeros(most)  # squared distances between neighbours, and to the vector
@@ -301,10 +301,10 @@ def _count_neighbours(coding: VectorCoding, i: int) -> int:
 
 
 @compiled
-def _most_neighbours(coding: VectorCoding, begin: int, end: int) -> int:
-    """The most neighbours that one of vectors ``begin`` to ``end`` of the order has, 1 at least."""
+def _most_neighbours(coding: VectorCoding) -> int:
+    """The most neighbours that any vector has, 1 at least: the form of ``kalman`` must not depend on which are coded at once."""
     most = 1
-    for i in range(begin, end):
+    for i in range(len(coding.residuals)):
         most = max(most, coding.causal.starts[i + 1] - coding.causal.starts[i])
     return most
 
