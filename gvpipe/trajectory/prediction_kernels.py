@@ -302,7 +302,7 @@ def _count_neighbours(coding: VectorCoding, i: int) -> int:
 
 @compiled
 def _most_neighbours(coding: VectorCoding) -> int:
-    """The most neighbours that any vector has, 1 at least: the form of ``kalman`` must not depend on which are coded at once."""
+    """The most neighbours of any vector, 1 at least: the form of ``kalman`` must not depend on which are coded at once."""
     most = 1
     for i in range(len(coding.residuals)):
         most = max(most, coding.causal.starts[i + 1] - coding.causal.starts[i])
