@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import islice
 from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
@@ -32,9 +33,10 @@ class _Ahead(Generic[Item, Result]):
     """Results in turn; who drops it waits for what has begun, since that may read the caller's files."""
 
     def __init__(self, function: Callable[[Item], Result], items: Sequence[Item], ahead: int) -> None:
-        self._function, self._rest = function, iter(items[ahead:])
+        self._function, self._rest = function, iter(items)
         self._pool = ThreadPoolExecutor(ahead, "gvpipe-ahead")
-        self._pending: deque[Future[Result]] = deque(self._pool.submit(function, item) for item in items[:ahead])
+        self._pending: deque[Future[Result]] = deque()
+        self._begin(ahead)
 
     def __iter__(self) -> Iterator[Result]:
         return self
@@ -48,13 +50,14 @@ class _Ahead(Generic[Item, Result]):
         except BaseException:
             self._end()
             raise
-        for item in self._rest:
-            self._pending.append(self._pool.submit(self._function, item))
-            break
+        self._begin(1)
         return result
 
     def __del__(self) -> None:
         self._end()
+
+    def _begin(self, n: int) -> None:
+        self._pending.extend(self._pool.submit(self._function, item) for item in islice(self._rest, n))
 
     def _end(self) -> None:
         self._pending.clear()

@@ -58,9 +58,15 @@ def segment_starts(n_frames: int, segments: int) -> list[int]:
     return [s * n_frames // segments for s in range(segments + 1)]
 
 
-def segments_between(start: int, stop: int, bounds: Sequence[int]) -> list[int]:
-    """Which segments frames ``start`` to ``stop`` lie in; ``bounds``: first frame of every segment, and F."""
-    return [s for s, (first, end) in enumerate(pairwise(bounds)) if max(start, first) < min(stop, end)]
+def segments_between(start: int, stop: int, bounds: Sequence[int]) -> list[tuple[int, int, int]]:
+    """The segments that frames ``start`` to ``stop`` lie in: ``(segment, first, last + 1)`` of those frames.
+
+    Examples:
+        >>> segments_between(3, 12, [0, 5, 10, 15])
+        [(0, 3, 5), (1, 5, 10), (2, 10, 12)]
+    """
+    spans = [(s, max(start, begin), min(stop, end)) for s, (begin, end) in enumerate(pairwise(bounds))]
+    return [span for span in spans if span[1] < span[2]]
 
 
 def cut(n_frames: int, longest: int, most: int) -> list[int]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
 from gvpipe.arrays import Array
 from gvpipe.budget import UNLIMITED, Budget
+from gvpipe.container.segments import segments_between
 from gvpipe.errors import InputError
 from gvpipe.fields.derived import Motion, Positions, Span
 from gvpipe.fields.head import read_head
@@ -77,10 +76,9 @@ class FieldReader:
         if not 0 <= start <= stop <= self._n_frames:
             raise InputError(f"field {self._name!r}: frames {start} to {stop}: there are 0 to {self._n_frames}")
         result = np.empty((stop - start, *self.shape[1:]), self.dtype)
-        for s, (begin, end) in enumerate(pairwise(self._bounds)):
-            first, last = max(start, begin), min(stop, end)
-            if first < last:
-                result[first - start : last - start] = self._decode(s)[first - begin : last - begin]
+        for s, first, last in segments_between(start, stop, self._bounds):
+            begin = self._bounds[s]
+            result[first - start : last - start] = self._decode(s)[first - begin : last - begin]
         return result
 
     def _decode(self, s: int) -> Array:

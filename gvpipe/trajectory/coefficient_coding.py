@@ -32,7 +32,7 @@ from gvpipe.trajectory.contexts import LARGEST, MAX_LEVEL, N_CONTEXTS, ONE, Resi
 from gvpipe.trajectory.prediction import predict_vectors
 
 MAX_VALUES = 1 << 27  # of a section: vectors times components
-PART, MOST_PARTS = 4096, 16  # vectors whose residuals are decoded before they are predicted, at least; parts of all of them
+PART, MOST_PARTS = 4096, 16  # vectors whose residuals are decoded before they are predicted, about; parts of all of them
 
 
 def encode_vectors(
@@ -130,12 +130,7 @@ def decode_vectors(
 
 
 def _parts(bounds: Int32) -> list[tuple[int, int]]:
-    """Up to `MOST_PARTS` runs of blocks of `PART` vectors at least; ``bounds (B + 1,)`` of blocks."""
-    parts: list[tuple[int, int]] = []
-    first, n_blocks, least = 0, len(bounds) - 1, max(PART, int(bounds[-1]) // MOST_PARTS)
-    while first < n_blocks:
-        last = max(first + 1, int(np.searchsorted(bounds, bounds[first] + least)))
-        last = n_blocks if bounds[-1] - bounds[min(last, n_blocks)] < least else last
-        parts.append((first, last))
-        first = last
-    return parts
+    """Up to `MOST_PARTS` runs of blocks, of about `PART` vectors or more; ``bounds (B + 1,)`` of blocks."""
+    n_parts = max(1, min(MOST_PARTS, int(bounds[-1]) // PART))
+    starts = np.searchsorted(bounds, bounds[-1] / n_parts * np.arange(n_parts))
+    return list(pairwise(np.unique([*starts, len(bounds) - 1]).tolist()))

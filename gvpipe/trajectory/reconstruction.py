@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from gvpipe.arrays import Float32, Float64, Integers
+from gvpipe.container.segments import segments_between
 from gvpipe.errors import corrupt
 from gvpipe.trajectory.basis import Basis
 
@@ -48,11 +48,8 @@ def read_frames(start: int, stop: int, bounds: list[int], points: Integers, deco
     from gvpipe.trajectory.product_kernels import place_points
 
     result, vertices = np.empty((stop - start, len(points), 3), np.float32), np.asarray(points, np.int64)
-    for s, (begin, end) in enumerate(pairwise(bounds)):
-        first, last = max(start, begin), min(stop, end)
-        if first >= last:
-            continue
-        segment = decode(s)
+    for s, first, last in segments_between(start, stop, bounds):
+        segment, begin = decode(s), bounds[s]
         for frame in range(first, last, TOGETHER):
             positions = segment.positions(frame - begin, min(frame + TOGETHER, last) - begin)  # (n, 3, P)
             n = place_points(positions, vertices, MAX_FLOAT32, result[frame - start : frame - start + len(positions)])

@@ -65,10 +65,11 @@ class PdctReader:
             CorruptFile: a clip does not decode.
         """
         result = np.empty((stop - start, len(self._surface.base), 3), np.float32)
-        wanted = segments_between(start, stop, self._bounds) if len(self._surface.traversal) else []
-        for c, clip in zip(wanted, run_ahead(self._clip, wanted, AHEAD if self._has_room(wanted) else 0), strict=True):
-            begin, last = self._bounds[c], min(stop, self._bounds[c + 1])
-            first, self._kept = max(start, begin), (c, clip)
+        spans = segments_between(start, stop, self._bounds) if len(self._surface.traversal) else []
+        wanted = [c for c, _, _ in spans]
+        clips = run_ahead(self._clip, wanted, AHEAD if self._has_room(wanted) else 0)
+        for (c, first, last), clip in zip(spans, clips, strict=True):
+            self._kept, begin = (c, clip), self._bounds[c]
             result[first - start : last - start] = clip[first - begin : last - begin]
         if self._still is not None:
             result[:, self._still.points] = self._still.positions

@@ -1,4 +1,4 @@
-"""Points of the cells of a k-d tree: sorted along their cell's direction, and their second moments."""
+"""Points of the cells of a k-d tree: sorted along their cell's direction, their second moments, and their pixels."""
 
 from __future__ import annotations
 
@@ -24,20 +24,26 @@ def sort_cells(order: Int64, starts: Int64, directions: Int64, points: Int64) ->
     other_keys = np.empty(len(order), np.int64)
     for cell in range(len(directions)):
         low, high = starts[cell], starts[cell + 1]
-        x, y, z = directions[cell, 0], directions[cell, 1], directions[cell, 2]
-        for i in range(low, high):
-            v = order[i]
-            key = x * points[v, 0] + y * points[v, 1] + z * points[v, 2]
-            k = i
-            first = low + (i - low) // RUN * RUN
-            while k > first and keys[k - 1] > key:
-                keys[k], order[k] = keys[k - 1], order[k - 1]
-                k -= 1
-            keys[k], order[k] = key, v
+        for first in range(low, high, RUN):
+            last = min(first + RUN, high)
+            _sort_few(order[first:last], directions[cell], points, keys[first:last])
         width = RUN
         while width < high - low:
             _merge_runs(keys, order, other_keys, vertices, low, high, width)
             width *= 2
+
+
+@inlined
+def _sort_few(order: Int64, direction: Int64, points: Int64, keys: Int64) -> None:
+    """Sort vertices ``(n,)`` by their place along a direction, with ``keys`` for work; those of one place keep their order."""
+    for i in range(len(order)):
+        v = order[i]
+        key = direction[0] * points[v, 0] + direction[1] * points[v, 1] + direction[2] * points[v, 2]
+        k = i
+        while k > 0 and keys[k - 1] > key:
+            keys[k], order[k] = keys[k - 1], order[k - 1]
+            k -= 1
+        keys[k], order[k] = key, v
 
 
 @compiled
@@ -132,7 +138,7 @@ def place_cells(
                     pixel[order[i]] = y * width + x
                 continue
             is_wide, longer = columns >= rows, max(columns, rows)
-            _sort_few(order, low, high, directions[cell][0 if is_wide else 3 :], points, keys)
+            _sort_few(order[low:high], directions[cell][0 if is_wide else 3 :], points, keys)
             first = longer // 2
             middle = low + (2 * (high - low) * first + longer) // (2 * longer)
             for begin, end, is_second in ((low, middle, False), (middle, high, True)):
@@ -143,16 +149,3 @@ def place_cells(
                 parts[n, 2], parts[n, 3] = (x + skipped, y) if is_wide else (x, y + skipped)
                 parts[n, 4], parts[n, 5] = (size, rows) if is_wide else (columns, size)
                 n += 1
-
-
-@inlined
-def _sort_few(order: Int64, low: int, high: int, direction: Int64, points: Int64, keys: Int64) -> None:
-    """Sort the vertices from ``low`` to ``high`` by their place along a direction; those of one place keep their order."""
-    for i in range(low, high):
-        v = order[i]
-        key = direction[0] * points[v, 0] + direction[1] * points[v, 1] + direction[2] * points[v, 2]
-        k = i
-        while k > low and keys[k - 1 - low] > key:
-            keys[k - low], order[k] = keys[k - 1 - low], order[k - 1]
-            k -= 1
-        keys[k - low], order[k] = key, v
