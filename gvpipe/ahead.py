@@ -1,7 +1,7 @@
 """Work that other threads do before its results are asked for.
 
-For parts of a file that decode alone, as segments and groups of pictures do: kernels and FFmpeg let other threads run. Threads
-end when the iterator is used up or dropped; one that is half read does not go on in a forked child.
+It suits parts of a file that decode alone, such as clips and groups of pictures: kernels and FFmpeg let other threads run.
+Threads end when the iterator is used up or dropped; one that is half read does not go on in a forked child.
 """
 
 from __future__ import annotations
