@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -19,12 +18,13 @@ from typing import Any
 import gvpipe
 from gvpipe.benchmark.json_results import write_results
 from gvpipe.benchmark.report import POINT_KEYS, BenchReport, Curve
-from gvpipe.benchmark.sweep import MEASURES, describe_machine, run
+from gvpipe.benchmark.sweep import MEASURES, describe_machine
 
 QUALITY = 75.0
 TARGET_KG = 0.1
 CODECS = ("mcgv", "mcgv:prediction=affine", "pca", "laplacian", "pdct")
 BOUND_CODECS = ("pca", "mcgv")
+COMMAND = ["python", "tools/measure_defaults.py", "*.npz"]  # without folders, which are a machine's own
 
 
 def main() -> None:
@@ -37,11 +37,11 @@ def main() -> None:
     found = json.loads(given.json.read_text("utf-8")) if given.json and given.json.exists() else {}
     order = list(dict.fromkeys(curve["sequence"] for curve in found.get("curves", [])))
     paths = sorted(given.sequences, key=lambda path: (order.index(path.stem) if path.stem in order else len(order), path.stem))
-    if given.max_error:
-        curves = [measure(path, codec, given.max_error) for path in paths for codec in BOUND_CODECS]
-        found |= BenchReport(gvpipe.__version__, describe_machine(), sys.argv, curves).to_json()
-    else:
-        found |= run([str(path) for path in paths], CODECS, [QUALITY]).to_json()
+    aims, codecs = ({"max_error": given.max_error}, BOUND_CODECS) if given.max_error else ({"quality": QUALITY}, CODECS)
+    curves = [measure(path, codec, aims) for path in paths for codec in codecs]
+    command = [*COMMAND, "--max-error", given.max_error] if given.max_error else COMMAND
+    found |= BenchReport(gvpipe.__version__, describe_machine(), command, curves).to_json()
+    if not given.max_error:
         found["targets"] = [aim(path) for path in paths]
     if given.json:
         write_results(given.json, found)
@@ -49,15 +49,17 @@ def main() -> None:
         print(json.dumps(found, indent=1))
 
 
-def measure(path: Path, codec: str, max_error: str) -> Curve:
-    """The file of one codec with a bound on every vertex: its bytes and errors."""
+def measure(path: Path, codec: str, aims: dict[str, Any]) -> Curve:
+    """The file of one codec, ``id`` or ``id:key=value``, made with a quality or a bound: its bytes and errors."""
     sequence = gvpipe.read(path)
+    identity, *pairs = codec.split(":")
+    settings = {**aims, **dict(pair.split("=") for pair in pairs)}
     with tempfile.TemporaryDirectory() as folder:
-        made = gvpipe.encode(sequence, Path(folder, "a.mp4"), codec, max_error=max_error)
+        made = gvpipe.encode(sequence, Path(folder, "a.mp4"), identity, **settings)
         errors = gvpipe.compare(sequence, gvpipe.decode(Path(folder, "a.mp4"))).to_json()
-    point = dict.fromkeys(POINT_KEYS) | {key: errors[key] for key in MEASURES} | {"bytes": made.bytes, "bpvf": made.bpvf}
+    found = {key: errors[key] for key in MEASURES} | {"quality": aims.get("quality"), "bytes": made.bytes, "bpvf": made.bpvf}
     shape = (sequence.n_vertices, len(sequence.faces), sequence.n_frames)
-    return Curve(path.stem, *shape, codec, {"max_error": max_error}, None, [point])
+    return Curve(path.stem, *shape, codec, settings, None, [dict.fromkeys(POINT_KEYS) | found])
 
 
 def aim(path: Path) -> dict[str, Any]:
