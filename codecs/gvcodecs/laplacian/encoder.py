@@ -54,6 +54,7 @@ from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
 
 FIRST = 1.0  # of the target error, asked of `reduce_trajectories` in a first encode, before drift is known
 NOISE = 3.0  # squared error that rounding of deltas leaves, in that of coefficients rounded alike, about
+MOST_WEIGHT = 1e4  # of a causal neighbour; those of curved surfaces are below 100
 POINT_COST, ROW_COST = 0.1, 5.0  # of a component: deltas cost little, so that components are paid for by their basis
 
 
@@ -133,9 +134,10 @@ class Laplacian(BaseCodec):
             coding = coding.without_deltas()
         if coding.needs_average:
             report("average", 0)
-        average, domain = memo("domain", lambda: _prepare(sequence, shared, coding, still))
+        prepared = memo("domain", lambda: _prepare(sequence, shared, coding, still))
         sections = {"mesh": shared.coded.mesh, "order": shared.coded.order, **({SECTION: held} if held else {})}
-        return _Start(shared, still, coding, domain, {**sections, **({} if average is None else {NAME: average})})
+        sections |= {} if prepared.average is None else {NAME: prepared.average}
+        return _Start(shared, still, prepared.coding, prepared.domain, sections)
 
     def _code(self, sequence: MeshSequence, start: _Start, asked: float, report: Progress) -> StepTrial:
         """Code with the step that would leave the error ``asked`` if nothing drifted, and tell the error that is left."""
@@ -244,14 +246,23 @@ def _code_segment(segments: _Segments, span: tuple[int, int]) -> _Segment:
     return _Segment(reduced.step, reduced.basis, anchors, deltas, squared)
 
 
-def _prepare(
-    sequence: MeshSequence, shared: CodedConnectivity, coding: CoefficientCoding, still: StillPoints
-) -> tuple[bytes | None, Domain]:
-    """The coded average mesh, where one is needed, and what coefficients are coded with: both know nothing of quality."""
+class _Prepared(NamedTuple):
+    """The coded average mesh, where one is needed, how coefficients are coded, and what with: all know nothing of quality."""
+
+    average: bytes | None
+    coding: CoefficientCoding
+    domain: Domain
+
+
+def _prepare(sequence: MeshSequence, shared: CodedConnectivity, coding: CoefficientCoding, still: StillPoints) -> _Prepared:
+    """Code the average mesh if its shape tells anything; an exactly flat one has differential coordinates of mere rounding."""
     mesh = shared.mesh
     surface = build_surface(mesh.point_faces, mesh.n_points)
-    if not coding.needs_average:
-        return None, build_domain(surface, None, coding, still.flags)
-    average = average_mesh(sequence, shared.members[surface.faces].astype(np.int32))[shared.members]
-    data, decoded = encode_average(average, surface, coding)
-    return data, build_domain(surface, decoded, coding, still.flags)
+    if coding.needs_average:
+        average = average_mesh(sequence, shared.members[surface.faces].astype(np.int32))[shared.members]
+        data, decoded = encode_average(average, surface, coding)
+        domain = build_domain(surface, decoded, coding, still.flags)
+        if np.abs(domain.deltas.weights).max(initial=0) <= MOST_WEIGHT:
+            return _Prepared(data, coding, domain)
+        coding = coding.without_average()
+    return _Prepared(None, coding, build_domain(surface, None, coding, still.flags))

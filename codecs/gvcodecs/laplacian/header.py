@@ -60,9 +60,13 @@ class CoefficientCoding:
         """Whether there is an average mesh: the combinatorial operator needs none but for section 7's prediction."""
         return self.operator != "tutte" or self.delta_prediction == "rigid"
 
+    def without_average(self) -> CoefficientCoding:
+        """The same by connectivity alone."""
+        return replace(self, operator="tutte", delta_prediction="kalman")
+
     def without_deltas(self) -> CoefficientCoding:
         """The same with all points as anchors: nothing is left to be solved for."""
-        return replace(self, operator="tutte", delta_prediction="kalman", anchors=1)
+        return replace(self.without_average(), anchors=1)
 
     @classmethod
     def of(cls, bitstream: Bitstream) -> CoefficientCoding:

@@ -119,6 +119,21 @@ def test_only_the_operator_that_needs_it_sends_an_average() -> None:
         assert ("average" in bitstream.sections) == sent
 
 
+@pytest.mark.parametrize("prediction", ["kalman", "rigid"])
+def test_an_exactly_flat_average_is_left_out(prediction: str) -> None:
+    """Its differential coordinates are rounding noise, and weights that follow from them reach 1e14."""
+    x, y = np.meshgrid(np.arange(40.0), np.arange(40.0), indexing="ij")
+    a = np.arange(1600).reshape(40, 40)
+    corners = [(a[:-1, :-1], a[1:, :-1], a[1:, 1:]), (a[:-1, :-1], a[1:, 1:], a[:-1, 1:])]
+    faces = np.concatenate([np.stack(each, -1).reshape(-1, 3) for each in corners]).astype(np.int32)
+    sheet = np.stack([x.ravel(), y.ravel(), np.zeros(1600)], 1)
+    falling = MeshSequence(np.stack([sheet - [0, 0, t * t / 30] for t in range(8)]).astype(np.float32), faces)
+    bitstream = Laplacian(delta_prediction=prediction).encode(falling).bitstream
+    assert bitstream.header["operator"] == "tutte"
+    assert "average" not in bitstream.sections
+    assert kg(falling, bitstream) < 0.2
+
+
 def test_components_setting_limits_the_basis() -> None:
     sequence = moving()
     few, many = (Laplacian(quality=70, components=n).encode(sequence).bitstream for n in (2, 30))
