@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import io
+import tempfile
 import zlib
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import IO, Any
 
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.errors import corrupt
-from gvpipe.media.picture_limits import picture_limits
+from gvpipe.media.picture_limits import IN_MEMORY, picture_limits
 
 TAG = "comment"
 TAG_PREFIX = "gvpipe "
@@ -22,9 +25,8 @@ LEAST_PICTURES = 16  # of a fragment, the last apart: each costs 100 bytes
 def remux(video: bytes, tag: str = "") -> bytes:
     """Copy the video's one track, unchanged, into a file that carries the tag, if there is one, and whose index comes first.
 
-    In memory, where the video is already: a file that PyAV writes itself stays open, and its disk space taken, if the
-    last write to it fails. What no player needs is left out: bit rates, the handler's name, the edit list where each picture
-    is shown in the order of coding.
+    Not by a path: a file that PyAV opens itself stays open, and its disk space taken, if the last write to it fails. What no
+    player needs is left out: bit rates, the handler's name, the edit list where each picture is shown in the order of coding.
     """
     return _copy(video, tag, {"movflags": "+faststart+use_metadata_tags"})
 
@@ -41,27 +43,61 @@ def _copy(video: bytes, tag: str, options: dict[str, str], least: int = 0) -> by
     import av
 
     options = {**PLAIN, **options}
-    result = io.BytesIO()
 
-    def reopen(name: str, flags: int, more: dict[str, str]) -> IO[bytes]:
-        return io.BytesIO(result.getvalue())  # FFmpeg reads the file again to move the index to the front
+    def open_track() -> AbstractContextManager[Any]:
+        return av.open(io.BytesIO(video), "r", format="mp4")
 
-    with av.open(io.BytesIO(video), "r", format="mp4") as source:
-        track = source.streams.video[0]
-        packets = [packet for packet in source.demux(track) if packet.size]
-        if all(packet.pts == packet.dts for packet in packets):
+    with open_track() as source:  # each time anew: packets that are kept take as much memory as the video
+        if all(packet.pts == packet.dts for packet in _packets(source)):
             options["use_editlist"] = "0"
-        if least and packets and packets[0].duration and packets[0].time_base:
-            shortest = int(least * packets[0].duration * packets[0].time_base * 1_000_000)
+    if least:
+        with open_track() as source:
+            first = next(_packets(source), None)
+        if first and first.duration and first.time_base:
+            shortest = int(least * first.duration * first.time_base * 1_000_000)
             options["min_frag_duration"] = str(min(shortest, LONGEST_MICROSECONDS))
-        with av.open(result, "w", format="mp4", options=options, io_open=reopen) as target:
+    with tempfile.SpooledTemporaryFile(IN_MEMORY) as result:
+        with (
+            open_track() as source,
+            av.open(result, "w", format="mp4", options=options, io_open=lambda *_: _SecondView(result)) as target,
+        ):
             if tag:
                 target.metadata[TAG] = TAG_PREFIX + tag
-            copy = target.add_stream_from_template(track)
-            for packet in packets:
+            copy = target.add_stream_from_template(source.streams.video[0])
+            for packet in _packets(source):
                 packet.stream = copy
                 target.mux(packet)
-    return result.getvalue()
+        result.seek(0)
+        return result.read()
+
+
+def _packets(container: Any) -> Iterator[Any]:
+    return (packet for packet in container.demux(container.streams.video[0]) if packet.size)
+
+
+class _SecondView:
+    """A file, opened again to be read while it is written: FFmpeg moves the index to the front like that."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file, self._place = file, 0
+
+    def read(self, size: int) -> bytes:
+        written = self._file.tell()
+        self._file.seek(self._place)
+        data = self._file.read(size)
+        self._place += len(data)
+        self._file.seek(written)
+        return data
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        written = self._file.tell()
+        self._file.seek(self._place)
+        self._place = self._file.seek(offset, whence)
+        self._file.seek(written)
+        return self._place
+
+    def tell(self) -> int:
+        return self._place
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The largest picture that FFmpeg may decode: what a stream says of itself is not believed."""
+"""The largest picture that FFmpeg may decode, whatever a stream says of itself, and the most of a video kept in memory."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from gvpipe.budget import Budget
 
 BYTES_PER_PIXEL = 32  # of the pictures that H.264's decoder holds at once: samples of two bytes, references, side data
 MAX_PIXELS = 1 << 28
+IN_MEMORY = 4 << 20  # bytes of a video that is written; longer ones lie in a temporary file: a buffer that grows is copied
 
 
 def most_pixels(budget: Budget) -> int:

@@ -16,13 +16,14 @@ is the GPL: then H.264 is read, and not written.
 from __future__ import annotations
 
 import io
+import tempfile
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import accumulate, pairwise
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import IO, TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ from gvpipe.arrays import Float64, Floats, Integers, UInt8
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.errors import CorruptFile, InputError, corrupt
 from gvpipe.media.jpeg import decode_jpeg, encode_jpeg
-from gvpipe.media.picture_limits import BYTES_PER_PIXEL, picture_limits
+from gvpipe.media.picture_limits import BYTES_PER_PIXEL, IN_MEMORY, picture_limits
 
 if TYPE_CHECKING:
     import av
@@ -60,7 +61,7 @@ X264 = {
 X264["8x8dct"] = 1  # makes the profile High with every preset, ultrafast too
 
 Plane = UInt8 | NDArray[np.uint16]
-Demuxed = tuple[list[Any], bytes | None]  # packets (`av.Packet`), and what the decoder is set up with
+Packets = list[memoryview]  # coded pictures
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,7 @@ class VideoWriter:
         self._count = 0
         if profile.codec != "mjpeg":
             check_x264()
-        self._file = io.BytesIO()
+        self._file: IO[bytes] = tempfile.SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115 - closed by `finish` or on exit
         self._container = av.open(self._file, "w", format="mp4", options={"fflags": "+bitexact"})
         rate = Fraction(fps).limit_denominator(1001) or Fraction(1, 1001)
         self._time_base = 1 / rate
@@ -182,13 +183,16 @@ class VideoWriter:
         if self._profile.codec != "mjpeg":
             self._container.mux(self._plain(self._stream.encode(None)))
         self._container.close()
-        return self._file.getvalue()
+        self._file.seek(0)
+        with self._file:
+            return self._file.read()
 
     def __enter__(self) -> VideoWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._container.close()
+        self._file.close()
 
     def _jpeg_packet(self, plane: Plane) -> av.Packet[Any]:
         import av
@@ -209,6 +213,21 @@ class VideoWriter:
         picture = av.VideoFrame.from_ndarray(np.concatenate([plane, neutral]), format=self._profile.pixel_format)
         picture.pts, picture.time_base = self._count, self._time_base
         return picture
+
+
+@dataclass(frozen=True)
+class Demuxed:
+    """A video taken apart.
+
+    Args:
+        packets: its coded pictures, each a part of the video's bytes.
+        is_key: whether each is a key frame.
+        extradata: what the decoder is set up with.
+    """
+
+    packets: Packets
+    is_key: list[bool]
+    extradata: bytes | None
 
 
 class Fragments(Protocol):
@@ -313,7 +332,7 @@ class VideoReader:
         what = f"a group of {n_pictures} pictures of {self.shape[1]}x{self.shape[0]}"
         self._budget.ask(what, size, SECONDS_PER_PIXEL * pixels)
 
-    def _decode_h264(self, packets: list[av.Packet[Any]], extradata: bytes | None) -> list[Plane]:
+    def _decode_h264(self, packets: Packets, extradata: bytes | None) -> list[Plane]:
         import av
 
         decoder = av.CodecContext.create("h264", "r")
@@ -344,15 +363,15 @@ class _WholePackets:
     """The packets of a whole video, and its groups of pictures, ``(first, last + 1)``."""
 
     def __init__(self, demuxed: Demuxed) -> None:
-        self._packets, self._extradata = demuxed
-        starts = [i for i, packet in enumerate(self._packets) if packet.is_keyframe]
+        self._demuxed = demuxed
+        starts = [i for i, is_key in enumerate(demuxed.is_key) if is_key]
         if not starts or starts[0] != 0:
             raise corrupt("the video does not start with a key frame")
-        self.groups = list(zip(starts, [*starts[1:], len(self._packets)], strict=True))
+        self.groups = list(zip(starts, [*starts[1:], len(demuxed.packets)], strict=True))
 
-    def read(self, first: int, last: int) -> Demuxed:
+    def read(self, first: int, last: int) -> tuple[Packets, bytes | None]:
         """The packets of a group, and what the decoder is set up with."""
-        return self._packets[first:last], self._extradata
+        return self._demuxed.packets[first:last], self._demuxed.extradata
 
 
 class _FragmentPackets:
@@ -371,20 +390,20 @@ class _FragmentPackets:
         if len(starts) < 2:
             raise corrupt("the video has no pictures")
         self.groups: list[tuple[int, int]] = list(pairwise(starts))
-        self._last: tuple[int, Demuxed] = (-1, ([], None))
+        self._last: tuple[int, Demuxed] = (-1, Demuxed([], [], None))
 
-    def read(self, first: int, last: int) -> Demuxed:
+    def read(self, first: int, last: int) -> tuple[Packets, bytes | None]:
         """The packets of a group, and what the decoder is set up with; raises `FormatError`."""
         number = bisect_right(self._starts, first) - 1
         kept, demuxed = self._last  # once: other threads read too
         if kept != number:
             demuxed = self._demux(self._fragments.head + self._fragments.read(number))
-            if len(demuxed[0]) != self._fragments.counts[number] or not demuxed[0][0].is_keyframe:
+            if len(demuxed.packets) != self._fragments.counts[number] or not demuxed.is_key[0]:
                 count = self._fragments.counts[number]
                 raise corrupt(f"fragment {number} of the video is not of {count} pictures from a key frame on")
             self._last = number, demuxed
         start = self._starts[number]
-        return demuxed[0][first - start : last - start], demuxed[1]
+        return demuxed.packets[first - start : last - start], demuxed.extradata
 
 
 class PlainPackets:
@@ -443,6 +462,20 @@ def _demux(data: bytes, profile: Profile, width: int, height: int, budget: Budge
             found = (context.name, context.width, context.height)
             if found != (profile.codec, width, height) or max(width, height) > MAX_SIDE:
                 raise CorruptFile(f"the video is {found}; {(profile.codec, width, height)} is needed")
-            return [packet for packet in container.demux(stream) if packet.size], context.extradata
+            packets: Packets = []
+            is_key = []
+            for packet in container.demux(stream):
+                if packet.size:
+                    packets.append(_part_of(data, packet))
+                    is_key.append(packet.is_keyframe)
+            return Demuxed(packets, is_key, context.extradata)
     except (av.FFmpegError, IndexError, ValueError) as exc:
         raise corrupt(f"the video track cannot be read ({exc})") from exc
+
+
+def _part_of(data: bytes, packet: av.Packet[Any]) -> memoryview:
+    """A packet's bytes where they lie in a file's, since copies take as much memory as the file."""
+    start = packet.pos or 0  # None where FFmpeg does not know
+    if data[start : start + packet.size] == bytes(packet):
+        return memoryview(data)[start : start + packet.size]
+    return memoryview(bytes(packet))

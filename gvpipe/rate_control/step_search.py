@@ -7,7 +7,6 @@ measured (`Anchor`), without a loop.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -75,6 +74,8 @@ def find_step(
 ) -> StepTrial:
     """Encode with one step after the other until the error is close enough; return the encode that came closest.
 
+    One encode is held at a time. Where none is close enough and the last is not the closest, that one is made again.
+
     Args:
         attempt: codes and measures with a step, model units.
         step: the first.
@@ -84,19 +85,21 @@ def find_step(
         rounds: most encodes.
     """
     middle = target_error * math.sqrt(band[0] * band[1])
-    best: StepTrial | None = None  # alone kept: an encode takes memory
-    before: tuple[float, float] | None = None
-    for _ in range(rounds):
-        trial = attempt(step)
-        trial = StepTrial(trial.encoded, step, max(trial.error, LEAST_ERROR))
-        if before and step != before[0]:
-            slope = _slope(before, (step, trial.error))
-        before = step, trial.error
-        best = min(best or trial, trial, key=lambda one: abs(math.log(one.error) - math.log(middle)))
-        if band[0] <= trial.error / target_error <= band[1]:
+    measured: list[tuple[float, float]] = []  # steps and errors, not encodes, which take memory
+    while True:
+        last = attempt(step)
+        measured.append((step, max(last.error, LEAST_ERROR)))
+        if len(measured) > 1 and step != measured[-2][0]:
+            slope = _slope(measured[-2], measured[-1])
+        if len(measured) >= rounds or band[0] <= measured[-1][1] / target_error <= band[1]:
             break
-        step *= _change(trial.error, middle, slope)
-    return dataclasses.replace(best, slope=slope) if best else attempt(step)
+        step *= _change(measured[-1][1], middle, slope)
+        del last
+    best, error = min(reversed(measured), key=lambda one: abs(math.log(one[1]) - math.log(middle)))
+    if best != step:  # seldom: it comes out as before
+        del last
+        last = attempt(best)
+    return StepTrial(last.encoded, best, error, slope)
 
 
 def step_between(anchors: Sequence[Anchor], target_error: float) -> float | None:

@@ -33,6 +33,18 @@ def test_errors_that_do_not_follow_the_step_end_the_loop() -> None:
     assert len(tried) == 3
 
 
+def test_the_closest_encode_is_made_again_where_it_is_not_the_last() -> None:
+    """Encodes are not kept: two of them take twice the memory."""
+    errors, tried = [1.2, 0.5, 2.0], list[float]()
+
+    def attempt(step: float) -> StepTrial:
+        tried.append(step)
+        return StepTrial(EMPTY, step, errors[len(tried) - 1] if len(tried) <= 3 else 1.2)
+
+    found = find_step(attempt, 1.0, 1.0)
+    assert (found.step, found.error) == (1.0, 1.2) and tried[3:] == [1.0]
+
+
 def test_steps_between_anchors() -> None:
     anchors = [Anchor(2.0, 1.0), Anchor(0.1, 0.1)]
     assert step_between(anchors, 10**-0.5) == pytest.approx(0.2**0.5)

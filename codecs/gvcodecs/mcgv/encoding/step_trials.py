@@ -20,7 +20,7 @@ IDLE_FRAMES = 24  # from which on pictures that change nothing take more bytes t
 
 
 class StepTrials:
-    """Codes a candidate and measures, once for each step; in the published mode the last alone is kept."""
+    """Codes a candidate and measures, once for each step; of encodes with pictures, which may be large, the last is kept."""
 
     def __init__(self, job: Job, candidate: Candidate) -> None:
         self.job, self.candidate = job, candidate
@@ -29,13 +29,14 @@ class StepTrials:
     def __call__(self, step: float) -> StepTrial:
         """Code with a step, model units, and measure."""
         if step not in self._done:
+            if self.candidate.start.pictures:
+                self._done.clear()
             start, coded = _code(self.job, self.candidate, step)
             encoded = _assemble(self.job, start, coded)
             if coded.predict:
                 error = measure_predicted(self.job, start, coded.predict)
             else:
                 error = measure_decoded(self.job, start, encoded.bitstream)
-                self._done.clear()  # the published mode asks for no step twice, and its files may be as large as the sequence
             self._done[step] = StepTrial(encoded, step, error)
         return self._done[step]
 

@@ -102,6 +102,7 @@ def motion_features(sequence: MeshSequence, base: Float64, ring: sparse.csr_arra
             motion = fit.motion((moved.astype(np.float64) - centre) / scale)  # (R, n, 4, 3)
             motions[:, 12 * k : 12 * (k + together)] = motion.reshape(n_rows, -1)
         features = _principal_coordinates(rows)
+        del rows, motions  # before the next are made
     return features
 
 
