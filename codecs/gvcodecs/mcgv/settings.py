@@ -46,7 +46,7 @@ class Settings(BaseCodec):
     base_bits: int = 0  # bits along the base frame's longest side, 4..20; 0: as many as pay (blended), 12 (affine)
     placement: str = AUTO  # charts: as published; halves: pixels follow from the base frame; tiles (blended): from charts;
     # auto: tiles if blended h264 (halves beyond 32768 points), else charts; blended, no pictures at all where that is smaller
-    density: float = 1.5  # pixels per vertex inside charts, 1..16 (placement charts)
+    density: float = 1.0  # pixels per vertex inside charts, 1..16 (placement charts)
     size: str = AUTO  # of a plane, pixels: auto, or WIDTHxHEIGHT in whole blocks, such as 256x256
     gop: int = 32  # frames per group of pictures, 1..1000 (h264)
     preset: str = "slow"  # x264's: slower ones are smaller

@@ -9,6 +9,7 @@ from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.tile_charts import charts_of
 from gvcodecs.mcgv.layout.chart_coding import SECTION as CHARTS
 from gvcodecs.mcgv.layout.chart_coding import encode_charts
+from gvcodecs.mcgv.layout.chart_groups import share_blocks
 from gvcodecs.mcgv.layout.chart_parameterization import parameterize
 from gvcodecs.mcgv.layout.kd_tree import choose_size, place_points
 from gvcodecs.mcgv.layout.layout import Layout
@@ -27,7 +28,8 @@ def lay_out(job: Job, start: Start, partition: Int32, groups: Integers) -> Layou
     block, size, positions = job.settings.block, job.settings.plane_size, start.lattice_points
     if start.placement == "charts":
         job.report("parameterize", 0)
-        return pack(parameterize(start.base, start.points.faces, partition), block, job.settings.density, size)
+        atlas = parameterize(start.base, start.points.faces, partition)
+        return pack(share_blocks(atlas, partition, block**2 / job.settings.density), block, job.settings.density, size)
     derive = place_points if start.placement == "halves" else place_charts
     return derive(positions, groups, *(size or choose_size(len(positions), block)), block)
 

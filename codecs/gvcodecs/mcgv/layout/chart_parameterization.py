@@ -31,18 +31,26 @@ class Atlas:
 
     Args:
         chart: ``(P,)`` chart of each point, 0..C-1.
-        uv: ``(P, 2)`` place in the chart, in the length unit of the base frame, up to the charts' distortion.
-        fill: ``(C,)`` part of its bounding rectangle that each chart's triangles cover, in (0, 1].
+        uv: ``(P, 2)`` place in the chart, from 0, in a length unit of the chart's own.
     """
 
     chart: Int32
     uv: Float64
-    fill: Float64
 
     @property
     def n_charts(self) -> int:
         """C, the number of charts."""
-        return len(self.fill)
+        return int(self.chart.max()) + 1
+
+    def parts(self) -> list[Int64]:
+        """The points of each chart."""
+        return _parts(self.chart)
+
+    def rectangle(self, part: Int64) -> Float64:
+        """``(2,)`` sides of the bounding rectangle of the chart of points ``part``; its area is their number."""
+        sides = np.maximum(self.uv[part].max(axis=0), 1e-12)
+        sides = np.maximum(sides, sides.max() / len(part))  # no chart is thinner than one point
+        return np.asarray(sides * np.sqrt(len(part) / sides.prod()))
 
 
 def parameterize(base: Float64, faces: Int32, clusters: Int32) -> Atlas:
@@ -62,8 +70,7 @@ def parameterize(base: Float64, faces: Int32, clusters: Int32) -> Atlas:
         raw[loose] = int(raw.max()) + 1 + clusters[loose]
         uv[loose] = _grid(clusters[loose])
     chart = np.asarray(np.unique(raw, return_inverse=True)[1], np.int32).ravel()
-    uv = _turn_upright(chart, uv)
-    return Atlas(chart, uv, _fill(chart, uv, faces))
+    return Atlas(chart, _turn_upright(chart, uv))
 
 
 def _xatlas(unit: Float64, faces: Int32, clusters: Int32, n_clusters: int) -> tuple[Int64, Float64]:
@@ -118,7 +125,7 @@ def _patches(unit: Float64, faces: Int32) -> list[Int32]:
 def _absorb(chart: Int64, uv: Float64, neighbours: sparse.csr_array, clusters: Int32) -> tuple[Int64, Float64]:
     """Dissolve charts of few points into the neighbouring chart of their cluster, each point among its neighbours there.
 
-    xatlas leaves many slivers along the clusters' rims; each would cost a whole block. Packing finds the points free pixels.
+    xatlas leaves many slivers along the clusters' rims. Packing finds the points free pixels.
     """
     chart, uv = chart.copy(), uv.copy()
     sizes = np.bincount(chart + 1)
@@ -149,26 +156,19 @@ def _grid(clusters: Int32) -> Float64:
     return places
 
 
+def _parts(chart: Int32) -> list[Int64]:
+    return np.split(np.argsort(chart, kind="stable"), np.cumsum(np.bincount(chart))[:-1])
+
+
 def _turn_upright(chart: Int32, uv: Float64) -> Float64:
     """Turn each chart so that its bounding rectangle is smallest, its lower left corner at 0, its longer side along u."""
     angles = np.linspace(0, np.pi / 2, 24, endpoint=False)
     turns = np.stack([np.stack([np.cos(angles), -np.sin(angles)], 1), np.stack([np.sin(angles), np.cos(angles)], 1)], 1)
     result = np.empty_like(uv)
-    for part in np.split(np.argsort(chart, kind="stable"), np.cumsum(np.bincount(chart))[:-1]):
+    for part in _parts(chart):
         turned = np.einsum("aij,pj->api", turns, uv[part])
         sides = np.ptp(turned, axis=1)
         best = turned[int(sides.prod(axis=1).argmin())]
         best = best - best.min(axis=0)
         result[part] = best if best[:, 0].max() >= best[:, 1].max() else best[:, ::-1]
     return result
-
-
-def _fill(chart: Int32, uv: Float64, faces: Int32) -> Float64:
-    n_charts = int(chart.max()) + 1
-    inside = faces[(chart[faces] == chart[faces[:, :1]]).all(axis=1)]
-    a, b, c = uv[inside[:, 0]], uv[inside[:, 1]], uv[inside[:, 2]]
-    doubled = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
-    covered = np.bincount(chart[inside[:, 0]], doubled / 2, minlength=n_charts)
-    sides = np.zeros((n_charts, 2))
-    np.maximum.at(sides, chart, uv)
-    return np.asarray(np.clip(covered / np.maximum(sides.prod(axis=1), 1e-30), 0.25, 1.0))

@@ -5,7 +5,7 @@ proportion to the pixels; so are the halves, down to single pixels. A k-d tree (
 Trees Used for Associative Searching*, 1975, with the cutting direction free) laid onto the pixel grid.
 
 Why: neighbours on the surface become neighbours in a block, every block is full (1.0 to 1.1 pixels a vertex, where charts in
-blocks take 4 to 17), nothing tears at charts' seams, and no pixel is sent. The price is that points that are near in
+blocks take 1.2 to 7), nothing tears at charts' seams, and no pixel is sent. The price is that points that are near in
 space but not on the surface share blocks too; separating them by their normals cost more than it gave.
 
 Stream: none. All arithmetic is on integers, since the decoder repeats it; `docs/format.md` tells it step by step. Directions
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvcodecs.mcgv.layout.layout import Layout
-from gvpipe.arrays import Int64, Integers
+from gvpipe.arrays import Bool, Int64, Integers
 from gvpipe.errors import CorruptFile, InputError
 
 COMMON = 90  # a multiple of every direction's squared length
@@ -145,21 +145,30 @@ def _halve(cells: Cells, order: Int64, points: Int64, shift: int | None, block: 
     first = np.where(longer >= 2 * block, longer // block // 2 * block, longer // 2)  # columns or rows of the first half
     first = np.where(longer == 1, 1, first)
     kept = (2 * counts * first + longer) // (2 * longer)  # rounded; no half overflows, since the whole did not
-    axis = np.where(wide, 0, 1)
-    rows = np.arange(len(counts))
-    corner, side = np.repeat(cells.corner, 2, axis=0), np.repeat(cells.side, 2, axis=0)
-    corner[2 * rows + 1, axis] += first
-    side[2 * rows, axis] = first
-    side[2 * rows + 1, axis] = longer - first
-    ends = np.stack([cells.starts[:-1] + kept, cells.starts[1:]], axis=1).ravel()
+    starts, corner, side, used = cut(cells.starts, cells.corner, cells.side, first, kept)
+    across, down = np.repeat(across, 2, axis=0)[used], np.repeat(down, 2, axis=0)[used]
+    return Cells(starts, corner, side, across, down)
+
+
+def cut(starts: Int64, corner: Int64, side: Int64, first: Int64, kept: Int64) -> tuple[Int64, Int64, Int64, Bool]:
+    """Cut rectangles in two across their longer sides, and their runs with them.
+
+    Args:
+        starts, corner, side: as in `Cells`, of n rectangles.
+        first: ``(n,)`` columns or rows of the first part; all of them where there is but one.
+        kept: ``(n,)`` length of the first part's run.
+
+    Returns:
+        Starts, corners and sides of the parts that have a run, and ``(2n,)`` which they are.
+    """
+    rows, axis = np.arange(len(side)), np.where(side[:, 0] >= side[:, 1], 0, 1)
+    corners, sides = np.repeat(corner, 2, axis=0), np.repeat(side, 2, axis=0)
+    corners[2 * rows + 1, axis] += first
+    sides[2 * rows, axis] = first
+    sides[2 * rows + 1, axis] -= first
+    ends = np.stack([starts[:-1] + kept, starts[1:]], axis=1).ravel()
     used = np.diff(ends, prepend=0) > 0
-    return Cells(
-        starts=np.r_[0, ends[used]],
-        corner=corner[used],
-        side=side[used],
-        across=np.repeat(across, 2, axis=0)[used],
-        down=np.repeat(down, 2, axis=0)[used],
-    )
+    return np.r_[0, ends[used]], corners[used], sides[used], used
 
 
 def _turn(cells: Cells, order: Int64, points: Int64, shift: int) -> tuple[Int64, Int64]:

@@ -2,8 +2,8 @@
 
 Mamou, Zaharia and Preteux 2007, section 3.3: the atlas is rearranged so that no block of the image coder's transform (8x8
 for JPEG, 16x16 for H.264) includes pixels of different charts. Here each chart is stretched to fill a rectangle of whole
-blocks, its vertices are assigned distinct pixels at the least total squared displacement (a sparse assignment problem), and the
-blocks that it then occupies are laid into the image as one piece, largest chart first, in the first free place.
+blocks, with a pixel or a little more for each vertex. The blocks that it then occupies are laid into the image as one piece,
+largest chart first, in the first free place.
 
 Departure: the paper quantises the parametric coordinates and samples the surface on the lattice. Here a pixel *is* a vertex, so
 that decoding needs no resampling and loses nothing; all other pixels are free for the padding.
@@ -14,18 +14,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from gvcodecs.mcgv.layout.chart_parameterization import Atlas
+from gvcodecs.mcgv.layout.kd_tree import cut
 from gvcodecs.mcgv.layout.layout import Layout
 from gvpipe.arrays import Bool, Float64, Int64
 from gvpipe.errors import InputError
 
-WINDOWS = (1, 2, 4, 8, 16)  # half-widths of the window of pixels that a vertex may take, tried in turn
-SQUARES = (1, 2, 4, 8, 16, 32)  # sides of squares whose points are counted
-CROWDED = 0.9  # points on so many pixels are too many
-SLACK = 0.35  # part of a block that a chart gives up rather than open another row of blocks
 FIT_ROUNDS = 8  # densities tried to fit a given image size
 
 
@@ -41,11 +36,10 @@ def pack(atlas: Atlas, block: int, density: float, size: tuple[int, int] | None)
     Raises:
         InputError: the charts do not fit the size given.
     """
-    chart, uv = atlas.chart, atlas.uv
-    parts = np.split(np.argsort(chart, kind="stable"), np.cumsum(np.bincount(chart))[:-1])
+    parts = atlas.parts()
 
     def attempt(density: float) -> Layout | None:
-        pieces = [_place(uv[part], fill, block, density) for part, fill in zip(parts, atlas.fill, strict=True)]
+        pieces = [_place(atlas.uv[part], atlas.rectangle(part), block, density) for part in parts]
         return _lay(pieces, parts, block, size)
 
     best = attempt(density)
@@ -59,7 +53,7 @@ def pack(atlas: Atlas, block: int, density: float, size: tuple[int, int] | None)
     if best is None:
         raise (
             InputError(
-                f"the {atlas.n_charts} charts of {len(chart)} points do not fit a plane of {size[0]}x{size[1]} pixels in "
+                f"the {atlas.n_charts} charts of {len(atlas.chart)} points do not fit a plane of {size[0]}x{size[1]} pixels in "
                 f"blocks of {block}; leave the size out, or give a larger one, or fewer clusters"
             )
             if size
@@ -68,74 +62,50 @@ def pack(atlas: Atlas, block: int, density: float, size: tuple[int, int] | None)
     return best
 
 
-def _place(uv: Float64, fill: float, block: int, density: float) -> Int64:
+def _place(uv: Float64, rectangle: Float64, block: int, density: float) -> Int64:
     """Return ``(n, 2)`` distinct integer places (x, y) of one chart, in a rectangle of whole blocks from (0, 0)."""
-    sides = np.maximum(uv.max(axis=0), 1e-12)
-    sides = np.maximum(sides, sides.max() / len(uv))  # no chart is thinner than one pixel
-    scale = np.sqrt(density * len(uv) / fill / sides.prod())
-    size = block * np.maximum(1, np.ceil(scale * sides / block - SLACK)).astype(np.int64)
-    while size.prod() < len(uv):
-        size[size.argmin()] += block
-    wanted = uv / sides * (size - 1)
-    for half in WINDOWS:
-        places = _assign(wanted, size, half)
-        if places is not None:
-            return places
-    # far too crowded for windows: rows of equal count by rank along y, then by rank along x
-    rows = np.empty(len(uv), np.int64)
-    rows[np.lexsort((uv[:, 0], uv[:, 1]))] = np.arange(len(uv)) // size[0]
-    columns = np.empty(len(uv), np.int64)
-    columns[np.lexsort((uv[:, 0], rows))] = np.arange(len(uv)) % size[0]
-    return np.column_stack([columns, rows])
+    size = block * _blocks(rectangle, int(np.ceil(len(uv) * density / block**2)))
+    wanted = uv / np.maximum(uv.max(axis=0), 1e-12) * (size - 1)
+    return distinct_pixels(wanted, size)
 
 
-def _assign(wanted: Float64, size: Int64, half: int) -> Int64 | None:
-    """Assign ``wanted (n, 2)`` to distinct pixels inside ``size``; None if windows of ``half`` are too crowded.
+def _blocks(rectangle: Float64, n: int) -> Int64:
+    """``(2,)`` columns and rows of blocks, at least n, for a chart of such sides: as few as go with as little stretch."""
+    columns = np.arange(1, n + 1)
+    rows = -(-n // columns)
+    stretch = np.abs(np.log(columns / rows) - np.log(rectangle[0] / rectangle[1]))
+    best = int((np.log(columns * rows) + stretch).argmin())
+    return np.array([columns[best], rows[best]])
 
-    The choice is made among windows of ``2 half``, the widest at most: just wide enough takes up to a hundred times as long.
+
+def distinct_pixels(wanted: Float64, size: Int64) -> Int64:
+    """Give points distinct pixels near the places that they want.
+
+    A rectangle of pixels is halved across its longer side, down to single ones. Each point goes to the half that it lies in.
+    Where one has too little room, the points nearest to the border go to the other.
+
+    Args:
+        wanted: ``(n, 2)`` places (x, y), pixels; integers are pixels' middles.
+        size: ``(2,)`` width and height of the rectangle, with room for n.
+
+    Returns:
+        ``(n, 2)`` x and y.
     """
-    if not _is_roomy(wanted, size, half):
-        return None
-    columns, graph = _choices(wanted, size, min(2 * half, WINDOWS[-1]))
-    if len(columns) < len(wanted):  # SciPy would match the pixels instead
-        return None
-    try:
-        rows, matched = csgraph.min_weight_full_bipartite_matching(graph)
-    except ValueError:  # there is none
-        return None
-    result = np.empty((len(wanted), 2), np.int64)
-    result[rows] = np.column_stack([columns[matched] % size[0], columns[matched] // size[0]])
-    return result
-
-
-def _is_roomy(wanted: Float64, size: Int64, half: int) -> bool:
-    """Whether the points of every square have pixels enough within ``half`` of it, so that most likely all find one."""
-    nearest = np.rint(wanted).astype(np.int64)
-    counts = np.zeros((size[1] + 1, size[0] + 1), np.int64)
-    np.add.at(counts, (nearest[:, 1] + 1, nearest[:, 0] + 1), 1)
-    sums = counts.cumsum(axis=0).cumsum(axis=1)
-    for side in SQUARES:
-        low = [np.arange(max(1, length - side + 1)) for length in size]
-        high = [np.minimum(first + side, length) for first, length in zip(low, size, strict=True)]
-        reach = [np.minimum(b + half, n) - np.maximum(a - half, 0) for a, b, n in zip(low, high, size, strict=True)]
-        (left, top), (right, bottom) = low, high
-        inside = sums[bottom][:, right] - sums[bottom][:, left] - sums[top][:, right] + sums[top][:, left]
-        if (inside > CROWDED * np.outer(reach[1], reach[0])).any():
-            return False
-    return True
-
-
-def _choices(wanted: Float64, size: Int64, half: int) -> tuple[Int64, sparse.csr_array]:
-    """The pixels within ``half`` of the nearest of any, ``(m,)``, and the cost ``(n, m)`` of each that may be taken."""
-    nearest = np.rint(wanted).astype(np.int64)
-    offsets = np.stack(np.meshgrid(np.arange(-half, half + 1), np.arange(-half, half + 1)), axis=-1).reshape(-1, 2)
-    candidates = nearest[:, None] + offsets
-    inside = ((candidates >= 0) & (candidates < size)).all(axis=2)
-    vertex, choice = np.nonzero(inside)
-    pixel = candidates[vertex, choice]
-    cost = ((pixel - wanted[vertex]) ** 2).sum(axis=1) + 1e-3  # a stored zero would count as no edge
-    columns, column = np.unique(pixel[:, 1] * size[0] + pixel[:, 0], return_inverse=True)
-    return columns, sparse.csr_array((cost, (vertex, column.ravel())), shape=(len(wanted), len(columns)))
+    order, starts = np.arange(len(wanted)), np.array([0, len(wanted)])
+    corner, side = np.zeros((1, 2), np.int64), np.asarray(size)[None]
+    while (side > 1).any():
+        counts, cells = np.diff(starts), np.arange(len(side))
+        axis, longer, across = np.where(side[:, 0] >= side[:, 1], 0, 1), side.max(axis=1), side.min(axis=1)
+        first = np.maximum(longer // 2, 1)
+        cell = np.repeat(cells, counts)
+        along = wanted[order, axis[cell]]
+        order = order[np.lexsort((along, cell))]
+        before = np.bincount(cell, along < (corner[cells, axis] + first - 0.5)[cell], len(cells)).astype(np.int64)
+        kept = np.clip(before, counts - across * (longer - first), across * first)
+        starts, corner, side, _ = cut(starts, corner, side, first, kept)
+    places = np.empty((len(wanted), 2), np.int64)
+    places[order] = corner
+    return places
 
 
 def _lay(pieces: list[Int64], parts: list[NDArray[np.intp]], block: int, size: tuple[int, int] | None) -> Layout | None:

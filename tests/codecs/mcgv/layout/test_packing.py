@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from surfaces import awkward_surfaces, bumpy_sheet, check_layout
 
-from gvcodecs.mcgv.layout import chart_parameterization, packing
+from gvcodecs.mcgv.layout import chart_parameterization
+from gvcodecs.mcgv.layout.chart_groups import share_blocks
 from gvcodecs.mcgv.layout.chart_parameterization import Atlas, parameterize
 from gvcodecs.mcgv.layout.coding import (
     decode_clusters,
@@ -18,7 +19,7 @@ from gvcodecs.mcgv.layout.coding import (
     encode_pixels,
     encode_slot_clusters,
 )
-from gvcodecs.mcgv.layout.packing import pack
+from gvcodecs.mcgv.layout.packing import distinct_pixels, pack
 from gvpipe.errors import InputError
 
 
@@ -31,11 +32,15 @@ def test_layout_invariants(name: str, block: int) -> None:
     for labels in (np.zeros(len(points), np.int32), clusters):
         atlas = parameterize(points, faces, labels)
         assert atlas.chart.shape == (len(points),) and set(atlas.chart.tolist()) == set(range(atlas.n_charts))
-        assert np.isfinite(atlas.uv).all() and ((atlas.fill > 0) & (atlas.fill <= 1)).all()
+        assert np.isfinite(atlas.uv).all() and (atlas.uv >= 0).all()
         assert len(np.unique(np.c_[atlas.chart, labels], axis=0)) == atlas.n_charts
-        layout = pack(atlas, block, 1.5, None)
-        check_layout(layout, atlas.chart, block)
-        assert np.array_equal(layout.pixel, pack(parameterize(points, faces, labels), block, 1.5, None).pixel)
+        check_layout(pack(atlas, block, 1.5, None), atlas.chart, block)
+        shared = share_blocks(atlas, labels, block**2)
+        assert len(np.unique(np.c_[shared.chart, labels], axis=0)) == shared.n_charts <= atlas.n_charts
+        layout = pack(shared, block, 1.0, None)
+        check_layout(layout, shared.chart, block)
+        again = share_blocks(parameterize(points, faces, labels), labels, block**2)
+        assert np.array_equal(layout.pixel, pack(again, block, 1.0, None).pixel)
         order = np.random.default_rng(1).permutation(len(points))  # the codec's, which files have before version 3
         walked = dataclasses.replace(layout, pixel=layout.pixel[order])
         back = decode_pixels(encode_pixels(walked), order, layout.width, layout.height)
@@ -67,7 +72,7 @@ def test_given_size_fits_or_says_so() -> None:
 def test_points_at_one_place_of_a_chart_get_pixels_of_their_own() -> None:
     """They crowd around it."""
     uv = np.repeat(np.array([[0.0, 0], [1, 0], [0, 1]]), [1, 40, 1], axis=0)
-    layout = pack(Atlas(np.zeros(42, np.int32), uv, np.array([0.5])), 8, 1.5, None)
+    layout = pack(Atlas(np.zeros(42, np.int32), uv), 8, 1.5, None)
     check_layout(layout, np.zeros(42), 8)
 
 
@@ -88,17 +93,44 @@ def test_clusters_of_many_triangles_are_cut(monkeypatch: pytest.MonkeyPatch) -> 
     check_layout(pack(atlas, 16, 1.5, None), atlas.chart, 16)
 
 
-def test_crowded_places_get_wider_windows() -> None:
-    """Squares are counted: what has room takes near pixels, a heap wider windows, more points than pixels none."""
-    grid = np.stack(np.meshgrid(np.arange(32.0), np.arange(32.0)), axis=-1).reshape(-1, 2)
-    size = np.array([40, 40])
-    assert packing._is_roomy(1.25 * grid, size, 1)
-    heap = np.tile([[20.0, 20.0]], (200, 1))
-    assert [packing._is_roomy(heap, size, half) for half in (1, 2, 4, 8)] == [False, False, False, True]
-    assert not packing._is_roomy(np.tile([[20.0, 20.0]], (1601, 1)), size, 64)
-    assert packing._assign(np.tile([[8.0, 8.0]], (1000, 1)), np.array([17, 17]), 8) is None
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(packing, "_is_roomy", lambda *given: True)
-        assert packing._assign(heap, size, 1) is None and packing._assign(heap, size, 2) is None
-    places = packing._assign(heap, size, 8)
-    assert places is not None and len(np.unique(places, axis=0)) == 200 and np.abs(places - 20).max() <= 9
+def test_distinct_places_stay() -> None:
+    """Points that want different pixels get them, near enough or exactly, in a rectangle that they fill or not."""
+    grid = np.stack(np.meshgrid(np.arange(32), np.arange(24)), axis=-1).reshape(-1, 2)
+    rng = np.random.default_rng(2)
+    for share in (1.0, 0.5, 0.01):
+        chosen = rng.permutation(grid)[: int(share * len(grid))]
+        near = chosen + rng.uniform(-0.49, 0.49, chosen.shape)
+        assert np.array_equal(distinct_pixels(near, np.array([32, 24])), chosen)
+
+
+def test_crowded_points_get_the_pixels_around_them() -> None:
+    """A heap fills the pixels of a square beside it, and points elsewhere stay where they are."""
+    wanted = np.append(np.full((64, 2), 16.2), [[2.0, 3], [30, 30]], axis=0)
+    places = distinct_pixels(wanted, np.array([32, 32]))
+    assert len(np.unique(places, axis=0)) == 66 and ((places >= 0) & (places < 32)).all()
+    assert np.abs(places[:64] - 16).max() <= 8 and places[64:].tolist() == [[2, 3], [30, 30]]
+    full = distinct_pixels(np.zeros((60, 2)), np.array([12, 5]))
+    assert len(np.unique(full, axis=0)) == 60 and full.max(axis=0).tolist() == [11, 4]
+    sheet = np.stack(np.meshgrid(np.arange(40) * 0.5, np.arange(40) * 0.5), axis=-1).reshape(-1, 2)  # four points a pixel
+    spread = distinct_pixels(sheet + 10, np.array([40, 40]))
+    assert len(np.unique(spread, axis=0)) == 1600
+    assert np.corrcoef(spread[:, 0], sheet[:, 0])[0, 1] > 0.9 and np.corrcoef(spread[:, 1], sheet[:, 1])[0, 1] > 0.9
+
+
+def test_small_charts_of_a_cluster_share_blocks() -> None:
+    """Groups have at most a block's room and one cluster; their charts lie apart; large charts are as they were."""
+    rng = np.random.default_rng(4)
+    sizes = np.array([3, 90, 40, 300, 12, 100, 1, 64, 30, 70])
+    cluster = np.array([0, 0, 0, 0, 0, 1, 1, 1, 1, 1])
+    chart = np.repeat(np.arange(10), sizes).astype(np.int32)
+    uv = rng.uniform(0, 1, (len(chart), 2)) * rng.uniform(0.1, 9, (10, 2))[chart]
+    uv -= np.array([uv[chart == k].min(axis=0) for k in range(10)])[chart]
+    shared = share_blocks(Atlas(chart, uv), cluster[chart], 128)
+    joined = [sorted(set(chart[shared.chart == k].tolist())) for k in range(shared.n_charts)]
+    assert sorted(joined) == [[0, 1, 4], [2], [3], [5, 6], [7], [8, 9]]
+    assert np.array_equal(shared.uv[chart == 3], uv[chart == 3])
+    for group in joined:
+        boxes = [(shared.uv[chart == k].min(axis=0), shared.uv[chart == k].max(axis=0)) for k in group]
+        for i, (low, high) in enumerate(boxes):
+            assert all((low > other_high).any() or (high < other_low).any() for other_low, other_high in boxes[:i])
+    assert share_blocks(Atlas(chart, uv), np.arange(10)[chart], 128).n_charts == 10
