@@ -41,6 +41,11 @@ PACKAGES = {
 }
 NO_FFMPEG = {"media.ffmpeg.enabled": False, "media.rdd-ffmpeg.enabled": False, "media.gmp-gmpopenh264.enabled": False}
 NO_GSTREAMER_DECODERS = {"GST_PLUGIN_FEATURE_RANK": "avdec_h264:NONE,openh264dec:NONE,vah264dec:NONE,vaapih264dec:NONE"}
+# Kernels stay in WebKit's interpreter. Its compilers stop other threads by signals; on Linux, compiled kernels then lose values
+# now and then. In WebKitGTK 2.50, 1 of 100 loads failed like that.
+INTERPRETED = {
+    f"JSC_thresholdFor{tier}Optimize{when}": "1000000000" for tier in ("BBQ", "OMG") for when in ("AfterWarmUp", "Soon")
+}
 MINI_BROWSERS = "*/webkit2gtk-4.1/MiniBrowser"  # below /usr/lib
 SCRIPT_SECONDS = 120
 
@@ -56,12 +61,15 @@ def missing(name: str = "chromium") -> str:
 
 
 @contextlib.contextmanager
-def browser(name: str, profile: Path, size: tuple[int, int] = (700, 700), h264: bool = True) -> Iterator[Any]:
+def browser(
+    name: str, profile: Path, size: tuple[int, int] = (700, 700), h264: bool = True, compiles: bool = False
+) -> Iterator[Any]:
     """A running browser of `NEEDS` with a new profile in the folder given: a Selenium driver, or what `Firefox` has of one.
 
     Args:
         size: of its window, pixels.
         h264: whether it may decode H.264; all but Chromium can do without.
+        compiles: whether WebKit may compile WebAssembly, for measures of time.
     """
     with contextlib.nullcontext("") if name == "chromium" else _display(size) as display:
         environment = {**os.environ, "DISPLAY": display}
@@ -70,7 +78,8 @@ def browser(name: str, profile: Path, size: tuple[int, int] = (700, 700), h264: 
         elif name == "firefox":
             driver = Firefox(str(_program("firefox-esr")), profile, size, environment, {} if h264 else NO_FFMPEG)
         else:
-            driver = _webkit(profile, size, environment | ({} if h264 else NO_GSTREAMER_DECODERS))
+            special = ({} if h264 else NO_GSTREAMER_DECODERS) | ({} if compiles else INTERPRETED)
+            driver = _webkit(profile, size, environment | special)
         try:
             driver.set_script_timeout(SCRIPT_SECONDS)
             yield driver

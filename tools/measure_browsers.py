@@ -45,7 +45,7 @@ def main() -> None:
                     print(f"{name}: {reason}")
                     continue
                 print(f"{name}; {os.getloadavg()[0]:.1f} processes want a core")
-                with browser(name, folder / name) as driver:
+                with browser(name, folder / name, compiles=True) as driver:
                     driver.get(f"{address}/module.html")
                     for number, file in enumerate(options.files):
                         first, rate = run(driver, DECODE, f"{number}.mp4", options.loops)
