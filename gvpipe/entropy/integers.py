@@ -71,7 +71,7 @@ def decode_integers(data: bytes, count: int, contexts: Integers | None = None, n
     Raises:
         CorruptFile: the block is not what the encoder writes for that count.
     """
-    import constriction
+    from gvpipe.entropy import range_decoder
 
     cursor = Cursor(data, name)
     groups = _groups(contexts, count)
@@ -83,15 +83,14 @@ def decode_integers(data: bytes, count: int, contexts: Integers | None = None, n
         tables.append(np.array(cursor.varints(size, TABLE_TOTAL, "a frequency"), np.int64))
         if len(group) and not tables[-1].any():
             raise cursor.corrupt("a frequency table is empty")
-    words = cursor.array("<u4", cursor.varint(cursor.left, "the word count"))
-    decoder = constriction.stream.queue.RangeDecoder(words.astype(np.uint32))
-    tokens = np.zeros(count, np.int64)
-    try:
-        for group, table in zip(groups, tables, strict=True):
-            if len(table) > 1 and len(group):
-                tokens[group] = decoder.decode(model(table), len(group))
-    except (ValueError, AssertionError, RuntimeError) as exc:
-        raise cursor.corrupt("its range-coded data do not decode") from exc
+    words = cursor.array("<u4", cursor.varint(cursor.left, "the word count")).astype(np.uint32)
+    state, tokens = range_decoder.start(words), np.zeros(count, np.int64)
+    for group, table in zip(groups, tables, strict=True):
+        if len(table) > 1 and len(group):
+            own = np.empty(len(group), np.int64)
+            if not range_decoder.decode_symbols(state, words, range_decoder.edges_of(table), own):
+                raise cursor.corrupt("its range-coded data do not decode")
+            tokens[group] = own
     return untokenise(tokens, cursor)
 
 

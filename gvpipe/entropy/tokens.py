@@ -17,6 +17,7 @@ DIRECT = 16  # values of u that are tokens of their own
 TABLE_TOTAL = 4096  # frequencies are scaled to about this total
 MAX_BITS = 40  # bit length of the largest u
 MAX_TOKENS = DIRECT + 2 * (MAX_BITS - 4)
+N_EXTRA = np.maximum((np.arange(MAX_TOKENS) - DIRECT) // 2 + 3, 0) * (np.arange(MAX_TOKENS) >= DIRECT)  # low bits of each token
 CHUNK = 16  # low bits that the range coder takes at a time
 
 
@@ -56,26 +57,9 @@ def untokenise(tokens: Int64, cursor: Cursor) -> Int64:
     Raises:
         CorruptFile: the low bits have another length.
     """
-    if tokens.max(initial=0) < DIRECT:
-        cursor.end()
-        return _unfold(tokens)
-    bits = (tokens - DIRECT) // 2 + 5
-    n_extra = np.where(tokens < DIRECT, 0, bits - 2)
-    total = int(n_extra.sum())
-    packed = cursor.take((total + 7) // 8)
+    from gvpipe.entropy.token_kernels import restore_values
+
+    bits = np.bincount(tokens, minlength=MAX_TOKENS) * N_EXTRA
+    packed = cursor.take((int(bits.sum()) + 7) // 8)
     cursor.end()
-    u = np.where(tokens < DIRECT, tokens, (2 + (tokens & 1)) << n_extra)
-    large = np.flatnonzero(tokens >= DIRECT)
-    large = large[np.argsort(tokens[large].astype(np.uint8), kind="stable")]
-    width = n_extra[large]
-    start = np.cumsum(width) - width
-    raw = np.frombuffer(packed + bytes(8), np.uint8)
-    eight = raw[(start >> 3)[:, None] + np.arange(8)].view(">u8")[:, 0].astype(np.uint64)  # from each value's first byte on
-    bits_left = (64 - (start & 7) - width).astype(np.uint64)
-    u[large] |= (eight >> bits_left).astype(np.int64) & ((1 << width) - 1)
-    return _unfold(u)
-
-
-def _unfold(u: Int64) -> Int64:
-    """The signed values of folded ones."""
-    return (u >> 1) ^ -(u & 1)
+    return restore_values(tokens, DIRECT, np.cumsum(bits) - bits, np.frombuffer(packed + bytes(8), np.uint8))
