@@ -8,6 +8,9 @@ from gvpipe.arrays import Int64
 from gvpipe.compiled import compiled, inlined
 
 RUN = 12  # points that are sorted by insertion
+SPARSE = 4  # places for each point, up to which they are counted
+DIGIT = 11  # bits of places that are counted at once, where there are more places
+MANY = 512  # points, from which on that is faster than merging
 
 
 @compiled
@@ -22,8 +25,23 @@ def sort_cells(order: Int64, starts: Int64, directions: Int64, points: Int64) ->
     """
     keys, vertices = np.empty(len(order), np.int64), np.empty(len(order), np.int64)
     other_keys = np.empty(len(order), np.int64)
+    most = 0
+    for cell in range(len(directions)):
+        most = max(most, starts[cell + 1] - starts[cell])
+    ends = np.empty(max(SPARSE * most, 1 << DIGIT) + 1, np.int64)
     for cell in range(len(directions)):
         low, high = starts[cell], starts[cell + 1]
+        if high - low > RUN:
+            span = _place(order[low:high], directions[cell], points, keys[low:high])
+            if span <= SPARSE * (high - low):
+                _sort_digit(keys[low:high], order[low:high], 0, -1, ends[: span + 1], other_keys, vertices)
+                continue
+            if high - low >= MANY:
+                mask = (1 << DIGIT) - 1
+                for shift in range(0, 64, DIGIT):
+                    if span >> shift:
+                        _sort_digit(keys[low:high], order[low:high], shift, mask, ends[: mask + 2], other_keys, vertices)
+                continue
         for first in range(low, high, RUN):
             last = min(first + RUN, high)
             _sort_few(order[first:last], directions[cell], points, keys[first:last])
@@ -31,6 +49,44 @@ def sort_cells(order: Int64, starts: Int64, directions: Int64, points: Int64) ->
         while width < high - low:
             _merge_runs(keys, order, other_keys, vertices, low, high, width)
             width *= 2
+
+
+@compiled
+def _place(order: Int64, direction: Int64, points: Int64, keys: Int64) -> int:
+    """Fill the places ``keys (n,)`` of vertices along a direction, from 0; return how many places there are."""
+    lowest = highest = 0
+    for i in range(len(order)):
+        v = order[i]
+        keys[i] = direction[0] * points[v, 0] + direction[1] * points[v, 1] + direction[2] * points[v, 2]
+        lowest = min(lowest, keys[i]) if i else keys[i]
+        highest = max(highest, keys[i]) if i else keys[i]
+    for i in range(len(order)):
+        keys[i] -= lowest
+    return int(highest - lowest + 1)
+
+
+@compiled
+def _sort_digit(keys: Int64, order: Int64, shift: int, mask: int, ends: Int64, new_keys: Int64, vertices: Int64) -> None:
+    """Sort vertices ``(n,)`` and their ``keys`` by a digit of these; those of one digit keep their order.
+
+    Args:
+        order, keys: changed; keys are 0 at least.
+        shift, mask: bits of a key below the digit, and those of the digit then; -1: all.
+        ends: one more than there are digits; for work.
+        new_keys, vertices: n or more, for work.
+    """
+    for digit in range(len(ends)):
+        ends[digit] = 0
+    for i in range(len(keys)):
+        ends[((keys[i] >> shift) & mask) + 1] += 1
+    for digit in range(len(ends) - 1):
+        ends[digit + 1] += ends[digit]
+    for i in range(len(keys)):
+        digit = (keys[i] >> shift) & mask
+        new_keys[ends[digit]], vertices[ends[digit]] = keys[i], order[i]
+        ends[digit] += 1
+    for i in range(len(keys)):
+        keys[i], order[i] = new_keys[i], vertices[i]
 
 
 @inlined
