@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from itertools import islice
 from typing import Generic, TypeVar
 
@@ -27,6 +28,20 @@ def run_ahead(function: Callable[[Item], Result], items: Sequence[Item], ahead: 
     if len(items) < 2 or ahead < 1:
         return map(function, items)
     return _Ahead(function, items, ahead)
+
+
+@contextmanager
+def beside(function: Callable[[], Result], worth: bool = True) -> Iterator[Callable[[], Result]]:
+    """Work ``function()`` out on another thread during a ``with`` block, which gets a function that waits for the result.
+
+    Where that is not ``worth`` a thread, it is worked out when the block asks. Errors are raised where the block asks. A block
+    that is left waits.
+    """
+    if not worth:
+        yield function
+        return
+    with ThreadPoolExecutor(1, "gvpipe-beside") as pool:
+        yield pool.submit(function).result
 
 
 class _Ahead(Generic[Item, Result]):

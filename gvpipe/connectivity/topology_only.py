@@ -20,11 +20,14 @@ Mesh stream: [6 x 32 bits] bytes of Draco, merges, loose triangles, counts; loos
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from gvpipe.ahead import beside
 from gvpipe.arrays import Array, Int32
 from gvpipe.connectivity.base_mesh import COMPRESSION_LEVEL, MAX_PER_BYTE, EncodedMesh, check_draco_header, keep_mesh
 from gvpipe.connectivity.seams import decode_seams, encode_seams
@@ -36,6 +39,7 @@ from gvpipe.errors import CorruptFile, corrupt_section
 from gvpipe.mesh.unique_rows import decode_table, encode_table, left_out, smallest_first, used_vertices
 
 HEADER = struct.Struct("<6I")
+LARGE = 1 << 14  # vertices; fewer do not pay for another thread
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,13 @@ class Topology:
 
     faces: Int32
     points: Array
+    point_faces: Int32
+    n_points: int
+
+
+class PointTriangles(NamedTuple):
+    """What comes first of a decoded mesh: triangles ``point_faces (T, 3) int32`` over ``n_points``, P."""
+
     point_faces: Int32
     n_points: int
 
@@ -86,6 +97,11 @@ def encode_triangles(faces: Array, n_points: int) -> tuple[tuple[bytes, bytes, b
 
 def decode_mesh(mesh: bytes, order: bytes, n_vertices: int, n_triangles: int = 2 * MAX_VERTICES) -> Topology:
     """Mirror of `encode_mesh`, for a mesh of at most ``n_vertices`` and ``n_triangles``; raises `CorruptFile`."""
+    return _begin_mesh(mesh, order, n_vertices, n_triangles)[1]()
+
+
+def _begin_mesh(mesh: bytes, order: bytes, n_vertices: int, n_triangles: int) -> tuple[PointTriangles, Callable[[], Topology]]:
+    """Decode the triangles over points; return these, and a function that decodes the vertices. Both raise `CorruptFile`."""
     cursor = Cursor(mesh, "mesh")
     bytes_draco, bytes_merges, bytes_loose, bytes_counts, n_loose, n_points = cursor.struct(HEADER)
     if n_points > min(MAX_VERTICES, n_vertices) or n_loose > min(n_triangles, MAX_PER_BYTE * len(mesh)):
@@ -95,8 +111,14 @@ def decode_mesh(mesh: bytes, order: bytes, n_vertices: int, n_triangles: int = 2
     point_faces = decode_triangles(draco, merges, loose, n_loose)
     if point_faces.size and (point_faces.min() < 0 or point_faces.max() >= n_points):
         raise cursor.corrupt("a triangle names a point that does not exist")
-    faces, points = decode_seams(cursor.take(bytes_counts), cursor.rest(), order, point_faces, n_points, n_vertices=n_vertices)
-    return Topology(faces.astype(np.int32), points, point_faces.astype(np.int32), n_points)
+    counts, corners = cursor.take(bytes_counts), cursor.rest()
+    opened = PointTriangles(point_faces.astype(np.int32), n_points)
+
+    def finish() -> Topology:
+        faces, points = decode_seams(counts, corners, order, opened.point_faces, n_points, n_vertices=n_vertices)
+        return Topology(faces.astype(np.int32), points, *opened)
+
+    return opened, finish
 
 
 def decode_triangles(draco: bytes, merges: bytes, loose: bytes, n_loose: int) -> Array:
@@ -108,13 +130,30 @@ def decode_triangles(draco: bytes, merges: bytes, loose: bytes, n_loose: int) ->
     return np.concatenate([smallest_first(_merge(faces, n_vertices, merges)), decode_table(loose, n_loose)])
 
 
+@contextmanager
+def open_mesh(bitstream: Bitstream) -> Iterator[tuple[PointTriangles, Callable[[], Topology]]]:
+    """Decode the sections ``mesh`` and ``order``: give the first part, and a function that waits for all of it.
+
+    What needs the first part alone can be done meanwhile. Both raise `CorruptFile` if the sections do not hold what the header
+    says.
+    """
+    n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
+    keep_mesh(bitstream.budget, n_vertices, n_triangles)
+    opened, finish = _begin_mesh(bitstream.section("mesh"), bitstream.section("order"), n_vertices, n_triangles)
+
+    def checked() -> Topology:
+        mesh = finish()
+        bitstream.check_size(len(mesh.points), len(mesh.faces))
+        return mesh
+
+    with beside(checked, n_vertices >= LARGE) as finished:
+        yield opened, finished
+
+
 def read_mesh(bitstream: Bitstream) -> Topology:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
-    n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
-    keep_mesh(bitstream.budget, bitstream.n_vertices, bitstream.n_triangles)
-    mesh = decode_mesh(bitstream.section("mesh"), bitstream.section("order"), n_vertices, n_triangles)
-    bitstream.check_size(len(mesh.points), len(mesh.faces))
-    return mesh
+    with open_mesh(bitstream) as (_, finished):
+        return finished()
 
 
 class _Carried(NamedTuple):

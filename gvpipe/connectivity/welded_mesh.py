@@ -12,12 +12,15 @@ Adaptive mesh stream: [8 bits] flags, then the same. Flag 1: the mesh of points 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 
+from gvpipe.ahead import beside
 from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.connectivity import adaptive_mesh
 from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base, keep_mesh
@@ -30,34 +33,44 @@ from gvpipe.mesh.unique_rows import smallest_first
 
 ADAPTIVE_MESH, ADAPTIVE_ORDER = 1, 2  # flags
 FEW_POINTS = 1 << 13  # up to which adaptive positions open in no time
+LARGE = 1 << 14  # vertices; fewer do not pay for another thread
 WORTH_WAITING = 0.9  # of the other stream, what theirs must be beyond that
 
 
 @dataclass(frozen=True)
-class WeldedMesh:
-    """A mesh and its points, numbered in the order of the coder's traversal.
+class PointMesh:
+    """The points of a mesh, numbered in the order of the coder's traversal.
 
     Args:
-        faces: ``(T, 3)`` triangles over V vertices.
-        point: ``(V,)`` the point of each vertex.
         lattice: ``(P, 3)`` positions of the points, lattice units.
         point_faces: ``(T, 3)`` the triangles over points.
     """
 
-    faces: Int32
-    point: Int64
     lattice: Int32
     point_faces: Int32
-
-    @cached_property
-    def members(self) -> Int64:
-        """``(P,)`` the first vertex of each point."""
-        return np.asarray(np.unique(self.point, return_index=True)[1])
 
     @cached_property
     def neighbours(self) -> sparse.csr_array:
         """The points' symmetric adjacency ``(P, P)``."""
         return adjacency(self.point_faces, len(self.lattice))
+
+
+@dataclass(frozen=True)
+class WeldedMesh(PointMesh):
+    """A mesh and its points.
+
+    Args:
+        faces: ``(T, 3)`` triangles over V vertices.
+        point: ``(V,)`` the point of each vertex.
+    """
+
+    faces: Int32
+    point: Int64
+
+    @cached_property
+    def members(self) -> Int64:
+        """``(P,)`` the first vertex of each point."""
+        return np.asarray(np.unique(self.point, return_index=True)[1])
 
 
 def encode_points(
@@ -77,7 +90,7 @@ def encode_points(
     flags |= ADAPTIVE_ORDER if coded.is_adaptive else 0
     head = bytes([flags]) if flags else b""
     mesh = head + pack_block(mesh) + pack_block(coded.counts) + coded.corners
-    decoded = WeldedMesh(coded.faces.astype(np.int32), coded.points, base.points, point_faces.astype(np.int32))
+    decoded = WeldedMesh(base.points, point_faces.astype(np.int32), coded.faces.astype(np.int32), coded.points)
     return EncodedMesh(mesh, coded.order, coded.permutation, is_adaptive=flags > 0), decoded
 
 
@@ -104,18 +117,30 @@ def decode_points(
 
     ``adaptive``: of an adaptive stream.
     """
+    return _begin_points(mesh, order, across, adaptive, n_vertices, n_triangles)[1]()
+
+
+def _begin_points(
+    mesh: bytes, order: bytes, across: bool, adaptive: bool, n_vertices: int, n_triangles: int
+) -> tuple[PointMesh, Callable[[], WeldedMesh]]:
+    """Decode the points; return these, and a function that decodes the vertices. Both raise `CorruptFile`."""
     cursor = Cursor(mesh, "mesh")
     flags = cursor.take(1)[0] if adaptive else 0
     if flags > ADAPTIVE_MESH + ADAPTIVE_ORDER:
         raise cursor.corrupt(f"flags {flags} are unknown")
     points, own = _decode_mesh(cursor.block(), bool(flags & ADAPTIVE_MESH), n_vertices, n_triangles)
     point_faces = smallest_first(own.astype(np.int64))
-    counts = cursor.block()
-    is_adaptive = bool(flags & ADAPTIVE_ORDER)
-    faces, point = decode_seams(
-        counts, cursor.rest(), order, point_faces, len(points), across, is_adaptive, n_vertices=n_vertices
-    )
-    return WeldedMesh(faces.astype(np.int32), point, points.astype(np.int32), point_faces.astype(np.int32))
+    counts, corners = cursor.block(), cursor.rest()
+    opened = PointMesh(points.astype(np.int32), point_faces.astype(np.int32))
+
+    def finish() -> WeldedMesh:
+        is_adaptive = bool(flags & ADAPTIVE_ORDER)
+        faces, point = decode_seams(
+            counts, corners, order, point_faces, len(points), across, is_adaptive, n_vertices=n_vertices
+        )
+        return WeldedMesh(opened.lattice, opened.point_faces, faces.astype(np.int32), point)
+
+    return opened, finish
 
 
 def _decode_mesh(mesh: bytes, adaptive: bool, n_vertices: int, n_triangles: int) -> tuple[Array, Array]:
@@ -126,11 +151,29 @@ def _decode_mesh(mesh: bytes, adaptive: bool, n_vertices: int, n_triangles: int)
     return base.points, base.faces
 
 
-def read_points(bitstream: Bitstream, across: bool = False, adaptive: bool = False) -> WeldedMesh:
-    """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
+@contextmanager
+def open_points(
+    bitstream: Bitstream, across: bool = False, adaptive: bool = False
+) -> Iterator[tuple[PointMesh, Callable[[], WeldedMesh]]]:
+    """Decode the sections ``mesh`` and ``order``: give the points, and a function that waits for all of it.
+
+    What needs points alone can be done meanwhile. Both raise `CorruptFile` if the sections do not hold what the header says.
+    """
     n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
     keep_mesh(bitstream.budget, bitstream.n_vertices, bitstream.n_triangles)
     sections = bitstream.section("mesh"), bitstream.section("order")
-    mesh = decode_points(*sections, across, adaptive, n_vertices, n_triangles)
-    bitstream.check_size(len(mesh.point), len(mesh.faces))
-    return mesh
+    points, finish = _begin_points(*sections, across, adaptive, n_vertices, n_triangles)
+
+    def checked() -> WeldedMesh:
+        mesh = finish()
+        bitstream.check_size(len(mesh.point), len(mesh.faces))
+        return mesh
+
+    with beside(checked, n_vertices >= LARGE) as finished:
+        yield points, finished
+
+
+def read_points(bitstream: Bitstream, across: bool = False, adaptive: bool = False) -> WeldedMesh:
+    """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
+    with open_points(bitstream, across, adaptive) as (_, finished):
+        return finished()

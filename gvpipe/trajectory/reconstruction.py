@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
+from gvpipe.ahead import AHEAD, run_ahead
 from gvpipe.arrays import Float32, Float64, Integers
 from gvpipe.container.segments import segments_between
 from gvpipe.errors import corrupt
 from gvpipe.trajectory.basis import Basis
 
-TOGETHER = 8  # frames rebuilt at once
+FEWEST, MOST, TOGETHER = 2, 8, 1 << 13  # frames rebuilt at once, of about so many points
+LARGE = 1 << 18  # positions; fewer do not pay for other threads
 MAX_FLOAT32 = float(np.finfo(np.float32).max)
 
 
@@ -48,11 +51,18 @@ def read_frames(start: int, stop: int, bounds: list[int], points: Integers, deco
     from gvpipe.trajectory.product_kernels import place_points
 
     result, vertices = np.empty((stop - start, len(points), 3), np.float32), np.asarray(points, np.int64)
+    together = min(max(TOGETHER // max(len(vertices), 1), FEWEST), MOST)
     for s, first, last in segments_between(start, stop, bounds):
         segment, begin = decode(s), bounds[s]
-        for frame in range(first, last, TOGETHER):
-            positions = segment.positions(frame - begin, min(frame + TOGETHER, last) - begin)  # (n, 3, P)
-            n = place_points(positions, vertices, MAX_FLOAT32, result[frame - start : frame - start + len(positions)])
-            if n < len(positions):
-                raise corrupt(f"frame {frame + n} does not decode to finite positions")
+        blocks = list(pairwise([*range(first, last, together), last]))
+
+        def rebuild(block: tuple[int, int], segment: Segment = segment, begin: int = begin) -> int:
+            """Fill frames of the result; return the first that is not finite, or the one after them."""
+            positions = segment.positions(block[0] - begin, block[1] - begin)  # (n, 3, P)
+            return block[0] + place_points(positions, vertices, MAX_FLOAT32, result[block[0] - start : block[1] - start])
+
+        ahead = AHEAD if (last - first) * len(vertices) >= LARGE else 0
+        for (_, end), done in zip(blocks, run_ahead(rebuild, blocks, ahead), strict=True):
+            if done < end:
+                raise corrupt(f"frame {done} does not decode to finite positions")
     return result

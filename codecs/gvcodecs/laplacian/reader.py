@@ -14,7 +14,7 @@ from gvcodecs.laplacian.domain import Domain, Surface, build_domain, build_surfa
 from gvcodecs.laplacian.header import Header
 from gvcodecs.laplacian.normal_equations import Singular
 from gvpipe.arrays import Float32, Int32
-from gvpipe.connectivity.topology_only import read_mesh
+from gvpipe.connectivity.topology_only import open_mesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import corrupt_section
@@ -34,10 +34,12 @@ class LaplacianReader:
 
     def __init__(self, bitstream: Bitstream) -> None:
         self._header = Header.of(bitstream)
-        self._mesh, self._bitstream = read_mesh(bitstream), bitstream
+        self._bitstream = bitstream
+        with open_mesh(bitstream) as (opened, mesh):
+            keep_hierarchy(bitstream.budget, opened.n_points, len(opened.point_faces))
+            surface = build_surface(opened.point_faces, opened.n_points)
+            self._mesh = mesh()
         self._still = read_still(bitstream, self._mesh)
-        keep_hierarchy(bitstream.budget, self._mesh.n_points, len(self._mesh.point_faces))
-        surface = build_surface(self._mesh.point_faces, self._mesh.n_points)
         try:
             self._domain = self._build_domain(surface)
         except Singular as exc:

@@ -6,8 +6,8 @@ A frame costs its group of pictures (H.264) or its one picture (JPEG), if there 
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -22,8 +22,10 @@ from gvcodecs.mcgv.layout.tiles import place_charts
 from gvcodecs.mcgv.motion.affine import AffineMotion
 from gvcodecs.mcgv.motion.blended import BlendedMotion, decode_transforms
 from gvcodecs.mcgv.motion.contract import Motion
+from gvcodecs.mcgv.motion.skinning_coding import Trajectories
 from gvcodecs.mcgv.pictures.no_pictures import NoPictures
 from gvcodecs.mcgv.pictures.outliers import SECTION
+from gvpipe.ahead import AHEAD, beside, run_ahead
 from gvpipe.arrays import Float32, Int32, Integers
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
@@ -32,6 +34,8 @@ from gvpipe.errors import CorruptFile, corrupt
 from gvpipe.media.video import VideoReader
 
 BYTES_PER_PIXEL, BYTES_PER_SLOT = 4, 200
+TOGETHER = 16  # frames whose transforms are kept for other threads
+LARGE = 1 << 20  # coordinates; fewer do not pay for other threads
 
 
 class McgvReader:
@@ -68,11 +72,15 @@ class McgvReader:
     def _motion(self) -> Motion:
         bitstream, header = self._bitstream, self._header
         if header.prediction == "blended":
-            with ThreadPoolExecutor(1) as pool:  # one segment's transforms decode beside the mesh: most of both is compiled
-                only = pool.submit(decode_transforms, bitstream, header, 0, self._bounds[1]) if header.segments == 1 else None
+            has_one = header.segments == 1
+
+            def decode() -> Trajectories | None:
+                return decode_transforms(bitstream, header, 0, self._bounds[1]) if has_one else None
+
+            with beside(decode, has_one) as only:  # its transforms decode beside the mesh: most of both is compiled
                 surface = self._surface
                 layout = read_layout(bitstream, header, surface)
-                return BlendedMotion(bitstream, header, surface, layout, self._bounds, only.result() if only else None)
+                return BlendedMotion(bitstream, header, surface, layout, self._bounds, only())
         surface = self._surface
         if header.placement == "halves":
             clusters = decode_slot_clusters(bitstream.section("clusters"), surface.order, header.clusters)
@@ -98,9 +106,13 @@ class McgvReader:
         """
         groups = self._video.read(start, stop)
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
+        ahead = AHEAD if result.size >= LARGE else 0
         for first, planes in groups:
-            for frame, plane in enumerate(planes, first):
-                self._motion.rebuild(frame, plane, result[frame - start])
+            for k in range(0, len(planes), TOGETHER):
+                some = enumerate(planes[k : k + TOGETHER], first + k)
+                fills = [partial(self._motion.rebuild(frame, plane), result[frame - start]) for frame, plane in some]
+                for _ in run_ahead(_call, fills, ahead):
+                    pass
         if self._header.outliers:
             self._outliers.apply(start, result)
         self._surface.fill_still(result)
@@ -117,6 +129,10 @@ class McgvReader:
         return DisplacementReader(
             bitstream.section(SECTION), bitstream.n_frames, surface.n_slots, SECTION, shared, budget=bitstream.budget
         )
+
+
+def _call(function: Callable[[], None]) -> None:
+    function()
 
 
 def _open_video(bitstream: Bitstream, header: Header, bounds: list[int]) -> VideoReader | NoPictures:

@@ -11,7 +11,7 @@ import numpy as np
 
 from gvcodecs.pca.header import Header
 from gvpipe.arrays import Float32, Int32
-from gvpipe.connectivity.topology_only import Topology, read_mesh
+from gvpipe.connectivity.topology_only import Topology, open_mesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import InputError
@@ -141,10 +141,10 @@ def _read_connectivity(bitstream: Bitstream, predictor: str) -> tuple[Topology, 
     """What follows from connectivity alone; files of a data set that have the same bytes there share it."""
 
     def read() -> tuple[Topology, Hierarchy, CausalOrder]:
-        mesh = read_mesh(bitstream)
-        keep_hierarchy(bitstream.budget, mesh.n_points, len(mesh.point_faces))
-        hierarchy = build_hierarchy(mesh.point_faces, mesh.n_points)
-        return mesh, hierarchy, causal_order(hierarchy, predictor)
+        with open_mesh(bitstream) as (opened, mesh):
+            keep_hierarchy(bitstream.budget, opened.n_points, len(opened.point_faces))
+            hierarchy = build_hierarchy(opened.point_faces, opened.n_points)
+            return mesh(), hierarchy, causal_order(hierarchy, predictor)
 
     if bitstream.shared is None:
         return read()

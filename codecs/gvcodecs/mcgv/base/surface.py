@@ -15,7 +15,7 @@ from gvcodecs.mcgv.base.welded_points import Points, weld_vertices
 from gvcodecs.mcgv.header import Header
 from gvpipe.arrays import Float32, Float64, Int32, Int64
 from gvpipe.connectivity.base_mesh import read_base
-from gvpipe.connectivity.welded_mesh import read_points
+from gvpipe.connectivity.welded_mesh import open_points
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import CorruptFile, corrupt
 from gvpipe.trajectory.still_vertices import decode_flags
@@ -79,12 +79,15 @@ def read_surface(bitstream: Bitstream, header: Header) -> DecodedBase:
         order = np.argsort(base.visits)
         rest = placed.astype(np.float32)
         return DecodedBase(base.faces, rest, own, own, base.points, placed, point, members, points, order)
-    mesh = read_points(bitstream, bitstream.version > 3, bitstream.version > 4)
-    n_points = len(mesh.lattice)
-    still = decode_flags(bitstream.section(STILL), n_points, STILL) if STILL in bitstream.sections else np.zeros(n_points, bool)
-    moves = np.flatnonzero(~still)
-    if not len(moves):
-        raise CorruptFile("section 'still' is corrupt: one point at least has samples; get the file again from its source")
+    with open_points(bitstream, bitstream.version > 3, bitstream.version > 4) as (opened, finished):
+        n_points = len(opened.lattice)
+        has_still = STILL in bitstream.sections
+        still = decode_flags(bitstream.section(STILL), n_points, STILL) if has_still else np.zeros(n_points, bool)
+        moves = np.flatnonzero(~still)
+        if not len(moves):
+            raise CorruptFile("section 'still' is corrupt: one point at least has samples; get the file again from its source")
+        points = Points.moving(opened, moves)
+        mesh = finished()
     slot = np.cumsum(~still) - 1
     placed = _place(mesh.lattice, header)
     vertices = np.flatnonzero(~still[mesh.point])
@@ -98,6 +101,6 @@ def read_surface(bitstream: Bitstream, header: Header) -> DecodedBase:
         base=placed[moves],
         point=own,
         members=own,
-        points=Points.moving(mesh, moves),
+        points=points,
         order=own,
     )

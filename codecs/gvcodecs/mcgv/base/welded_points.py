@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from gvpipe.arrays import Int32, Int64, Integers
-from gvpipe.connectivity.welded_mesh import WeldedMesh
+from gvpipe.connectivity.welded_mesh import PointMesh
 from gvpipe.mesh.topology import adjacency, components, weld
 
 
@@ -28,7 +28,7 @@ class Points:
     neighbours: sparse.csr_array
 
     @classmethod
-    def moving(cls, mesh: WeldedMesh, moves: Int64) -> Points:
+    def moving(cls, mesh: PointMesh, moves: Int64) -> Points:
         """The points ``moves (P,)`` of a mesh, and what joins them."""
         if len(moves) == len(mesh.lattice):
             return cls(mesh.point_faces, mesh.neighbours)

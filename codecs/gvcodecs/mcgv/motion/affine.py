@@ -5,6 +5,8 @@ Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.2. Eve
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -71,8 +73,8 @@ class AffineMotion:
         self._residuals = header.residual_step * header.profile.offsets
         self._segment: tuple[int, Float64] = (-1, np.zeros((0, 0, 4, 3)))
 
-    def rebuild(self, frame: int, samples: Array, positions: Float32) -> None:
-        """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
+    def rebuild(self, frame: int, samples: Array) -> Callable[[Float32], None]:
+        """As `Motion.rebuild`."""
         from gvcodecs.mcgv.motion.reconstruction_kernels import AffinePoints, Sites, rebuild
 
         s = locate(self._bounds, frame)
@@ -85,4 +87,4 @@ class AffineMotion:
             self._segment = (s, dequantise(lattice, self._rest, self._header.transform_step))
         sites = Sites(self._samples.vertices, self._samples.pixels(samples.shape[1]), self._residuals)
         points = AffinePoints(self._coordinates, self._clusters)
-        rebuild(samples.reshape(3, -1), sites, points, self._segment[1][frame - self._bounds[s]], positions)
+        return partial(rebuild, samples.reshape(3, -1), sites, points, self._segment[1][frame - self._bounds[s]])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -91,8 +93,8 @@ class BlendedMotion:
         self._segment: tuple[int, Trajectories | None] = (0, first)
         self._chunk: tuple[int, int, Float64] = (-1, -1, np.zeros((0, 0, 4, 3)))
 
-    def rebuild(self, frame: int, samples: Array, positions: Float32) -> None:
-        """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
+    def rebuild(self, frame: int, samples: Array) -> Callable[[Float32], None]:
+        """As `Motion.rebuild`."""
         from gvcodecs.mcgv.motion.reconstruction_kernels import Sites, SkinnedPoints, rebuild_blended
 
         s = locate(self._bounds, frame)
@@ -101,7 +103,7 @@ class BlendedMotion:
             self._chunk = (s, chunk, self._transforms(s, chunk))
         sites = Sites(self._samples.vertices, self._samples.pixels(samples.shape[1]), self._residuals)
         points = SkinnedPoints(self._base, self._homogeneous, self._clusters, self._parts)
-        rebuild_blended(samples.reshape(3, -1), sites, points, self._chunk[2][offset], positions)
+        return partial(rebuild_blended, samples.reshape(3, -1), sites, points, self._chunk[2][offset])
 
     def _transforms(self, s: int, chunk: int) -> Float64:
         """``(n, K, 4, 3)`` of a chunk of a segment's frames: always whole, so that sums do not depend on what else is read."""

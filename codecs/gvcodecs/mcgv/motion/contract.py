@@ -57,8 +57,13 @@ def predicted_chunks(
 class Motion(Protocol):
     """A prediction as it is decoded; keeps the transforms of the last segment for the next frame."""
 
-    def rebuild(self, frame: int, samples: Array, positions: Float32) -> None:
-        """Fill what moves of a frame's ``positions (V, 3)`` from its ``samples (3 height, line)``; raises `CorruptFile`."""
+    def rebuild(self, frame: int, samples: Array) -> Callable[[Float32], None]:
+        """Return what fills what moves of a frame's ``positions (V, 3)``, on any thread.
+
+        Args:
+            frame: whose transforms are decoded at once; raises `CorruptFile`.
+            samples: ``(3 height, line)`` of its picture.
+        """
         ...
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gvcodecs.mcgv.base.welded_points import Points, weld_vertices
-from gvpipe.connectivity.welded_mesh import WeldedMesh
+from gvpipe.connectivity.welded_mesh import PointMesh
 
 
 def test_points_are_numbered_along_the_codecs_order() -> None:
@@ -21,9 +21,7 @@ def test_points_are_numbered_along_the_codecs_order() -> None:
 
 def test_points_that_move_keep_the_sides_between_them() -> None:
     """Also those of triangles whose third corner stands still, which are no triangles any more."""
-    mesh = WeldedMesh(
-        faces=np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2]], np.int32),
-        point=np.arange(5),
+    mesh = PointMesh(
         lattice=np.arange(15, dtype=np.int32).reshape(5, 3),
         point_faces=np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4]], np.int32),
     )
