@@ -260,6 +260,9 @@ def _value(value: Any, called: list[FunctionType]) -> str:
         if f"{function.__module__}.".startswith(PACKAGES) or function is not value:
             called.append(function)
         return f"{function.__module__}.{function.__qualname__} {getattr(value, 'targetoptions', '')}"
+    written = getattr(value, "_defn", None)  # an intrinsic's Python, which writes code with all that its module has
+    if isinstance(written, FunctionType):
+        return f"{written.__qualname__} {_value(sys.modules[written.__module__], called)}"
     if isinstance(value, ModuleType):
         file = getattr(value, "__file__", None)
         ours = f"{value.__name__}.".startswith(PACKAGES) and file

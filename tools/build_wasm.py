@@ -162,7 +162,7 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
     ],
     "gvpipe.trajectory.causal_kernels.keep_ranks": [CAUSAL, FLAGS],
     "gvpipe.trajectory.context_kernels.decode_residuals": [RESIDUALS, INPUTS, STREAM, SCALAR, SCALAR],
-    "gvpipe.trajectory.prediction_kernels.predict_kalman": [VECTORS, SCALAR, SCALAR],
+    "gvpipe.trajectory.kalman_kernels.predict_kalman": [VECTORS, SCALAR, SCALAR],
     "gvpipe.trajectory.prediction_kernels.predict_lsp": [VECTORS, SCALAR, SCALAR],
     "gvpipe.trajectory.prediction_kernels.predict_navg": [VECTORS, SCALAR, SCALAR],
     "gvpipe.trajectory.prediction_kernels.predict_rbf": [VECTORS, SCALAR, SCALAR, "float64"],

@@ -74,7 +74,7 @@ def decimate(faces: Int32, n_vertices: int, max_waves: int) -> Decimation:
     n_gone, n_waves = 0, 0
     while n_waves < max_waves and n_vertices - n_gone > MIN_COARSE:
         candidates, costs = _removal_costs(lists, regular, hole)
-        for i in np.argsort(costs, kind="mergesort"):
+        for i in _sorted_by_cost(costs):
             v = candidates[i]
             if n_vertices - n_gone <= MIN_COARSE:
                 break
@@ -137,6 +137,27 @@ def _removal_costs(lists: CornerLists, regular: Int32, hole: Hole) -> tuple[Int3
             candidates[n], costs[n] = v, cost - own * own
             n += 1
     return candidates[:n], costs[:n]
+
+
+@compiled
+def _sorted_by_cost(costs: Int64) -> Int64:
+    """The order of n costs, equal ones as they are; counted where they lie close together, as they do but around hubs."""
+    if not len(costs):
+        return np.empty(0, np.int64)
+    lowest = costs.min()
+    span = costs.max() - lowest + 1
+    if span > len(costs) + 256:
+        return np.argsort(costs, kind="mergesort")
+    starts, order = np.zeros(span + 1, np.int64), np.empty(len(costs), np.int64)
+    for cost in costs:
+        starts[cost - lowest + 1] += 1
+    for k in range(span):
+        starts[k + 1] += starts[k]
+    for i in range(len(costs)):
+        k = costs[i] - lowest
+        order[starts[k]] = i
+        starts[k] += 1
+    return order
 
 
 @inlined

@@ -49,11 +49,13 @@ def predict_vectors(
         beta: exponent of the radial function (rbf).
         begin, end: which vectors of the order, those before ``begin`` being done; None: up to the last of ``residuals``.
     """
-    from gvpipe.trajectory import prediction_kernels
+    from gvpipe.trajectory import kalman_kernels, prediction_kernels
 
     coding = prediction_kernels.VectorCoding(causal, step, residuals, decoded, np.zeros((0, 0)) if target is None else target)
     stop = len(residuals) if end is None else end
-    if predictor == "rbf":
+    if predictor == "kalman":
+        kalman_kernels.predict_kalman(coding, begin, stop)
+    elif predictor == "rbf":
         prediction_kernels.predict_rbf(coding, begin, stop, beta)
     else:
         getattr(prediction_kernels, f"predict_{predictor}")(coding, begin, stop)

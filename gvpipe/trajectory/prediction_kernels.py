@@ -11,12 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Float64, Int64
-from gvpipe.compiled import compiled
+from gvpipe.compiled import compiled, inlined
 from gvpipe.trajectory.causal_order import CausalOrder
 
-MAX_SPREAD = 2.0**26  # of kalman, squared steps: beyond, its shorter form loses to rounding what the longer keeps
 ROUND_UP = 0.42  # added before a residual's magnitude is cut to whole steps: 0.5 would cost 1.5 % more at equal error
-DOUBT = 1e-4  # of kalman: part of a weight's variance that a component leaves at least, so that rounding cannot grow
 RIDGE, COARSE_RIDGE = 4.0, 64.0  # of lsp, in squared steps: draws weights that are left open to the prior ones
 NUGGET = 16  # of rbf, in units of step**beta: what quantisation adds to the radial function between two vectors
 EVERY = 4  # rbf's weights are solved for each of the first components, then for every fourth: distances hardly change
@@ -67,150 +65,13 @@ def predict_navg(coding: VectorCoding, begin: int, end: int) -> None:
             guess = 0.0
             for j in range(n):
                 guess += causal.weights[first + j] * decoded[causal.neighbours[first + j], c]
-            _code(coding, i, c, guess)
-
-
-@compiled
-def predict_kalman(coding: VectorCoding, begin: int, end: int) -> None:
-    """Predict by weights that each decoded component updates.
-
-    With P the weights' covariance and u, v the neighbours' values of two components, their predictions have the covariance
-    u' P v. What a component is off by moves the others by its covariance with them over its variance. Of few components their
-    own covariances are worked out, of many the weights' after each component: whichever costs less.
-    """
-    most = _most_neighbours(coding)
-    if coding.decoded.shape[1] <= 2 * most:
-        _predict_few(coding, begin, end, most)
-    else:
-        _predict_many(coding, begin, end, most)
-
-
-@compiled
-def _predict_few(coding: VectorCoding, begin: int, end: int, most: int) -> None:
-    """Predict by the components' covariances: an LDL' factorisation, of R components in n R**2 / 2 + R**3 / 6 products.
-
-    Vectors whose neighbours are further apart than `MAX_SPREAD` go to `_predict_many`.
-    """
-    n_components, noise = coding.decoded.shape[1], coding.step * coding.step
-    guesses, changes, inverses = np.zeros(n_components), np.zeros(n_components), np.zeros(n_components)
-    spread = np.zeros((most + 3, n_components))  # the neighbours' values from their mean, times the roots of the variances
-    covariances, factors = np.zeros((n_components, n_components)), np.zeros((n_components, n_components))
-    for i in range(begin, end):
-        n = _spread_neighbours(coding, i, guesses, spread)
-        if _sum_covariances(spread, n, covariances) > MAX_SPREAD * noise:
-            _predict_many(coding, i, i + 1, most)
-            continue
-        for c in range(n_components):
-            own = covariances[c]
-            for b in range(c):
-                for a in range(b):
-                    own[b] -= own[a] * factors[b, a]
-            for b in range(c):
-                factors[c, b] = own[b] * inverses[b]
-                own[c] -= own[b] * factors[c, b]
-            inverses[c] = 1 / (noise + (1 + DOUBT) * own[c])
-            guess = guesses[c]
-            for b in range(c):
-                guess += own[b] * changes[b]
-            changes[c] = _code(coding, i, c, guess) * inverses[c]
-
-
-@compiled
-def _spread_neighbours(coding: VectorCoding, i: int, guesses: Float64, spread: Float64) -> int:
-    """Fill ``guesses (R,)`` of the prior weights, and rows of ``spread`` of n neighbours and three of zeros; return n."""
-    causal, decoded = coding.causal, coding.decoded
-    first, end = causal.starts[i], causal.starts[i + 1]
-    n, sum_of_variances = end - first, 0.0
-    mean = spread[n]
-    for c in range(len(guesses)):
-        guesses[c] = mean[c] = 0.0
-    for j in range(first, end):
-        values, weight, variance = decoded[causal.neighbours[j]], causal.weights[j], causal.variances[j]
-        sum_of_variances += variance
-        for c in range(len(guesses)):
-            guesses[c] += weight * values[c]
-            mean[c] += variance * values[c]
-    scale = 1 / sum_of_variances if causal.affine and sum_of_variances > 0 else 0.0  # condition on the sum of the weights
-    for c in range(len(guesses)):
-        mean[c] *= scale
-    for j in range(n):
-        values, root = decoded[causal.neighbours[first + j]], np.sqrt(causal.variances[first + j])
-        for c in range(len(guesses)):
-            spread[j, c] = root * (values[c] - mean[c])
-    for j in range(n, n + 3):
-        for c in range(len(guesses)):
-            spread[j, c] = 0.0
-    return int(n)
-
-
-@compiled
-def _sum_covariances(spread: Float64, n: int, covariances: Float64) -> float:
-    """Fill the lower triangle of ``covariances (R, R)``, of four neighbours at a time; return the largest variance."""
-    largest = 0.0
-    for c in range(len(covariances)):
-        sums = covariances[c][: c + 1]
-        for b in range(len(sums)):
-            sums[b] = 0.0
-        for j in range(0, n, 4):
-            one, two, three, four = spread[j][: c + 1], spread[j + 1][: c + 1], spread[j + 2][: c + 1], spread[j + 3][: c + 1]
-            u, v, w, x = one[c], two[c], three[c], four[c]
-            for b in range(len(sums)):
-                sums[b] += (u * one[b] + v * two[b]) + (w * three[b] + x * four[b])
-        largest = max(largest, sums[c])
-    return largest
-
-
-@compiled
-def _predict_many(coding: VectorCoding, begin: int, end: int, most: int) -> None:
-    """Predict by the covariances of the neighbours' weights: of R components in 2 n**2 R products.
-
-    A component's update of the covariances, ``gains * directions'``, waits for the next component, whose products with them
-    take the same loop.
-    """
-    causal, decoded, noise = coding.causal, coding.decoded, coding.step * coding.step
-    memory, covariances = np.zeros((5, most)), np.zeros((most, most))
-    for i in range(begin, end):
-        first = causal.starts[i]
-        n = causal.starts[i + 1] - first
-        weights, values, directions = memory[0][:n], memory[1][:n], memory[2][:n]
-        gains, products = memory[3][:n], memory[4][:n]
-        total = 0.0
-        for j in range(n):
-            weights[j] = causal.weights[first + j]
-            total += causal.variances[first + j]
-        for j in range(n):
-            directions[j] = gains[j] = 0.0
-            for k in range(n):
-                covariances[j, k] = 0.0
-            covariances[j, j] = causal.variances[first + j]
-            if causal.affine:  # condition on the sum of the weights
-                for k in range(n):
-                    covariances[j, k] -= causal.variances[first + j] * causal.variances[first + k] / total
-        for c in range(decoded.shape[1]):
-            guess = 0.0
-            for j in range(n):
-                values[j] = decoded[causal.neighbours[first + j], c]
-                guess += weights[j] * values[j]
-                products[j] = 0.0
-            change = _code(coding, i, c, guess)
-            for k in range(n):
-                row, direction, value = covariances[k][:n], directions[k], values[k]
-                for j in range(len(row)):
-                    row[j] -= gains[j] * direction
-                    products[j] += row[j] * value
-            variance = noise  # of the component's prediction
-            for j in range(n):
-                directions[j] = products[j]
-                variance += (1 + DOUBT) * directions[j] * values[j]
-            for j in range(n):
-                gains[j] = directions[j] / variance
-                weights[j] += gains[j] * change
+            code_component(coding, i, causal.order[i], c, guess)
 
 
 @compiled
 def predict_lsp(coding: VectorCoding, begin: int, end: int) -> None:
     """Predict by least squares over the components decoded so far."""
-    fit = _least_squares(_most_neighbours(coding))
+    fit = _least_squares(most_neighbours(coding))
     for i in range(begin, end):
         _predict_vector_lsp(coding, i, fit)
 
@@ -219,7 +80,7 @@ def predict_lsp(coding: VectorCoding, begin: int, end: int) -> None:
 def predict_rbf(coding: VectorCoding, begin: int, end: int, beta: float) -> None:
     """Predict by interpolation with radial functions, where a vector has a ring of two at least; else as `predict_lsp`."""
     causal, decoded = coding.causal, coding.decoded
-    most = _most_neighbours(coding)
+    most = most_neighbours(coding)
     fit = _least_squares(most)
     weights, values = np.zeros(most), np.zeros(most)
     squared, to_vector = np.zeros((most, most)), np.zeros(most)  # squared distances between neighbours, and to the vector
@@ -242,7 +103,7 @@ def predict_rbf(coding: VectorCoding, begin: int, end: int, beta: float) -> None
             for j in range(n):
                 values[j] = decoded[causal.neighbours[first + j], c]
                 guess += weights[j] * values[j]
-            value = guess + _code(coding, i, c, guess)
+            value = guess + code_component(coding, i, causal.order[i], c, guess)
             for j in range(n):
                 to_vector[j] += (value - values[j]) ** 2
                 for k in range(n):
@@ -272,17 +133,16 @@ def _predict_vector_lsp(coding: VectorCoding, i: int, fit: LeastSquares) -> None
         for j in range(n):
             fit.values[j] = decoded[causal.neighbours[first + j], c]
             guess += fit.weights[j] * fit.values[j]
-        value = guess + _code(coding, i, c, guess)
+        value = guess + code_component(coding, i, causal.order[i], c, guess)
         for j in range(n):
             fit.right[j] += fit.values[j] * value
             for k in range(j + 1):
                 fit.normal[j, k] += fit.values[j] * fit.values[k]
 
 
-@compiled
-def _code(coding: VectorCoding, i: int, c: int, guess: float) -> float:
+@inlined
+def code_component(coding: VectorCoding, i: int, vector: int, c: int, guess: float) -> float:
     """Quantise component c of vector i of the order, if there is a target; decode it, and return by how much it is off."""
-    vector = coding.causal.order[i]
     if len(coding.target):
         steps = (coding.target[vector, c] - guess) / coding.step
         whole = np.floor(abs(steps) + ROUND_UP)
@@ -301,7 +161,7 @@ def _count_neighbours(coding: VectorCoding, i: int) -> int:
 
 
 @compiled
-def _most_neighbours(coding: VectorCoding) -> int:
+def most_neighbours(coding: VectorCoding) -> int:
     """The most neighbours of any vector, 1 at least: the form of ``kalman`` must not depend on which are coded at once."""
     most = 1
     for i in range(len(coding.residuals)):
