@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from gvpipe.arrays import Float64
-from gvpipe.trajectory import kalman_kernels
+from gvpipe.trajectory.batch_kernels import sort_window
 from gvpipe.trajectory.causal_order import CausalOrder
+from gvpipe.trajectory.kalman_kernels import predict_in_batches
 from gvpipe.trajectory.prediction import PREDICTORS, predict_vectors
 from gvpipe.trajectory.prediction_kernels import VectorCoding
 from gvpipe.trajectory.temporal_neighbours import temporal_order
@@ -36,28 +37,29 @@ def test_both_forms_of_kalman_predict_the_same(n_components: int, step: float, a
     most = int(np.diff(causal.starts).max())
     residuals, coded, decoded = np.zeros(target.shape, np.int64), np.zeros(target.shape), np.zeros(target.shape)
     coding = VectorCoding(causal, step, residuals, coded, target)
-    kalman_kernels.predict_few(coding, 0, len(target), most)
-    kalman_kernels.predict_many(coding._replace(decoded=decoded, target=np.zeros((0, 0))), 0, len(target), most)
+    predict_in_batches(coding, 0, len(target), most, True)
+    predict_in_batches(coding._replace(decoded=decoded, target=np.zeros((0, 0))), 0, len(target), most, False)
     assert np.abs(residuals).max() > 10
     assert np.allclose(coded, decoded, rtol=0, atol=0.01 * step)
 
 
-@pytest.mark.parametrize("step", [STEP, STEP / 1000])  # of the finer one some vectors take the longer form
-def test_vectors_side_by_side_are_predicted_as_if_alone(step: float) -> None:
+@pytest.mark.parametrize("are_few", [True, False])
+@pytest.mark.parametrize("step", [STEP, STEP / 1000])  # of the finer one some vectors take the other form
+def test_vectors_side_by_side_are_predicted_as_if_alone(step: float, are_few: bool) -> None:
     causal, target = _rows(7)
     most = int(np.diff(causal.starts).max())
     residuals, coded = np.zeros(target.shape, np.int64), np.zeros(target.shape)
-    kalman_kernels.predict_few(VectorCoding(causal, step, residuals, coded, target), 0, len(target), most)
+    predict_in_batches(VectorCoding(causal, step, residuals, coded, target), 0, len(target), most, are_few)
     decoded = np.zeros(target.shape)
     for i in range(len(target)):
-        kalman_kernels.predict_few(VectorCoding(causal, step, residuals, decoded, np.zeros((0, 0))), i, i + 1, most)
+        predict_in_batches(VectorCoding(causal, step, residuals, decoded, np.zeros((0, 0))), i, i + 1, most, are_few)
     assert np.array_equal(decoded, coded)
 
 
 def test_vectors_side_by_side_do_not_predict_one_another() -> None:
     causal, _ = _rows(1)
     ranks, bounds, depths = np.empty(512, np.int32), np.empty(514, np.int32), np.zeros(150, np.int32)
-    deepest = kalman_kernels._sort_window(causal, 30, 150, 0, depths, ranks, bounds)
+    deepest = sort_window(causal, 30, 150, 0, depths, ranks, bounds)
     assert sorted(ranks[:120]) == list(range(30, 150)) and bounds[1] == 0 and bounds[deepest + 1] == 120
     done = set(causal.order[:30].tolist())
     for depth in range(1, deepest + 1):
