@@ -19,8 +19,9 @@ import os
 import struct
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 from uuid import UUID
 
 from gvpipe.atomic import unnamed_path
@@ -156,7 +157,7 @@ def load(bitstream: Bitstream) -> Bitstream:
 
 
 def _pack(bitstream: Bitstream, parts: SegmentParts | None) -> Iterable[bytes]:
-    """A file in parts: in the plain layout the video with its tag, the head of the box, the payload."""
+    """A file in parts: in the plain layout the video with its tag, in blocks, the head of the box, the payload."""
     bitstream = load(bitstream)
     if bitstream.is_bare and parts is None:
         return _pack_bare(bitstream)
@@ -167,17 +168,18 @@ def _pack(bitstream: Bitstream, parts: SegmentParts | None) -> Iterable[bytes]:
         video = remux_fragments(bitstream.video, f"{STREAM_VERSION} {identity}")
         return pack_stream(video, pack_header(bitstream, extra), bitstream.sections, parts)
     payload = pack_payload(bitstream, extra)
-    return remux(bitstream.video, f"{VERSION} {identity}"), uuid_head(BOX_UUID, len(payload)), payload
+    return chain(remux(bitstream.video, f"{VERSION} {identity}"), [uuid_head(BOX_UUID, len(payload)), payload])
 
 
 def _pack_bare(bitstream: Bitstream) -> Iterable[bytes]:
     """A file of the bare layout in parts."""
-    extra, video = {}, bare.NO_TRACKS
+    extra: dict[str, Any] = {}
+    video: Iterable[bytes] = [bare.NO_TRACKS]
     if bitstream.video:
         track, video = inspect(bitstream.video), remux(bitstream.video)
         extra = {"video_crc32": track.checksum, "track_crc32": track.configuration}
     payload = bare.pack_bare(bitstream, extra)
-    return video, uuid_head(BOX_UUID, len(payload)), payload
+    return chain(video, [uuid_head(BOX_UUID, len(payload)), payload])
 
 
 def _read_address(url: str, unlimited: bool) -> Bitstream:

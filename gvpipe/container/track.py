@@ -19,11 +19,14 @@ TAG_PREFIX = "gvpipe "
 PLAIN = {"fflags": "+bitexact", "write_btrt": "0", "empty_hdlr_name": "1"}  # what no player needs is left out
 FRAGMENTS = "+frag_keyframe+delay_moov+default_base_moof+skip_trailer"
 LONGEST_MICROSECONDS = (1 << 31) - 1  # of FFmpeg's options
+BLOCK = 1 << 20  # bytes that are copied at a time
 LEAST_PICTURES = 16  # of a fragment, the last apart: each costs 100 bytes
 
 
-def remux(video: bytes, tag: str = "") -> bytes:
+def remux(video: bytes, tag: str = "") -> Iterator[bytes]:
     """Copy the video's one track, unchanged, into a file that carries the tag, if there is one, and whose index comes first.
+
+    Yields the file in blocks, since the whole would take as much memory again.
 
     Not by a path: a file that PyAV opens itself stays open, and its disk space taken, if the last write to it fails. What no
     player needs is left out: bit rates, the handler's name, the edit list where each picture is shown in the order of coding.
@@ -36,10 +39,10 @@ def remux_fragments(video: bytes, tag: str) -> bytes:
 
     Each begins with a key frame. All but the last have `LEAST_PICTURES` pictures at least.
     """
-    return _copy(video, tag, {"movflags": FRAGMENTS + "+use_metadata_tags"}, LEAST_PICTURES)
+    return b"".join(_copy(video, tag, {"movflags": FRAGMENTS + "+use_metadata_tags"}, LEAST_PICTURES))
 
 
-def _copy(video: bytes, tag: str, options: dict[str, str], least: int = 0) -> bytes:
+def _copy(video: bytes, tag: str, options: dict[str, str], least: int = 0) -> Iterator[bytes]:
     import av
 
     options = {**PLAIN, **options}
@@ -68,7 +71,8 @@ def _copy(video: bytes, tag: str, options: dict[str, str], least: int = 0) -> by
                 packet.stream = copy
                 target.mux(packet)
         result.seek(0)
-        return result.read()
+        while block := result.read(BLOCK):
+            yield block
 
 
 def _packets(container: Any) -> Iterator[Any]:
