@@ -72,11 +72,12 @@ def test_lattices_too_fine_for_halves_are_corrupt() -> None:
         place_points(points + 1, None, 16, 16, 16)
 
 
+@pytest.mark.parametrize("scale", [1, 60, 40_000])  # places are counted, digit by digit, or runs of points merged
 @pytest.mark.parametrize("n_cells", [1, 7, 300])
-def test_cells_are_sorted_and_measured(n_cells: int) -> None:
+def test_cells_are_sorted_and_measured(n_cells: int, scale: int) -> None:
     """The kernels give what NumPy does: a stable sort by cell and place, and second moments."""
     draw = np.random.default_rng(n_cells)
-    points = draw.integers(0, 9, (2000, 3)) * draw.integers(1, 1 << 16)
+    points = draw.integers(0, 9, (2000, 3)) * scale
     starts = np.r_[0, np.sort(draw.choice(np.arange(1, 2000), n_cells - 1, replace=False)), 2000].astype(np.int64)
     directions, order = draw.integers(-2, 3, (n_cells, 3)), draw.permutation(2000)
     cell = np.repeat(np.arange(n_cells), np.diff(starts))
