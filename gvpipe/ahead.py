@@ -34,8 +34,8 @@ def run_ahead(function: Callable[[Item], Result], items: Sequence[Item], ahead: 
 def beside(function: Callable[[], Result], worth: bool = True) -> Iterator[Callable[[], Result]]:
     """Work ``function()`` out on another thread during a ``with`` block, which gets a function that waits for the result.
 
-    Where that is not ``worth`` a thread, it is worked out when the block asks. Errors are raised where the block asks. A block
-    that is left waits.
+    The block asks once. Where that is not ``worth`` a thread, the function is called then. Errors are raised where the block
+    asks, and nowhere else. A block that is left waits.
     """
     if not worth:
         yield function

@@ -16,8 +16,9 @@ import operator
 from collections.abc import Callable
 from typing import Any, cast
 
+import numpy as np
 from llvmlite import ir
-from numba.core import types
+from numba.core import config, types
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
@@ -93,8 +94,21 @@ def _add_operator(function: Any, instruction: str) -> None:
     lower_builtin(function, row_type, row_type)(lower)
 
 
-load = cast(Callable[[Float64, int], Float64], intrinsic(_load))
-store = cast(Callable[[Float64, int, Float64], None], intrinsic(_store))
-same = cast(Callable[[float], Float64], intrinsic(_same))
+def _load_plain(array: Float64, at: int) -> Float64:
+    return array[at : at + LANES].copy()
+
+
+def _store_plain(array: Float64, at: int, row: Float64) -> None:
+    array[at : at + LANES] = row
+
+
+def _same_plain(number: float) -> Float64:
+    return np.full(LANES, number)
+
+
+is_plain = config.DISABLE_JIT  # kernels are Python then
+load = cast(Callable[[Float64, int], Float64], _load_plain if is_plain else intrinsic(_load))
+store = cast(Callable[[Float64, int, Float64], None], _store_plain if is_plain else intrinsic(_store))
+same = cast(Callable[[float], Float64], _same_plain if is_plain else intrinsic(_same))
 for _function, _instruction in OPERATORS.items():
     _add_operator(_function, _instruction)

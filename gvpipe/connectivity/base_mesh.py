@@ -32,6 +32,8 @@ MAX_DRACO_COORDINATE = (1 << 22) - 1  # Draco's time and memory grow with the ra
 DRACO_PREFIX = b"DRACO\x02\x02\x01\x01\x00\x00"  # version 2.2, triangular mesh, Edgebreaker, no metadata
 MAX_PER_BYTE = 1024  # no allocation beyond what this many bytes can honestly hold; deflate's own limit is near
 PEAK_PER_VERTEX, PEAK_PER_TRIANGLE = 160, 160  # bytes
+LARGE = 1 << 14  # vertices; fewer do not pay for another thread
+BESIDE = 3  # times the peak, above what a mesh and a vertex hierarchy take together
 KEPT_PER_VERTEX, KEPT_PER_TRIANGLE = 24, 24
 SECONDS_PER_VERTEX, SECONDS_PER_TRIANGLE = 0.4e-6, 0.3e-6
 GENERIC = 4  # draco::GeometryAttribute::GENERIC
@@ -107,6 +109,12 @@ def keep_mesh(budget: Budget, n_vertices: int, n_triangles: int) -> None:
     budget.ask(what, PEAK_PER_VERTEX * n_vertices + PEAK_PER_TRIANGLE * n_triangles)
     seconds = SECONDS_PER_VERTEX * n_vertices + SECONDS_PER_TRIANGLE * n_triangles
     budget.keep(what, KEPT_PER_VERTEX * n_vertices + KEPT_PER_TRIANGLE * n_triangles, seconds)
+
+
+def may_run_beside(budget: Budget, n_vertices: int, n_triangles: int) -> bool:
+    """Whether vertices are decoded beside what needs points alone: of large meshes, if the file may take the memory of both."""
+    peak = PEAK_PER_VERTEX * n_vertices + PEAK_PER_TRIANGLE * n_triangles
+    return n_vertices >= LARGE and BESIDE * peak <= budget.memory_left
 
 
 def _encode_draco(points: Array, faces: Array) -> bytes:

@@ -29,7 +29,14 @@ import numpy as np
 
 from gvpipe.ahead import beside
 from gvpipe.arrays import Array, Int32
-from gvpipe.connectivity.base_mesh import COMPRESSION_LEVEL, MAX_PER_BYTE, EncodedMesh, check_draco_header, keep_mesh
+from gvpipe.connectivity.base_mesh import (
+    COMPRESSION_LEVEL,
+    MAX_PER_BYTE,
+    EncodedMesh,
+    check_draco_header,
+    keep_mesh,
+    may_run_beside,
+)
 from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.bitstream import Bitstream
@@ -39,7 +46,6 @@ from gvpipe.errors import CorruptFile, corrupt_section
 from gvpipe.mesh.unique_rows import decode_table, encode_table, left_out, smallest_first, used_vertices
 
 HEADER = struct.Struct("<6I")
-LARGE = 1 << 14  # vertices; fewer do not pay for another thread
 
 
 @dataclass(frozen=True)
@@ -140,20 +146,15 @@ def open_mesh(bitstream: Bitstream) -> Iterator[tuple[PointTriangles, Callable[[
     n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
     keep_mesh(bitstream.budget, n_vertices, n_triangles)
     opened, finish = _begin_mesh(bitstream.section("mesh"), bitstream.section("order"), n_vertices, n_triangles)
+    bitstream.check_size(n_vertices, len(opened.point_faces))
 
     def checked() -> Topology:
         mesh = finish()
         bitstream.check_size(len(mesh.points), len(mesh.faces))
         return mesh
 
-    with beside(checked, n_vertices >= LARGE) as finished:
+    with beside(checked, may_run_beside(bitstream.budget, n_vertices, n_triangles)) as finished:
         yield opened, finished
-
-
-def read_mesh(bitstream: Bitstream) -> Topology:
-    """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
-    with open_mesh(bitstream) as (_, finished):
-        return finished()
 
 
 class _Carried(NamedTuple):

@@ -23,7 +23,7 @@ from scipy import sparse
 from gvpipe.ahead import beside
 from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.connectivity import adaptive_mesh
-from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base, keep_mesh
+from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base, keep_mesh, may_run_beside
 from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.bitstream import Bitstream
@@ -33,7 +33,6 @@ from gvpipe.mesh.unique_rows import smallest_first
 
 ADAPTIVE_MESH, ADAPTIVE_ORDER = 1, 2  # flags
 FEW_POINTS = 1 << 13  # up to which adaptive positions open in no time
-LARGE = 1 << 14  # vertices; fewer do not pay for another thread
 WORTH_WAITING = 0.9  # of the other stream, what theirs must be beyond that
 
 
@@ -159,21 +158,27 @@ def open_points(
 
     What needs points alone can be done meanwhile. Both raise `CorruptFile` if the sections do not hold what the header says.
     """
+    points, finish = _begin_reading(bitstream, across, adaptive)
+    with beside(finish, may_run_beside(bitstream.budget, bitstream.n_vertices, bitstream.n_triangles)) as finished:
+        yield points, finished
+
+
+def read_points(bitstream: Bitstream, across: bool = False, adaptive: bool = False) -> WeldedMesh:
+    """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
+    return _begin_reading(bitstream, across, adaptive)[1]()
+
+
+def _begin_reading(bitstream: Bitstream, across: bool, adaptive: bool) -> tuple[PointMesh, Callable[[], WeldedMesh]]:
+    """As `_begin_points`, of a file; sizes are checked."""
     n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
-    keep_mesh(bitstream.budget, bitstream.n_vertices, bitstream.n_triangles)
+    keep_mesh(bitstream.budget, n_vertices, n_triangles)
     sections = bitstream.section("mesh"), bitstream.section("order")
     points, finish = _begin_points(*sections, across, adaptive, n_vertices, n_triangles)
+    bitstream.check_size(n_vertices, len(points.point_faces))
 
     def checked() -> WeldedMesh:
         mesh = finish()
         bitstream.check_size(len(mesh.point), len(mesh.faces))
         return mesh
 
-    with beside(checked, n_vertices >= LARGE) as finished:
-        yield points, finished
-
-
-def read_points(bitstream: Bitstream, across: bool = False, adaptive: bool = False) -> WeldedMesh:
-    """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
-    with open_points(bitstream, across, adaptive) as (_, finished):
-        return finished()
+    return points, checked

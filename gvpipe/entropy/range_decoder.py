@@ -2,7 +2,7 @@
 
 Why: `gvpipe.entropy.block_coder` asks for a few values at a time, whose contexts depend on those before. A call of the library
 for each of these costs far more than what it decodes: samba's blended motion opens four times as fast with these loops.
-Encoding, and whatever is decoded at once, stays with the library.
+Blocks of a few integers (`gvpipe.entropy.integers`) are decoded here, too. Encoding stays with the library.
 
 A state is ``(3,) uint64``: point minus lower end, range, and the place of the next word.
 

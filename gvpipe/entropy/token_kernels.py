@@ -22,9 +22,9 @@ def restore_values(tokens: Int64, direct: int, places: Int64, packed: UInt8) -> 
         folded = token = tokens[i]
         if token >= direct:
             width, place = (token - direct) // 2 + 3, places[token]
-            low = 0
+            low = np.int64(0)
             for k in range(place >> 3, ((place + width - 1) >> 3) + 1):
-                low = low << 8 | packed[k]
+                low = low << 8 | np.int64(packed[k])
             low >>= 7 - ((place + width - 1) & 7)
             folded = (2 + (token & 1)) << width | low & ((1 << width) - 1)
             places[token] = place + width
