@@ -10,7 +10,7 @@ from gvpipe.arrays import Int32, Int64
 from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
 from gvpipe.mesh.corner_kernels import next_corner, previous_corner
-from gvpipe.mesh.corner_lists import AFTER, link_corners
+from gvpipe.mesh.corner_lists import list_corners
 
 SAME, NEW, OLDER = 0, 1, 2  # symbols; an older entry's number is added to the last
 UNLINKED, UNKNOWN, JOINED, CUT = 0, 1, 2, 3  # what is known of the edge between two corners of a fan
@@ -45,10 +45,10 @@ def code_sharing(coder: SerialCoder, mesh: Corners, n_vertices: int, entries: In
             are numbered in the order of coding.
     """
     flat = mesh.triangles.ravel()
-    lists = link_corners(mesh.triangles, n_vertices)
+    lists = list_corners(mesh.triangles, n_vertices)
     most = 1
     for v in range(n_vertices):
-        most = max(most, lists.degree[v])
+        most = max(most, lists.starts[v + 1] - lists.starts[v])
     fan, turned = (
         _Fan(np.empty(most, np.int64), np.empty(most, np.int64)),
         _Fan(np.empty(most, np.int64), np.empty(most, np.int64)),
@@ -59,14 +59,12 @@ def code_sharing(coder: SerialCoder, mesh: Corners, n_vertices: int, entries: In
     n = 0
     for v in range(n_vertices):
         first = n
-        c = lists.head[v]
-        while c >= 0:
+        for c in lists.corners[lists.starts[v] : lists.starts[v + 1]]:
             if not is_visited[c]:
                 size, cuts = _find_fan(v, c, mesh, entries, fan, turned)
                 for i in range(size):
                     is_visited[fan.corners[i]] = True
                 n, cuts = _code_fan(coder, mesh, fan, (size, cuts, first, n), (given, coded, entries))
-            c = lists.corners[c, AFTER]
     return n
 
 

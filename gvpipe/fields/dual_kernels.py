@@ -6,7 +6,7 @@ import numpy as np
 
 from gvpipe.arrays import Int32
 from gvpipe.compiled import compiled
-from gvpipe.mesh.corner_lists import AFTER, link_corners
+from gvpipe.mesh.corner_lists import list_corners
 
 LARGEST_FAN = 64  # triangles; larger fans are left alone: chaining one is quadratic in its size
 
@@ -14,20 +14,14 @@ LARGEST_FAN = 64  # triangles; larger fans are left alone: chaining one is quadr
 @compiled
 def find_dual(faces: Int32, n_vertices: int) -> Int32:
     """Dual triangles of ``faces (T, 3)`` over V vertices; see `gvpipe.fields.dual_mesh.dual_triangles`."""
-    lists = link_corners(faces.copy(), n_vertices)
+    lists = list_corners(faces, n_vertices)
     dual = np.empty((3 * len(faces), 3), np.int32)
     n_dual = 0
-    around, fan = np.empty(LARGEST_FAN, np.int32), np.empty(LARGEST_FAN, np.int32)
+    fan = np.empty(LARGEST_FAN, np.int32)
     for v in range(n_vertices):
-        degree = lists.degree[v]
-        if degree < 3 or degree > LARGEST_FAN:
-            continue
-        corner, n = lists.head[v], 0
-        while corner >= 0:
-            around[n] = corner
-            n += 1
-            corner = lists.corners[corner, AFTER]
-        if _chain(faces, around, n, fan):
+        around = lists.corners[lists.starts[v] : lists.starts[v + 1]]
+        n = len(around)
+        if 3 <= n <= LARGEST_FAN and _chain(faces, around, n, fan):
             n_dual = _add_strip(fan, n, dual, n_dual)
     return dual[:n_dual].copy()
 

@@ -8,7 +8,7 @@ these cases:
 - it has more than `MAX_RING` neighbours;
 - its hole cannot be filled without using an edge twice.
 
-Everything is an integer; see `gvpipe.mesh.corner_lists` for the lists of corners.
+Everything is an integer; see `gvpipe.mesh.fans` for the triangles, `gvpipe.mesh.hole_filling` for rings and holes.
 
 Source: Vasa and Skala 2010, section 3.2 (degrees near 6, derived by both sides); see `gvpipe.mesh.hierarchy`.
 """
@@ -21,19 +21,20 @@ import numpy as np
 
 from gvpipe.arrays import Int32, Int64
 from gvpipe.compiled import compiled, inlined
-from gvpipe.mesh.corner_lists import (
-    AFTER,
+from gvpipe.mesh.fans import (
+    DEGREE,
     NEXT_VERTEX,
     PREVIOUS_VERTEX,
-    CornerLists,
-    Hole,
-    empty_hole,
-    fill_hole,
-    find_ring,
-    link,
-    link_corners,
-    unlink,
+    REGULAR_DEGREE,
+    START,
+    Fans,
+    add_triangles,
+    make_fans,
+    remaining_triangles,
+    remove_triangles,
+    with_room,
 )
+from gvpipe.mesh.hole_filling import Hole, empty_hole, fill_hole, find_ring
 
 MAX_RING = 12  # most neighbours of a vertex that is removed
 MAX_NEIGHBOURS = 20  # most vertices kept about a vertex: its ring, then what lies across the ring, then what touches the ring
@@ -64,34 +65,38 @@ class Decimation(NamedTuple):
 @compiled
 def decimate(faces: Int32, n_vertices: int, max_waves: int) -> Decimation:
     """Remove vertices of ``faces (T, 3)``, wave by wave, until none can go, or `MIN_COARSE` of V are left."""
-    lists, hole = link_corners(faces.copy(), n_vertices), empty_hole(MAX_RING)
+    (fans, end), hole = make_fans(faces, n_vertices), empty_hole(MAX_RING, n_vertices)
     freed = np.empty(MAX_RING, np.int32)
-    regular = _regular_degrees(n_vertices, lists, hole)
+    _set_regular_degrees(fans, hole)
     order, rings = np.empty(n_vertices, np.int32), np.empty(n_vertices, np.int32)
     waves, starts = np.zeros(max_waves + 1, np.int32), np.zeros(n_vertices + 1, np.int32)
     neighbours = np.empty((n_vertices + 1) * MAX_NEIGHBOURS + 2 * MAX_RING, np.int32)
     locked = np.full(n_vertices, -1, np.int32)  # the last wave that touched a vertex
+    left = np.arange(n_vertices).astype(np.int32)
     n_gone, n_waves = 0, 0
     while n_waves < max_waves and n_vertices - n_gone > MIN_COARSE:
-        candidates, costs = _removal_costs(lists, regular, hole)
+        left = _with_triangles(left, fans)
+        candidates, costs = _removal_costs(left, fans, hole)
         for i in _sorted_by_cost(costs):
             v = candidates[i]
             if n_vertices - n_gone <= MIN_COARSE:
                 break
             if locked[v] == n_waves:
                 continue
-            size, closed = find_ring(v, lists, hole)
+            size, closed = find_ring(v, fans, hole)
             if size < 2:
                 continue
-            n_new, _ = fill_hole(size, closed, lists, regular, hole)
+            n_new, _ = fill_hole(size, closed, fans, hole)
             if n_new < 0:
                 continue
             for j in range(size):
                 locked[hole.ring[j]] = n_waves
-            _remove_triangles(v, lists, freed)
+            remove_triangles(v, fans, freed)
             start = starts[n_gone]
-            starts[n_gone + 1] = start + _list_neighbours(size, closed, lists, hole, neighbours[start : start + MAX_NEIGHBOURS])
-            _add_triangles(n_new, lists, hole, freed)
+            found = neighbours[start : start + MAX_NEIGHBOURS]
+            starts[n_gone + 1] = start + _list_neighbours(size, closed, fans, hole, found, n_gone)
+            fans, end = with_room(hole.triangles, n_new, fans, end)
+            add_triangles(hole.triangles, n_new, freed, fans)
             order[n_gone] = v
             rings[n_gone] = size if closed else -size
             n_gone += 1
@@ -105,35 +110,40 @@ def decimate(faces: Int32, n_vertices: int, max_waves: int) -> Decimation:
         starts[: n_gone + 1],
         neighbours[: starts[n_gone]],
         rings[:n_gone],
-        lists.triangles[lists.triangles[:, 0] >= 0],
+        remaining_triangles(fans, len(faces)),
     )
 
 
 @compiled
-def _regular_degrees(n_vertices: int, lists: CornerLists, hole: Hole) -> Int32:
-    """``(V,)`` the degree that each vertex is to have."""
-    regular = np.full(n_vertices, REGULAR, np.int32)
-    for v in range(n_vertices):
-        size, closed = find_ring(v, lists, hole)
-        if size > 0 and not closed:
-            regular[v] = REGULAR_BOUNDARY
-    return regular
+def _set_regular_degrees(fans: Fans, hole: Hole) -> None:
+    for v in range(len(fans.heads)):
+        size, closed = find_ring(v, fans, hole)
+        fans.heads[v, REGULAR_DEGREE] = REGULAR_BOUNDARY if size > 0 and not closed else REGULAR
 
 
 @compiled
-def _removal_costs(lists: CornerLists, regular: Int32, hole: Hole) -> tuple[Int32, Int64]:
-    """The n vertices that can be removed, ascending, and what the removal of each costs."""
-    candidates, costs = np.empty(len(regular), np.int32), np.empty(len(regular), np.int64)
+def _with_triangles(vertices: Int32, fans: Fans) -> Int32:
+    """Those of the vertices that have triangles, moved to the front of ``vertices``."""
     n = 0
-    for v in range(len(regular)):
-        if lists.head[v] < 0:  # it is gone, or has no triangle
-            continue
-        size, closed = find_ring(v, lists, hole)
+    for v in vertices:
+        if fans.heads[v, DEGREE]:
+            vertices[n] = v
+            n += 1
+    return vertices[:n]
+
+
+@compiled
+def _removal_costs(left: Int32, fans: Fans, hole: Hole) -> tuple[Int32, Int64]:
+    """Which n of the vertices that are ``left`` can be removed, and what the removal of each costs."""
+    candidates, costs = np.empty(len(left), np.int32), np.empty(len(left), np.int64)
+    n = 0
+    for v in left:
+        size, closed = find_ring(v, fans, hole)
         if size < 2:
             continue
-        n_new, cost = fill_hole(size, closed, lists, regular, hole)
+        n_new, cost = fill_hole(size, closed, fans, hole)
         if n_new >= 0:
-            own = lists.degree[v] - regular[v]
+            own = fans.heads[v, DEGREE] - fans.heads[v, REGULAR_DEGREE]
             candidates[n], costs[n] = v, cost - own * own
             n += 1
     return candidates[:n], costs[:n]
@@ -161,65 +171,41 @@ def _sorted_by_cost(costs: Int64) -> Int64:
 
 
 @inlined
-def _remove_triangles(v: int, lists: CornerLists, freed: Int32) -> None:
-    """Take out the triangles around v; ``freed`` gets their numbers."""
-    n = 0
-    c = lists.head[v]
-    while c >= 0:
-        freed[n] = c // 3
-        n += 1
-        c = lists.corners[c, AFTER]
-    for i in range(n):
-        for k in range(3):
-            unlink(lists, freed[i], k)
-        lists.triangles[freed[i], 0] = -1
-
-
-@inlined
-def _add_triangles(n_new: int, lists: CornerLists, hole: Hole, freed: Int32) -> None:
-    """Put the triangles that fill the hole in the place of those that were freed."""
-    for i in range(n_new):
-        for k in range(3):
-            lists.triangles[freed[i], k] = hole.triangles[i, k]
-        for k in range(3):
-            link(lists, freed[i], k)
-
-
-@inlined
-def _list_neighbours(size: int, closed: bool, lists: CornerLists, hole: Hole, found: Int32) -> int:
+def _list_neighbours(size: int, closed: bool, fans: Fans, hole: Hole, found: Int32, mark: int) -> int:
     """Fill ``found`` with the ring, what lies across its sides, then what touches it; return how many these are.
 
-    The vertex' own triangles are out of the lists already.
+    The vertex' own triangles are out of the fans already. ``mark`` is the number of this list.
     """
-    ring, corners = hole.ring, lists.corners
+    ring, heads, sides = hole.ring, fans.heads, fans.sides
     for i in range(size):
         found[i] = ring[i]
+        hole.marks[ring[i]] = mark
     n = size
     for i in range(min(size if closed else size - 1, MAX_NEIGHBOURS - size)):
-        a, b = ring[i], ring[(i + 1) % size]
-        from_b = lists.degree[b] < lists.degree[a]  # the shorter list: a hub's would make this quadratic
-        c = lists.head[b] if from_b else lists.head[a]
-        while c >= 0:
-            if corners[c, NEXT_VERTEX] == a if from_b else corners[c, PREVIOUS_VERTEX] == b:
-                n = _add_once(corners[c, PREVIOUS_VERTEX] if from_b else corners[c, NEXT_VERTEX], found, n)
-                break
-            c = corners[c, AFTER]
+        a, b = ring[i], ring[i + 1 if i + 1 < size else 0]
+        from_b = heads[b, DEGREE] < heads[a, DEGREE]  # the shorter list: a hub's would make this quadratic
+        own, other, column, beyond = (b, a, NEXT_VERTEX, PREVIOUS_VERTEX) if from_b else (a, b, PREVIOUS_VERTEX, NEXT_VERTEX)
+        low = heads[own, START]
+        at = low + heads[own, DEGREE] - 1
+        while at >= low and sides[at, column] != other:
+            at -= 1
+        if at >= low:
+            n = _add_once(sides[at, beyond], found, n, hole, mark)
     for i in range(size):
-        c = lists.head[ring[i]]
-        while c >= 0 and n < MAX_NEIGHBOURS:
-            n = _add_once(corners[c, NEXT_VERTEX], found, n)
-            n = _add_once(corners[c, PREVIOUS_VERTEX], found, n)
-            c = corners[c, AFTER]
+        low = heads[ring[i], START]
+        at = low + heads[ring[i], DEGREE] - 1
+        while at >= low and n < MAX_NEIGHBOURS:
+            n = _add_once(sides[at, NEXT_VERTEX], found, n, hole, mark)
+            n = _add_once(sides[at, PREVIOUS_VERTEX], found, n, hole, mark)
+            at -= 1
     return n
 
 
 @inlined
-def _add_once(vertex: int, found: Int32, n: int) -> int:
+def _add_once(vertex: int, found: Int32, n: int, hole: Hole, mark: int) -> int:
     """Append a vertex to the n in ``found`` if there is room and it is not among them; return their number."""
-    if n == MAX_NEIGHBOURS:
+    if n == MAX_NEIGHBOURS or hole.marks[vertex] == mark:
         return n
-    for i in range(n):
-        if found[i] == vertex:
-            return n
+    hole.marks[vertex] = mark
     found[n] = vertex
     return n + 1

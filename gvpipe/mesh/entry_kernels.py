@@ -13,7 +13,7 @@ import numpy as np
 from gvpipe.arrays import Bool, Int32, Int64
 from gvpipe.compiled import compiled
 from gvpipe.mesh.corner_kernels import next_corner, previous_corner
-from gvpipe.mesh.corner_lists import AFTER, link_corners
+from gvpipe.mesh.corner_lists import list_corners
 
 LEVELS = 4  # entries that complete this many triangles less one, or more, are alike
 NONE = -1
@@ -46,7 +46,7 @@ class _Stacks(NamedTuple):
 @compiled
 def order_by_corners(triangles: Int32, opposite: Int64, n_entries: int) -> EntryOrder:
     """Order the entries 0..N-1 of ``triangles (T, 3)``; ``opposite (3T,)`` is of `opposite_corners`."""
-    lists = link_corners(triangles, n_entries)
+    lists = list_corners(triangles, n_entries)
     flat = triangles.ravel()
     order, starts = np.empty(n_entries, np.int64), np.zeros(n_entries + 1, np.int64)
     gates = np.empty((len(flat), 4), np.int64)
@@ -60,29 +60,24 @@ def order_by_corners(triangles: Int32, opposite: Int64, n_entries: int) -> Entry
             continue
         while entry >= 0:
             first = n_gates
-            c = lists.head[entry]
-            while c >= 0:  # triangles that this entry completes
+            own = lists.corners[lists.starts[entry] : lists.starts[entry + 1]]
+            for c in own:  # triangles that this entry completes
                 a, b = flat[next_corner(c)], flat[previous_corner(c)]
                 if is_done[a] and is_done[b]:
                     o = flat[opposite[c]] if opposite[c] >= 0 else NONE
                     _fill(gates, n_gates, a, b, (o if o >= 0 and is_done[o] else NONE, c))
                     n_gates += 1
-                c = lists.corners[c, AFTER]
-            c = lists.head[entry] if n_gates == first else NONE
-            while c >= 0:  # else whatever shares a triangle
+            for c in own if n_gates == first else own[:0]:  # else whatever shares a triangle
                 a, b = flat[next_corner(c)], flat[previous_corner(c)]
                 if is_done[a] or is_done[b]:
                     _fill(gates, n_gates, a if is_done[a] else b, NONE, (NONE, c))
                     n_gates += 1
-                c = lists.corners[c, AFTER]
             order[n] = entry
             is_done[entry] = True
             n += 1
             starts[n] = n_gates
-            c = lists.head[entry]
-            while c >= 0:
+            for c in own:
                 _push_neighbours(flat[next_corner(c)], flat[previous_corner(c)], is_done, completes, stacks)
-                c = lists.corners[c, AFTER]
             entry = _pop(is_done, stacks)
     return EntryOrder(order, starts, gates[:n_gates].copy())
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from gvpipe.arrays import Bool, Int32
 from gvpipe.compiled import compiled
-from gvpipe.mesh.corner_lists import AFTER, NEXT_VERTEX, PREVIOUS_VERTEX, CornerLists, link_corners
+from gvpipe.mesh.corner_lists import CornerLists, list_corners
 
 
 class Traversal(NamedTuple):
@@ -46,7 +46,7 @@ def traverse(triangles: Int32, seeds: Int32, n_vertices: int) -> Traversal:
         seeds: ``(n,)`` the vertices, all that triangles use among them; components start in their order.
         n_vertices: V.
     """
-    lists = link_corners(triangles, n_vertices)
+    lists = list_corners(triangles, n_vertices)
     order = np.empty(len(seeds), np.int32)
     starts = np.zeros(len(seeds) + 1, np.int32)
     neighbours = np.empty(3 * len(seeds), np.int32)
@@ -75,7 +75,7 @@ def traverse(triangles: Int32, seeds: Int32, n_vertices: int) -> Traversal:
                     if is_done[a] and is_done[b]:
                         neighbours[end], neighbours[end + 1] = a, b
                         end += 2
-                        opposite = _opposite(a, b, lists, is_done)
+                        opposite = _opposite(a, b, lists, triangles, is_done)
                         if opposite >= 0:
                             neighbours[end] = opposite
                             end += 1
@@ -94,27 +94,20 @@ def traverse(triangles: Int32, seeds: Int32, n_vertices: int) -> Traversal:
 @compiled
 def _append_around(v: int, tail: int, lists: CornerLists, queue: _Queue) -> int:
     """Append the triangles around v that were never queued; return the queue's new end."""
-    c = lists.head[v]
-    while c >= 0:
+    for c in lists.corners[lists.starts[v] : lists.starts[v + 1]]:
         if not queue.is_queued[c // 3]:
             queue.is_queued[c // 3] = True
             queue.triangles[tail] = c // 3
             tail += 1
-        c = lists.corners[c, AFTER]
     return tail
 
 
 @compiled
-def _opposite(a: int, b: int, lists: CornerLists, is_done: Bool) -> int:
+def _opposite(a: int, b: int, lists: CornerLists, triangles: Int32, is_done: Bool) -> int:
     """The third vertex of the first triangle at the edge a b of which that is done; -1 without one."""
-    c = lists.head[a]
-    while c >= 0:
-        third = -1
-        if lists.corners[c, NEXT_VERTEX] == b:
-            third = lists.corners[c, PREVIOUS_VERTEX]
-        elif lists.corners[c, PREVIOUS_VERTEX] == b:
-            third = lists.corners[c, NEXT_VERTEX]
+    for c in lists.corners[lists.starts[a] : lists.starts[a + 1]]:
+        after, before = triangles[c // 3, (c + 1) % 3], triangles[c // 3, (c + 2) % 3]
+        third = before if after == b else after if before == b else -1
         if third >= 0 and is_done[third]:
-            return third
-        c = lists.corners[c, AFTER]
+            return int(third)
     return -1
