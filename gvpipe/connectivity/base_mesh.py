@@ -24,7 +24,7 @@ from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor
 from gvpipe.errors import CorruptFile, InputError, corrupt_section
-from gvpipe.mesh.unique_rows import decode_table, encode_table, left_out, row_ids, smallest_first, used_vertices
+from gvpipe.mesh.unique_rows import are_distinct, decode_table, encode_table, left_out, row_ids, smallest_first, used_vertices
 
 HEADER = struct.Struct("<4I")
 COMPRESSION_LEVEL = 10  # Draco's best; 20 ms for 10k vertices
@@ -205,6 +205,8 @@ def _decode_draco(draco: bytes) -> tuple[Array, Array]:
     if keys.size and keys.max() >= 1 << 31:
         raise corrupt_section("mesh", "lattice coordinate out of range")
 
+    if are_distinct(keys):
+        return keys, faces
     ids, representatives = row_ids(keys)  # merge what Draco split
     by_appearance = np.argsort(representatives)
     return keys[representatives[by_appearance]], np.argsort(by_appearance)[ids][faces]

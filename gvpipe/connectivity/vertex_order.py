@@ -19,7 +19,7 @@ import numpy as np
 from gvpipe.arrays import Array
 from gvpipe.connectivity.visit_symbols import N_SYMBOLS, quantised, split_ranks, weights_of
 from gvpipe.errors import InputError, corrupt_section
-from gvpipe.mesh.unique_rows import sort_rows
+from gvpipe.mesh.unique_rows import are_distinct, sort_rows
 
 if TYPE_CHECKING:
     from gvpipe.connectivity.visit_kernels import NeighbourLists
@@ -87,7 +87,13 @@ def neighbour_lists(points: Array, faces: Array) -> NeighbourLists:
     from gvpipe.connectivity.visit_kernels import sort_neighbours
 
     rows = np.ascontiguousarray(points, np.int64)
+    twins = np.zeros((0, 2), np.int64) if are_distinct(rows) else _twins(rows)
+    return sort_neighbours(rows, np.ascontiguousarray(faces, np.int64), twins)
+
+
+def _twins(rows: Array) -> Array:
+    """Pairs ``(n, 2)`` of vertices at one point: each with the next one there."""
     by_point = sort_rows(rows)
     same = (rows[by_point[1:]] == rows[by_point[:-1]]).all(axis=1)
-    twins = np.c_[by_point[1:], by_point[:-1]][same]
-    return sort_neighbours(rows, np.ascontiguousarray(faces, np.int64), twins)
+    twins: Array = np.c_[by_point[1:], by_point[:-1]][same]
+    return twins

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from gvpipe.arrays import Int64
 from gvpipe.compiled import compiled
 
 
@@ -15,3 +18,17 @@ def next_corner(corner: int) -> int:
 def previous_corner(corner: int) -> int:
     """The corner before it in its triangle."""
     return corner - 1 if corner % 3 > 0 else corner + 2
+
+
+@compiled
+def turn_smallest_first(faces: Int64) -> Int64:
+    """``faces (T, 3)``, each turned so that its smallest index leads, the first one of equals."""
+    turned = np.empty(faces.shape, np.int64)
+    for t in range(len(faces)):
+        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+        if b < a and b <= c:
+            a, b, c = b, c, a
+        elif c < a and c < b:
+            a, b, c = c, a, b
+        turned[t, 0], turned[t, 1], turned[t, 2] = a, b, c
+    return turned

@@ -28,26 +28,33 @@ def link_vertices(faces: Int32, n_vertices: int) -> Graph:
     places = np.zeros(n_vertices + 1, np.int64)
     for t in range(len(faces)):
         for k in range(3):
-            if faces[t, k] != faces[t, (k + 1) % 3]:
-                places[faces[t, k] + 1] += 1
-                places[faces[t, (k + 1) % 3] + 1] += 1
+            a, b = faces[t, k], faces[t, k + 1 if k < 2 else 0]
+            if a != b:
+                places[a + 1] += 1
+                places[b + 1] += 1
     for v in range(n_vertices):
         places[v + 1] += places[v]
-    neighbours, ends = np.empty(places[n_vertices], np.int32), places.copy()
+    unsorted, ends = np.empty(places[n_vertices], np.int32), places.copy()
     for t in range(len(faces)):
         for k in range(3):
-            a, b = faces[t, k], faces[t, (k + 1) % 3]
+            a, b = faces[t, k], faces[t, k + 1 if k < 2 else 0]
             if a != b:
-                neighbours[ends[a]], neighbours[ends[b]] = b, a
+                unsorted[ends[a]], unsorted[ends[b]] = b, a
                 ends[a] += 1
                 ends[b] += 1
+    neighbours = np.empty(len(unsorted), np.int32)
+    ends = places.copy()
+    for v in range(n_vertices):  # ascending vertices give themselves to their neighbours, whose lists so ascend
+        for k in range(places[v], places[v + 1]):
+            w = unsorted[k]
+            if ends[w] == places[w] or neighbours[ends[w] - 1] != v:
+                neighbours[ends[w]] = v
+                ends[w] += 1
     starts, end = np.zeros(n_vertices + 1, np.int64), 0
     for v in range(n_vertices):
-        neighbours[places[v] : places[v + 1]].sort()
-        for k in range(places[v], places[v + 1]):
-            if end == starts[v] or neighbours[end - 1] != neighbours[k]:
-                neighbours[end] = neighbours[k]
-                end += 1
+        for k in range(places[v], ends[v]):
+            neighbours[end] = neighbours[k]
+            end += 1
         starts[v + 1] = end
     return Graph(starts, neighbours[:end].copy())
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from gvpipe.arrays import Array, Int32, Int64, Integers
 from gvpipe.mesh.unique_rows import row_ids
@@ -26,9 +25,11 @@ def unique_edges(faces: Int32) -> Int32:
 
 def adjacency(faces: Int32, n_vertices: int) -> sparse.csr_array:
     """Return the symmetric ``(V, V)`` vertex adjacency of ``faces (T, 3)``, entries 1, diagonal empty."""
-    edges = unique_edges(faces)
-    rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
-    return sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n_vertices, n_vertices))
+    from gvpipe.mesh.graph_kernels import link_vertices
+
+    graph = link_vertices(np.ascontiguousarray(faces, np.int32), n_vertices)
+    entries = np.ones(len(graph.neighbours)), graph.neighbours, graph.starts.astype(np.int32)
+    return sparse.csr_array(entries, shape=(n_vertices, n_vertices))
 
 
 def k_ring(neighbours: sparse.csr_array, k: int, some: Integers | None = None) -> sparse.csr_array:
@@ -43,8 +44,10 @@ def k_ring(neighbours: sparse.csr_array, k: int, some: Integers | None = None) -
 
 def components(neighbours: sparse.csr_array) -> tuple[int, Int32]:
     """Return the number of connected components and each vertex's component ``(V,)``."""
-    count, labels = csgraph.connected_components(neighbours, directed=False)
-    return int(count), labels
+    from gvpipe.mesh.graph_kernels import Graph, label_components
+
+    labels = label_components(Graph(neighbours.indptr.astype(np.int64), neighbours.indices.astype(np.int32, copy=False)))
+    return int(labels.max(initial=-1)) + 1, labels
 
 
 def weld(points: NDArray[np.generic]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
