@@ -1,11 +1,12 @@
-"""Eight numbers at once in kernels: as many equal computations side by side, with the bits that each has alone.
+"""Several numbers at once in kernels: as many equal computations side by side, with the bits that each has alone.
 
 LLVM makes vector instructions of long loops over slices. Loops of a few turns, as over a small matrix, stay scalar. So kernels
-that solve many small systems put eight of them side by side, number k of all of them in one row of `LANES`, and work on rows:
+that solve many small systems put eight of them side by side, number k of all of them in one row of `LANES`, and work on rows;
+kernels that move points have rows of `COORDINATES`, the last of which is unused:
 
-- `load` and `store` move a row between a flat array and registers;
+- `load` and `store` move a row between a flat array and registers, `load_point` and `store_point` a row of coordinates;
 - ``+``, ``-``, ``*`` and ``/`` of two rows work lane by lane, and nothing is fused;
-- `same` makes a row of one number.
+- `same` and `same_point` make a row of one number.
 
 A processor with narrower registers takes several instructions a row.
 """
@@ -24,64 +25,77 @@ from numba.extending import intrinsic, lower_builtin, models, register_model
 
 from gvpipe.arrays import Float64
 
-LANES = 8
-ROW = ir.VectorType(ir.DoubleType(), LANES)
+LANES, COORDINATES = 8, 4  # numbers in a row
 OPERATORS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul", operator.truediv: "fdiv"}
+
+Load = Callable[[Float64, int], Float64]
+Store = Callable[[Float64, int, Float64], None]
+Same = Callable[[float], Float64]
 
 
 class _RowType(types.Type):
-    def __init__(self) -> None:
-        super().__init__("Row")
+    """Of a row of ``lanes`` numbers."""
 
-
-row_type = _RowType()
+    def __init__(self, lanes: int) -> None:
+        self.lanes = lanes
+        super().__init__(f"Row{lanes}")
 
 
 @register_model(_RowType)
 class _RowModel(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, ROW)
+        super().__init__(manager, kind, _vector(kind.lanes))
 
 
-def _load(_typing: Any, array: Any, at: Any) -> tuple[Any, Any]:
-    """The row of a flat array that begins at a place."""
-
-    def generate(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-        row = builder.load(_pointer(context, builder, sig, given))
-        row.align = 8
-        return row
-
-    return row_type(array, types.intp), generate
+def _vector(lanes: int) -> Any:
+    return ir.VectorType(ir.DoubleType(), lanes)
 
 
-def _store(_typing: Any, array: Any, at: Any, row: Any) -> tuple[Any, Any]:
-    """Put a row into a flat array from a place on."""
+def _make_rows(lanes: int) -> tuple[Load, Store, Same]:
+    """Teach numba rows of so many numbers; return what loads, stores and makes them."""
+    row_type = _RowType(lanes)
 
-    def generate(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-        builder.store(given[2], _pointer(context, builder, sig, given)).align = 8
-        return context.get_dummy_value()
+    def load(_typing: Any, array: Any, at: Any) -> tuple[Any, Any]:
+        """The row of a flat array that begins at a place."""
 
-    return types.void(array, types.intp, row_type), generate
+        def generate(context: Any, builder: Any, sig: Any, given: Any) -> Any:
+            row = builder.load(_pointer(context, builder, sig, given, lanes))
+            row.align = 8
+            return row
+
+        return row_type(array, types.intp), generate
+
+    def store(_typing: Any, array: Any, at: Any, row: Any) -> tuple[Any, Any]:
+        """Put a row into a flat array from a place on."""
+
+        def generate(context: Any, builder: Any, sig: Any, given: Any) -> Any:
+            builder.store(given[2], _pointer(context, builder, sig, given, lanes)).align = 8
+            return context.get_dummy_value()
+
+        return types.void(array, types.intp, row_type), generate
+
+    def same(_typing: Any, number: Any) -> tuple[Any, Any]:
+        """A row of one number."""
+
+        def generate(context: Any, builder: Any, sig: Any, given: Any) -> Any:
+            row = ir.Constant(_vector(lanes), ir.Undefined)
+            for lane in range(lanes):
+                row = builder.insert_element(row, given[0], ir.Constant(ir.IntType(32), lane))
+            return row
+
+        return row_type(types.float64), generate
+
+    for function, instruction in OPERATORS.items():
+        _add_operator(function, instruction, row_type)
+    return cast(Load, intrinsic(load)), cast(Store, intrinsic(store)), cast(Same, intrinsic(same))
 
 
-def _same(_typing: Any, number: Any) -> tuple[Any, Any]:
-    """A row of one number."""
-
-    def generate(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-        row = ir.Constant(ROW, ir.Undefined)
-        for lane in range(LANES):
-            row = builder.insert_element(row, given[0], ir.Constant(ir.IntType(32), lane))
-        return row
-
-    return row_type(types.float64), generate
-
-
-def _pointer(context: Any, builder: Any, sig: Any, given: Any) -> Any:
+def _pointer(context: Any, builder: Any, sig: Any, given: Any, lanes: int) -> Any:
     array = context.make_array(sig.args[0])(context, builder, given[0])
-    return builder.bitcast(builder.gep(array.data, [given[1]]), ROW.as_pointer())
+    return builder.bitcast(builder.gep(array.data, [given[1]]), _vector(lanes).as_pointer())
 
 
-def _add_operator(function: Any, instruction: str) -> None:
+def _add_operator(function: Any, instruction: str, row_type: Any) -> None:
     """Teach numba an operator of two rows."""
 
     class Template(ConcreteTemplate):  # type: ignore[misc]
@@ -94,21 +108,21 @@ def _add_operator(function: Any, instruction: str) -> None:
     lower_builtin(function, row_type, row_type)(lower)
 
 
-def _load_plain(array: Float64, at: int) -> Float64:
-    return array[at : at + LANES].copy()
+def _make_plain_rows(lanes: int) -> tuple[Load, Store, Same]:
+    """As `_make_rows`, where kernels are Python."""
+
+    def load(array: Float64, at: int) -> Float64:
+        return array[at : at + lanes].copy()
+
+    def store(array: Float64, at: int, row: Float64) -> None:
+        array[at : at + lanes] = row
+
+    def same(number: float) -> Float64:
+        return np.full(lanes, number)
+
+    return load, store, same
 
 
-def _store_plain(array: Float64, at: int, row: Float64) -> None:
-    array[at : at + LANES] = row
-
-
-def _same_plain(number: float) -> Float64:
-    return np.full(LANES, number)
-
-
-is_plain = config.DISABLE_JIT  # kernels are Python then
-load = cast(Callable[[Float64, int], Float64], _load_plain if is_plain else intrinsic(_load))
-store = cast(Callable[[Float64, int, Float64], None], _store_plain if is_plain else intrinsic(_store))
-same = cast(Callable[[float], Float64], _same_plain if is_plain else intrinsic(_same))
-for _function, _instruction in OPERATORS.items():
-    _add_operator(_function, _instruction)
+_make = _make_plain_rows if config.DISABLE_JIT else _make_rows
+load, store, same = _make(LANES)
+load_point, store_point, same_point = _make(COORDINATES)

@@ -6,12 +6,13 @@ A frame costs its group of pictures (H.264) or its one picture (JPEG), if there 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cached_property, partial
 
 import numpy as np
 
-from gvcodecs.mcgv.base.surface import DecodedBase, read_surface
+from gvcodecs.mcgv.base.surface import DecodedBase, Slots, open_surface
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.chart_coding import SECTION as CHARTS
 from gvcodecs.mcgv.layout.chart_coding import decode_charts
@@ -20,8 +21,8 @@ from gvcodecs.mcgv.layout.kd_tree import place_points
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.tiles import place_charts
 from gvcodecs.mcgv.motion.affine import AffineMotion
-from gvcodecs.mcgv.motion.blended import BlendedMotion, decode_transforms
-from gvcodecs.mcgv.motion.contract import Motion
+from gvcodecs.mcgv.motion.blended import BlendedMotion, decode_transforms, read_blend
+from gvcodecs.mcgv.motion.contract import Motion, Samples
 from gvcodecs.mcgv.motion.skinning_coding import Trajectories
 from gvcodecs.mcgv.pictures.no_pictures import NoPictures
 from gvcodecs.mcgv.pictures.outliers import SECTION
@@ -36,6 +37,7 @@ from gvpipe.media.video import VideoReader
 BYTES_PER_PIXEL, BYTES_PER_SLOT = 4, 200
 TOGETHER = 16  # frames whose transforms are kept for other threads
 LARGE = 1 << 20  # coordinates; fewer do not pay for other threads
+MANY_SLOTS = 1 << 14  # whose layout is found beside their blend
 
 
 class McgvReader:
@@ -48,6 +50,7 @@ class McgvReader:
     def __init__(self, bitstream: Bitstream, header: Header) -> None:
         self._header, self._bitstream = header, bitstream
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
+        self._decoded: DecodedBase | None = None
         self._video = _open_video(bitstream, self._header, self._bounds)
         if self._video.n_frames != bitstream.n_frames:
             raise CorruptFile(f"the video has {self._video.n_frames} pictures in place of {bitstream.n_frames}")
@@ -64,23 +67,44 @@ class McgvReader:
         """``(T, 3) int32`` triangles."""
         return self._surface.faces
 
-    @cached_property
+    @property
     def _surface(self) -> DecodedBase:
-        return read_surface(self._bitstream, self._header)
+        with self._open_surface() as (_, finished):
+            return finished()
+
+    @contextmanager
+    def _open_surface(self) -> Iterator[tuple[Slots, Callable[[], DecodedBase]]]:
+        """As `open_surface`; the surface is kept."""
+        if (surface := self._decoded) is not None:
+            yield surface, lambda: surface
+            return
+        with open_surface(self._bitstream, self._header) as (slots, finished):
+            yield slots, lambda: self._keep(finished())
+
+    def _keep(self, surface: DecodedBase) -> DecodedBase:
+        self._decoded = surface
+        return surface
 
     @cached_property
     def _motion(self) -> Motion:
+        return self._read_blended() if self._header.prediction == "blended" else self._read_affine()
+
+    def _read_blended(self) -> Motion:
+        """The blend, with the layout, the first transforms and the vertices beside it: most of each is compiled."""
         bitstream, header = self._bitstream, self._header
-        if header.prediction == "blended":
-            has_one = header.segments == 1
+        has_one = header.segments == 1
 
-            def decode() -> Trajectories | None:
-                return decode_transforms(bitstream, header, 0, self._bounds[1]) if has_one else None
+        def decode() -> Trajectories | None:
+            return decode_transforms(bitstream, header, 0, self._bounds[1]) if has_one else None
 
-            with beside(decode, has_one) as only:  # its transforms decode beside the mesh: most of both is compiled
-                surface = self._surface
-                layout = read_layout(bitstream, header, surface)
-                return BlendedMotion(bitstream, header, surface, layout, self._bounds, only())
+        with beside(decode, has_one) as only, self._open_surface() as (slots, finished):
+            with beside(lambda: read_layout(bitstream, header, slots), slots.n_slots >= MANY_SLOTS) as layout:
+                blend = read_blend(bitstream, header, slots)
+                samples = Samples(finished(), layout())
+            return BlendedMotion(bitstream, header, samples, blend, self._bounds, only())
+
+    def _read_affine(self) -> Motion:
+        bitstream, header = self._bitstream, self._header
         surface = self._surface
         if header.placement == "halves":
             clusters = decode_slot_clusters(bitstream.section("clusters"), surface.order, header.clusters)
@@ -141,22 +165,22 @@ def _open_video(bitstream: Bitstream, header: Header, bounds: list[int]) -> Vide
     return VideoReader(bitstream.pictures, header.profile, header.width, 3 * header.height, bitstream.budget)
 
 
-def read_layout(bitstream: Bitstream, header: Header, surface: DecodedBase, groups: Integers | None = None) -> Layout:
+def read_layout(bitstream: Bitstream, header: Header, slots: Slots, groups: Integers | None = None) -> Layout:
     """The slots' pixels in a file; by halves, ``groups (S,)`` belong together, connected pieces if not given.
 
     Raises:
         CorruptFile: they are not what an encoder writes.
     """
     n_pixels = header.width * header.height
-    bitstream.budget.ask(f"a layout of {n_pixels} pixels", BYTES_PER_PIXEL * n_pixels + BYTES_PER_SLOT * surface.n_slots)
+    bitstream.budget.ask(f"a layout of {n_pixels} pixels", BYTES_PER_PIXEL * n_pixels + BYTES_PER_SLOT * slots.n_slots)
     if not header.pictures:
-        return Layout(1, 1, np.zeros(surface.n_slots, np.int64))
-    if n_pixels < surface.n_slots:
-        raise CorruptFile(f"header: planes of {header.width}x{header.height} do not hold {surface.n_slots} samples")
+        return Layout(1, 1, np.zeros(slots.n_slots, np.int64))
+    if n_pixels < slots.n_slots:
+        raise CorruptFile(f"header: planes of {header.width}x{header.height} do not hold {slots.n_slots} samples")
     if header.placement == "halves":
-        groups = surface.points.pieces()[surface.point] if groups is None else groups
-        return place_points(surface.lattice, groups, header.width, header.height, header.block)
+        groups = slots.points.pieces()[slots.point] if groups is None else groups
+        return place_points(slots.lattice, groups, header.width, header.height, header.block)
     if header.placement == "tiles":
-        charts = decode_charts(bitstream.section(CHARTS), surface.points.neighbours)
-        return place_charts(surface.lattice, charts[surface.point], header.width, header.height, header.block)
-    return decode_pixels(bitstream.section("pixels"), surface.order, header.width, header.height)
+        charts = decode_charts(bitstream.section(CHARTS), slots.points.neighbours)
+        return place_charts(slots.lattice, charts[slots.point], header.width, header.height, header.block)
+    return decode_pixels(bitstream.section("pixels"), slots.order, header.width, header.height)

@@ -298,8 +298,10 @@ export const CHART_KERNELS_MAX_NEAR = 8;
 // gvcodecs.mcgv.layout.coding
 export const CODING_CONTEXTS = 4;
 
+// gvcodecs.mcgv.layout.directions
+export const DIRECTIONS_COMMON = 90;
+
 // gvcodecs.mcgv.layout.kd_tree
-export const KD_TREE_COMMON = 90;
 export const KD_TREE_FRAME = 4;
 export const KD_TREE_MOMENT_BITS = 10;
 export const KD_TREE_SPREAD = 2;

@@ -7,6 +7,8 @@ slot, and a blend moved vertices at one base position together.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,24 +26,16 @@ STILL = "still"  # section: which points never move
 
 
 @dataclass(frozen=True)
-class DecodedBase:
-    """The base frame, and its S slots.
+class Slots:
+    """The base frame's S slots: what motion and pictures need of it.
 
     Args:
-        faces: ``(T, 3)`` triangles over V vertices.
-        rest: ``(V, 3)`` decoded base positions, model units.
-        vertices: ``(M,)`` the vertices that move, ascending.
-        slot: ``(M,)`` theirs.
-        lattice: ``(S, 3)`` the slots' base positions, lattice units; base: the same in model units.
+        lattice: ``(S, 3)`` their base positions, lattice units; base: the same in model units.
         point: ``(S,)`` the point of each slot; members: ``(P,)`` a slot of each point.
         points: that a blend moves.
         order: ``(S,)`` slots in the codec's order.
     """
 
-    faces: Int32
-    rest: Float32
-    vertices: Int64
-    slot: Int64
     lattice: Int32
     base: Float64
     point: Int64
@@ -53,6 +47,23 @@ class DecodedBase:
     def n_slots(self) -> int:
         """S, the number of slots."""
         return len(self.lattice)
+
+
+@dataclass(frozen=True)
+class DecodedBase(Slots):
+    """The base frame: its slots, and its vertices.
+
+    Args:
+        faces: ``(T, 3)`` triangles over V vertices.
+        rest: ``(V, 3)`` decoded base positions, model units.
+        vertices: ``(M,)`` the vertices that move, ascending.
+        slot: ``(M,)`` theirs.
+    """
+
+    faces: Int32
+    rest: Float32
+    vertices: Int64
+    slot: Int64
 
     def fill_still(self, positions: Float32) -> None:
         """Fill in the vertices of ``positions (n, V, 3)`` that never move."""
@@ -72,13 +83,24 @@ def _place(lattice: Int32, header: Header) -> Float64:
 
 def read_surface(bitstream: Bitstream, header: Header) -> DecodedBase:
     """Decode the sections ``mesh``, ``order`` and ``still``; raises `CorruptFile`."""
+    with open_surface(bitstream, header) as (_, finished):
+        return finished()
+
+
+@contextmanager
+def open_surface(bitstream: Bitstream, header: Header) -> Iterator[tuple[Slots, Callable[[], DecodedBase]]]:
+    """As `read_surface`: give the slots, and a function that waits for all of it. Both raise `CorruptFile`.
+
+    What needs slots alone can be done meanwhile.
+    """
     if bitstream.version < 3:
         base = read_base(bitstream)
         points, point, members = weld_vertices(base.points, base.faces, base.visits)
         own, placed = np.arange(len(base.points)), _place(base.points, header)
-        order = np.argsort(base.visits)
-        rest = placed.astype(np.float32)
-        return DecodedBase(base.faces, rest, own, own, base.points, placed, point, members, points, order)
+        order, rest = np.argsort(base.visits), placed.astype(np.float32)
+        surface = DecodedBase(base.points, placed, point, members, points, order, base.faces, rest, own, own)
+        yield surface, lambda: surface
+        return
     with open_points(bitstream, bitstream.version > 3, bitstream.version > 4) as (opened, finished):
         n_points = len(opened.lattice)
         has_still = STILL in bitstream.sections
@@ -86,21 +108,18 @@ def read_surface(bitstream: Bitstream, header: Header) -> DecodedBase:
         moves = np.flatnonzero(~still)
         if not len(moves):
             raise CorruptFile("section 'still' is corrupt: one point at least has samples; get the file again from its source")
-        points = Points.moving(opened, moves)
-        mesh = finished()
-    slot = np.cumsum(~still) - 1
-    placed = _place(mesh.lattice, header)
-    vertices = np.flatnonzero(~still[mesh.point])
-    own = np.arange(len(moves))
-    return DecodedBase(
-        faces=mesh.faces,
-        rest=placed.astype(np.float32)[mesh.point],
-        vertices=vertices,
-        slot=slot[mesh.point[vertices]],
-        lattice=mesh.lattice[moves],
-        base=placed[moves],
-        point=own,
-        members=own,
-        points=points,
-        order=own,
-    )
+        placed, own = _place(opened.lattice, header), np.arange(len(moves))
+        slots = Slots(opened.lattice[moves], placed[moves], own, own, Points.moving(opened, moves), own)
+
+        def finish() -> DecodedBase:
+            mesh = finished()
+            vertices = np.flatnonzero(~still[mesh.point])
+            return DecodedBase(
+                **vars(slots),
+                faces=mesh.faces,
+                rest=placed.astype(np.float32)[mesh.point],
+                vertices=vertices,
+                slot=(np.cumsum(~still) - 1)[mesh.point[vertices]],
+            )
+
+        yield slots, finish

@@ -15,7 +15,6 @@ has one pair of directions for all of its cuts: transforms code what is monotono
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 
@@ -25,21 +24,11 @@ from gvcodecs.mcgv.layout.layout import Layout
 from gvpipe.arrays import Bool, Int64, Integers
 from gvpipe.errors import CorruptFile, InputError
 
-COMMON = 90  # a multiple of every direction's squared length
 FRAME = 4  # pixels: side of the squares that share one pair of directions
 MOMENT_BITS = 10  # of deviations in second moments: their sums stay exact in a double for 2**24 vertices
 SPREAD = 2  # groups are moved apart by this many times their distance from the middle
 MAX_COORDINATE = 1 << 20  # of points: no finer lattice is ever chosen
 MAX_RATIO = 3.0  # of the sides of an automatic plane
-
-
-def _directions() -> Int64:
-    steps = itertools.product(range(-2, 3), repeat=3)
-    return np.array([d for d in steps if d > (0, 0, 0) and math.gcd(*d) == 1], np.int64)
-
-
-DIRECTIONS = _directions()  # (49, 3), lexicographic
-WEIGHTS = COMMON // np.square(DIRECTIONS).sum(axis=1)  # (49,)
 
 
 @dataclass(frozen=True)
@@ -107,14 +96,12 @@ def fill(cells: Cells, order: Int64, points: Int64, width: int, block: int, shif
         block: as in `place_points`.
         shift: of moments where cells turn as their points do; None: they keep their directions.
     """
-    from gvcodecs.mcgv.layout.kd_tree_kernels import place_cells
+    from gvcodecs.mcgv.layout.kd_tree_kernels import Halving, place_cells
 
-    order, points = order.copy(), np.ascontiguousarray(points)
-    while (cells.side > FRAME).any():
-        cells = _halve(cells, order, points, shift, block)
-    across, down = (cells.across, cells.down) if shift is None else _turn(cells, order, points, shift)
+    halving = Halving(np.ascontiguousarray(points), width, block, FRAME, -1 if shift is None else shift)
     pixel = np.empty(len(points), np.int64)
-    place_cells(order, cells.starts, np.hstack([cells.corner, cells.side]), np.hstack([across, down]), points, width, pixel)
+    rectangles, directions = np.hstack([cells.corner, cells.side]), np.hstack([cells.across, cells.down])
+    place_cells(order.copy(), cells.starts, rectangles, directions, halving, pixel)
     return pixel
 
 
@@ -125,29 +112,11 @@ def moment_shift(points: Int64) -> int:
 
 def _spread(points: Int64, groups: Integers | None) -> Int64:
     """Move groups apart, so that cuts run between them first; all coordinates from 0."""
-    if groups is not None:
+    if groups is not None and groups.max(initial=0) > 0:
         counts = np.maximum(np.bincount(groups), 1)
-        sums = np.zeros((len(counts), 3), np.int64)
-        np.add.at(sums, groups, points)
+        sums = np.stack([np.bincount(groups, column) for column in points.T], axis=1).astype(np.int64)  # below 2**53: exact
         points = points + SPREAD * (sums // counts[:, None] - points.sum(axis=0) // len(points))[groups]
     return np.asarray(points - points.min(axis=0))
-
-
-def _halve(cells: Cells, order: Int64, points: Int64, shift: int | None, block: int) -> Cells:
-    """Cut every cell of more than one pixel across its longer side, and its vertices with it; ``order`` changes."""
-    from gvcodecs.mcgv.layout.kd_tree_kernels import sort_cells
-
-    counts = np.diff(cells.starts)
-    wide = cells.side[:, 0] >= cells.side[:, 1]
-    longer = cells.side.max(axis=1)
-    across, down = (cells.across, cells.down) if shift is None else _turn(cells, order, points, shift)
-    sort_cells(order, cells.starts, np.where(wide[:, None], across, down), points)
-    first = np.where(longer >= 2 * block, longer // block // 2 * block, longer // 2)  # columns or rows of the first half
-    first = np.where(longer == 1, 1, first)
-    kept = (2 * counts * first + longer) // (2 * longer)  # rounded; no half overflows, since the whole did not
-    starts, corner, side, used = cut(cells.starts, cells.corner, cells.side, first, kept)
-    across, down = np.repeat(across, 2, axis=0)[used], np.repeat(down, 2, axis=0)[used]
-    return Cells(starts, corner, side, across, down)
 
 
 def cut(starts: Int64, corner: Int64, side: Int64, first: Int64, kept: Int64) -> tuple[Int64, Int64, Int64, Bool]:
@@ -171,27 +140,6 @@ def cut(starts: Int64, corner: Int64, side: Int64, first: Int64, kept: Int64) ->
     return np.r_[0, ends[used]], corners[used], sides[used], used
 
 
-def _turn(cells: Cells, order: Int64, points: Int64, shift: int) -> tuple[Int64, Int64]:
-    """Return the cells' directions ``(n, 3)`` across and down, after a look at their points."""
-    across, down, wide = cells.across.copy(), cells.down.copy(), cells.side[:, 0] >= cells.side[:, 1]
-    frames = np.flatnonzero((cells.side == FRAME).all(axis=1))
-    larger = np.flatnonzero(cells.side.max(axis=1) > FRAME)
-    if not len(frames) and not len(larger):
-        return across, down
-    moments = second_moments(points, order, cells.starts, shift)
-    scores = spreads(moments[larger])
-    best = _towards(DIRECTIONS[scores.argmax(axis=1)], np.where(wide[larger, None], across[larger], down[larger]))
-    for target, chosen in ((across, wide[larger]), (down, ~wide[larger])):
-        target[larger[chosen]] = best[chosen]
-    if len(frames):
-        one, two = widest_pairs(spreads(moments[frames]))
-        u, v = across[frames], down[frames]
-        swap = _likeness(two, u) + _likeness(one, v) > _likeness(one, u) + _likeness(two, v)
-        across[frames] = _towards(np.where(swap[:, None], two, one), u)
-        down[frames] = _towards(np.where(swap[:, None], one, two), v)
-    return across, down
-
-
 def second_moments(points: Int64, order: Int64, starts: Int64, shift: int, counts: Int64 | None = None) -> Int64:
     """Second moments ``(n, 6)`` of the cells' points about their means: xx, yy, zz, xy, xz, yz.
 
@@ -200,34 +148,5 @@ def second_moments(points: Int64, order: Int64, starts: Int64, shift: int, count
     from gvcodecs.mcgv.layout.kd_tree_kernels import add_moments
 
     moments = np.empty((len(starts) - 1, 6), np.int64)
-    add_moments(points, order, starts, shift, np.ones(len(order), np.int64) if counts is None else counts, moments)
+    add_moments(points, order, starts, shift, order[:0] if counts is None else counts, moments)
     return moments
-
-
-def spreads(moments: Int64) -> Int64:
-    """`COMMON` times the points' spread ``(n, 49)`` along each direction."""
-    x, y, z = DIRECTIONS.T
-    terms = np.stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z])
-    return np.asarray(moments @ (terms * WEIGHTS))
-
-
-def widest_pairs(scores: Int64) -> tuple[Int64, Int64]:
-    """The directions ``(n, 3)`` of the highest of ``scores (n, 49)``, and of the highest at 60 degrees or more from these."""
-    one = DIRECTIONS[scores.argmax(axis=1)]
-    square = 4 * np.square(one @ DIRECTIONS.T) * WEIGHTS * _weight(one)[:, None]
-    return one, DIRECTIONS[np.where(square <= COMMON**2, scores, -1).argmax(axis=1)]
-
-
-def _towards(directions: Int64, before: Int64) -> Int64:
-    """Turn about those that point against the ones before."""
-    against = (directions * before).sum(axis=1) < 0
-    return np.where(against[:, None], -directions, directions)
-
-
-def _likeness(one: Int64, two: Int64) -> Int64:
-    """`COMMON` squared times the squared cosines between directions ``(n, 3)``; 0 where one is unknown."""
-    return np.asarray(np.square((one * two).sum(axis=1)) * _weight(one) * _weight(two))
-
-
-def _weight(directions: Int64) -> Int64:
-    return np.asarray(COMMON // np.maximum(np.square(directions).sum(axis=1), 1))

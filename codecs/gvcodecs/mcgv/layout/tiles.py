@@ -17,16 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gvcodecs.mcgv.layout.kd_tree import (
-    DIRECTIONS,
-    Cells,
-    check_room,
-    fill,
-    moment_shift,
-    second_moments,
-    spreads,
-    widest_pairs,
-)
+from gvcodecs.mcgv.layout.directions import DIRECTIONS, spreads, widest_pairs
+from gvcodecs.mcgv.layout.kd_tree import Cells, check_room, fill, moment_shift, second_moments
 from gvcodecs.mcgv.layout.layout import Layout
 from gvpipe.arrays import Int64, Integers
 

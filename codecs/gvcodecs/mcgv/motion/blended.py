@@ -10,9 +10,8 @@ import numpy as np
 
 from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
-from gvcodecs.mcgv.base.surface import DecodedBase
+from gvcodecs.mcgv.base.surface import Slots
 from gvcodecs.mcgv.header import Header
-from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.motion.blend_problem import Fitted
 from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
 from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit
@@ -27,9 +26,9 @@ BYTES_PER_POINT, SECONDS_PER_POINT = 400, 1e-6
 CHUNK = 16  # frames whose transforms are made at a time
 
 
-def keep_blend(bitstream: Bitstream, surface: DecodedBase, header: Header) -> None:
+def keep_blend(bitstream: Bitstream, slots: Slots, header: Header) -> None:
     """Check that a file may take the memory and work of its skinning weights; raises `OverBudget`."""
-    n_points, n_transforms = len(surface.members), CHUNK * 12 * header.clusters
+    n_points, n_transforms = len(slots.members), CHUNK * 12 * header.clusters
     what = f"a blend of {header.clusters} clusters for {n_points} points"
     bitstream.budget.keep(what, BYTES_PER_POINT * n_points + 24 * n_transforms, SECONDS_PER_POINT * n_points)
 
@@ -61,13 +60,20 @@ def code_blended(start: Start, fitted: Fitted, report: Progress) -> CodedMotion:
     return CodedMotion(fitted.n_clusters, start.step, coded, predict)
 
 
+def read_blend(bitstream: Bitstream, header: Header, slots: Slots) -> Blend:
+    """The blend of a file's points; raises `CorruptFile`, `OverBudget`."""
+    keep_blend(bitstream, slots, header)
+    weights = decode_weights(bitstream.section("weights"), slots.points.neighbours, header.clusters)
+    return Blend(slots.base[slots.members], weights, header.clusters)
+
+
 class BlendedMotion:
     """Mirror of `code_blended`: frames of a bitstream from its transforms and samples.
 
     Args:
         bitstream, header: of the file.
-        surface: of the base frame.
-        layout: the sample points' pixels.
+        samples: of the vertices that move.
+        blend: of their points (`read_blend`).
         bounds: first frame of every segment, and F.
         first: transforms of the first segment, if they are decoded already.
     """
@@ -76,34 +82,33 @@ class BlendedMotion:
         self,
         bitstream: Bitstream,
         header: Header,
-        surface: DecodedBase,
-        layout: Layout,
+        samples: Samples,
+        blend: Blend,
         bounds: list[int],
         first: Trajectories | None = None,
     ) -> None:
+        from gvcodecs.mcgv.motion.reconstruction_kernels import skinned_points
+
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
-        keep_blend(bitstream, surface, header)
-        weights = decode_weights(bitstream.section("weights"), surface.points.neighbours, header.clusters)
-        self._blend = Blend(surface.base[surface.members], weights, header.clusters)
-        self._samples = Samples(surface, layout)
-        point = surface.point[self._samples.slots]
-        self._base, self._homogeneous = surface.base[self._samples.slots], self._blend.homogeneous[point]
-        self._clusters, self._parts = weights.clusters[point], weights.weights[point] / TOTAL
+        self._blend, weights = blend, blend.weights
+        self._samples, surface = samples, samples.surface
+        point = surface.point[samples.slots]
+        clusters, parts = weights.clusters[point], weights.weights[point] / TOTAL
+        self._points = skinned_points(surface.base[samples.slots], blend.homogeneous[point], clusters, parts)
         self._residuals = header.residual_step * header.profile.offsets
         self._segment: tuple[int, Trajectories | None] = (0, first)
         self._chunk: tuple[int, int, Float64] = (-1, -1, np.zeros((0, 0, 4, 3)))
 
     def rebuild(self, frame: int, samples: Array) -> Callable[[Float32], None]:
         """As `Motion.rebuild`."""
-        from gvcodecs.mcgv.motion.reconstruction_kernels import Sites, SkinnedPoints, rebuild_blended
+        from gvcodecs.mcgv.motion.reconstruction_kernels import Sites, in_rows, rebuild_blended
 
         s = locate(self._bounds, frame)
         chunk, offset = divmod(frame - self._bounds[s], CHUNK)
         if self._chunk[:2] != (s, chunk):
             self._chunk = (s, chunk, self._transforms(s, chunk))
         sites = Sites(self._samples.vertices, self._samples.pixels(samples.shape[1]), self._residuals)
-        points = SkinnedPoints(self._base, self._homogeneous, self._clusters, self._parts)
-        return partial(rebuild_blended, samples.reshape(3, -1), sites, points, self._chunk[2][offset])
+        return partial(rebuild_blended, samples.reshape(3, -1), sites, self._points, in_rows(self._chunk[2][offset]))
 
     def _transforms(self, s: int, chunk: int) -> Float64:
         """``(n, K, 4, 3)`` of a chunk of a segment's frames: always whole, so that sums do not depend on what else is read."""

@@ -8,8 +8,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from gvpipe.arrays import Array, Float32, Float64, Int32, Int64
 from gvpipe.compiled import compiled
+from gvpipe.lanes import COORDINATES, load_point, same_point, store_point
 
 
 class Sites(NamedTuple):
@@ -39,19 +42,31 @@ class AffinePoints(NamedTuple):
 
 
 class SkinnedPoints(NamedTuple):
-    """What linear blend skinning needs of M vertices.
+    """What linear blend skinning needs of M vertices; arrays are flat, in rows of four.
 
     Args:
-        base: ``(M, 3)`` base positions, model units.
-        homogeneous: ``(M, 4)`` coordinates.
-        clusters: ``(M, 4) int32``, used ones first.
-        weights: ``(M, 4)`` parts of one; 0 where unused.
+        base: M rows: base positions, model units, and 0.
+        homogeneous: M rows of coordinates.
+        clusters: M rows of int32.
+        weights: M rows: parts of one; 0 where unused.
     """
 
     base: Float64
     homogeneous: Float64
     clusters: Int32
     weights: Float64
+
+
+def skinned_points(base: Float64, homogeneous: Float64, clusters: Int32, weights: Float64) -> SkinnedPoints:
+    """Of arrays ``(M, 3)``, and ``(M, 4)`` three times."""
+    return SkinnedPoints(in_rows(base), homogeneous.ravel(), clusters.ravel(), weights.ravel())
+
+
+def in_rows(vectors: Float64) -> Float64:
+    """Vectors ``(..., 3)`` as rows of four, flat."""
+    rows = np.zeros((*vectors.shape[:-1], COORDINATES))
+    rows[..., :3] = vectors
+    return rows.ravel()
 
 
 @compiled
@@ -76,19 +91,22 @@ def rebuild(samples: Array, sites: Sites, points: AffinePoints, transforms: Floa
 
 @compiled
 def rebuild_blended(samples: Array, sites: Sites, points: SkinnedPoints, transforms: Float64, positions: Float32) -> None:
-    """Fill ``positions (V, 3) float32``, model units, of one frame of linear blend skinning; arguments are as in `rebuild`."""
+    """Fill ``positions (V, 3) float32``, model units, of one frame of linear blend skinning.
+
+    Arguments are as in `rebuild`, but ``transforms``: flat, for each cluster four rows of four in model units, whose last
+    numbers are not used. All four clusters of a vertex are added up, unused ones too: branches would take longer.
+    """
+    row = np.empty(COORDINATES)
     for i in range(len(sites.vertices)):
+        at = COORDINATES * i
+        x, y, z = points.homogeneous[at], points.homogeneous[at + 1], points.homogeneous[at + 2]
+        moved = load_point(points.base, at)
+        for j in range(at, at + 4):
+            k = 4 * COORDINATES * points.clusters[j]
+            turned = same_point(x) * load_point(transforms, k) + same_point(y) * load_point(transforms, k + COORDINATES)
+            turned = turned + same_point(z) * load_point(transforms, k + 2 * COORDINATES)
+            moved = moved + same_point(points.weights[j]) * (turned + load_point(transforms, k + 3 * COORDINATES))
+        store_point(row, 0, moved)
         vertex, pixel = sites.vertices[i], sites.pixels[i]
-        x, y, z = points.homogeneous[i, 0], points.homogeneous[i, 1], points.homogeneous[i, 2]
-        moved_x, moved_y, moved_z = points.base[i, 0], points.base[i, 1], points.base[i, 2]
-        for j in range(points.weights.shape[1]):
-            weight = points.weights[i, j]
-            if weight == 0.0:
-                break
-            rows = transforms[points.clusters[i, j]]
-            moved_x += weight * (x * rows[0, 0] + y * rows[1, 0] + z * rows[2, 0] + rows[3, 0])
-            moved_y += weight * (x * rows[0, 1] + y * rows[1, 1] + z * rows[2, 1] + rows[3, 1])
-            moved_z += weight * (x * rows[0, 2] + y * rows[1, 2] + z * rows[2, 2] + rows[3, 2])
-        positions[vertex, 0] = moved_x + sites.residuals[samples[0, pixel]]
-        positions[vertex, 1] = moved_y + sites.residuals[samples[1, pixel]]
-        positions[vertex, 2] = moved_z + sites.residuals[samples[2, pixel]]
+        for axis in range(3):
+            positions[vertex, axis] = row[axis] + sites.residuals[samples[axis, pixel]]

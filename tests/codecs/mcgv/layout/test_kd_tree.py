@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from placing import halved
 from surfaces import awkward_surfaces, check_layout
 
-from gvcodecs.mcgv.layout.kd_tree import choose_size, place_points, second_moments
-from gvcodecs.mcgv.layout.kd_tree_kernels import place_cells, sort_cells
+from gvcodecs.mcgv.layout.kd_tree import FRAME, choose_size, place_points, second_moments
+from gvcodecs.mcgv.layout.kd_tree_kernels import Halving, place_cells
 from gvpipe.arrays import Int64
 from gvpipe.errors import CorruptFile, InputError
 from gvpipe.mesh.lattice import Lattice
@@ -72,19 +72,13 @@ def test_lattices_too_fine_for_halves_are_corrupt() -> None:
         place_points(points + 1, None, 16, 16, 16)
 
 
-@pytest.mark.parametrize("scale", [1, 60, 40_000])  # places are counted, digit by digit, or runs of points merged
 @pytest.mark.parametrize("n_cells", [1, 7, 300])
-def test_cells_are_sorted_and_measured(n_cells: int, scale: int) -> None:
-    """The kernels give what NumPy does: a stable sort by cell and place, and second moments."""
+def test_cells_are_measured(n_cells: int) -> None:
+    """The kernel gives the second moments that NumPy does."""
     draw = np.random.default_rng(n_cells)
-    points = draw.integers(0, 9, (2000, 3)) * scale
+    points = draw.integers(0, 9, (2000, 3)) * 60
     starts = np.r_[0, np.sort(draw.choice(np.arange(1, 2000), n_cells - 1, replace=False)), 2000].astype(np.int64)
-    directions, order = draw.integers(-2, 3, (n_cells, 3)), draw.permutation(2000)
-    cell = np.repeat(np.arange(n_cells), np.diff(starts))
-    keys = (points[order] * directions[cell]).sum(axis=1)
-    wanted = order[np.lexsort((keys, cell))]
-    sort_cells(order, starts, directions, points)
-    assert np.array_equal(order, wanted)
+    order = draw.permutation(2000)
     for counts in (None, draw.integers(1, 5, 2000)):
         times = np.ones(2000, np.int64) if counts is None else counts
         n = np.add.reduceat(times, starts[:-1])
@@ -95,16 +89,17 @@ def test_cells_are_sorted_and_measured(n_cells: int, scale: int) -> None:
         assert np.array_equal(second_moments(points, order, starts, 3, counts), moments)
 
 
-def test_small_cells_are_halved_down_to_pixels() -> None:
+@pytest.mark.parametrize("scale", [1, 60, 40_000])  # places are counted, digit by digit, or runs of points merged
+def test_cells_are_halved_down_to_pixels(scale: int) -> None:
     """The kernel gives each vertex the pixel that cutting cell after cell does, sorted anew for every cut."""
     draw = np.random.default_rng(3)
-    sides, x = [(4, 4), (4, 2), (1, 3), (3, 4), (1, 1), (4, 1), (2, 4)], 0
+    sides, x = [(4, 4), (4, 2), (1, 3), (3, 4), (1, 1), (4, 1), (2, 4), (48, 80), (7, 30), (16, 5)], 0
     rectangles, starts = [], [0]
     for width, height in sides:
         rectangles.append((x, 5, width, height))
         starts.append(starts[-1] + int(draw.integers(1, width * height + 1)))
         x += width
-    points, order = draw.integers(0, 4, (starts[-1], 3)), draw.permutation(starts[-1])
+    points, order = draw.integers(0, 4, (starts[-1], 3)) * scale, draw.permutation(starts[-1])
     directions = draw.integers(-2, 3, (len(sides), 6))
     wanted = np.full(len(order), -1)
 
@@ -112,11 +107,11 @@ def test_small_cells_are_halved_down_to_pixels() -> None:
         if not len(vertices):
             return
         if side == (1, 1):
-            wanted[vertices] = at[1] * 100 + at[0]
+            wanted[vertices] = at[1] * 400 + at[0]
             return
         axis = 0 if side[0] >= side[1] else 1
         vertices = vertices[np.argsort(points[vertices] @ turned[3 * axis : 3 * axis + 3], kind="stable")]
-        first = side[axis] // 2
+        first = side[axis] // 32 * 16 if side[axis] >= 32 else side[axis] // 2
         kept = (2 * len(vertices) * first + side[axis]) // (2 * side[axis])
         one, two, further = list(side), list(side), list(at)
         one[axis], two[axis], further[axis] = first, side[axis] - first, at[axis] + first
@@ -126,6 +121,7 @@ def test_small_cells_are_halved_down_to_pixels() -> None:
     for cell, (left, top, width, height) in enumerate(rectangles):
         halve(order[starts[cell] : starts[cell + 1]], (left, top), (width, height), directions[cell])
     pixel = np.empty(len(order), np.int64)
-    place_cells(order.copy(), np.array(starts), np.array(rectangles), directions, points, 100, pixel)
+    halving = Halving(points, 400, 16, FRAME, -1)
+    place_cells(order.copy(), np.array(starts), np.array(rectangles), directions, halving, pixel)
     assert np.array_equal(pixel, wanted)
     assert len(np.unique(pixel)) == len(pixel)

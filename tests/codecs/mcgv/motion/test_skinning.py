@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from blends import apply_weights, blended
 
-from gvcodecs.mcgv.motion.reconstruction_kernels import Sites, SkinnedPoints, rebuild_blended
+from gvcodecs.mcgv.motion.reconstruction_kernels import Sites, in_rows, rebuild_blended, skinned_points
 from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit, Weights, homogeneous
 
 
@@ -35,9 +35,9 @@ def test_rebuilding_is_base_blend_and_residual() -> None:
     vertices = draw.permutation(n)
     points = homogeneous(base)
     result = np.zeros((n, 3), np.float32)
-    skinned = SkinnedPoints(base[vertices], points[vertices], weights.clusters[vertices], weights.weights[vertices] / TOTAL)
+    skinned = skinned_points(base[vertices], points[vertices], weights.clusters[vertices], weights.weights[vertices] / TOTAL)
     sites = Sites(vertices, pixels, 0.01 * (np.arange(256.0) - 128))
-    rebuild_blended(samples, sites, skinned, transforms, result)
+    rebuild_blended(samples, sites, skinned, in_rows(transforms), result)
     wanted = base + apply_weights(points, weights, transforms)
     wanted[vertices] += 0.01 * (samples[:, pixels].T.astype(float) - 128)
     assert np.allclose(result, wanted, atol=1e-5)
