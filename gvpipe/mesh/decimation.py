@@ -62,67 +62,57 @@ class Decimation(NamedTuple):
     left: Int32
 
 
+class Progress(NamedTuple):
+    """A decimation under way. Kernels fill its arrays; they return another one, since fans may move in memory.
+
+    Args:
+        fans: the triangles that are there; end: where their sides end.
+        order, rings, starts, neighbours: as of `Decimation`, of the vertices that are gone; longer.
+        locked: ``(V,)`` the last wave that touched each vertex.
+        n_gone: how many vertices are gone.
+    """
+
+    fans: Fans
+    end: int
+    order: Int32
+    rings: Int32
+    starts: Int32
+    neighbours: Int32
+    locked: Int32
+    n_gone: int
+
+
 @compiled
 def decimate(faces: Int32, n_vertices: int, max_waves: int) -> Decimation:
     """Remove vertices of ``faces (T, 3)``, wave by wave, until none can go, or `MIN_COARSE` of V are left."""
-    (fans, end), hole = make_fans(faces, n_vertices), empty_hole(MAX_RING, n_vertices)
-    freed = np.empty(MAX_RING, np.int32)
-    _set_regular_degrees(fans, hole)
-    order, rings = np.empty(n_vertices, np.int32), np.empty(n_vertices, np.int32)
-    waves, starts = np.zeros(max_waves + 1, np.int32), np.zeros(n_vertices + 1, np.int32)
-    neighbours = np.empty((n_vertices + 1) * MAX_NEIGHBOURS + 2 * MAX_RING, np.int32)
-    locked = np.full(n_vertices, -1, np.int32)  # the last wave that touched a vertex
-    left = np.arange(n_vertices).astype(np.int32)
-    n_gone, n_waves = 0, 0
-    while n_waves < max_waves and n_vertices - n_gone > MIN_COARSE:
-        left = _with_triangles(left, fans)
-        candidates, costs = _removal_costs(left, fans, hole)
-        for i in _sorted_by_cost(costs):
-            v = candidates[i]
-            if n_vertices - n_gone <= MIN_COARSE:
-                break
-            if locked[v] == n_waves:
-                continue
-            size, closed = find_ring(v, fans, hole)
-            if size < 2:
-                continue
-            n_new, _ = fill_hole(size, closed, fans, hole)
-            if n_new < 0:
-                continue
-            for j in range(size):
-                locked[hole.ring[j]] = n_waves
-            remove_triangles(v, fans, freed)
-            start = starts[n_gone]
-            found = neighbours[start : start + MAX_NEIGHBOURS]
-            starts[n_gone + 1] = start + _list_neighbours(size, closed, fans, hole, found, n_gone)
-            fans, end = with_room(hole.triangles, n_new, fans, end)
-            add_triangles(hole.triangles, n_new, freed, fans)
-            order[n_gone] = v
-            rings[n_gone] = size if closed else -size
-            n_gone += 1
-        if n_gone == waves[n_waves]:
+    progress, left = begin(faces, n_vertices), np.arange(n_vertices).astype(np.int32)
+    hole, waves, n_waves = empty_hole(MAX_RING, n_vertices), np.zeros(max_waves + 1, np.int32), 0
+    while n_waves < max_waves and n_vertices - progress.n_gone > MIN_COARSE:
+        left = with_triangles(left, progress.fans)
+        candidates, costs = removal_costs(left, progress.fans)
+        progress = remove_wave(progress, candidates, costs, n_waves, hole)
+        if progress.n_gone == waves[n_waves]:
             break
         n_waves += 1
-        waves[n_waves] = n_gone
-    return Decimation(
-        order[:n_gone],
-        waves[: n_waves + 1],
-        starts[: n_gone + 1],
-        neighbours[: starts[n_gone]],
-        rings[:n_gone],
-        remaining_triangles(fans, len(faces)),
-    )
+        waves[n_waves] = progress.n_gone
+    return finish(progress, waves[: n_waves + 1], len(faces))
 
 
 @compiled
-def _set_regular_degrees(fans: Fans, hole: Hole) -> None:
-    for v in range(len(fans.heads)):
+def begin(faces: Int32, n_vertices: int) -> Progress:
+    """A decimation of ``faces (T, 3)`` over V vertices, none of which is gone yet."""
+    fans, end = make_fans(faces, n_vertices)
+    hole = empty_hole(MAX_RING, 0)
+    for v in range(n_vertices):
         size, closed = find_ring(v, fans, hole)
         fans.heads[v, REGULAR_DEGREE] = REGULAR_BOUNDARY if size > 0 and not closed else REGULAR
+    order, rings, starts = np.empty(n_vertices, np.int32), np.empty(n_vertices, np.int32), np.zeros(n_vertices + 1, np.int32)
+    neighbours = np.empty((n_vertices + 1) * MAX_NEIGHBOURS + 2 * MAX_RING, np.int32)
+    return Progress(fans, end, order, rings, starts, neighbours, np.full(n_vertices, -1, np.int32), 0)
 
 
 @compiled
-def _with_triangles(vertices: Int32, fans: Fans) -> Int32:
+def with_triangles(vertices: Int32, fans: Fans) -> Int32:
     """Those of the vertices that have triangles, moved to the front of ``vertices``."""
     n = 0
     for v in vertices:
@@ -133,11 +123,12 @@ def _with_triangles(vertices: Int32, fans: Fans) -> Int32:
 
 
 @compiled
-def _removal_costs(left: Int32, fans: Fans, hole: Hole) -> tuple[Int32, Int64]:
-    """Which n of the vertices that are ``left`` can be removed, and what the removal of each costs."""
-    candidates, costs = np.empty(len(left), np.int32), np.empty(len(left), np.int64)
+def removal_costs(vertices: Int32, fans: Fans) -> tuple[Int32, Int64]:
+    """Which n of the vertices can be removed, and what the removal of each costs."""
+    hole = empty_hole(MAX_RING, 0)  # of its own: threads that share a line of memory wait for each other
+    candidates, costs = np.empty(len(vertices), np.int32), np.empty(len(vertices), np.int64)
     n = 0
-    for v in left:
+    for v in vertices:
         size, closed = find_ring(v, fans, hole)
         if size < 2:
             continue
@@ -147,6 +138,45 @@ def _removal_costs(left: Int32, fans: Fans, hole: Hole) -> tuple[Int32, Int64]:
             candidates[n], costs[n] = v, cost - own * own
             n += 1
     return candidates[:n], costs[:n]
+
+
+@compiled
+def remove_wave(progress: Progress, candidates: Int32, costs: Int64, wave: int, hole: Hole) -> Progress:
+    """Remove one wave, of n ``candidates`` those that cost least first; its number is ``wave``."""
+    fans, end, order, rings, starts, neighbours, locked, n_gone = progress
+    freed = np.empty(MAX_RING, np.int32)
+    for i in _sorted_by_cost(costs):
+        v = candidates[i]
+        if len(order) - n_gone <= MIN_COARSE:
+            break
+        if locked[v] == wave:
+            continue
+        size, closed = find_ring(v, fans, hole)
+        if size < 2:
+            continue
+        n_new, _ = fill_hole(size, closed, fans, hole)
+        if n_new < 0:
+            continue
+        for j in range(size):
+            locked[hole.ring[j]] = wave
+        remove_triangles(v, fans, freed)
+        start = starts[n_gone]
+        found = neighbours[start : start + MAX_NEIGHBOURS]
+        starts[n_gone + 1] = start + _list_neighbours(size, closed, fans, hole, found, n_gone)
+        fans, end = with_room(hole.triangles, n_new, fans, end)
+        add_triangles(hole.triangles, n_new, freed, fans)
+        order[n_gone] = v
+        rings[n_gone] = size if closed else -size
+        n_gone += 1
+    return Progress(fans, end, order, rings, starts, neighbours, locked, n_gone)
+
+
+@compiled
+def finish(progress: Progress, waves: Int32, n_triangles: int) -> Decimation:
+    """What a decimation of ``n_triangles`` has come to in ``waves``."""
+    n = progress.n_gone
+    neighbours, left = progress.neighbours[: progress.starts[n]], remaining_triangles(progress.fans, n_triangles)
+    return Decimation(progress.order[:n], waves, progress.starts[: n + 1], neighbours, progress.rings[:n], left)
 
 
 @compiled

@@ -8,7 +8,7 @@ import numpy as np
 
 from gvpipe.arrays import Int32
 from gvpipe.compiled import compiled
-from gvpipe.mesh.decimation import decimate
+from gvpipe.mesh.decimation import Decimation, decimate
 from gvpipe.mesh.traversal import traverse
 
 MIN_BLOCK = 48  # vertices; smaller waves are joined to one block, since a block is coded at once
@@ -51,7 +51,12 @@ def proper_triangles(faces: Int32) -> Int32:
 @compiled
 def build_order(faces: Int32, n_vertices: int, max_waves: int) -> Hierarchy:
     """Take the mesh ``faces (T, 3)`` over V vertices apart, in ``max_waves`` waves at most."""
-    fine = decimate(proper_triangles(faces), n_vertices, max_waves)
+    return join_orders(decimate(proper_triangles(faces), n_vertices, max_waves), n_vertices)
+
+
+@compiled
+def join_orders(fine: Decimation, n_vertices: int) -> Hierarchy:
+    """The hierarchy of V vertices after their decimation."""
     n_coarse = n_vertices - len(fine.order)
     coarse = traverse(fine.left, _others(fine.order, n_vertices), n_vertices)
     order, rings, starts = np.empty(n_vertices, np.int32), np.zeros(n_vertices, np.int32), np.zeros(n_vertices + 1, np.int32)

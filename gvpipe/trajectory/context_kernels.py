@@ -76,16 +76,16 @@ def _find_near(first: int, end: int, inputs: ContextInputs) -> Int32:
 
 
 @compiled
-def _find_contexts(first: int, end: int, c: int, magnitudes: Int64, inputs: ContextInputs, before: Int64, near: Int32) -> Int64:
+def _find_contexts(first: int, end: int, c: int, values: Int64, inputs: ContextInputs, before: Int64, near: Int32) -> Int64:
     """``(end - first,)`` contexts of component c in the block of ranks ``first`` to ``end``.
 
     Args:
-        magnitudes: ``(R, m)`` by rank, in 1 / ONE, of the blocks before and of this block's components before c.
+        values: ``(R, m)`` residuals by rank, of the blocks before and of this block's components before c.
         before: ``(R,)`` mean magnitudes of the block before, in 1 / ONE.
         near: of the block (`_find_near`).
     """
     contexts = np.empty(end - first, np.int64)
-    usual, own = inputs.usual, magnitudes[c]
+    usual, own = inputs.usual, values[c]
     usual_short = usual_long = 0
     for k in range(max(0, c - len(LONG)), c):
         usual_long += usual[k] * LONG[c - 1 - k]
@@ -96,7 +96,7 @@ def _find_contexts(first: int, end: int, c: int, magnitudes: Int64, inputs: Cont
     shorts, longs = np.empty(TILE, np.int64), np.empty(TILE, np.int64)
     for begin in range(first, end, TILE):
         n = min(TILE, end - begin)
-        _sum_spans(begin, n, c, magnitudes, shorts, longs)
+        _sum_spans(begin, n, c, values, shorts, longs)
         for j in range(n):
             i = begin + j
             around = usual[c]
@@ -106,9 +106,9 @@ def _find_contexts(first: int, end: int, c: int, magnitudes: Int64, inputs: Cont
                     rank = near[i - first, place]
                     if rank < 0:
                         break
-                    around += own[rank]
+                    around += abs(own[rank])
                 if around:  # most are 0, and divisions are slow
-                    around //= near[i - first, 0]
+                    around = ONE * around // near[i - first, 0]
             forecast = fixed + POWERS[2] * _log(around + FLOOR_NEAR, inputs)
             forecast += POWERS[3] * _log(shorts[j] + FLOOR_SPAN, inputs) + POWERS[4] * _log(longs[j] + FLOOR_SPAN, inputs)
             octaves = forecast // POWER_ONE - 6 * PER_OCTAVE  # ONE is six octaves
@@ -117,45 +117,41 @@ def _find_contexts(first: int, end: int, c: int, magnitudes: Int64, inputs: Cont
 
 
 @compiled
-def _sum_spans(begin: int, n: int, c: int, magnitudes: Int64, shorts: Int64, longs: Int64) -> None:
-    """Fill ``shorts`` and ``longs`` of n ranks from ``begin`` on: weighted sums over the components before c."""
+def _sum_spans(begin: int, n: int, c: int, values: Int64, shorts: Int64, longs: Int64) -> None:
+    """Fill ``shorts`` and ``longs`` of n ranks from ``begin`` on: weighted sums of magnitudes of the components before c."""
     for j in range(n):
         shorts[j] = longs[j] = 0
     for k in range(max(0, c - len(LONG)), c):
-        values, weight = magnitudes[k][begin : begin + n], LONG[c - 1 - k]
+        row, weight = values[k][begin : begin + n], ONE * LONG[c - 1 - k]
         for j in range(n):
-            longs[j] += values[j] * weight
+            longs[j] += abs(row[j]) * weight
         if k >= c - len(SHORT):
-            weight = SHORT[c - 1 - k]
+            weight = ONE * SHORT[c - 1 - k]
             for j in range(n):
-                shorts[j] += values[j] * weight
+                shorts[j] += abs(row[j]) * weight
 
 
 @compiled
-def _mean_magnitudes(magnitudes: Int64, first: int, end: int, means: Int64) -> None:
-    """Fill ``means (R,)`` of a block of ``magnitudes (R, m)``, in 1 / ONE, rounded up to one at least."""
+def _mean_magnitudes(values: Int64, first: int, end: int, means: Int64) -> None:
+    """Fill ``means (R,)`` of the magnitudes of a block of ``values (R, m)``, in 1 / ONE, rounded up to one at least."""
     for c in range(len(means)):
         total = 0
         for i in range(first, end):
-            total += magnitudes[c, i]
-        means[c] = total // max(1, end - first) + 1
+            total += abs(values[c, i])
+        means[c] = ONE * total // max(1, end - first) + 1
 
 
 @compiled
-def find_all_contexts(residuals: Int64, inputs: ContextInputs) -> UInt8:
-    """``(m, R)`` contexts of ``residuals (m, R)`` by rank, all of which there are."""
-    contexts = np.zeros(residuals.shape, np.uint8)
-    magnitudes = np.empty((residuals.shape[1], len(residuals)), np.int64)
-    for i in range(len(residuals)):
-        for c in range(residuals.shape[1]):
-            magnitudes[c, i] = ONE * abs(residuals[i, c])
+def find_all_contexts(values: Int64, inputs: ContextInputs) -> UInt8:
+    """``(R, m)`` contexts of residuals ``values (R, m)`` by rank, all of which there are."""
+    contexts = np.zeros(values.shape, np.uint8)
     before = inputs.usual.copy()
     for b in range(len(inputs.blocks) - 1):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
         near = _find_near(first, end, inputs)
-        for c in range(residuals.shape[1]):
-            contexts[first:end, c] = _find_contexts(first, end, c, magnitudes, inputs, before, near)
-        _mean_magnitudes(magnitudes, first, end, before)
+        for c in range(len(values)):
+            contexts[c, first:end] = _find_contexts(first, end, c, values, inputs, before, near)
+        _mean_magnitudes(values, first, end, before)
     return contexts
 
 
@@ -170,19 +166,18 @@ def decode_residuals(residuals: Residuals, inputs: ContextInputs, stream: BlockS
     Returns:
         0, or what is wrong: as of `take_block`, or OUT_OF_RANGE.
     """
-    decoded, magnitudes, means = residuals
+    decoded, means = residuals
     for b in range(first_block, end_block):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
         near = _find_near(first, end, inputs)
-        for c in range(decoded.shape[1]):
-            contexts = _find_contexts(first, end, c, magnitudes, inputs, means, near)
+        for c in range(len(decoded)):
+            contexts = _find_contexts(first, end, c, decoded, inputs, means, near)
             values, status = take_block(stream, contexts)
             if status:
                 return status
             for i in range(len(values)):
                 if abs(values[i]) >= LARGEST:
                     return OUT_OF_RANGE
-                decoded[first + i, c] = values[i]
-                magnitudes[c, first + i] = ONE * abs(values[i])
-        _mean_magnitudes(magnitudes, first, end, means)
+                decoded[c, first + i] = values[i]
+        _mean_magnitudes(decoded, first, end, means)
     return 0

@@ -48,16 +48,14 @@ class ContextInputs(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """Residuals as far as they are decoded; kernels fill it block by block. All are int64, and 0 to begin with.
+    """Residuals as far as they are decoded; kernels fill it block by block. Both are int64.
 
     Args:
-        values: ``(m, R)`` by rank.
-        magnitudes: ``(R, m)`` in 1 / ONE, component by component: contexts read one of them at a time.
+        values: ``(R, m)`` by rank, 0 to begin with: contexts read one component at a time.
         means: ``(R,)`` magnitudes of the last block, in 1 / ONE; before the first, `ContextInputs.usual`.
     """
 
     values: Int64
-    magnitudes: Int64
     means: Int64
 
 
