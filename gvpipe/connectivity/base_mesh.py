@@ -20,7 +20,7 @@ import numpy as np
 
 from gvpipe.arrays import Array, Int32
 from gvpipe.budget import Budget
-from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
+from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order, places_of
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor
 from gvpipe.errors import CorruptFile, InputError, corrupt_section
@@ -91,7 +91,7 @@ def decode_base(mesh: bytes, order: bytes, n_vertices: int = MAX_VERTICES, n_tri
     visits = np.arange(len(points))
     if order:
         visits = decode_order(order, points, faces)
-        points, faces = points[visits], np.argsort(visits)[faces]
+        points, faces = points[visits], places_of(visits)[faces]
     return BaseMesh(points.astype(np.int32), faces.astype(np.int32), visits)
 
 

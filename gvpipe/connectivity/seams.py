@@ -22,7 +22,7 @@ from gvpipe.arrays import Array, Int64
 from gvpipe.connectivity import adaptive_order
 from gvpipe.connectivity.edge_seams import decode_across_edges, encode_across_edges
 from gvpipe.connectivity.seam_corners import SeamCorners, are_first, find_seam_corners
-from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order
+from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order, places_of
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import corrupt_section
 from gvpipe.mesh.unique_rows import corners_from_smallest
@@ -113,7 +113,7 @@ def decode_seams(
             visits = adaptive_order.decode_adaptive_order(order, points, faces)
         else:
             visits = decode_order(order, _as_lattice(points), faces)
-        points, faces = points[visits], np.argsort(visits)[faces]
+        points, faces = points[visits], places_of(visits)[faces]
     return faces, points
 
 

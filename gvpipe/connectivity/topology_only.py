@@ -213,22 +213,22 @@ def _place_points(faces: Array, n_points: int, carried: _Carried) -> tuple[tuple
 
 def _merge(faces: Array, n_vertices: int, merges: bytes) -> Array:
     """Draco's triangles over points: vertices that it split are one point again; raises `CorruptFile`."""
-    stands_for = np.arange(n_vertices)
-    if merges:
-        cursor = Cursor(merges, "mesh")
-        n_merges = cursor.varint(n_vertices, "the number of merges")
-        gaps, back = decode_integers(cursor.rest(), 2 * n_merges, name="mesh").reshape(2, -1)
-        if not n_merges or ((gaps < 0) | (gaps >= n_vertices)).any():
-            raise corrupt_section("mesh", "a merge names a vertex that does not exist")
-        again = np.cumsum(gaps + 1) - 1
-        if (back <= 0).any() or again[-1] >= n_vertices or (back > again).any():
-            raise corrupt_section("mesh", "a merge names a vertex that does not exist")
-        stands_for[again] = again - back
-        is_new = np.ones(n_vertices, bool)
-        is_new[again] = False
-        if not is_new[stands_for[again]].all():
-            raise corrupt_section("mesh", "a merge names a merged vertex")
-        stands_for = (np.cumsum(is_new) - 1)[stands_for]
+    if not merges:
+        return faces
+    cursor, stands_for = Cursor(merges, "mesh"), np.arange(n_vertices)
+    n_merges = cursor.varint(n_vertices, "the number of merges")
+    gaps, back = decode_integers(cursor.rest(), 2 * n_merges, name="mesh").reshape(2, -1)
+    if not n_merges or ((gaps < 0) | (gaps >= n_vertices)).any():
+        raise corrupt_section("mesh", "a merge names a vertex that does not exist")
+    again = np.cumsum(gaps + 1) - 1
+    if (back <= 0).any() or again[-1] >= n_vertices or (back > again).any():
+        raise corrupt_section("mesh", "a merge names a vertex that does not exist")
+    stands_for[again] = again - back
+    is_new = np.ones(n_vertices, bool)
+    is_new[again] = False
+    if not is_new[stands_for[again]].all():
+        raise corrupt_section("mesh", "a merge names a merged vertex")
+    stands_for = (np.cumsum(is_new) - 1)[stands_for]
     merged: Array = stands_for[faces]
     return merged
 

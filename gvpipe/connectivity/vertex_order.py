@@ -82,6 +82,13 @@ def decode_order(data: bytes, points: Array, faces: Array) -> Array:
     return coded.visits
 
 
+def places_of(visits: Array) -> Array:
+    """The inverse ``(V,)`` of a permutation: where each vertex comes; far faster than a sort."""
+    places = np.empty(len(visits), np.int64)
+    places[visits] = np.arange(len(visits))
+    return places
+
+
 def neighbour_lists(points: Array, faces: Array) -> NeighbourLists:
     """What a search reaches from each vertex, of ``points (V, 3)``, lattice units, and ``faces (T, 3)``."""
     from gvpipe.connectivity.visit_kernels import sort_neighbours

@@ -95,6 +95,8 @@ class PcaReader:
         return frames
 
     def _decode(self, s: int, lod: int) -> Segment:
+        from gvpipe.trajectory.product_kernels import transposed
+
         if self._kept is None or self._kept[0] != (s, lod):
             step = self._header.steps[s]
             n_frames = self._bounds[s + 1] - self._bounds[s]
@@ -116,11 +118,10 @@ class PcaReader:
                 self._header.beta,
                 given,
             )
-            if self._header.predictor == "lsp":
-                coefficients = coefficients[:, ::-1]
             if lod:
                 coefficients = coefficients[self._alive(lod)]
-            self._kept = (s, lod), Segment(basis, np.ascontiguousarray(coefficients.T))
+            rows = transposed(coefficients)
+            self._kept = (s, lod), Segment(basis, rows[::-1].copy() if self._header.predictor == "lsp" else rows)
         return self._kept[1]
 
     def _count_blocks(self, lod: int) -> int:
