@@ -24,13 +24,12 @@ def find_energies(homogeneous: Float64, clusters: Int32, parts: Float64, n_clust
     """
     energies = np.zeros((n_clusters, 4, 4))
     for p in range(len(homogeneous)):
-        y = homogeneous[p]
         for j in range(parts.shape[1]):
             if parts[p, j] > 0:
-                own, square = energies[clusters[p, j]], parts[p, j] * parts[p, j]
+                k, square = clusters[p, j], parts[p, j] * parts[p, j]
                 for r in range(4):
                     for c in range(4):
-                        own[r, c] += square * (y[r] * y[c])
+                        energies[k, r, c] += square * (homogeneous[p, r] * homogeneous[p, c])
     return energies
 
 

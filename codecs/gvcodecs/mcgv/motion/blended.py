@@ -14,7 +14,7 @@ from gvcodecs.mcgv.base.surface import Slots
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.motion.blend_problem import Fitted
 from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
-from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit
+from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import Trajectories, decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
 from gvpipe.arrays import Array, Float32, Float64
@@ -90,11 +90,9 @@ class BlendedMotion:
         from gvcodecs.mcgv.motion.reconstruction_kernels import skinned_points
 
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
-        self._blend, weights = blend, blend.weights
+        self._blend = blend
         self._samples, surface = samples, samples.surface
-        point = surface.point[samples.slots]
-        clusters, parts = weights.clusters[point], weights.weights[point] / TOTAL
-        self._points = skinned_points(surface.base[samples.slots], blend.homogeneous[point], clusters, parts)
+        self._points = skinned_points(samples.slots, surface.base, surface.point, blend.homogeneous, blend.weights)
         self._residuals = header.residual_step * header.profile.offsets
         self._segment: tuple[int, Trajectories | None] = (0, first)
         self._chunk: tuple[int, int, Float64] = (-1, -1, np.zeros((0, 0, 4, 3)))

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gvcodecs.mcgv.motion.skinning import TOTAL, Weights
 from gvpipe.arrays import Array, Float32, Float64, Int32, Int64
 from gvpipe.compiled import compiled
 from gvpipe.lanes import COORDINATES, load_point, same_point, store_point
@@ -57,9 +58,25 @@ class SkinnedPoints(NamedTuple):
     weights: Float64
 
 
-def skinned_points(base: Float64, homogeneous: Float64, clusters: Int32, weights: Float64) -> SkinnedPoints:
-    """Of arrays ``(M, 3)``, and ``(M, 4)`` three times."""
-    return SkinnedPoints(in_rows(base), homogeneous.ravel(), clusters.ravel(), weights.ravel())
+@compiled
+def skinned_points(slots: Int64, base: Float64, points: Int64, homogeneous: Float64, weights: Weights) -> SkinnedPoints:
+    """What skinning needs of vertices at ``slots (M,)``.
+
+    Args:
+        base: ``(S, 3)`` the slots' base positions; points: ``(S,)`` their points.
+        homogeneous: ``(P, 4)`` the points' coordinates.
+        weights: theirs.
+    """
+    n = COORDINATES * len(slots)
+    bases, coordinates, clusters, parts = np.zeros(n), np.empty(n), np.empty(n, np.int32), np.empty(n)
+    for i in range(len(slots)):
+        at, point = COORDINATES * i, points[slots[i]]
+        for k in range(3):
+            bases[at + k] = base[slots[i], k]
+        for k in range(COORDINATES):
+            coordinates[at + k], clusters[at + k] = homogeneous[point, k], weights.clusters[point, k]
+            parts[at + k] = weights.weights[point, k] / TOTAL
+    return SkinnedPoints(bases, coordinates, clusters, parts)
 
 
 def in_rows(vectors: Float64) -> Float64:

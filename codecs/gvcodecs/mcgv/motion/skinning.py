@@ -141,4 +141,6 @@ def homogeneous(base: Float64) -> Float64:
     """``(P, 4)`` coordinates in the middle of the bounding box, in parts of its longest side, and 1."""
     low, high = base.min(axis=0), base.max(axis=0)
     extent = float((high - low).max()) or 1.0
-    return np.column_stack([(base - (low + high) / 2) / extent, np.ones(len(base))])
+    result = np.ones((len(base), 4))
+    result[:, :3] = (base - (low + high) / 2) / extent
+    return result

@@ -35,7 +35,7 @@ def test_rebuilding_is_base_blend_and_residual() -> None:
     vertices = draw.permutation(n)
     points = homogeneous(base)
     result = np.zeros((n, 3), np.float32)
-    skinned = skinned_points(base[vertices], points[vertices], weights.clusters[vertices], weights.weights[vertices] / TOTAL)
+    skinned = skinned_points(vertices, base, np.arange(n), points, weights)
     sites = Sites(vertices, pixels, 0.01 * (np.arange(256.0) - 128))
     rebuild_blended(samples, sites, skinned, in_rows(transforms), result)
     wanted = base + apply_weights(points, weights, transforms)
