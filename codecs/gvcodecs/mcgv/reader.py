@@ -21,13 +21,14 @@ from gvcodecs.mcgv.layout.kd_tree import place_points
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.tiles import place_charts
 from gvcodecs.mcgv.motion.affine import AffineMotion
-from gvcodecs.mcgv.motion.blended import BlendedMotion, decode_transforms, read_blend
+from gvcodecs.mcgv.motion.blended import BYTES_PER_POINT, BlendedMotion, decode_transforms, read_blend
 from gvcodecs.mcgv.motion.contract import Motion, Samples
 from gvcodecs.mcgv.motion.skinning_coding import Trajectories
 from gvcodecs.mcgv.pictures.no_pictures import NoPictures
 from gvcodecs.mcgv.pictures.outliers import SECTION
 from gvpipe.ahead import AHEAD, beside, run_ahead
 from gvpipe.arrays import Float32, Int32, Integers
+from gvpipe.connectivity.base_mesh import may_run_beside
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.corrections.displacements import DisplacementReader, PointVertices
@@ -98,10 +99,17 @@ class McgvReader:
             return decode_transforms(bitstream, header, 0, self._bounds[1]) if has_one else None
 
         with beside(decode, has_one) as only, self._open_surface() as (slots, finished):
-            with beside(lambda: read_layout(bitstream, header, slots), slots.n_slots >= MANY_SLOTS) as layout:
+            with beside(lambda: read_layout(bitstream, header, slots), self._has_room(slots)) as layout:
                 blend = read_blend(bitstream, header, slots)
                 samples = Samples(finished(), layout())
             return BlendedMotion(bitstream, header, samples, blend, self._bounds, only())
+
+    def _has_room(self, slots: Slots) -> bool:
+        """Whether the layout is found beside blend and vertices: of large meshes, if the file may take the memory of all."""
+        bitstream, budget = self._bitstream, self._bitstream.budget
+        needed = bytes_of_layout(self._header, slots) + BYTES_PER_POINT * slots.n_slots
+        is_large = slots.n_slots >= MANY_SLOTS and may_run_beside(budget, bitstream.n_vertices, bitstream.n_triangles)
+        return is_large and 2 * needed <= budget.memory_left
 
     def _read_affine(self) -> Motion:
         bitstream, header = self._bitstream, self._header
@@ -165,6 +173,11 @@ def _open_video(bitstream: Bitstream, header: Header, bounds: list[int]) -> Vide
     return VideoReader(bitstream.pictures, header.profile, header.width, 3 * header.height, bitstream.budget)
 
 
+def bytes_of_layout(header: Header, slots: Slots) -> int:
+    """The memory that finding a layout takes."""
+    return BYTES_PER_PIXEL * header.width * header.height + BYTES_PER_SLOT * slots.n_slots
+
+
 def read_layout(bitstream: Bitstream, header: Header, slots: Slots, groups: Integers | None = None) -> Layout:
     """The slots' pixels in a file; by halves, ``groups (S,)`` belong together, connected pieces if not given.
 
@@ -172,7 +185,7 @@ def read_layout(bitstream: Bitstream, header: Header, slots: Slots, groups: Inte
         CorruptFile: they are not what an encoder writes.
     """
     n_pixels = header.width * header.height
-    bitstream.budget.ask(f"a layout of {n_pixels} pixels", BYTES_PER_PIXEL * n_pixels + BYTES_PER_SLOT * slots.n_slots)
+    bitstream.budget.ask(f"a layout of {n_pixels} pixels", bytes_of_layout(header, slots))
     if not header.pictures:
         return Layout(1, 1, np.zeros(slots.n_slots, np.int64))
     if n_pixels < slots.n_slots:
