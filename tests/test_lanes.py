@@ -45,9 +45,9 @@ def digest() -> str:
     random, whole = np.random.default_rng(1), hashlib.sha256()
     for n_components in (3, 14):
         target = random.normal(size=(24, n_components)).cumsum(axis=0)
-        residuals, coded = np.zeros(target.T.shape, np.int64), np.zeros(target.shape)
+        residuals, coded = np.zeros(target.shape, np.int64), np.zeros(target.shape)
         predict_vectors(temporal_order(8), 0.01, residuals, coded, target, "kalman", 1.8)
-        whole.update(residuals.T.tobytes() + coded.tobytes())
+        whole.update(residuals.tobytes() + coded.tobytes())
     values = np.array([3, -1, 1000, 123456, -99999, 70])
     assert np.array_equal(decode_integers(encode_integers(values), len(values)), values)
     return whole.hexdigest()

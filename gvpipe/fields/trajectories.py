@@ -42,14 +42,14 @@ def encode_trajectories(target: Float64, n_frames: int, causal: CausalOrder, sha
     rows = _by_frame(target, n_frames)
     reduced = reduce_trajectories(rows, (share / 2) ** 2 * rows.size, n_axes=target.shape[1] // n_frames)
     n_components = reduced.coefficients.shape[1]
-    ranked, decoded = np.zeros(reduced.coefficients.T.shape, np.int64), np.zeros(reduced.coefficients.shape)
+    ranked, decoded = np.zeros(reduced.coefficients.shape, np.int64), np.zeros(reduced.coefficients.shape)
     predict_vectors(causal, reduced.step, ranked, decoded, reduced.coefficients, "kalman", 1.8)
     base = _rebuild(decoded, reduced.decoded)
     left = np.rint(target - _by_component(base, n_frames))
     if max(np.abs(left).max(initial=0), np.abs(ranked).max(initial=0)) >= LARGEST:
         return None
-    residuals = np.empty(decoded.shape, np.int64)
-    residuals[causal.order] = ranked.T
+    residuals = np.empty_like(ranked)
+    residuals[causal.order] = ranked
     coefficients = encode_residuals(residuals, max(1, n_components), causal)
     corrections = encode_residuals(left.astype(np.int64), n_frames, causal)
     return STEP.pack(reduced.step) + pack_block(reduced.basis) + pack_block(coefficients) + corrections
@@ -80,7 +80,7 @@ def decode_trajectories(
     n_components = basis.vectors.shape[1]
     residuals = decode_residuals(cursor.block(), n_components, max(1, n_components), causal, name)
     decoded = np.zeros(residuals.shape)
-    predict_vectors(causal, step, np.ascontiguousarray(residuals[causal.order].T), decoded, None, "kalman", 1.8)
+    predict_vectors(causal, step, np.ascontiguousarray(residuals[causal.order]), decoded, None, "kalman", 1.8)
     left = decode_residuals(cursor.rest(), n_axes * n_frames, n_frames, causal, name)
     return _by_component(_rebuild(decoded, basis), n_frames) + left
 

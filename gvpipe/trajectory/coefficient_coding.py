@@ -59,20 +59,20 @@ def encode_vectors(
     """
     from gvpipe.trajectory.context_kernels import find_all_contexts
 
-    residuals = np.zeros((target.shape[1], len(causal.order)), np.int64)
+    residuals = np.zeros((len(causal.order), target.shape[1]), np.int64)
     decoded = np.zeros(target.shape) if given is None else given.copy()
     predict_vectors(causal, step, residuals, decoded, target, predictor, beta)
     largest = max(int(residuals.max(initial=0)), -int(residuals.min(initial=0)))
     if largest >= LARGEST:
         raise InputError(f"a residual has {largest} quantisation steps, at most {LARGEST} fit; ask for a lower quality")
-    sums = np.array([np.abs(row).sum() for row in residuals], np.int64)  # one at a time: a copy may be large
-    means = sums * ONE // max(1, len(causal.order))
+    sums = np.array([np.abs(column).sum() for column in residuals.T], np.int64)  # one at a time: a copy may be large
+    means = sums * ONE // max(1, len(residuals))
     levels = np.searchsorted(level_bounds(), means + 1, side="right") - 1
     contexts = find_all_contexts(residuals, context_inputs(causal, len(target), levels, len(causal.blocks) - 1))
     coder = BlockEncoder(N_CONTEXTS)
     for first, end in pairwise(causal.blocks.tolist()):
         for c in range(target.shape[1]):
-            coder.add(residuals[c, first:end], contexts[c, first:end])
+            coder.add(residuals[first:end, c], contexts[first:end, c])
     head = encode_integers(np.diff(levels, prepend=0))
     return pack_block(head) + coder.finish(), decoded
 
@@ -114,7 +114,8 @@ def decode_vectors(
     n_vectors = int(causal.blocks[wanted])
     decoded = np.zeros((len(causal.order), n_components)) if given is None else given.copy()
     inputs = context_inputs(causal, len(decoded), levels, wanted)
-    residuals = Residuals(np.zeros((n_components, n_vectors), np.int64), inputs.usual.copy())
+    ranked, rows = np.zeros((n_vectors, n_components), np.int64), np.zeros((n_components, n_vectors), np.int64)
+    residuals = Residuals(ranked, rows, inputs.usual.copy())
 
     def take(blocks: tuple[int, int]) -> tuple[int, int]:
         """Decode the residuals of blocks; return which vectors these are."""
@@ -122,7 +123,7 @@ def decode_vectors(
         return int(causal.blocks[blocks[0]]), int(causal.blocks[blocks[1]])
 
     for begin, end in run_ahead(take, _parts(causal.blocks[: wanted + 1]), 1):  # predict while the next ones are decoded
-        predict_vectors(causal, step, residuals.values, decoded, None, predictor, beta, begin, end)
+        predict_vectors(causal, step, ranked, decoded, None, predictor, beta, begin, end)
     if n_blocks is None:
         coder.end()
     return decoded

@@ -11,6 +11,7 @@ from gvpipe.arrays import Int32, Int64, UInt8
 from gvpipe.compiled import compiled
 from gvpipe.entropy.block_kernels import OUT_OF_RANGE, BlockStream, take_block
 from gvpipe.trajectory.contexts import (
+    ENTRY_BITS,
     FLOOR_NEAR,
     FLOOR_SPAN,
     HIGHEST,
@@ -18,7 +19,6 @@ from gvpipe.trajectory.contexts import (
     LONG,
     LOWEST,
     N_NEAR,
-    ONE,
     PER_OCTAVE,
     POWER_ONE,
     POWERS,
@@ -27,7 +27,7 @@ from gvpipe.trajectory.contexts import (
     Residuals,
 )
 
-TILE = 512  # vectors whose earlier components are summed up at once
+TILE, FEW = 512, 16  # vectors whose earlier components are summed up at once; that are turned from columns to rows at once
 
 
 @compiled
@@ -76,16 +76,16 @@ def _find_near(first: int, end: int, inputs: ContextInputs) -> Int32:
 
 
 @compiled
-def _find_contexts(first: int, end: int, c: int, values: Int64, inputs: ContextInputs, before: Int64, near: Int32) -> Int64:
+def _find_contexts(first: int, end: int, c: int, rows: Int64, inputs: ContextInputs, before: Int64, near: Int32) -> Int64:
     """``(end - first,)`` contexts of component c in the block of ranks ``first`` to ``end``.
 
     Args:
-        values: ``(R, m)`` residuals by rank, of the blocks before and of this block's components before c.
+        rows: as of `Residuals`, of the blocks before and of this block's components before c.
         before: ``(R,)`` mean magnitudes of the block before, in 1 / ONE.
         near: of the block (`_find_near`).
     """
     contexts = np.empty(end - first, np.int64)
-    usual, own = inputs.usual, values[c]
+    usual, own = inputs.usual, rows[c]
     usual_short = usual_long = 0
     for k in range(max(0, c - len(LONG)), c):
         usual_long += usual[k] * LONG[c - 1 - k]
@@ -96,7 +96,7 @@ def _find_contexts(first: int, end: int, c: int, values: Int64, inputs: ContextI
     shorts, longs = np.empty(TILE, np.int64), np.empty(TILE, np.int64)
     for begin in range(first, end, TILE):
         n = min(TILE, end - begin)
-        _sum_spans(begin, n, c, values, shorts, longs)
+        _sum_spans(begin, n, c, rows, shorts, longs)
         for j in range(n):
             i = begin + j
             around = usual[c]
@@ -106,9 +106,9 @@ def _find_contexts(first: int, end: int, c: int, values: Int64, inputs: ContextI
                     rank = near[i - first, place]
                     if rank < 0:
                         break
-                    around += abs(own[rank])
+                    around += own[rank] >> 1
                 if around:  # most are 0, and divisions are slow
-                    around = ONE * around // near[i - first, 0]
+                    around //= near[i - first, 0]
             forecast = fixed + POWERS[2] * _log(around + FLOOR_NEAR, inputs)
             forecast += POWERS[3] * _log(shorts[j] + FLOOR_SPAN, inputs) + POWERS[4] * _log(longs[j] + FLOOR_SPAN, inputs)
             octaves = forecast // POWER_ONE - 6 * PER_OCTAVE  # ONE is six octaves
@@ -117,41 +117,44 @@ def _find_contexts(first: int, end: int, c: int, values: Int64, inputs: ContextI
 
 
 @compiled
-def _sum_spans(begin: int, n: int, c: int, values: Int64, shorts: Int64, longs: Int64) -> None:
+def _sum_spans(begin: int, n: int, c: int, rows: Int64, shorts: Int64, longs: Int64) -> None:
     """Fill ``shorts`` and ``longs`` of n ranks from ``begin`` on: weighted sums of magnitudes of the components before c."""
     for j in range(n):
         shorts[j] = longs[j] = 0
     for k in range(max(0, c - len(LONG)), c):
-        row, weight = values[k][begin : begin + n], ONE * LONG[c - 1 - k]
+        row, weight = rows[k][begin : begin + n], LONG[c - 1 - k]
         for j in range(n):
-            longs[j] += abs(row[j]) * weight
+            longs[j] += (row[j] >> 1) * weight
         if k >= c - len(SHORT):
-            weight = ONE * SHORT[c - 1 - k]
+            weight = SHORT[c - 1 - k]
             for j in range(n):
-                shorts[j] += abs(row[j]) * weight
+                shorts[j] += (row[j] >> 1) * weight
 
 
 @compiled
-def _mean_magnitudes(values: Int64, first: int, end: int, means: Int64) -> None:
-    """Fill ``means (R,)`` of the magnitudes of a block of ``values (R, m)``, in 1 / ONE, rounded up to one at least."""
+def _mean_magnitudes(rows: Int64, first: int, end: int, means: Int64) -> None:
+    """Fill ``means (R,)`` of a block of ``rows (R, m)``, in 1 / ONE, rounded up to one at least."""
     for c in range(len(means)):
         total = 0
         for i in range(first, end):
-            total += abs(values[c, i])
-        means[c] = ONE * total // max(1, end - first) + 1
+            total += rows[c, i] >> 1
+        means[c] = total // max(1, end - first) + 1
 
 
 @compiled
-def find_all_contexts(values: Int64, inputs: ContextInputs) -> UInt8:
-    """``(R, m)`` contexts of residuals ``values (R, m)`` by rank, all of which there are."""
-    contexts = np.zeros(values.shape, np.uint8)
-    before = inputs.usual.copy()
+def find_all_contexts(residuals: Int64, inputs: ContextInputs) -> UInt8:
+    """``(m, R)`` contexts of ``residuals (m, R)`` by rank, all of which there are."""
+    contexts, before = np.zeros(residuals.shape, np.uint8), inputs.usual.copy()
+    rows = np.empty((residuals.shape[1], len(residuals)), np.int64)
+    for i in range(len(residuals)):
+        for c in range(len(rows)):
+            rows[c, i] = _entry(residuals[i, c])
     for b in range(len(inputs.blocks) - 1):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
         near = _find_near(first, end, inputs)
-        for c in range(len(values)):
-            contexts[c, first:end] = _find_contexts(first, end, c, values, inputs, before, near)
-        _mean_magnitudes(values, first, end, before)
+        for c in range(len(rows)):
+            contexts[first:end, c] = _find_contexts(first, end, c, rows, inputs, before, near)
+        _mean_magnitudes(rows, first, end, before)
     return contexts
 
 
@@ -166,18 +169,35 @@ def decode_residuals(residuals: Residuals, inputs: ContextInputs, stream: BlockS
     Returns:
         0, or what is wrong: as of `take_block`, or OUT_OF_RANGE.
     """
-    decoded, means = residuals
+    ranked, rows, means = residuals
     for b in range(first_block, end_block):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
         near = _find_near(first, end, inputs)
-        for c in range(len(decoded)):
-            contexts = _find_contexts(first, end, c, decoded, inputs, means, near)
+        for c in range(len(rows)):
+            contexts = _find_contexts(first, end, c, rows, inputs, means, near)
             values, status = take_block(stream, contexts)
             if status:
                 return status
             for i in range(len(values)):
                 if abs(values[i]) >= LARGEST:
                     return OUT_OF_RANGE
-                decoded[c, first + i] = values[i]
-        _mean_magnitudes(decoded, first, end, means)
+                rows[c, first + i] = _entry(values[i])
+        _mean_magnitudes(rows, first, end, means)
+        _rank(rows, first, end, ranked)
     return 0
+
+
+@compiled
+def _entry(residual: int) -> int:
+    """What `Residuals.rows` has of a residual."""
+    return abs(residual) << ENTRY_BITS | (residual < 0)
+
+
+@compiled
+def _rank(rows: Int64, first: int, end: int, ranked: Int64) -> None:
+    """Fill ranks ``first`` to ``end`` of ``ranked (m, R)`` from ``rows (R, m)``, few at a time, which stay in the cache."""
+    for begin in range(first, end, FEW):
+        for c in range(len(rows)):
+            for i in range(begin, min(begin + FEW, end)):
+                magnitude = rows[c, i] >> ENTRY_BITS
+                ranked[i, c] = -magnitude if rows[c, i] & 1 else magnitude

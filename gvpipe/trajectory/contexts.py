@@ -14,6 +14,7 @@ from gvpipe.trajectory.causal_order import CausalOrder
 SHORT = (16, 10, 6, 4)  # weights of a vector's earlier components, the latest first
 LONG = (16, 14, 13, 12, 11, 10, 9, 8, 7, 6, 6, 5, 5, 4, 4, 3)
 ONE = 64  # fixed point of magnitudes
+ENTRY_BITS = ONE.bit_length()  # by which a magnitude is shifted to stand above a sign, in 1 / ONE
 PER_OCTAVE = 16  # of integer logarithms
 MAX_LEVEL = 160
 LARGEST = 1 << 36  # magnitude of a residual, in steps; sums of its forecasts stay below 2**58
@@ -48,14 +49,16 @@ class ContextInputs(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """Residuals as far as they are decoded; kernels fill it block by block. Both are int64.
+    """Residuals as far as they are decoded; kernels fill it block by block. All are int64, and 0 to begin with.
 
     Args:
-        values: ``(R, m)`` by rank, 0 to begin with: contexts read one component at a time.
+        ranked: ``(m, R)`` by rank, for predictors.
+        rows: ``(R, m)`` for contexts, which read one component at a time: magnitudes in 1 / ONE, above a bit for the sign.
         means: ``(R,)`` magnitudes of the last block, in 1 / ONE; before the first, `ContextInputs.usual`.
     """
 
-    values: Int64
+    ranked: Int64
+    rows: Int64
     means: Int64
 
 

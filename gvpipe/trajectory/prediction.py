@@ -51,9 +51,8 @@ def predict_vectors(
     """
     from gvpipe.trajectory import kalman_kernels, prediction_kernels
 
-    assert len(residuals) == decoded.shape[1]  # kernels do not look where they write
     coding = prediction_kernels.VectorCoding(causal, step, residuals, decoded, np.zeros((0, 0)) if target is None else target)
-    stop = residuals.shape[1] if end is None else end
+    stop = len(residuals) if end is None else end
     if predictor == "kalman":
         kalman_kernels.predict_kalman(coding, begin, stop)
     elif predictor == "rbf":

@@ -27,7 +27,7 @@ class VectorCoding(NamedTuple):
     Args:
         causal: the order.
         step: quantisation step of every component.
-        residuals: ``(R, m)`` of the first m vectors of the order, in steps.
+        residuals: ``(m, R)`` of the first m vectors of the order, in steps.
         decoded: ``(n, R)`` components, by vector, in the order of transmission. Given vectors are there already.
         target: ``(n, R)`` what to code; ``(0, 0)``: decode.
     """
@@ -146,8 +146,8 @@ def code_component(coding: VectorCoding, i: int, vector: int, c: int, guess: flo
     if len(coding.target):
         steps = (coding.target[vector, c] - guess) / coding.step
         whole = np.floor(abs(steps) + ROUND_UP)
-        coding.residuals[c, i] = whole if steps > 0 else -whole
-    change: float = coding.residuals[c, i] * coding.step
+        coding.residuals[i, c] = whole if steps > 0 else -whole
+    change: float = coding.residuals[i, c] * coding.step
     coding.decoded[vector, c] = guess + change
     return change
 
@@ -164,7 +164,7 @@ def _count_neighbours(coding: VectorCoding, i: int) -> int:
 def most_neighbours(coding: VectorCoding) -> int:
     """The most neighbours of any vector, 1 at least: the form of ``kalman`` must not depend on which are coded at once."""
     most = 1
-    for i in range(coding.residuals.shape[1]):
+    for i in range(len(coding.residuals)):
         most = max(most, coding.causal.starts[i + 1] - coding.causal.starts[i])
     return most
 

@@ -20,7 +20,7 @@ STEP = 0.01
 @pytest.mark.parametrize("predictor", PREDICTORS)
 def test_decoded_is_what_was_coded(predictor: str, n_components: int) -> None:
     causal, target = _rows(n_components)
-    residuals, coded = np.zeros(target.T.shape, np.int64), np.zeros(target.shape)
+    residuals, coded = np.zeros(target.shape, np.int64), np.zeros(target.shape)
     predict_vectors(causal, STEP, residuals, coded, target, predictor, 1.8)
     decoded = np.zeros(target.shape)
     predict_vectors(causal, STEP, residuals, decoded, None, predictor, 1.8)
@@ -35,7 +35,7 @@ def test_both_forms_of_kalman_predict_the_same(n_components: int, step: float, a
     causal, target = _rows(n_components)
     causal = causal._replace(affine=affine)
     most = int(np.diff(causal.starts).max())
-    residuals, coded, decoded = np.zeros(target.T.shape, np.int64), np.zeros(target.shape), np.zeros(target.shape)
+    residuals, coded, decoded = np.zeros(target.shape, np.int64), np.zeros(target.shape), np.zeros(target.shape)
     coding = VectorCoding(causal, step, residuals, coded, target)
     predict_in_batches(coding, 0, len(target), most, True)
     predict_in_batches(coding._replace(decoded=decoded, target=np.zeros((0, 0))), 0, len(target), most, False)
@@ -48,7 +48,7 @@ def test_both_forms_of_kalman_predict_the_same(n_components: int, step: float, a
 def test_vectors_side_by_side_are_predicted_as_if_alone(step: float, are_few: bool) -> None:
     causal, target = _rows(7)
     most = int(np.diff(causal.starts).max())
-    residuals, coded = np.zeros(target.T.shape, np.int64), np.zeros(target.shape)
+    residuals, coded = np.zeros(target.shape, np.int64), np.zeros(target.shape)
     predict_in_batches(VectorCoding(causal, step, residuals, coded, target), 0, len(target), most, are_few)
     decoded = np.zeros(target.shape)
     for i in range(len(target)):

@@ -40,11 +40,9 @@ export function decodeTrajectories(data, [frames, components], { kernels, causal
 function decodeCoefficients(data, count, step, { kernels, causal, name }) {
   const residuals = decodeResiduals(kernels, causal, data, [count, Math.max(1, count)], name);
   const rows = causal[0].shape[0];
-  const ranked = kernels.array("int64", [count, rows]);
+  const ranked = kernels.array("int64", [rows, count]);
   const [order, from, to] = [kernels.view(causal[0]), kernels.view(residuals), kernels.view(ranked)];
-  order.forEach((row, rank) => {
-    for (let k = 0; k < count; k++) to[k * rows + rank] = from[row * count + k];
-  });
+  order.forEach((row, rank) => to.set(from.subarray(row * count, (row + 1) * count), rank * count));
   const decoded = kernels.array("float64", [rows, count]);
   const coding = [...causal, step, ranked, decoded, kernels.array("float64", [0, 0])];
   inBlocks(rows, (first, end) => kernels.call("predict_kalman", ...coding, first, end));

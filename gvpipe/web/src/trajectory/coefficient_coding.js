@@ -55,8 +55,8 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
   const decoded = given ?? kernels.array("float64", [n, components]);
   const inputs = contextInputs(kernels, causal, decoded.shape[0], usual, wanted);
   const vectors = kernels.view(bounds)[wanted];
-  const residuals = kernels.array("int64", [components, vectors]);
-  const known = [residuals, kernels.array("int64", [components], usual)];
+  const residuals = kernels.array("int64", [vectors, components]);
+  const known = [residuals, kernels.array("int64", [components, vectors]), kernels.array("int64", [components], usual)];
   for (let b = 0; b < wanted; b++) {
     stream.check(kernels.call("decode_residuals", ...known, ...inputs, ...stream.arrays, b, b + 1)[0]);
     yield;
@@ -65,7 +65,7 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
   const target = kernels.array("float64", [0, 0]);
   const coding = [...causal, step, residuals, decoded, target];
   const last = predictor === "rbf" ? [beta] : [];
-  yield* blockSteps(vectors, (first, end) => kernels.call(`predict_${predictor}`, ...coding, first, end, ...last));
+  yield* blockSteps(residuals.shape[0], (first, end) => kernels.call(`predict_${predictor}`, ...coding, first, end, ...last));
   kernels.free(...inputs.filter((array) => !causal.includes(array)), ...stream.arrays, ...known, target);
   return decoded;
 }
