@@ -22,13 +22,16 @@ import numpy as np
 from gvpipe.arrays import Int32, Int64
 from gvpipe.compiled import compiled, inlined
 from gvpipe.mesh.fans import (
+    CORNER,
     DEGREE,
+    EXTENT,
     NEXT_VERTEX,
     PREVIOUS_VERTEX,
     REGULAR_DEGREE,
     START,
     Fans,
     add_triangles,
+    before_marked,
     make_fans,
     remaining_triangles,
     remove_triangles,
@@ -216,15 +219,18 @@ def _list_neighbours(size: int, closed: bool, fans: Fans, hole: Hole, found: Int
         from_b = heads[b, DEGREE] < heads[a, DEGREE]  # the shorter list: a hub's would make this quadratic
         own, other, column, beyond = (b, a, NEXT_VERTEX, PREVIOUS_VERTEX) if from_b else (a, b, PREVIOUS_VERTEX, NEXT_VERTEX)
         low = heads[own, START]
-        at = low + heads[own, DEGREE] - 1
+        at = low + heads[own, EXTENT] - 1
         while at >= low and sides[at, column] != other:
             at -= 1
         if at >= low:
             n = _add_once(sides[at, beyond], found, n, hole, mark)
     for i in range(size):
         low = heads[ring[i], START]
-        at = low + heads[ring[i], DEGREE] - 1
+        at = low + heads[ring[i], EXTENT] - 1
         while at >= low and n < MAX_NEIGHBOURS:
+            if sides[at, CORNER] < 0:
+                at = before_marked(at, low, fans)
+                continue
             n = _add_once(sides[at, NEXT_VERTEX], found, n, hole, mark)
             n = _add_once(sides[at, PREVIOUS_VERTEX], found, n, hole, mark)
             at -= 1

@@ -2,6 +2,9 @@
 
 A vertex' *sides* are the far sides of its triangles. They lie together in memory, since decimation reads them all, many times:
 a list of corners linked through triangles took nearly twice as long. Everything is an integer.
+
+A side that is removed is closed up by the later ones. Of more than `BIG` sides it is marked instead, found by its corner, so
+that hubs take no longer than others. When half of them are marked, they are closed up.
 """
 
 from __future__ import annotations
@@ -14,29 +17,34 @@ from gvpipe.arrays import Int32
 from gvpipe.compiled import compiled, inlined
 
 HUB = 256  # triangles; an edge between two vertices that have more counts as there, unsearched
+BIG = 64  # sides; fans with fewer have no marked ones
 LEAST_ROOM, SPARE = 8, 2  # sides for which a vertex has room at first: in all, and beyond its own
 NEXT_VERTEX, PREVIOUS_VERTEX, CORNER = range(3)  # columns of `Fans.sides`
-START, DEGREE, ROOM, REGULAR_DEGREE = range(4)  # columns of `Fans.heads`
+START, DEGREE, EXTENT, REGULAR_DEGREE = range(4)  # columns of `Fans.heads`
 
 
 class Fans(NamedTuple):
     """Triangles by vertex; int32.
 
     Args:
-        heads: ``(V, 4)`` of each vertex where its sides start, how many there are, for how many there is room, and the degree
-            (number of triangles) that it is to have.
+        heads: ``(V, 4)`` of each vertex where its sides start, how many there are, how many with those that are marked, and
+            the degree (number of triangles) that it is to have.
         sides: ``(n, 3)`` the latest one of a vertex last: the next and the previous vertex of a triangle, and the vertex'
-            corner ``3 t + k`` in it.
+            corner ``3 t + k`` in it. Marked: -1, minus the sides to skip from here back to one that is not, and -1.
+        rooms: ``(V,)`` for how many sides each vertex has room.
+        places: ``(3T,)`` the side of each corner, if its vertex has more than `BIG`.
     """
 
     heads: Int32
     sides: Int32
+    rooms: Int32
+    places: Int32
 
 
 @compiled
 def make_fans(triangles: Int32, n_vertices: int) -> tuple[Fans, int]:
     """The fans of ``triangles (T, 3)`` over V vertices, and where their sides end; a vertex' smallest corner is its last."""
-    heads = np.zeros((n_vertices, 4), np.int32)
+    heads, rooms = np.zeros((n_vertices, 4), np.int32), np.zeros(n_vertices, np.int32)
     for t in range(len(triangles)):
         for k in range(3):
             heads[triangles[t, k], DEGREE] += 1
@@ -44,10 +52,10 @@ def make_fans(triangles: Int32, n_vertices: int) -> tuple[Fans, int]:
     for v in range(n_vertices):
         heads[v, START] = end
         if heads[v, DEGREE]:
-            heads[v, ROOM] = max(heads[v, DEGREE] + SPARE, LEAST_ROOM)
-        end += heads[v, ROOM]
+            rooms[v] = max(heads[v, DEGREE] + SPARE, LEAST_ROOM)
+        end += rooms[v]
         heads[v, DEGREE] = 0
-    fans = Fans(heads, np.empty((end + end // 8, 3), np.int32))
+    fans = Fans(heads, np.empty((end + end // 8, 3), np.int32), rooms, np.empty(3 * len(triangles), np.int32))
     for t in range(len(triangles) - 1, -1, -1):
         for k in range(2, -1, -1):
             v, after, before = triangles[t, k], triangles[t, k + 1 if k < 2 else 0], triangles[t, k - 1 if k > 0 else 2]
@@ -61,9 +69,10 @@ def remaining_triangles(fans: Fans, n_triangles: int) -> Int32:
     triangles = np.full((n_triangles, 3), -1, np.int32)
     for v in range(len(fans.heads)):
         low = fans.heads[v, START]
-        for at in range(low, low + fans.heads[v, DEGREE]):
+        for at in range(low, low + fans.heads[v, EXTENT]):
             corner = fans.sides[at, CORNER]
-            triangles[corner // 3, corner % 3] = v
+            if corner >= 0:
+                triangles[corner // 3, corner % 3] = v
     return triangles[triangles[:, 0] >= 0]
 
 
@@ -75,11 +84,21 @@ def has_edge(a: int, b: int, fans: Fans) -> bool:
     if min(fewer, more) > HUB:
         return True
     if more < fewer:
-        a, b, fewer = b, a, more
-    at, end = heads[a, START], heads[a, START] + fewer
+        a, b = b, a
+    at, end = heads[a, START], heads[a, START] + heads[a, EXTENT]
     while at < end and sides[at, NEXT_VERTEX] != b and sides[at, PREVIOUS_VERTEX] != b:
         at += 1
     return bool(at < end)
+
+
+@compiled
+def before_marked(at: int, low: int, fans: Fans) -> int:
+    """The last side from a marked one back to ``low`` that is not marked; ``low - 1`` or less if there is none."""
+    sides, found = fans.sides, at
+    while found >= low and sides[found, CORNER] < 0:
+        found += sides[found, PREVIOUS_VERTEX]
+    sides[at, PREVIOUS_VERTEX] = found - at  # who comes here again has one step
+    return found
 
 
 @inlined
@@ -95,14 +114,19 @@ def add_triangles(triangles: Int32, n: int, numbers: Int32, fans: Fans) -> None:
 def _append_side(v: int, after: int, before: int, corner: int, fans: Fans) -> None:
     """Give v the far side of a triangle in which it is ``corner``, from the vertex after it to the one before it."""
     heads, sides = fans.heads, fans.sides
-    at = heads[v, START] + heads[v, DEGREE]
+    at = heads[v, START] + heads[v, EXTENT]
     sides[at, NEXT_VERTEX], sides[at, PREVIOUS_VERTEX], sides[at, CORNER] = after, before, corner
     heads[v, DEGREE] += 1
+    heads[v, EXTENT] += 1
+    if heads[v, EXTENT] > BIG:
+        if heads[v, EXTENT] == BIG + 1:
+            _note_places(v, fans)
+        fans.places[corner] = at
 
 
 @inlined
 def remove_triangles(v: int, fans: Fans, freed: Int32) -> None:
-    """Take out the triangles around v; ``freed`` gets their numbers, that of the latest side first."""
+    """Take out the triangles around v, `BIG` at most; ``freed`` gets their numbers, that of the latest side first."""
     heads, sides = fans.heads, fans.sides
     low, n = heads[v, START], heads[v, DEGREE]
     for i in range(n):
@@ -111,21 +135,57 @@ def remove_triangles(v: int, fans: Fans, freed: Int32) -> None:
         freed[i] = t
         _remove_side(sides[at, NEXT_VERTEX], 3 * t + (k + 1 if k < 2 else 0), fans)
         _remove_side(sides[at, PREVIOUS_VERTEX], 3 * t + (k - 1 if k > 0 else 2), fans)
-    heads[v, DEGREE] = 0
+    heads[v, DEGREE] = heads[v, EXTENT] = 0
 
 
 @inlined
 def _remove_side(v: int, corner: int, fans: Fans) -> None:
     """Take out the side of one of v's corners; the others keep their order."""
     heads, sides = fans.heads, fans.sides
+    if heads[v, EXTENT] > BIG:
+        _mark_side(v, corner, fans)
+        return
     at = heads[v, START]
-    last = at + heads[v, DEGREE] - 1
-    while sides[at, CORNER] != corner:
+    last = at + heads[v, EXTENT] - 1
+    while at < last and sides[at, CORNER] != corner:
         at += 1
     for j in range(at, last):
         for k in range(3):
             sides[j, k] = sides[j + 1, k]
     heads[v, DEGREE] -= 1
+    heads[v, EXTENT] -= 1
+
+
+@compiled
+def _mark_side(v: int, corner: int, fans: Fans) -> None:
+    """As `_remove_side`, of more than `BIG` sides."""
+    heads, sides, at = fans.heads, fans.sides, fans.places[corner]
+    sides[at, NEXT_VERTEX] = sides[at, PREVIOUS_VERTEX] = sides[at, CORNER] = -1
+    heads[v, DEGREE] -= 1
+    if 2 * heads[v, DEGREE] <= heads[v, EXTENT]:
+        _close_up(v, heads[v, START], sides, fans)
+
+
+@compiled
+def _close_up(v: int, low: int, target: Int32, fans: Fans) -> None:
+    """Move v's sides, without those that are marked, to where ``target`` has room from ``low`` on: there or before."""
+    heads, sides, n = fans.heads, fans.sides, 0
+    start = heads[v, START]
+    for at in range(start, start + heads[v, EXTENT]):
+        if sides[at, CORNER] >= 0:
+            for k in range(3):
+                target[low + n, k] = sides[at, k]
+            n += 1
+    heads[v, START], heads[v, EXTENT] = low, n
+    if n > BIG:
+        _note_places(v, Fans(heads, target, fans.rooms, fans.places))
+
+
+@compiled
+def _note_places(v: int, fans: Fans) -> None:
+    low = fans.heads[v, START]
+    for at in range(low, low + fans.heads[v, EXTENT]):
+        fans.places[fans.sides[at, CORNER]] = at
 
 
 @inlined
@@ -136,38 +196,32 @@ def with_room(triangles: Int32, n: int, fans: Fans, end: int) -> tuple[Fans, int
     for i in range(n):
         for k in range(3):
             v = triangles[i, k]
-            heads[v, DEGREE] += 1
-            is_short |= heads[v, DEGREE] > heads[v, ROOM]
+            heads[v, EXTENT] += 1
+            is_short |= heads[v, EXTENT] > fans.rooms[v]
     for i in range(n):
         for k in range(3):
-            heads[triangles[i, k], DEGREE] -= 1
+            heads[triangles[i, k], EXTENT] -= 1
     return _move_sides(triangles, n, fans, end) if is_short else (fans, end)
 
 
 @compiled
 def _move_sides(triangles: Int32, n: int, fans: Fans, end: int) -> tuple[Fans, int]:
     """As `with_room`: vertices that lack room get twice what they need, at the end."""
-    heads = fans.heads
+    heads, rooms = fans.heads, fans.rooms
     for i in range(3 * n):
-        v, needed = triangles[i // 3, i % 3], 0
+        v, more = triangles[i // 3, i % 3], 0
         for j in range(3 * n):
-            needed += triangles[j // 3, j % 3] == v
-        needed += heads[v, DEGREE]
-        if needed <= heads[v, ROOM]:
+            more += triangles[j // 3, j % 3] == v
+        if heads[v, EXTENT] + more <= rooms[v]:
             continue
+        room = 2 * (heads[v, DEGREE] + more)
         sides = fans.sides
-        if end + 2 * needed > len(sides):
-            sides = np.empty((end + 2 * needed + len(sides) // 4, 3), np.int32)
-            _copy_sides(fans.sides[:end], sides)
-        low = heads[v, START]
-        _copy_sides(sides[low : low + heads[v, DEGREE]], sides[end:])
-        heads[v, START], heads[v, ROOM] = end, 2 * needed
-        fans, end = Fans(heads, sides), end + 2 * needed
+        if end + room > len(sides):
+            sides = np.empty((end + room + len(sides) // 4, 3), np.int32)
+            for at in range(end):
+                for k in range(3):
+                    sides[at, k] = fans.sides[at, k]
+        _close_up(v, end, sides, fans)
+        rooms[v] = room
+        fans, end = Fans(heads, sides, rooms, fans.places), end + room
     return fans, end
-
-
-@compiled
-def _copy_sides(source: Int32, target: Int32) -> None:
-    for i in range(len(source)):
-        for k in range(3):
-            target[i, k] = source[i, k]

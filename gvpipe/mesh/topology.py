@@ -43,7 +43,7 @@ def k_ring(neighbours: sparse.csr_array, k: int, some: Integers | None = None) -
 
 
 def components(neighbours: sparse.csr_array) -> tuple[int, Int32]:
-    """Return the number of connected components and each vertex's component ``(V,)``."""
+    """Return the number of connected components and each vertex's component ``(V,)``, of a symmetric adjacency."""
     from gvpipe.mesh.graph_kernels import Graph, label_components
 
     labels = label_components(Graph(neighbours.indptr.astype(np.int64), neighbours.indices.astype(np.int32, copy=False)))

@@ -47,7 +47,7 @@ def _group_nearby(positions: Float32, tolerance: float) -> Int64:
     distance, other = np.asarray(found[0]), np.asarray(found[1])
     start, end = np.nonzero(distance <= tolerance)
     links = sparse.csr_array((np.ones(len(start)), (start, other[start, end])), shape=(len(distinct),) * 2)
-    return np.asarray(components(links)[1][groups], np.int64)
+    return np.asarray(components(sparse.csr_array(links + links.T))[1][groups], np.int64)
 
 
 def _split(frames: Float32, groups: Int64, tolerance: float, free: int) -> Int64:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import gvpipe.sequence
 from gvpipe.sequence import MeshSequence
 from gvpipe.trajectory import welding
-from gvpipe.trajectory.welding import find_points
+from gvpipe.trajectory.welding import _group_nearby, find_points
 
 NO_FACES = np.zeros((0, 3), np.int32)
 
@@ -133,3 +133,12 @@ def test_chunks_are_left_out_once_all_vertices_are_alone(monkeypatch: pytest.Mon
     lazy = Lazy(np.random.default_rng(0).random((30, 40, 3)).astype(np.float32))
     assert np.array_equal(find_points(MeshSequence(lazy, NO_FACES)), np.arange(40))
     assert lazy.loaded <= 2
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_links_join_both_ways(seed: int) -> None:
+    """More positions lie within the tolerance than one has links; one at the edge has links to others that have none to it."""
+    positions = np.random.default_rng(seed).normal(0, 0.04, (200, 3)).astype(np.float32)
+    apart = np.linalg.norm(positions[:, None] - positions, axis=2)
+    assert (np.sort(apart, axis=1)[:, 1] < 0.1).all()  # nobody is alone
+    assert (_group_nearby(positions, 0.1) == 0).all()
