@@ -18,7 +18,8 @@ import gvpipe
 pytestmark = [pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing()), pytest.mark.slow]
 Run = Callable[..., Any]
 WAIT = "const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));"
-UNTIL = f"{WAIT} const until = async (test) => {{ for (let i = 0; i < 500 && !test(); i++) await wait(10); return test(); }};"
+# for 20 s at most: a field of 720,000 exact values takes five where two programs share a core
+UNTIL = f"{WAIT} const until = async (test) => {{ for (let i = 0; i < 2000 && !test(); i++) await wait(10); return test(); }};"
 READY = "await new Promise((resolve) => element.addEventListener('ready', resolve, { once: true }));"
 NAME = "(error) => error.name"
 STREAM: dict[str, Any] = {"quality": 80, "segment": 20}
