@@ -1,13 +1,19 @@
 """NumPy archives: ``vertices (F, V, 3)``, ``faces (T, 3)``, ``fps``, ``field_NAME (F, R[, C])``, and an asset's other data.
 
-The archive is an ordinary compressed ``.npz``; `numpy.load` reads it. Its bytes depend on the sequence alone, not on
+The archive is an ordinary ``.npz``; `numpy.load` reads it. Its bytes depend on the sequence alone, not on
 the time of writing. It holds everything that a sequence has; `gvpipe.io.npz_asset` lists the members.
+
+Members are deflated, but for positions and fields of which that saves little: positions that move lose a tenth of their
+bytes at 20 MB a second, which took most of the time of decoding a large file. Members are dated 1980, which is `zipfile`'s own
+default.
 """
 
 from __future__ import annotations
 
 import warnings
 import zipfile
+import zlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +35,9 @@ from gvpipe.io.npz_odd import FIELD, is_known, odd_notes
 from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS
 from gvpipe.sequence import MeshSequence
 
+LEVEL = 1  # of deflating: higher ones take three times as long, and save 2 % of triangles
+SAMPLE = 1 << 18  # bytes of positions, or of a field, that are deflated on trial
+WORTH = 0.75  # part that is left of them at most where all are deflated
 LARGE = 64 << 20  # bytes of positions that are read from a temporary file, frame by frame, in place of being kept in memory
 
 
@@ -40,19 +49,21 @@ def write_npz(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     """
     statics: dict[str, NDArray[Any]] = {"faces": sequence.faces, "fps": np.array(sequence.fps, np.float64)}
     statics |= asset_members(sequence)
-    # `numpy.savez_compressed` wants all frames at once, so the large members are written by hand
+    # `numpy.savez` wants all frames at once, so the large members are written by hand
     descr, read = ("<f8", sequence.read_absolute) if sequence.origin.any() else ("<f4", sequence.read)
     header = {"descr": descr, "fortran_order": False, "shape": (sequence.n_frames, sequence.n_vertices, 3)}
-    with unnamed_path(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-        with archive.open(_member("vertices"), "w", force_zip64=True) as file:
+    with unnamed_path(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
+        positions = _large_member("vertices", _second(read, sequence.n_frames).astype(descr))
+        with archive.open(positions, "w", force_zip64=True) as file:
             np.lib.format.write_array_header_1_0(file, header)
             for start, stop in sequence.spans():
                 file.write(np.ascontiguousarray(read(start, stop), descr).data)
-        for name, values in statics.items():
-            with archive.open(_member(name), "w", force_zip64=True) as file:
-                np.lib.format.write_array(file, values, allow_pickle=False)
+        for name, array in statics.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, array, allow_pickle=False)
         for name, field in sequence.fields.items():
-            with archive.open(_member(f"field_{name}"), "w", force_zip64=True) as file:
+            values = _large_member(f"field_{name}", _second(field.read, len(field)))
+            with archive.open(values, "w", force_zip64=True) as file:
                 write_field(file, field)
     return ()
 
@@ -182,9 +193,12 @@ def _as_usual(name: str, values: NDArray[np.generic], path: Path) -> NDArray[np.
     return as_color(values) if name == "color" else values.astype(np.float32)
 
 
-def _member(name: str) -> zipfile.ZipInfo:
-    """An archive member dated 1980 (`ZipInfo`'s own default), so that equal sequences give equal bytes."""
-    info = zipfile.ZipInfo(f"{name}.npy")
-    info.compress_type = zipfile.ZIP_DEFLATED
-    info.external_attr = 0o600 << 16
-    return info
+def _second(read: Callable[[int, int], Array], n_frames: int) -> Array:
+    """The second frame, if there is one: the first of a geometry video may be on a grid, the others are not."""
+    return read(min(1, n_frames - 1), min(2, n_frames))
+
+
+def _large_member(name: str, frame: NDArray[Any]) -> str | zipfile.ZipInfo:
+    """An archive member, deflated where one of its frames says that this is worth its time, and else stored."""
+    member, sample = f"{name}.npy", frame.tobytes()[:SAMPLE]
+    return member if len(zlib.compress(sample, LEVEL)) <= WORTH * len(sample) else zipfile.ZipInfo(member)

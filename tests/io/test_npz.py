@@ -55,6 +55,25 @@ def test_npz_attributes_and_numpy_reads_it(tmp_path: Path) -> None:
     assert (tmp_path / "b.npz").read_bytes() == first
 
 
+def test_what_deflating_saves_little_of_is_stored(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    noise = np.repeat(rng.random((4, 500, 3), np.float32)[:1], 4, axis=0)
+    on_a_grid = np.round(4 * noise)
+    faces = np.arange(498, dtype=np.int32).reshape(-1, 3)
+    for first, others in ((noise, on_a_grid), (on_a_grid, noise)):
+        positions = np.concatenate([first[:1], others[1:]])  # the first frame says nothing of the others
+        fields = {"height": Field(others[:, :, 2])}
+        io.write(MeshSequence(positions, faces, fields=fields), tmp_path / "a.npz")
+        with zipfile.ZipFile(tmp_path / "a.npz") as archive:
+            kinds = {entry.filename: entry.compress_type for entry in archive.infolist()}
+        kind = zipfile.ZIP_STORED if others is noise else zipfile.ZIP_DEFLATED
+        assert kinds["vertices.npy"] == kinds["field_height.npy"] == kind and kinds["faces.npy"] == zipfile.ZIP_DEFLATED
+        read = io.read(tmp_path / "a.npz")
+        assert same_bits(read.positions, positions) and same_bits(read.fields["height"].read(0, 4)[..., 0], others[:, :, 2])
+    io.write(MeshSequence(noise[:1], faces), tmp_path / "one.npz")
+    assert same_bits(io.read(tmp_path / "one.npz").positions, noise[:1])
+
+
 def test_npz_float64_and_no_fps(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", vertices=np.ones((2, 3, 3)) / 3, faces=FACES.astype(np.uint64))
     read = io.read(tmp_path / "a.npz")
