@@ -19,6 +19,7 @@ from gvpipe.io.simulation.xml_arrays import TYPES
 from gvpipe.sequence import MeshSequence
 
 BLOCK = 1 << 20  # bytes of a block before compression
+LEVEL = 1  # of compression: higher ones take three times as long for triangles, and gain little on positions
 NAMES = {np.dtype(code): name for name, code in TYPES.items()}
 
 
@@ -81,6 +82,6 @@ def vtp_bytes(content: PolyContent, points: Array, fields: Mapping[str, Array]) 
 
 def _packed(raw: bytes) -> bytes:
     """Header and compressed blocks."""
-    blocks = [zlib.compress(raw[at : at + BLOCK]) for at in range(0, len(raw), BLOCK)]
+    blocks = [zlib.compress(raw[at : at + BLOCK], LEVEL) for at in range(0, len(raw), BLOCK)]
     header = [len(blocks), BLOCK, len(raw) % BLOCK, *map(len, blocks)] if blocks else [0]
     return np.array(header, "<u8").tobytes() + b"".join(blocks)
