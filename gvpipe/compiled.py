@@ -6,7 +6,7 @@ where they call them, not at the top of a file.
 numba compiles a kernel when it is first called with arguments of some types. `gvpipe.machine_code` keeps what it makes in
 files. They only save time: code that is not found or does not load is compiled again.
 
-Compiling all kernels of an encode takes up to half a minute. So the logger of this module says once per process that it
+Compiling all kernels of an encode takes a minute or more. So the logger of this module says once per process that it
 begins, at level INFO, which is silent unless someone listens. The command line does.
 """
 
@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import functools
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar, cast
 
 import numba
@@ -22,7 +22,7 @@ import numba
 from gvpipe.machine_code import MachineCode
 
 LOGGER = logging.getLogger(__name__)
-ONCE = "compiling kernels, once after installation; the first commands take up to half a minute longer"
+ONCE = "compiling kernels, once after installation; the first commands take a minute or two longer"
 EVERY_TIME = "compiling kernels in every run, since no folder takes machine code; set NUMBA_CACHE_DIR to one that does"
 
 OPTIONS = {
@@ -51,7 +51,14 @@ def _compiled(function: Function, options: dict[str, bool]) -> Function:
     if kernel is not function:  # NUMBA_DISABLE_JIT leaves it as it is
         on_miss, on_refusal = functools.partial(_announce, ONCE), functools.partial(_announce, EVERY_TIME)
         kernel._cache = MachineCode(function, options, on_miss, on_refusal)  # what `cache=True` sets, to numba's own class
+        kernel.get_call_template = functools.partial(_find_overload, kernel.get_call_template)
     return cast(Function, kernel)
+
+
+def _find_overload(find: Callable[..., Any], arguments: Iterable[Any], keywords: Mapping[str, Any]) -> Any:
+    """What a call by another kernel finds: numba alone compiles a version for each constant argument, here one serves all."""
+    types = numba.types
+    return find(tuple(map(types.unliteral, arguments)), {name: types.unliteral(kind) for name, kind in keywords.items()})
 
 
 @functools.cache

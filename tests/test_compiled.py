@@ -205,6 +205,19 @@ def test_the_portable_processor_stands_in_for_none_that_is_asked_for(monkeypatch
     assert not machine_code.stands_in.__wrapped__()
 
 
+def test_constants_make_no_versions() -> None:
+    @compiled
+    def scaled(value: Any, factors: Any, shift: int = 0) -> Any:
+        return value * factors[0] + factors[1] + shift
+
+    @compiled
+    def calls(n: int) -> Any:
+        return scaled(1, (2, n)) + scaled(n, (n, 3)) + scaled(4, (5, 6), shift=7)
+
+    assert calls(10) == 12 + 103 + 33
+    assert len(scaled.signatures) == 2  # type: ignore[attr-defined]  # with a default, and without
+
+
 def test_files_that_nobody_reads_go(kernels: Any) -> None:
     kernel = kernels().double
     assert kernel(2) == 4

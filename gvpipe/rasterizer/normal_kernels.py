@@ -29,7 +29,9 @@ def point_normals(points: Array, of_faces: Array, normals: Array) -> None:
 
     The normal is zero where they cancel.
     """
-    normals[:] = 0.0
+    for p in range(len(normals)):
+        for axis in range(3):
+            normals[p, axis] = 0.0
     for t in range(len(points)):
         for i in range(3):
             for axis in range(3):

@@ -107,11 +107,10 @@ def rasterise(chosen: Array, scene: Scene, look: Look | None, z_buffer: ZBuffer,
 def _clear(z_buffer: ZBuffer, layer: int, rows: tuple[int, int]) -> None:
     """Empty a layer; what is see-through is then only seen before what is opaque."""
     depths, triangles, last, (top, bottom) = z_buffer.depths, z_buffer.triangles, len(z_buffer.depths) - 1, rows
-    triangles[layer, top:bottom] = -1
-    if layer == last:
-        depths[layer, top:bottom] = 0.0
-    else:
-        depths[layer, top:bottom] = depths[last, top:bottom]
+    for y in range(top, bottom):
+        for x in range(depths.shape[2]):
+            triangles[layer, y, x] = -1
+            depths[layer, y, x] = 0.0 if layer == last else depths[last, y, x]
 
 
 @compiled

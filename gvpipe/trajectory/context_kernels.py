@@ -153,7 +153,9 @@ def find_all_contexts(residuals: Int64, inputs: ContextInputs) -> UInt8:
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
         near = _find_near(first, end, inputs)
         for c in range(len(rows)):
-            contexts[first:end, c] = _find_contexts(first, end, c, rows, inputs, before, near)
+            found = _find_contexts(first, end, c, rows, inputs, before, near)
+            for i in range(first, end):
+                contexts[i, c] = found[i - first]
         _mean_magnitudes(rows, first, end, before)
     return contexts
 

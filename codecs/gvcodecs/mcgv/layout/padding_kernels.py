@@ -32,7 +32,8 @@ def factor_blocks(fixed: Bool, block: int, first: Int64, factors: Float32) -> No
                 continue
             y, x = p // block, p % block
             row = rows[count]
-            row[:] = 0.0
+            for j in range(width):
+                row[j] = 0.0
             for dy in range(-1, 2):
                 for dx in range(-1, 2):
                     if (dy or dx) and 0 <= y + dy < block and 0 <= x + dx < block:
@@ -52,7 +53,8 @@ def factor_blocks(fixed: Bool, block: int, first: Int64, factors: Float32) -> No
             for i in range(1, min(width, count + 1)):
                 total -= row[i] * row[i]
             row[0] = 1.0 / np.sqrt(total)
-            factors[first[k] + count] = row
+            for j in range(width):
+                factors[first[k] + count, j] = row[j]
             count += 1
 
 
