@@ -205,6 +205,7 @@ def test_the_portable_processor_stands_in_for_none_that_is_asked_for(monkeypatch
     assert not machine_code.stands_in.__wrapped__()
 
 
+@pytest.mark.usefixtures("kernels")  # so that nothing is loaded
 def test_constants_make_no_versions() -> None:
     @compiled
     def scaled(value: Any, factors: Any, shift: int = 0) -> Any:
