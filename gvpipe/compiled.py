@@ -6,8 +6,8 @@ where they call them, not at the top of a file.
 numba compiles a kernel when it is first called with arguments of some types. `gvpipe.machine_code` keeps what it makes in
 files. They only save time: code that is not found or does not load is compiled again.
 
-Compiling all kernels of an encode takes a minute or more. So the logger of this module says once per process that it
-begins, at level INFO, which is silent unless someone listens. The command line does.
+Compiling all kernels of an encode takes up to a minute, on slow machines two. So the logger of this module says once per
+process that it begins, at level INFO, which is silent unless someone listens. The command line does.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numba
 from gvpipe.machine_code import MachineCode
 
 LOGGER = logging.getLogger(__name__)
-ONCE = "compiling kernels, once after installation; the first commands take a minute or two longer"
+ONCE = "compiling kernels, once after installation; the first commands take up to a minute longer, on slow machines two"
 EVERY_TIME = "compiling kernels in every run, since no folder takes machine code; set NUMBA_CACHE_DIR to one that does"
 
 OPTIONS = {

@@ -1,6 +1,6 @@
 """Animated fields, and positions, in NumPy archives, written and read some frames at a time.
 
-A member of an archive is one deflated stream, so that frames in its middle cannot be had alone. It is inflated when the first
+Of a member that is one deflated stream, frames in the middle cannot be had alone. So a member is copied when the first
 frame is asked for, into an unnamed temporary file, which then gives any frames. A member in Fortran order, whose time runs
 fastest, is turned on its way there.
 """
@@ -39,7 +39,7 @@ def write_field(file: IO[bytes], field: Field) -> None:
 
 
 class NpzFrames:
-    """A member ``(F, R)`` or ``(F, R, C)`` of an archive, inflated when it is first sliced.
+    """A member ``(F, R)`` or ``(F, R, C)`` of an archive, copied when it is first sliced.
 
     Args:
         path: of the archive.

@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gvcodecs.mcgv.browser import browser_obstacle
+from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.reader_choice import open_reader, segment_parts
 from gvcodecs.mcgv.settings import Settings
 from gvpipe.codec import Encoded, FrameReader, Memo, Progress
@@ -35,8 +36,7 @@ class Mcgv(Settings):
     """
 
     def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
-        from gvcodecs.mcgv.encode_job import Job  # here: what encodes takes 0.2 s to import, for which no player should wait
-        from gvcodecs.mcgv.encoding.target_search import encode_to_target
+        from gvcodecs.mcgv.encoding.target_search import encode_to_target  # takes 0.2 s, for which no player should wait
 
         return encode_to_target(Job(self, sequence, memo, report))
 

@@ -19,7 +19,7 @@ from gvpipe.io.simulation.xml_arrays import TYPES
 from gvpipe.sequence import MeshSequence
 
 BLOCK = 1 << 20  # bytes of a block before compression
-LEVEL = 1  # of compression: higher ones take three times as long for triangles, and gain little on positions
+LEVEL = 1  # of compression: level 6 takes three to six times as long, and saves 2 % of triangles
 NAMES = {np.dtype(code): name for name, code in TYPES.items()}
 
 
