@@ -62,4 +62,11 @@ def chosen(
         sequence = sequence.with_fps(fps)
     if progress is None:
         return sequence
-    return sequence.watched(lambda stop: progress(stage, stop / sequence.n_frames))
+    furthest = 0
+
+    def told(stop: int) -> None:
+        nonlocal furthest  # archives are sampled before they are written, which is no step back
+        furthest = max(furthest, stop)
+        progress(stage, furthest / sequence.n_frames)
+
+    return sequence.watched(told)

@@ -15,7 +15,7 @@ import gvpipe
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.part import Part
-from gvpipe.cli.choices import chosen_frames
+from gvpipe.cli.choices import chosen, chosen_frames
 from gvpipe.sequence import MeshSequence
 
 Run = Callable[..., Any]
@@ -120,3 +120,13 @@ def test_frames_are_named_once(run: Run, video: Path, tmp_path: Path) -> None:
     assert chosen_frames(None, None, "3:") == (3, None) and chosen_frames(2, 5, None) == (2, 5)
     for command in ("decode", "convert"):
         assert run(command, video, tmp_path / "a.npz", "--frames", "2:5", "--stop", 4).status == 2
+
+
+def test_progress_does_not_step_back() -> None:
+    told: list[float] = []
+    points, faces = grid(3)
+    sequence = MeshSequence(np.repeat(points[None].astype(np.float32), 4, axis=0), faces.astype(np.int32))
+    watched = chosen(sequence, (), None, "write", lambda _, part: told.append(part))
+    for frame in (1, 0, 1, 2, 3):  # a look ahead, then all
+        watched.read(frame, frame + 1)
+    assert told == [0.5, 0.5, 0.5, 0.75, 1.0]
