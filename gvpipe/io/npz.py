@@ -195,8 +195,9 @@ def _as_usual(name: str, values: NDArray[np.generic], path: Path) -> NDArray[np.
 def _sample(read: Callable[[int, int], Array], n_frames: int) -> Array:
     """Frames of `SAMPLE` bytes, or the second one: the first of a geometry video may be on a grid where the others are not."""
     first = min(1, n_frames - 1)
-    n_sampled = max(1, SAMPLE // max(1, read(first, first + 1).nbytes))
-    return read(first, min(n_frames, first + n_sampled))
+    frame = read(first, first + 1)
+    stop = min(n_frames, first + SAMPLE // frame.nbytes)
+    return read(first, stop) if stop > first + 1 else frame
 
 
 def _large_member(name: str, sample: NDArray[Any]) -> str | zipfile.ZipInfo:
