@@ -383,9 +383,7 @@ def _as_faces(given: Any, n_vertices: int, name: str) -> Int32:
         faces = np.zeros((0, 3), np.int32)
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
         raise InputError(f"{name}: faces have shape {faces.shape} and type {faces.dtype}; (triangles, 3) integers are needed")
-    out = np.flatnonzero(((faces < 0) | (faces >= n_vertices)).any(axis=1))
-    if len(out):
-        raise InputError(
-            f"{name}: triangle {out[0]} is {faces[out[0]].tolist()}; vertex indices must lie in 0..{n_vertices - 1}"
-        )
+    if faces.min(initial=0) < 0 or faces.max(initial=0) >= n_vertices:
+        out = np.flatnonzero(((faces < 0) | (faces >= n_vertices)).any(axis=1))[0]
+        raise InputError(f"{name}: triangle {out} is {faces[out].tolist()}; vertex indices must lie in 0..{n_vertices - 1}")
     return np.ascontiguousarray(faces, dtype=np.int32)

@@ -60,6 +60,19 @@ def link_vertices(faces: Int32, n_vertices: int) -> Graph:
 
 
 @compiled
+def lower_neighbours(graph: Graph) -> tuple[Int64, Int64]:
+    """The neighbours of lower number: bounds of each vertex' ``(V + 1,)``, and the neighbours, ascending at each."""
+    starts, lower = np.zeros(len(graph.starts), np.int64), np.empty(len(graph.neighbours), np.int64)
+    end = 0
+    for v in range(len(starts) - 1):
+        for k in range(graph.starts[v], graph.starts[v + 1]):
+            lower[end] = graph.neighbours[k]  # the next one takes its place unless it counts
+            end += graph.neighbours[k] < v
+        starts[v + 1] = end
+    return starts, lower[:end].copy()
+
+
+@compiled
 def label_components(graph: Graph) -> Int32:
     """The connected component of each vertex ``(V,)``; components are numbered by their first vertices."""
     n_vertices = len(graph.starts) - 1

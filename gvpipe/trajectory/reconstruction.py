@@ -16,6 +16,7 @@ from gvpipe.trajectory.basis import Basis
 
 FEWEST, MOST, TOGETHER = 2, 8, 1 << 13  # frames rebuilt at once, of about so many points
 LARGE = 1 << 18  # positions; fewer do not pay for other threads
+RUN = 1 << 16  # positions that a thread rebuilds at a time, about
 MAX_FLOAT32 = float(np.finfo(np.float32).max)
 
 
@@ -55,14 +56,20 @@ def read_frames(start: int, stop: int, bounds: list[int], points: Integers, deco
     for s, first, last in segments_between(start, stop, bounds):
         segment, begin = decode(s), bounds[s]
         blocks = list(pairwise([*range(first, last, together), last]))
+        at_once = max(1, RUN // (together * max(len(vertices), 1)))  # blocks that a thread rebuilds before it asks for more
 
-        def rebuild(block: tuple[int, int], segment: Segment = segment, begin: int = begin) -> int:
+        def rebuild(run: list[tuple[int, int]], segment: Segment = segment, begin: int = begin) -> int:
             """Fill frames of the result; return the first that is not finite, or the one after them."""
-            positions = segment.positions(block[0] - begin, block[1] - begin)  # (n, 3, P)
-            return block[0] + place_points(positions, vertices, MAX_FLOAT32, result[block[0] - start : block[1] - start])
+            for low, high in run:
+                positions = segment.positions(low - begin, high - begin)  # (n, 3, P)
+                done = low + place_points(positions, vertices, MAX_FLOAT32, result[low - start : high - start])
+                if done < high:
+                    return done
+            return run[-1][1]
 
         ahead = AHEAD if (last - first) * len(vertices) >= LARGE else 0
-        for (_, end), done in zip(blocks, run_ahead(rebuild, blocks, ahead), strict=True):
-            if done < end:
+        runs = [blocks[k : k + at_once] for k in range(0, len(blocks), at_once)]
+        for run, done in zip(runs, run_ahead(rebuild, runs, ahead), strict=True):
+            if done < run[-1][1]:
                 raise corrupt(f"frame {done} does not decode to finite positions")
     return result

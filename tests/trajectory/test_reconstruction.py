@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gvpipe.errors import CorruptFile
+from gvpipe.trajectory import reconstruction
 from gvpipe.trajectory.basis import Basis
 from gvpipe.trajectory.reconstruction import Segment, read_frames
 
@@ -24,7 +25,10 @@ def test_vertices_get_their_points_from_any_segment() -> None:
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -1e39])
-def test_no_position_is_refused_by_its_frame(value: float) -> None:
+@pytest.mark.parametrize("run", [1, 1 << 16])
+def test_no_position_is_refused_by_its_frame(value: float, run: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reconstruction, "LARGE", 1)  # on other threads
+    monkeypatch.setattr(reconstruction, "RUN", run)
     segments = _segments()
     segments[0].basis.mean[3 * 9 + 1] = value
     read_frames(0, 9, BOUNDS, np.arange(4), lambda s: segments[s])

@@ -6,9 +6,11 @@ A frame costs its group of pictures (H.264) or its one picture (JPEG), if there 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cached_property, partial
+from itertools import chain
 
 import numpy as np
 
@@ -33,7 +35,7 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.corrections.displacements import DisplacementReader, PointVertices
 from gvpipe.errors import CorruptFile, corrupt
-from gvpipe.media.video import VideoReader
+from gvpipe.media.video import Plane, VideoReader
 
 BYTES_PER_PIXEL, BYTES_PER_SLOT = 4, 200
 TOGETHER = 16  # frames whose transforms are kept for other threads
@@ -139,18 +141,18 @@ class McgvReader:
         groups = self._video.read(start, stop)
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
         ahead = AHEAD if result.size >= LARGE else 0
-        for first, planes in groups:
-            for k in range(0, len(planes), TOGETHER):
-                some = enumerate(planes[k : k + TOGETHER], first + k)
-                fills = [partial(self._motion.rebuild(frame, plane), result[frame - start]) for frame, plane in some]
-                for _ in run_ahead(_call, fills, ahead):
-                    pass
+        with beside(lambda: next(groups, None), ahead > 0) as begun:
+            motion, first = self._motion, begun()
+        filling: Iterator[None] = iter(())
+        for some in _few_at_a_time(chain([first] if first else [], groups)):
+            fills = [partial(motion.rebuild(frame, plane), result[frame - start]) for frame, plane in some]
+            deque(filling, maxlen=0)  # the frames before these
+            filling = run_ahead(_call_all, [fills[k::AHEAD] for k in range(AHEAD)], ahead)  # no thread waits for the next frame
+        deque(filling, maxlen=0)
         if self._header.outliers:
             self._outliers.apply(start, result)
         self._surface.fill_still(result)
-        with np.errstate(invalid="ignore"):
-            total = float(result.sum(dtype=np.float64))  # finite where all are; faster than to look at each
-        if not math.isfinite(total):
+        if not all([*run_ahead(_is_finite, np.array_split(result, AHEAD), ahead)]):
             raise corrupt(f"frames {start} to {stop - 1} do not decode to finite positions")
         return result
 
@@ -163,8 +165,21 @@ class McgvReader:
         )
 
 
-def _call(function: Callable[[], None]) -> None:
-    function()
+def _few_at_a_time(groups: Iterable[tuple[int, list[Plane]]]) -> Iterator[list[tuple[int, Plane]]]:
+    """Lists of up to `TOGETHER` frames and their planes, of groups of pictures."""
+    for first, planes in groups:
+        for k in range(0, len(planes), TOGETHER):
+            yield list(enumerate(planes[k : k + TOGETHER], first + k))
+
+
+def _call_all(functions: Iterable[Callable[[], None]]) -> None:
+    for function in functions:
+        function()
+
+
+def _is_finite(positions: Float32) -> bool:
+    with np.errstate(invalid="ignore"):
+        return math.isfinite(float(positions.sum(dtype=np.float64)))  # the sum is, where all are; faster than to look at each
 
 
 def _open_video(bitstream: Bitstream, header: Header, bounds: list[int]) -> VideoReader | NoPictures:

@@ -10,8 +10,11 @@ import pytest
 from sequences import patched
 
 from gvcodecs.mcgv import Mcgv, trajectory_reader
+from gvcodecs.mcgv import reader as mcgv_reader
 from gvcodecs.mcgv.base.surface import read_surface
 from gvcodecs.mcgv.header import Header
+from gvcodecs.mcgv.layout import kd_tree
+from gvcodecs.mcgv.motion import blended
 from gvcodecs.mcgv.reader import read_layout
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
@@ -52,6 +55,19 @@ def test_points_stay_whole_and_still_vertices_still(settings: dict[str, Any]) ->
     reader = open_reader(stream)
     for frame in (7, 0, 11, 3):
         assert np.array_equal(reader.read(frame, frame + 1)[0], frames[frame])
+
+
+@pytest.mark.parametrize("settings", [*ROUTES, {"prediction": "blended", "quality": 20}], ids=str)
+def test_threads_decode_the_same(settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Several groups of pictures or one, from any frame on: as on one thread."""
+    for gop in (4, 64):
+        stream = Mcgv(**{**FAST, **settings, "gop": gop}).encode(patched(n_frames=40)).bitstream
+        expected = decode(stream)
+        with monkeypatch.context() as patch:
+            for module, name in ((mcgv_reader, "LARGE"), (mcgv_reader, "MANY_SLOTS"), (blended, "LARGE"), (kd_tree, "LARGE")):
+                patch.setattr(module, name, 1)
+            for start, stop in ((0, 40), (3, 38), (17, 18)):
+                assert np.array_equal(open_reader(stream).read(start, stop), expected[start:stop])
 
 
 @pytest.mark.parametrize("settings", ROUTES, ids=str)

@@ -24,9 +24,9 @@ class CausalNeighbours(NamedTuple):
 
 def causal_neighbours(neighbours: sparse.csr_array) -> CausalNeighbours:
     """Return the causal neighbours of all points, for their symmetric adjacency ``(P, P)``."""
+    from gvpipe.mesh.graph_kernels import Graph, lower_neighbours
+
     if not neighbours.has_sorted_indices:
         neighbours = neighbours.sorted_indices()
-    bounds = neighbours.indptr.astype(np.int64)
-    is_lower = neighbours.indices < np.repeat(np.arange(len(bounds) - 1), np.diff(bounds))
-    starts = np.concatenate([[0], np.cumsum(is_lower)])[bounds]
-    return CausalNeighbours(starts, neighbours.indices[is_lower].astype(np.int64))
+    graph = Graph(neighbours.indptr.astype(np.int64), neighbours.indices.astype(np.int32, copy=False))
+    return CausalNeighbours(*lower_neighbours(graph))

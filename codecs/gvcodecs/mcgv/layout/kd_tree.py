@@ -16,11 +16,13 @@ has one pair of directions for all of its cuts: transforms code what is monotono
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
 from gvcodecs.mcgv.layout.layout import Layout
+from gvpipe.ahead import run_ahead
 from gvpipe.arrays import Bool, Int64, Integers
 from gvpipe.errors import CorruptFile, InputError
 
@@ -28,6 +30,7 @@ FRAME = 4  # pixels: side of the squares that share one pair of directions
 MOMENT_BITS = 10  # of deviations in second moments: their sums stay exact in a double for 2**24 vertices
 SPREAD = 2  # groups are moved apart by this many times their distance from the middle
 MAX_COORDINATE = 1 << 20  # of points: no finer lattice is ever chosen
+LARGE = 1 << 15  # vertices; fewer do not pay for other threads
 MAX_RATIO = 3.0  # of the sides of an automatic plane
 
 
@@ -96,12 +99,20 @@ def fill(cells: Cells, order: Int64, points: Int64, width: int, block: int, shif
         block: as in `place_points`.
         shift: of moments where cells turn as their points do; None: they keep their directions.
     """
-    from gvcodecs.mcgv.layout.kd_tree_kernels import Halving, place_cells
+    from gvcodecs.mcgv.layout.kd_tree_kernels import Halving, halve_cell, place_cells
 
     halving = Halving(np.ascontiguousarray(points), width, block, FRAME, -1 if shift is None else shift)
-    pixel = np.empty(len(points), np.int64)
+    own, pixel = order.copy(), np.empty(len(points), np.int64)
     rectangles, directions = np.hstack([cells.corner, cells.side]), np.hstack([cells.across, cells.down])
-    place_cells(order.copy(), cells.starts, rectangles, directions, halving, pixel)
+    if len(rectangles) > 1 or len(own) < LARGE:
+        place_cells(own, cells.starts, rectangles, directions, halving, pixel)
+        return pixel
+    parts, ways = halve_cell(own, rectangles[0], directions[0], halving)
+
+    def place(k: int) -> None:
+        place_cells(own, parts[k, :2], parts[k : k + 1, 2:], ways[k : k + 1], halving, pixel)
+
+    deque(run_ahead(place, range(len(parts))), maxlen=0)  # halves know nothing of each other
     return pixel
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +16,7 @@ from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
 from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import Trajectories, decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
+from gvpipe.ahead import run_ahead
 from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
@@ -24,6 +24,7 @@ from gvpipe.trajectory.sparse_rows import as_rows
 
 BYTES_PER_POINT, SECONDS_PER_POINT = 400, 1e-6
 CHUNK = 16  # frames whose transforms are made at a time
+LARGE = 1 << 14  # vertices that move; fewer do not pay for other threads
 
 
 def keep_blend(bitstream: Bitstream, slots: Slots, header: Header) -> None:
@@ -87,12 +88,18 @@ class BlendedMotion:
         bounds: list[int],
         first: Trajectories | None = None,
     ) -> None:
-        from gvcodecs.mcgv.motion.reconstruction_kernels import skinned_points
+        from gvcodecs.mcgv.motion.reconstruction_kernels import SkinnedPoints, skinned_points
 
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
         self._blend = blend
         self._samples, surface = samples, samples.surface
-        self._points = skinned_points(samples.slots, surface.base, surface.point, blend.homogeneous, blend.weights)
+        n = len(samples.slots)
+        self._spans = [slice(0, n)] if n < LARGE else [slice(0, n // 2), slice(n // 2, n)]
+
+        def prepare(span: slice) -> SkinnedPoints:
+            return skinned_points(samples.slots[span], surface.base, surface.point, blend.homogeneous, blend.weights)
+
+        self._points = [*run_ahead(prepare, self._spans)]
         self._residuals = header.residual_step * header.profile.offsets
         self._segment: tuple[int, Trajectories | None] = (0, first)
         self._chunk: tuple[int, int, Float64] = (-1, -1, np.zeros((0, 0, 4, 3)))
@@ -105,8 +112,15 @@ class BlendedMotion:
         chunk, offset = divmod(frame - self._bounds[s], CHUNK)
         if self._chunk[:2] != (s, chunk):
             self._chunk = (s, chunk, self._transforms(s, chunk))
-        sites = Sites(self._samples.vertices, self._samples.pixels(samples.shape[1]), self._residuals)
-        return partial(rebuild_blended, samples.reshape(3, -1), sites, self._points, in_rows(self._chunk[2][offset]))
+        transforms = in_rows(self._chunk[2][offset])
+        planes, vertices, pixels = samples.reshape(3, -1), self._samples.vertices, self._samples.pixels(samples.shape[1])
+
+        def fill(positions: Float32) -> None:
+            for span, points in zip(self._spans, self._points, strict=True):
+                sites = Sites(vertices[span], pixels[span], self._residuals)
+                rebuild_blended(planes, sites, points, transforms, positions)
+
+        return fill
 
     def _transforms(self, s: int, chunk: int) -> Float64:
         """``(n, K, 4, 3)`` of a chunk of a segment's frames: always whole, so that sums do not depend on what else is read."""

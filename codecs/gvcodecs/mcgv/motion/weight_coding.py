@@ -54,7 +54,7 @@ def decode_weights(data: bytes, neighbours: sparse.csr_array, n_clusters: int) -
     counts = decode_integers(cursor.take(cursor.varint(cursor.left, "a length")), n_points, _count_contexts(causal), SECTION)
     if ((counts < 0) | (counts > INFLUENCES)).any():
         raise cursor.corrupt("a point follows more than four clusters")
-    column, own, changed = _used(counts)
+    column, own, changed = _used(counts[counts > 0])  # few points have numbers
     second = cursor.take(cursor.varint(cursor.left, "a length"))
     gaps = decode_integers(second, int(own.sum()), column[own], SECTION)
     changes = decode_integers(cursor.rest(), int(changed.sum()), column[changed], SECTION)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gvcodecs.mcgv.motion.blended import CHUNK
 from gvcodecs.mcgv.motion.contract import locate
+from gvpipe.media.video import Plane
 
 
 class NoPictures:
@@ -21,7 +21,7 @@ class NoPictures:
 
     def __init__(self, bounds: list[int], zero: int) -> None:
         self._bounds = bounds
-        self._plane: NDArray[np.uint8] = np.full((3, 1), zero, np.uint8)
+        self._plane: Plane = np.full((3, 1), zero, np.uint8)
 
     @property
     def n_frames(self) -> int:
@@ -37,6 +37,6 @@ class NoPictures:
     def close(self) -> None:
         """There is nothing to let go of."""
 
-    def read(self, start: int, stop: int) -> Iterator[tuple[int, list[NDArray[np.uint8]]]]:
+    def read(self, start: int, stop: int) -> Iterator[tuple[int, list[Plane]]]:
         """Yield the frames ``start`` to ``stop`` at once: the first, and for each ``(3, 1)`` samples."""
         yield start, [self._plane] * (stop - start)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from placing import halved
 from surfaces import awkward_surfaces, check_layout
 
+from gvcodecs.mcgv.layout import kd_tree
 from gvcodecs.mcgv.layout.kd_tree import FRAME, choose_size, place_points, second_moments
 from gvcodecs.mcgv.layout.kd_tree_kernels import Halving, place_cells
 from gvpipe.arrays import Int64
@@ -31,6 +32,18 @@ def test_placement_follows_its_description(name: str, block: int) -> None:
             check_layout(layout, np.zeros(len(points), np.int32), block)
             wanted = halved(lattice.tolist(), None if labels is None else labels.tolist(), *size, block)
             assert layout.pixel.tolist() == wanted
+
+
+@pytest.mark.parametrize("name", awkward_surfaces())
+def test_halves_on_threads_get_the_same_pixels(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    points = np.asarray(awkward_surfaces()[name][0])
+    lattice = Lattice.over(points, 12).quantise(points)
+    width, height = choose_size(len(points), 16)
+    for size in ((width, height), (width + 48, 3 * height)):
+        expected = place_points(lattice, None, *size, 16).pixel
+        with monkeypatch.context() as patch:
+            patch.setattr(kd_tree, "LARGE", 1)
+            assert np.array_equal(place_points(lattice, None, *size, 16).pixel, expected)
 
 
 def test_placement_keeps_neighbours_together() -> None:
