@@ -39,10 +39,11 @@ class Budget:
 
     Args:
         n_bytes: n, of the file; None: whatever it takes.
+        is_spare: whether work may run side by side where that takes more memory.
     """
 
-    def __init__(self, n_bytes: int | None) -> None:
-        self.n_bytes = n_bytes
+    def __init__(self, n_bytes: int | None, is_spare: bool = True) -> None:
+        self.n_bytes, self.is_spare = n_bytes, is_spare
         self.memory = float("inf") if n_bytes is None else max(LEAST_BYTES, BYTES_PER_BYTE * n_bytes)
         self.seconds = float("inf") if n_bytes is None else max(LEAST_SECONDS, SECONDS_PER_BYTE * n_bytes)
         self._kept_memory, self._kept_seconds = 0.0, 0.0
@@ -73,6 +74,11 @@ class Budget:
     def memory_left(self) -> float:
         """Bytes that may still be asked for."""
         return max(0.0, self.memory - self._kept_memory)
+
+    @property
+    def memory_beside(self) -> float:
+        """Bytes that work side by side may take, all of it together."""
+        return self.memory_left if self.is_spare else 0.0
 
     @property
     def seconds_left(self) -> float:
@@ -116,6 +122,7 @@ class Budget:
 
 
 UNLIMITED = Budget(None)
+THRIFTY = Budget(None, is_spare=False)  # for an encoder that reads its own file, and has much in memory itself
 
 
 def _bytes(count: float) -> str:

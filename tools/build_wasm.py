@@ -52,7 +52,7 @@ MIXING = (
     [NUMBERS, "uint8[2]", NUMBERS, LONGS, LONGS, LONGS, LONGS],
 )
 ENTRIES = ("gvpipe.mesh.entry_kernels.EntryOrder", [LONGS, LONGS, NUMBERS])
-LISTS = ("gvpipe.connectivity.visit_kernels.NeighbourLists", [LONGS, LONGS])
+LISTS = ("gvpipe.connectivity.visit_kernels.NeighbourLists", [LONGS, INTS])
 VISITS = ("gvpipe.connectivity.visit_kernels.CodedVisits", [LONGS] * 3)
 SEAMS = ("gvpipe.connectivity.seam_corners.SeamCorners", [LONGS] * 4)
 SERIAL = ("gvpipe.entropy.serial_kernels.SerialCoder", [STREAM, LONGS, LONGS, LONGS, "bool"])

@@ -114,7 +114,7 @@ def keep_mesh(budget: Budget, n_vertices: int, n_triangles: int) -> None:
 def may_run_beside(budget: Budget, n_vertices: int, n_triangles: int) -> bool:
     """Whether vertices are decoded beside what needs points alone: of large meshes, if the file may take the memory of both."""
     peak = PEAK_PER_VERTEX * n_vertices + PEAK_PER_TRIANGLE * n_triangles
-    return n_vertices >= LARGE and BESIDE * peak <= budget.memory_left
+    return n_vertices >= LARGE and BESIDE * peak <= budget.memory_beside
 
 
 def _encode_draco(points: Array, faces: Array) -> bytes:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Int64, UInt32, UInt64
+from gvpipe.arrays import Bool, Int32, Int64, UInt32, UInt64
 from gvpipe.compiled import compiled
 from gvpipe.connectivity.visit_symbols import ESCAPE, EXACT_RANKS
 from gvpipe.entropy.range_decoder import decode_symbols, decode_uniform
@@ -19,11 +19,11 @@ class NeighbourLists(NamedTuple):
 
     Args:
         starts: ``(V + 1,)`` int64 bounds of each vertex' neighbours in ``neighbours``.
-        neighbours: ``(E,)`` int64, nearest first: along triangle edges, and vertices at one point.
+        neighbours: ``(E,)`` int32, nearest first: along triangle edges, and vertices at one point.
     """
 
     starts: Int64
-    neighbours: Int64
+    neighbours: Int32
 
 
 class CodedVisits(NamedTuple):
@@ -87,7 +87,7 @@ def sort_neighbours(points: Int64, faces: Int64, twins: Int64) -> NeighbourLists
         starts[twins[t, 1] + 1] += 1
     for v in range(n_vertices):
         starts[v + 1] += starts[v]
-    neighbours = np.empty(starts[-1], np.int64)
+    neighbours = np.empty(starts[-1], np.int32)
     end = starts[:-1].copy()
     for t in range(len(faces)):
         for k in range(3):

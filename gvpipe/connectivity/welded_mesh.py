@@ -135,7 +135,7 @@ def _begin_points(
     def finish() -> WeldedMesh:
         is_adaptive = bool(flags & ADAPTIVE_ORDER)
         faces, point = decode_seams(
-            counts, corners, order, point_faces, len(points), across, is_adaptive, n_vertices=n_vertices
+            counts, corners, order, opened.point_faces, len(opened.lattice), across, is_adaptive, n_vertices=n_vertices
         )
         return WeldedMesh(opened.lattice, opened.point_faces, faces.astype(np.int32), point)
 

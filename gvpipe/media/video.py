@@ -300,9 +300,12 @@ class VideoReader:
         Where several groups are asked for, decoding starts with the call and runs ahead of the iteration, on other threads.
 
         Raises:
+            OverBudget: a group of pictures takes more than the file may.
             CorruptFile: while iterating: a group does not decode to its number of planes.
         """
         wanted = [g for g, (first, last) in enumerate(self._groups) if first < stop and last > start]
+        for n_pictures in {self._groups[g][1] - self._groups[g][0] for g in wanted if g != self._cached[0]}:
+            self._ask_for(n_pictures)  # at once: what other threads keep meanwhile would decide it
         decoded = run_ahead(self._decode, wanted)
         return (self._part(group, planes, start, stop) for group, planes in zip(wanted, decoded, strict=True))
 
@@ -316,7 +319,6 @@ class VideoReader:
         number, planes = self._cached
         if number != group:
             first, last = self._groups[group]
-            self._ask_for(last - first)
             packets, extradata = self._packets.read(first, last)
             if self.profile.codec == "mjpeg":
                 planes = [decode_jpeg(bytes(packet), *self.shape) for packet in packets]

@@ -5,12 +5,11 @@ A frame costs its group of pictures (H.264) or its one picture (JPEG), if there 
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cached_property, partial
-from itertools import chain
+from itertools import chain, islice
 
 import numpy as np
 
@@ -111,7 +110,7 @@ class McgvReader:
         bitstream, budget = self._bitstream, self._bitstream.budget
         needed = bytes_of_layout(self._header, slots) + BYTES_PER_POINT * slots.n_slots
         is_large = slots.n_slots >= MANY_SLOTS and may_run_beside(budget, bitstream.n_vertices, bitstream.n_triangles)
-        return is_large and 2 * needed <= budget.memory_left
+        return is_large and 2 * needed <= budget.memory_beside
 
     def _read_affine(self) -> Motion:
         bitstream, header = self._bitstream, self._header
@@ -141,18 +140,24 @@ class McgvReader:
         groups = self._video.read(start, stop)
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
         ahead = AHEAD if result.size >= LARGE else 0
-        with beside(lambda: next(groups, None), ahead > 0) as begun:
-            motion, first = self._motion, begun()
+        overlaps = ahead > 0 and self._bitstream.budget.is_spare
+        with beside(lambda: [*islice(groups, 1)], overlaps) as begun:
+            motion = self._motion
+            frames = _frames(chain(begun(), groups))
+        del begun  # it keeps the first pictures
         filling: Iterator[None] = iter(())
-        for some in _few_at_a_time(chain([first] if first else [], groups)):
+        while some := list(islice(frames, TOGETHER)):
             fills = [partial(motion.rebuild(frame, plane), result[frame - start]) for frame, plane in some]
             deque(filling, maxlen=0)  # the frames before these
-            filling = run_ahead(_call_all, [fills[k::AHEAD] for k in range(AHEAD)], ahead)  # no thread waits for the next frame
+            parts = [part for k in range(AHEAD) if (part := fills[k::AHEAD])]
+            filling = run_ahead(_call_all, parts, ahead)  # a thread gets all of its frames at once
+            if not overlaps:
+                deque(filling, maxlen=0)
         deque(filling, maxlen=0)
         if self._header.outliers:
             self._outliers.apply(start, result)
         self._surface.fill_still(result)
-        if not all([*run_ahead(_is_finite, np.array_split(result, AHEAD), ahead)]):
+        if not all([*run_ahead(_is_finite, np.array_split(result.ravel(), AHEAD), ahead)]):
             raise corrupt(f"frames {start} to {stop - 1} do not decode to finite positions")
         return result
 
@@ -165,11 +170,10 @@ class McgvReader:
         )
 
 
-def _few_at_a_time(groups: Iterable[tuple[int, list[Plane]]]) -> Iterator[list[tuple[int, Plane]]]:
-    """Lists of up to `TOGETHER` frames and their planes, of groups of pictures."""
+def _frames(groups: Iterable[tuple[int, list[Plane]]]) -> Iterator[tuple[int, Plane]]:
+    """Each frame and its planes, of groups of pictures, which are let go of as they end."""
     for first, planes in groups:
-        for k in range(0, len(planes), TOGETHER):
-            yield list(enumerate(planes[k : k + TOGETHER], first + k))
+        yield from enumerate(planes, first)
 
 
 def _call_all(functions: Iterable[Callable[[], None]]) -> None:
@@ -179,7 +183,7 @@ def _call_all(functions: Iterable[Callable[[], None]]) -> None:
 
 def _is_finite(positions: Float32) -> bool:
     with np.errstate(invalid="ignore"):
-        return math.isfinite(float(positions.sum(dtype=np.float64)))  # the sum is, where all are; faster than to look at each
+        return bool(np.isfinite([positions.min(initial=0), positions.max(initial=0)]).all())  # faster than a look at each
 
 
 def _open_video(bitstream: Bitstream, header: Header, bounds: list[int]) -> VideoReader | NoPictures:

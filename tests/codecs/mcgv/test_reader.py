@@ -16,6 +16,8 @@ from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout import kd_tree
 from gvcodecs.mcgv.motion import blended
 from gvcodecs.mcgv.reader import read_layout
+from gvpipe.budget import THRIFTY, UNLIMITED
+from gvpipe.connectivity import base_mesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import CorruptFile
 from gvpipe.registry import open_reader
@@ -64,10 +66,13 @@ def test_threads_decode_the_same(settings: dict[str, Any], monkeypatch: pytest.M
         stream = Mcgv(**{**FAST, **settings, "gop": gop}).encode(patched(n_frames=40)).bitstream
         expected = decode(stream)
         with monkeypatch.context() as patch:
-            for module, name in ((mcgv_reader, "LARGE"), (mcgv_reader, "MANY_SLOTS"), (blended, "LARGE"), (kd_tree, "LARGE")):
-                patch.setattr(module, name, 1)
-            for start, stop in ((0, 40), (3, 38), (17, 18)):
-                assert np.array_equal(open_reader(stream).read(start, stop), expected[start:stop])
+            for module in (mcgv_reader, blended, kd_tree, base_mesh):
+                patch.setattr(module, "LARGE", 1)
+            patch.setattr(mcgv_reader, "MANY_SLOTS", 1)
+            for start, stop in ((0, 40), (3, 38), (17, 18), (5, 5)):
+                for budget in (UNLIMITED, THRIFTY):
+                    reader = open_reader(dataclasses.replace(stream, budget=budget))
+                    assert np.array_equal(reader.read(start, stop), expected[start:stop])
 
 
 @pytest.mark.parametrize("settings", ROUTES, ids=str)

@@ -109,7 +109,9 @@ def open_surface(bitstream: Bitstream, header: Header) -> Iterator[tuple[Slots, 
         if not len(moves):
             raise CorruptFile("section 'still' is corrupt: one point at least has samples; get the file again from its source")
         placed, own = _place(opened.lattice, header), np.arange(len(moves))
-        slots = Slots(opened.lattice[moves], placed[moves], own, own, Points.moving(opened, moves), own)
+        slots = Slots(
+            opened.lattice.take(moves, axis=0), placed.take(moves, axis=0), own, own, Points.moving(opened, moves), own
+        )
 
         def finish() -> DecodedBase:
             mesh = finished()

@@ -112,7 +112,7 @@ def fill(cells: Cells, order: Int64, points: Int64, width: int, block: int, shif
     def place(k: int) -> None:
         place_cells(own, parts[k, :2], parts[k : k + 1, 2:], ways[k : k + 1], halving, pixel)
 
-    deque(run_ahead(place, range(len(parts))), maxlen=0)  # halves know nothing of each other
+    deque(run_ahead(place, range(len(parts))), maxlen=0)  # they share no vertex and no pixel
     return pixel
 
 

@@ -65,7 +65,7 @@ def read_blend(bitstream: Bitstream, header: Header, slots: Slots) -> Blend:
     """The blend of a file's points; raises `CorruptFile`, `OverBudget`."""
     keep_blend(bitstream, slots, header)
     weights = decode_weights(bitstream.section("weights"), slots.points.neighbours, header.clusters)
-    return Blend(slots.base[slots.members], weights, header.clusters)
+    return Blend(slots.base.take(slots.members, axis=0), weights, header.clusters)
 
 
 class BlendedMotion:

@@ -38,12 +38,13 @@ def test_placement_follows_its_description(name: str, block: int) -> None:
 def test_halves_on_threads_get_the_same_pixels(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     points = np.asarray(awkward_surfaces()[name][0])
     lattice = Lattice.over(points, 12).quantise(points)
+    groups = np.random.default_rng(7).integers(0, 3, len(points))
     width, height = choose_size(len(points), 16)
-    for size in ((width, height), (width + 48, 3 * height)):
-        expected = place_points(lattice, None, *size, 16).pixel
+    for size, labels in (((width, height), None), ((width + 48, 3 * height), groups)):
+        expected = place_points(lattice, labels, *size, 16).pixel
         with monkeypatch.context() as patch:
             patch.setattr(kd_tree, "LARGE", 1)
-            assert np.array_equal(place_points(lattice, None, *size, 16).pixel, expected)
+            assert np.array_equal(place_points(lattice, labels, *size, 16).pixel, expected)
 
 
 def test_placement_keeps_neighbours_together() -> None:
