@@ -46,8 +46,11 @@ FIELD = f"""{TEXT} const video = await GeometryVideo.load(args[0]);
     const {{ range, bound, unit, components, domain, type }} = field;
     return {{ frames, range, bound, unit, components, domain, type }};"""
 KIND = """const read = async (video) => {
-      for (const field of video.fields.values()) await field.frame(video.frameCount - 1);
-      video.close();
+      try {
+        for (const field of video.fields.values()) await field.frame(video.frameCount - 1);
+      } finally {
+        video.close(); // a browser has room for about a hundred memories of kernels, which those that are left open keep
+      }
       return "read";
     };
     return GeometryVideo.load(args[0]).then(read).catch((error) => `${error.kind}: ${error.message}`)"""
