@@ -99,20 +99,18 @@ def fill(cells: Cells, order: Int64, points: Int64, width: int, block: int, shif
         block: as in `place_points`.
         shift: of moments where cells turn as their points do; None: they keep their directions.
     """
-    from gvcodecs.mcgv.layout.kd_tree_kernels import Halving, halve_cell, place_cells
+    from gvcodecs.mcgv.layout.kd_tree_kernels import Halving, place_cells
 
     halving = Halving(np.ascontiguousarray(points), width, block, FRAME, -1 if shift is None else shift)
     own, pixel = order.copy(), np.empty(len(points), np.int64)
     rectangles, directions = np.hstack([cells.corner, cells.side]), np.hstack([cells.across, cells.down])
-    if len(rectangles) > 1 or len(own) < LARGE:
-        place_cells(own, cells.starts, rectangles, directions, halving, pixel)
-        return pixel
-    parts, ways = halve_cell(own, rectangles[0], directions[0], halving)
+    is_shared = len(rectangles) == 1 and len(own) >= LARGE
+    parts, ways = place_cells(own, cells.starts, rectangles, directions, halving, pixel, is_shared)
 
     def place(k: int) -> None:
-        place_cells(own, parts[k, :2], parts[k : k + 1, 2:], ways[k : k + 1], halving, pixel)
+        place_cells(own, parts[k, :2], parts[k : k + 1, 2:].copy(), ways[k : k + 1], halving, pixel, False)
 
-    deque(run_ahead(place, range(len(parts))), maxlen=0)  # they share no vertex and no pixel
+    deque(run_ahead(place, range(len(parts))), maxlen=0)  # halves share no vertex and no pixel
     return pixel
 
 

@@ -198,8 +198,10 @@ def _measure(points: Int64, order: Int64, run: tuple[int, int], shift: int, coun
 
 
 @compiled
-def place_cells(order: Int64, starts: Int64, rectangles: Int64, directions: Int64, halving: Halving, pixel: Int64) -> None:
-    """Halve cells down to single pixels, each by itself.
+def place_cells(
+    order: Int64, starts: Int64, rectangles: Int64, directions: Int64, halving: Halving, pixel: Int64, once: bool
+) -> tuple[Int64, Int64]:
+    """Halve cells down to single pixels, each by itself; return what is left to do: bounds and rectangles, and directions.
 
     Args:
         order: ``(V,)`` vertices; their order in a cell changes.
@@ -208,6 +210,7 @@ def place_cells(order: Int64, starts: Int64, rectangles: Int64, directions: Int6
         directions: ``(n, 6)`` across and down; 0 where none is known.
         halving: how.
         pixel: ``(V,)``, filled.
+        once: halve the first cell once, and leave its halves, ``(n, 6)`` each.
     """
     parts, ways = np.empty((MOST_PARTS, 6), np.int64), np.empty((MOST_PARTS, 6), np.int64)  # bounds and rectangles; directions
     most = 0
@@ -228,36 +231,15 @@ def place_cells(order: Int64, starts: Int64, rectangles: Int64, directions: Int6
                 for i in range(low, high):
                     pixel[order[i]] = parts[n, 3] * halving.width + parts[n, 2]
                 continue
-            _sort_cell(order, parts[n], ways[n], halving, moments, work)
+            if halving.shift >= 0 and (max(columns, rows) > halving.frame or columns == rows == halving.frame):
+                _measure(halving.points, order, (low, high), halving.shift, order[:0], moments)
+                _turn(moments, columns, rows, halving.frame, ways[n])
+            at = 0 if columns >= rows else 3
+            _sort_along(order, (low, high), (ways[n, at], ways[n, at + 1], ways[n, at + 2]), halving.points, work)
             n += _halve(halving.block, parts[n:], ways[n:])
-
-
-@compiled
-def halve_cell(order: Int64, rectangle: Int64, directions: Int64, halving: Halving) -> tuple[Int64, Int64]:
-    """Halve one cell once; return bounds and rectangles ``(n, 6)`` and directions ``(n, 6)`` of the halves with vertices.
-
-    ``order (V,)``, which is changed, ``rectangle (4,)``, ``directions (6,)`` and ``halving`` are as of `place_cells`.
-    """
-    parts, ways = np.empty((2, 6), np.int64), np.empty((2, 6), np.int64)
-    parts[0, 0], parts[0, 1] = 0, len(order)
-    for k in range(4):
-        parts[0, 2 + k] = rectangle[k]
-    for k in range(6):
-        ways[0, k] = directions[k]
-    _sort_cell(order, parts[0], ways[0], halving, np.empty(6, np.int64), _empty_work(len(order)))
-    n = _halve(halving.block, parts, ways)
-    return parts[:n], ways[:n]
-
-
-@inlined
-def _sort_cell(order: Int64, part: Int64, way: Int64, halving: Halving, moments: Int64, work: _Work) -> None:
-    """Turn the directions ``way (6,)`` of a cell, if it turns, and sort its vertices along the one that it is halved in."""
-    low, high, columns, rows = part[0], part[1], part[4], part[5]
-    if halving.shift >= 0 and (max(columns, rows) > halving.frame or columns == rows == halving.frame):
-        _measure(halving.points, order, (low, high), halving.shift, order[:0], moments)
-        _turn(moments, columns, rows, halving.frame, way)
-    at = 0 if columns >= rows else 3
-    _sort_along(order, (low, high), (way[at], way[at + 1], way[at + 2]), halving.points, work)
+            if once:
+                return parts[:n], ways[:n]
+    return parts[:0], ways[:0]
 
 
 @inlined

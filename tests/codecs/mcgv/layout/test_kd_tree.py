@@ -136,6 +136,6 @@ def test_cells_are_halved_down_to_pixels(scale: int) -> None:
         halve(order[starts[cell] : starts[cell + 1]], (left, top), (width, height), directions[cell])
     pixel = np.empty(len(order), np.int64)
     halving = Halving(points, 400, 16, FRAME, -1)
-    place_cells(order.copy(), np.array(starts), np.array(rectangles), directions, halving, pixel)
+    place_cells(order.copy(), np.array(starts), np.array(rectangles), directions, halving, pixel, False)
     assert np.array_equal(pixel, wanted)
     assert len(np.unique(pixel)) == len(pixel)
