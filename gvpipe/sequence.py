@@ -349,11 +349,16 @@ def numbers_of(sequence: MeshSequence) -> dict[str, str]:
     return numbers
 
 
+def are_finite(positions: Floats) -> bool:
+    """Whether no number of an array is a NaN or an infinity."""
+    with np.errstate(invalid="ignore"):
+        extremes = (positions.min(initial=0), positions.max(initial=0))  # a NaN shows in both, an infinity in one
+    return bool(np.isfinite(extremes).all())
+
+
 def check_finite(block: Floats, name: str, first_frame: int = 0) -> None:
     """Raise `InputError` naming frame and vertex if ``block (n, V, 3)`` holds a NaN or an infinity."""
-    with np.errstate(invalid="ignore"):
-        extremes = (block.min(initial=0), block.max(initial=0))  # a NaN shows in both, an infinity in one
-    if not np.isfinite(extremes).all():
+    if not are_finite(block):
         frame, vertex = np.argwhere(~np.isfinite(block).all(axis=2))[0]
         raise InputError(
             f"{name}: frame {first_frame + frame}, vertex {vertex} is {block[frame, vertex].tolist()}; every coordinate "

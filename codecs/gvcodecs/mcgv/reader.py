@@ -35,6 +35,7 @@ from gvpipe.container.segments import segment_starts
 from gvpipe.corrections.displacements import DisplacementReader, PointVertices
 from gvpipe.errors import CorruptFile, corrupt
 from gvpipe.media.video import Plane, VideoReader
+from gvpipe.sequence import are_finite
 
 BYTES_PER_PIXEL, BYTES_PER_SLOT = 4, 200
 TOGETHER = 16  # frames whose transforms are kept for other threads
@@ -157,7 +158,7 @@ class McgvReader:
         if self._header.outliers:
             self._outliers.apply(start, result)
         self._surface.fill_still(result)
-        if not all([*run_ahead(_is_finite, np.array_split(result.ravel(), AHEAD), ahead)]):
+        if not all([*run_ahead(are_finite, np.array_split(result.ravel(), AHEAD), ahead)]):
             raise corrupt(f"frames {start} to {stop - 1} do not decode to finite positions")
         return result
 
@@ -179,11 +180,6 @@ def _frames(groups: Iterable[tuple[int, list[Plane]]]) -> Iterator[tuple[int, Pl
 def _call_all(functions: Iterable[Callable[[], None]]) -> None:
     for function in functions:
         function()
-
-
-def _is_finite(positions: Float32) -> bool:
-    with np.errstate(invalid="ignore"):
-        return bool(np.isfinite([positions.min(initial=0), positions.max(initial=0)]).all())  # faster than a look at each
 
 
 def _open_video(bitstream: Bitstream, header: Header, bounds: list[int]) -> VideoReader | NoPictures:
