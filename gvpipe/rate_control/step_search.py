@@ -23,7 +23,9 @@ ROUNDS = 3  # encodes at most
 MOST_CHANGE = math.log(4)  # of a step's logarithm, at once
 SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: assumed at first, and believed
 BAND = 0.9, 1.06  # part of the target error that is close enough, for codecs whose errors scatter by a few percent
+FLAT = 0.2  # slope below which errors hardly follow steps
 NEAR = 2.0  # times, an error beside a measured one for which the step in proportion is believed
+UNREACHED = math.inf
 LEAST_ERROR = 1e-300  # instead of 0, which has no logarithm
 
 
@@ -93,7 +95,10 @@ def find_step(
             slope = _slope(measured[-2], measured[-1])
         if len(measured) >= rounds or band[0] <= measured[-1][1] / target_error <= band[1]:
             break
-        step *= _change(measured[-1][1], middle, slope)
+        change = _flat_change(measured, middle) or _change(measured[-1][1], middle, slope)
+        if change == UNREACHED:
+            break
+        step *= change
         del last
     best, error = min(reversed(measured), key=lambda one: abs(math.log(one[1]) - math.log(middle)))
     if best != step:  # seldom: it comes out as before
@@ -145,6 +150,24 @@ def _slope(before: tuple[float, float], after: tuple[float, float]) -> float:
     """Of the error's logarithm over the step's, so far as it is believed; given are steps and errors."""
     slope = math.log(after[1] / before[1]) / math.log(after[0] / before[0])
     return min(max(slope, SLOPES[0]), SLOPES[1])
+
+
+def _flat_change(measured: Sequence[tuple[float, float]], target_error: float) -> float | None:
+    """What to multiply the last step by where errors hardly follow steps; None where they do.
+
+    Something else than rounding to steps leaves most of the error then, so that ``error^2 = rest + factor step^2``. A target
+    below the rest is `UNREACHED`.
+    """
+    if len(measured) < 2 or measured[-1][0] == measured[-2][0]:
+        return None
+    (before, error_before), (step, error) = measured[-2:]
+    factor = (error**2 - error_before**2) / (step**2 - before**2)
+    if not factor > 0 or math.log(error / error_before) / math.log(step / before) >= FLAT:
+        return None
+    square = (target_error**2 - error**2) / factor + step**2
+    if square <= 0:
+        return UNREACHED
+    return min(max(math.sqrt(square) / step, math.exp(-MOST_CHANGE)), math.exp(MOST_CHANGE))
 
 
 def _change(error: float, target_error: float, slope: float) -> float:

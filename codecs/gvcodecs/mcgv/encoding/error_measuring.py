@@ -12,7 +12,8 @@ from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.motion.contract import predicted_chunks
 from gvcodecs.mcgv.reader_choice import open_reader
-from gvpipe.arrays import Float64
+from gvpipe.ahead import halves, run_ahead
+from gvpipe.arrays import Float32, Float64
 from gvpipe.budget import THRIFTY
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.rate_control.step_search import root_mean_square
@@ -33,7 +34,12 @@ def measure_predicted(job: Job, start: Start, predict: Callable[[int, int], Floa
     job.report("measure", 0)
     vertices, points = start.moving()
     given, total = job.sequence, job.sequence.n_frames * start.still_error
+    spans = halves(len(vertices))
     for _, block, predicted in predicted_chunks(given, start.bounds, predict):
-        off = block[:, vertices] - predicted[:, points]
-        total += float(np.vdot(off, off))
+
+        def square(span: slice, block: Float32 = block, predicted: Float64 = predicted) -> float:
+            off = block[:, vertices[span]] - predicted[:, points[span]]
+            return float(np.vdot(off, off))
+
+        total += sum(run_ahead(square, spans))
     return math.sqrt(total / (given.n_frames * given.n_vertices))

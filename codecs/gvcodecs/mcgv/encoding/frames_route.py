@@ -14,6 +14,6 @@ from gvcodecs.mcgv.pictures.frames import code_frames, measure_residuals
 def code_frame_pictures(job: Job, start: Start, fitted: Fitted) -> Coded:
     """Code what a start holds as a blend and residual pictures."""
     layout, placed = lay_out_blended(job, start), chart_sections(job, start)
-    motion = code_blended(start, fitted, job.report)
+    motion = code_blended(job, start, fitted)
     frames = code_frames(job, start, motion, layout, measure_residuals(start, motion))
     return Coded.of_frames(layout, motion, frames, placed)

@@ -11,5 +11,5 @@ from gvcodecs.mcgv.motion.blended import code_blended
 
 def code_skinning_alone(job: Job, start: Start, fitted: Fitted) -> Coded:
     """Code what a start holds as a blend alone."""
-    motion = code_blended(start, fitted, job.report)
+    motion = code_blended(job, start, fitted)
     return Coded(None, {"clusters": motion.n_clusters, "transform_step": motion.step}, motion.sections, b"", motion.predict)

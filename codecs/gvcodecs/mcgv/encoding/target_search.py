@@ -27,7 +27,8 @@ from gvpipe.rate_control.step_search import SLOPE, StepTrial, find_step, nearest
 GUESS = {"blended": 3.5, "affine": 1.65}  # steps by the error that they leave, root mean square over vertices
 BAND = {"blended": (0.9, 0.99), "affine": (1.0, 1.1)}  # of the target error: the published mode is no finer than asked
 FINE = 0.81  # part of the target error, from which on the first encode of a large sequence is kept
-FAR = 0.75, 1.4  # of the target error: what a blend is kept for
+FAR = 0.75, 1.4  # of the target error: what a blend is kept for that needs no pictures
+NEAR = 0.8, 1.4  # the same of others
 MAX_MOVE = math.log(4)  # of the step's logarithm, at once
 REUSED = 0.35  # of the error's logarithm, away from that measured: up to there a blend serves another quality
 SECOND = 0.9  # part of the target error that the second blend is fitted for
@@ -87,7 +88,7 @@ def _fit_again(trials: StepTrials, step: float, target_error: float) -> tuple[St
     if trials.are_pictures_idle(step) and FAR[0] <= trials.alone(step).error / target_error <= FAR[1]:
         return trials, step
     first = trials(step)
-    if FAR[0] <= first.error / target_error <= FAR[1]:
+    if NEAR[0] <= first.error / target_error <= NEAR[1]:
         return trials, step
     factor = _limited(math.log(SECOND * target_error / max(first.error, LEAST * target_error)))
     others, other_step = _begin(trials.job, step * factor, target_error, 0.0)

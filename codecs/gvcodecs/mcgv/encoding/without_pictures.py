@@ -129,6 +129,8 @@ def _fit_again(
 ) -> tuple[StepTrials, StepTrial]:
     """The blend, or another one, fitted on the base frame and for the step that were found, if the file is smaller."""
     others = _fit_anew(trials, trial.step, target_error)
+    if others.candidate.fitted is trials.candidate.fitted:
+        return trials, trial
     other = find_step(others, trial.step, target_error, band, SLOPE, MAX_ROUNDS)
     return (others, other) if other.error <= target_error and cost(other) < cost(trial) else (trials, trial)
 
@@ -136,7 +138,7 @@ def _fit_again(
 def _fit_anew(trials: StepTrials, step: float, target_error: float) -> StepTrials:
     """Trials of another blend on the same base frame, fitted from a step on for a target error, model units."""
     start = dataclasses.replace(trials.candidate.start, step=step)
-    return StepTrials(trials.job, Candidate(start, fit_skinning(trials.job, start, target_error)[0]))
+    return StepTrials(trials.job, Candidate(start, fit_skinning(trials.job, start, target_error, trials.candidate.fitted)[0]))
 
 
 def _count_transform_bytes(bitstream: Bitstream) -> int:

@@ -87,5 +87,8 @@ class Problem:
 def renumber(weights: Weights) -> Fitted:
     """Number the clusters that points follow from 0."""
     clusters, parts = weights
-    used, number = np.unique(np.where(parts > 0, clusters, clusters[:, :1]), return_inverse=True)
-    return Fitted(Weights(np.where(parts > 0, number.reshape(clusters.shape), 0).astype(np.int32), parts), len(used))
+    own = np.where(parts > 0, clusters, clusters[:, :1])
+    is_used = np.zeros(int(own.max(initial=0)) + 1, bool)
+    is_used[own.ravel()] = True
+    number = np.cumsum(is_used, dtype=np.int32) - 1
+    return Fitted(Weights(np.where(parts > 0, number[own], 0).astype(np.int32, copy=False), parts), int(is_used.sum()))

@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.base.surface import Slots
+from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.motion.blend_problem import Fitted
 from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
 from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import Trajectories, decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
-from gvpipe.ahead import run_ahead
+from gvpipe.ahead import halves, run_ahead
 from gvpipe.arrays import Array, Float32, Float64
-from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.trajectory.sparse_rows import as_rows
 
+if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
+    from gvpipe.trajectory.product_kernels import Rows
+
 BYTES_PER_POINT, SECONDS_PER_POINT = 400, 1e-6
 CHUNK = 16  # frames whose transforms are made at a time
+KEPT, MANY_POINTS = 1 << 22, 1 << 18  # numbers of transforms, and points, of the largest blend that is kept between encodes
 LARGE = 1 << 14  # vertices that move; fewer do not pay for other threads
 
 
@@ -34,31 +42,76 @@ def keep_blend(bitstream: Bitstream, slots: Slots, header: Header) -> None:
     bitstream.budget.keep(what, BYTES_PER_POINT * n_points + 24 * n_transforms, SECONDS_PER_POINT * n_points)
 
 
-def code_blended(start: Start, fitted: Fitted, report: Progress) -> CodedMotion:
+@dataclass(frozen=True)
+class Solved:
+    """A blend and the transforms that suit it best, which no step changes.
+
+    Args:
+        fitted: the blend.
+        weights: its section.
+        matrix: of the blend, ``(P, 4K)``.
+        transforms: ``(4K, 3n)`` rows of equal weight, segment after segment: a list, or made one by one.
+    """
+
+    fitted: Fitted
+    weights: bytes
+    matrix: Rows
+    transforms: Iterable[Float64]
+
+
+def code_blended(job: Job, start: Start, fitted: Fitted) -> CodedMotion:
     """Code the points' skinning weights, and the transforms of every segment with the start's step."""
-    base, bounds = start.base, start.bounds
-    fit = BlendFit(Blend(base, fitted.weights, fitted.n_clusters))
-    coded = {"weights": encode_weights(fitted.weights, causal_neighbours(start.points.neighbours))}
+    base, bounds, solved = start.base, start.bounds, _solve(job, start, fitted)
+    coded = {"weights": solved.weights}
     segments: list[Trajectories] = []
-    for s, (begin, end) in enumerate(pairwise(bounds)):
-        # column by column, as solvers give them: the order decides the last bits of products
-        transforms = np.empty((4 * fitted.n_clusters, 3 * (end - begin)), order="F")
-        for first, block in start.sequence.chunks(begin, end):
-            at = 3 * (first - begin)
-            transforms[:, at : at + 3 * len(block)] = fit.fit(_columns(block - base))
+    for s, transforms in enumerate(solved.transforms):
         coded[f"transforms.{s}"], decoded = encode_trajectories(transforms, start.step)
         segments.append(decoded)
-        report("transforms", (s + 1) / (len(bounds) - 1))
-    matrix = as_rows(fit.matrix)  # the factors of its normal equations are needed no more
+        job.report("transforms", (s + 1) / (len(bounds) - 1))
+    matrix, spans = solved.matrix, halves(len(base))
 
     def predict(first: int, stop: int) -> Float64:
         from gvpipe.trajectory.product_kernels import multiply
 
         s = locate(bounds, first)
-        moved = multiply(matrix, np.ascontiguousarray(segments[s].rows(first - bounds[s], stop - bounds[s])))  # (P, 3n)
-        return np.asarray(base + moved.reshape(len(moved), stop - first, 3).swapaxes(0, 1))
+        moves = np.ascontiguousarray(segments[s].rows(first - bounds[s], stop - bounds[s]))
+        result = np.empty((stop - first, len(base), 3))
+
+        def fill(span: slice) -> None:
+            rows = matrix._replace(starts=matrix.starts[span.start : span.stop + 1])
+            moved = multiply(rows, moves).reshape(-1, stop - first, 3)
+            np.add(base[span], moved.swapaxes(0, 1), out=result[:, span])
+
+        deque(run_ahead(fill, spans), maxlen=0)
+        return result
 
     return CodedMotion(fitted.n_clusters, start.step, coded, predict)
+
+
+def _solve(job: Job, start: Start, fitted: Fitted) -> Solved:
+    """What a blend comes to; the last one is kept, if it does not take much, since several steps are tried with one."""
+    kept = job.memo("solved", list[Solved])
+    if kept and kept[0].fitted is fitted:
+        return kept[0]
+    kept.clear()
+    fit = BlendFit(Blend(start.base, fitted.weights, fitted.n_clusters))
+    weights = encode_weights(fitted.weights, causal_neighbours(start.points.neighbours))
+    solved = Solved(fitted, weights, as_rows(fit.matrix), _fit_segments(start, fit, 4 * fitted.n_clusters))
+    if 12 * fitted.n_clusters * start.sequence.n_frames <= KEPT and len(start.base) <= MANY_POINTS:
+        solved = dataclasses.replace(solved, transforms=[*solved.transforms])
+        kept.append(solved)
+    return solved
+
+
+def _fit_segments(start: Start, fit: BlendFit, n_rows: int) -> Iterator[Float64]:
+    """Yield the transforms of each segment."""
+    for begin, end in pairwise(start.bounds):
+        # column by column, as solvers give them: the order decides the last bits of products
+        transforms = np.empty((n_rows, 3 * (end - begin)), order="F")
+        for first, block in start.sequence.chunks(begin, end):
+            at = 3 * (first - begin)
+            transforms[:, at : at + 3 * len(block)] = fit.fit(_columns(block - start.base))
+        yield transforms
 
 
 def read_blend(bitstream: Bitstream, header: Header, slots: Slots) -> Blend:

@@ -29,8 +29,8 @@ from gvpipe.trajectory.gram import descending_eigenvectors, is_tall, smaller_gra
 
 RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`
 FRAMES = 192  # frames, evenly spaced, that fitting looks at
-LARGE = 1 << 16  # points: surfaces of more have a coarse one; that of a smaller one would carry too few clusters
-SPACING, MOST_SITES = 4, 1 << 17  # points that a coarse one stands for, least; coarse ones, most, beside one a piece
+SPACING = 4  # points that a coarse one stands for, if sites stay between the two numbers below
+FEWEST_SITES, MOST_SITES = 1 << 14, 1 << 17  # fewer would carry too few clusters; beside these, one a piece
 DIMENSIONS = 40  # principal coordinates of motions that clusters start from
 ROUNDED = 0.025  # squared steps that rounding a number of the transforms leaves: many are of components too small to be coded
 PICTURED = 0.45  # steps, root mean square, that pictures leave of a point's residual
@@ -101,7 +101,7 @@ class SampledMotions:
 
     def __init__(self, sequence: MeshSequence, base: Float64, neighbours: sparse.csr_array) -> None:
         self._sequence, self._base, self._neighbours = sequence, base, neighbours
-        points, self._nearest = _choose_sites(neighbours)
+        self._sites, self._nearest = points, _ = _choose_sites(neighbours)
         moved = _displacements(sequence.sample(FRAMES, points), base[points])
         coarse = _contract(neighbours, self._nearest, len(points))
         self.coarse = Motions(moved, base[points], coarse, sequence.n_frames, len(points) / len(base))
@@ -110,6 +110,10 @@ class SampledMotions:
         """The coarse surface's blend, every point's weights being those of the coarse point nearest to it."""
         clusters, parts = fitted.weights
         return Fitted(Weights(clusters[self._nearest], parts[self._nearest]), fitted.n_clusters)
+
+    def thin(self, fitted: Fitted) -> Fitted:
+        """Mirror of `spread`: what the coarse points follow."""
+        return renumber(Weights(fitted.weights.clusters[self._sites], fitted.weights.weights[self._sites]))
 
     def start(self, n_clusters: int) -> Fitted:
         """As of `Motions`."""
@@ -203,7 +207,7 @@ def _principal(columns: Float64) -> tuple[Float64, Float64, Float64]:
 
 def spacing(n_points: int) -> int:
     """How many of a surface's points one stands for in its coarse surface."""
-    return max(SPACING, -(-n_points // MOST_SITES)) if n_points > LARGE else 1
+    return max(min(SPACING, -(-n_points // FEWEST_SITES)), -(-n_points // MOST_SITES))
 
 
 def _choose_sites(neighbours: sparse.csr_array) -> tuple[Int64, Int64]:

@@ -54,7 +54,7 @@ PATCH = 2  # order of the neighbourhood that an added cluster starts with
 
 
 def fit_blend(
-    motions: Motions | SampledMotions, step: float, n_clusters: int, target_error: float = 0.0
+    motions: Motions | SampledMotions, step: float, n_clusters: int, target_error: float = 0.0, before: Fitted | None = None
 ) -> tuple[Fitted, float]:
     """Fit a blend; return it, and the quantisation step it was fitted for.
 
@@ -64,11 +64,19 @@ def fit_blend(
         n_clusters: K, about; 0: as many as pay.
         target_error: root mean square over points, model units. The step changes until the blend leaves about this error.
             0: the step stays.
+        before: a blend of these points for another step, near which the search of a large surface begins.
     """
     if isinstance(motions, SampledMotions):
-        few, step = fit_blend(motions.coarse, step, n_clusters, target_error)
+        coarse = motions.coarse
+        start = motions.thin(before) if before else coarse.start(n_clusters or 1)
+        few, step = _search(coarse, step, n_clusters, target_error, start)
         return _alternate(motions.problem(step), motions.spread(few), LAST_PASSES), step
-    starts = [motions.start(n_clusters or 1)]
+    return _search(motions, step, n_clusters, target_error, motions.start(n_clusters or 1))
+
+
+def _search(motions: Motions, step: float, n_clusters: int, target_error: float, start: Fitted) -> tuple[Fitted, float]:
+    """As `fit_blend`, from a blend on."""
+    starts = [start]
     for _ in range(ROUNDS):
         problem = motions.problem(step)
         found = [] if n_clusters else _find_number(problem, motions, starts)

@@ -7,7 +7,8 @@ For each point:
 3. Least squares (`weight_fit_kernels`) gives the weights of one, two, three and four candidates.
 4. Of all these, the weights of least ``squared error + price * bits`` are kept.
 
-Points that follow see the choice, as a decoder will.
+Points that follow see the choice, as a decoder will. Of many points the second half is chosen beside the first, and sees its
+weights as they were before.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ from gvcodecs.mcgv.motion.weight_fit_kernels import (
     squared_error,
 )
 from gvcodecs.mcgv.motion.weight_kernels import Listed, expect, list_clusters, new_list, rank_of, suggest
+from gvcodecs.mcgv.motion.weight_order_kernels import sort_border
+from gvpipe.ahead import halves, run_ahead
 from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.compiled import compiled
 
@@ -126,9 +129,22 @@ def choose(points: PointMotions, transforms: Transforms, prices: Prices, start: 
     Returns:
         The weights, and the squared errors ``(P,)`` that they leave.
     """
-    weights, errors = Weights(start.clusters.copy(), start.weights.copy()), np.zeros(len(points.homogeneous))
-    _choose(points, transforms, prices, _new_memory(len(transforms.columns), prices, points.price), weights, errors)
-    return weights, errors
+    errors = np.zeros(len(points.homogeneous))
+    spans = halves(len(errors))
+    n_clusters = len(transforms.columns)
+
+    def choose_in(span: slice) -> Weights:
+        """Those of the points of a span; points before it are seen as they were."""
+        weights, memory = Weights(start.clusters.copy(), start.weights.copy()), _new_memory(n_clusters, prices, points.price)
+        _choose(points, transforms, prices, memory, weights, errors, span.start, span.stop)
+        return weights if len(spans) == 1 else Weights(weights.clusters[span], weights.weights[span])
+
+    parts = [*run_ahead(choose_in, spans)]
+    if len(parts) == 1:
+        return parts[0], errors
+    chosen = Weights(*map(np.concatenate, zip(*parts, strict=True)))
+    sort_border(points.causal, chosen, spans[1].start)
+    return chosen, errors
 
 
 def _new_memory(n_clusters: int, prices: Prices, price: float) -> Memory:
@@ -147,15 +163,22 @@ def _new_memory(n_clusters: int, prices: Prices, price: float) -> Memory:
 
 @compiled
 def _choose(
-    points: PointMotions, transforms: Transforms, prices: Prices, memory: Memory, weights: Weights, errors: Float64
+    points: PointMotions,
+    transforms: Transforms,
+    prices: Prices,
+    memory: Memory,
+    weights: Weights,
+    errors: Float64,
+    first: int,
+    stop: int,
 ) -> None:
-    """Change ``weights`` and fill ``errors``, point after point."""
+    """Change ``weights`` and fill ``errors`` from a first point up to another one, point after point."""
     listed, candidates, fit, ranked, around, best, least = memory  # once: each look into a named tuple counts references
     causal, ring, places, motions, price = points
     taken, solution, parts, gram, choices = fit.taken, fit.solution, ranked.parts, candidates.gram, candidates.clusters
     all_clusters, all_weights = weights
     best_clusters, best_weights = best
-    for point in range(len(errors)):
+    for point in range(first, stop):
         n_listed = list_clusters(point, causal, weights, listed)
         n = min(n_listed, INFLUENCES)
         for j in range(n):
