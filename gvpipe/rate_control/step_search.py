@@ -20,12 +20,11 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.sequence import MeshSequence
 
 ROUNDS = 3  # encodes at most
-MOST_CHANGE = math.log(4)  # of a step's logarithm, at once
+MOST_CHANGE = 4.0  # times, of a step at once
 SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: assumed at first, and believed
 BAND = 0.9, 1.06  # part of the target error that is close enough, for codecs whose errors scatter by a few percent
 FLAT = 0.2  # slope below which errors hardly follow steps
 NEAR = 2.0  # times, an error beside a measured one for which the step in proportion is believed
-UNREACHED = math.inf
 LEAST_ERROR = 1e-300  # instead of 0, which has no logarithm
 
 
@@ -38,12 +37,14 @@ class StepTrial:
         step: its quantisation step, model units.
         error: root mean square error, model units.
         slope: how the error's logarithm rises with the step's, about.
+        rest: error that is left however fine the step, model units, about; 0 where errors follow steps.
     """
 
     encoded: Encoded
     step: float
     error: float
     slope: float = SLOPE
+    rest: float = 0.0
 
     @property
     def bitstream(self) -> Bitstream:
@@ -61,6 +62,27 @@ class Anchor:
     def distance(self, target_error: float) -> float:
         """How far a target error, model units, is from the error measured, as a logarithm."""
         return math.log(target_error) - math.log(self.error)
+
+
+@dataclass(frozen=True)
+class Flat:
+    """Errors that hardly follow steps, since rounding to steps makes little of them: ``error^2 = rest^2 + factor step^2``."""
+
+    rest: float
+    factor: float
+
+    @classmethod
+    def of(cls, before: tuple[float, float], after: tuple[float, float]) -> Flat | None:
+        """From two steps and the errors that they left, model units; None where errors follow steps, or fall."""
+        (step, error), (other, other_error) = before, after
+        factor = (other_error**2 - error**2) / (other**2 - step**2)
+        if not factor > 0 or math.log(other_error / error) / math.log(other / step) >= FLAT:
+            return None
+        return cls(math.sqrt(max(error**2 - factor * step**2, 0.0)), factor)
+
+    def step(self, target_error: float) -> float:
+        """The step that leaves an error above the rest, model units."""
+        return math.sqrt((target_error**2 - self.rest**2) / self.factor)
 
 
 AnyAnchor = TypeVar("AnyAnchor", bound=Anchor)
@@ -88,23 +110,26 @@ def find_step(
     """
     middle = target_error * math.sqrt(band[0] * band[1])
     measured: list[tuple[float, float]] = []  # steps and errors, not encodes, which take memory
+    flat: Flat | None = None
     while True:
         last = attempt(step)
         measured.append((step, max(last.error, LEAST_ERROR)))
         if len(measured) > 1 and step != measured[-2][0]:
-            slope = _slope(measured[-2], measured[-1])
+            slope, flat = _slope(measured[-2], measured[-1]), Flat.of(measured[-2], measured[-1])
         if len(measured) >= rounds or band[0] <= measured[-1][1] / target_error <= band[1]:
             break
-        change = _flat_change(measured, middle) or _change(measured[-1][1], middle, slope)
-        if change == UNREACHED:
+        if flat and flat.rest >= middle:
             break
-        step *= change
+        if flat:
+            step = min(max(flat.step(middle), step / MOST_CHANGE), step * MOST_CHANGE)
+        else:
+            step *= _change(measured[-1][1], middle, slope)
         del last
     best, error = min(reversed(measured), key=lambda one: abs(math.log(one[1]) - math.log(middle)))
     if best != step:  # seldom: it comes out as before
         del last
         last = attempt(best)
-    return StepTrial(last.encoded, best, error, slope)
+    return StepTrial(last.encoded, best, error, slope, flat.rest if flat else 0.0)
 
 
 def step_between(anchors: Sequence[Anchor], target_error: float) -> float | None:
@@ -152,25 +177,7 @@ def _slope(before: tuple[float, float], after: tuple[float, float]) -> float:
     return min(max(slope, SLOPES[0]), SLOPES[1])
 
 
-def _flat_change(measured: Sequence[tuple[float, float]], target_error: float) -> float | None:
-    """What to multiply the last step by where errors hardly follow steps; None where they do.
-
-    Something else than rounding to steps leaves most of the error then, so that ``error^2 = rest + factor step^2``. A target
-    below the rest is `UNREACHED`.
-    """
-    if len(measured) < 2 or measured[-1][0] == measured[-2][0]:
-        return None
-    (before, error_before), (step, error) = measured[-2:]
-    factor = (error**2 - error_before**2) / (step**2 - before**2)
-    if not factor > 0 or math.log(error / error_before) / math.log(step / before) >= FLAT:
-        return None
-    square = (target_error**2 - error**2) / factor + step**2
-    if square <= 0:
-        return UNREACHED
-    return min(max(math.sqrt(square) / step, math.exp(-MOST_CHANGE)), math.exp(MOST_CHANGE))
-
-
 def _change(error: float, target_error: float, slope: float) -> float:
     """What to multiply a step by, so that it leaves the target error."""
-    change = (math.log(target_error) - math.log(error)) / slope
-    return math.exp(min(max(change, -MOST_CHANGE), MOST_CHANGE))
+    change, most = (math.log(target_error) - math.log(error)) / slope, math.log(MOST_CHANGE)
+    return math.exp(min(max(change, -most), most))

@@ -29,6 +29,7 @@ PUBLISHED = 0.43  # lattice steps, root mean square, that the published mode's b
 MAX_TRANSFORMS = 0.25  # part of the bytes that transforms may take for a finer error to be tried: rigid motion takes less
 FINE_LATTICES = 1.05, 1.2, 1.35, 1.5  # times that error, lattice steps of base frames: the smallest mesh is taken
 FINE_WORTH = 0.3  # bytes may grow by the quotient of the errors to this power: motion that is not rigid costs 0.5 and more
+HOPELESS = 1.5  # times that error: where a blend leaves more at any step, none is tried
 FINE_BAND = 0.88, 1.0  # of that error, which is close enough
 
 
@@ -74,7 +75,8 @@ def refine(trials: StepTrials, trial: StepTrial) -> StepTrial:
         return trial
     job, candidate = trials.job, trials.candidate
     fine_error = PUBLISHED * Lattice.over(job.sequence.read(0, 1)[0], AFFINE_BITS).step
-    if fine_error >= trial.error:
+    blend_error = max(trial.rest**2 - candidate.start.lattice.step**2 / 4, 0.0) ** 0.5  # less what rounding the base frame leaves
+    if fine_error >= trial.error or blend_error > HOPELESS * fine_error:
         return trial
     step = trial.step * (fine_error / trial.error) ** (1 / SLOPE)
     finer = StepTrials(job, _smallest_base(job, candidate, step, fine_error))
