@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from gvpipe.ahead import run_ahead
+from gvpipe.ahead import MANY, halves, run_ahead
 
 
 def test_results_come_in_order_from_other_threads() -> None:
@@ -19,6 +19,12 @@ def test_results_come_in_order_from_other_threads() -> None:
     assert list(run_ahead(square, [3])) == [(9, True)]
     assert list(run_ahead(square, [1, 2], 0)) == [(1, True), (4, True)]
     assert list(run_ahead(square, [])) == []
+
+
+def test_many_items_are_halved() -> None:
+    assert halves(0) == [slice(0, 0)] and halves(MANY - 1) == [slice(0, MANY - 1)]
+    first, second = halves(MANY + 1)
+    assert first == slice(0, MANY // 2) and second == slice(MANY // 2, MANY + 1)
 
 
 def test_no_more_is_begun_than_asked_for() -> None:

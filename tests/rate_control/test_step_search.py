@@ -33,6 +33,25 @@ def test_errors_that_do_not_follow_the_step_end_the_loop() -> None:
     assert len(tried) == 3
 
 
+@pytest.mark.parametrize("factor", [0.002, 0.02, 0.2])
+def test_errors_that_hardly_follow_the_step_are_met(factor: float) -> None:
+    """As of blends, which leave most of the error however fine the step."""
+    found = find_step(lambda step: StepTrial(EMPTY, step, (0.8**2 + factor * step**2) ** 0.5), 1.0, 1.0, rounds=6)
+    assert BAND[0] <= found.error <= BAND[1]
+
+
+def test_an_error_that_no_step_leaves_is_not_looked_for() -> None:
+    tried: list[float] = []
+
+    def attempt(step: float) -> StepTrial:
+        tried.append(step)
+        return StepTrial(EMPTY, step, (0.8**2 + 0.01 * step**2) ** 0.5)
+
+    found = find_step(attempt, 1.0, 0.5, rounds=6)
+    assert len(tried) == 2 and found.step == min(tried)
+    assert found.rest == pytest.approx(0.8) and find_step(lambda step: pretend(step, 1.0), 1.0, 1.0).rest == 0
+
+
 def test_the_closest_encode_is_made_again_where_it_is_not_the_last() -> None:
     """Encodes are not kept: two of them take twice the memory."""
     errors, tried = [1.2, 0.5, 2.0], list[float]()

@@ -11,6 +11,11 @@ from sequences import grid, waving
 import gvpipe
 from gvcodecs.mcgv import Mcgv
 from gvcodecs.mcgv.base import base_frame
+from gvcodecs.mcgv.encode_job import Job
+from gvcodecs.mcgv.encoding.initial_skinning import fit_skinning
+from gvcodecs.mcgv.motion import blended
+from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
+from gvpipe.codec import Memo
 from gvpipe.container import bitstream
 from gvpipe.metrics.vertex_errors import measure_errors
 from gvpipe.quality_scale import error_of
@@ -79,3 +84,30 @@ def test_pieces_that_part_are_predicted_each_for_itself() -> None:
     extent = float(np.linalg.norm(np.ptp(frames[0], axis=0)))
     errors = np.linalg.norm(open_reader(stream).read(0, 20) - frames, axis=2) / extent
     assert errors.max() < 0.02 and "outliers" not in stream.sections
+
+
+def test_a_blend_is_solved_once_for_all_its_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files are those of an encoder that keeps nothing."""
+    solved: list[int] = []
+
+    class Counted(BlendFit):
+        def __init__(self, blend: Blend) -> None:
+            solved.append(blend.n_clusters)
+            super().__init__(blend)
+
+    monkeypatch.setattr(blended, "BlendFit", Counted)
+    files, counts = [], []
+    for kept in (blended.KEPT, 0):
+        monkeypatch.setattr(blended, "KEPT", kept)
+        files.append(Mcgv(quality=60).encode(waving(12, 40)).bitstream.to_bytes())
+        counts.append(len(solved))
+        solved.clear()
+    assert files[0] == files[1] and counts[0] < counts[1]
+
+
+def test_a_blend_asked_for_again_is_the_same() -> None:
+    job = Job(Mcgv(), waving(12, 20), Memo(), lambda stage, done: None)
+    start = base_frame.begin(job, 1e-3, 1e-3)
+    found = fit_skinning(job, start, 1e-3)
+    assert fit_skinning(job, start, 1e-3)[0] is found[0]
+    assert fit_skinning(job, start, 2e-3)[0] is not found[0]

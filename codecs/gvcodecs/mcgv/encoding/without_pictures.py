@@ -75,7 +75,9 @@ def refine(trials: StepTrials, trial: StepTrial) -> StepTrial:
         return trial
     job, candidate = trials.job, trials.candidate
     fine_error = PUBLISHED * Lattice.over(job.sequence.read(0, 1)[0], AFFINE_BITS).step
-    blend_error = max(trial.rest**2 - candidate.start.lattice.step**2 / 4, 0.0) ** 0.5  # less what rounding the base frame leaves
+    blend_error = (
+        max(trial.rest**2 - candidate.start.lattice.step**2 / 4, 0.0) ** 0.5
+    )  # less what rounding the base frame leaves
     if fine_error >= trial.error or blend_error > HOPELESS * fine_error:
         return trial
     step = trial.step * (fine_error / trial.error) ** (1 / SLOPE)

@@ -78,6 +78,11 @@ def test_a_blend_found_on_some_points_fits_all(
         motions = find_motions(sequence, base, neighbours)
         assert isinstance(motions, Motions if points == 1 else SampledMotions)
         fitted, _ = fit_blend(motions, STEP, 0)
+        if isinstance(motions, SampledMotions):  # what a coarse point follows is what it was given
+            thin = motions.thin(motions.spread(motions.thin(fitted)))
+            assert np.array_equal(thin.weights.clusters, motions.thin(fitted).weights.clusters)
+            again, _ = fit_blend(motions, STEP / 2, 0, before=fitted)
+            assert again.weights.clusters.shape == (len(base), 4) and again.n_clusters >= fitted.n_clusters // 2
         assert fitted.weights.clusters.shape == (len(base), 4) and (fitted.weights.weights.sum(axis=1) == TOTAL).all()
         fit = BlendFit(Blend(base, fitted.weights, fitted.n_clusters))
         errors.append(np.sqrt(np.square(moved - fit.matrix @ fit.fit(moved)).mean()))

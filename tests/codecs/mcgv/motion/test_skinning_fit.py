@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from blends import apply_weights, blended, check_weights
 from sequences import waving
 
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
+from gvcodecs.mcgv.motion import weight_selection
 from gvcodecs.mcgv.motion.point_motions import find_motions
 from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit, Weights, homogeneous
 from gvcodecs.mcgv.motion.skinning_fit import fit_blend
-from gvcodecs.mcgv.motion.weight_coding import encode_weights, guess_prices
+from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights, guess_prices
 from gvcodecs.mcgv.motion.weight_fit_kernels import prepare
 from gvcodecs.mcgv.motion.weight_selection import PointMotions, Ring, choose
 from gvpipe.mesh.topology import adjacency
@@ -35,6 +37,23 @@ def test_choice_finds_the_weights_of_a_blend() -> None:
         # weights are wrong by half a part of TOTAL each at most, and where bits cost something by little more
         spread = np.abs(np.einsum("pr,krm->pkm", points, transforms)).max(axis=1)
         assert (errors <= most * 4 * (np.square(spread) / TOTAL**2).sum(axis=1) + 30 * price).all()
+
+
+def test_halves_are_chosen_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second one sees the first as it was, and its points still have their clusters in the order of ranks."""
+    sequence = waving(16, 30)
+    base = np.asarray(sequence.read(0, 1)[0], np.float64)
+    neighbours = adjacency(sequence.faces, len(base))
+    motions = find_motions(sequence, base, neighbours)
+    whole = fit_blend(motions, 1e-3, 8)[0]
+    middle = len(base) // 3
+    monkeypatch.setattr(weight_selection, "halves", lambda n: [slice(0, middle), slice(middle, n)])
+    fitted = fit_blend(motions, 1e-3, 8)[0]
+    data = [len(encode_weights(each.weights, causal_neighbours(neighbours))) for each in (whole, fitted)]
+    assert not np.array_equal(whole.weights.clusters, fitted.weights.clusters) and data[1] < 1.2 * data[0]
+    restored = decode_weights(encode_weights(fitted.weights, causal_neighbours(neighbours)), neighbours, fitted.n_clusters)
+    for found, chosen in zip(restored, fitted.weights, strict=True):
+        assert np.array_equal(found, chosen)
 
 
 def test_dearer_bits_make_smaller_sections() -> None:
