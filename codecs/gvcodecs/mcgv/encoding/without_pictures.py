@@ -6,6 +6,7 @@ They take little time, so that more encodes than elsewhere are made.
 from __future__ import annotations
 
 import dataclasses
+import math
 
 from gvcodecs.mcgv.base.base_lattice import AFFINE_BITS, base_step
 from gvcodecs.mcgv.encode_job import Job
@@ -75,9 +76,8 @@ def refine(trials: StepTrials, trial: StepTrial) -> StepTrial:
         return trial
     job, candidate = trials.job, trials.candidate
     fine_error = PUBLISHED * Lattice.over(job.sequence.read(0, 1)[0], AFFINE_BITS).step
-    blend_error = (
-        max(trial.rest**2 - candidate.start.lattice.step**2 / 4, 0.0) ** 0.5
-    )  # less what rounding the base frame leaves
+    rounded = candidate.start.lattice.step / 2  # root mean square error that rounding the base frame leaves
+    blend_error = math.sqrt(max(trial.rest**2 - rounded**2, 0.0))
     if fine_error >= trial.error or blend_error > HOPELESS * fine_error:
         return trial
     step = trial.step * (fine_error / trial.error) ** (1 / SLOPE)
