@@ -24,6 +24,7 @@ MOST_CHANGE = 4.0  # times, of a step at once
 SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: assumed at first, and believed
 BAND = 0.9, 1.06  # part of the target error that is close enough, for codecs whose errors scatter by a few percent
 FLAT = 0.2  # slope below which errors hardly follow steps
+FINEST = 0.75  # part of the target error, from which on an error may stay where a larger one saves too little
 NEAR = 2.0  # times, an error beside a measured one for which the step in proportion is believed
 LEAST_ERROR = 1e-300  # instead of 0, which has no logarithm
 
@@ -95,6 +96,7 @@ def find_step(
     band: tuple[float, float] = BAND,
     slope: float = 1.0,
     rounds: int = ROUNDS,
+    cost: Callable[[StepTrial], float] | None = None,
 ) -> StepTrial:
     """Encode with one step after the other until the error is close enough; return the encode that came closest.
 
@@ -107,15 +109,22 @@ def find_step(
         band: least and most part of it that is close enough.
         slope: of the error's logarithm over the step's, assumed until two are measured.
         rounds: most encodes.
+        cost: of an encode, its error counted. Where errors hardly follow steps, steps grow only as long as that falls, if the
+            error is near already. None: until the error is close enough.
     """
     middle = target_error * math.sqrt(band[0] * band[1])
     measured: list[tuple[float, float]] = []  # steps and errors, not encodes, which take memory
     flat: Flat | None = None
+    price, price_before = math.inf, math.inf
     while True:
         last = attempt(step)
+        price_before, price = price, cost(last) if cost else math.inf
         measured.append((step, max(last.error, LEAST_ERROR)))
         if len(measured) > 1 and step != measured[-2][0]:
             slope, flat = _slope(measured[-2], measured[-1]), Flat.of(measured[-2], measured[-1])
+        if flat and FINEST * target_error < measured[-2][1] < measured[-1][1] <= middle and price > price_before:
+            measured = measured[-2:-1]
+            break
         if len(measured) >= rounds or band[0] <= measured[-1][1] / target_error <= band[1]:
             break
         if flat and flat.rest >= middle:

@@ -52,6 +52,18 @@ def test_an_error_that_no_step_leaves_is_not_looked_for() -> None:
     assert found.rest == pytest.approx(0.8) and find_step(lambda step: pretend(step, 1.0), 1.0, 1.0).rest == 0
 
 
+@pytest.mark.parametrize("pays", [False, True])
+def test_steps_that_save_too_little_are_not_taken(pays: bool) -> None:
+    """An error below the one asked for stays, where a larger one would save next to nothing."""
+
+    def attempt(step: float) -> StepTrial:
+        return StepTrial(EMPTY, step, (0.8**2 + 0.01 * step**2) ** 0.5)
+
+    found = find_step(attempt, 1.0, 1.0, rounds=6, cost=lambda trial: -trial.step if pays else trial.step)
+    assert BAND[0] <= found.error <= BAND[1] if pays else found.step == 1.0 and 0.8 < found.error < BAND[0]
+    assert find_step(attempt, 1.0, 1.2, rounds=6, cost=lambda trial: trial.step).error > 0.9  # too far from what was asked for
+
+
 def test_the_closest_encode_is_made_again_where_it_is_not_the_last() -> None:
     """Encodes are not kept: two of them take twice the memory."""
     errors, tried = [1.2, 0.5, 2.0], list[float]()

@@ -56,7 +56,7 @@ def omit_pictures(
         idle = alone(step).error <= target_error
     if not idle and not _are_pictures_dear(trials, step, target_error):
         return None
-    trial = find_step(alone, step, target_error, band, SLOPE, MAX_ROUNDS)
+    trial = find_step(alone, step, target_error, band, SLOPE, MAX_ROUNDS, cost)
     if trial.error > target_error or (not idle and cost(trial) >= cost(trials(step))):
         return None
     return (
@@ -122,8 +122,8 @@ def _choose_base(
         if lattice_step < REBASED * trials.candidate.start.lattice.step:
             continue
         others = StepTrials(job, rebase(job, trials.candidate, trial.step, coarsest * target_error))
-        other = find_step(others, trial.step, target_error, band, SLOPE, MAX_ROUNDS)
-        if other.error <= target_error and count_bytes(other.bitstream) < count_bytes(trial.bitstream):
+        other = find_step(others, trial.step, target_error, band, SLOPE, MAX_ROUNDS, cost)
+        if other.error <= target_error and cost(other) < cost(trial):
             trials, trial = others, other
     return trials, trial
 
@@ -135,7 +135,7 @@ def _fit_again(
     others = _fit_anew(trials, trial.step, target_error)
     if others.candidate.fitted is trials.candidate.fitted:
         return trials, trial
-    other = find_step(others, trial.step, target_error, band, SLOPE, MAX_ROUNDS)
+    other = find_step(others, trial.step, target_error, band, SLOPE, MAX_ROUNDS, cost)
     return (others, other) if other.error <= target_error and cost(other) < cost(trial) else (trials, trial)
 
 
