@@ -56,7 +56,7 @@ def omit_pictures(
         idle = alone(step).error <= target_error
     if not idle and not _are_pictures_dear(trials, step, target_error):
         return None
-    trial = find_step(alone, step, target_error, band, SLOPE, MAX_ROUNDS, cost)
+    trial = _find(alone, step, target_error, band)
     if trial.error > target_error or (not idle and cost(trial) >= cost(trials(step))):
         return None
     return (
@@ -87,6 +87,11 @@ def refine(trials: StepTrials, trial: StepTrial) -> StepTrial:
         return trial
     fine = find_step(finer, step, fine_error, FINE_BAND, SLOPE, MAX_ROUNDS)
     return fine if fine.error <= fine_error and cost(fine, FINE_WORTH) <= most else trial
+
+
+def _find(trials: StepTrials, step: float, target_error: float, band: tuple[float, float]) -> StepTrial:
+    """An encode of about a target error; or a finer one, where that costs next to nothing and no other encode is compared."""
+    return find_step(trials, step, target_error, band, SLOPE, MAX_ROUNDS, None if trials.job.memo.is_shared else cost)
 
 
 def _smallest_base(job: Job, candidate: Candidate, step: float, fine_error: float) -> Candidate:
@@ -122,7 +127,7 @@ def _choose_base(
         if lattice_step < REBASED * trials.candidate.start.lattice.step:
             continue
         others = StepTrials(job, rebase(job, trials.candidate, trial.step, coarsest * target_error))
-        other = find_step(others, trial.step, target_error, band, SLOPE, MAX_ROUNDS, cost)
+        other = _find(others, trial.step, target_error, band)
         if other.error <= target_error and cost(other) < cost(trial):
             trials, trial = others, other
     return trials, trial
@@ -135,7 +140,7 @@ def _fit_again(
     others = _fit_anew(trials, trial.step, target_error)
     if others.candidate.fitted is trials.candidate.fitted:
         return trials, trial
-    other = find_step(others, trial.step, target_error, band, SLOPE, MAX_ROUNDS, cost)
+    other = _find(others, trial.step, target_error, band)
     return (others, other) if other.error <= target_error and cost(other) < cost(trial) else (trials, trial)
 
 
