@@ -24,7 +24,7 @@ MOST_CHANGE = 4.0  # times, of a step at once
 SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: assumed at first, and believed
 BAND = 0.9, 1.06  # part of the target error that is close enough, for codecs whose errors scatter by a few percent
 FLAT = 0.2  # slope below which errors hardly follow steps
-FINEST = 0.75  # part of the target error, from which on an error may stay where a larger one saves too little
+FINEST = 0.85  # part of the target error, from which on an error may stay where a larger one saves too little
 NEAR = 2.0  # times, an error beside a measured one for which the step in proportion is believed
 LEAST_ERROR = 1e-300  # instead of 0, which has no logarithm
 
