@@ -96,6 +96,7 @@ def find_step(
     band: tuple[float, float] = BAND,
     slope: float = 1.0,
     rounds: int = ROUNDS,
+    levels_off: bool = False,
     cost: Callable[[StepTrial], float] | None = None,
 ) -> StepTrial:
     """Encode with one step after the other until the error is close enough; return the encode that came closest.
@@ -109,27 +110,31 @@ def find_step(
         band: least and most part of it that is close enough.
         slope: of the error's logarithm over the step's, assumed until two are measured.
         rounds: most encodes.
+        levels_off: whether errors may level off at fine steps, as those of blends do: then `Flat` tells the next step, and an
+            error that no step leaves ends the search.
         cost: of an encode, its error counted. Where errors hardly follow steps, steps grow only as long as that falls, if the
             error is near already. None: until the error is close enough.
     """
     middle = target_error * math.sqrt(band[0] * band[1])
     measured: list[tuple[float, float]] = []  # steps and errors, not encodes, which take memory
     flat: Flat | None = None
-    price, price_before = math.inf, math.inf
+    price, price_before, n_hopeless = math.inf, math.inf, 0
     while True:
         last = attempt(step)
         price_before, price = price, cost(last) if cost else math.inf
         measured.append((step, max(last.error, LEAST_ERROR)))
         if len(measured) > 1 and step != measured[-2][0]:
-            slope, flat = _slope(measured[-2], measured[-1]), Flat.of(measured[-2], measured[-1])
+            slope = _slope(measured[-2], measured[-1])
+            flat = Flat.of(measured[-2], measured[-1]) if levels_off else None
+        n_hopeless = n_hopeless + 1 if flat and flat.rest > band[1] * target_error else 0
         if flat and FINEST * target_error < measured[-2][1] < measured[-1][1] <= middle and price > price_before:
             measured = measured[-2:-1]
             break
         if len(measured) >= rounds or band[0] <= measured[-1][1] / target_error <= band[1]:
             break
-        if flat and flat.rest >= middle:
+        if n_hopeless == 2:  # once proves nothing: errors level off at steps that round everything to 0, too
             break
-        if flat:
+        if flat and flat.rest < middle:
             step = min(max(flat.step(middle), step / MOST_CHANGE), step * MOST_CHANGE)
         else:
             step *= _change(measured[-1][1], middle, slope)

@@ -33,10 +33,12 @@ def test_errors_that_do_not_follow_the_step_end_the_loop() -> None:
     assert len(tried) == 3
 
 
-@pytest.mark.parametrize("factor", [0.002, 0.02, 0.2])
+@pytest.mark.parametrize("factor", [0.0002, 0.002, 0.02])
 def test_errors_that_hardly_follow_the_step_are_met(factor: float) -> None:
     """As of blends, which leave most of the error however fine the step."""
-    found = find_step(lambda step: StepTrial(EMPTY, step, (0.8**2 + factor * step**2) ** 0.5), 1.0, 1.0, rounds=6)
+    found = find_step(
+        lambda step: StepTrial(EMPTY, step, (0.8**2 + factor * step**2) ** 0.5), 1.0, 1.0, rounds=6, levels_off=True
+    )
     assert BAND[0] <= found.error <= BAND[1]
 
 
@@ -47,9 +49,22 @@ def test_an_error_that_no_step_leaves_is_not_looked_for() -> None:
         tried.append(step)
         return StepTrial(EMPTY, step, (0.8**2 + 0.01 * step**2) ** 0.5)
 
-    found = find_step(attempt, 1.0, 0.5, rounds=6)
-    assert len(tried) == 2 and found.step == min(tried)
+    found = find_step(attempt, 1.0, 0.5, rounds=6, levels_off=True)
+    assert len(tried) == 3 and found.step == min(tried)
     assert found.rest == pytest.approx(0.8) and find_step(lambda step: pretend(step, 1.0), 1.0, 1.0).rest == 0
+
+
+@pytest.mark.parametrize("first", [3.0, 4.0, 6.0, 8.0])
+def test_an_error_just_above_the_rest_is_met(first: float) -> None:
+    found = find_step(
+        lambda step: StepTrial(EMPTY, step, (0.95**2 + 0.01 * step**2) ** 0.5), first, 1.0, (0.9, 0.99), 0.8, 5, levels_off=True
+    )
+    assert found.error <= 0.99
+
+
+def test_steps_that_round_everything_away_do_not_end_the_search() -> None:
+    found = find_step(lambda step: StepTrial(EMPTY, step, step / (1 + step**2) ** 0.5), 8.0, 0.3, rounds=5, levels_off=True)
+    assert BAND[0] <= found.error / 0.3 <= BAND[1]
 
 
 @pytest.mark.parametrize("pays", [False, True])
@@ -59,9 +74,11 @@ def test_steps_that_save_too_little_are_not_taken(pays: bool) -> None:
     def attempt(step: float) -> StepTrial:
         return StepTrial(EMPTY, step, (0.8**2 + 0.01 * step**2) ** 0.5)
 
-    found = find_step(attempt, 1.0, 0.93, rounds=6, cost=lambda trial: -trial.step if pays else trial.step)
+    found = find_step(attempt, 1.0, 0.93, rounds=6, levels_off=True, cost=lambda trial: -trial.step if pays else trial.step)
     assert BAND[0] <= found.error / 0.93 <= BAND[1] if pays else found.step == 1.0 and found.error < BAND[0] * 0.93
-    assert find_step(attempt, 1.0, 1.2, rounds=6, cost=lambda trial: trial.step).error > 0.9  # too far from what was asked for
+    assert (
+        find_step(attempt, 1.0, 1.2, rounds=6, levels_off=True, cost=lambda trial: trial.step).error > 0.9
+    )  # too far from what was asked for
 
 
 def test_the_closest_encode_is_made_again_where_it_is_not_the_last() -> None:

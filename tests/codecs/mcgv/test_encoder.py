@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -111,4 +112,6 @@ def test_a_blend_asked_for_again_is_the_same() -> None:
     start = base_frame.begin(job, 1e-3, 1e-3)
     found = fit_skinning(job, start, 1e-3)
     assert fit_skinning(job, start, 1e-3)[0] is found[0]
-    assert fit_skinning(job, start, 2e-3)[0] is not found[0]
+    others = (start, 2e-3), (dataclasses.replace(start, step=2e-3), 1e-3), (base_frame.begin(job, 1e-2, 1e-2), 1e-3)
+    for other, target_error in others:
+        assert fit_skinning(job, start, 1e-3)[0] is not fit_skinning(job, other, target_error)[0]

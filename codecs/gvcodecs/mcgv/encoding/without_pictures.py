@@ -36,7 +36,7 @@ FINE_BAND = 0.88, 1.0  # of that error, which is close enough
 
 def approach(trials: StepTrials, anchor: CandidateAnchor, step: float, target_error: float) -> StepTrial:
     """Come close to a target error from an anchor; it follows the step less: base frame and blend have errors of their own."""
-    return find_step(trials, step, target_error, NARROW, anchor.slope, MAX_ROUNDS)
+    return find_step(trials, step, target_error, NARROW, anchor.slope, MAX_ROUNDS, levels_off=True)
 
 
 def omit_pictures(
@@ -85,13 +85,13 @@ def refine(trials: StepTrials, trial: StepTrial) -> StepTrial:
     most = cost(trial, FINE_WORTH)
     if cost(finer(step), FINE_WORTH) > most:
         return trial
-    fine = find_step(finer, step, fine_error, FINE_BAND, SLOPE, MAX_ROUNDS)
+    fine = find_step(finer, step, fine_error, FINE_BAND, SLOPE, MAX_ROUNDS, levels_off=True)
     return fine if fine.error <= fine_error and cost(fine, FINE_WORTH) <= most else trial
 
 
 def _find(trials: StepTrials, step: float, target_error: float, band: tuple[float, float]) -> StepTrial:
     """An encode of about a target error; or a finer one, where that costs next to nothing and no other encode is compared."""
-    return find_step(trials, step, target_error, band, SLOPE, MAX_ROUNDS, None if trials.job.memo.is_shared else cost)
+    return find_step(trials, step, target_error, band, SLOPE, MAX_ROUNDS, True, None if trials.job.memo.is_shared else cost)
 
 
 def _smallest_base(job: Job, candidate: Candidate, step: float, fine_error: float) -> Candidate:

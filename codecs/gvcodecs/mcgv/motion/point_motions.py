@@ -19,6 +19,7 @@ from threading import Lock
 import numpy as np
 from scipy import sparse
 
+from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.motion.blend_problem import Fitted, Problem, Trial, renumber
 from gvcodecs.mcgv.motion.segmentation import SEED, local_motions
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights
@@ -29,8 +30,8 @@ from gvpipe.trajectory.gram import descending_eigenvectors, is_tall, smaller_gra
 
 RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`
 FRAMES = 192  # frames, evenly spaced, that fitting looks at
-SPACING = 4  # points that a coarse one stands for, if sites stay between the two numbers below
-FEWEST_SITES, MOST_SITES = 1 << 14, 1 << 17  # fewer would carry too few clusters; beside these, one a piece
+SPACING = 4  # points that a coarse one stands for; fewer where that leaves less than half of the first number below
+FEW_SITES, MOST_SITES = 1 << 14, 1 << 17  # coarse points: fewer would carry too few clusters; beside the second, one a piece
 DIMENSIONS = 40  # principal coordinates of motions that clusters start from
 ROUNDED = 0.025  # squared steps that rounding a number of the transforms leaves: many are of components too small to be coded
 PICTURED = 0.45  # steps, root mean square, that pictures leave of a point's residual
@@ -113,7 +114,11 @@ class SampledMotions:
 
     def thin(self, fitted: Fitted) -> Fitted:
         """Mirror of `spread`: what the coarse points follow."""
-        return renumber(Weights(fitted.weights.clusters[self._sites], fitted.weights.weights[self._sites]))
+        from gvcodecs.mcgv.motion.weight_order_kernels import sort_by_rank
+
+        weights = Weights(fitted.weights.clusters[self._sites], fitted.weights.weights[self._sites])
+        sort_by_rank(causal_neighbours(self.coarse.neighbours), weights)  # other neighbours, other ranks
+        return renumber(weights)
 
     def start(self, n_clusters: int) -> Fitted:
         """As of `Motions`."""
@@ -207,7 +212,7 @@ def _principal(columns: Float64) -> tuple[Float64, Float64, Float64]:
 
 def spacing(n_points: int) -> int:
     """How many of a surface's points one stands for in its coarse surface."""
-    return max(min(SPACING, -(-n_points // FEWEST_SITES)), -(-n_points // MOST_SITES))
+    return max(min(SPACING, -(-n_points // FEW_SITES)), -(-n_points // MOST_SITES))
 
 
 def _choose_sites(neighbours: sparse.csr_array) -> tuple[Int64, Int64]:

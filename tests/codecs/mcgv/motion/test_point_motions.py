@@ -7,7 +7,7 @@ import pytest
 from sequences import waving
 
 from gvcodecs.mcgv.motion import point_motions
-from gvcodecs.mcgv.motion.point_motions import FEWEST_SITES, MOST_SITES, SPACING, Motions, SampledMotions, find_motions, spacing
+from gvcodecs.mcgv.motion.point_motions import FEW_SITES, MOST_SITES, SPACING, Motions, SampledMotions, find_motions, spacing
 from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit
 from gvcodecs.mcgv.motion.skinning_fit import fit_blend
 from gvpipe.mesh.topology import adjacency
@@ -28,9 +28,9 @@ def surface() -> tuple[MeshSequence, np.ndarray, np.ndarray]:
 
 
 def test_large_surfaces_alone_have_a_coarse_one_of_a_bounded_number_of_points() -> None:
-    assert spacing(FEWEST_SITES) == 1 and spacing(FEWEST_SITES + 1) == 2 and spacing(10**5) == SPACING
-    for n_points in (FEWEST_SITES + 1, 10**6, 10**7):
-        assert -(-n_points // spacing(n_points)) <= MOST_SITES
+    assert spacing(FEW_SITES) == 1 and spacing(FEW_SITES + 1) == 2 and spacing(10**5) == SPACING
+    for n_points in (FEW_SITES + 1, 2 * FEW_SITES + 1, 3 * FEW_SITES + 1, 10**6, 10**7):
+        assert FEW_SITES / 2 < -(-n_points // spacing(n_points)) <= MOST_SITES
 
 
 def test_every_point_has_a_stand_in_of_its_own_piece(surface: tuple[MeshSequence, np.ndarray, np.ndarray],
