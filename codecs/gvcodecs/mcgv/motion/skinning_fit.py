@@ -10,7 +10,7 @@ A cluster costs twelve numbers a frame, or where motion has few principal trajec
 save a squared error: numbers of clusters are tried from the smallest up, until error and cost together fall no more. K-means
 is a draw of luck, and sees what is alike, not what a blend lacks. So each number is tried twice: by k-means, and by adding
 clusters to the blend before where its errors are. The best of either kind, weights' bits counted, goes on to the end, and the
-one that costs less there is kept. The first number that does worse than a smaller one by either start ends the search.
+one that costs less there is kept. The search ends at the first number where neither start beats the best before.
 """
 
 from __future__ import annotations
