@@ -45,9 +45,9 @@ def beside(function: Callable[[], Result], worth: bool = True) -> Iterator[Calla
         yield pool.submit(function).result
 
 
-def halves(n: int) -> list[slice]:
-    """Cut ``n`` items for `run_ahead`: in two where they are many. It does not depend on the machine, nor do results."""
-    return [slice(0, n)] if n < MANY else [slice(0, n // 2), slice(n // 2, n)]
+def halves(n: int, many: int = MANY) -> list[slice]:
+    """Cut ``n`` items for `run_ahead`: in two where they are ``many``. It does not depend on the machine, nor do results."""
+    return [slice(0, n)] if n < many else [slice(0, n // 2), slice(n // 2, n)]
 
 
 class _Ahead(Generic[Item, Result]):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from gvpipe.ahead import AHEAD
 from gvpipe.arrays import Float32, Int64
 from gvpipe.mesh.topology import components
 from gvpipe.sequence import MeshSequence
 
 ROUNDS = 64  # groups that leave a group one by one, in one chunk; what is left then is compared exactly
-THREADS = 2  # that search
 NEAREST = 8  # distinct positions searched around each, itself among them
 
 
@@ -44,7 +44,7 @@ def _group_nearby(positions: Float32, tolerance: float) -> Int64:
     from scipy.spatial import KDTree
 
     distinct = positions[np.unique(groups, return_index=True)[1]].astype(np.float64)
-    found = KDTree(distinct).query(distinct, k=np.arange(1, min(NEAREST, len(distinct)) + 1), workers=THREADS)
+    found = KDTree(distinct).query(distinct, k=np.arange(1, min(NEAREST, len(distinct)) + 1), workers=AHEAD)
     distance, other = np.asarray(found[0]), np.asarray(found[1])
     start, end = np.nonzero(distance <= tolerance)
     links = sparse.csr_array((np.ones(len(start)), (start, other[start, end])), shape=(len(distinct),) * 2)

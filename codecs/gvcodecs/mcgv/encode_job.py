@@ -9,6 +9,7 @@ from gvpipe.codec import Memo, Progress
 from gvpipe.sequence import MeshSequence
 
 LARGE = 1_500_000  # vertices of all frames
+HEAVY = 1 << 18  # vertices
 
 
 @dataclass(frozen=True)
@@ -31,3 +32,8 @@ class Job:
     def is_large(self) -> bool:
         """Whether time counts more than the last percent of bytes: fewer encodes are tried."""
         return self.sequence.n_frames * self.sequence.n_vertices > LARGE
+
+    @property
+    def is_heavy(self) -> bool:
+        """Whether memory counts more than time: the encode of a frame holds so much."""
+        return self.sequence.n_vertices > HEAVY

@@ -18,14 +18,12 @@ from gvpipe.budget import THRIFTY
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.rate_control.step_search import root_mean_square
 
-MANY_VERTICES = 1 << 18  # whose encode holds so much that memory counts more than time
-
 
 def measure_decoded(job: Job, start: Start, bitstream: Bitstream) -> float:
     """Root mean square error of vertices, model units, of a bitstream that is decoded."""
     job.report("measure", 0)
     own = job.sequence.reordered(start.coded.permutation, start.faces)
-    read = dataclasses.replace(bitstream, budget=THRIFTY) if job.sequence.n_vertices > MANY_VERTICES else bitstream
+    read = dataclasses.replace(bitstream, budget=THRIFTY) if job.is_heavy else bitstream
     return root_mean_square(own, open_reader(read))
 
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
 
 BYTES_PER_POINT, SECONDS_PER_POINT = 400, 1e-6
 CHUNK = 16  # frames whose transforms are made at a time
-KEPT, MANY_POINTS = 1 << 22, 1 << 18  # numbers of transforms, and points, of the largest blend that is kept between encodes
+KEPT = 1 << 22  # numbers of transforms that are kept between encodes, most
 LARGE = 1 << 14  # vertices that move; fewer do not pay for other threads
 
 
@@ -97,7 +97,7 @@ def _solve(job: Job, start: Start, fitted: Fitted) -> Solved:
     fit = BlendFit(Blend(start.base, fitted.weights, fitted.n_clusters))
     weights = encode_weights(fitted.weights, causal_neighbours(start.points.neighbours))
     solved = Solved(fitted, weights, as_rows(fit.matrix), _fit_segments(start, fit, 4 * fitted.n_clusters))
-    if 12 * fitted.n_clusters * start.sequence.n_frames <= KEPT and len(start.base) <= MANY_POINTS:
+    if 12 * fitted.n_clusters * start.sequence.n_frames <= KEPT and not job.is_heavy:
         solved = dataclasses.replace(solved, transforms=[*solved.transforms])
         kept.append(solved)
     return solved
@@ -146,8 +146,7 @@ class BlendedMotion:
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
         self._blend = blend
         self._samples, surface = samples, samples.surface
-        n = len(samples.slots)
-        self._spans = [slice(0, n)] if n < LARGE else [slice(0, n // 2), slice(n // 2, n)]
+        self._spans = halves(len(samples.slots), LARGE)
 
         def prepare(span: slice) -> SkinnedPoints:
             return skinned_points(samples.slots[span], surface.base, surface.point, blend.homogeneous, blend.weights)

@@ -137,10 +137,9 @@ def choose(points: PointMotions, transforms: Transforms, prices: Prices, start: 
         """Those of the points of a span; points before it are seen as they were."""
         weights, memory = Weights(start.clusters.copy(), start.weights.copy()), _new_memory(n_clusters, prices, points.price)
         _choose(points, transforms, prices, memory, weights, errors, span.start, span.stop)
-        return weights if len(spans) == 1 else Weights(weights.clusters[span], weights.weights[span])
+        return Weights(weights.clusters[span], weights.weights[span])
 
-    parts = [*run_ahead(choose_in, spans)]
-    chosen = parts[0] if len(parts) == 1 else Weights(*map(np.concatenate, zip(*parts, strict=True)))
+    chosen = Weights(*map(np.concatenate, zip(*run_ahead(choose_in, spans), strict=True)))
     sort_border(points.causal, chosen, spans[-1].start)  # none where all is one span; small meshes compile the kernel, too
     return chosen, errors
 
