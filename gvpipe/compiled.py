@@ -19,6 +19,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 
+from gvpipe.borrowing import BorrowingCompiler
 from gvpipe.machine_code import MachineCode
 
 LOGGER = logging.getLogger(__name__)
@@ -47,7 +48,7 @@ def inlined(function: Function) -> Function:
 
 
 def _compiled(function: Function, options: dict[str, bool]) -> Function:
-    kernel: Any = numba.njit(**options)(function)
+    kernel: Any = numba.njit(pipeline_class=BorrowingCompiler, **options)(function)
     if kernel is not function:  # NUMBA_DISABLE_JIT leaves it as it is
         on_miss, on_refusal = functools.partial(_announce, ONCE), functools.partial(_announce, EVERY_TIME)
         kernel._cache = MachineCode(function, options, on_miss, on_refusal)  # what `cache=True` sets, to numba's own class

@@ -46,7 +46,7 @@ from numba.core.sigutils import normalize_signature
 from numba.core.types.containers import BaseNamedTuple, BaseTuple
 from numba.misc.appdirs import AppDirs
 
-FORMAT = 1  # of the files
+FORMAT = 2  # of the files, and of how kernels are compiled (`gvpipe.borrowing`)
 INSTALLED = Path(__file__).with_name("kernels")
 SUFFIX = ".nbc"
 DIGEST = 32  # bytes of a SHA-256

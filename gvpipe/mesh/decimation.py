@@ -22,6 +22,7 @@ import numpy as np
 from gvpipe.arrays import Int32, Int64
 from gvpipe.compiled import compiled, inlined
 from gvpipe.mesh.fans import (
+    BIG,
     CORNER,
     DEGREE,
     EXTENT,
@@ -30,12 +31,16 @@ from gvpipe.mesh.fans import (
     REGULAR_DEGREE,
     START,
     Fans,
+    across,
     add_triangles,
     before_marked,
+    has_room,
     make_fans,
+    make_room,
+    note_triangles,
+    part_from,
+    part_from_hub,
     remaining_triangles,
-    remove_triangles,
-    with_room,
 )
 from gvpipe.mesh.hole_filling import Hole, empty_hole, fill_hole, find_ring
 
@@ -105,24 +110,32 @@ def decimate(faces: Int32, n_vertices: int, max_waves: int) -> Decimation:
 def begin(faces: Int32, n_vertices: int) -> Progress:
     """A decimation of ``faces (T, 3)`` over V vertices, none of which is gone yet."""
     fans, end = make_fans(faces, n_vertices)
-    hole = empty_hole(MAX_RING, 0)
-    for v in range(n_vertices):
-        size, closed = find_ring(v, fans, hole)
-        fans.heads[v, REGULAR_DEGREE] = REGULAR_BOUNDARY if size > 0 and not closed else REGULAR
+    _note_regular_degrees(fans, empty_hole(MAX_RING, 0))
     order, rings, starts = np.empty(n_vertices, np.int32), np.empty(n_vertices, np.int32), np.zeros(n_vertices + 1, np.int32)
     neighbours = np.empty((n_vertices + 1) * MAX_NEIGHBOURS + 2 * MAX_RING, np.int32)
     return Progress(fans, end, order, rings, starts, neighbours, np.full(n_vertices, -1, np.int32), 0)
 
 
 @compiled
+def _note_regular_degrees(fans: Fans, hole: Hole) -> None:
+    for v in range(len(fans.heads)):
+        size, closed = find_ring(v, fans, hole)
+        fans.heads[v, REGULAR_DEGREE] = REGULAR_BOUNDARY if size > 0 and not closed else REGULAR
+
+
+@compiled
 def with_triangles(vertices: Int32, fans: Fans) -> Int32:
     """Those of the vertices that have triangles, moved to the front of ``vertices``."""
+    return vertices[: _move_to_front(vertices, fans)]
+
+
+@compiled
+def _move_to_front(vertices: Int32, fans: Fans) -> int:
     n = 0
     for v in vertices:
-        if fans.heads[v, DEGREE]:
-            vertices[n] = v
-            n += 1
-    return vertices[:n]
+        vertices[n] = v
+        n += 1 if fans.heads[v, DEGREE] else 0
+    return n
 
 
 @compiled
@@ -130,6 +143,12 @@ def removal_costs(vertices: Int32, fans: Fans) -> tuple[Int32, Int64]:
     """Which n of the vertices can be removed, and what the removal of each costs."""
     hole = empty_hole(MAX_RING, 0)  # of its own: threads that share a line of memory wait for each other
     candidates, costs = np.empty(len(vertices), np.int32), np.empty(len(vertices), np.int64)
+    n = _fill_costs(vertices, fans, hole, candidates, costs)
+    return candidates[:n], costs[:n]
+
+
+@compiled
+def _fill_costs(vertices: Int32, fans: Fans, hole: Hole, candidates: Int32, costs: Int64) -> int:
     n = 0
     for v in vertices:
         size, closed = find_ring(v, fans, hole)
@@ -140,16 +159,35 @@ def removal_costs(vertices: Int32, fans: Fans) -> tuple[Int32, Int64]:
             own = fans.heads[v, DEGREE] - fans.heads[v, REGULAR_DEGREE]
             candidates[n], costs[n] = v, cost - own * own
             n += 1
-    return candidates[:n], costs[:n]
+    return n
 
 
 @compiled
 def remove_wave(progress: Progress, candidates: Int32, costs: Int64, wave: int, hole: Hole) -> Progress:
     """Remove one wave, of n ``candidates`` those that cost least first; its number is ``wave``."""
-    fans, end, order, rings, starts, neighbours, locked, n_gone = progress
+    turns, at = _sorted_by_cost(costs), 0
     freed = np.empty(MAX_RING, np.int32)
-    for i in _sorted_by_cost(costs):
-        v = candidates[i]
+    while at < len(turns):
+        at, n_gone, size = _remove_some(progress, candidates, turns, at, wave, hole, freed)
+        fans, end, order, rings, starts, neighbours, locked, _ = progress
+        for i in range(size):  # of a ring that lacks room
+            if not has_room(hole.ring[i], _new_degree(i, fans, hole), fans):
+                fans, end = make_room(hole.ring[i], _new_degree(i, fans, hole), fans, end)
+        progress = Progress(fans, end, order, rings, starts, neighbours, locked, n_gone)
+    return progress
+
+
+@compiled
+def _remove_some(
+    progress: Progress, candidates: Int32, turns: Int64, first: int, wave: int, hole: Hole, freed: Int32
+) -> tuple[int, int, int]:
+    """Remove candidates, from turn ``first`` on, until none is left or the fans lack room for one.
+
+    Returns the turn of that one, how many vertices are gone, and the size of its ring, which is in ``hole``; 0 at the end.
+    """
+    fans, _, order, rings, starts, neighbours, locked, n_gone = progress
+    for turn in range(first, len(turns)):
+        v = candidates[turns[turn]]
         if len(order) - n_gone <= MIN_COARSE:
             break
         if locked[v] == wave:
@@ -160,18 +198,45 @@ def remove_wave(progress: Progress, candidates: Int32, costs: Int64, wave: int, 
         n_new, _ = fill_hole(size, closed, fans, hole)
         if n_new < 0:
             continue
-        for j in range(size):
-            locked[hole.ring[j]] = wave
-        remove_triangles(v, fans, freed)
+        is_short = False
+        for i in range(size):
+            is_short |= not has_room(hole.ring[i], _new_degree(i, fans, hole), fans)
+        if is_short:
+            return turn, n_gone, size
+        for i in range(size):
+            locked[hole.ring[i]] = wave
+        note_triangles(v, fans, freed)
+        _part_from_ring(v, size, fans, hole)
         start = starts[n_gone]
-        found = neighbours[start : start + MAX_NEIGHBOURS]
+        found = neighbours[start : start + MAX_NEIGHBOURS + 1]
         starts[n_gone + 1] = start + _list_neighbours(size, closed, fans, hole, found, n_gone)
-        fans, end = with_room(hole.triangles, n_new, fans, end)
         add_triangles(hole.triangles, n_new, freed, fans)
         order[n_gone] = v
         rings[n_gone] = size if closed else -size
         n_gone += 1
-    return Progress(fans, end, order, rings, starts, neighbours, locked, n_gone)
+    return len(turns), n_gone, 0
+
+
+@inlined
+def _new_degree(i: int, fans: Fans, hole: Hole) -> int:
+    """How many triangles ring vertex i has when the hole is filled."""
+    return int(hole.excess[i] + fans.heads[hole.ring[i], REGULAR_DEGREE])
+
+
+@inlined
+def _part_from_ring(v: int, size: int, fans: Fans, hole: Hole) -> None:
+    """Take out the triangles around v, which has a ring of so many vertices; note what lies across the ring's sides."""
+    ring, heads, is_hub = hole.ring, fans.heads, False
+    for i in range(size):
+        if heads[ring[i], EXTENT] > BIG:
+            part_from_hub(ring[i], v, fans)
+            is_hub = True
+        else:
+            hole.across[i] = part_from(ring[i], v, ring[i + 1 if i + 1 < size else 0], fans)
+    if is_hub:
+        for i in range(size):
+            hole.across[i] = across(ring[i], ring[i + 1 if i + 1 < size else 0], fans)
+    heads[v, DEGREE] = heads[v, EXTENT] = 0
 
 
 @compiled
@@ -215,15 +280,8 @@ def _list_neighbours(size: int, closed: bool, fans: Fans, hole: Hole, found: Int
         hole.marks[ring[i]] = mark
     n = size
     for i in range(min(size if closed else size - 1, MAX_NEIGHBOURS - size)):
-        a, b = ring[i], ring[i + 1 if i + 1 < size else 0]
-        from_b = heads[b, DEGREE] < heads[a, DEGREE]  # the shorter list: a hub's would make this quadratic
-        own, other, column, beyond = (b, a, NEXT_VERTEX, PREVIOUS_VERTEX) if from_b else (a, b, PREVIOUS_VERTEX, NEXT_VERTEX)
-        low = heads[own, START]
-        at = low + heads[own, EXTENT] - 1
-        while at >= low and sides[at, column] != other:
-            at -= 1
-        if at >= low:
-            n = _add_once(sides[at, beyond], found, n, hole, mark)
+        if hole.across[i] >= 0:
+            n = _add_once(hole.across[i], found, n, hole, mark)
     for i in range(size):
         low = heads[ring[i], START]
         at = low + heads[ring[i], EXTENT] - 1
@@ -234,14 +292,13 @@ def _list_neighbours(size: int, closed: bool, fans: Fans, hole: Hole, found: Int
             n = _add_once(sides[at, NEXT_VERTEX], found, n, hole, mark)
             n = _add_once(sides[at, PREVIOUS_VERTEX], found, n, hole, mark)
             at -= 1
-    return n
+    return min(n, MAX_NEIGHBOURS)
 
 
 @inlined
 def _add_once(vertex: int, found: Int32, n: int, hole: Hole, mark: int) -> int:
-    """Append a vertex to the n in ``found`` if there is room and it is not among them; return their number."""
-    if n == MAX_NEIGHBOURS or hole.marks[vertex] == mark:
-        return n
-    hole.marks[vertex] = mark
+    """Append a vertex to the n in ``found`` if it is not among them; return their number. There is room for one more."""
     found[n] = vertex
-    return n + 1
+    is_new = hole.marks[vertex] != mark
+    hole.marks[vertex] = mark
+    return n + 1 if is_new else n

@@ -56,24 +56,36 @@ def make_fans(triangles: Int32, n_vertices: int) -> tuple[Fans, int]:
         end += rooms[v]
         heads[v, DEGREE] = 0
     fans = Fans(heads, np.empty((end + end // 8, 3), np.int32), rooms, np.empty(3 * len(triangles), np.int32))
+    _append_all(triangles, fans)
+    return fans, end
+
+
+@compiled
+def _append_all(triangles: Int32, fans: Fans) -> None:
+    """Append the sides of all triangles, the last triangle first."""
     for t in range(len(triangles) - 1, -1, -1):
         for k in range(2, -1, -1):
             v, after, before = triangles[t, k], triangles[t, k + 1 if k < 2 else 0], triangles[t, k - 1 if k > 0 else 2]
             _append_side(v, after, before, 3 * t + k, fans)
-    return fans, end
 
 
 @compiled
 def remaining_triangles(fans: Fans, n_triangles: int) -> Int32:
     """The triangles ``(n, 3)`` that are there, by their numbers, which are below ``n_triangles``."""
     triangles = np.full((n_triangles, 3), -1, np.int32)
+    _place_corners(fans, triangles)
+    return triangles[triangles[:, 0] >= 0]
+
+
+@compiled
+def _place_corners(fans: Fans, triangles: Int32) -> None:
+    """Write the vertex of each corner that is there into ``triangles``, by number."""
     for v in range(len(fans.heads)):
         low = fans.heads[v, START]
         for at in range(low, low + fans.heads[v, EXTENT]):
             corner = fans.sides[at, CORNER]
             if corner >= 0:
                 triangles[corner // 3, corner % 3] = v
-    return triangles[triangles[:, 0] >= 0]
 
 
 @inlined
@@ -125,40 +137,62 @@ def _append_side(v: int, after: int, before: int, corner: int, fans: Fans) -> No
 
 
 @inlined
-def remove_triangles(v: int, fans: Fans, freed: Int32) -> None:
-    """Take out the triangles around v, `BIG` at most; ``freed`` gets their numbers, that of the latest side first."""
-    heads, sides = fans.heads, fans.sides
-    low, n = heads[v, START], heads[v, DEGREE]
-    for i in range(n):
-        at = low + n - 1 - i
-        t, k = sides[at, CORNER] // 3, sides[at, CORNER] % 3
-        freed[i] = t
-        _remove_side(sides[at, NEXT_VERTEX], 3 * t + (k + 1 if k < 2 else 0), fans)
-        _remove_side(sides[at, PREVIOUS_VERTEX], 3 * t + (k - 1 if k > 0 else 2), fans)
-    heads[v, DEGREE] = heads[v, EXTENT] = 0
+def note_triangles(v: int, fans: Fans, numbers: Int32) -> None:
+    """Fill ``numbers`` with those of v's triangles, `BIG` at most, that of the latest side first."""
+    last = fans.heads[v, START] + fans.heads[v, DEGREE] - 1
+    for i in range(fans.heads[v, DEGREE]):
+        numbers[i] = fans.sides[last - i, CORNER] // 3
 
 
 @inlined
-def _remove_side(v: int, corner: int, fans: Fans) -> None:
-    """Take out the side of one of v's corners; the others keep their order."""
+def part_from(u: int, v: int, beyond: int, fans: Fans) -> int:
+    """Take the triangles with v out of u's fan, of `BIG` sides at most; the others keep their order.
+
+    Returns the vertex after u in the latest triangle left in which ``beyond`` is before it, -1 if there is none.
+    """
     heads, sides = fans.heads, fans.sides
-    if heads[v, EXTENT] > BIG:
-        _mark_side(v, corner, fans)
-        return
-    at = heads[v, START]
-    last = at + heads[v, EXTENT] - 1
-    while at < last and sides[at, CORNER] != corner:
-        at += 1
-    for j in range(at, last):
-        for k in range(3):
-            sides[j, k] = sides[j + 1, k]
-    heads[v, DEGREE] -= 1
-    heads[v, EXTENT] -= 1
+    low, found = heads[u, START], -1
+    to = low
+    for at in range(low, low + heads[u, EXTENT]):
+        after, before = sides[at, NEXT_VERTEX], sides[at, PREVIOUS_VERTEX]
+        sides[to, NEXT_VERTEX], sides[to, PREVIOUS_VERTEX], sides[to, CORNER] = after, before, sides[at, CORNER]
+        found = after if before == beyond and after != v else found
+        to += 1 if after != v and before != v else 0
+    heads[u, DEGREE] = heads[u, EXTENT] = to - low
+    return found
+
+
+@compiled
+def part_from_hub(u: int, v: int, fans: Fans) -> None:
+    """Take the triangles with v, of `BIG` at most, out of the fan of u, which has more than `BIG` sides."""
+    sides, low = fans.sides, fans.heads[v, START]
+    for at in range(low + fans.heads[v, DEGREE] - 1, low - 1, -1):
+        if fans.heads[u, EXTENT] <= BIG:  # closed up meanwhile
+            part_from(u, v, -1, fans)
+            return
+        t, k = sides[at, CORNER] // 3, sides[at, CORNER] % 3
+        if sides[at, NEXT_VERTEX] == u:
+            _mark_side(u, 3 * t + (k + 1 if k < 2 else 0), fans)
+        elif sides[at, PREVIOUS_VERTEX] == u:
+            _mark_side(u, 3 * t + (k - 1 if k > 0 else 2), fans)
+
+
+@compiled
+def across(a: int, b: int, fans: Fans) -> int:
+    """The vertex after a in the latest triangle in which b is before it, -1 if there is none; looks at the shorter fan."""
+    heads, sides = fans.heads, fans.sides
+    from_b = heads[b, DEGREE] < heads[a, DEGREE]
+    own, other, column, beyond = (b, a, NEXT_VERTEX, PREVIOUS_VERTEX) if from_b else (a, b, PREVIOUS_VERTEX, NEXT_VERTEX)
+    low = heads[own, START]
+    at = low + heads[own, EXTENT] - 1
+    while at >= low and sides[at, column] != other:
+        at -= 1
+    return int(sides[at, beyond]) if at >= low else -1
 
 
 @compiled
 def _mark_side(v: int, corner: int, fans: Fans) -> None:
-    """As `_remove_side`, of more than `BIG` sides."""
+    """Take out the side of one of v's corners, of more than `BIG` sides."""
     heads, sides, at = fans.heads, fans.sides, fans.places[corner]
     sides[at, NEXT_VERTEX] = sides[at, PREVIOUS_VERTEX] = sides[at, CORNER] = -1
     heads[v, DEGREE] -= 1
@@ -189,39 +223,26 @@ def _note_places(v: int, fans: Fans) -> None:
 
 
 @inlined
-def with_room(triangles: Int32, n: int, fans: Fans, end: int) -> tuple[Fans, int]:
-    """Fans with room for the first n of ``triangles``, and where their sides end; those given end at ``end``."""
-    heads = fans.heads
-    is_short = False
-    for i in range(n):
-        for k in range(3):
-            v = triangles[i, k]
-            heads[v, EXTENT] += 1
-            is_short |= heads[v, EXTENT] > fans.rooms[v]
-    for i in range(n):
-        for k in range(3):
-            heads[triangles[i, k], EXTENT] -= 1
-    return _move_sides(triangles, n, fans, end) if is_short else (fans, end)
+def has_room(v: int, degree: int, fans: Fans) -> bool:
+    """Whether v has room to come to so many triangles, where those that leave leave before others come."""
+    n = degree if fans.heads[v, EXTENT] <= BIG else fans.heads[v, EXTENT] + degree
+    return bool(n <= LEAST_ROOM or n <= fans.rooms[v])
 
 
 @compiled
-def _move_sides(triangles: Int32, n: int, fans: Fans, end: int) -> tuple[Fans, int]:
-    """As `with_room`: vertices that lack room get twice what they need, at the end."""
-    heads, rooms = fans.heads, fans.rooms
-    for i in range(3 * n):
-        v, more = triangles[i // 3, i % 3], 0
-        for j in range(3 * n):
-            more += triangles[j // 3, j % 3] == v
-        if heads[v, EXTENT] + more <= rooms[v]:
-            continue
-        room = 2 * (heads[v, DEGREE] + more)
-        sides = fans.sides
-        if end + room > len(sides):
-            sides = np.empty((end + room + len(sides) // 4, 3), np.int32)
-            for at in range(end):
-                for k in range(3):
-                    sides[at, k] = fans.sides[at, k]
-        _close_up(v, end, sides, fans)
-        rooms[v] = room
-        fans, end = Fans(heads, sides, rooms, fans.places), end + room
-    return fans, end
+def make_room(v: int, degree: int, fans: Fans, end: int) -> tuple[Fans, int]:
+    """Fans in which v has room, at their end, for twice so many triangles, and where their sides end; they ended at ``end``."""
+    sides, room = fans.sides, 2 * (fans.heads[v, DEGREE] + degree)
+    if end + room > len(sides):
+        sides = np.empty((end + room + len(sides) // 4, 3), np.int32)
+        _copy_rows(fans.sides, end, sides)
+    _close_up(v, end, sides, fans)
+    fans.rooms[v] = room
+    return Fans(fans.heads, sides, fans.rooms, fans.places), end + room
+
+
+@compiled
+def _copy_rows(source: Int32, n: int, target: Int32) -> None:
+    for row in range(n):
+        for k in range(3):
+            target[row, k] = source[row, k]

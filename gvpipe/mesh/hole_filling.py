@@ -19,6 +19,7 @@ class Hole(NamedTuple):
         polygon: ``(n,)`` places in the ring that no ear has cut off yet.
         excess: ``(n,)`` by how much each ring vertex' degree exceeds the one it is to have.
         triangles: ``(n, 3)`` what fills the hole.
+        across: ``(n,)`` of each side of the ring, from its vertex to the next, the vertex beyond it; -1: there is none.
         marks: ``(V,)`` of each vertex the number of the list of neighbours that it was in last, -1 of none.
     """
 
@@ -26,14 +27,20 @@ class Hole(NamedTuple):
     polygon: Int32
     excess: Int32
     triangles: Int32
+    across: Int32
     marks: Int32
 
 
 @compiled
 def empty_hole(size: int, n_vertices: int) -> Hole:
     """Memory for rings of up to ``size`` of V vertices."""
-    ring, polygon, excess = np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size, np.int32)
-    return Hole(ring, polygon, excess, np.empty((size, 3), np.int32), np.full(n_vertices, -1, np.int32))
+    ring, polygon, excess, across = (
+        np.empty(size, np.int32),
+        np.empty(size, np.int32),
+        np.empty(size, np.int32),
+        np.empty(size, np.int32),
+    )
+    return Hole(ring, polygon, excess, np.empty((size, 3), np.int32), across, np.full(n_vertices, -1, np.int32))
 
 
 @inlined

@@ -13,13 +13,17 @@ from gvpipe.mesh.fans import (
     EXTENT,
     START,
     Fans,
+    across,
     add_triangles,
     before_marked,
     has_edge,
+    has_room,
     make_fans,
+    make_room,
+    note_triangles,
+    part_from,
+    part_from_hub,
     remaining_triangles,
-    remove_triangles,
-    with_room,
 )
 
 
@@ -35,6 +39,15 @@ def corners_of(v: int, fans: Fans) -> list[int]:
         at -= 1
     assert len(found) == fans.heads[v, DEGREE]
     return found
+
+
+def vertex_between(a: int, b: int, lists: list[list[int]], there: dict[int, tuple[int, ...]]) -> int:
+    """The vertex after a in the latest triangle in which b is before it, -1 if there is none."""
+    for corner in lists[a]:
+        face, k = there[corner // 3], corner % 3
+        if face[k - 1] == b:
+            return face[(k + 1) % 3]
+    return -1
 
 
 def wheel(n_rim: int) -> Int32:
@@ -59,15 +72,27 @@ def test_triangles_come_and_go_in_order(n_rim: int, seed: int) -> None:
     for v in draw.permutation(n_rim)[: n_rim - 3]:
         freed = np.empty(BIG, np.int32)
         wanted = [corner // 3 for corner in lists[v]]
-        remove_triangles(int(v), fans, freed)
+        note_triangles(int(v), fans, freed)
         assert freed[: len(wanted)].tolist() == wanted
+        around = sorted({u for t in wanted for u in there[t]} - {int(v)})
         for t in wanted:
             for k, u in enumerate(there.pop(t)):
                 lists[u].remove(3 * t + k)
+        for u in around:
+            beyond = int(draw.choice(around))
+            if fans.heads[u, EXTENT] > BIG:
+                part_from_hub(u, int(v), fans)
+            else:
+                assert part_from(u, int(v), beyond, fans) == vertex_between(u, beyond, lists, there)
+        fans.heads[v, DEGREE] = fans.heads[v, EXTENT] = 0
+        for u, beyond in draw.choice(around, (3, 2)) if around else ():
+            assert across(u, beyond, fans) == vertex_between(u, beyond, lists, there)
         alive = [u for u in range(n_rim) if lists[u]]
         if wanted and len(alive) > 1:
             new = np.array([[*draw.choice(alive, 2, replace=False), n_rim + draw.integers(2)]], np.int32)
-            fans, end = with_room(new, 1, fans, end)
+            for u in new[0]:
+                if not has_room(u, len(lists[u]) + 1, fans):
+                    fans, end = make_room(u, len(lists[u]) + 1, fans, end)
             add_triangles(new, 1, freed, fans)
             there[wanted[0]] = tuple(map(int, new[0]))
             for k, u in enumerate(new[0]):

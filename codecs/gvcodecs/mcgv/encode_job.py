@@ -10,6 +10,7 @@ from gvpipe.sequence import MeshSequence
 
 LARGE = 1_500_000  # vertices of all frames
 HEAVY = 1 << 18  # vertices
+IDLE_FRAMES = 24  # from which on pictures that change nothing take more bytes than the poster in their place, about
 
 
 @dataclass(frozen=True)
@@ -37,3 +38,8 @@ class Job:
     def is_heavy(self) -> bool:
         """Whether memory counts more than time: the encode of a frame holds so much."""
         return self.sequence.n_vertices > HEAVY
+
+    @property
+    def may_be_without_pictures(self) -> bool:
+        """Whether an encode without pictures may come first, and be the only one."""
+        return self.settings.may_omit_pictures and self.sequence.n_frames >= IDLE_FRAMES

@@ -16,7 +16,6 @@ from gvpipe.codec import Encoded
 from gvpipe.rate_control.step_search import StepTrial
 
 ROUNDING = math.sqrt(1 / 12)  # steps, root mean square, that rounding to steps leaves
-IDLE_FRAMES = 24  # from which on pictures that change nothing take more bytes than the poster in their place, about
 
 
 class StepTrials:
@@ -48,9 +47,7 @@ class StepTrials:
 
     def are_pictures_idle(self, step: float) -> bool:
         """Whether the blend alone leaves less than pictures of a step, model units, would: these round to steps."""
-        if not self.job.settings.may_omit_pictures or self.job.sequence.n_frames < IDLE_FRAMES:
-            return False
-        return self.alone(step).error <= ROUNDING * step
+        return self.job.may_be_without_pictures and self.alone(step).error <= ROUNDING * step
 
 
 def encode(job: Job, candidate: Candidate, step: float) -> Encoded:

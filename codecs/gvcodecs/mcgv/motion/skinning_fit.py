@@ -10,7 +10,7 @@ A cluster costs twelve numbers a frame, or where motion has few principal trajec
 save a squared error: numbers of clusters are tried from the smallest up, until error and cost together fall no more. K-means
 is a draw of luck, and sees what is alike, not what a blend lacks. So each number is tried twice: by k-means, and by adding
 clusters to the blend before where its errors are. The best of either kind, weights' bits counted, goes on to the end, and the
-one that costs less there is kept. The search ends at the first number where neither start beats the best before.
+one that costs less there is kept. The search ends at the first number where neither start gains much on the best before.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ CLOSE = 0.18  # logarithm of the error left over that
 SLOPE = 0.75  # of its logarithm over the step's
 MOST_MOVED = 3.0  # times, the step at once
 PROMISING = 1.2  # times the cost of the best, up to which another blend goes on
-PATIENCE = 1  # numbers of clusters that may do worse than a smaller one, in a row
+PATIENCE = 1  # numbers of clusters that may gain less over smaller ones, in a row
+LEAST_GAIN = 0.03  # of the cost: what a number of clusters must gain, or the next one does worse
 PATCH = 2  # order of the neighbourhood that an added cluster starts with
 
 
@@ -109,7 +110,7 @@ def _find_number(problem: Problem, motions: Motions, starts: list[Fitted]) -> li
             begun.append(motions.start(round(count)))
         tried = _try_all(problem, begun, TRIAL_PASSES)
         costs = [trial.cost for trial in tried]
-        worse = 0 if min(costs) < min(least) else worse + 1
+        worse = 0 if min(costs) < (1 - LEAST_GAIN) * min(least) else worse + 1
         for kind, cost in enumerate(costs):
             if cost < least[kind]:
                 best[kind], least[kind] = tried[kind], cost
