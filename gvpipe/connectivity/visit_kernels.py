@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Bool, Int32, Int64, UInt32, UInt64
-from gvpipe.compiled import compiled
+from gvpipe.compiled import compiled, inlined
 from gvpipe.connectivity.visit_symbols import ESCAPE, EXACT_RANKS
 from gvpipe.entropy.range_decoder import decode_symbols, decode_uniform
 
@@ -77,61 +77,92 @@ def sort_neighbours(points: Int64, faces: Int64, twins: Int64) -> NeighbourLists
         faces: ``(T, 3)`` triangles.
         twins: ``(n, 2)`` pairs of vertices at one point.
     """
-    n_vertices = len(points)
-    starts = np.zeros(n_vertices + 1, np.int64)
+    starts = np.zeros(len(points) + 1, np.int64)
+    neighbours = np.empty(_count(faces, twins, starts), np.int32)
+    ends = starts[:-1].copy()
+    _list(faces, twins, ends, neighbours)
+    _sort(points, ends, np.empty(SHORT_LIST, np.int64), NeighbourLists(starts, neighbours))
+    return NeighbourLists(starts, neighbours[: starts[-1]].copy())
+
+
+@compiled
+def _count(faces: Int64, twins: Int64, starts: Int64) -> int:
+    """Fill ``starts``; every triangle counts for itself. Return how many neighbours there are."""
     for t in range(len(faces)):
         for k in range(3):
             starts[faces[t, k] + 1] += 2
     for t in range(len(twins)):
-        starts[twins[t, 0] + 1] += 1
-        starts[twins[t, 1] + 1] += 1
-    for v in range(n_vertices):
+        for k in range(2):
+            starts[twins[t, k] + 1] += 1
+    for v in range(len(starts) - 1):
         starts[v + 1] += starts[v]
-    neighbours = np.empty(starts[-1], np.int32)
-    end = starts[:-1].copy()
+    return int(starts[-1])
+
+
+@compiled
+def _list(faces: Int64, twins: Int64, ends: Int64, neighbours: Int32) -> None:
+    """Fill lists that begin at ``ends``, which move behind them."""
     for t in range(len(faces)):
         for k in range(3):
             here = faces[t, k]
-            neighbours[end[here]] = faces[t, (k + 1) % 3]
-            neighbours[end[here] + 1] = faces[t, (k + 2) % 3]
-            end[here] += 2
+            neighbours[ends[here]] = faces[t, k + 1 if k < 2 else 0]
+            neighbours[ends[here] + 1] = faces[t, k - 1 if k > 0 else 2]
+            ends[here] += 2
     for t in range(len(twins)):
         for k in range(2):
-            neighbours[end[twins[t, k]]] = twins[t, 1 - k]
-            end[twins[t, k]] += 1
+            neighbours[ends[twins[t, k]]] = twins[t, 1 - k]
+            ends[twins[t, k]] += 1
+
+
+@compiled
+def _sort(points: Int64, ends: Int64, apart: Int64, lists: NeighbourLists) -> None:
+    """Sort each list, leave out who is there twice, and close up the gaps; ``apart`` is memory for `SHORT_LIST` distances."""
+    starts, neighbours = lists
     kept = 0
-    distance = np.empty(SHORT_LIST, np.int64)
-    for v in range(n_vertices):
-        own = neighbours[starts[v] : end[v]]
-        n = len(own)
-        if n <= SHORT_LIST:  # insertion sort: no allocation
-            for i in range(n):
-                y = own[i]
-                dx, dy, dz = points[y, 0] - points[v, 0], points[y, 1] - points[v, 1], points[y, 2] - points[v, 2]
-                d = dx * dx + dy * dy + dz * dz  # may wrap round beyond 30 bits, at both ends alike
-                j = i
-                while j > 0 and (distance[j - 1] > d or (distance[j - 1] == d and own[j - 1] > y)):
-                    distance[j], own[j] = distance[j - 1], own[j - 1]
-                    j -= 1
-                distance[j], own[j] = d, y
-        else:
-            own = own[np.argsort(own, kind="mergesort")]
-            apart = np.empty(n, np.int64)
-            for i in range(n):
-                dx, dy, dz = (
-                    points[own[i], 0] - points[v, 0],
-                    points[own[i], 1] - points[v, 1],
-                    points[own[i], 2] - points[v, 2],
-                )
-                apart[i] = dx * dx + dy * dy + dz * dz
-            own = own[np.argsort(apart, kind="mergesort")]
+    for v in range(len(points)):
+        first, n = starts[v], ends[v] - starts[v]
         starts[v] = kept
-        for i in range(n):
-            if i == 0 or own[i] != own[i - 1]:
-                neighbours[kept] = own[i]
-                kept += 1
-    starts[n_vertices] = kept
-    return NeighbourLists(starts, neighbours[:kept].copy())
+        if n > SHORT_LIST:
+            kept += _sort_long(points, v, neighbours[first : first + n], neighbours[kept : kept + n])
+            continue
+        size = 0  # of those in order, from kept on: insertion needs no memory
+        for i in range(first, first + n):
+            y = neighbours[i]
+            d = _squared_distance(points, v, y)
+            j = size
+            while j > 0 and (apart[j - 1] > d or (apart[j - 1] == d and neighbours[kept + j - 1] > y)):
+                j -= 1
+            if j > 0 and neighbours[kept + j - 1] == y:
+                continue
+            for k in range(size, j, -1):
+                apart[k], neighbours[kept + k] = apart[k - 1], neighbours[kept + k - 1]
+            apart[j], neighbours[kept + j] = d, y
+            size += 1
+        kept += size
+    starts[len(points)] = kept
+
+
+@compiled
+def _sort_long(points: Int64, v: int, own: Int32, target: Int32) -> int:
+    """Fill ``target``, which may be the same memory, with a list in order, nobody twice; return how many these are."""
+    ordered = own[np.argsort(own, kind="mergesort")]
+    apart = np.empty(len(own), np.int64)
+    for i in range(len(own)):
+        apart[i] = _squared_distance(points, v, ordered[i])
+    ordered = ordered[np.argsort(apart, kind="mergesort")]
+    n = 0
+    for i in range(len(own)):
+        if i == 0 or ordered[i] != ordered[i - 1]:
+            target[n] = ordered[i]
+            n += 1
+    return n
+
+
+@inlined
+def _squared_distance(points: Int64, v: int, y: int) -> int:
+    """Of two vertices; it may wrap round beyond 30 bits, at both ends alike."""
+    dx, dy, dz = points[y, 0] - points[v, 0], points[y, 1] - points[v, 1], points[y, 2] - points[v, 2]
+    return int(dx * dx + dy * dy + dz * dz)
 
 
 @compiled

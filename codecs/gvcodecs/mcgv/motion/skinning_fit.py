@@ -50,7 +50,7 @@ SLOPE = 0.75  # of its logarithm over the step's
 MOST_MOVED = 3.0  # times, the step at once
 PROMISING = 1.2  # times the cost of the best, up to which another blend goes on
 PATIENCE = 1  # numbers of clusters that may gain less over smaller ones, in a row
-LEAST_GAIN = 0.03  # of the cost: what a number of clusters must gain, or the next one does worse
+LEAST_GAIN = 0.015  # of the cost: what a number of clusters must gain, or the next one does worse
 PATCH = 2  # order of the neighbourhood that an added cluster starts with
 
 
