@@ -13,6 +13,8 @@ before, in the order of the search; rank 0 is the first of them):
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from gvpipe.arrays import Bool, Int64, UInt8
@@ -30,6 +32,27 @@ MAX_RUN = 15
 LONG_RUN = 8
 
 
+class Memory(NamedTuple):
+    """What coding of V vertices keeps, int64.
+
+    Args:
+        search: of `search_visits`.
+        around: ``(V,)`` visited neighbours of each vertex.
+        left, position: ``(V,)`` the vertices not visited, in the order that removals by swapping leave; of each in that order.
+        numbers: ``(MATCHED + V,)`` coded, behind zeros.
+        latest: ``(2**MATCH_BITS,)`` by the last numbers, hashed, where they were last.
+        contexts: ``(N_CONTEXTS,)``.
+    """
+
+    search: tuple[Bool, Int64, Int64]
+    around: Int64
+    left: Int64
+    position: Int64
+    numbers: Int64
+    latest: Int64
+    contexts: Int64
+
+
 @compiled
 def code_visits(
     lists: NeighbourLists, points: Int64, reach: int, mixing: Mixing, state: Int64, data: UInt8, decoding: bool, visits: Int64
@@ -43,15 +66,36 @@ def code_visits(
         mixing, state, data, decoding: as of `code_number`.
         visits: the codec's vertex of each vertex of the user's.
     """
+    n = len(visits)
+    seen_by, queue = np.full(n, -1, np.int64), np.empty(min(reach, n) + 1, np.int64)
+    memory = Memory(
+        (np.zeros(n, np.bool_), seen_by, queue),
+        np.zeros(n, np.int64),
+        np.arange(n),
+        np.arange(n),
+        np.zeros(n + MATCHED, np.int64),
+        np.full(1 << MATCH_BITS, -1, np.int64),
+        np.empty(N_CONTEXTS, np.int64),
+    )
+    return _code(lists, points, reach, mixing, state, data, decoding, visits, memory)
+
+
+@compiled
+def _code(
+    lists: NeighbourLists,
+    points: Int64,
+    reach: int,
+    mixing: Mixing,
+    state: Int64,
+    data: UInt8,
+    decoding: bool,
+    visits: Int64,
+    memory: Memory,
+) -> bool:
+    """As `code_visits`."""
     n_vertices = len(visits)
-    visited = np.zeros(n_vertices, np.bool_)
-    around = np.zeros(n_vertices, np.int64)  # visited neighbours of each vertex
-    seen_by = np.full(n_vertices, -1, np.int64)  # the last search that saw a vertex
-    queue = np.empty(min(reach, n_vertices) + 1, np.int64)
-    left, position = np.arange(n_vertices), np.arange(n_vertices)
-    numbers = np.zeros(n_vertices + MATCHED, np.int64)  # behind zeros
-    latest = np.full(1 << MATCH_BITS, -1, np.int64)
-    contexts = np.empty(N_CONTEXTS, np.int64)
+    search, around, left, position, numbers, latest, contexts = memory
+    visited = search[0]
     first_left, match, run = 0, -1, 0
     for v in range(n_vertices):
         row = v + MATCHED
@@ -60,7 +104,7 @@ def code_visits(
         contexts[6] = mix_hash(numbers[match] if match >= 0 else -1, run)
         number = 0
         if not decoding:
-            number = 1 + search_visits(lists, reach, v, (visited, seen_by, queue), visits, first_left, visits[v], -1)[0]
+            number = 1 + search_visits(lists, reach, v, search, visits, first_left, visits[v], -1)[0]
         group = 0 if match < 0 else 1 if run < LONG_RUN else 2
         number = code_number(mixing, contexts, group, state, data, decoding, False, number)
         target = visits[v]
@@ -70,7 +114,7 @@ def code_visits(
         elif decoding:
             if number > reach:
                 return False
-            target = search_visits(lists, reach, v, (visited, seen_by, queue), visits, first_left, -1, number - 1)[1]
+            target = search_visits(lists, reach, v, search, visits, first_left, -1, number - 1)[1]
             if target < 0:
                 return False
         visits[v] = target

@@ -28,7 +28,8 @@ class SeamCorners(NamedTuple):
 def find_seam_corners(point_faces: Array, counts: Array) -> SeamCorners:
     """Return the corners on seams of triangles ``(T, 3)`` over points that have ``counts (P,)`` vertices."""
     points = point_faces.ravel()
-    corners = np.flatnonzero(counts[points] > 1)
+    has_seams = bool((counts > 1).any())  # most large meshes have none
+    corners = np.flatnonzero(counts[points] > 1) if has_seams else np.zeros(0, np.int64)
     corners = corners[np.argsort(points[corners], kind="stable")]
     is_first = np.diff(points[corners], prepend=-1) > 0
     begins = np.maximum.accumulate(np.where(is_first, np.arange(len(corners)), 0))

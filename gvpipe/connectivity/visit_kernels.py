@@ -172,26 +172,44 @@ def traverse_visits(lists: NeighbourLists, reach: int, coded: CodedVisits, decod
     A search looks at ``reach`` vertices at most. Returns the number of vertices done; fewer than V means that a rank or a jump
     points nowhere.
     """
-    ranks, jumps, visits = coded.ranks, coded.jumps, coded.visits
-    n_vertices = len(visits)
-    visited = np.zeros(n_vertices, np.bool_)
-    seen_by = np.full(n_vertices, -1, np.int64)  # the last search that saw a vertex
-    queue = np.empty(min(reach, n_vertices) + 1, np.int64)
-    left = np.arange(n_vertices)  # the vertices not visited, in the order that removals by swapping leave
-    position = np.arange(n_vertices)
-    first_left = 0
+    n_vertices = len(coded.visits)
+    seen_by, queue = np.full(n_vertices, -1, np.int64), np.empty(min(reach, n_vertices) + 1, np.int64)
+    left, position = np.arange(n_vertices), np.arange(n_vertices)
+    return _traverse(lists, reach, coded, decoding, (np.zeros(n_vertices, np.bool_), seen_by, queue), left, position)
+
+
+@compiled
+def _traverse(
+    lists: NeighbourLists,
+    reach: int,
+    coded: CodedVisits,
+    decoding: bool,
+    memory: tuple[Bool, Int64, Int64],
+    left: Int64,
+    position: Int64,
+) -> int:
+    """As `traverse_visits`.
+
+    Args:
+        lists, reach, coded, decoding: of that.
+        memory: of `search_visits`; nobody was visited.
+        left: ``(V,)`` the vertices not visited, in the order that removals by swapping leave.
+        position: ``(V,)`` of each in that order.
+    """
+    (ranks, jumps, visits), visited = coded, memory[0]
+    n_vertices, first_left = len(visits), 0
     for v in range(n_vertices):
         if decoding and ranks[v] < 0:
             if jumps[v] >= n_vertices - v:
                 return v
             target = left[jumps[v]]
         elif decoding:
-            target = search_visits(lists, reach, v, (visited, seen_by, queue), visits, first_left, -1, ranks[v])[1]
+            target = search_visits(lists, reach, v, memory, visits, first_left, -1, ranks[v])[1]
             if target < 0:
                 return v
         else:
             target = visits[v]
-            ranks[v] = search_visits(lists, reach, v, (visited, seen_by, queue), visits, first_left, target, -1)[0]
+            ranks[v] = search_visits(lists, reach, v, memory, visits, first_left, target, -1)[0]
             jumps[v] = position[target]
         visits[v] = target
         visited[target] = True
