@@ -6,7 +6,8 @@ kernels that move points have rows of `COORDINATES`, the last of which is unused
 
 - `load` and `store` move a row between a flat array and registers, `load_point` and `store_point` a row of coordinates;
 - ``+``, ``-``, ``*`` and ``/`` of two rows work lane by lane, and nothing is fused;
-- `same` and `same_point` make a row of one number.
+- `same` and `same_point` make a row of one number;
+- `prefetch` asks the memory for what is needed soon, and nothing waits for it.
 
 A processor with narrower registers takes several instructions a row.
 """
@@ -31,6 +32,8 @@ OPERATORS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul", o
 Load = Callable[[Float64, int], Float64]
 Store = Callable[[Float64, int, Float64], None]
 Same = Callable[[float], Float64]
+Prefetch = Callable[[Float64, int, int], None]
+READ, KEEP, DATA = 0, 3, 1  # what `prefetch` is for, in LLVM's words
 
 
 class _RowType(types.Type):
@@ -90,6 +93,26 @@ def _make_rows(lanes: int) -> tuple[Load, Store, Same]:
     return cast(Load, intrinsic(load)), cast(Store, intrinsic(store)), cast(Same, intrinsic(same))
 
 
+def _make_prefetch() -> Prefetch:
+    """What asks for the numbers about a place in an array ``(n, m)``, which is not looked at."""
+
+    def prefetch(_typing: Any, array: Any, row: Any, column: Any) -> tuple[Any, Any]:
+        def generate(context: Any, builder: Any, sig: Any, given: Any) -> Any:
+            array = context.make_array(sig.args[0])(context, builder, given[0])
+            columns = builder.extract_value(array.shape, 1)
+            at = builder.add(builder.mul(given[1], columns), given[2])
+            place = builder.bitcast(builder.gep(array.data, [at]), ir.IntType(8).as_pointer())
+            number = ir.IntType(32)
+            kind = ir.FunctionType(ir.VoidType(), [place.type, number, number, number])
+            function = builder.module.globals.get("llvm.prefetch.p0i8") or ir.Function(builder.module, kind, "llvm.prefetch.p0i8")
+            builder.call(function, [place, *(ir.Constant(number, each) for each in (READ, KEEP, DATA))])
+            return context.get_dummy_value()
+
+        return types.void(array, types.intp, types.intp), generate
+
+    return cast(Prefetch, intrinsic(prefetch))
+
+
 def _pointer(context: Any, builder: Any, sig: Any, given: Any, lanes: int) -> Any:
     array = context.make_array(sig.args[0])(context, builder, given[0])
     return builder.bitcast(builder.gep(array.data, [given[1]]), _vector(lanes).as_pointer())
@@ -123,6 +146,11 @@ def _make_plain_rows(lanes: int) -> tuple[Load, Store, Same]:
     return load, store, same
 
 
+def _plain_prefetch(array: Float64, row: int, column: int) -> None:
+    """As `prefetch`, where kernels are Python."""
+
+
 _make = _make_plain_rows if config.DISABLE_JIT else _make_rows
 load, store, same = _make(LANES)
 load_point, store_point, same_point = _make(COORDINATES)
+prefetch = _plain_prefetch if config.DISABLE_JIT else _make_prefetch()

@@ -11,11 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Float64, Int32
-from gvpipe.compiled import compiled
-from gvpipe.lanes import LANES
+from gvpipe.compiled import compiled, inlined
+from gvpipe.lanes import LANES, prefetch
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.prediction_kernels import VectorCoding
 
+LINE = 8  # numbers that come from memory at once, on most processors
 WINDOW = 512  # vectors of which some are put together: in more, the next ones would lie too far apart in memory
 
 
@@ -89,6 +90,16 @@ def gather(coding: VectorCoding, ranks: Int32, batch: Batch) -> int:
             values[0], values[1], values[2], values[3] = decoded[a, i], decoded[b, i], decoded[c, i], decoded[d, i]
             values[4], values[5], values[6], values[7] = decoded[e, i], decoded[f, i], decoded[g, i], decoded[h, i]
     return int(n_rows)
+
+
+@inlined
+def fetch(coding: VectorCoding, ranks: Int32) -> None:
+    """Ask the memory for what `gather` takes of the neighbours: in large meshes they lie far apart, and it would wait for each."""
+    causal, n_components = coding.causal, coding.decoded.shape[1]
+    for rank in ranks:
+        for k in range(causal.starts[rank], causal.starts[rank + 1]):
+            for column in range(0, n_components, LINE):
+                prefetch(coding.decoded, causal.neighbours[k], column)
 
 
 @compiled

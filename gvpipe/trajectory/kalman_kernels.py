@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Bool, Float64
-from gvpipe.compiled import compiled
+from gvpipe.compiled import compiled, inlined
 from gvpipe.lanes import LANES, load, same, store
-from gvpipe.trajectory.batch_kernels import WINDOW, Batch, empty_batch, gather, in_fours, sort_window
+from gvpipe.trajectory.batch_kernels import WINDOW, Batch, empty_batch, fetch, gather, in_fours, sort_window
 from gvpipe.trajectory.prediction_kernels import VectorCoding, code_component, most_neighbours
 
 MAX_SPREAD = 2.0**26  # squared steps: beyond, the shorter form loses to rounding what the longer keeps
@@ -79,10 +79,12 @@ def predict_in_batches(coding: VectorCoding, begin: int, end: int, most: int, ar
     for first in range(begin, end, WINDOW):
         before = deepest
         deepest = sort_window(coding.causal, first, min(first + WINDOW, end), before, depths, ranks, bounds)
+        last = bounds[deepest - before + 1]
         for depth in range(1, deepest - before + 1):
             for at in range(bounds[depth], bounds[depth + 1], LANES):
                 own = ranks[at : min(at + LANES, bounds[depth + 1])]
                 n_rows = gather(coding, own, batch)
+                fetch(coding, ranks[at + LANES : min(at + 2 * LANES, last)])
                 if not are_few:
                     _code_many(coding, len(own), n_rows, batch, weights)
                     continue
@@ -119,19 +121,45 @@ def _spread_neighbours(affine: bool, n_rows: int, batch: Batch, components: Comp
 
 @compiled
 def _sum_covariances(n_rows: int, spread: Float64, components: Components) -> None:
-    """Fill the lower triangles of the covariances, of four neighbours at a time."""
-    n_components = len(components.guesses) // LANES
+    """Fill the lower triangles of the covariances, two rows and two columns at a time: half of the loads.
+
+    What lies above a diagonal is filled here and there, too.
+    """
+    n_components, own = len(components.guesses) // LANES, components.covariances
     row = LANES * n_components
-    for c in range(n_components):
+    for c in range(0, n_components - 1, 2):
+        for b in range(0, c + 1, 2):
+            low, high, other_low, other_high = same(0.0), same(0.0), same(0.0), same(0.0)
+            for j in range(0, n_rows, 4):
+                u, v = j * row + LANES * c, j * row + LANES * b
+                u0, u1, u2, u3 = _load_four(spread, u, row)
+                w0, w1, w2, w3 = _load_four(spread, u + LANES, row)
+                v0, v1, v2, v3 = _load_four(spread, v, row)
+                low = low + ((u0 * v0 + u1 * v1) + (u2 * v2 + u3 * v3))
+                other_low = other_low + ((w0 * v0 + w1 * v1) + (w2 * v2 + w3 * v3))
+                v0, v1, v2, v3 = _load_four(spread, v + LANES, row)
+                high = high + ((u0 * v0 + u1 * v1) + (u2 * v2 + u3 * v3))
+                other_high = other_high + ((w0 * v0 + w1 * v1) + (w2 * v2 + w3 * v3))
+            at = c * row + LANES * b
+            store(own, at, low)
+            store(own, at + LANES, high)
+            store(own, at + row, other_low)
+            store(own, at + row + LANES, other_high)
+    if n_components % 2:
+        c = n_components - 1
         for b in range(c + 1):
             total = same(0.0)
             for j in range(0, n_rows, 4):
-                u, v = j * row + LANES * c, j * row + LANES * b
-                first, second = load(spread, u) * load(spread, v), load(spread, u + row) * load(spread, v + row)
-                u, v = u + 2 * row, v + 2 * row
-                third, fourth = load(spread, u) * load(spread, v), load(spread, u + row) * load(spread, v + row)
-                total = total + ((first + second) + (third + fourth))
-            store(components.covariances, LANES * (c * n_components + b), total)
+                u0, u1, u2, u3 = _load_four(spread, j * row + LANES * c, row)
+                v0, v1, v2, v3 = _load_four(spread, j * row + LANES * b, row)
+                total = total + ((u0 * v0 + u1 * v1) + (u2 * v2 + u3 * v3))
+            store(own, c * row + LANES * b, total)
+
+
+@inlined
+def _load_four(array: Float64, at: int, row: int) -> tuple[Float64, Float64, Float64, Float64]:
+    """Rows of numbers from four neighbours."""
+    return load(array, at), load(array, at + row), load(array, at + 2 * row), load(array, at + 3 * row)
 
 
 @compiled
@@ -156,7 +184,23 @@ def _code_few(coding: VectorCoding, n: int, batch: Batch, components: Components
     for c in range(n_components):
         row = LANES * n_components * c
         guess, variance = load(components.guesses, LANES * c), load(own, row + LANES * c)
-        for b in range(c):
+        for b in range(0, c - 1, 2):  # two columns at a time: one difference does not wait for the other
+            covariance, next_covariance = load(own, row + LANES * b), load(own, row + LANES * b + LANES)
+            other = LANES * n_components * b
+            following = other + LANES * n_components
+            for a in range(0, LANES * b, LANES):
+                one = load(own, row + a)
+                covariance = covariance - one * load(factors, other + a)
+                next_covariance = next_covariance - one * load(factors, following + a)
+            next_covariance = next_covariance - covariance * load(factors, following + LANES * b)
+            for at, value in ((LANES * b, covariance), (LANES * b + LANES, next_covariance)):
+                store(own, row + at, value)
+                factor = value * load(inverses, at)
+                store(factors, row + at, factor)
+                variance = variance - value * factor
+                guess = guess + value * load(changes, at)
+        if c % 2:
+            b = c - 1
             covariance, other = load(own, row + LANES * b), LANES * n_components * b
             for a in range(0, LANES * b, LANES):
                 covariance = covariance - load(own, row + a) * load(factors, other + a)
