@@ -24,7 +24,7 @@ from numba.core import config, types
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
-from gvpipe.arrays import Float64
+from gvpipe.arrays import Float64, Int32
 
 LANES, COORDINATES = 8, 4  # numbers in a row
 OPERATORS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul", operator.truediv: "fdiv"}
@@ -32,7 +32,7 @@ OPERATORS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul", o
 Load = Callable[[Float64, int], Float64]
 Store = Callable[[Float64, int, Float64], None]
 Same = Callable[[float], Float64]
-Prefetch = Callable[[Float64, int, int], None]
+Prefetch = Callable[[Float64 | Int32, int, int], None]
 READ, KEEP, DATA = 0, 3, 1  # what `prefetch` is for, in LLVM's words
 
 
@@ -104,7 +104,9 @@ def _make_prefetch() -> Prefetch:
             place = builder.bitcast(builder.gep(array.data, [at]), ir.IntType(8).as_pointer())
             number = ir.IntType(32)
             kind = ir.FunctionType(ir.VoidType(), [place.type, number, number, number])
-            function = builder.module.globals.get("llvm.prefetch.p0i8") or ir.Function(builder.module, kind, "llvm.prefetch.p0i8")
+            function = builder.module.globals.get("llvm.prefetch.p0i8") or ir.Function(
+                builder.module, kind, "llvm.prefetch.p0i8"
+            )
             builder.call(function, [place, *(ir.Constant(number, each) for each in (READ, KEEP, DATA))])
             return context.get_dummy_value()
 
@@ -146,7 +148,7 @@ def _make_plain_rows(lanes: int) -> tuple[Load, Store, Same]:
     return load, store, same
 
 
-def _plain_prefetch(array: Float64, row: int, column: int) -> None:
+def _plain_prefetch(array: Float64 | Int32, row: int, column: int) -> None:
     """As `prefetch`, where kernels are Python."""
 
 

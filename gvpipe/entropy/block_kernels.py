@@ -69,27 +69,42 @@ def sort_tokens(values: Int64, contexts: Int64, counts: Int64) -> tuple[UInt8, I
 @compiled
 def take_block(stream: BlockStream, contexts: Int64) -> tuple[Int64, int]:
     """Return the next block's values ``(n,)`` for its ``contexts (n,)``, 0..C-1, and a status: 0, NO_TABLE or NO_DATA."""
+    memory = np.empty((3, len(contexts)), np.int64)
+    status = fill_block(stream, contexts, memory, np.empty(len(stream.sizes) + 1, np.int64))
+    return memory[0], status
+
+
+@compiled
+def fill_block(stream: BlockStream, contexts: Int64, memory: Int64, ends: Int64) -> int:
+    """As `take_block`; the first n of ``memory[0]`` get the values. Return the status.
+
+    Args:
+        stream, contexts: of that.
+        memory: ``(3, m)``, m at least n.
+        ends: ``(C + 1,)`` memory.
+    """
     state, words, sizes = stream.state, stream.words, stream.sizes
-    n = len(contexts)
-    values = np.zeros(n, np.int64)
-    ends = np.zeros(len(sizes) + 1, np.int64)
+    n, values, tokens, widths = len(contexts), memory[0], memory[1], memory[2]
+    for context in range(len(ends)):
+        ends[context] = 0
     for i in range(n):
         ends[contexts[i] + 1] += 1
     for context in range(len(sizes)):
         if ends[context + 1] and not sizes[context]:
-            return values, NO_TABLE
+            return NO_TABLE
         ends[context + 1] += ends[context]
-    tokens = np.zeros(n, np.int64)  # context after context
-    for context in range(len(sizes)):
-        start, end = ends[context], ends[context + 1]
-        if sizes[context] > 1 and start < end and not decode_symbols(state, words, stream.edges[context], tokens[start:end]):
-            return values, NO_DATA
-    widths = np.zeros(n, np.int64)  # of low bits that follow
-    widest = 0
+    for context in range(len(sizes)):  # their tokens, context after context
+        own = tokens[ends[context] : ends[context + 1]]
+        if sizes[context] < 2:
+            for i in range(len(own)):
+                own[i] = 0
+        elif len(own) and not decode_symbols(state, words, stream.edges[context], own):
+            return NO_DATA
+    widest = 0  # of low bits that follow
     for i in range(n):
         token = tokens[ends[contexts[i]]]
         ends[contexts[i]] += 1
-        values[i] = token
+        values[i], widths[i] = token, 0
         if token >= DIRECT:
             widths[i] = (token - DIRECT) // 2 + 3
             widest = max(widest, widths[i])
@@ -99,8 +114,8 @@ def take_block(stream: BlockStream, contexts: Int64) -> tuple[Int64, int]:
             if widths[i] > shift:
                 bits = decode_bits(state, words, min(widths[i] - shift, CHUNK))
                 if bits < 0:
-                    return values, NO_DATA
+                    return NO_DATA
                 values[i] |= bits << shift
     for i in range(n):
         values[i] = (values[i] >> 1) ^ -(values[i] & 1)
-    return values, 0
+    return 0

@@ -21,6 +21,7 @@ import numpy as np
 
 from gvpipe.arrays import Int32, Int64
 from gvpipe.compiled import compiled, inlined
+from gvpipe.lanes import prefetch
 from gvpipe.mesh.fans import (
     BIG,
     CORNER,
@@ -46,6 +47,9 @@ from gvpipe.mesh.hole_filling import Hole, empty_hole, fill_hole, find_ring
 
 MAX_RING = 12  # most neighbours of a vertex that is removed
 MAX_NEIGHBOURS = 20  # most vertices kept about a vertex: its ring, then what lies across the ring, then what touches the ring
+FAR = 1 << 16  # vertices, from which on fans lie far apart in memory
+STRIDE = 4  # turns between one look ahead and the next
+SIDES_APART = 5  # sides of 12 bytes: within another 64 bytes
 MIN_COARSE = 16  # vertices; decimation stops here at the latest
 REGULAR, REGULAR_BOUNDARY = 6, 3  # triangles around a vertex
 
@@ -150,7 +154,11 @@ def removal_costs(vertices: Int32, fans: Fans) -> tuple[Int32, Int64]:
 @compiled
 def _fill_costs(vertices: Int32, fans: Fans, hole: Hole, candidates: Int32, costs: Int64) -> int:
     n = 0
-    for v in vertices:
+    is_far = len(fans.heads) > FAR
+    for i in range(len(vertices)):
+        if is_far:
+            _fetch(vertices, i, fans)
+        v = vertices[i]
         size, closed = find_ring(v, fans, hole)
         if size < 2:
             continue
@@ -165,10 +173,10 @@ def _fill_costs(vertices: Int32, fans: Fans, hole: Hole, candidates: Int32, cost
 @compiled
 def remove_wave(progress: Progress, candidates: Int32, costs: Int64, wave: int, hole: Hole) -> Progress:
     """Remove one wave, of n ``candidates`` those that cost least first; its number is ``wave``."""
-    turns, at = _sorted_by_cost(costs), 0
+    queue, at = candidates[_sorted_by_cost(costs)], 0
     freed = np.empty(MAX_RING, np.int32)
-    while at < len(turns):
-        at, n_gone, size = _remove_some(progress, candidates, turns, at, wave, hole, freed)
+    while at < len(queue):
+        at, n_gone, size = _remove_some(progress, queue, at, wave, hole, freed)
         fans, end, order, rings, starts, neighbours, locked, _ = progress
         for i in range(size):  # of a ring that lacks room
             if not has_room(hole.ring[i], _new_degree(i, fans, hole), fans):
@@ -178,16 +186,17 @@ def remove_wave(progress: Progress, candidates: Int32, costs: Int64, wave: int, 
 
 
 @compiled
-def _remove_some(
-    progress: Progress, candidates: Int32, turns: Int64, first: int, wave: int, hole: Hole, freed: Int32
-) -> tuple[int, int, int]:
-    """Remove candidates, from turn ``first`` on, until none is left or the fans lack room for one.
+def _remove_some(progress: Progress, queue: Int32, first: int, wave: int, hole: Hole, freed: Int32) -> tuple[int, int, int]:
+    """Remove the vertices of a queue, from turn ``first`` on, until none is left or the fans lack room for one.
 
     Returns the turn of that one, how many vertices are gone, and the size of its ring, which is in ``hole``; 0 at the end.
     """
     fans, _, order, rings, starts, neighbours, locked, n_gone = progress
-    for turn in range(first, len(turns)):
-        v = candidates[turns[turn]]
+    is_far = len(fans.heads) > FAR
+    for turn in range(first, len(queue)):
+        if is_far:
+            _fetch(queue, turn, fans)
+        v = queue[turn]
         if len(order) - n_gone <= MIN_COARSE:
             break
         if locked[v] == wave:
@@ -214,7 +223,32 @@ def _remove_some(
         order[n_gone] = v
         rings[n_gone] = size if closed else -size
         n_gone += 1
-    return len(turns), n_gone, 0
+    return len(queue), n_gone, 0
+
+
+@inlined
+def _fetch(vertices: Int32, i: int, fans: Fans) -> None:
+    """Ask the memory for what vertices after the one at i take, each by what was asked for a few turns before."""
+    n = len(vertices)
+    if i + 4 * STRIDE < n:
+        prefetch(fans.heads, vertices[i + 4 * STRIDE], 0)
+    if i + 3 * STRIDE < n:
+        _fetch_sides(vertices[i + 3 * STRIDE], fans)
+    if i + 2 * STRIDE < n:
+        low, degree = fans.heads[vertices[i + 2 * STRIDE], START], fans.heads[vertices[i + 2 * STRIDE], DEGREE]
+        for at in range(low, low + min(degree, MAX_RING)):
+            prefetch(fans.heads, fans.sides[at, NEXT_VERTEX], 0)
+    if i + STRIDE < n:
+        low, degree = fans.heads[vertices[i + STRIDE], START], fans.heads[vertices[i + STRIDE], DEGREE]
+        for at in range(low, low + min(degree, MAX_RING)):
+            _fetch_sides(fans.sides[at, NEXT_VERTEX], fans)
+
+
+@inlined
+def _fetch_sides(v: int, fans: Fans) -> None:
+    """Ask for v's first sides: those of most vertices."""
+    prefetch(fans.sides, fans.heads[v, START], 0)
+    prefetch(fans.sides, fans.heads[v, START] + SIDES_APART, 0)
 
 
 @inlined

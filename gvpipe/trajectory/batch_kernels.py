@@ -94,7 +94,7 @@ def gather(coding: VectorCoding, ranks: Int32, batch: Batch) -> int:
 
 @inlined
 def fetch(coding: VectorCoding, ranks: Int32) -> None:
-    """Ask the memory for what `gather` takes of the neighbours: in large meshes they lie far apart, and it would wait for each."""
+    """Ask the memory for what `gather` takes: the neighbours of large meshes lie far apart, and it would wait for each."""
     causal, n_components = coding.causal, coding.decoded.shape[1]
     for rank in ranks:
         for k in range(causal.starts[rank], causal.starts[rank + 1]):

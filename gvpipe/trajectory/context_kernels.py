@@ -5,11 +5,13 @@ Kernels of `gvpipe.trajectory.coefficient_coding`.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from gvpipe.arrays import Int32, Int64, UInt8
 from gvpipe.compiled import compiled
-from gvpipe.entropy.block_kernels import OUT_OF_RANGE, BlockStream, take_block
+from gvpipe.entropy.block_kernels import OUT_OF_RANGE, BlockStream, fill_block
 from gvpipe.trajectory.contexts import (
     ENTRY_BITS,
     FLOOR_NEAR,
@@ -28,6 +30,29 @@ from gvpipe.trajectory.contexts import (
 )
 
 TILE, FEW = 512, 16  # vectors whose earlier components are summed up at once; that are turned from columns to rows at once
+
+
+class Memory(NamedTuple):
+    """For blocks of up to n vectors.
+
+    Args:
+        near: ``(n, N_NEAR + 1) int32`` (`_find_near`).
+        contexts: ``(n,) int64``.
+        spans: ``(2, TILE) int64`` sums of magnitudes over the short and the long span.
+    """
+
+    near: Int32
+    contexts: Int64
+    spans: Int64
+
+
+@compiled
+def _new_memory(blocks: Int32, first_block: int, end_block: int) -> Memory:
+    """Memory for blocks with these bounds."""
+    n = 0
+    for b in range(first_block, end_block):
+        n = max(n, blocks[b + 1] - blocks[b])
+    return Memory(np.empty((n, N_NEAR + 1), np.int32), np.empty(n, np.int64), np.empty((2, TILE), np.int64))
 
 
 @compiled
@@ -55,15 +80,12 @@ def _log_of_large(value: int, inputs: ContextInputs) -> int:
 
 
 @compiled
-def _find_near(first: int, end: int, inputs: ContextInputs) -> Int32:
-    """``(end - first, N_NEAR + 1)``: how many causal neighbours count, 1 at least; ranks of those before ``first``, then -1.
+def _find_near(first: int, end: int, inputs: ContextInputs, near: Int32) -> None:
+    """Fill ``near (n, N_NEAR + 1)``: how many causal neighbours count, 1 at least; ranks of those before ``first``, then -1.
 
-    None of the first block, which may be large, and has nothing before it.
+    Not of the first block, which may be large, and has nothing before it.
     """
-    near = np.full((end - first if first else 0, N_NEAR + 1), -1, np.int32)
-    if first == 0:
-        return near
-    for i in range(first, end):
+    for i in range(first, end if first else 0):
         count = min(inputs.ring_sizes[i], inputs.starts[i + 1] - inputs.starts[i], N_NEAR)
         near[i - first, 0] = max(count, 1)
         found = 0
@@ -72,20 +94,21 @@ def _find_near(first: int, end: int, inputs: ContextInputs) -> Int32:
             if rank < first:
                 found += 1
                 near[i - first, found] = rank
-    return near
+        for j in range(found, N_NEAR):
+            near[i - first, j + 1] = -1
 
 
 @compiled
-def _find_contexts(first: int, end: int, c: int, rows: Int64, inputs: ContextInputs, before: Int64, near: Int32) -> Int64:
-    """``(end - first,)`` contexts of component c in the block of ranks ``first`` to ``end``.
+def _find_contexts(first: int, end: int, c: int, rows: Int64, inputs: ContextInputs, before: Int64, memory: Memory) -> None:
+    """Fill ``memory.contexts`` of component c in the block of ranks ``first`` to ``end``.
 
     Args:
         rows: as of `Residuals`, of the blocks before and of this block's components before c.
         before: ``(R,)`` mean magnitudes of the block before, in 1 / ONE.
-        near: of the block (`_find_near`).
+        memory: what is near is known (`_find_near`).
     """
-    contexts = np.empty(end - first, np.int64)
-    usual, own = inputs.usual, rows[c]
+    usual, own, near, contexts = inputs.usual, rows[c], memory.near, memory.contexts
+    shorts, longs = memory.spans[0], memory.spans[1]
     usual_short = usual_long = 0
     for k in range(max(0, c - len(LONG)), c):
         usual_long += usual[k] * LONG[c - 1 - k]
@@ -93,7 +116,6 @@ def _find_contexts(first: int, end: int, c: int, rows: Int64, inputs: ContextInp
             usual_short += usual[k] * SHORT[c - 1 - k]
     fixed = POWERS[0] * _log(usual[c], inputs) + POWERS[1] * _log(before[c], inputs)
     fixed -= POWERS[3] * _log(usual_short + FLOOR_SPAN, inputs) + POWERS[4] * _log(usual_long + FLOOR_SPAN, inputs)
-    shorts, longs = np.empty(TILE, np.int64), np.empty(TILE, np.int64)
     for begin in range(first, end, TILE):
         n = min(TILE, end - begin)
         _sum_spans(begin, n, c, rows, shorts, longs)
@@ -113,7 +135,6 @@ def _find_contexts(first: int, end: int, c: int, rows: Int64, inputs: ContextInp
             forecast += POWERS[3] * _log(shorts[j] + FLOOR_SPAN, inputs) + POWERS[4] * _log(longs[j] + FLOOR_SPAN, inputs)
             octaves = forecast // POWER_ONE - 6 * PER_OCTAVE  # ONE is six octaves
             contexts[i - first] = min(max(octaves // (PER_OCTAVE // 2), LOWEST), HIGHEST) - LOWEST
-    return contexts
 
 
 @compiled
@@ -146,18 +167,25 @@ def find_all_contexts(residuals: Int64, inputs: ContextInputs) -> UInt8:
     """``(m, R)`` contexts of ``residuals (m, R)`` by rank, all of which there are."""
     contexts, before = np.zeros(residuals.shape, np.uint8), inputs.usual.copy()
     rows = np.empty((residuals.shape[1], len(residuals)), np.int64)
+    _fill_contexts(residuals, inputs, before, rows, _new_memory(inputs.blocks, 0, len(inputs.blocks) - 1), contexts)
+    return contexts
+
+
+@compiled
+def _fill_contexts(
+    residuals: Int64, inputs: ContextInputs, before: Int64, rows: Int64, memory: Memory, contexts: UInt8
+) -> None:
     for i in range(len(residuals)):
         for c in range(len(rows)):
             rows[c, i] = _entry(residuals[i, c])
     for b in range(len(inputs.blocks) - 1):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
-        near = _find_near(first, end, inputs)
+        _find_near(first, end, inputs, memory.near)
         for c in range(len(rows)):
-            found = _find_contexts(first, end, c, rows, inputs, before, near)
+            _find_contexts(first, end, c, rows, inputs, before, memory)
             for i in range(first, end):
-                contexts[i, c] = found[i - first]
+                contexts[i, c] = memory.contexts[i - first]
         _mean_magnitudes(rows, first, end, before)
-    return contexts
 
 
 @compiled
@@ -171,19 +199,36 @@ def decode_residuals(residuals: Residuals, inputs: ContextInputs, stream: BlockS
     Returns:
         0, or what is wrong: as of `take_block`, or OUT_OF_RANGE.
     """
+    memory = _new_memory(inputs.blocks, first_block, end_block)
+    numbers, ends = np.empty((3, len(memory.contexts)), np.int64), np.empty(len(stream.sizes) + 1, np.int64)
+    return _decode_blocks(residuals, inputs, stream, first_block, end_block, memory, numbers, ends)
+
+
+@compiled
+def _decode_blocks(
+    residuals: Residuals,
+    inputs: ContextInputs,
+    stream: BlockStream,
+    first_block: int,
+    end_block: int,
+    memory: Memory,
+    numbers: Int64,
+    ends: Int64,
+) -> int:
+    """As `decode_residuals`, with memory for `fill_block`."""
     ranked, rows, means = residuals
     for b in range(first_block, end_block):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
-        near = _find_near(first, end, inputs)
+        _find_near(first, end, inputs, memory.near)
         for c in range(len(rows)):
-            contexts = _find_contexts(first, end, c, rows, inputs, means, near)
-            values, status = take_block(stream, contexts)
+            _find_contexts(first, end, c, rows, inputs, means, memory)
+            status = fill_block(stream, memory.contexts[: end - first], numbers, ends)
             if status:
                 return status
-            for i in range(len(values)):
-                if abs(values[i]) >= LARGEST:
+            for i in range(end - first):
+                if abs(numbers[0, i]) >= LARGEST:
                     return OUT_OF_RANGE
-                rows[c, first + i] = _entry(values[i])
+                rows[c, first + i] = _entry(numbers[0, i])
         _mean_magnitudes(rows, first, end, means)
         _rank(rows, first, end, ranked)
     return 0

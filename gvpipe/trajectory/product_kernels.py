@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.arrays import Float32, Float64, Int32, Int64
-from gvpipe.compiled import compiled
+from gvpipe.compiled import compiled, inlined
 
 BLOCK = 1024  # columns at a time: a block of four vectors stays in the cache
-FEW_ROWS = 64  # of a tall matrix, which stay in the cache
+TILE = 128  # vertices at a time, whose coefficients stay in the cache for all frames
 
 
 class Rows(NamedTuple):
@@ -59,34 +59,73 @@ def weighted_sums(weights: Float64, vectors: Float64) -> Float64:
 
 
 @compiled
-def transposed(matrix: Float64) -> Float64:
-    """``matrix (n, m)`` as ``(m, n)``: of tall ones, in a third of NumPy's time."""
-    result = np.empty((matrix.shape[1], len(matrix)))
-    for first in range(0, len(matrix), FEW_ROWS):
-        end = min(first + FEW_ROWS, len(matrix))
-        for column in range(matrix.shape[1]):
-            row = result[column]
-            for i in range(first, end):
-                row[i] = matrix[i, column]
-    return result
+def rebuild_vertices(
+    rows: tuple[Float64, Float64], coefficients: Float64, vertices: Int64, largest: float, frames: Float32, first: int, end: int
+) -> int:
+    """Fill vertices ``first`` to ``end`` of ``frames (n, V, 3)``; return the first frame with one that is not finite, or n.
+
+    Vertices come few at a time, for all frames, so that coefficients are read once.
+
+    Args:
+        rows: ``(3n, R)`` weights of the coefficients, and ``(3n,)`` what is added to their sums; by frame, then by axis.
+        coefficients: ``(P, R)`` of the points.
+        vertices: ``(V,)`` their points.
+        largest: coordinates beyond it, and NaN, are not finite in float32.
+    """
+    own, sums = np.empty((coefficients.shape[1], TILE)), np.empty((3, TILE))
+    return _rebuild(rows, coefficients, vertices, largest, frames, first, end, own, sums)
 
 
 @compiled
-def place_points(points: Float64, vertices: Int64, largest: float, frames: Float32) -> int:
-    """Give each vertex of ``frames (n, V, 3)`` its point of ``points (n, 3, P)``; return the first frame not to have it, or n.
+def _rebuild(
+    rows: tuple[Float64, Float64],
+    coefficients: Float64,
+    vertices: Int64,
+    largest: float,
+    frames: Float32,
+    first: int,
+    end: int,
+    own: Float64,
+    sums: Float64,
+) -> int:
+    """As `rebuild_vertices`, with memory for the coefficients of `TILE` vertices, by component, and for their coordinates."""
+    (weights, added), done = rows, len(frames)
+    for begin in range(first, end, TILE):
+        n = min(TILE, end - begin)
+        for i in range(n):
+            point = vertices[begin + i]
+            for k in range(len(own)):
+                own[k, i] = coefficients[point, k]
+        for frame in range(done):
+            for axis in range(3):
+                _sum_terms(weights[3 * frame + axis], added[3 * frame + axis], own, sums[axis][:n])
+            for i in range(n):
+                x, y, z = sums[0, i], sums[1, i], sums[2, i]
+                if not (abs(x) <= largest and abs(y) <= largest and abs(z) <= largest):
+                    done = min(done, frame)
+                frames[frame, begin + i, 0], frames[frame, begin + i, 1], frames[frame, begin + i, 2] = x, y, z
+            if done <= frame:
+                break
+    return done
 
-    Args:
-        vertices: ``(V,)`` their points.
-        largest: coordinates beyond it, and NaN, end the work.
-    """
-    for i in range(len(frames)):
-        frame, x, y, z = frames[i], points[i, 0], points[i, 1], points[i, 2]
-        for v in range(len(frame)):
-            point = vertices[v]
-            if not (abs(x[point]) <= largest and abs(y[point]) <= largest and abs(z[point]) <= largest):
-                return i
-            frame[v, 0], frame[v, 1], frame[v, 2] = x[point], y[point], z[point]
-    return len(frames)
+
+@inlined
+def _sum_terms(weights: Float64, added: float, terms: Float64, sums: Float64) -> None:
+    """Fill ``sums (n,)`` with the products of ``weights (R,)`` with ``terms (R, m)``, first to last, and what is added then."""
+    whole = len(weights) - len(weights) % 4
+    for i in range(len(sums)):
+        sums[i] = 0.0
+    for k in range(0, whole, 4):
+        a, b, c, d = terms[k], terms[k + 1], terms[k + 2], terms[k + 3]
+        u, v, w, x = weights[k], weights[k + 1], weights[k + 2], weights[k + 3]
+        for i in range(len(sums)):
+            sums[i] = (((sums[i] + u * a[i]) + v * b[i]) + w * c[i]) + x * d[i]
+    for k in range(whole, len(weights)):
+        a, u = terms[k], weights[k]
+        for i in range(len(sums)):
+            sums[i] += u * a[i]
+    for i in range(len(sums)):
+        sums[i] += added
 
 
 @compiled

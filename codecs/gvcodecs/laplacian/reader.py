@@ -76,8 +76,6 @@ class LaplacianReader:
         return build_domain(surface, average, self._header.coding, self._still.flags, self._bitstream.budget)
 
     def _decode(self, s: int) -> Segment:
-        from gvpipe.trajectory.product_kernels import transposed
-
         if self._kept is None or self._kept[0] != s:
             step, section = self._header.steps[s], self._bitstream.section
             name, n_frames = f"basis.{s}", self._bounds[s + 1] - self._bounds[s]
@@ -95,5 +93,5 @@ class LaplacianReader:
             domain, coding = self._domain, self._header.coding
             domain.system.equations.ask_to_solve(n_components)
             coefficients = decode_coefficients(anchors, deltas, n_components, step, domain, coding, names, given)
-            self._kept = s, Segment(basis, transposed(coefficients))
+            self._kept = s, Segment(basis, np.ascontiguousarray(coefficients))
         return self._kept[1]

@@ -27,8 +27,8 @@ from gvpipe.container.cursor import Cursor
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import CorruptFile
 from gvpipe.media.video import VideoReader
+from gvpipe.trajectory.basis import Basis
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES
-from gvpipe.trajectory.reconstruction import Segment
 
 BYTES_PER_SAMPLE, SECONDS_PER_SAMPLE = 48, 0.1e-6
 MAX_FLOAT32 = float(np.finfo(np.float32).max)
@@ -54,7 +54,17 @@ class _Segment:
     """A decoded segment: its number, its basis and its slots' coefficients ``(R, S)``."""
 
     number: int
-    trajectories: Segment
+    basis: Basis
+    coefficients: Float64
+
+    def positions(self, frame: int) -> Float64:
+        """The slots' coordinates ``(3, S)`` in a frame of the segment, less those of the base frame."""
+        from gvpipe.trajectory.product_kernels import weighted_sums
+
+        rows = slice(3 * frame, 3 * frame + 3)
+        sums = weighted_sums(np.ascontiguousarray(self.basis.vectors[rows]), self.coefficients)
+        sums += self.basis.mean[rows, None]
+        return sums
 
 
 class TrajectoryReader:
@@ -115,7 +125,7 @@ class TrajectoryReader:
         for frame in range(start, stop):
             s = locate(self._bounds, frame)
             segment = self._decode(s)
-            placed = segment.trajectories.positions(frame - self._bounds[s], frame - self._bounds[s] + 1)[0]  # (3, S)
+            placed = segment.positions(frame - self._bounds[s])
             placed += base
             if not np.abs(placed).max(initial=0) <= MAX_FLOAT32:
                 raise CorruptFile(f"frame {frame} does not decode to finite positions; get the file again from its source")
@@ -133,7 +143,7 @@ class TrajectoryReader:
             samples, step = self._samples(s), self._images.steps[s]
             matrix = self._shared.matrix
             basis, coefficients = decode_segment(Cursor(data, name), samples, step, matrix, point, n_frames, budget)
-            self._segment = _Segment(s, Segment(basis, coefficients))
+            self._segment = _Segment(s, basis, coefficients)
         return self._segment
 
     def _samples(self, s: int) -> Float64:

@@ -95,8 +95,6 @@ class PcaReader:
         return frames
 
     def _decode(self, s: int, lod: int) -> Segment:
-        from gvpipe.trajectory.product_kernels import transposed
-
         if self._kept is None or self._kept[0] != (s, lod):
             step = self._header.steps[s]
             n_frames = self._bounds[s + 1] - self._bounds[s]
@@ -120,8 +118,9 @@ class PcaReader:
             )
             if lod:
                 coefficients = coefficients[self._alive(lod)]
-            rows = transposed(coefficients)
-            self._kept = (s, lod), Segment(basis, rows[::-1].copy() if self._header.predictor == "lsp" else rows)
+            if self._header.predictor == "lsp":
+                coefficients = np.ascontiguousarray(coefficients[:, ::-1])
+            self._kept = (s, lod), Segment(basis, coefficients)
         return self._kept[1]
 
     def _count_blocks(self, lod: int) -> int:
