@@ -23,17 +23,27 @@ SURE, LEAST = (
 def weigh_hierarchy(hierarchy: Hierarchy, overshoots: bool) -> CausalOrder:
     """The order of a hierarchy's vertices, coarse to fine."""
     weights, variances = np.empty(len(hierarchy.neighbours)), np.empty(len(hierarchy.neighbours))
-    ring_sizes = np.abs(hierarchy.rings)
+    fill_weights(hierarchy, overshoots, 0, len(hierarchy.rings), weights, variances)
+    return join_order(hierarchy, weights, variances)
+
+
+@compiled
+def join_order(hierarchy: Hierarchy, weights: Float64, variances: Float64) -> CausalOrder:
+    """The order of a hierarchy's vertices, with what `fill_weights` filled."""
+    order, starts, neighbours, rings, blocks, _ = hierarchy
+    return CausalOrder(order, starts, neighbours, weights, variances, np.abs(rings), blocks, True)
+
+
+@compiled
+def fill_weights(hierarchy: Hierarchy, overshoots: bool, begin: int, stop: int, weights: Float64, variances: Float64) -> None:
+    """Fill prior weights of the neighbours of the vertices at ranks ``begin`` to ``stop``, and their variances."""
     overshoot = OVERSHOOT if overshoots else 0.0
-    for rank in range(len(hierarchy.rings)):
-        first, end, ring = hierarchy.starts[rank], hierarchy.starts[rank + 1], ring_sizes[rank]
+    for rank in range(begin, stop):
+        first, end, ring = hierarchy.starts[rank], hierarchy.starts[rank + 1], abs(hierarchy.rings[rank])
         doubt = min(max(rank / SURE, LEAST), 1.0)
         _weigh(weights[first:end], ring, hierarchy.rings[rank] < 0, overshoot)
         for number in range(end - first):
             variances[first + number] = (RING_VARIANCE if number < ring or ring == 0 else FAR_VARIANCE) * doubt
-    return CausalOrder(
-        hierarchy.order, hierarchy.starts, hierarchy.neighbours, weights, variances, ring_sizes, hierarchy.blocks, True
-    )
 
 
 @compiled

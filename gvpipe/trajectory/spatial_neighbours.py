@@ -11,10 +11,12 @@ Source: Vasa and Skala 2010, sections 3.2 and 3.3; overshoot and boundary rule a
 
 from __future__ import annotations
 
+from collections import deque
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gvpipe.ahead import halves, run_ahead
 from gvpipe.arrays import Int32
 from gvpipe.trajectory.causal_order import CausalOrder
 
@@ -24,9 +26,15 @@ if TYPE_CHECKING:
 
 def hierarchy_order(hierarchy: Hierarchy, overshoots: bool = True) -> CausalOrder:
     """Return the order of all V vertices, coarse to fine; ``overshoots`` is False for predictors that see the ring alone."""
-    from gvpipe.trajectory.spatial_kernels import weigh_hierarchy
+    from gvpipe.trajectory.spatial_kernels import fill_weights, join_order
 
-    return weigh_hierarchy(hierarchy, overshoots)
+    weights, variances = (np.empty(len(hierarchy.neighbours)) for _ in range(2))
+
+    def fill(ranks: slice) -> None:
+        fill_weights(hierarchy, overshoots, ranks.start, ranks.stop, weights, variances)
+
+    deque(run_ahead(fill, halves(len(hierarchy.rings))), maxlen=0)
+    return join_order(hierarchy, weights, variances)
 
 
 def traversal_order(faces: Int32, n_vertices: int) -> CausalOrder:
