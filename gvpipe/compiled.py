@@ -40,10 +40,7 @@ def compiled(function: Function) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """As `compiled`, for a small function that takes tuples of arrays: its code becomes part of each kernel that calls it.
-
-    A call counts the references of each array up and down, atomically: 0.1 microseconds, more than what such functions do.
-    """
+    """As `compiled`, for a small function: its code becomes part of each kernel that calls it."""
     return _compiled(function, {**OPTIONS, "forceinline": True})
 
 

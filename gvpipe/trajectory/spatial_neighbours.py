@@ -26,14 +26,17 @@ if TYPE_CHECKING:
 
 def hierarchy_order(hierarchy: Hierarchy, overshoots: bool = True) -> CausalOrder:
     """Return the order of all V vertices, coarse to fine; ``overshoots`` is False for predictors that see the ring alone."""
-    from gvpipe.trajectory.spatial_kernels import fill_weights, join_order
+    from gvpipe.trajectory.spatial_kernels import fill_weights, join_order, weigh_hierarchy
 
+    parts = halves(len(hierarchy.rings))
+    if len(parts) < 2:
+        return weigh_hierarchy(hierarchy, overshoots)
     weights, variances = (np.empty(len(hierarchy.neighbours)) for _ in range(2))
 
     def fill(ranks: slice) -> None:
         fill_weights(hierarchy, overshoots, ranks.start, ranks.stop, weights, variances)
 
-    deque(run_ahead(fill, halves(len(hierarchy.rings))), maxlen=0)
+    deque(run_ahead(fill, parts), maxlen=0)
     return join_order(hierarchy, weights, variances)
 
 

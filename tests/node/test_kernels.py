@@ -60,7 +60,7 @@ def test_kernels_equal_numba_on_trajectories(name: str, tmp_path: Path) -> None:
         if len(video.levels) > 1:
             assert len(video.level(1).faces)
     used = {name for name, *_ in calls}
-    assert used >= {"build_order", "decode_residuals", "weighted_sums"}
+    assert used >= {"build_order", "weigh_hierarchy", "decode_residuals"}
     assert used >= ({"keep_ranks", "weigh_traversal", "fit_still"} if "still" in name else {f"predict_{name.split('-')[-1]}"})
     compare(calls, tmp_path)
 

@@ -110,7 +110,7 @@ def fill_gram(start: int, stop: int, place: Float64, motion: Float64, transforms
         transforms: of all clusters.
         candidates: their clusters are set.
     """
-    clusters, along, gram = candidates  # once: each look into a named tuple counts references
+    clusters, along, gram = candidates
     all_columns, products = transforms
     square = 0.0
     for i in range(len(motion)):

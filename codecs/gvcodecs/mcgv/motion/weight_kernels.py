@@ -87,7 +87,7 @@ def list_clusters(point: int, causal: CausalNeighbours, weights: Weights, listed
 @compiled
 def suggest(listed: Listed, n_listed: int) -> int:
     """Divide TOTAL among the first four clusters of a list, as its ``shares``; return how many get something."""
-    sums, shares = listed.sums, listed.shares  # once: each look into a named tuple counts references
+    sums, shares = listed.sums, listed.shares
     n = min(n_listed, INFLUENCES)
     total = 0
     for j in range(n):

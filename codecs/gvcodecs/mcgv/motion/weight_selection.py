@@ -170,7 +170,7 @@ def _choose(
     stop: int,
 ) -> None:
     """Change ``weights`` and fill ``errors`` from a first point up to another one, point after point."""
-    listed, candidates, fit, ranked, around, best, least = memory  # once: each look into a named tuple counts references
+    listed, candidates, fit, ranked, around, best, least = memory
     causal, ring, places, motions, price = points
     taken, solution, parts, gram, choices = fit.taken, fit.solution, ranked.parts, candidates.gram, candidates.clusters
     all_clusters, all_weights = weights
