@@ -22,7 +22,7 @@ from itertools import pairwise
 import numpy as np
 
 from gvpipe.ahead import run_ahead
-from gvpipe.arrays import Float64, Int32
+from gvpipe.arrays import Float64, Int32, Integers
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.entropy.integers import decode_integers, encode_integers
@@ -59,13 +59,15 @@ def encode_vectors(
     """
     from gvpipe.trajectory.context_kernels import find_all_contexts
 
-    residuals = np.zeros((len(causal.order), target.shape[1]), np.int64)
+    wide = np.zeros((len(causal.order), target.shape[1]), np.int64)
     decoded = np.zeros(target.shape) if given is None else given.copy()
-    predict_vectors(causal, step, residuals, decoded, target, predictor, beta)
-    largest = max(int(residuals.max(initial=0)), -int(residuals.min(initial=0)))
+    predict_vectors(causal, step, wide, decoded, target, predictor, beta)
+    largest = max(int(wide.max(initial=0)), -int(wide.min(initial=0)))
     if largest >= LARGEST:
         raise InputError(f"a residual has {largest} quantisation steps, at most {LARGEST} fit; ask for a lower quality")
-    sums = np.array([np.abs(column).sum() for column in residuals.T], np.int64)  # one at a time: a copy may be large
+    sums = np.array([np.abs(column).sum() for column in wide.T], np.int64)  # one at a time: a copy may be large
+    residuals: Integers = wide.astype(np.int32) if largest <= np.iinfo(np.int32).max else wide
+    del wide  # what follows takes as much memory again
     means = sums * ONE // max(1, len(residuals))
     levels = np.searchsorted(level_bounds(), means + 1, side="right") - 1
     contexts = find_all_contexts(residuals, context_inputs(causal, len(target), levels, len(causal.blocks) - 1))

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int32, Int64, UInt8
+from gvpipe.arrays import Int32, Int64, Integers, UInt8
 from gvpipe.compiled import compiled
 from gvpipe.entropy.block_kernels import OUT_OF_RANGE, BlockStream, fill_block
 from gvpipe.trajectory.contexts import (
@@ -36,7 +36,7 @@ class Memory(NamedTuple):
     """For blocks of up to n vectors.
 
     Args:
-        near: ``(n, N_NEAR + 1) int32`` (`_find_near`).
+        near: ``(m, N_NEAR + 1) int32`` (`_find_near`), of blocks after the first, of up to m.
         contexts: ``(n,) int64``.
         spans: ``(2, TILE) int64`` sums of magnitudes over the short and the long span.
     """
@@ -49,10 +49,12 @@ class Memory(NamedTuple):
 @compiled
 def _new_memory(blocks: Int32, first_block: int, end_block: int) -> Memory:
     """Memory for blocks with these bounds."""
-    n = 0
+    n = n_later = 0
     for b in range(first_block, end_block):
         n = max(n, blocks[b + 1] - blocks[b])
-    return Memory(np.empty((n, N_NEAR + 1), np.int32), np.empty(n, np.int64), np.empty((2, TILE), np.int64))
+        if blocks[b]:
+            n_later = max(n_later, blocks[b + 1] - blocks[b])
+    return Memory(np.empty((n_later, N_NEAR + 1), np.int32), np.empty(n, np.int64), np.empty((2, TILE), np.int64))
 
 
 @compiled
@@ -163,8 +165,8 @@ def _mean_magnitudes(rows: Int64, first: int, end: int, means: Int64) -> None:
 
 
 @compiled
-def find_all_contexts(residuals: Int64, inputs: ContextInputs) -> UInt8:
-    """``(m, R)`` contexts of ``residuals (m, R)`` by rank, all of which there are."""
+def find_all_contexts(residuals: Integers, inputs: ContextInputs) -> UInt8:
+    """``(m, R)`` contexts of ``residuals (m, R)`` by rank, all of which there are; int32, or where they do not fit, int64."""
     contexts, before = np.zeros(residuals.shape, np.uint8), inputs.usual.copy()
     rows = np.empty((residuals.shape[1], len(residuals)), np.int64)
     _fill_contexts(residuals, inputs, before, rows, _new_memory(inputs.blocks, 0, len(inputs.blocks) - 1), contexts)
@@ -173,11 +175,11 @@ def find_all_contexts(residuals: Int64, inputs: ContextInputs) -> UInt8:
 
 @compiled
 def _fill_contexts(
-    residuals: Int64, inputs: ContextInputs, before: Int64, rows: Int64, memory: Memory, contexts: UInt8
+    residuals: Integers, inputs: ContextInputs, before: Int64, rows: Int64, memory: Memory, contexts: UInt8
 ) -> None:
     for i in range(len(residuals)):
         for c in range(len(rows)):
-            rows[c, i] = _entry(residuals[i, c])
+            rows[c, i] = _entry(np.int64(residuals[i, c]))
     for b in range(len(inputs.blocks) - 1):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
         _find_near(first, end, inputs, memory.near)
