@@ -179,7 +179,7 @@ def _fill_contexts(
 ) -> None:
     for i in range(len(residuals)):
         for c in range(len(rows)):
-            rows[c, i] = _entry(np.int64(residuals[i, c]))
+            rows[c, i] = _entry(int(residuals[i, c]))
     for b in range(len(inputs.blocks) - 1):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
         _find_near(first, end, inputs, memory.near)
