@@ -69,6 +69,10 @@ class BorrowingCompiler(CompilerBase):  # type: ignore[misc]
     def define_pipelines(self) -> list[Any]:
         """The steps of compiling."""
         steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        if NativeLowering not in (step for step, _ in steps.passes):
+            raise NotImplementedError(
+                "this version of numba has no NativeLowering"
+            )  # kernels would count, and nobody would know
         steps.passes = [(_BorrowingLowering if step is NativeLowering else step, why) for step, why in steps.passes]
         steps.finalize()
         return [steps]

@@ -46,7 +46,10 @@ from numba.core.sigutils import normalize_signature
 from numba.core.types.containers import BaseNamedTuple, BaseTuple
 from numba.misc.appdirs import AppDirs
 
-FORMAT = 2  # of the files, and of how kernels are compiled (`gvpipe.borrowing`)
+from gvpipe import borrowing
+
+FORMAT = 2  # of the files
+COMPILER = hashlib.sha256(Path(borrowing.__file__).read_bytes()).hexdigest()
 INSTALLED = Path(__file__).with_name("kernels")
 SUFFIX = ".nbc"
 DIGEST = 32  # bytes of a SHA-256
@@ -201,7 +204,7 @@ def _processor(codegen: Any) -> tuple[str, str]:
 @functools.cache
 def _surroundings() -> tuple[object, ...]:
     """What all machine code of this process depends on, but for the processor."""
-    versions = FORMAT, numba.__version__, llvmlite.__version__, sys.implementation.cache_tag
+    versions = FORMAT, numba.__version__, llvmlite.__version__, sys.implementation.cache_tag, COMPILER
     settings = tuple(str(getattr(config, name, None)) for name in SETTINGS)
     return (*versions, sys.platform, platform.machine().lower(), settings)
 

@@ -36,10 +36,11 @@ for path in sys.argv[1:]:
         reader = inner
     if hasattr(reader, "_decode"):
         segment = reader._decode(*(0, 0) if type(reader).__name__ == "PcaReader" else (0,))
-        segment = getattr(segment, "trajectories", segment)
-        if hasattr(segment, "positions"):
-            digest.update(np.ascontiguousarray(segment.coefficients))
-            digest.update(segment.positions(0, 1))
+        if hasattr(segment, "coefficients"):
+            for numbers in (segment.coefficients, segment.basis.vectors, segment.basis.mean):
+                digest.update(np.ascontiguousarray(numbers))
+        elif type(reader).__name__ in ("PcaReader", "LaplacianReader", "TrajectoryReader"):
+            raise TypeError(f"{path}: a segment has no coefficients")
     print(digest.hexdigest(), os.path.basename(path))
 """
 FEW = ("laplacian-2-still", "mcgv-4-rigid", "pca-2-still", "pdct-2-still")  # all codecs, quick to compile for

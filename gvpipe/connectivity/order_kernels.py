@@ -33,7 +33,7 @@ LONG_RUN = 8
 
 
 class Memory(NamedTuple):
-    """What coding of V vertices keeps, int64.
+    """What coding of V vertices keeps; int64 but for who was visited.
 
     Args:
         search: of `search_visits`.

@@ -69,14 +69,14 @@ def sort_tokens(values: Int64, contexts: Int64, counts: Int64) -> tuple[UInt8, I
 @compiled
 def take_block(stream: BlockStream, contexts: Int64) -> tuple[Int64, int]:
     """Return the next block's values ``(n,)`` for its ``contexts (n,)``, 0..C-1, and a status: 0, NO_TABLE or NO_DATA."""
-    memory = np.empty((3, len(contexts)), np.int64)
+    memory = np.zeros((3, len(contexts)), np.int64)
     status = fill_block(stream, contexts, memory, np.empty(len(stream.sizes) + 1, np.int64))
-    return memory[0], status
+    return memory[0].copy(), status
 
 
 @compiled
 def fill_block(stream: BlockStream, contexts: Int64, memory: Int64, ends: Int64) -> int:
-    """As `take_block`; the first n of ``memory[0]`` get the values. Return the status.
+    """As `take_block`; the first n of ``memory[0]`` get the values, other rows tokens and widths of bits. Return the status.
 
     Args:
         stream, contexts: of that.

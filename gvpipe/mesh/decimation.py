@@ -47,7 +47,7 @@ from gvpipe.mesh.hole_filling import Hole, empty_hole, fill_hole, find_ring
 
 MAX_RING = 12  # most neighbours of a vertex that is removed
 MAX_NEIGHBOURS = 20  # most vertices kept about a vertex: its ring, then what lies across the ring, then what touches the ring
-FAR = 1 << 16  # vertices, from which on fans lie far apart in memory
+FAR = 1 << 16  # vertices; the fans of more lie far apart in memory
 STRIDE = 4  # turns between one look ahead and the next
 SIDES_APART = 5  # sides of 12 bytes: within another 64 bytes
 MIN_COARSE = 16  # vertices; decimation stops here at the latest

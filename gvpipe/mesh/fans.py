@@ -18,6 +18,7 @@ from gvpipe.compiled import compiled, inlined
 
 HUB = 256  # triangles; an edge between two vertices that have more counts as there, unsearched
 BIG = 64  # sides; fans with fewer have no marked ones
+MOST_LEAVE = 2  # sides that leave a fan with one vertex
 LEAST_ROOM, SPARE = 8, 2  # sides for which a vertex has room at first: in all, and beyond its own
 NEXT_VERTEX, PREVIOUS_VERTEX, CORNER = range(3)  # columns of `Fans.sides`
 START, DEGREE, EXTENT, REGULAR_DEGREE = range(4)  # columns of `Fans.heads`
@@ -115,7 +116,7 @@ def before_marked(at: int, low: int, fans: Fans) -> int:
 
 @inlined
 def add_triangles(triangles: Int32, n: int, numbers: Int32, fans: Fans) -> None:
-    """Add the first n of ``triangles`` under the first of ``numbers``; there is room (`with_room`)."""
+    """Add the first n of ``triangles`` under the first of ``numbers``; there is room (`has_room`, `make_room`)."""
     for i in range(n):
         for k in range(3):
             v, after, before = triangles[i, k], triangles[i, k + 1 if k < 2 else 0], triangles[i, k - 1 if k > 0 else 2]
@@ -225,14 +226,14 @@ def _note_places(v: int, fans: Fans) -> None:
 @inlined
 def has_room(v: int, degree: int, fans: Fans) -> bool:
     """Whether v has room to come to so many triangles, where those that leave leave before others come."""
-    n = degree if fans.heads[v, EXTENT] <= BIG else fans.heads[v, EXTENT] + degree
+    n = degree if fans.heads[v, EXTENT] <= BIG else fans.heads[v, EXTENT] - fans.heads[v, DEGREE] + degree + MOST_LEAVE
     return bool(n <= LEAST_ROOM or n <= fans.rooms[v])
 
 
 @compiled
 def make_room(v: int, degree: int, fans: Fans, end: int) -> tuple[Fans, int]:
     """Fans in which v has room, at their end, for twice so many triangles, and where their sides end; they ended at ``end``."""
-    sides, room = fans.sides, 2 * (fans.heads[v, DEGREE] + degree)
+    sides, room = fans.sides, 2 * degree
     if end + room > len(sides):
         sides = np.empty((end + room + len(sides) // 4, 3), np.int32)
         _copy_rows(fans.sides, end, sides)

@@ -11,7 +11,7 @@ from gvpipe.arrays import Float64
 from gvpipe.errors import CorruptFile
 from gvpipe.trajectory import reconstruction
 from gvpipe.trajectory.basis import Basis
-from gvpipe.trajectory.product_kernels import TILE
+from gvpipe.trajectory.product_kernels import MANY_FRAMES, TILE
 from gvpipe.trajectory.reconstruction import Segment, read_frames
 
 BOUNDS = [0, 10, 13]
@@ -38,12 +38,13 @@ def test_no_position_is_refused_by_its_frame(value: float, large: int, monkeypat
 
 
 @pytest.mark.parametrize("n_components", [0, 1, 4, 7])
-def test_sums_run_first_to_last_whatever_the_number_of_vertices(n_components: int) -> None:
+@pytest.mark.parametrize("n_frames", [1, MANY_FRAMES - 1, MANY_FRAMES])
+def test_sums_run_first_to_last_whatever_the_number_of_vertices(n_frames: int, n_components: int) -> None:
     rng = np.random.default_rng(5)
-    basis = Basis(rng.normal(size=6), rng.normal(size=(6, n_components)))
+    basis = Basis(rng.normal(size=3 * n_frames), rng.normal(size=(3 * n_frames, n_components)))
     segment, points = Segment(basis, rng.normal(size=(90, n_components))), rng.integers(0, 90, 2 * TILE + 7)
-    expected = _positions(segment, 2).astype(np.float32)[:, points]
-    assert np.array_equal(read_frames(0, 2, [0, 2], points, lambda _: segment), expected)
+    expected = _positions(segment, n_frames).astype(np.float32)[:, points]
+    assert np.array_equal(read_frames(0, n_frames, [0, n_frames], points, lambda _: segment), expected)
 
 
 def _positions(segment: Segment, n_frames: int) -> Float64:

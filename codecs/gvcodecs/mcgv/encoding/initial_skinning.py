@@ -23,7 +23,7 @@ def fit_skinning(job: Job, start: Start, target_error: float, before: Fitted | N
         return kept[key]
     job.report("segment", 0)
     motions = motions_of(job, start)
-    needs_charts = start.placement == "tiles" and not job.may_be_without_pictures
+    needs_charts = start.pictures and start.placement == "tiles" and not job.may_be_without_pictures
     with ThreadPoolExecutor(1) as pool:  # charts beside the blend, whose loops hold no lock
         charts = pool.submit(charts_of, job, start) if needs_charts else None
         found = fit_blend(motions, start.step, job.settings.clusters, target_error / math.sqrt(start.moving_part), before)

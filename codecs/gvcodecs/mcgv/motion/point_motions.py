@@ -151,6 +151,9 @@ def find_motions(sequence: MeshSequence, base: Float64, neighbours: sparse.csr_a
     return Motions(_displacements(sequence.sample(FRAMES), base), base, neighbours, sequence.n_frames)
 
 
+WARNINGS = Lock()  # what is ignored is a matter of the whole process
+
+
 class Clustering:
     """K-means of the points' motions for any number of clusters: the first K of one sequence of seeds start it."""
 
@@ -170,7 +173,7 @@ class Clustering:
         clusters = np.zeros((len(self._features), INFLUENCES), np.int32)
         parts = np.zeros((len(self._features), INFLUENCES), np.int32)
         parts[:, 0] = TOTAL
-        with warnings.catch_warnings():
+        with WARNINGS, warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a cluster may run empty: it is dropped
             centres, _ = kmeans2(self._sample, seeds, iter=K_MEANS_ROUNDS, minit="matrix")
         clusters[:, 0] = vq(self._features, centres)[0]

@@ -49,8 +49,8 @@ CLOSE = 0.18  # logarithm of the error left over that
 SLOPE = 0.75  # of its logarithm over the step's
 MOST_MOVED = 3.0  # times, the step at once
 PROMISING = 1.2  # times the cost of the best, up to which another blend goes on
-PATIENCE = 1  # numbers of clusters that may gain less over smaller ones, in a row
-LEAST_GAIN = 0.015  # of the cost: what a number of clusters must gain, or the next one does worse
+PATIENCE = 1  # numbers of clusters, in a row, that gain too little over smaller ones: then the search ends
+LEAST_GAIN = 0.015  # of the cost: where a number of clusters gains less, the next one does worse
 PATCH = 2  # order of the neighbourhood that an added cluster starts with
 
 
@@ -103,14 +103,14 @@ def _find_number(problem: Problem, motions: Motions, starts: list[Fitted]) -> li
     most, most_clustered = min(MOST, len(problem.base) / LEAST_POINTS), MOST_DISTANCES / len(problem.base)
     half = starts[0].n_clusters // 2
     count = float(max(FEWEST, half if half <= most_clustered else starts[0].n_clusters))  # to grow to fewer changes nothing
-    worse = 0
-    while count <= most and problem.cluster_price * count < min(least) and worse < PATIENCE:
+    idle = 0
+    while count <= most and problem.cluster_price * count < min(least) and idle < PATIENCE:
         begun = [_grow(last, round(count), patches, draw)]
         if count <= most_clustered:
             begun.append(motions.start(round(count)))
         tried = _try_all(problem, begun, TRIAL_PASSES)
         costs = [trial.cost for trial in tried]
-        worse = 0 if min(costs) < (1 - LEAST_GAIN) * min(least) else worse + 1
+        idle = 0 if min(costs) < (1 - LEAST_GAIN) * min(least) else idle + 1
         for kind, cost in enumerate(costs):
             if cost < least[kind]:
                 best[kind], least[kind] = tried[kind], cost
