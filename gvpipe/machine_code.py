@@ -48,7 +48,7 @@ from numba.misc.appdirs import AppDirs
 
 from gvpipe import borrowing
 
-FORMAT = 2  # of the files
+FORMAT = 1  # of the files
 COMPILER = hashlib.sha256(Path(borrowing.__file__).read_bytes()).hexdigest()
 INSTALLED = Path(__file__).with_name("kernels")
 SUFFIX = ".nbc"

@@ -41,11 +41,8 @@ def read_frames(start: int, stop: int, bounds: list[int], points: Integers, deco
 
     result, vertices = np.empty((stop - start, len(points), 3), np.float32), np.asarray(points, np.int64)
     for s, first, last in segments_between(start, stop, bounds):
-        segment, own, frames = (
-            decode(s),
-            slice(3 * (first - bounds[s]), 3 * (last - bounds[s])),
-            result[first - start : last - start],
-        )
+        segment, frames = decode(s), result[first - start : last - start]
+        own = slice(3 * (first - bounds[s]), 3 * (last - bounds[s]))
         rows = np.ascontiguousarray(segment.basis.vectors[own]), np.ascontiguousarray(segment.basis.mean[own])
 
         def rebuild(
@@ -54,8 +51,7 @@ def read_frames(start: int, stop: int, bounds: list[int], points: Integers, deco
             """Fill some vertices; return the first frame that is not finite, or the one after them."""
             return rebuild_vertices(rows, segment.coefficients, vertices, MAX_FLOAT32, frames, part.start, part.stop)
 
-        parts = halves(len(vertices), 0 if (last - first) * len(vertices) >= LARGE else len(vertices) + 1)
-        done = min(run_ahead(rebuild, parts))
+        done = min(run_ahead(rebuild, halves(len(vertices), -(-LARGE // len(frames)))))
         if done < last - first:
             raise corrupt(f"frame {first + done} does not decode to finite positions")
     return result
