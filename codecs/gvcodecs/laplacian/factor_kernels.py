@@ -14,8 +14,10 @@ import numpy as np
 from gvcodecs.laplacian.operator_kernels import Lower
 from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.compiled import compiled
+from gvpipe.lanes import LANES, load, same, store
 
 NONE = -1
+AT_ONCE = 64  # columns
 
 
 class Factors(NamedTuple):
@@ -33,71 +35,49 @@ class Factors(NamedTuple):
 
 
 @compiled
-def factor_pattern(starts: Int64, rows: Int32, n_entries: int) -> tuple[Int64, Int32]:
-    """Bounds of columns ``(n + 1,)``, and rows, of the factor of a matrix.
-
-    Args:
-        starts, rows: columns of the matrix, entries below the diagonal alone.
-        n_entries: of the factor, below the diagonal, at most.
-    """
-    n = len(starts) - 1
-    bounds, found = np.zeros(n + 1, np.int64), np.empty(n_entries, np.int32)
-    child, sibling = np.full(n, NONE, np.int64), np.full(n, NONE, np.int64)  # columns whose first row is a column
-    mark = np.full(n, NONE, np.int64)
-    end = 0
-    for j in range(n):
-        first = end
-        mark[j] = j
-        for k in range(starts[j], starts[j + 1]):
-            mark[rows[k]] = j
-            found[end] = rows[k]
-            end += 1
-        c = child[j]
-        while c != NONE:
-            for k in range(bounds[c] + 1, bounds[c + 1]):
-                if mark[found[k]] != j:
-                    mark[found[k]] = j
-                    found[end] = found[k]
-                    end += 1
-            c = sibling[c]
-        found[first:end].sort()
-        if end > first:
-            sibling[j] = child[found[first]]
-            child[found[first]] = j
-        bounds[j + 1] = end
-    return bounds, found[:end]
-
-
-@compiled
 def factorise(matrix: Lower, bounds: Int64, found: Int32) -> tuple[Factors, int]:
     """The factors of a matrix, and the first column whose pivot is not positive; -1 if there is none.
 
     Args:
-        bounds, found: as `factor_pattern` gives them.
+        bounds, found: as `gvpipe.mesh.elimination_kernels.factor_pattern` gives them.
     """
-    n = len(matrix.diagonal)
-    result, pivots = np.empty(len(found)), np.empty(n)
+    factors = Factors(bounds, found, np.empty(len(found)), np.empty(len(matrix.diagonal)))
+    return factors, _fill_factors(matrix, factors)
+
+
+@compiled
+def _fill_factors(matrix: Lower, factors: Factors) -> int:
+    """Fill values and pivots; return the column as `factorise` does.
+
+    A column takes in its chain of columns, one after the other. Neighbours in the chain that have the same rows are taken at
+    once, `AT_ONCE` at most: every sum keeps its order.
+    """
+    bounds, found, result, pivots = factors
+    n = len(pivots)
     column = np.zeros(n)
     waiting, following = np.full(n, NONE, np.int64), np.full(n, NONE, np.int64)  # columns whose next row is a column
     upcoming = np.zeros(n, np.int64)  # entry of each column's next row
+    kinds, firsts, scales, taken = _find_kinds(bounds, found), np.zeros(AT_ONCE, np.int64), np.zeros(AT_ONCE), np.zeros(n)
     for j in range(n):
         for k in range(matrix.starts[j], matrix.starts[j + 1]):
             column[matrix.rows[k]] = matrix.values[k]
         pivot = matrix.diagonal[j]
         c = waiting[j]
         while c != NONE:
-            first, end, after = upcoming[c], bounds[c + 1], following[c]
-            scaled = result[first] * pivots[c]
-            pivot -= result[first] * scaled
-            for k in range(first + 1, end):
-                column[found[k]] -= result[k] * scaled
-            if first + 1 < end:
-                upcoming[c] = first + 1
-                following[c] = waiting[found[first + 1]]
-                waiting[found[first + 1]] = c
-            c = after
+            kind, count, n_rows = kinds[c], 0, bounds[c + 1] - upcoming[c] - 1
+            while c != NONE and kinds[c] == kind and count < AT_ONCE:
+                first, after = upcoming[c], following[c]
+                firsts[count], scales[count] = first + 1, result[first] * pivots[c]
+                pivot -= result[first] * scales[count]
+                count += 1
+                if n_rows:
+                    upcoming[c] = first + 1
+                    following[c] = waiting[found[first + 1]]
+                    waiting[found[first + 1]] = c
+                c = after
+            _subtract(result, found, firsts, scales, count, n_rows, taken, column)
         if not pivot > 0:
-            return Factors(bounds, found, result, pivots), j
+            return j
         pivots[j] = pivot
         for k in range(bounds[j], bounds[j + 1]):
             result[k] = column[found[k]] / pivot
@@ -106,7 +86,46 @@ def factorise(matrix: Lower, bounds: Int64, found: Int32) -> tuple[Factors, int]
             upcoming[j] = bounds[j]
             following[j] = waiting[found[bounds[j]]]
             waiting[found[bounds[j]]] = j
-    return Factors(bounds, found, result, pivots), NONE
+    return NONE
+
+
+@compiled
+def _find_kinds(bounds: Int64, found: Int32) -> Int64:
+    """A number for each column ``(n,)``: from any row on that two of one number share, all their rows are the same."""
+    n = len(bounds) - 1
+    kinds = np.empty(n, np.int64)
+    for j in range(n - 1, -1, -1):
+        kinds[j] = j
+        if bounds[j] < bounds[j + 1]:
+            parent = found[bounds[j]]  # has all rows of j below it
+            if bounds[j + 1] - bounds[j] == bounds[parent + 1] - bounds[parent] + 1:
+                kinds[j] = kinds[parent]
+    return kinds
+
+
+@compiled
+def _subtract(
+    values: Float64, rows: Int32, columns: Int64, scales: Float64, count: int, n_rows: int, taken: Float64, column: Float64
+) -> None:
+    """Take ``count`` columns, scaled, from a column; they have the same ``n_rows`` rows, which ``taken`` has room for."""
+    first = columns[0]
+    for k in range(n_rows):
+        taken[k] = column[rows[first + k]]
+    i = 0
+    while i + 4 <= count:
+        at_0, at_1, at_2, at_3 = columns[i], columns[i + 1], columns[i + 2], columns[i + 3]
+        by_0, by_1, by_2, by_3 = scales[i], scales[i + 1], scales[i + 2], scales[i + 3]
+        for k in range(n_rows):
+            left = (taken[k] - values[at_0 + k] * by_0) - values[at_1 + k] * by_1
+            taken[k] = (left - values[at_2 + k] * by_2) - values[at_3 + k] * by_3
+        i += 4
+    while i < count:
+        at, by = columns[i], scales[i]
+        for k in range(n_rows):
+            taken[k] -= values[at + k] * by
+        i += 1
+    for k in range(n_rows):
+        column[rows[first + k]] = taken[k]
 
 
 @compiled
@@ -116,31 +135,36 @@ def solve_columns(factors: Factors, order: Int32, right: Float64, solved: Float6
     Args:
         order: ``(n,)`` the unknown of each row of the factors.
     """
-    part = np.empty((len(order), end - first))
+    if not len(factors.values):  # each unknown has an equation of its own
+        for i in range(len(order)):
+            for c in range(first, end):
+                solved[order[i], c] = right[order[i], c] / factors.pivots[i]
+        return
+    width = (end - first + LANES - 1) // LANES * LANES
+    part = np.zeros(len(order) * width)
     for i in range(len(order)):
         for c in range(end - first):
-            part[i, c] = right[order[i], first + c]
-    solve_in_place(factors, part)
+            part[i * width + c] = right[order[i], first + c]
+    _solve_rows(factors, part, width)
     for i in range(len(order)):
         for c in range(end - first):
-            solved[order[i], first + c] = part[i, c]
+            solved[order[i], first + c] = part[i * width + c]
 
 
 @compiled
-def solve_in_place(factors: Factors, right: Float64) -> None:
-    """Turn right-hand sides ``(n, m)`` into solutions."""
-    n = len(right)
+def _solve_rows(factors: Factors, right: Float64, width: int) -> None:
+    """Turn right-hand sides ``(n width,)``, a row of ``width`` for each row of the factors, into solutions."""
+    starts, rows, values, pivots = factors
+    n = len(pivots)
     for j in range(n):
-        own = right[j]
-        for k in range(factors.starts[j], factors.starts[j + 1]):
-            value, other = factors.values[k], right[factors.rows[k]]
-            for c in range(len(own)):
-                other[c] -= value * own[c]
+        for c in range(0, width, LANES):
+            own = load(right, j * width + c)
+            for k in range(starts[j], starts[j + 1]):
+                other = rows[k] * width + c
+                store(right, other, load(right, other) - same(values[k]) * own)
     for j in range(n - 1, -1, -1):
-        own = right[j]
-        for c in range(len(own)):
-            own[c] /= factors.pivots[j]
-        for k in range(factors.starts[j], factors.starts[j + 1]):
-            value, other = factors.values[k], right[factors.rows[k]]
-            for c in range(len(own)):
-                own[c] -= value * other[c]
+        for c in range(0, width, LANES):
+            own = load(right, j * width + c) / same(pivots[j])
+            for k in range(starts[j], starts[j + 1]):
+                own = own - same(values[k]) * load(right, rows[k] * width + c)
+            store(right, j * width + c, own)

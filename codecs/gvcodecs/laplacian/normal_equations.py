@@ -1,9 +1,9 @@
 """Least squares with a sparse operator: the normal equations, factored as L D L^T.
 
-The order of elimination follows from the triangles in integers (`elimination_kernels`), and with it the size of the factor. On
-surfaces it grows as P log P entries, and the work as P sqrt(P): 70 entries and 4200 products a point for 10,000 points, 130 and
-22,000 for 100,000. On triangles that connect points at random it grows as P^2 and P^3. So work is counted before it begins: it
-has a limit, and a file's budget has to have room for it.
+The order of elimination follows from the triangles in integers (`gvpipe.mesh.elimination_kernels`), and with it the size of the
+factor. On surfaces it grows as P log P entries, and the work as P sqrt(P): 70 entries and 4200 products a point for 10,000
+points, 130 and 22,000 for 100,000. On triangles that connect points at random it grows as P^2 and P^3. So work is counted
+before it begins: it has a limit, and a file's budget has to have room for it.
 
 Factors are plain arrays, sums run in one order (`factor_kernels`): the solution has the same bits on every machine.
 """
@@ -27,7 +27,6 @@ COLUMNS = 32  # solved at once: more do not fit the cache
 FREE_PRODUCTS = 1 << 27  # that any system may take
 STEPS = 3 << 26  # of an encoder's search for an order: a second, of the two that any file may take
 PRODUCTS = 512  # that P points may take beside, times P sqrt(P): 7 times what a square grid of 100,000 points needs
-FEW_COLUMNS = 4  # where each unknown has an equation of its own: their copies take memory, and gain nothing
 NO_LIMIT = 1 << 62
 BYTES_PER_PAIR, SECONDS_PER_PAIR = 20, 15e-9  # of points that a row couples
 BYTES_PER_ENTRY, SECONDS_PER_ENTRY = 12, 20e-9  # of a factor
@@ -85,8 +84,9 @@ class NormalEquations:
     """
 
     def __init__(self, operator: Rows, held: Float64, budget: Budget = UNLIMITED) -> None:
-        from gvcodecs.laplacian.factor_kernels import factor_pattern, factorise
+        from gvcodecs.laplacian.factor_kernels import factorise
         from gvcodecs.laplacian.operator_kernels import normal_matrix, transpose
+        from gvpipe.mesh.elimination_kernels import factor_pattern
 
         self._rows, self._budget = operator, budget
         n_pairs, what = int(np.square(np.diff(operator.starts)).sum()), f"factoring over {len(held)} points"
@@ -133,16 +133,15 @@ class NormalEquations:
         from gvcodecs.laplacian.factor_kernels import solve_columns
 
         n_columns = right.shape[1]
-        at_once = COLUMNS if self.fill.entries else FEW_COLUMNS
-        for first in range(0, n_columns, at_once):
-            solve_columns(self._factors, self._order, right, right, first, min(first + at_once, n_columns))
+        for first in range(0, n_columns, COLUMNS):
+            solve_columns(self._factors, self._order, right, right, first, min(first + COLUMNS, n_columns))
         return right
 
 
 def _eliminate(rows: Rows, transposed: Rows, limit: int, most_steps: int) -> tuple[Int32, Int32, Fill]:
     """Order of elimination ``(P,)``, the normal matrix' columns beside its diagonal, and the factor's cost."""
-    from gvcodecs.laplacian.elimination_kernels import order_unknowns
     from gvcodecs.laplacian.operator_kernels import normal_pattern
+    from gvpipe.mesh.elimination_kernels import order_unknowns
 
     starts: Int64
     starts, columns = normal_pattern(rows, transposed)

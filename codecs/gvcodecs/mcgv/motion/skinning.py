@@ -24,8 +24,6 @@ from scipy import sparse
 from gvpipe.arrays import Float64, Int32, Int64
 
 if TYPE_CHECKING:
-    from scipy.sparse.linalg import SuperLU
-
     from gvpipe.trajectory.product_kernels import Rows
 
 INFLUENCES = 4  # most clusters that a point follows
@@ -74,18 +72,24 @@ class Blend:
 
         self.n_clusters, self.weights = n_clusters, weights
         self.homogeneous = homogeneous(base)
-        self._inverse = _whiten(find_energies(self.homogeneous, *self._parts, n_clusters))  # (K, 4, 4)
+        self.inverse = _whiten(find_energies(self.homogeneous, *self._parts, n_clusters))  # (K, 4, 4)
 
     def rows(self) -> Rows:
         """B in coordinates of equal weight, ``(P, 4K)``, as kernels take it."""
         from gvcodecs.mcgv.motion.blend_kernels import blend_rows
 
-        return blend_rows(self.homogeneous, *self._parts, self._inverse)
+        return blend_rows(self.homogeneous, *self._parts, self.inverse)
 
     @property
     def _parts(self) -> tuple[Int32, Float64]:
         """Clusters and weights of the points, ``(P, 4)``, as kernels take them."""
         return self.weights.clusters, self.weights.weights / TOTAL
+
+    def normal_equations(self, motions: Float64) -> NormalEquations:
+        """Those of the transforms that carry displacements ``(P, m)``, model units."""
+        from gvcodecs.mcgv.motion.skinning_fit_kernels import normal_equations
+
+        return normal_equations(*self._parts, self.homogeneous, motions, self.n_clusters)
 
     def matrix(self) -> sparse.csr_array:
         """B in coordinates of equal weight: ``(P, 4K)``."""
@@ -95,7 +99,7 @@ class Blend:
     def transforms(self, rows: Float64) -> Float64:
         """``(K, 4, m)`` transforms in model units for ``rows (4K, m)`` of equal weight."""
         blocks = rows.reshape(self.n_clusters, 4, -1)
-        return np.asarray(sum(self._inverse[:, i, :, None] * blocks[:, i, None] for i in range(4)))
+        return np.asarray(sum(self.inverse[:, i, :, None] * blocks[:, i, None] for i in range(4)))
 
 
 class BlendFit:
@@ -103,31 +107,54 @@ class BlendFit:
 
     def __init__(self, blend: Blend) -> None:
         self.matrix = blend.matrix()
-        self._factor = _factorise(self.matrix.T @ self.matrix)
+        self._system = ClusterSystem(blend.normal_equations(np.zeros((self.matrix.shape[0], 0))), blend.inverse)
 
     def fit(self, motions: Float64) -> Float64:
         """``(4K, m)`` rows of equal weight that carry displacements ``(P, m)`` best."""
-        return np.asarray(self._factor.solve(self.matrix.T @ motions))
+        return self._system.solve(self.matrix.T @ motions)
+
+
+class ClusterSystem:
+    """The factored normal equations of all clusters; sparse, since few clusters share points.
+
+    Args:
+        normal: the equations.
+        inverse: ``(K, 4, 4)`` from equal weight to model units.
+    """
+
+    def __init__(self, normal: NormalEquations, inverse: Float64) -> None:
+        from gvcodecs.mcgv.motion.cluster_system_kernels import factorise_blocks, lower_blocks, new_factor
+        from gvpipe.mesh.elimination_kernels import factor_pattern, order_unknowns
+
+        starts = np.searchsorted(normal.rows, np.arange(len(inverse) + 1))
+        most = len(inverse) ** 4  # no order takes as many products, or steps
+        self._order, n_blocks, *_ = order_unknowns(starts, normal.columns.astype(np.int32), most, most)
+        matrix = lower_blocks(normal, inverse, np.argsort(self._order), RIDGE)
+        self._factor = new_factor(*factor_pattern(matrix.starts, matrix.rows, n_blocks))
+        factorise_blocks(matrix, self._factor)
+
+    def solve(self, right: Float64) -> Float64:
+        """Solutions ``(4K, m)`` for right-hand sides ``(4K, m)``, both of equal weight."""
+        from gvcodecs.mcgv.motion.cluster_system_kernels import solve_blocks
+
+        n, m = len(self._order), right.shape[1]
+        rows = np.zeros((n, 4, -(-m // 4) * 4))
+        rows[..., :m] = right.reshape(n, 4, m)[self._order]
+        for first in range(0, m, 4):
+            part = rows[..., first : first + 4].ravel()
+            solve_blocks(self._factor, part)
+            rows[..., first : first + 4] = part.reshape(n, 4, 4)
+        result = np.empty((n, 4, m))
+        result[self._order] = rows[..., :m]
+        return result.reshape(4 * n, m)
 
 
 def solve_normal(normal: NormalEquations) -> Float64:
     """Transforms ``(K, 4, m)`` that solve the normal equations, as `BlendFit` would."""
     n = len(normal.right)
-    is_diagonal = normal.rows == normal.columns  # pairs are sorted
-    inverse = _whiten(normal.blocks[is_diagonal])
-    white = inverse[normal.rows] @ normal.blocks @ inverse[normal.columns].swapaxes(1, 2)
-    starts = np.searchsorted(normal.rows, np.arange(n + 1))
-    factor = _factorise(sparse.bsr_array((white, normal.columns, starts), shape=(4 * n, 4 * n)))
-    rows = factor.solve((inverse @ normal.right).reshape(4 * n, -1))
+    inverse = _whiten(normal.blocks[normal.rows == normal.columns])  # pairs are sorted
+    rows = ClusterSystem(normal, inverse).solve((inverse @ normal.right).reshape(4 * n, -1))
     return np.ascontiguousarray(inverse.swapaxes(1, 2) @ rows.reshape(n, 4, -1))
-
-
-def _factorise(white: sparse.csr_array | sparse.bsr_array) -> SuperLU:
-    """Factor a normal matrix of rows of equal weight: sparse, since few clusters share points."""
-    from scipy.sparse.linalg import splu
-
-    damped = sparse.csc_array(white) + RIDGE * sparse.eye_array(white.shape[0], format="csc")
-    return splu(damped, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def _whiten(energies: Float64) -> Float64:

@@ -97,6 +97,42 @@ def order_unknowns(starts: Int64, columns: Int32, most_products: int, most_steps
 
 
 @compiled
+def factor_pattern(starts: Int64, rows: Int32, n_entries: int) -> tuple[Int64, Int32]:
+    """Bounds of columns ``(n + 1,)``, and rows, of the factor of a matrix.
+
+    Args:
+        starts, rows: columns of the matrix, entries below the diagonal alone.
+        n_entries: of the factor, below the diagonal, at most.
+    """
+    n = len(starts) - 1
+    bounds, found = np.zeros(n + 1, np.int64), np.empty(n_entries, np.int32)
+    child, sibling = np.full(n, NONE, np.int64), np.full(n, NONE, np.int64)  # columns whose first row is a column
+    mark = np.full(n, NONE, np.int64)
+    end = 0
+    for j in range(n):
+        first = end
+        mark[j] = j
+        for k in range(starts[j], starts[j + 1]):
+            mark[rows[k]] = j
+            found[end] = rows[k]
+            end += 1
+        c = child[j]
+        while c != NONE:
+            for k in range(bounds[c] + 1, bounds[c + 1]):
+                if mark[found[k]] != j:
+                    mark[found[k]] = j
+                    found[end] = found[k]
+                    end += 1
+            c = sibling[c]
+        found[first:end].sort()
+        if end > first:
+            sibling[j] = child[found[first]]
+            child[found[first]] = j
+        bounds[j + 1] = end
+    return bounds, found[:end]
+
+
+@compiled
 def _open_graph(starts: Int64, columns: Int32) -> tuple[QuotientGraph, Int32, int]:
     """The graph before the first elimination, the lists, and their end."""
     n = len(starts) - 1
