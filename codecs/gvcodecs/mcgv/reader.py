@@ -23,7 +23,7 @@ from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.tiles import place_charts
 from gvcodecs.mcgv.motion.affine import AffineMotion
 from gvcodecs.mcgv.motion.blended import BYTES_PER_POINT, BlendedMotion, decode_transforms, read_blend
-from gvcodecs.mcgv.motion.contract import Motion, Samples
+from gvcodecs.mcgv.motion.contract import Fill, Motion, Samples
 from gvcodecs.mcgv.motion.skinning_coding import Trajectories
 from gvcodecs.mcgv.pictures.no_pictures import NoPictures
 from gvcodecs.mcgv.pictures.outliers import SECTION
@@ -148,10 +148,10 @@ class McgvReader:
         del begun  # it keeps the first pictures
         filling: Iterator[None] = iter(())
         while some := list(islice(frames, TOGETHER)):
-            fills = [partial(motion.rebuild(frame, plane), result[frame - start]) for frame, plane in some]
+            first = some[0][0]
+            fills = motion.rebuild(first, [picture for _, picture in some])
             deque(filling, maxlen=0)  # the frames before these
-            parts = [part for k in range(AHEAD) if (part := fills[k::AHEAD])]
-            filling = run_ahead(_call_all, parts, ahead)  # a thread gets all of its frames at once
+            filling = run_ahead(partial(_fill, result[first - start :][: len(some)]), fills, ahead)
             if not overlaps:
                 deque(filling, maxlen=0)
         deque(filling, maxlen=0)
@@ -177,9 +177,8 @@ def _frames(groups: Iterable[tuple[int, list[Plane]]]) -> Iterator[tuple[int, Pl
         yield from enumerate(planes, first)
 
 
-def _call_all(functions: Iterable[Callable[[], None]]) -> None:
-    for function in functions:
-        function()
+def _fill(positions: Float32, fill: Fill) -> None:
+    fill(positions)
 
 
 def _open_video(bitstream: Bitstream, header: Header, bounds: list[int]) -> VideoReader | NoPictures:

@@ -55,7 +55,7 @@ class DecodedBase(Slots):
 
     Args:
         faces: ``(T, 3)`` triangles over V vertices.
-        rest: ``(V, 3)`` decoded base positions, model units.
+        rest: ``(V, 3)`` decoded base positions, model units; empty where all vertices move.
         vertices: ``(M,)`` the vertices that move, ascending.
         slot: ``(M,)`` theirs.
     """
@@ -97,7 +97,7 @@ def open_surface(bitstream: Bitstream, header: Header) -> Iterator[tuple[Slots, 
         base = read_base(bitstream)
         points, point, members = weld_vertices(base.points, base.faces, base.visits)
         own, placed = np.arange(len(base.points)), _place(base.points, header)
-        order, rest = np.argsort(base.visits), placed.astype(np.float32)
+        order, rest = np.argsort(base.visits), np.zeros((0, 3), np.float32)
         surface = DecodedBase(base.points, placed, point, members, points, order, base.faces, rest, own, own)
         yield surface, lambda: surface
         return
@@ -108,20 +108,18 @@ def open_surface(bitstream: Bitstream, header: Header) -> Iterator[tuple[Slots, 
         moves = np.flatnonzero(~still)
         if not len(moves):
             raise CorruptFile("section 'still' is corrupt: one point at least has samples; get the file again from its source")
-        placed, own = _place(opened.lattice, header), np.arange(len(moves))
-        slots = Slots(
-            opened.lattice.take(moves, axis=0), placed.take(moves, axis=0), own, own, Points.moving(opened, moves), own
-        )
+        placed, own, all_move = _place(opened.lattice, header), np.arange(len(moves)), len(moves) == n_points
+        lattice = opened.lattice if all_move else opened.lattice.take(moves, axis=0)
+        slot_base = placed if all_move else placed.take(moves, axis=0)
+        slots = Slots(lattice, slot_base, own, own, Points.moving(opened, moves), own)
 
         def finish() -> DecodedBase:
             mesh = finished()
-            vertices = np.flatnonzero(~still[mesh.point])
-            return DecodedBase(
-                **vars(slots),
-                faces=mesh.faces,
-                rest=placed.astype(np.float32)[mesh.point],
-                vertices=vertices,
-                slot=(np.cumsum(~still) - 1)[mesh.point[vertices]],
-            )
+            if all_move:
+                vertices, slot, rest = np.arange(len(mesh.point)), mesh.point, np.zeros((0, 3), np.float32)
+            else:
+                vertices, rest = np.flatnonzero(~still[mesh.point]), placed.astype(np.float32)[mesh.point]
+                slot = (np.cumsum(~still) - 1)[mesh.point[vertices]]
+            return DecodedBase(**vars(slots), faces=mesh.faces, rest=rest, vertices=vertices, slot=slot)
 
         yield slots, finish

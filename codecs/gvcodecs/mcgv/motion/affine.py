@@ -5,7 +5,7 @@ Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.2. Eve
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from functools import partial
 from itertools import pairwise
 
@@ -17,8 +17,8 @@ from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.motion.affine_coding import decode_transforms, dequantise, encode_transforms, quantise
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
-from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
-from gvpipe.arrays import Array, Float32, Float64, Int32
+from gvcodecs.mcgv.motion.contract import CodedMotion, Fill, Samples, locate, shared_out
+from gvpipe.arrays import Array, Float64, Int32
 from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
 
@@ -73,8 +73,11 @@ class AffineMotion:
         self._residuals = header.residual_step * header.profile.offsets
         self._segment: tuple[int, Float64] = (-1, np.zeros((0, 0, 4, 3)))
 
-    def rebuild(self, frame: int, samples: Array) -> Callable[[Float32], None]:
+    def rebuild(self, first: int, pictures: Sequence[Array]) -> list[Fill]:
         """As `Motion.rebuild`."""
+        return shared_out([self._rebuild_one(frame, samples) for frame, samples in enumerate(pictures, first)])
+
+    def _rebuild_one(self, frame: int, samples: Array) -> Fill:
         from gvcodecs.mcgv.motion.reconstruction_kernels import AffinePoints, Sites, rebuild
 
         s = locate(self._bounds, frame)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ from gvcodecs.mcgv.base.surface import Slots
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.motion.blend_problem import Fitted
-from gvcodecs.mcgv.motion.contract import CodedMotion, Samples, locate
+from gvcodecs.mcgv.motion.contract import CodedMotion, Fill, Samples, locate, shared_out
 from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import Trajectories, decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
@@ -27,6 +28,7 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.trajectory.sparse_rows import as_rows
 
 if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
+    from gvcodecs.mcgv.motion.reconstruction_kernels import SkinnedPoints
     from gvpipe.trajectory.product_kernels import Rows
 
 BYTES_PER_POINT, SECONDS_PER_POINT = 400, 1e-6
@@ -141,30 +143,25 @@ class BlendedMotion:
         bounds: list[int],
         first: Trajectories | None = None,
     ) -> None:
-        from gvcodecs.mcgv.motion.reconstruction_kernels import SkinnedPoints, skinned_points
-
         self._bitstream, self._header, self._bounds = bitstream, header, bounds
         self._blend = blend
-        self._samples, surface = samples, samples.surface
+        self._samples = samples
         self._spans = halves(len(samples.slots), LARGE)
-
-        def prepare(span: slice) -> SkinnedPoints:
-            return skinned_points(samples.slots[span], surface.base, surface.point, blend.homogeneous, blend.weights)
-
-        self._points = [*run_ahead(prepare, self._spans)]
         self._residuals = header.residual_step * header.profile.offsets
         self._segment: tuple[int, Trajectories | None] = (0, first)
         self._chunk: tuple[int, int, Float64] = (-1, -1, np.zeros((0, 0, 4, 3)))
 
-    def rebuild(self, frame: int, samples: Array) -> Callable[[Float32], None]:
+    def rebuild(self, first: int, pictures: Sequence[Array]) -> list[Fill]:
         """As `Motion.rebuild`."""
-        from gvcodecs.mcgv.motion.reconstruction_kernels import Sites, in_rows, rebuild_blended
+        transforms = [self._transforms_of(frame) for frame in range(first, first + len(pictures))]
+        if self._header.pictures:
+            return shared_out([*map(self._rebuild_one, transforms, pictures)])
+        return [partial(self._rebuild_all, span, np.stack(transforms)) for span in self._spans]
 
-        s = locate(self._bounds, frame)
-        chunk, offset = divmod(frame - self._bounds[s], CHUNK)
-        if self._chunk[:2] != (s, chunk):
-            self._chunk = (s, chunk, self._transforms(s, chunk))
-        transforms = in_rows(self._chunk[2][offset])
+    def _rebuild_one(self, transforms: Float64, samples: Array) -> Fill:
+        """What fills a frame, given its transforms and its picture."""
+        from gvcodecs.mcgv.motion.reconstruction_kernels import Sites, rebuild_blended
+
         planes, vertices, pixels = samples.reshape(3, -1), self._samples.vertices, self._samples.pixels(samples.shape[1])
 
         def fill(positions: Float32) -> None:
@@ -173,6 +170,37 @@ class BlendedMotion:
                 rebuild_blended(planes, sites, points, transforms, positions)
 
         return fill
+
+    def _rebuild_all(self, span: slice, transforms: Float64, positions: Float32) -> None:
+        """Fill the vertices of a span in n frames ``(n, V, 3)`` without pictures, given transforms ``(n, 16K)``."""
+        from gvcodecs.mcgv.motion.reconstruction_kernels import rebuild_without_pictures
+
+        samples, blend = self._samples, self._blend
+        places = samples.vertices[span], samples.slots[span], samples.surface.base, samples.surface.point
+        rebuild_without_pictures(*places, blend.homogeneous, blend.weights, transforms, positions)
+
+    @cached_property
+    def _points(self) -> list[SkinnedPoints]:
+        """What each span needs for frames with pictures."""
+        from gvcodecs.mcgv.motion.reconstruction_kernels import skinned_points
+
+        slots, surface, blend = self._samples.slots, self._samples.surface, self._blend
+        return [
+            *run_ahead(
+                lambda span: skinned_points(slots[span], surface.base, surface.point, blend.homogeneous, blend.weights),
+                self._spans,
+            )
+        ]
+
+    def _transforms_of(self, frame: int) -> Float64:
+        """Those of a frame, as `in_rows` lays them out: ``(16K,)``."""
+        from gvcodecs.mcgv.motion.reconstruction_kernels import in_rows
+
+        s = locate(self._bounds, frame)
+        chunk, offset = divmod(frame - self._bounds[s], CHUNK)
+        if self._chunk[:2] != (s, chunk):
+            self._chunk = (s, chunk, self._transforms(s, chunk))
+        return in_rows(self._chunk[2][offset])
 
     def _transforms(self, s: int, chunk: int) -> Float64:
         """``(n, K, 4, 3)`` of a chunk of a segment's frames: always whole, so that sums do not depend on what else is read."""

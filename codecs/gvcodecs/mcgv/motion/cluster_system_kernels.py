@@ -237,9 +237,7 @@ def _store_rows(values: Float64, at: int, row_0: Float64, row_1: Float64, row_2:
 
 
 @inlined
-def _weigh(
-    values: Float64, at: int, step: int, row_0: Float64, row_1: Float64, row_2: Float64, row_3: Float64
-) -> Float64:
+def _weigh(values: Float64, at: int, step: int, row_0: Float64, row_1: Float64, row_2: Float64, row_3: Float64) -> Float64:
     """The sum of four rows, weighted by every ``step``-th number from a place on."""
     first = same_point(values[at]) * row_0 + same_point(values[at + step]) * row_1
     return first + (same_point(values[at + 2 * step]) * row_2 + same_point(values[at + 3 * step]) * row_3)

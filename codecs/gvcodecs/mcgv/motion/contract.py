@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Protocol
 
@@ -12,9 +13,11 @@ import numpy as np
 
 from gvcodecs.mcgv.base.surface import DecodedBase
 from gvcodecs.mcgv.layout.layout import Layout
+from gvpipe.ahead import AHEAD
 from gvpipe.arrays import Array, Float32, Float64, Int64
 from gvpipe.sequence import MeshSequence
 
+Fill = Callable[[Float32], None]
 PREDICTED = 1 << 18  # vertices of all frames that are predicted at once: more are of no use, and take 100 bytes each
 
 
@@ -57,14 +60,24 @@ def predicted_chunks(
 class Motion(Protocol):
     """A prediction as it is decoded; keeps the transforms of the last segment for the next frame."""
 
-    def rebuild(self, frame: int, samples: Array) -> Callable[[Float32], None]:
-        """Return what fills what moves of a frame's ``positions (V, 3)``, on any thread.
+    def rebuild(self, first: int, pictures: Sequence[Array]) -> list[Fill]:
+        """Return what together fills what moves of n frames, each on any thread.
 
         Args:
-            frame: whose transforms are decoded at once; raises `CorruptFile`.
-            samples: ``(3 height, line)`` of its picture.
+            first: the first frame; the transforms of all are decoded at once; raises `CorruptFile`.
+            pictures: n times ``(3 height, line)`` samples, frame after frame.
         """
         ...
+
+
+def shared_out(fills: Sequence[Fill]) -> list[Fill]:
+    """What fills frames ``positions (V, 3)`` one by one, as what fills ``positions (n, V, 3)``, in so many parts as threads."""
+
+    def fill_every(k: int, positions: Float32) -> None:
+        for fill, frame in zip(fills[k::AHEAD], positions[k::AHEAD], strict=True):
+            fill(frame)
+
+    return [partial(fill_every, k) for k in range(min(AHEAD, len(fills)))]
 
 
 class Samples:
@@ -82,16 +95,19 @@ class Samples:
 
     def __init__(self, surface: DecodedBase, layout: Layout) -> None:
         self.surface = surface
-        pixel = layout.pixel[surface.slot]
-        order: Int64 = np.sort(pixel << 32 | np.arange(len(pixel))) & 0xFFFFFFFF  # by pixel, then number; faster than argsort
-        self.vertices, self.slots = surface.vertices[order], surface.slot[order]
-        self._row, self._column = np.divmod(pixel[order], layout.width)
-        self._line, self._pixels = 0, self._row
+        pixel, self._width = layout.pixel[surface.slot], layout.width
+        if layout.width * layout.height > 1:
+            order: Int64 = np.sort(pixel << 32 | np.arange(len(pixel))) & 0xFFFFFFFF  # by pixel, then number, as argsort sorts
+            self.vertices, self.slots, self._pixel = surface.vertices[order], surface.slot[order], pixel[order]
+        else:  # no pictures
+            self.vertices, self.slots, self._pixel = surface.vertices, surface.slot, pixel
+        self._line, self._pixels = 0, self._pixel
 
     def pixels(self, line: int) -> Int64:
         """``(M,)`` where they are in a plane whose lines take ``line`` samples, the plane's width or more."""
         if line != self._line:
-            self._line, self._pixels = line, self._row * line + self._column
+            row, column = np.divmod(self._pixel, self._width)
+            self._line, self._pixels = line, row * line + column
         return self._pixels
 
 

@@ -13,7 +13,9 @@ import numpy as np
 from gvcodecs.mcgv.motion.skinning import TOTAL, Weights
 from gvpipe.arrays import Array, Float32, Float64, Int32, Int64
 from gvpipe.compiled import compiled
-from gvpipe.lanes import COORDINATES, load_point, same_point, store_point
+from gvpipe.lanes import COORDINATES, load_point, prefetch, same_point, store_point
+
+AT_ONCE, SOON = 256, 24  # vertices that are fetched at once, and how far ahead they are asked for
 
 
 class Sites(NamedTuple):
@@ -67,16 +69,37 @@ def skinned_points(slots: Int64, base: Float64, points: Int64, homogeneous: Floa
         homogeneous: ``(P, 4)`` the points' coordinates.
         weights: theirs.
     """
-    n = COORDINATES * len(slots)
-    bases, coordinates, clusters, parts = np.zeros(n), np.empty(n), np.empty(n, np.int32), np.empty(n)
-    for i in range(len(slots)):
-        at, point = COORDINATES * i, points[slots[i]]
+    result = _new_points(len(slots))
+    _fill_points(slots, 0, base, points, homogeneous, weights, result)
+    return result
+
+
+@compiled
+def _new_points(n: int) -> SkinnedPoints:
+    """Memory for n vertices."""
+    size = COORDINATES * n
+    return SkinnedPoints(np.zeros(size), np.empty(size), np.empty(size, np.int32), np.empty(size))
+
+
+@compiled
+def _fill_points(
+    slots: Int64, first: int, base: Float64, points: Int64, homogeneous: Float64, weights: Weights, result: SkinnedPoints
+) -> None:
+    """As `skinned_points`, from a first vertex on, as many as there is memory for, or vertices left."""
+    bases, coordinates, clusters, parts = result
+    for i in range(min(len(bases) // COORDINATES, len(slots) - first)):
+        later = slots[min(first + i + SOON, len(slots) - 1)]
+        prefetch(base, later, 0)
+        prefetch(homogeneous, points[later], 0)
+        prefetch(weights.clusters, points[later], 0)
+        prefetch(weights.weights, points[later], 0)
+        slot = slots[first + i]
+        at, point = COORDINATES * i, points[slot]
         for k in range(3):
-            bases[at + k] = base[slots[i], k]
+            bases[at + k] = base[slot, k]
         for k in range(COORDINATES):
             coordinates[at + k], clusters[at + k] = homogeneous[point, k], weights.clusters[point, k]
             parts[at + k] = weights.weights[point, k] / TOTAL
-    return SkinnedPoints(bases, coordinates, clusters, parts)
 
 
 def in_rows(vectors: Float64) -> Float64:
@@ -104,6 +127,51 @@ def rebuild(samples: Array, sites: Sites, points: AffinePoints, transforms: Floa
         for axis in range(3):
             predicted = x * rows[0, axis] + y * rows[1, axis] + z * rows[2, axis] + rows[3, axis]
             positions[vertex, axis] = predicted + sites.residuals[samples[axis, pixel]]
+
+
+@compiled
+def rebuild_without_pictures(
+    vertices: Int64,
+    slots: Int64,
+    base: Float64,
+    points: Int64,
+    homogeneous: Float64,
+    weights: Weights,
+    transforms: Float64,
+    positions: Float32,
+) -> None:
+    """Fill ``positions (n, V, 3) float32`` of n frames of linear blend skinning that have no residuals.
+
+    Arguments are as in `skinned_points`, and ``transforms (n, 16K)``, each frame's as in `rebuild_blended`, which gives the
+    same bits. What is known of `AT_ONCE` vertices is fetched once for all frames.
+    """
+    fetched = _new_points(AT_ONCE)
+    for first in range(0, len(vertices), AT_ONCE):
+        _fill_points(slots, first, base, points, homogeneous, weights, fetched)
+        _rebuild_some(vertices, first, fetched, transforms, positions)
+
+
+@compiled
+def _rebuild_some(vertices: Int64, first: int, points: SkinnedPoints, transforms: Float64, positions: Float32) -> None:
+    """Fill all frames of the vertices from a first one on whose ``points`` are fetched."""
+    bases, coordinates, clusters, parts = points
+    rows, size = transforms.ravel(), transforms.shape[1]
+    row = np.empty(COORDINATES)
+    for frame in range(len(positions)):
+        for i in range(min(AT_ONCE, len(vertices) - first)):
+            at = COORDINATES * i
+            x, y, z = coordinates[at], coordinates[at + 1], coordinates[at + 2]
+            moved = load_point(bases, at)
+            for j in range(at, at + COORDINATES):
+                if parts[j] == 0.0:  # unused ones are last
+                    break
+                k = size * frame + 4 * COORDINATES * clusters[j]
+                turned = same_point(x) * load_point(rows, k) + same_point(y) * load_point(rows, k + COORDINATES)
+                turned = turned + same_point(z) * load_point(rows, k + 2 * COORDINATES)
+                moved = moved + same_point(parts[j]) * (turned + load_point(rows, k + 3 * COORDINATES))
+            store_point(row, 0, moved)
+            for axis in range(3):
+                positions[frame, vertices[first + i], axis] = row[axis] + 0.0  # -0 becomes 0, as where there are residuals
 
 
 @compiled
