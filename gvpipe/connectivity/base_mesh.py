@@ -18,9 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gvpipe.ahead import beside
 from gvpipe.arrays import Array, Int32
 from gvpipe.budget import Budget
-from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order, places_of
+from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order, neighbour_lists, places_of
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor
 from gvpipe.errors import CorruptFile, InputError, corrupt_section
@@ -90,7 +91,7 @@ def decode_base(mesh: bytes, order: bytes, n_vertices: int = MAX_VERTICES, n_tri
     points, faces = _decode_mesh(mesh, n_vertices, n_triangles)
     visits = np.arange(len(points))
     if order:
-        visits = decode_order(order, points, faces)
+        visits = decode_order(order, neighbour_lists(points, faces))
         points, faces = points[visits], places_of(visits)[faces]
     return BaseMesh(points.astype(np.int32), faces.astype(np.int32), visits)
 
@@ -199,14 +200,15 @@ def _decode_draco(draco: bytes) -> tuple[Array, Array]:
             occurrence = np.asarray(attribute["data"])
     if occurrence.shape != (len(points), 1) or occurrence.dtype.kind not in "iu":
         raise corrupt_section("mesh", "unexpected Draco attributes")
-    keys = np.c_[points, occurrence].astype(np.int64)
-    if faces.size and (faces.min() < 0 or faces.max() >= len(keys)):
-        raise corrupt_section("mesh", "a triangle names a vertex that does not exist")
+    keys = np.empty((len(points), 4), np.int64)
+    keys[:, :3], keys[:, 3:] = points, occurrence
     if keys.size and keys.max() >= 1 << 31:
         raise corrupt_section("mesh", "lattice coordinate out of range")
-
-    if are_distinct(keys):
-        return keys, faces
+    with beside(lambda: are_distinct(keys), len(keys) >= LARGE) as distinct:
+        if faces.size and (faces.min() < 0 or faces.max() >= len(keys)):
+            raise corrupt_section("mesh", "a triangle names a vertex that does not exist")
+        if distinct():
+            return keys, faces
     ids, representatives = row_ids(keys)  # merge what Draco split
     by_appearance = np.argsort(representatives)
     return keys[representatives[by_appearance]], np.argsort(by_appearance)[ids][faces]
@@ -238,8 +240,10 @@ def _decode_mesh(mesh: bytes, n_vertices: int, n_triangles: int) -> tuple[Array,
     draco, loose_points = cursor.take(bytes_draco), cursor.take(bytes_points)
     check_draco_header(draco, n_triangles)
     keys, draco_faces = _decode_draco(draco)
-    points = np.concatenate([keys[:, :3], decode_table(loose_points, n_loose_points)])
-    faces = np.concatenate([draco_faces, decode_table(cursor.rest(), n_loose_faces)])
+    points, faces = (
+        _with_loose(keys[:, :3], loose_points, n_loose_points),
+        _with_loose(draco_faces, cursor.rest(), n_loose_faces),
+    )
     if len(points) > MAX_VERTICES:
         raise corrupt_section("mesh", f"{len(points)} vertices, at most {MAX_VERTICES}")
     if points.size and points.min() < 0:
@@ -247,6 +251,12 @@ def _decode_mesh(mesh: bytes, n_vertices: int, n_triangles: int) -> tuple[Array,
     if faces.size and (faces.min() < 0 or faces.max() >= len(points)):
         raise corrupt_section("mesh", "a triangle names a vertex that does not exist")
     return points, faces
+
+
+def _with_loose(rows: Array, data: bytes, count: int) -> Array:
+    """Rows, and after them ``count`` more that a table holds."""
+    loose = decode_table(data, count)
+    return np.concatenate([rows, loose]) if count else rows
 
 
 def _occurrences(rows: Array) -> Array:

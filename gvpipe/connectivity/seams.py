@@ -15,6 +15,7 @@ Order stream: `vertex_order`, points in place of positions, or `adaptive_order`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,10 +23,20 @@ from gvpipe.arrays import Array, Int64
 from gvpipe.connectivity import adaptive_order
 from gvpipe.connectivity.edge_seams import decode_across_edges, encode_across_edges
 from gvpipe.connectivity.seam_corners import SeamCorners, are_first, find_seam_corners
-from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order, places_of
+from gvpipe.connectivity.vertex_order import (
+    MAX_VERTICES,
+    decode_order,
+    encode_order,
+    nearest_numbers,
+    neighbour_lists,
+    places_of,
+)
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.errors import corrupt_section
 from gvpipe.mesh.unique_rows import corners_from_smallest
+
+if TYPE_CHECKING:
+    from gvpipe.mesh.graph_kernels import Graph
 
 WORTHWHILE = 0.96  # of the bytes, up to which an order that adapts is chosen: it decodes more slowly
 MAX_SEAM_VERTICES = 7  # larger numbers of vertices of a point share a context
@@ -102,18 +113,21 @@ def decode_seams(
     adaptive: bool = False,
     *,
     n_vertices: int = MAX_VERTICES,
+    graph: Graph | None = None,
 ) -> tuple[Array, Array]:
     """Mirror of `encode_seams`: triangles ``(T, 3)`` over at most ``n_vertices``, and the point of each vertex ``(V,)``.
 
-    ``adaptive``: the order is of `adaptive_order`.
+    ``adaptive``: the order is of `adaptive_order`. ``graph``: of the points, where there is one: it saves time.
     """
     faces, points = _decode_corners(_decode_counts(counts, n_points, n_vertices), corners, point_faces, across)
     if order:
         if adaptive:
             visits = adaptive_order.decode_adaptive_order(order, points, faces)
+        elif graph and len(points) == n_points:  # no seams
+            visits = decode_order(order, nearest_numbers(graph))
         else:
-            visits = decode_order(order, _as_lattice(points), faces)
-        points, faces = points[visits], places_of(visits)[faces]
+            visits = decode_order(order, neighbour_lists(_as_lattice(points), faces))
+        points, faces = points[visits], places_of(visits).astype(np.int32)[faces]
     return faces, points
 
 
@@ -161,6 +175,8 @@ def _decode_counts(data: bytes, n_points: int, n_vertices: int) -> Array:
 def _decode_corners(counts: Array, data: bytes, point_faces: Array, across: bool) -> tuple[Array, Array]:
     """Mirror of `_encode_corners`: triangles over vertices, and the point of each vertex."""
     numbers = decode_across_edges(data, point_faces, counts) if across else _decode_differences(data, point_faces, counts)
+    if len(numbers) and counts.max() == 1:
+        return point_faces, np.arange(len(counts))
     flat = point_faces.ravel()
     starts = np.cumsum(counts) - counts
     faces: Array = (starts[flat] + numbers).reshape(-1, 3)

@@ -23,6 +23,7 @@ from gvpipe.mesh.unique_rows import are_distinct, sort_rows
 
 if TYPE_CHECKING:
     from gvpipe.connectivity.visit_kernels import NeighbourLists
+    from gvpipe.mesh.graph_kernels import Graph
 
 REACH = 256  # most vertices that one search looks at: 1024 saves 0.3 bit per vertex on samba, and takes twice the time
 MAX_VERTICES = (1 << 24) - 1  # constriction's largest uniform alphabet
@@ -55,15 +56,15 @@ def encode_order(visits: Array, points: Array, faces: Array) -> bytes:
     return bytes(table.tobytes() + words.astype("<u4").tobytes())
 
 
-def decode_order(data: bytes, points: Array, faces: Array) -> Array:
-    """The inverse of `encode_order`: visits (V,) int64, always a permutation, or CorruptFile.
+def decode_order(data: bytes, lists: NeighbourLists) -> Array:
+    """The inverse of `encode_order`, given `neighbour_lists`: visits (V,) int64, always a permutation, or CorruptFile.
 
     A range coder cannot notice every change of its bytes: lengths and checksums are the container's.
     """
     from gvpipe.connectivity.visit_kernels import CodedVisits, decode_ranks, traverse_visits
     from gvpipe.entropy import range_decoder
 
-    n_vertices = len(points)
+    n_vertices = len(lists.starts) - 1
     if len(data) < N_SYMBOLS or (len(data) - N_SYMBOLS) % 4 or n_vertices > MAX_VERTICES:
         raise corrupt_section("order", f"{len(data)} bytes for {n_vertices} vertices")
     table = np.frombuffer(data, np.uint8, N_SYMBOLS)
@@ -76,7 +77,7 @@ def decode_order(data: bytes, points: Array, faces: Array) -> Array:
         raise corrupt_section("order", "the range coder ran out of step")
     if not range_decoder.may_be_exhausted(state, words):
         raise corrupt_section("order", "bytes left over")
-    n_done = traverse_visits(neighbour_lists(points, faces), REACH, coded, True)
+    n_done = traverse_visits(lists, REACH, coded, True)
     if n_done != n_vertices:
         raise corrupt_section("order", f"no vertex has the rank sent for vertex {n_done}")
     return coded.visits
@@ -96,6 +97,15 @@ def neighbour_lists(points: Array, faces: Array) -> NeighbourLists:
     rows = np.ascontiguousarray(points, np.int64)
     twins = np.zeros((0, 2), np.int64) if are_distinct(rows) else _twins(rows)
     return sort_neighbours(rows, np.ascontiguousarray(faces, np.int64), twins)
+
+
+def nearest_numbers(graph: Graph) -> NeighbourLists:
+    """As `neighbour_lists` of points on a line, each at its own number, but that no vertex is its own neighbour."""
+    from gvpipe.connectivity.visit_kernels import NeighbourLists, fill_by_distance
+
+    lists = NeighbourLists(graph.starts, np.empty_like(graph.neighbours))
+    fill_by_distance(graph, lists.neighbours)
+    return lists
 
 
 def _twins(rows: Array) -> Array:

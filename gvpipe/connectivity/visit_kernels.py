@@ -10,6 +10,7 @@ from gvpipe.arrays import Bool, Int32, Int64, UInt32, UInt64
 from gvpipe.compiled import compiled, inlined
 from gvpipe.connectivity.visit_symbols import ESCAPE, EXACT_RANKS
 from gvpipe.entropy.range_decoder import decode_symbols, decode_uniform
+from gvpipe.mesh.graph_kernels import Graph
 
 SHORT_LIST = 64  # neighbours that are sorted by insertion
 
@@ -156,6 +157,27 @@ def _sort_long(points: Int64, v: int, own: Int32, target: Int32) -> int:
             target[n] = ordered[i]
             n += 1
     return n
+
+
+@compiled
+def fill_by_distance(graph: Graph, neighbours: Int32) -> None:
+    """Fill each vertex' neighbours in the order of their numbers' distance from its own; of two alike, the lower first."""
+    for v in range(len(graph.starts) - 1):
+        stop = graph.starts[v + 1]
+        above = graph.starts[v]
+        while above < stop and graph.neighbours[above] < v:
+            above += 1
+        below = above - 1
+        for k in range(graph.starts[v], stop):
+            is_below = above == stop
+            if below >= graph.starts[v] and not is_below:
+                is_below = v - graph.neighbours[below] <= graph.neighbours[above] - v
+            if is_below:
+                neighbours[k] = graph.neighbours[below]
+                below -= 1
+            else:
+                neighbours[k] = graph.neighbours[above]
+                above += 1
 
 
 @inlined

@@ -16,9 +16,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from gvpipe.ahead import beside
 from gvpipe.arrays import Array, Int32, Int64
@@ -28,8 +28,10 @@ from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, pack_block
-from gvpipe.mesh.topology import adjacency
 from gvpipe.mesh.unique_rows import smallest_first
+
+if TYPE_CHECKING:
+    from gvpipe.mesh.graph_kernels import Graph
 
 ADAPTIVE_MESH, ADAPTIVE_ORDER = 1, 2  # flags
 FEW_POINTS = 1 << 13  # up to which adaptive positions open in no time
@@ -49,9 +51,11 @@ class PointMesh:
     point_faces: Int32
 
     @cached_property
-    def neighbours(self) -> sparse.csr_array:
-        """The points' symmetric adjacency ``(P, P)``."""
-        return adjacency(self.point_faces, len(self.lattice))
+    def graph(self) -> Graph:
+        """The points' edges."""
+        from gvpipe.mesh.graph_kernels import link_vertices
+
+        return link_vertices(np.ascontiguousarray(self.point_faces, np.int32), len(self.lattice))
 
 
 @dataclass(frozen=True)
@@ -128,16 +132,16 @@ def _begin_points(
     if flags > ADAPTIVE_MESH + ADAPTIVE_ORDER:
         raise cursor.corrupt(f"flags {flags} are unknown")
     points, own = _decode_mesh(cursor.block(), bool(flags & ADAPTIVE_MESH), n_vertices, n_triangles)
-    point_faces = smallest_first(own.astype(np.int64))
     counts, corners = cursor.block(), cursor.rest()
-    opened = PointMesh(points.astype(np.int32), point_faces.astype(np.int32))
+    opened = PointMesh(points.astype(np.int32), smallest_first(own.astype(np.int32)))
+    _ = opened.graph  # found now, before two threads ask for it
 
     def finish() -> WeldedMesh:
-        is_adaptive = bool(flags & ADAPTIVE_ORDER)
+        adapts, streams = bool(flags & ADAPTIVE_ORDER), (counts, corners, order)
         faces, point = decode_seams(
-            counts, corners, order, opened.point_faces, len(opened.lattice), across, is_adaptive, n_vertices=n_vertices
+            *streams, opened.point_faces, len(points), across, adapts, n_vertices=n_vertices, graph=opened.graph
         )
-        return WeldedMesh(opened.lattice, opened.point_faces, faces.astype(np.int32), point)
+        return WeldedMesh(opened.lattice, opened.point_faces, faces.astype(np.int32, copy=False), point)
 
     return opened, finish
 

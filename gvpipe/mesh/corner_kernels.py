@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64
+from gvpipe.arrays import Integers
 from gvpipe.compiled import compiled
 
 
@@ -21,9 +21,9 @@ def previous_corner(corner: int) -> int:
 
 
 @compiled
-def turn_smallest_first(faces: Int64) -> Int64:
+def turn_smallest_first(faces: Integers) -> Integers:
     """``faces (T, 3)``, each turned so that its smallest index leads, the first one of equals."""
-    turned = np.empty(faces.shape, np.int64)
+    turned = np.empty_like(faces)
     for t in range(len(faces)):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         if b < a and b <= c:

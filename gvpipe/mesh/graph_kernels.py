@@ -9,6 +9,8 @@ import numpy as np
 from gvpipe.arrays import Int32, Int64
 from gvpipe.compiled import compiled
 
+SHORT_LIST = 64  # neighbours that are sorted by insertion
+
 
 class Graph(NamedTuple):
     """The vertices that edges lead to from each vertex.
@@ -25,38 +27,57 @@ class Graph(NamedTuple):
 @compiled
 def link_vertices(faces: Int32, n_vertices: int) -> Graph:
     """The graph of ``faces (T, 3)`` over V vertices; collapsed sides of degenerate triangles are no edges."""
-    places = np.zeros(n_vertices + 1, np.int64)
+    starts = np.zeros(n_vertices + 1, np.int64)
+    _count_corners(faces, starts)
+    neighbours = np.empty(starts[n_vertices], np.int32)
+    _list_sides(faces, starts.copy(), neighbours)
+    _sort_lists(starts, neighbours)
+    return Graph(starts, neighbours[: starts[n_vertices]].copy())
+
+
+@compiled
+def _count_corners(faces: Int32, starts: Int64) -> None:
+    """Fill bounds of lists that have two places for each corner."""
     for t in range(len(faces)):
         for k in range(3):
-            a, b = faces[t, k], faces[t, k + 1 if k < 2 else 0]
-            if a != b:
-                places[a + 1] += 1
-                places[b + 1] += 1
-    for v in range(n_vertices):
-        places[v + 1] += places[v]
-    unsorted, ends = np.empty(places[n_vertices], np.int32), places.copy()
+            starts[faces[t, k] + 1] += 2
+    for v in range(len(starts) - 1):
+        starts[v + 1] += starts[v]
+
+
+@compiled
+def _list_sides(faces: Int32, ends: Int64, neighbours: Int32) -> None:
+    """Put the other corners of its triangles into each vertex' list; ``ends``, where the lists begin, move on."""
     for t in range(len(faces)):
         for k in range(3):
-            a, b = faces[t, k], faces[t, k + 1 if k < 2 else 0]
-            if a != b:
-                unsorted[ends[a]], unsorted[ends[b]] = b, a
-                ends[a] += 1
-                ends[b] += 1
-    neighbours = np.empty(len(unsorted), np.int32)
-    ends = places.copy()
-    for v in range(n_vertices):  # ascending vertices give themselves to their neighbours, whose lists so ascend
-        for k in range(places[v], places[v + 1]):
-            w = unsorted[k]
-            if ends[w] == places[w] or neighbours[ends[w] - 1] != v:
-                neighbours[ends[w]] = v
-                ends[w] += 1
-    starts, end = np.zeros(n_vertices + 1, np.int64), 0
-    for v in range(n_vertices):
-        for k in range(places[v], ends[v]):
-            neighbours[end] = neighbours[k]
-            end += 1
-        starts[v + 1] = end
-    return Graph(starts, neighbours[:end].copy())
+            here = faces[t, k]
+            at = ends[here]
+            neighbours[at], neighbours[at + 1] = faces[t, k + 1 if k < 2 else 0], faces[t, k - 1 if k > 0 else 2]
+            ends[here] = at + 2
+
+
+@compiled
+def _sort_lists(starts: Int64, neighbours: Int32) -> None:
+    """Sort each list, leave out the vertex itself and who is there twice, and close up the gaps."""
+    kept = 0
+    for v in range(len(starts) - 1):
+        first, stop = starts[v], starts[v + 1]
+        starts[v] = kept
+        if stop - first > SHORT_LIST:
+            neighbours[first:stop].sort()
+        begin = kept
+        for i in range(first, stop):
+            y = neighbours[i]
+            j = kept
+            while j > begin and neighbours[j - 1] > y:
+                j -= 1
+            if y == v or (j > begin and neighbours[j - 1] == y):
+                continue
+            for k in range(kept, j, -1):
+                neighbours[k] = neighbours[k - 1]
+            neighbours[j] = y
+            kept += 1
+    starts[len(starts) - 1] = kept
 
 
 @compiled
@@ -69,7 +90,7 @@ def lower_neighbours(graph: Graph) -> tuple[Int64, Int64]:
             lower[end] = graph.neighbours[k]  # the next one takes its place unless it counts
             end += graph.neighbours[k] < v
         starts[v + 1] = end
-    return starts, lower[:end].copy()
+    return starts, lower[:end]
 
 
 @compiled

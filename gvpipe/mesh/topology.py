@@ -6,12 +6,17 @@ at most k edges reaches, the vertex itself included.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from gvpipe.arrays import Array, Int32, Int64, Integers
 from gvpipe.mesh.unique_rows import row_ids
+
+if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
+    from gvpipe.mesh.graph_kernels import Graph
 
 
 def unique_edges(faces: Int32) -> Int32:
@@ -27,9 +32,22 @@ def adjacency(faces: Int32, n_vertices: int) -> sparse.csr_array:
     """Return the symmetric ``(V, V)`` vertex adjacency of ``faces (T, 3)``, entries 1, diagonal empty."""
     from gvpipe.mesh.graph_kernels import link_vertices
 
-    graph = link_vertices(np.ascontiguousarray(faces, np.int32), n_vertices)
+    return adjacency_of(link_vertices(np.ascontiguousarray(faces, np.int32), n_vertices))
+
+
+def adjacency_of(graph: Graph) -> sparse.csr_array:
+    """As `adjacency`, of a graph of V vertices."""
     entries = np.ones(len(graph.neighbours)), graph.neighbours, graph.starts.astype(np.int32)
-    return sparse.csr_array(entries, shape=(n_vertices, n_vertices))
+    return sparse.csr_array(entries, shape=(len(graph.starts) - 1, len(graph.starts) - 1))
+
+
+def graph_of(neighbours: sparse.csr_array) -> Graph:
+    """The graph of a symmetric adjacency ``(V, V)``."""
+    from gvpipe.mesh.graph_kernels import Graph
+
+    if not neighbours.has_sorted_indices:
+        neighbours = neighbours.sorted_indices()
+    return Graph(neighbours.indptr.astype(np.int64), neighbours.indices.astype(np.int32, copy=False))
 
 
 def k_ring(neighbours: sparse.csr_array, k: int, some: Integers | None = None) -> sparse.csr_array:
@@ -44,9 +62,9 @@ def k_ring(neighbours: sparse.csr_array, k: int, some: Integers | None = None) -
 
 def components(neighbours: sparse.csr_array) -> tuple[int, Int32]:
     """Return the number of connected components and each vertex's component ``(V,)``, of a symmetric adjacency."""
-    from gvpipe.mesh.graph_kernels import Graph, label_components
+    from gvpipe.mesh.graph_kernels import label_components
 
-    labels = label_components(Graph(neighbours.indptr.astype(np.int64), neighbours.indices.astype(np.int32, copy=False)))
+    labels = label_components(graph_of(neighbours))
     return int(labels.max(initial=-1)) + 1, labels
 
 

@@ -107,7 +107,7 @@ def smallest_first(faces: Array) -> Array:
     """
     from gvpipe.mesh.corner_kernels import turn_smallest_first
 
-    turned = turn_smallest_first(np.ascontiguousarray(faces, np.int64))
+    turned = turn_smallest_first(np.ascontiguousarray(faces, np.int32 if faces.dtype == np.int32 else np.int64))
     return np.asarray(turned.astype(faces.dtype, copy=False))
 
 

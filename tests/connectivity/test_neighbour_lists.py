@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gvpipe.connectivity.vertex_order import nearest_numbers
 from gvpipe.connectivity.visit_kernels import SHORT_LIST, sort_neighbours
+from gvpipe.mesh.graph_kernels import link_vertices
+
+NO_TWINS = np.zeros((0, 2), np.int64)
 
 
 @pytest.mark.parametrize("extent", [1, 3, 100, 1 << 20])
@@ -35,5 +39,15 @@ def test_hubs_have_long_lists() -> None:
     rim = np.arange(1, n)
     faces = np.stack([np.zeros(n - 1, np.int64), rim, np.roll(rim, -1)], axis=1)
     points = np.stack([np.arange(n)[::-1], np.zeros(n, np.int64), np.zeros(n, np.int64)], axis=1)
-    found = sort_neighbours(points, faces, np.zeros((0, 2), np.int64))
+    found = sort_neighbours(points, faces, NO_TWINS)
     assert found.neighbours[: found.starts[1]].tolist() == rim.tolist()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_graph_gives_the_lists_of_points_at_their_numbers(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    n = int(draw.integers(3, 150))
+    faces = np.array([draw.choice(n, 3, replace=False) for _ in range(int(draw.integers(0, 600)))], np.int32).reshape(-1, 3)
+    points = np.c_[np.arange(n), np.zeros((n, 2), np.int64)]
+    wanted, found = sort_neighbours(points, faces.astype(np.int64), NO_TWINS), nearest_numbers(link_vertices(faces, n))
+    assert np.array_equal(found.starts, wanted.starts) and np.array_equal(found.neighbours, wanted.neighbours)

@@ -40,6 +40,7 @@ from gvpipe.sequence import are_finite
 BYTES_PER_PIXEL, BYTES_PER_SLOT = 4, 200
 TOGETHER = 16  # frames whose transforms are kept for other threads
 LARGE = 1 << 20  # coordinates; fewer do not pay for other threads
+PAGE = 1 << 10  # coordinates
 MANY_SLOTS = 1 << 14  # whose layout is found beside their blend
 
 
@@ -142,7 +143,13 @@ class McgvReader:
         result = np.empty((stop - start, self._bitstream.n_vertices, 3), np.float32)
         ahead = AHEAD if result.size >= LARGE else 0
         overlaps = ahead > 0 and self._bitstream.budget.is_spare
-        with beside(lambda: [*islice(groups, 1)], overlaps) as begun:
+
+        def begin() -> list[tuple[int, list[Plane]]]:
+            if overlaps:
+                result.reshape(-1)[::PAGE] = 0  # memory comes page by page, when it is first written
+            return [*islice(groups, 1)]
+
+        with beside(begin, overlaps) as begun:
             motion = self._motion
             frames = _frames(chain(begun(), groups))
         del begun  # it keeps the first pictures
@@ -208,6 +215,6 @@ def read_layout(bitstream: Bitstream, header: Header, slots: Slots, groups: Inte
         groups = slots.points.pieces()[slots.point] if groups is None else groups
         return place_points(slots.lattice, groups, header.width, header.height, header.block)
     if header.placement == "tiles":
-        charts = decode_charts(bitstream.section(CHARTS), slots.points.neighbours)
+        charts = decode_charts(bitstream.section(CHARTS), slots.points.causal_neighbours())
         return place_charts(slots.lattice, charts[slots.point], header.width, header.height, header.block)
     return decode_pixels(bitstream.section("pixels"), slots.order, header.width, header.height)

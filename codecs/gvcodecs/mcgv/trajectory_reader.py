@@ -106,7 +106,7 @@ class TrajectoryReader:
             raise CorruptFile(f"header: {n_components} components of {surface.n_slots} samples; {MAX_VALUES} values at most")
         layout = read_layout(self._bitstream, header, surface)
         keep_blend(self._bitstream, surface, header)
-        weights = decode_weights(self._bitstream.section("weights"), surface.points.neighbours, header.clusters)
+        weights = decode_weights(self._bitstream.section("weights"), surface.points.causal_neighbours(), header.clusters)
         matrix = Blend(surface.base[surface.members], weights, header.clusters).matrix()
         return _Shared(np.ascontiguousarray(surface.base.T), layout, matrix)
 

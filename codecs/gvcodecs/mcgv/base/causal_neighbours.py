@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
 from scipy import sparse
 
 from gvpipe.arrays import Int64
+from gvpipe.mesh.topology import graph_of
+
+if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
+    from gvpipe.mesh.graph_kernels import Graph
 
 
 class CausalNeighbours(NamedTuple):
@@ -24,9 +27,11 @@ class CausalNeighbours(NamedTuple):
 
 def causal_neighbours(neighbours: sparse.csr_array) -> CausalNeighbours:
     """Return the causal neighbours of all points, for their symmetric adjacency ``(P, P)``."""
-    from gvpipe.mesh.graph_kernels import Graph, lower_neighbours
+    return causal_neighbours_in(graph_of(neighbours))
 
-    if not neighbours.has_sorted_indices:
-        neighbours = neighbours.sorted_indices()
-    graph = Graph(neighbours.indptr.astype(np.int64), neighbours.indices.astype(np.int32, copy=False))
+
+def causal_neighbours_in(graph: Graph) -> CausalNeighbours:
+    """As `causal_neighbours`, for the points' graph."""
+    from gvpipe.mesh.graph_kernels import lower_neighbours
+
     return CausalNeighbours(*lower_neighbours(graph))

@@ -6,13 +6,19 @@ Points are numbered in the codec's order, which is a walk over the surface (Drac
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 
+from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighbours_in
 from gvpipe.arrays import Int32, Int64, Integers
 from gvpipe.connectivity.welded_mesh import PointMesh
-from gvpipe.mesh.topology import adjacency, components, weld
+from gvpipe.mesh.topology import adjacency_of, graph_of, weld
+
+if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
+    from gvpipe.mesh.graph_kernels import Graph
 
 
 @dataclass(frozen=True)
@@ -21,30 +27,42 @@ class Points:
 
     Args:
         faces: ``(T, 3)`` triangles over points.
-        neighbours: the points' symmetric adjacency ``(P, P)``.
+        graph: what joins the points.
     """
 
     faces: Int32
-    neighbours: sparse.csr_array
+    graph: Graph
 
     @classmethod
     def moving(cls, mesh: PointMesh, moves: Int64) -> Points:
         """The points ``moves (P,)`` of a mesh, and what joins them."""
         if len(moves) == len(mesh.lattice):
-            return cls(mesh.point_faces, mesh.neighbours)
+            return cls(mesh.point_faces, mesh.graph)
         number = np.full(len(mesh.lattice), -1, np.int32)
         number[moves] = np.arange(len(moves))
         faces = number[mesh.point_faces]
-        return cls(faces[(faces >= 0).all(axis=1)], sparse.csr_array(mesh.neighbours[moves][:, moves]))
+        joined = sparse.csr_array(adjacency_of(mesh.graph)[moves][:, moves])
+        return cls(faces[(faces >= 0).all(axis=1)], graph_of(joined))
+
+    @cached_property
+    def neighbours(self) -> sparse.csr_array:
+        """The points' symmetric adjacency ``(P, P)``."""
+        return adjacency_of(self.graph)
+
+    def causal_neighbours(self) -> CausalNeighbours:
+        """Each point's neighbours of lower number, found anew: they take memory."""
+        return causal_neighbours_in(self.graph)
 
     @property
     def n_points(self) -> int:
         """P, the number of points."""
-        return int(self.neighbours.shape[0])
+        return len(self.graph.starts) - 1
 
     def pieces(self) -> Int32:
         """``(P,)`` the connected piece of the surface that each point belongs to."""
-        return components(self.neighbours)[1]
+        from gvpipe.mesh.graph_kernels import label_components
+
+        return label_components(self.graph)
 
 
 def weld_vertices(lattice: Integers, faces: Int32, visits: Int64) -> tuple[Points, Int64, Int64]:
@@ -53,6 +71,8 @@ def weld_vertices(lattice: Integers, faces: Int32, visits: Int64) -> tuple[Point
     Returns:
         The points, the point of each vertex ``(V,)``, and the first vertex of each point ``(P,)``.
     """
+    from gvpipe.mesh.graph_kernels import link_vertices
+
     order = np.argsort(visits)
     first, found = weld(lattice[order])  # first: places in the codec's order
     members = np.sort(first)
@@ -60,4 +80,4 @@ def weld_vertices(lattice: Integers, faces: Int32, visits: Int64) -> tuple[Point
     point = np.empty(len(lattice), np.int64)
     point[order] = number[found]
     own = point[faces].astype(np.int32)
-    return Points(own, adjacency(own, len(members))), point, order[members]
+    return Points(own, link_vertices(own, len(members))), point, order[members]

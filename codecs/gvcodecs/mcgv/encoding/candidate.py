@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvcodecs.mcgv.base.base_frame import Start, begin
-from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.motion.blend_problem import Fitted
 from gvcodecs.mcgv.motion.skinning import Weights
@@ -47,5 +46,5 @@ def rebase(job: Job, candidate: Candidate, step: float, target_error: float) -> 
     number[given.point[given.sources]] = np.arange(len(given.sources))
     before = number[start.point[start.sources]]  # the number that each point had
     weights = Weights(fitted.weights.clusters[before], fitted.weights.weights[before])
-    sort_by_rank(causal_neighbours(start.points.neighbours), weights)  # other numbers, other causal neighbours, other ranks
+    sort_by_rank(start.points.causal_neighbours(), weights)  # other numbers, other causal neighbours, other ranks
     return Candidate(start, Fitted(weights, fitted.n_clusters))

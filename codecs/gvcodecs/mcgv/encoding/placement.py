@@ -45,4 +45,4 @@ def chart_sections(job: Job, start: Start) -> dict[str, bytes]:
     """The section of charts, if placement has one."""
     if start.placement != "tiles":
         return {}
-    return {CHARTS: encode_charts(charts_of(job, start), start.points.neighbours)}
+    return {CHARTS: encode_charts(charts_of(job, start), start.points.causal_neighbours())}

@@ -12,9 +12,8 @@ charts are numbered as they first occur::
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 
-from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighbours
+from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours
 from gvpipe.arrays import Int64, Integers
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
@@ -29,23 +28,21 @@ def number_charts(charts: Integers) -> Int64:
     return np.asarray(np.argsort(np.argsort(first))[own.ravel()])
 
 
-def encode_charts(charts: Int64, neighbours: sparse.csr_array) -> bytes:
-    """Return the section for ``charts (P,)`` of `number_charts`, points adjacent as in ``neighbours (P, P)``."""
+def encode_charts(charts: Int64, causal: CausalNeighbours) -> bytes:
+    """Return the section for ``charts (P,)`` of `number_charts`, given the points' causal neighbours."""
     from gvcodecs.mcgv.layout.chart_kernels import describe
 
-    causal = causal_neighbours(neighbours)
     ranks, numbers = np.empty(len(charts), np.int64), np.empty(len(charts), np.int64)
     count = describe(causal.starts, causal.neighbours, charts, ranks, numbers)
     first = encode_integers(ranks, _contexts(causal))
     return pack_block(first) + varint(count) + encode_integers(numbers[:count])
 
 
-def decode_charts(data: bytes, neighbours: sparse.csr_array) -> Int64:
+def decode_charts(data: bytes, causal: CausalNeighbours) -> Int64:
     """Mirror of `encode_charts`; raises `CorruptFile` where a point's chart makes no sense."""
     from gvcodecs.mcgv.layout.chart_kernels import restore
 
     cursor = Cursor(data, SECTION)
-    causal = causal_neighbours(neighbours)
     n_points = len(causal.starts) - 1
     ranks = decode_integers(cursor.block(), n_points, _contexts(causal), SECTION)
     count = cursor.varint(n_points, "the number of charts told by number")

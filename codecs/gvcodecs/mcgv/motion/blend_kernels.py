@@ -13,6 +13,23 @@ LEAST_ENERGY = 1e-9  # of a cluster that no point follows
 
 
 @compiled
+def fill_homogeneous(base: Float64, result: Float64) -> None:
+    """Fill coordinates ``(P, 4)`` of points ``(P, 3)`` (`skinning.homogeneous`)."""
+    low, high, middle, extent = np.full(3, np.inf), np.full(3, -np.inf), np.zeros(3), 0.0
+    for p in range(len(base)):
+        for axis in range(3):
+            low[axis], high[axis] = min(low[axis], base[p, axis]), max(high[axis], base[p, axis])
+    if len(base):
+        for axis in range(3):
+            middle[axis], extent = (low[axis] + high[axis]) / 2, max(extent, high[axis] - low[axis])
+    extent = extent if extent > 0 else 1.0
+    for p in range(len(base)):
+        for axis in range(3):
+            result[p, axis] = (base[p, axis] - middle[axis]) / extent
+        result[p, 3] = 1.0
+
+
+@compiled
 def find_energies(homogeneous: Float64, clusters: Int32, parts: Float64, n_clusters: int) -> Float64:
     """The energy ``(K, 4, 4)`` that each cluster's rows cause.
 

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gvcodecs.mcgv.base.base_frame import Start
-from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.base.surface import Slots
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.header import Header
@@ -97,7 +96,7 @@ def _solve(job: Job, start: Start, fitted: Fitted) -> Solved:
         return kept[0]
     kept.clear()
     fit = BlendFit(Blend(start.base, fitted.weights, fitted.n_clusters))
-    weights = encode_weights(fitted.weights, causal_neighbours(start.points.neighbours))
+    weights = encode_weights(fitted.weights, start.points.causal_neighbours())
     solved = Solved(fitted, weights, as_rows(fit.matrix), _fit_segments(start, fit, 4 * fitted.n_clusters))
     if 12 * fitted.n_clusters * start.sequence.n_frames <= KEPT and not job.is_heavy:
         solved = dataclasses.replace(solved, transforms=[*solved.transforms])
@@ -119,7 +118,7 @@ def _fit_segments(start: Start, fit: BlendFit, n_rows: int) -> Iterator[Float64]
 def read_blend(bitstream: Bitstream, header: Header, slots: Slots) -> Blend:
     """The blend of a file's points; raises `CorruptFile`, `OverBudget`."""
     keep_blend(bitstream, slots, header)
-    weights = decode_weights(bitstream.section("weights"), slots.points.neighbours, header.clusters)
+    weights = decode_weights(bitstream.section("weights"), slots.points.causal_neighbours(), header.clusters)
     return Blend(slots.base.take(slots.members, axis=0), weights, header.clusters)
 
 

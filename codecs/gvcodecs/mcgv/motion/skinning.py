@@ -166,8 +166,8 @@ def _whiten(energies: Float64) -> Float64:
 
 def homogeneous(base: Float64) -> Float64:
     """``(P, 4)`` coordinates in the middle of the bounding box, in parts of its longest side, and 1."""
-    low, high = (np.array([pick(column) for column in base.T]) for pick in (np.min, np.max))  # by column: a sixth of the time
-    extent = float((high - low).max()) or 1.0
-    result = np.ones((len(base), 4))
-    result[:, :3] = (base - (low + high) / 2) / extent
+    from gvcodecs.mcgv.motion.blend_kernels import fill_homogeneous
+
+    result = np.empty((len(base), 4))
+    fill_homogeneous(np.ascontiguousarray(base), result)
     return result

@@ -14,9 +14,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy import sparse
 
-from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighbours
+from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights
 from gvpipe.arrays import Bool, Float64, Int64
 from gvpipe.container.cursor import Cursor, varint
@@ -40,8 +39,8 @@ def encode_weights(weights: Weights, causal: CausalNeighbours) -> bytes:
     return varint(len(first)) + first + varint(len(second)) + second + third
 
 
-def decode_weights(data: bytes, neighbours: sparse.csr_array, n_clusters: int) -> Weights:
-    """Mirror of `encode_weights`, for points of adjacency ``neighbours (P, P)``.
+def decode_weights(data: bytes, causal: CausalNeighbours, n_clusters: int) -> Weights:
+    """Mirror of `encode_weights`.
 
     Raises:
         CorruptFile: a point's clusters or weights are out of range.
@@ -49,7 +48,6 @@ def decode_weights(data: bytes, neighbours: sparse.csr_array, n_clusters: int) -
     from gvcodecs.mcgv.motion.weight_kernels import WeightNumbers, restore
 
     cursor = Cursor(data, SECTION)
-    causal = causal_neighbours(neighbours)
     n_points = len(causal.starts) - 1
     counts = decode_integers(cursor.take(cursor.varint(cursor.left, "a length")), n_points, _count_contexts(causal), SECTION)
     if ((counts < 0) | (counts > INFLUENCES)).any():

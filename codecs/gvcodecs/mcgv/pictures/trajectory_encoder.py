@@ -14,7 +14,6 @@ from itertools import pairwise
 import numpy as np
 
 from gvcodecs.mcgv.base.base_frame import Start
-from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding import Padding
@@ -52,7 +51,7 @@ def code_trajectories(job: Job, start: Start, fitted: Fitted, layout: Layout) ->
     """
     settings, profile, bounds = job.settings, job.settings.video_profile, start.bounds
     fit = BlendFit(Blend(start.base, fitted.weights, fitted.n_clusters))
-    sections = {"weights": encode_weights(fitted.weights, causal_neighbours(start.points.neighbours))}
+    sections = {"weights": encode_weights(fitted.weights, start.points.causal_neighbours())}
     fineness, level = FINENESS[profile.name], LEVEL[profile.name]
     largest = profile.amplitude / fineness
     padding = Padding(layout, settings.block)

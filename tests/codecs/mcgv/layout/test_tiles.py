@@ -17,6 +17,7 @@ from surfaces import awkward_surfaces, check_layout
 
 import gvpipe
 from gvcodecs.mcgv import Mcgv
+from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.layout.chart_coding import decode_charts, encode_charts, number_charts
 from gvcodecs.mcgv.layout.kd_tree import choose_size
 from gvcodecs.mcgv.layout.tiles import place_charts
@@ -80,27 +81,27 @@ def _labels(n_points: int, patches: int) -> NDArray[np.int64]:
 def test_charts_come_back(name: str) -> None:
     """Any charts of any surface, from one to one each; numbers as they first occur."""
     points, faces = awkward_surfaces()[name]
-    neighbours = adjacency(faces, len(points))
+    causal = causal_neighbours(adjacency(faces, len(points)))
     for patches in (1, 2, 7, 10 * len(points)):
         charts = _labels(len(points), patches)
         first = np.unique(charts, return_index=True)[1]
         assert (np.diff(first) > 0).all() and charts.max() == len(first) - 1
-        assert np.array_equal(decode_charts(encode_charts(charts, neighbours), neighbours), charts)
+        assert np.array_equal(decode_charts(encode_charts(charts, causal), causal), charts)
 
 
 def test_charts_of_patches_cost_little() -> None:
     """Sixteen patches of a sheet in the order of its rows: a third of a bit a point."""
     faces = grid(64)[1]
     y, x = np.divmod(np.arange(64 * 64), 64)
-    section = encode_charts(number_charts(y // 16 * 4 + x // 16), adjacency(faces, 64 * 64))
+    section = encode_charts(number_charts(y // 16 * 4 + x // 16), causal_neighbours(adjacency(faces, 64 * 64)))
     assert 8 * len(section) < 0.35 * 64 * 64
 
 
 def test_hostile_charts_are_noticed() -> None:
     """Sections changed, cut or lengthened: charts numbered without a gap, or `CorruptFile`."""
     faces = grid(20)[1]
-    neighbours = adjacency(faces, 400)
-    data = encode_charts(_labels(400, 5), neighbours)
+    causal = causal_neighbours(adjacency(faces, 400))
+    data = encode_charts(_labels(400, 5), causal)
     random = np.random.default_rng(3)
     variants = [data[:n] for n in range(len(data))] + [data + b"\0", b"\xff" * len(data)]
     for place in random.integers(0, len(data), 200).tolist():
@@ -108,7 +109,7 @@ def test_hostile_charts_are_noticed() -> None:
     refused = 0
     for variant in variants:
         try:
-            charts = decode_charts(variant, neighbours)
+            charts = decode_charts(variant, causal)
         except CorruptFile:
             refused += 1
         else:

@@ -51,7 +51,8 @@ def test_halves_are_chosen_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None
     fitted = fit_blend(motions, 1e-3, 8)[0]
     data = [len(encode_weights(each.weights, causal_neighbours(neighbours))) for each in (whole, fitted)]
     assert not np.array_equal(whole.weights.clusters, fitted.weights.clusters) and data[1] < 1.2 * data[0]
-    restored = decode_weights(encode_weights(fitted.weights, causal_neighbours(neighbours)), neighbours, fitted.n_clusters)
+    causal = causal_neighbours(neighbours)
+    restored = decode_weights(encode_weights(fitted.weights, causal), causal, fitted.n_clusters)
     for found, chosen in zip(restored, fitted.weights, strict=True):
         assert np.array_equal(found, chosen)
 
