@@ -13,8 +13,9 @@ Code is looked for in two folders:
 2. `INSTALLED`, which ``gvpipe warmup --installed`` fills and a wheel may ship. Code there may be made for a processor of
    `PORTABLE`, which others can stand in for.
 
-A file is the SHA-256 of the rest, and numba's pickle of a compile result. It is written as a whole or not at all. A damaged
-file, and one that does not load, count as none. The files are programs: their folder must be as safe as the sources'.
+A file is the SHA-256 of the rest, and a pickle: the names that its code defines, and numba's compile result. It is written as a
+whole or not at all. A damaged file, and one that does not load, count as none. The files are programs: their folder must be as
+safe as the sources'.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ from llvmlite import binding
 from numba.core import config
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 from numba.core.types.containers import BaseNamedTuple, BaseTuple
@@ -48,7 +50,7 @@ from numba.misc.appdirs import AppDirs
 
 from gvpipe import borrowing
 
-FORMAT = 1  # of the files
+FORMAT = 2  # of the files
 COMPILER = hashlib.sha256(Path(borrowing.__file__).read_bytes()).hexdigest()
 INSTALLED = Path(__file__).with_name("kernels")
 SUFFIX = ".nbc"
@@ -106,11 +108,11 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compile result for argument types, None if there is none that fits."""
-        target_context.refresh()
+        rtsys.initialize(target_context)  # the rest of numba's context serves compilation, and takes 0.1 s
         found = None
         for path in self._places(sig, target_context.codegen()) if self._is_enabled else ():
             with contextlib.suppress(Exception):  # unpickling may raise any
-                found = CompileResult._rebuild(target_context, *pickle.loads(_read(path)))
+                found = _rebuild(target_context, *pickle.loads(_read(path)))
                 break
         if found is not None and tuple(found.signature.args) == tuple(normalize_signature(sig)[0]):
             return found
@@ -127,7 +129,8 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
             return
         path = folder / self._name(sig, _processor(data.codegen))
         try:
-            _write(path, dumps(data._replace(type_annotation="")._reduce()))
+            symbols = _defined(data.library._get_module_for_linking())
+            _write(path, dumps((symbols, data._replace(type_annotation="")._reduce())))
             _remove_old(folder, self._stem())
         except OSError:
             self.disable()
@@ -280,6 +283,30 @@ def _value(value: Any, called: list[FunctionType]) -> str:
         return f"frozenset({sorted(map(repr, value))})"
     named = getattr(value, "__module__", None), getattr(value, "__name__", None)
     return repr(named) if all(named) else repr(value)  # built-in functions, numpy's; numbers, texts
+
+
+def _defined(module: Any) -> list[str]:
+    """The names that a module defines."""
+    return [each.name for kind in (module.functions, module.global_variables) for each in kind if not each.is_declaration]
+
+
+def _rebuild(target_context: Any, symbols: list[str], reduced: tuple[Any, ...]) -> Any:
+    """A compile result from its file.
+
+    numba reads the bitcode of each, which takes longer than all the rest. Only kernels that are compiled later, and call this
+    one, need it. So it is read then.
+    """
+    (name, kind, (code, bitcode)), *others = reduced
+    target_context.codegen()._engine._defined_symbols.update(symbols)
+    result = CompileResult._rebuild(target_context, (name, kind, (code, _nothing())), *others)
+    result.library._get_module_for_linking = functools.cache(lambda: binding.parse_bitcode(bitcode))
+    return result
+
+
+@functools.cache
+def _nothing() -> bytes:
+    """The bitcode of a module without functions."""
+    return bytes(binding.parse_assembly("").as_bitcode())
 
 
 def _read(path: Path) -> bytes:
