@@ -22,8 +22,9 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.benchmark.bd_rate import average_rate_difference, rate_at
+from gvpipe.benchmark.growth import exponents, fit_line
 from gvpipe.benchmark.report import BenchReport
-from gvpipe.benchmark.scale import FEW_FRAMES, exponents
+from gvpipe.benchmark.scale import FEW_FRAMES
 from gvpipe.benchmark.scale_plots import draw, row_of
 from gvpipe.benchmark.scale_report import ScalePoint, ScaleReport
 from gvpipe.benchmark.scale_report import table as scale_table
@@ -160,8 +161,9 @@ def scale_report() -> ScaleReport:
 
 
 def growth() -> list[str]:
-    """For each codec, how processor time grows in either row, and what the largest size takes."""
-    heads = ["codec", "row", "largest size", *(f"{name}, exponents" for name in COSTS.values())]
+    """For each codec, how time grows in either row, and what the largest size takes."""
+    heads = ["codec", "row", "largest size"]
+    heads += [f"{name}, s" for name in COSTS.values()] + [f"{name}, exponents" for name in COSTS.values()]
     heads += [f"{name}, million vertex-frames a second" for name in COSTS.values()]
     rows = []
     for grows in ("vertices", "frames"):
@@ -171,9 +173,16 @@ def growth() -> list[str]:
             own = [point for point in own if grows == "vertices" or point.frames != FEW_FRAMES]  # that one is of the other row
             last = own[-1]
             powers = (", ".join(f"{power:.2f}" for power in exponents(own, key)) for key in COSTS)
+            lines = (_spell_line(own, key.replace("_cpu", "")) for key in COSTS)
             rates = (number(rate_of(last, key), ".2f") for key in COSTS)
-            rows.append((name_of(codec), grows, f"{last.vertices:,} x {last.frames:,}", *powers, *rates))
+            rows.append((name_of(codec), grows, f"{last.vertices:,} x {last.frames:,}", *lines, *powers, *rates))
     return table(heads, rows)
+
+
+def _spell_line(points: list[ScalePoint], key: str) -> str:
+    """The time of a row as what is fixed, and what a million vertex-frames add."""
+    line = fit_line(points, key)
+    return f"{line.fixed:.2f} + {1e6 * line.slope:.2f} n, within {line.factor:.2f}" if line else "-"
 
 
 def memory() -> list[str]:

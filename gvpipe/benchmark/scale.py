@@ -6,12 +6,10 @@ few frames, and for each number of frames of a small mesh. A command before all 
 
 from __future__ import annotations
 
-import math
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import gvpipe
@@ -71,12 +69,6 @@ def run(
                     if points[-1].decode_s is None:
                         break
     return ScaleReport(gvpipe.__version__, describe_machine(), ["gvpipe", *sys.argv[1:]], points)
-
-
-def exponents(points: Iterable[ScalePoint], key: str) -> list[float]:
-    """How a cost grows: log(cost) by log(vertices x frames) between neighbouring ``points`` of a row; 1 is linear."""
-    known = [(p.vertices * p.frames, getattr(p, key)) for p in points if getattr(p, key)]
-    return [math.log(b[1] / a[1]) / math.log(b[0] / a[0]) for a, b in pairwise(known)]
 
 
 def _write(folder: Path, size: Size) -> Path:

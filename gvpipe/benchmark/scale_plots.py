@@ -1,7 +1,7 @@
 """Processor time and memory against vertices and against frames, from a scale report alone, log axes.
 
-A grey line through the largest size shows what would grow as vertices times frames do. Dotted: memory of 300 MB and six times
-the longest segment's positions as float32.
+A grey line is the sum of a fixed cost and one that grows as vertices times frames do (`gvpipe.benchmark.growth`). Dotted: memory
+of 300 MB and six times the longest segment's positions as float32.
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from gvpipe.benchmark.growth import fit_line
 from gvpipe.benchmark.pictures import draw_pictures
 from gvpipe.benchmark.scale_report import ScalePoint, ScaleReport
 
@@ -67,8 +70,11 @@ def _draw_row(grows: str, row: list[ScalePoint]) -> Figure:
                 continue
             x, y = zip(*known, strict=True)
             panel.plot(x, y, marker="o", color=colours(i % 10), label=codec)
-            if key.endswith("_s"):
-                panel.plot(x, [y[-1] * n / x[-1] for n in x], color=GREY, linewidth=0.8, zorder=1)
+            line = fit_line([p for p in row if p.codec == codec], key) if key.endswith("_s") else None
+            if line:
+                sizes = np.geomspace(x[0], x[-1])
+                costs = line.fixed + line.slope * sizes * getattr(row[0], ROWS[grows])
+                panel.plot(sizes, costs, color=GREY, linewidth=0.8, zorder=1)
         if key.endswith("_mb"):
             bound = [(getattr(p, grows), FIXED_MB + PER_SEGMENT * p.segment_mb) for p in row if p.codec == codecs[0]]
             panel.plot(*zip(*bound, strict=True), linestyle=":", color=GREY)

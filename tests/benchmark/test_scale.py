@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from gvpipe.benchmark import own_process, scale
+from gvpipe.benchmark import growth, own_process, scale
 from gvpipe.benchmark.scale_plots import draw, row_of
 from gvpipe.benchmark.scale_report import ScalePoint, ScaleReport, table
 from gvpipe.benchmark.torus import make_torus
@@ -49,8 +49,15 @@ def test_reports_are_read_as_written(tmp_path: Path) -> None:
 
 
 def test_growth() -> None:
-    assert scale.exponents(POINTS, "encode_s") == pytest.approx([1, 1])
-    assert scale.exponents(LONG, "decode_s") == []
+    assert growth.exponents(POINTS, "encode_s") == pytest.approx([1, 1])
+    assert growth.exponents(LONG, "decode_s") == []
+    line = growth.fit_line(
+        [dataclasses.replace(point, encode_s=2 + point.encode_s) for point in POINTS if point.encode_s], "encode_s"
+    )
+    assert line == pytest.approx((2, 1 / 16_000, 1))
+    line = growth.fit_line([dataclasses.replace(POINTS[0], encode_s=4.0), *POINTS[1:]], "encode_s")
+    assert line and 1.1 < line.factor < 4
+    assert growth.fit_line(LONG, "encode_s") is None
     assert row_of(REPORT.scale, "vertices") == POINTS and row_of(REPORT.scale, "frames") == [LONG[0], POINTS[0], LONG[1]]
     assert row_of(POINTS, "frames") == []
     assert "| pca | 100,000 | 16 | 1,000 | 100 | 100 | 1,300 | 50.0 | 50.0 | 1,200 |" in table(POINTS)
