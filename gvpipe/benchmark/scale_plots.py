@@ -1,7 +1,7 @@
 """Processor time and memory against vertices and against frames, from a scale report alone, log axes.
 
-A grey line is the sum of a fixed cost and one that grows as vertices times frames do (`gvpipe.benchmark.growth`). Dotted: memory
-of 300 MB and six times the longest segment's positions as float32.
+A grey line is the sum of a fixed cost and one that grows as vertices times frames do (`gvpipe.benchmark.growth`). Dotted:
+memory of 300 MB and six times the longest segment's positions as float32.
 """
 
 from __future__ import annotations
