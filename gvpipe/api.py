@@ -208,7 +208,7 @@ def encode(
         target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
         asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
         with _segments_coded_by(executor, sequence, source, {"fps": fps, **options}, is_shared):
-            coded = _code(sequence, given, target, asset, clock)
+            coded = _code(sequence, given, target, asset, bare, clock)
     size, bitstream = _write(sequence, coded, path, clock, STREAM if stream else BARE if bare else PLAIN)
     clock("", 1.0)
     return Report(
@@ -505,7 +505,12 @@ class _Coded:
 
 
 def _code(
-    sequence: MeshSequence, given: Codec | Sequence[Codec], target: Target | None, asset: AssetCoder, progress: Progress
+    sequence: MeshSequence,
+    given: Codec | Sequence[Codec],
+    target: Target | None,
+    asset: AssetCoder,
+    is_bare: bool,
+    progress: Progress,
 ) -> _Coded:
     """Encode, at the quality that meets the target, with the codec that does so in the smallest file."""
     if isinstance(given, Codec):
@@ -513,9 +518,9 @@ def _code(
             encoded = encode_sequence(given, sequence, progress)
             progress("asset", 0.0)
             return _Coded(given, dataclasses.replace(encoded, bitstream=asset.add(encoded, given)))
-        choice = meet(target, given, sequence, progress, asset=asset)
+        choice = meet(target, given, sequence, progress, asset=asset, is_bare=is_bare)
     else:
-        choice = choose_codec(given, sequence, target or default_target(given), progress, asset)
+        choice = choose_codec(given, sequence, target or default_target(given), progress, asset, is_bare)
     trial = choice.trial
     check = partial(choice.trials.check, trial.encoded.permutation)
     encoded = dataclasses.replace(trial.encoded, bitstream=asset.add(trial.encoded, trial.codec))

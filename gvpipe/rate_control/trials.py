@@ -83,6 +83,7 @@ class Trials:
         bound: largest distance of a vertex from where it was, model units; None: whatever the quality gives.
         progress: called with the stages of every encode.
         asset: what is coded beside the positions; None: nothing.
+        is_bare: whether files are of the bare layout, which has no poster.
     """
 
     def __init__(
@@ -92,9 +93,11 @@ class Trials:
         bound: float | None = None,
         progress: Progress | None = None,
         asset: AssetCoder | None = None,
+        is_bare: bool = False,
     ) -> None:
         self.codec = codec
         self._sequence, self._bound, self._progress, self._asset = sequence, bound, progress, asset
+        self._is_bare = is_bare
         self._memo = Memo()
 
     def __call__(self, quality: float) -> Trial:
@@ -114,11 +117,17 @@ class Trials:
         if self._asset is not None:
             report("asset", 0.0)
             bitstream = self._asset.add(dataclasses.replace(encoded, bitstream=bitstream), codec, is_final=False)
-        video = bitstream.video or memo("poster", lambda: poster_of(self._sequence))
-        size = file_size(dataclasses.replace(bitstream, video=video))
+        size = file_size(self._as_written(bitstream))
         report("measure", 1.0)
         bpvf = 8 * size / (bitstream.n_vertices * bitstream.n_frames)
         return Trial(codec, size, bpvf, errors, Encoded(bitstream, encoded.permutation))
+
+    def _as_written(self, bitstream: Bitstream) -> Bitstream:
+        """What a file holds of an encode."""
+        if self._is_bare:
+            return dataclasses.replace(bitstream, is_bare=True)
+        video = bitstream.video or self._memo("poster", lambda: poster_of(self._sequence))
+        return dataclasses.replace(bitstream, video=video)
 
     def check(self, permutation: Integers, bitstream: Bitstream) -> None:
         """Decode a finished file's bitstream, if there is a bound, and measure every vertex.
