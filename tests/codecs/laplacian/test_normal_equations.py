@@ -12,6 +12,7 @@ from tubes import matrix_of, operator_of, tube
 
 import gvcodecs.laplacian.domain as domain
 from gvcodecs.laplacian import Laplacian
+from gvcodecs.laplacian.factor_kernels import AT_ONCE, factorise, solve_columns
 from gvcodecs.laplacian.laplace_kernels import thin_rows
 from gvcodecs.laplacian.normal_equations import (
     NO_LIMIT,
@@ -22,6 +23,7 @@ from gvcodecs.laplacian.normal_equations import (
     count_fill,
     most_products,
 )
+from gvcodecs.laplacian.operator_kernels import Lower
 from gvpipe.arrays import Float64, Int32
 from gvpipe.budget import Budget
 from gvpipe.sequence import MeshSequence
@@ -112,3 +114,24 @@ def test_random_triangles_are_counted_refused_and_coded_without_deltas(monkeypat
     with pytest.raises(TooMuchFill, match="800 points"):
         Laplacian.reader(dataclasses.replace(bitstream, budget=Budget(1 << 20)))
     assert Laplacian.reader(bitstream).read(0, 1).shape == (1, small, 3)  # unlimited
+
+
+@pytest.mark.parametrize("n_columns", [1, 8, 33])
+def test_columns_of_like_rows_are_taken_at_once(n_columns: int) -> None:
+    """A full matrix, whose columns are alike from each row on: more of them than are taken at once."""
+    n = 2 * AT_ONCE + 5
+    draw = np.random.default_rng(2)
+    root = draw.normal(size=(n, n))
+    dense = root @ root.T + np.eye(n)
+    starts = np.cumsum([0, *range(n - 1, -1, -1)])
+    rows = np.concatenate([np.arange(j + 1, n) for j in range(n)]).astype(np.int32)
+    columns = np.repeat(np.arange(n), np.arange(n - 1, -1, -1))
+    factors, at = factorise(Lower(starts, rows, dense[rows, columns], np.diag(dense).copy()), starts, rows)
+    assert at == -1
+    lower = np.eye(n)
+    lower[factors.rows, columns] = factors.values
+    assert np.allclose(lower * factors.pivots @ lower.T, dense)
+    right = draw.normal(size=(n, n_columns))
+    order, solved = draw.permutation(n).astype(np.int32), np.zeros_like(right)
+    solve_columns(factors, order, right, solved, 0, n_columns)
+    assert np.allclose(solved[order], np.linalg.solve(dense, right[order]))
