@@ -297,8 +297,14 @@ def _rebuild(target_context: Any, symbols: list[str], reduced: tuple[Any, ...]) 
     one, need it. So it is read then.
     """
     (name, kind, (code, bitcode)), *others = reduced
-    target_context.codegen()._engine._defined_symbols.update(symbols)
-    result = CompileResult._rebuild(target_context, (name, kind, (code, _nothing())), *others)
+    known = target_context.codegen()._engine._defined_symbols
+    new = set(symbols) - known
+    known |= new  # numba looks there for the kernel's address
+    try:
+        result = CompileResult._rebuild(target_context, (name, kind, (code, _nothing())), *others)
+    except BaseException:
+        known -= new
+        raise
     result.library._get_module_for_linking = functools.cache(lambda: binding.parse_bitcode(bitcode))
     return result
 

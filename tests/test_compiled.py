@@ -88,6 +88,19 @@ def test_code_comes_from_files(kernels: Any) -> None:
     assert again(3) == 6 and hits(again) == 1
 
 
+def test_kernels_that_call_loaded_ones(kernels: Any) -> None:
+    """Their callee's bitcode is read from its file when they are compiled."""
+    assert kernels().double(2) == 4
+    double = kernels().double
+    assert double(3) == 6 and hits(double) == 1
+
+    @compiled
+    def double_and_one(value: int) -> int:
+        return int(double(value)) + 1
+
+    assert double_and_one(4) == 9 and double(5) == 10 and hits(double) == 1
+
+
 def test_one_folder_serves_all_clones(kernels: Any) -> None:
     """Neither a path nor a time is part of a file's name."""
     assert kernels().scaled(2) == 2

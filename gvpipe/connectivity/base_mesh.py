@@ -240,10 +240,8 @@ def _decode_mesh(mesh: bytes, n_vertices: int, n_triangles: int) -> tuple[Array,
     draco, loose_points = cursor.take(bytes_draco), cursor.take(bytes_points)
     check_draco_header(draco, n_triangles)
     keys, draco_faces = _decode_draco(draco)
-    points, faces = (
-        _with_loose(keys[:, :3], loose_points, n_loose_points),
-        _with_loose(draco_faces, cursor.rest(), n_loose_faces),
-    )
+    points = _with_loose(keys[:, :3], loose_points, n_loose_points)
+    faces = _with_loose(draco_faces, cursor.rest(), n_loose_faces)
     if len(points) > MAX_VERTICES:
         raise corrupt_section("mesh", f"{len(points)} vertices, at most {MAX_VERTICES}")
     if points.size and points.min() < 0:

@@ -10,9 +10,7 @@ from gvpipe.arrays import Bool, Int32, Int64, UInt32, UInt64
 from gvpipe.compiled import compiled, inlined
 from gvpipe.connectivity.visit_symbols import ESCAPE, EXACT_RANKS
 from gvpipe.entropy.range_decoder import decode_symbols, decode_uniform
-from gvpipe.mesh.graph_kernels import Graph
-
-SHORT_LIST = 64  # neighbours that are sorted by insertion
+from gvpipe.mesh.graph_kernels import SHORT_LIST, Graph, count_sides, list_sides
 
 
 class NeighbourLists(NamedTuple):
@@ -89,9 +87,7 @@ def sort_neighbours(points: Int64, faces: Int64, twins: Int64) -> NeighbourLists
 @compiled
 def _count(faces: Int64, twins: Int64, starts: Int64) -> int:
     """Fill ``starts``; every triangle counts for itself. Return how many neighbours there are."""
-    for t in range(len(faces)):
-        for k in range(3):
-            starts[faces[t, k] + 1] += 2
+    count_sides(faces, starts)
     for t in range(len(twins)):
         for k in range(2):
             starts[twins[t, k] + 1] += 1
@@ -103,12 +99,7 @@ def _count(faces: Int64, twins: Int64, starts: Int64) -> int:
 @compiled
 def _list(faces: Int64, twins: Int64, ends: Int64, neighbours: Int32) -> None:
     """Fill lists that begin at ``ends``, which move behind them."""
-    for t in range(len(faces)):
-        for k in range(3):
-            here = faces[t, k]
-            neighbours[ends[here]] = faces[t, k + 1 if k < 2 else 0]
-            neighbours[ends[here] + 1] = faces[t, k - 1 if k > 0 else 2]
-            ends[here] += 2
+    list_sides(faces, ends, neighbours)
     for t in range(len(twins)):
         for k in range(2):
             neighbours[ends[twins[t, k]]] = twins[t, 1 - k]

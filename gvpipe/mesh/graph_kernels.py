@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int32, Int64
+from gvpipe.arrays import Int32, Int64, Integers
 from gvpipe.compiled import compiled
 
 SHORT_LIST = 64  # neighbours that are sorted by insertion
@@ -28,25 +28,25 @@ class Graph(NamedTuple):
 def link_vertices(faces: Int32, n_vertices: int) -> Graph:
     """The graph of ``faces (T, 3)`` over V vertices; collapsed sides of degenerate triangles are no edges."""
     starts = np.zeros(n_vertices + 1, np.int64)
-    _count_corners(faces, starts)
+    count_sides(faces, starts)
+    for v in range(n_vertices):
+        starts[v + 1] += starts[v]
     neighbours = np.empty(starts[n_vertices], np.int32)
-    _list_sides(faces, starts.copy(), neighbours)
+    list_sides(faces, starts.copy(), neighbours)
     _sort_lists(starts, neighbours)
     return Graph(starts, neighbours[: starts[n_vertices]].copy())
 
 
 @compiled
-def _count_corners(faces: Int32, starts: Int64) -> None:
-    """Fill bounds of lists that have two places for each corner."""
+def count_sides(faces: Integers, starts: Int64) -> None:
+    """Count two places for each corner of ``faces (T, 3)``, at the number after its vertex'."""
     for t in range(len(faces)):
         for k in range(3):
             starts[faces[t, k] + 1] += 2
-    for v in range(len(starts) - 1):
-        starts[v + 1] += starts[v]
 
 
 @compiled
-def _list_sides(faces: Int32, ends: Int64, neighbours: Int32) -> None:
+def list_sides(faces: Integers, ends: Int64, neighbours: Int32) -> None:
     """Put the other corners of its triangles into each vertex' list; ``ends``, where the lists begin, move on."""
     for t in range(len(faces)):
         for k in range(3):
@@ -57,6 +57,14 @@ def _list_sides(faces: Int32, ends: Int64, neighbours: Int32) -> None:
 
 
 @compiled
+def sort_stably(numbers: Int32) -> None:
+    """Sort numbers; a merge sort, since a file could give an order in which numba's quicksort takes quadratic time."""
+    ordered = numbers[np.argsort(numbers, kind="mergesort")]
+    for i in range(len(numbers)):
+        numbers[i] = ordered[i]
+
+
+@compiled
 def _sort_lists(starts: Int64, neighbours: Int32) -> None:
     """Sort each list, leave out the vertex itself and who is there twice, and close up the gaps."""
     kept = 0
@@ -64,7 +72,7 @@ def _sort_lists(starts: Int64, neighbours: Int32) -> None:
         first, stop = starts[v], starts[v + 1]
         starts[v] = kept
         if stop - first > SHORT_LIST:
-            neighbours[first:stop].sort()
+            sort_stably(neighbours[first:stop])
         begin = kept
         for i in range(first, stop):
             y = neighbours[i]
@@ -90,7 +98,7 @@ def lower_neighbours(graph: Graph) -> tuple[Int64, Int64]:
             lower[end] = graph.neighbours[k]  # the next one takes its place unless it counts
             end += graph.neighbours[k] < v
         starts[v + 1] = end
-    return starts, lower[:end]
+    return starts, lower[:end]  # the rest was never written, and takes no memory
 
 
 @compiled

@@ -1,11 +1,11 @@
 """The codec, with its settings, that meets a target with the smallest file.
 
-1. Every candidate meets the target roughly on the sequence's first frames. Of a short and small sequence these are all of it:
-   then the encodes are gone on with.
+1. Every candidate meets the target roughly on the sequence's first frames.
 2. Its size for all frames is estimated: shared + per_frame * (error / target)^ELASTICITY * F / SAMPLE. Sections named
    ``NAME.N`` and the video are per frame, the others shared. For a target in bits, its error at that size is estimated.
 3. The candidates with the smallest estimates encode all frames.
-4. The smallest file is kept; for a target in bits, the one with the smallest error.
+4. The smallest file is kept; for a target in bits, the one with the smallest error. Estimates of short and small sequences are
+   encodes of all frames, so the best of them counts, too.
 
 Estimates of one codec with several settings err alike where the first frames differ from the others. So two codecs encode a
 longer sequence.
@@ -14,8 +14,8 @@ longer sequence.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, cast
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, cast
 
 from gvpipe.codec import Codec, Progress
 from gvpipe.errors import InputError
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 SAMPLE = 100  # frames of an estimate
 ELASTICITY = 0.45  # bytes per frame are about proportional to the error to minus this power
 CLOSE = 1.08  # times the best estimate: another candidate that may be the smallest
-KEPT = 1 << 20  # vertices times frames, up to which the encodes of all candidates are kept
+KEPT = 1 << 20  # vertices times frames, up to which estimates are kept: what their searches know takes memory
 FEW = 2  # candidates that need no estimate
 MOST = 3  # candidates that encode all frames, where there are estimates
 
@@ -68,27 +68,27 @@ def choose_codec(
     Raises:
         InputError: no codec meets the target; the message says why.
     """
-    ranking, estimates, n_finalists = [_Estimate(0.0, codec, None) for codec in codecs], "", len(codecs)
+    ranking, estimates, n_finalists = list(codecs), "", len(codecs)
+    whole: list[Choice] = []  # estimates that are encodes of all there is
     if len(codecs) > FEW:
-        is_whole = sequence.n_frames <= SAMPLE and sequence.n_frames * sequence.n_vertices <= KEPT
-        keeps = is_whole and (asset is None or asset.is_empty)
-        costs = [_estimate(codec, sequence, target, progress, is_bare, keeps) for codec in codecs]
-        costs.sort(key=lambda estimate: estimate.cost)
+        is_small = sequence.n_frames <= SAMPLE and sequence.n_frames * sequence.n_vertices <= KEPT
+        keep = whole.append if is_small and (asset is None or asset.is_empty) else None
+        costs = [_estimate(codec, sequence, target, progress, is_bare, keep) for codec in codecs]
+        costs.sort(key=lambda item: item[0])
         chosen = _finalists(costs, sequence.n_frames > SAMPLE)
-        ranking = [*chosen, *(estimate for estimate in costs if estimate not in chosen)]
+        ranking = [*chosen, *(codec for _, codec in costs if codec not in chosen)]
         n_finalists = len(chosen)
         unit = "KG" if target.measure == "bpvf" else "bytes"
-        listed = ", ".join(f"{describe(estimate.codec)} {estimate.cost:.4g}" for estimate in costs)
-        estimates = f"; estimates ({unit}): {listed}"
+        estimates = f"; estimates ({unit}): {', '.join(f'{describe(codec)} {cost:.4g}' for cost, codec in costs)}"
     finalists: list[Choice] = []
     failures = []
-    for estimate in ranking:
+    for codec in ranking:
         if len(finalists) < n_finalists:
             try:
-                before = estimate.choice
-                finalists.append(meet(target, estimate.codec, sequence, progress, False, asset, is_bare, before))
+                finalists.append(meet(target, codec, sequence, progress, asset=asset, is_bare=is_bare))
             except InputError as exc:
                 failures.append(str(exc))
+    finalists += sorted(whole, key=lambda choice: _cost(choice.trial, target))[:1]
     if not finalists:
         raise InputError(f"no codec meets the target: {'; '.join(dict.fromkeys(failures))}")
     best = min(finalists, key=lambda choice: _cost(choice.trial, target))
@@ -98,40 +98,41 @@ def choose_codec(
     return Choice(best.trial, best.trials, [trial for choice in finalists for trial in choice.tried], reason)
 
 
-class _Estimate(NamedTuple):
-    """What meeting the target will cost (infinity: it is not met), the settings at the quality that met it, and the encodes."""
-
-    cost: float
-    codec: Codec
-    choice: Choice | None
-
-
-def _finalists(costs: list[_Estimate], is_part: bool) -> list[_Estimate]:
+def _finalists(costs: list[tuple[float, Codec]], is_part: bool) -> list[Codec]:
     """The candidates that encode all frames; ``costs`` are sorted, and estimated from some frames if ``is_part``."""
-    close = [estimate for estimate in costs if estimate.cost <= CLOSE * costs[0].cost][:MOST]
-    rival = next((estimate for estimate in costs if estimate.codec.id != close[0].codec.id), None)
+    close = [codec for cost, codec in costs if cost <= CLOSE * costs[0][0]][:MOST]
+    rival = next((codec for _, codec in costs if codec.id != close[0].id), None)
     if is_part and rival and rival not in close:
         close = [*close[: MOST - 1], rival]
     return close
 
 
 def _estimate(
-    codec: Codec, sequence: MeshSequence, target: Target, progress: Progress | None, is_bare: bool, keeps: bool
-) -> _Estimate:
-    """Estimate what a codec costs; ``keeps`` its encodes, which are of all frames."""
+    codec: Codec,
+    sequence: MeshSequence,
+    target: Target,
+    progress: Progress | None,
+    is_bare: bool,
+    keep: Callable[[Choice], None] | None,
+) -> tuple[float, Codec]:
+    """The estimated cost (infinity: it does not meet the target), and the settings at the quality that met it.
+
+    ``keep`` is called with an estimate that meets the target.
+    """
     n_sample = min(SAMPLE, sequence.n_frames)
     try:
-        choice = meet(target, codec, sequence.part(0, n_sample).bare(), progress, True, is_bare=is_bare)
+        choice = meet(target, codec, sequence.part(0, n_sample).bare(), progress, is_rough=True, is_bare=is_bare)
     except InputError:
-        return _Estimate(float("inf"), codec, None)
-    trial, kept = choice.trial, choice if keeps else None
-    quality = trial.codec.quality
+        return float("inf"), codec
+    if keep:
+        keep(choice)
+    trial, quality = choice.trial, choice.trial.codec.quality
     better = cast("Codec", dataclasses.replace(cast("DataclassInstance", codec), quality=quality))
     if target.measure == "bpvf":
-        return _Estimate(_cost(trial, target) * (trial.bpvf / target.value) ** (1 / ELASTICITY), better, kept)
+        return _cost(trial, target) * (trial.bpvf / target.value) ** (1 / ELASTICITY), better
     shared = sum(len(data) for name, data in trial.bitstream.sections.items() if not name[-1].isdigit())
     off = 1.0 if target.measure == "max" else target.of(trial) / target.value
-    return _Estimate(shared + (trial.bytes - shared) * off**ELASTICITY * sequence.n_frames / n_sample, better, kept)
+    return shared + (trial.bytes - shared) * off**ELASTICITY * sequence.n_frames / n_sample, better
 
 
 def _cost(trial: Trial, target: Target) -> float:

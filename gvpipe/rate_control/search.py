@@ -46,26 +46,23 @@ def meet(
     is_rough: bool = False,
     asset: AssetCoder | None = None,
     is_bare: bool = False,
-    before: Choice | None = None,
 ) -> Choice:
     """Encode at the quality that meets a target, within 3 % or, for estimates, roughly.
 
     The search starts at the quality of that rmse or KG error, for other targets at the codec's own. What ``asset`` codes beside
-    the positions counts as bytes of the file, and ``is_bare`` says whether that is of the bare layout. ``before`` is what an
-    estimate found for the same frames, without an asset: the search goes on from there.
+    the positions counts as bytes of the file, and ``is_bare`` says whether that is of the bare layout.
 
     Raises:
         InputError: no quality meets it.
     """
     if target.measure == "max":
-        trials = before.trials if before else Trials(codec, sequence, target.value, progress, asset, is_bare)
-        gain, known = ROUGH_GAIN if is_rough else LEAST_GAIN, before.tried if before else ()
-        trial, tried = find_smallest(trials, target.value, codec.quality, gain, known)
+        trials = Trials(codec, sequence, target.value, progress, asset, is_bare)
+        trial, tried = find_smallest(trials, target.value, codec.quality, ROUGH_GAIN if is_rough else LEAST_GAIN)
         reason = (
             f"quality {trial.codec.quality:.4g} is the smallest of {len(tried)}, {trial.corrections} bytes of it corrections"
         )
         return Choice(trial, trials, tried, reason)
-    trials = before.trials if before else Trials(codec, sequence, None, progress, asset, is_bare)
+    trials = Trials(codec, sequence, None, progress, asset, is_bare)
     tolerance = ROUGH_TOLERANCE if is_rough else TOLERANCE
     trial, tried = find_quality(trials, target, _start(target, codec, sequence, tolerance), tolerance)
     found = target.of(trial)

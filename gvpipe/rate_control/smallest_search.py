@@ -7,7 +7,7 @@ sizes, the middle one least, predicts it; their logarithms are nearer to a parab
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 from gvpipe.quality_scale import BELOW, on_scale
@@ -23,11 +23,7 @@ LEAST_GAIN = 0.003  # part of the size that one more encode must promise to save
 
 
 def find_smallest(
-    attempt: Callable[[float], Trial],
-    bound: float,
-    start: float,
-    tolerance: float = LEAST_GAIN,
-    known: Sequence[Trial] = (),
+    attempt: Callable[[float], Trial], bound: float, start: float, tolerance: float = LEAST_GAIN
 ) -> tuple[Trial, list[Trial]]:
     """Search the quality whose file, corrections to ``bound`` included, is smallest.
 
@@ -36,15 +32,14 @@ def find_smallest(
         bound: largest distance of a vertex from where it was, model units.
         start: the first quality.
         tolerance: part of the size that one more encode must promise to save.
-        known: trials of another search for the same, which this one goes on with.
 
     Returns:
         The trial with the smallest file, and all trials, in order.
     """
-    tried = [*known] or [attempt(start)]
+    tried = [attempt(start)]
     rmse = tried[0].errors.rmse
     second = on_scale(start + _limited(math.log(BOUND_RATIO * rmse / bound) / BELOW)) if rmse > 0 else start
-    if second != start and not known:  # there the rmse is a usual part of the bound
+    if second != start:  # there the rmse is a usual part of the bound
         tried.append(attempt(second))
     step = FIRST_STEP
     while len(tried) < MOST_ENCODES:

@@ -40,7 +40,7 @@ class Trial:
         bytes: size of the whole file.
         bpvf: the same, bits per vertex and frame.
         errors: of the decoded frames.
-        encoded: the bitstream with its poster, ready to be written.
+        encoded: the bitstream.
     """
 
     codec: Codec
@@ -51,7 +51,7 @@ class Trial:
 
     @property
     def bitstream(self) -> Bitstream:
-        """With its poster, ready to be written."""
+        """As it is coded, without a poster."""
         return self.encoded.bitstream
 
     @property

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gvpipe.connectivity.vertex_order import nearest_numbers
-from gvpipe.connectivity.visit_kernels import SHORT_LIST, sort_neighbours
-from gvpipe.mesh.graph_kernels import link_vertices
+from gvpipe.connectivity.visit_kernels import sort_neighbours
+from gvpipe.mesh.graph_kernels import SHORT_LIST, link_vertices
 
 NO_TWINS = np.zeros((0, 2), np.int64)
 

@@ -154,6 +154,7 @@ class BlendedMotion:
         """As `Motion.rebuild`."""
         transforms = [self._transforms_of(frame) for frame in range(first, first + len(pictures))]
         if self._header.pictures:
+            _ = self._points  # found now, before two threads ask for it
             return shared_out([*map(self._rebuild_one, transforms, pictures)])
         return [partial(self._rebuild_all, span, np.stack(transforms)) for span in self._spans]
 

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from blends import apply_weights, blended
 
-from gvcodecs.mcgv.motion.reconstruction_kernels import Sites, in_rows, rebuild_blended, skinned_points
-from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit, Weights, homogeneous
+from gvcodecs.mcgv.motion.reconstruction_kernels import (
+    AT_ONCE,
+    Sites,
+    in_rows,
+    rebuild_blended,
+    rebuild_without_pictures,
+    skinned_points,
+)
+from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Blend, BlendFit, Weights, homogeneous
 
 
 def test_blend_is_linear_in_its_transforms() -> None:
@@ -41,3 +49,24 @@ def test_rebuilding_is_base_blend_and_residual() -> None:
     wanted = base + apply_weights(points, weights, transforms)
     wanted[vertices] += 0.01 * (samples[:, pixels].T.astype(float) - 128)
     assert np.allclose(result, wanted, atol=1e-5)
+
+
+@pytest.mark.parametrize("n_vertices", [1, AT_ONCE - 1, AT_ONCE, 3 * AT_ONCE + 7])
+def test_frames_without_pictures_are_those_of_no_residual(n_vertices: int) -> None:
+    """To the bit, whatever the order of vertices; some points follow one cluster, some four."""
+    draw = np.random.default_rng(n_vertices)
+    n_points, n_frames = n_vertices // 2 + 1, 3
+    points, parts = draw.integers(0, n_points, n_vertices), np.zeros((n_points, INFLUENCES), np.int32)
+    for point, used in enumerate(draw.integers(1, INFLUENCES + 1, n_points)):
+        parts[point, :used] = draw.multinomial(TOTAL - used, np.ones(used) / used) + 1
+    weights = Weights(np.where(parts > 0, draw.integers(0, 5, parts.shape), 0).astype(np.int32), parts)
+    base, coordinates = draw.standard_normal((n_vertices, 3)), homogeneous(draw.standard_normal((n_points, 3)))
+    vertices, slots = (draw.permutation(n_vertices) for _ in range(2))
+    transforms = np.stack([in_rows(each) for each in draw.standard_normal((n_frames, 5, 4, 3))])
+    found, wanted = (np.zeros((n_frames, n_vertices, 3), np.float32) for _ in range(2))
+    rebuild_without_pictures(vertices, slots, base, points, coordinates, weights, transforms, found)
+    sites = Sites(vertices, np.zeros(n_vertices, np.int64), np.zeros(1))
+    skinned = skinned_points(slots, base, points, coordinates, weights)
+    for frame, own in zip(wanted, transforms, strict=True):
+        rebuild_blended(np.zeros((3, 1), np.uint8), sites, skinned, own, frame)
+    assert np.array_equal(found, wanted)
