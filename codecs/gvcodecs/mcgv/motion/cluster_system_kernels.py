@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvcodecs.mcgv.motion.skinning import NormalEquations
 from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.compiled import compiled, inlined
 from gvpipe.lanes import COORDINATES, load_point, same_point, store_point
@@ -21,6 +20,21 @@ from gvpipe.lanes import COORDINATES, load_point, same_point, store_point
 NONE = -1
 BLOCK = COORDINATES * COORDINATES
 LEAST = 1e-12  # a pivot of what depends on other unknowns but for rounding
+
+
+class NormalEquations(NamedTuple):
+    """Normal equations of all clusters' transforms: a block for every two clusters that share a point, and the right side.
+
+    Args:
+        rows, columns: ``(n,) int64`` the clusters of each block, sorted by row, then by column.
+        blocks: ``(n, 4, 4)``.
+        right: ``(K, 4, m)``.
+    """
+
+    rows: Int64
+    columns: Int64
+    blocks: Float64
+    right: Float64
 
 
 class Blocks(NamedTuple):

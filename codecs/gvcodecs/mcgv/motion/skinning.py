@@ -21,9 +21,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy import sparse
 
-from gvpipe.arrays import Float64, Int32, Int64
+from gvpipe.arrays import Float64, Int32
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
+    from gvcodecs.mcgv.motion.cluster_system_kernels import NormalEquations
     from gvpipe.trajectory.product_kernels import Rows
 
 INFLUENCES = 4  # most clusters that a point follows
@@ -41,21 +42,6 @@ class Weights(NamedTuple):
 
     clusters: Int32
     weights: Int32
-
-
-class NormalEquations(NamedTuple):
-    """Normal equations of all clusters' transforms: a block for every two clusters that share a point, and the right side.
-
-    Args:
-        rows, columns: ``(n,) int64`` the clusters of each block, sorted by row, then by column.
-        blocks: ``(n, 4, 4)``.
-        right: ``(K, 4, m)``.
-    """
-
-    rows: Int64
-    columns: Int64
-    blocks: Float64
-    right: Float64
 
 
 class Blend:

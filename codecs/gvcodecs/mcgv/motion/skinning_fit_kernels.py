@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvcodecs.mcgv.motion.skinning import NormalEquations
+from gvcodecs.mcgv.motion.cluster_system_kernels import NormalEquations
 from gvpipe.arrays import Float64, Int32, Int64
 from gvpipe.compiled import compiled
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gvcodecs.mcgv.motion.blend_kernels import find_energies, invert_factors
-from gvcodecs.mcgv.motion.skinning import INFLUENCES, RIDGE, ClusterSystem, NormalEquations, homogeneous
+from gvcodecs.mcgv.motion.cluster_system_kernels import NormalEquations
+from gvcodecs.mcgv.motion.skinning import INFLUENCES, RIDGE, ClusterSystem, homogeneous
 from gvcodecs.mcgv.motion.skinning_fit_kernels import normal_equations
 from gvpipe.arrays import Float64
 
