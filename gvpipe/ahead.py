@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from itertools import islice
+from threading import Event
 from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
@@ -20,15 +21,18 @@ MANY = 1 << 15  # items that pay for another thread
 AHEAD = 2  # results that are worked out at the same time, while the last one is used
 
 
-def run_ahead(function: Callable[[Item], Result], items: Sequence[Item], ahead: int = AHEAD) -> Iterator[Result]:
-    """Yield ``function(item)`` for each item in turn, worked out on up to ``ahead`` other threads, from the call on.
+def run_ahead(
+    function: Callable[[Item], Result], items: Sequence[Item], ahead: int = AHEAD, n_threads: int | None = None
+) -> Iterator[Result]:
+    """Yield ``function(item)`` for each item in turn, up to ``ahead`` of them worked out on other threads, from the call on.
 
+    With one of ``n_threads``, which are as many as are ahead if not given, an item is begun when the one before it is done.
     One item alone, or all where ``ahead`` is 0, are worked out by the caller's thread when they are asked for. Errors of
     ``function`` are raised in the place of its result; nothing further is begun then.
     """
     if len(items) < 2 or ahead < 1:
         return map(function, items)
-    return _Ahead(function, items, ahead)
+    return _Ahead(function, items, ahead, n_threads or ahead)
 
 
 @contextmanager
@@ -53,9 +57,11 @@ def halves(n: int, many: int = MANY) -> list[slice]:
 class _Ahead(Generic[Item, Result]):
     """Results in turn; who drops it waits for what has begun, since that may read the caller's files."""
 
-    def __init__(self, function: Callable[[Item], Result], items: Sequence[Item], ahead: int) -> None:
+    def __init__(self, function: Callable[[Item], Result], items: Sequence[Item], ahead: int, n_threads: int) -> None:
         self._function, self._rest = function, iter(items)
-        self._pool = ThreadPoolExecutor(ahead, "gvpipe-ahead")
+        self._pool = ThreadPoolExecutor(n_threads, "gvpipe-ahead")
+        if n_threads == 1:
+            self._function = _until_one_fails(function)
         self._pending: deque[Future[Result]] = deque()
         self._begin(ahead)
 
@@ -83,3 +89,19 @@ class _Ahead(Generic[Item, Result]):
     def _end(self) -> None:
         self._pending.clear()
         self._pool.shutdown(cancel_futures=True)
+
+
+def _until_one_fails(function: Callable[[Item], Result]) -> Callable[[Item], Result]:
+    """As ``function``, for items one after the other; those after an error, which the caller finds first, are left out."""
+    has_failed = Event()
+
+    def call(item: Item) -> Result:
+        if has_failed.is_set():
+            raise CancelledError
+        try:
+            return function(item)
+        except BaseException:
+            has_failed.set()
+            raise
+
+    return call

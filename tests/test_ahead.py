@@ -41,6 +41,24 @@ def test_no_more_is_begun_than_asked_for() -> None:
     assert max(begun) <= 2  # the one returned, and two ahead
 
 
+def test_one_thread_begins_an_item_when_the_one_before_is_done() -> None:
+    begun: list[int] = []
+
+    def begin(n: int) -> int:
+        begun.append(n)
+        time.sleep(0.01)
+        assert begun[-1] == n
+        if n == 3:
+            raise ValueError("three")
+        return n
+
+    results = run_ahead(begin, range(9), 9, n_threads=1)
+    time.sleep(0.2)
+    assert begun == [0, 1, 2, 3]  # nobody had to ask, and nothing is begun after an error
+    with pytest.raises(ValueError, match="three"):
+        list(results)
+
+
 @pytest.mark.parametrize("taken", [0, 1])
 def test_who_drops_results_waits_for_what_has_begun(taken: int) -> None:
     ended: list[int] = []

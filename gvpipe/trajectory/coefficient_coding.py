@@ -124,7 +124,8 @@ def decode_vectors(
         coder.check(decode_residuals(residuals, inputs, coder.stream, *blocks))
         return int(causal.blocks[blocks[0]]), int(causal.blocks[blocks[1]])
 
-    for begin, end in run_ahead(take, _parts(causal.blocks[: wanted + 1]), 1):  # predict while the next ones are decoded
+    parts = _parts(causal.blocks[: wanted + 1])
+    for begin, end in run_ahead(take, parts, len(parts), n_threads=1):  # predict while the next ones are decoded
         predict_vectors(causal, step, ranked, decoded, None, predictor, beta, begin, end)
     if n_blocks is None:
         coder.end()
