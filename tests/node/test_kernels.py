@@ -194,3 +194,12 @@ def compare(calls: list[Call], folder: Path) -> None:
                 continue
             assert (value.dtype.name, list(value.shape)) == (kept["type"], kept["shape"]), (name, number)
             assert value.tobytes() == found[kept["at"] : kept["at"] + value.nbytes], (name, number)
+
+
+@NODE
+@pytest.mark.parametrize(("failures", "wanted"), [(0, [1, "open"]), (1, [2, "open"]), (2, [2, "RangeError"])])
+def test_memory_is_asked_for_twice(failures: int, wanted: list[Any]) -> None:
+    """Browsers give back the memories of workers some time after they ended."""
+    script = Path(__file__).with_name("run_memory.mjs")
+    ended = subprocess.run(["node", script, str(failures)], capture_output=True, text=True, check=True)
+    assert json.loads(ended.stdout) == wanted

@@ -28,6 +28,7 @@ const PAGE = 65536;
 const HEADER = 64; // bytes before the data of what kernels allocate
 const SMALL = 1 << 20; // bytes; below, sizes are powers of two
 const ALIGNMENT = 64;
+const WAIT = 500; // ms, until memory is asked for once more
 const RESULT = 1024; // bytes; a tuple of ten arrays takes fewer
 
 const modules = new WeakMap(); // bytes -> promise of what they compile to: instances share machine code
@@ -45,10 +46,17 @@ function refused(error) {
 
 /** Kernels with a memory of their own, which is freed as a whole: with this object. */
 export class Kernels {
-  /** @param {Uint8Array} bytes of `kernels.wasm` @returns {Promise<Kernels>} */
+  /** @param {Uint8Array} bytes of `kernels.wasm` @returns {Promise<Kernels>} @throws {RangeError} there is no memory for more */
   static async open(bytes) {
     if (!modules.has(bytes)) modules.set(bytes, WebAssembly.compile(bytes).catch((error) => Promise.reject(refused(error))));
-    return new Kernels(await modules.get(bytes));
+    const module = await modules.get(bytes);
+    try {
+      return new Kernels(module);
+    } catch (error) {
+      if (!(error instanceof RangeError)) throw error;
+    }
+    await new Promise((resolve) => setTimeout(resolve, WAIT)); // memories of workers that ended are given back some time later
+    return new Kernels(module);
   }
 
   #module;
