@@ -123,7 +123,7 @@ def decode_seams(
     if order:
         if adaptive:
             visits = adaptive_order.decode_adaptive_order(order, points, faces)
-        elif graph and len(points) == n_points:  # no seams
+        elif graph is not None and len(points) == n_points:  # no seams
             visits = decode_order(order, nearest_numbers(graph))
         else:
             visits = decode_order(order, neighbour_lists(_as_lattice(points), faces))

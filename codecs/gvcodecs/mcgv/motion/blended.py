@@ -156,7 +156,8 @@ class BlendedMotion:
         if self._header.pictures:
             _ = self._points  # found now, before two threads ask for it
             return shared_out([*map(self._rebuild_one, transforms, pictures)])
-        return [partial(self._rebuild_all, span, np.stack(transforms)) for span in self._spans]
+        stacked = np.stack(transforms)
+        return [partial(self._rebuild_all, span, stacked) for span in self._spans]
 
     def _rebuild_one(self, transforms: Float64, samples: Array) -> Fill:
         """What fills a frame, given its transforms and its picture."""

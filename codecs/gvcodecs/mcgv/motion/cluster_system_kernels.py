@@ -2,7 +2,7 @@
 
 Few clusters share points, so that the matrix is sparse. A block is one entry of an ordinary sparse factorisation: columns are
 eliminated in an order that leaves few blocks, and each waits at the row that it changes next. Blocks of the factor are kept
-turned, one after the other, so that the four numbers of a row of `gvpipe.lanes` are used with one number of another block.
+turned. So four numbers of one block, a row of `gvpipe.lanes`, are multiplied with one number of another.
 
 Encoders alone solve these equations: decoders are told the transforms.
 """
