@@ -7,7 +7,6 @@ sequence with every codec, beside each other, and keep what they compile (`gvpip
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -21,6 +20,7 @@ import numpy as np
 from gvpipe import api
 from gvpipe.atomic import atomic_files, temporary_folder
 from gvpipe.errors import GvpipeError, InputError
+from gvpipe.isolation.python import run_python
 from gvpipe.registry import codec_ids
 
 if TYPE_CHECKING:
@@ -95,14 +95,9 @@ def _run_tasks(environment: dict[str, str], progress: Callable[[str, float], Non
 
 
 def _run_task(task: str, environment: dict[str, str]) -> None:
-    command = [sys.executable, "-W", "ignore", "-m", "gvpipe.warmup", task]
-    path = os.pathsep.join(entry for entry in sys.path if entry)  # where gvpipe was found, the codecs are
-    ended = subprocess.run(
-        command, env={**os.environ, "PYTHONPATH": path, **environment}, stdin=subprocess.DEVNULL, capture_output=True, text=True
-    )
-    if ended.returncode:
-        reason = (ended.stderr.strip().splitlines() or [f"status {ended.returncode}"])[-1]
-        raise GvpipeError(f"compiling for {task} failed: {reason}")
+    ended = run_python(["-W", "ignore", "-m", "gvpipe.warmup", task], environment)
+    if ended.status:
+        raise GvpipeError(f"compiling for {task} failed: {ended.last_line}")
 
 
 def run_task(task: str) -> None:

@@ -5,8 +5,6 @@ The process writes its memory to a file as it ends: what the system tells of an 
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -14,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gvpipe.errors import InputError
+from gvpipe.isolation.python import TimeoutExpired, run_python
 
 ENTRY = """
 import sys
@@ -22,7 +21,6 @@ write_peak_at_exit(sys.argv.pop(1))
 from gvpipe.cli import main
 main()
 """
-LAST_LINE = -1  # of standard error, which says why
 
 
 @dataclass(frozen=True)
@@ -50,15 +48,12 @@ def measure_command(words: Sequence[str], limit: float | None = None) -> Cost | 
         told = Path(folder, "peak")
         before, started = _children_seconds(), time.perf_counter()
         try:
-            done = subprocess.run(
-                [sys.executable, "-c", ENTRY, str(told), *words], capture_output=True, text=True, timeout=limit, check=False
-            )
-        except subprocess.TimeoutExpired:
+            done = run_python(["-c", ENTRY, str(told), *words], limit=limit)
+        except TimeoutExpired:
             return None
         seconds, after = time.perf_counter() - started, _children_seconds()
-        if done.returncode:
-            why = (done.stderr.strip().splitlines() or [f"status {done.returncode}, as when memory runs out"])[LAST_LINE]
-            raise InputError(f"gvpipe {' '.join(words)} failed: {why}")
+        if done.status:
+            raise InputError(f"gvpipe {' '.join(words)} failed: {done.last_line}")
         peak = told.read_text()
     return Cost(seconds, None if before is None or after is None else after - before, float(peak) if peak else None)
 

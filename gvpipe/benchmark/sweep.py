@@ -8,15 +8,12 @@ are read at random and compared with the whole.
 from __future__ import annotations
 
 import dataclasses
-import multiprocessing
 import os
 import platform
 import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +29,8 @@ from gvpipe.errors import GvpipeError, InputError
 from gvpipe.metrics.comparison import compare
 from gvpipe.rate_control.purposes import VARIANTS
 from gvpipe.registry import codec_class, codec_ids
+from gvpipe.tasks.executor import Work, WorkerDied
+from gvpipe.tasks.processes import Processes
 
 QUALITIES = (0.0, 20.0, 40.0, 60.0, 75.0, 90.0, 100.0)
 MEASURED = {
@@ -128,14 +127,23 @@ def settings_of(codec: str, qualities: Sequence[float], texts: Mapping[str, str]
 
 
 def _in_own_process(source: str, codec: str, qualities: list[float], texts: dict[str, str]) -> Curve:
-    context = multiprocessing.get_context("spawn")
-    try:
-        with ProcessPoolExecutor(1, mp_context=context) as pool:
-            return pool.submit(measure_curve, source, codec, qualities, texts).result()
-    except BrokenProcessPool as exc:
-        raise InputError(f"measuring {codec} on {source} ended early, as when memory runs out; measure fewer frames") from exc
-    except OSError as exc:
-        raise output_error(tempfile.gettempdir(), exc) from exc
+    with Processes(1, attempts=1) as processes:
+        (outcome,) = processes.run(_measuring, b"", [(source, codec, qualities, texts)])
+    if isinstance(outcome.error, WorkerDied):
+        raise InputError(
+            f"measuring {codec} on {source} ended early, as when memory runs out ({outcome.error}); measure fewer frames"
+        ) from outcome.error
+    if isinstance(outcome.error, OSError):
+        raise output_error(tempfile.gettempdir(), outcome.error) from outcome.error
+    if outcome.error is not None:
+        raise outcome.error
+    curve: Curve = outcome.value
+    return curve
+
+
+def _measuring(data: bytes) -> Work:
+    """What a process does with a task."""
+    return lambda task: measure_curve(*task)
 
 
 def _time(sequence: gvpipe.MeshSequence, codec: Any, path: Path) -> dict[str, Any]:

@@ -10,8 +10,6 @@ from __future__ import annotations
 import contextlib
 import os
 import pickle
-import subprocess
-import sys
 import time
 import weakref
 from pathlib import Path
@@ -21,6 +19,7 @@ from gvpipe.errors import InputError, TopologyChange, printable
 from gvpipe.forks import ForkLock, renew_after_fork
 from gvpipe.io.damage import unreadable
 from gvpipe.io.library_worker import CHANGED, REFUSED, TOO_LONG
+from gvpipe.isolation.python import Process, TimeoutExpired, start_python
 
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # numpy loads 10 to 20 ms earlier, and has no large products here
 LONGEST_END = 10.0  # seconds until a process that has closed its pipe has ended
@@ -41,7 +40,7 @@ class LibraryProcess:
         self._path, self._module, self._kind, self._died = path, module, kind, died
         self._lock = ForkLock()
         self._prepared: list[tuple[str, tuple[Any, ...]]] = []
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: Process[bytes] | None = None
         self._finalizer: Any = None
         self._asked = 0.0  # when that was last
         renew_after_fork(self)
@@ -125,9 +124,9 @@ class LibraryProcess:
             raise unreadable(self._path, self._kind, said)
         return result
 
-    def _end_of(self, process: subprocess.Popen[bytes]) -> str:
+    def _end_of(self, process: Process[bytes]) -> str:
         """Why it has ended."""
-        with contextlib.suppress(subprocess.TimeoutExpired):  # it has closed its pipe, and lives
+        with contextlib.suppress(TimeoutExpired):  # it has closed its pipe, and lives
             if TOO_LONG and process.wait(LONGEST_END) == TOO_LONG:
                 return "its library took more time than its size allows; if you trust it, use --unlimited (unlimited=True)"
         return self._died
@@ -146,18 +145,12 @@ def _make_room() -> None:
         each.rest()
 
 
-def start_process(module: str, path: Path) -> subprocess.Popen[bytes]:
+def start_process(module: str, path: Path) -> Process[bytes]:
     """A new Python that runs a module, with a path as its argument and pipes for requests and answers."""
-    return subprocess.Popen(
-        [sys.executable, "-m", module, os.fspath(path)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **ONE_THREAD},
-    )
+    return start_python(["-m", module, os.fspath(path)], ONE_THREAD)
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def _end(process: Process[bytes]) -> None:
     process.kill()
     for pipe in (process.stdin, process.stdout):
         if pipe is not None:

@@ -7,12 +7,9 @@ again. They last as long as the pool, so that kernels are loaded once.
 from __future__ import annotations
 
 import contextlib
-import os
 import pickle
 import queue
 import signal
-import subprocess
-import sys
 import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -20,6 +17,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from gvpipe.atomic import temporary_folder
+from gvpipe.isolation.python import Process, TimeoutExpired, start_python
 from gvpipe.tasks.executor import ATTEMPTS, Outcome, Prepare, WorkerDied
 from gvpipe.tasks.worker import PREPARE, PROTOCOL, TASK, receive, send
 
@@ -33,10 +31,11 @@ class Processes:
 
     Args:
         count: of processes. They start when there are tasks for them.
+        attempts: times that a task is given to a process, if processes die of it.
     """
 
-    def __init__(self, count: int) -> None:
-        self._count, self._slots = count, list[_Slot]()
+    def __init__(self, count: int, attempts: int = ATTEMPTS) -> None:
+        self._count, self._attempts, self._slots = count, attempts, list[_Slot]()
         self._stack = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
@@ -56,7 +55,8 @@ class Processes:
         ended: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
         first = pickle.dumps((PREPARE, prepare, data), PROTOCOL)
         busy = self._slots[: len(waiting)]
-        threads = [threading.Thread(target=_serve, args=(slot, first, waiting, ended), daemon=True) for slot in busy]
+        given = first, waiting, ended, self._attempts
+        threads = [threading.Thread(target=_serve, args=(slot, *given), daemon=True) for slot in busy]
         n_left = len(tasks)
         try:
             for thread in threads:
@@ -80,7 +80,7 @@ class _Slot:
 
     def __init__(self, folder: str) -> None:
         self._folder = folder
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: Process[bytes] | None = None
         self._lock = threading.Lock()
         self._is_closed = False
 
@@ -132,7 +132,9 @@ class _Slot:
                     pipe.close()
 
 
-def _serve(slot: _Slot, first: bytes, waiting: deque[tuple[int, Any]], ended: queue.SimpleQueue[Outcome]) -> None:
+def _serve(
+    slot: _Slot, first: bytes, waiting: deque[tuple[int, Any]], ended: queue.SimpleQueue[Outcome], attempts: int
+) -> None:
     """Give tasks to one process until none is left."""
     is_prepared = False
     while True:
@@ -141,7 +143,7 @@ def _serve(slot: _Slot, first: bytes, waiting: deque[tuple[int, Any]], ended: qu
         except IndexError:
             return
         outcome = Outcome(index)
-        for _ in range(ATTEMPTS):
+        for _ in range(attempts):
             try:
                 if slot.is_empty or not is_prepared:
                     slot.tell(first)
@@ -149,7 +151,7 @@ def _serve(slot: _Slot, first: bytes, waiting: deque[tuple[int, Any]], ended: qu
                 outcome = _outcome(index, slot.ask(pickle.dumps((TASK, task), PROTOCOL)))
                 break
             except WorkerDied as exc:
-                outcome = Outcome(index, None, WorkerDied(f"{exc}, {ATTEMPTS} times"))
+                outcome = Outcome(index, None, WorkerDied(f"{exc}, {attempts} times" if attempts > 1 else str(exc)))
             except Exception as exc:  # no process starts; the others' tasks go on
                 outcome = Outcome(index, None, exc)
                 break
@@ -164,23 +166,17 @@ def _outcome(index: int, answer: bytes) -> Outcome:
     return Outcome(index, value, error)
 
 
-def _start(folder: str) -> subprocess.Popen[bytes]:
-    return subprocess.Popen(
-        [sys.executable, "-m", "gvpipe.tasks.worker"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **ONE_THREAD, **dict.fromkeys(TEMPORARY, folder)},
-    )
+def _start(folder: str) -> Process[bytes]:
+    return start_python(["-m", "gvpipe.tasks.worker"], {**ONE_THREAD, **dict.fromkeys(TEMPORARY, folder)})
 
 
-def _how_it_ended(process: subprocess.Popen[bytes] | None) -> str:
+def _how_it_ended(process: Process[bytes] | None) -> str:
     """In a few words."""
     if process is None:
         return "its process was ended"
     try:
         status = process.wait(timeout=10)
-    except subprocess.TimeoutExpired:
+    except TimeoutExpired:
         return "its process stopped answering"
     if status < 0:
         name = signal.Signals(-status).name if -status in set(signal.Signals) else f"signal {-status}"

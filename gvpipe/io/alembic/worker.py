@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from gvpipe.io.alembic.reader import read_archive
 from gvpipe.io.library_worker import limited_time
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_worker import serve_scene
+from gvpipe.isolation.confinement import confine
 from gvpipe.sequence import MeshSequence
 
 
 def read_limited(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
     """Read as `read_archive` does."""
+    import alembic3d  # noqa: F401  its libraries load before nothing else can be opened
+
+    confine([os.path.dirname(os.path.realpath(path))])
     if options.unlimited:
         return read_archive(path, options)
     with limited_time(path.stat().st_size):

@@ -6,6 +6,7 @@ A request is the name of a method of `gvpipe.io.fbx.evaluator.FbxScene` and its 
 from __future__ import annotations
 
 import gc
+import os
 import sys
 from functools import cache
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 
 from gvpipe.io.fbx.evaluator import FbxScene
 from gvpipe.io.library_worker import serve
+from gvpipe.isolation.confinement import confine
 
 METHODS = ("takes", "choose", "describe", "positions")
 
@@ -21,7 +23,9 @@ METHODS = ("takes", "choose", "describe", "positions")
 def _scene() -> FbxScene:
     import ufbx
 
-    return FbxScene(ufbx, Path(sys.argv[1]))
+    path = Path(sys.argv[1])
+    confine([os.path.dirname(os.path.realpath(path))])
+    return FbxScene(ufbx, path)
 
 
 def answer(name: str, arguments: tuple[Any, ...]) -> Any:

@@ -34,7 +34,6 @@ TYPES = {
 }  # fmt: skip
 # what NumPy says of text behind the last number, as in Gmsh files with numbers per point: 2.4, and older versions' result
 UNMATCHED = "unmatched data", "cannot reshape array of size"
-INCLUDE = re.compile(rb"^\s*\*include", re.IGNORECASE | re.MULTILINE)  # Abaqus: the name of any file
 
 
 class MeshioLoader:
@@ -42,6 +41,7 @@ class MeshioLoader:
 
     def __init__(self) -> None:
         self._process: LibraryProcess | None = None
+        self._folder = Path()
 
     def __call__(self, path: Path) -> Dataset:
         """Load a file.
@@ -51,8 +51,9 @@ class MeshioLoader:
         """
         if importlib.util.find_spec("meshio") is None:
             raise InputError(f"{path}: {EXTRA}")
-        if self._process is None:
-            self._process = LibraryProcess(path, WORKER, path.suffix[1:].upper(), DIED)
+        folder = path.absolute().parent
+        if self._process is None or folder != self._folder:  # a process sees one folder alone
+            self._process, self._folder = LibraryProcess(path, WORKER, path.suffix[1:].upper(), DIED), folder
         held: Arrays = self._process.ask("load", str(path.absolute()), path=path)
         return Dataset(
             lambda: _points(held.points),
@@ -75,7 +76,7 @@ def read_by_meshio(path: Path) -> Arrays:
     """Read a file by meshio, in this process; raises `ValueError`."""
     import meshio
 
-    if path.suffix.lower() == ".inp" and INCLUDE.search(path.read_bytes()):
+    if path.suffix.lower() == ".inp" and _includes(path.read_bytes()):
         raise ValueError("it includes other files, which are not followed; write it as one file")
     try:
         with warnings.catch_warnings():
@@ -98,6 +99,14 @@ def read_by_meshio(path: Path) -> Arrays:
         {name: np.asarray(values) for name, values in mesh.point_data.items()},
         {name: [np.asarray(each) for each in blocks] for name, blocks in mesh.cell_data.items()},
     )
+
+
+def _includes(text: bytes) -> bool:
+    """Whether meshio finds the name of another file in Abaqus's text: it looks for the keyword without regard to stars."""
+    if b"include" not in text.replace(b"*", b"").lower():
+        return False
+    lines = re.split(rb"[\r\n]", text)
+    return any(line.partition(b",")[0].strip().replace(b"*", b"").upper() == b"INCLUDE" for line in lines)
 
 
 def _points(points: Array) -> Floats:

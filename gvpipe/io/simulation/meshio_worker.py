@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from functools import cache
 from pathlib import Path
@@ -9,14 +10,18 @@ from typing import Any
 
 from gvpipe.io.library_worker import bytes_below, limit_memory, serve
 from gvpipe.io.simulation.meshio_files import Arrays, read_by_meshio
+from gvpipe.isolation.confinement import confine, watch_opens
 
 
 @cache
 def _limit() -> None:
-    """Set the limit once, for all files of the first one's extension in its folder."""
+    """Set the limits once, for all files of the first one's extension in its folder."""
     import meshio  # noqa: F401  what it takes itself does not count
 
     first = Path(sys.argv[1])
+    folder = os.path.dirname(os.path.realpath(first))
+    confine([folder])
+    watch_opens(folder)
     limit_memory(max(first.stat().st_size, bytes_below(first.parent, (first.suffix.lower(),))))
 
 

@@ -36,6 +36,9 @@ def open_stage(path: Path) -> Any:
         for error in stage.GetCompositionErrors():
             if type(error).__name__ in MISSING:
                 named = re.search(r"@(.*?)@", str(error))
+                file = _beside(stage, named[1]) if named else ""
+                if os.path.exists(file) and not is_inside(file, Path(os.path.realpath(path)).parent):
+                    raise _outside(path, file)  # `gvpipe.isolation.confinement` kept it from being opened
                 raise InputError(
                     f"{path} refers to {named[1] if named else 'a file'}, which cannot be read; put it in its place, or export "
                     "again as one file"
@@ -61,20 +64,44 @@ def usd_errors(path: Path) -> Iterator[None]:
 
 
 def check_inside(stage: Any, path: Path) -> None:
-    """Raise `InputError` if a layer that the stage uses lies outside of the file's folder."""
+    """Raise `InputError` if a layer that the stage uses, or will use as a value clip, lies outside of the file's folder."""
     folder = Path(os.path.realpath(path)).parent
-    outside = [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath and not is_inside(layer.realPath, folder)]
-    if outside:
-        raise InputError(
-            f"{path} takes what it shows from outside of its folder: {outside[0]}; put that inside, or make one file of all "
-            "(usdcat --flatten)"
-        )
+    for file in (*(layer.realPath for layer in stage.GetUsedLayers()), *_clip_files(stage)):
+        if file and not is_inside(file, folder):
+            raise _outside(path, file)
 
 
 def is_inside(path: str, folder: Path) -> bool:
-    """Whether a file, or a package of USD and a file in it, lies below a folder, links followed."""
-    outer = path.split("[", 1)[0]
+    """Whether a file, or a package of USD and a file in it (``a.usdz[b.usdc]``), lies below a folder, links followed."""
+    from pxr import Ar
+
+    outer = Ar.SplitPackageRelativePathOuter(path)[0] if Ar.IsPackageRelativePath(path) else path
     return Path(os.path.realpath(outer)).is_relative_to(folder)
+
+
+def _clip_files(stage: Any) -> Iterator[str]:
+    """Files of value clips, which OpenUSD opens when a frame is asked for."""
+    from pxr import Usd
+
+    for prim in stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)):
+        if not prim.HasAuthoredMetadata("clips"):
+            continue
+        clips = Usd.ClipsAPI(prim)
+        for name in clips.GetClips():
+            assets = [clips.GetClipManifestAssetPath(name), *clips.ComputeClipAssetPaths(name)]
+            yield from (asset.resolvedPath or _beside(stage, asset.path) for asset in assets if asset)
+
+
+def _beside(stage: Any, named: str) -> str:
+    """Where a file that OpenUSD did not find would lie."""
+    return os.path.join(os.path.dirname(stage.GetRootLayer().realPath), named) if named else ""
+
+
+def _outside(path: Path, file: str) -> InputError:
+    return InputError(
+        f"{path} takes what it shows from outside of its folder: {file}; put that inside, or make one file of all "
+        "(usdcat --flatten)"
+    )
 
 
 def stage_times(

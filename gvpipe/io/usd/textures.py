@@ -77,7 +77,9 @@ class Textures:
         return (self.images[source.texture.image], source.output) if source else None
 
     def _load(self, asset: Any) -> int | None:
-        name = asset.path.split("[")[-1].rstrip("]")
+        from pxr import Ar
+
+        name = Ar.SplitPackageRelativePathInner(asset.path)[1] or asset.path
         data, reason = self._bytes(asset)
         if data is None:
             self.notes.append(f"texture {name} {reason}; it was left out")

@@ -10,6 +10,7 @@ from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_worker import serve_scene
 from gvpipe.io.usd.reader import read_stage
 from gvpipe.io.usd.signature import SIGNATURES
+from gvpipe.isolation.confinement import confine
 from gvpipe.sequence import MeshSequence
 
 THREADS = 4  # of OpenUSD: each one's stack counts as memory
@@ -19,6 +20,8 @@ def read_limited(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
     """Read as `read_stage` does; files beside the file count to its size, as it may refer to them."""
     os.environ.setdefault("PXR_WORK_THREAD_LIMIT", str(THREADS))
     import pxr.UsdSkel  # noqa: F401  libraries of code do not count
+
+    confine([os.path.dirname(os.path.realpath(path))])
 
     if options.unlimited:
         return read_stage(path, options)

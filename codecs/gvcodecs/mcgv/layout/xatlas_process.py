@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import os
 import pickle
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -19,6 +17,7 @@ import numpy as np
 from gvcodecs.mcgv.layout import xatlas_worker
 from gvcodecs.mcgv.layout.xatlas_worker import Charts, Mesh
 from gvpipe.errors import InputError
+from gvpipe.isolation.python import TimeoutExpired, run_python
 
 ATTEMPTS = 4
 SECONDS = 600.0  # that an attempt may take, whatever the meshes
@@ -45,22 +44,19 @@ def run_xatlas(meshes: list[Mesh]) -> list[Charts]:
 
 def _run(meshes: list[Mesh]) -> list[Charts]:
     """Charts of some meshes, by one process."""
-    command = [sys.executable, "-P", str(Path(xatlas_worker.__file__))]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "OPENBLAS_NUM_THREADS": "1"}
     limit = SECONDS + SECONDS_TRIANGLE * sum(len(triangles) for _, triangles in meshes)
     request = pickle.dumps(meshes, protocol=5)
     reason = ""
     for _ in range(ATTEMPTS):
         try:
-            done = subprocess.run(command, input=request, capture_output=True, timeout=limit, env=environment)
-        except subprocess.TimeoutExpired:
+            done = run_python([str(Path(xatlas_worker.__file__))], {"OPENBLAS_NUM_THREADS": "1"}, request, limit)
+        except TimeoutExpired:
             reason = f"took more than {limit:.0f} s"
             continue
         except OSError as exc:
             raise InputError(f"xatlas, which makes charts, cannot be run: {exc}; --set placement=halves needs none") from exc
-        if done.returncode == 0:
-            charts: list[Charts] = pickle.loads(done.stdout)
+        if done.status == 0:
+            charts: list[Charts] = pickle.loads(done.out)
             return charts
-        said = done.stderr.decode(errors="replace").strip().splitlines()
-        reason = f"ended with status {done.returncode}" + (f" ({said[-1]})" if said else "")
+        reason = f"ended with status {done.status}" + (f" ({done.last_line})" if done.err.strip() else "")
     raise InputError(f"xatlas, which makes charts, {reason}, {ATTEMPTS} times; --set placement=halves needs none")
