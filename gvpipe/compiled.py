@@ -21,10 +21,13 @@ import numba
 
 from gvpipe.borrowing import BorrowingCompiler
 from gvpipe.machine_code import MachineCode
+from gvpipe.runtime.code_folder import why_none
 
 LOGGER = logging.getLogger(__name__)
 ONCE = "compiling kernels, once after installation; the first commands take up to a minute longer, on slow machines two"
-EVERY_TIME = "compiling kernels in every run, since no folder takes machine code; set NUMBA_CACHE_DIR to one that does"
+EVERY_TIME = (
+    "compiling kernels in every run, since no safe folder takes machine code ({}); set NUMBA_CACHE_DIR to one of your own"
+)
 
 OPTIONS = {
     "nogil": True,
@@ -47,7 +50,7 @@ def inlined(function: Function) -> Function:
 def _compiled(function: Function, options: dict[str, bool]) -> Function:
     kernel: Any = numba.njit(pipeline_class=BorrowingCompiler, **options)(function)
     if kernel is not function:  # NUMBA_DISABLE_JIT leaves it as it is
-        on_miss, on_refusal = functools.partial(_announce, ONCE), functools.partial(_announce, EVERY_TIME)
+        on_miss, on_refusal = functools.partial(_announce, ONCE), lambda: _announce(EVERY_TIME.format(why_none()))
         kernel._cache = MachineCode(function, options, on_miss, on_refusal)  # what `cache=True` sets, to numba's own class
         kernel.get_call_template = functools.partial(_find_overload, kernel.get_call_template)
     return cast(Function, kernel)

@@ -9,13 +9,12 @@ all that its code follows from. So one folder serves all installations of a user
 Code is looked for in two folders:
 
 1. the user's own, which takes new code: ``NUMBA_CACHE_DIR/gvpipe``, else ``gvpipe/kernels`` where the system keeps caches,
-   else ``__pycache__/kernels`` beside this module; the first that takes files;
+   else ``__pycache__/kernels`` in this package; the first that is safe and takes files (`gvpipe.runtime.code_folder`);
 2. `INSTALLED`, which ``gvpipe warmup --installed`` fills and a wheel may ship. Code there may be made for a processor of
    `PORTABLE`, which others can stand in for.
 
-A file is the SHA-256 of the rest, and a pickle: the names that its code defines, and numba's compile result. It is written as a
-whole or not at all. A damaged file, and one that does not load, count as none. The files are programs: their folder must be as
-safe as the sources'.
+`gvpipe.runtime.code_file` says what is in a file. It is written as a whole or not at all. A damaged file, and one that does not
+load, count as none. The files are programs: their folder must be as safe as the sources'.
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ import contextlib
 import functools
 import hashlib
 import os
-import pickle
 import platform
 import re
 import sys
@@ -41,20 +39,17 @@ import numpy as np
 from llvmlite import binding
 from numba.core import config
 from numba.core.caching import _Cache
-from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
-from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
-from numba.core.types.containers import BaseNamedTuple, BaseTuple
-from numba.misc.appdirs import AppDirs
 
 from gvpipe import borrowing
+from gvpipe.runtime.code_file import Unstorable, pack, rebuild, spelt, unpack
+from gvpipe.runtime.code_folder import own_folder as own_folder
 
-FORMAT = 2  # of the files
+FORMAT = 3  # of the files
 COMPILER = hashlib.sha256(Path(borrowing.__file__).read_bytes()).hexdigest()
 INSTALLED = Path(__file__).with_name("kernels")
 SUFFIX = ".nbc"
-DIGEST = 32  # bytes of a SHA-256
 PACKAGES = ("gvpipe.", "gvcodecs.")
 SETTINGS = ("OPT", "BOUNDSCHECK", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DEBUGINFO_DEFAULT", "LLVM_REFPRUNE_PASS")  # of numba
 DAY = 86_400.0  # seconds
@@ -111,10 +106,10 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
         rtsys.initialize(target_context)  # the rest of numba's context serves compilation, and takes 0.1 s
         found = None
         for path in self._places(sig, target_context.codegen()) if self._is_enabled else ():
-            with contextlib.suppress(Exception):  # unpickling may raise any
-                found = _rebuild(target_context, *pickle.loads(_read(path)))
+            with contextlib.suppress(Exception):  # LLVM and the linker may raise any
+                found = rebuild(target_context, tuple(normalize_signature(sig)[0]), unpack(_read(path)))
                 break
-        if found is not None and tuple(found.signature.args) == tuple(normalize_signature(sig)[0]):
+        if found is not None:
             return found
         self._on_miss()
         return None
@@ -129,10 +124,9 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
             return
         path = folder / self._name(sig, _processor(data.codegen))
         try:
-            symbols = _defined(data.library._get_module_for_linking())
-            _write(path, dumps((symbols, data._replace(type_annotation="")._reduce())))
+            _write(path, pack(data))
             _remove_old(folder, self._stem())
-        except OSError:
+        except (OSError, Unstorable):
             self.disable()
 
     def _places(self, sig: Any, codegen: Any) -> Iterator[Path]:
@@ -147,34 +141,12 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
 
     def _name(self, sig: Any, processor: tuple[str, str]) -> str:
         """The name of the file for argument types on a processor: LLVM's name of it, and features beside those of that name."""
-        arguments = [_spelt(kind) for kind in normalize_signature(sig)[0]]
+        arguments = [spelt(kind) for kind in normalize_signature(sig)[0]]
         key = repr((_content(self._function), sorted(self._options.items()), arguments, _surroundings(), processor))
         return f"{self._stem()}-{hashlib.sha256(key.encode()).hexdigest()[:32]}{SUFFIX}"
 
     def _stem(self) -> str:
         return re.sub(r"[^\w.]", "_", f"{self._function.__module__}.{self._function.__qualname__}")[-100:]
-
-
-def own_folder() -> Path | None:
-    """The folder that takes this user's machine code; None if none does."""
-    return _first_writable(str(config.CACHE_DIR))
-
-
-@functools.cache
-def _first_writable(given: str) -> Path | None:
-    if given:
-        wanted = [Path(given) / "gvpipe"]
-    else:
-        wanted = [
-            Path(AppDirs("gvpipe", appauthor=False).user_cache_dir) / "kernels",
-            Path(__file__).parent / "__pycache__" / "kernels",
-        ]
-    for folder in wanted:
-        with contextlib.suppress(OSError):
-            folder.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=folder).close()
-            return folder
-    return None
 
 
 @functools.cache
@@ -210,14 +182,6 @@ def _surroundings() -> tuple[object, ...]:
     versions = FORMAT, numba.__version__, llvmlite.__version__, sys.implementation.cache_tag, COMPILER
     settings = tuple(str(getattr(config, name, None)) for name in SETTINGS)
     return (*versions, sys.platform, platform.machine().lower(), settings)
-
-
-def _spelt(kind: Any) -> str:
-    """An argument's type; named tuples with their modules."""
-    if isinstance(kind, BaseNamedTuple):
-        fields = ", ".join(map(_spelt, kind))
-        return f"{kind.instance_class.__module__}.{kind.instance_class.__qualname__}({fields})"
-    return f"({', '.join(map(_spelt, kind))})" if isinstance(kind, BaseTuple) else str(kind)
 
 
 def _content(function: FunctionType) -> str:
@@ -285,46 +249,14 @@ def _value(value: Any, called: list[FunctionType]) -> str:
     return repr(named) if all(named) else repr(value)  # built-in functions, numpy's; numbers, texts
 
 
-def _defined(module: Any) -> list[str]:
-    """The names that a module defines."""
-    return [each.name for kind in (module.functions, module.global_variables) for each in kind if not each.is_declaration]
-
-
-def _rebuild(target_context: Any, symbols: list[str], reduced: tuple[Any, ...]) -> Any:
-    """A compile result from its file.
-
-    numba reads the bitcode of each, which takes longer than all the rest. Only kernels that are compiled later, and call this
-    one, need it. So it is read then.
-    """
-    (name, kind, (code, bitcode)), *others = reduced
-    known = target_context.codegen()._engine._defined_symbols
-    new = set(symbols) - known
-    known |= new  # numba looks there for the kernel's address
-    try:
-        result = CompileResult._rebuild(target_context, (name, kind, (code, _nothing())), *others)
-    except BaseException:
-        known -= new
-        raise
-    result.library._get_module_for_linking = functools.cache(lambda: binding.parse_bitcode(bitcode))
-    return result
-
-
-@functools.cache
-def _nothing() -> bytes:
-    """The bitcode of a module without functions."""
-    return bytes(binding.parse_assembly("").as_bitcode())
-
-
 def _read(path: Path) -> bytes:
-    """The pickle in a file; raise an error for a missing or damaged one."""
+    """What is in a file; raises OSError for a missing one."""
     data = path.read_bytes()
-    if hashlib.sha256(data[DIGEST:]).digest() != data[:DIGEST]:
-        raise ValueError(f"{path} is damaged")
     now = time.time()
     with contextlib.suppress(OSError):  # of folders that are only read
         if now - path.stat().st_mtime > DAY:
             os.utime(path)
-    return data[DIGEST:]
+    return data
 
 
 def _write(path: Path, data: bytes) -> None:
@@ -332,7 +264,7 @@ def _write(path: Path, data: bytes) -> None:
     descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=".")
     try:
         with os.fdopen(descriptor, "wb") as file:
-            file.write(hashlib.sha256(data).digest() + data)
+            file.write(data)
         os.replace(name, path)
     except BaseException:
         with contextlib.suppress(OSError):

@@ -63,6 +63,7 @@ def warm_up(installed: bool = False, portable: bool = False, progress: Callable[
         GvpipeError: a task failed.
     """
     from gvpipe.machine_code import INSTALLED, own_folder, portable_settings
+    from gvpipe.runtime.code_folder import why_none
 
     start, settings = time.perf_counter(), portable_settings() if portable else {}
     if portable and not installed:
@@ -71,7 +72,7 @@ def warm_up(installed: bool = False, portable: bool = False, progress: Callable[
         raise InputError("no portable processor is known for this machine; leave out --portable")
     folder = INSTALLED if installed else own_folder()
     if folder is None:
-        raise InputError("no folder takes machine code; set NUMBA_CACHE_DIR to one that does")
+        raise InputError(f"no safe folder takes machine code ({why_none()}); set NUMBA_CACHE_DIR to one of your own")
     before = set(folder.glob("*.nbc"))
     if installed:
         with atomic_files(folder) as made, temporary_folder() as empty:

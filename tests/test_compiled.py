@@ -174,10 +174,11 @@ def test_a_file_that_cannot_be_replaced(kernels: Any) -> None:
 
 def test_no_folder_takes_files(kernels: Any, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
     monkeypatch.setattr(machine_code, "own_folder", lambda: None)
+    monkeypatch.setattr(module, "why_none", lambda: "none is there")
     module._announce.cache_clear()
     with caplog.at_level(logging.INFO, logger="gvpipe.compiled"):
         assert kernels().double(2) == 4
-    assert caplog.messages == [module.ONCE, module.EVERY_TIME]
+    assert caplog.messages == [module.ONCE, module.EVERY_TIME.format("none is there")]
 
 
 def test_functions_without_a_file() -> None:
