@@ -21,36 +21,29 @@ or value, the limit and what to do about it.
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+from gvpipe.text import escaped
 
 REMEDY = "get the file again from its source"
 LONGEST = 800  # characters of a message
 LONGEST_QUOTE = 60  # characters of a value that a message quotes
-UNSHOWN = ("Cc", "Cs", "Zl", "Zp")  # Unicode's categories of what no terminal should be sent
 CUT = " ... "
 
 
 def printable(text: str, longest: int = LONGEST) -> str:
-    """Return a text as one line that any terminal shows: control characters escaped, its middle left out where it is long.
+    """Return a text as one line that any terminal shows: `gvpipe.text.escaped`, and its middle left out where it is long.
 
     Examples:
         >>> printable("two\\nlines and a bell\\a")
         'two lines and a bell\\\\x07'
     """
-    if not text.isprintable():
-        text = "".join(map(_shown, text))
+    text = escaped(text)
     if len(text) <= longest:
         return text
     half = (longest - len(CUT)) // 2
     return text[:half] + CUT + text[-half:]
-
-
-def _shown(character: str) -> str:
-    if unicodedata.category(character) not in UNSHOWN:
-        return character
-    return " " if character.isspace() else character.encode("unicode_escape").decode("ascii")
 
 
 def quote(value: object) -> str:

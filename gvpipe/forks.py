@@ -2,7 +2,7 @@
 
 A fork copies one thread alone. A lock that another thread held stays locked in the child for ever, a pool waits for threads
 that are not there, and an open file shares its position with the parent. So whoever has such things registers here, and makes
-them anew in the child.
+them anew in the child. What an object finds once and keeps has no lock at all (`kept`).
 """
 
 from __future__ import annotations
@@ -10,8 +10,11 @@ from __future__ import annotations
 import os
 import threading
 import weakref
+from collections.abc import Callable
 from types import TracebackType
-from typing import Protocol
+from typing import Any, Generic, Protocol, Self, TypeVar, overload
+
+Value = TypeVar("Value")
 
 
 class Forkable(Protocol):
@@ -28,6 +31,32 @@ _registered: weakref.WeakSet[Forkable] = weakref.WeakSet()
 def renew_after_fork(thing: Forkable) -> None:
     """Let ``thing.after_fork()`` be called in every child process that is forked while ``thing`` is alive."""
     _registered.add(thing)
+
+
+class kept(Generic[Value]):
+    """A property that is found once for each object, and kept.
+
+    `functools.cached_property` of Python 3.11 has one lock for all objects of a class, which a fork may copy locked. Here two
+    threads may find the same value at the same time, and one of the two is kept.
+    """
+
+    def __init__(self, find: Callable[[Any], Value]) -> None:
+        self._find, self.__doc__ = find, find.__doc__
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    @overload
+    def __get__(self, instance: None, owner: type | None = None) -> Self: ...
+
+    @overload
+    def __get__(self, instance: object, owner: type | None = None) -> Value: ...
+
+    def __get__(self, instance: object | None, owner: type | None = None) -> Self | Value:
+        if instance is None:
+            return self
+        found: Value = instance.__dict__.setdefault(self._name, self._find(instance))
+        return found
 
 
 class ForkLock:

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from gvpipe.errors import GvpipeError
+from gvpipe.text import escaped
 
 if TYPE_CHECKING:
     from gvpipe.rasterizer.camera import Animation
@@ -22,14 +23,16 @@ SAMPLES = 3  # per pixel and axis
 
 def card(title: str, numbers: Mapping[str, str], sequence: Animation) -> str:
     """Return HTML with a title, named numbers, and a picture of the first frame if it can be painted."""
-    rows = "".join(
-        f'<tr><td style="text-align:left">{html.escape(name)}</td><td style="text-align:left">{html.escape(value)}</td></tr>'
-        for name, value in numbers.items()
-    )
+    cell = '<td style="text-align:left">{}</td>'
+    rows = "".join(f"<tr>{cell.format(_safe(name))}{cell.format(_safe(value))}</tr>" for name, value in numbers.items())
     return (
         f'<div style="display:flex;align-items:center;gap:1em">{_picture(sequence)}'
-        f"<div><b>{html.escape(title)}</b><table>{rows}</table></div></div>"
+        f"<div><b>{_safe(title)}</b><table>{rows}</table></div></div>"
     )
+
+
+def _safe(text: str) -> str:
+    return html.escape(escaped(text))
 
 
 def png(sequence: Animation) -> bytes:

@@ -26,6 +26,7 @@ from gvpipe.asset.material import Image, Material, check_materials
 from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part, check_parts
 from gvpipe.asset.polygons import as_polygons
+from gvpipe.asset.texts import Cleaner
 from gvpipe.errors import InputError, printable
 from gvpipe.frame_views import Guarded, Narrowed, Permuted, Shifted, Span, Watched
 from gvpipe.notes import ASSUMED_FPS, count, show_origin
@@ -133,10 +134,13 @@ class MeshSequence:
         for image in self.images:
             if not isinstance(image, Image):
                 raise TypeError(f"an image is {show(image)}; a gvpipe.Image is needed")
-        images = tuple(self.images)
-        materials = check_materials(tuple(self.materials), len(images), self.name)
-        parts = check_parts(self.parts, self.faces, self.n_vertices, len(materials), self.name)
+        cleaner = Cleaner(self.name)
+        images = tuple(map(cleaner.image, self.images))
+        materials = check_materials(tuple(map(cleaner.material, self.materials)), len(images), self.name)
+        given_parts = tuple(map(cleaner.part, self.parts))
+        parts = check_parts(given_parts, self.faces, self.n_vertices, len(materials), self.name)
         checked = {
+            "metadata": cleaner.metadata(self.metadata),
             "materials": materials,
             "images": images,
             "parts": parts,
@@ -144,10 +148,13 @@ class MeshSequence:
         }
         for key, value in checked.items():
             object.__setattr__(self, key, value)
-        attributes = {key: as_attribute(key, given, self.rows, self.name) for key, given in self.attributes.items()}
+        named = cleaner.by_name(self.attributes, "attributes").items()
+        attributes = {key: cleaner.unit(as_attribute(key, given, self.rows, self.name)) for key, given in named}
         object.__setattr__(self, "attributes", attributes)
-        fields = {key: as_field(key, given, self.n_frames, self.rows, self.name) for key, given in self.fields.items()}
+        moving = cleaner.by_name(self.fields, "fields").items()
+        fields = {key: cleaner.unit(as_field(key, given, self.n_frames, self.rows, self.name)) for key, given in moving}
         object.__setattr__(self, "fields", fields)
+        object.__setattr__(self, "notes", (*self.notes, *cleaner.notes))
 
     def _narrow(self, positions: Array) -> None:
         """Round an array in memory, keep it if that lost anything, and find its origin."""

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from gvpipe.errors import InputError
+from gvpipe.text import text_fault
 
 LARGEST = float(np.finfo(np.float64).max)  # an integer of JSON may exceed it
 
@@ -88,6 +89,10 @@ def _typed(hint: Any, value: Any, where: str) -> Any:
     if origin is not None:  # a mapping of texts, which its dataclass checks
         if not isinstance(value, dict):
             raise InputError(f"{where} is {_short(value)}; an object of texts is needed")
+        for name, text in value.items():
+            fault = text_fault(name) or (text_fault(text, has_lines=True) if isinstance(text, str) else "")
+            if fault:
+                raise InputError(f"{where}: {_short(name)} {fault}; rename it")
         return value
     if hint is float:
         if type(value) not in (int, float) or not abs(value) <= LARGEST:
@@ -95,6 +100,8 @@ def _typed(hint: Any, value: Any, where: str) -> Any:
         return float(value)
     if type(value) is not hint or (hint is int and abs(value) >= 1 << 31):
         raise InputError(f"{where} is {_short(value)}; a value of type {hint.__name__} is needed")
+    if hint is str and (fault := text_fault(value)):
+        raise InputError(f"{where} {fault}; rename it")
     return value
 
 

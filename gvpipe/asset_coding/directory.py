@@ -27,7 +27,7 @@ from gvpipe.asset.plain import from_plain, to_plain
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.json_object import JsonObject, pack_json, unpack_json
-from gvpipe.errors import InputError, corrupt_section, printable
+from gvpipe.errors import FormatError, InputError, corrupt_section, printable
 
 SECTION, ARRANGEMENT = "asset", "arrangement"
 CODED, SURFACE, OCTAHEDRAL = 1, 2, 3  # codings of fields; attributes have the first
@@ -99,9 +99,13 @@ class Directory:
         return tuple(each.name for each in (*self.attributes, *self.fields) if each.name not in known)
 
 
-def pack_directory(directory: Directory) -> bytes:
-    """Return the section."""
-    return pack_json(
+def pack_directory(directory: Directory, n_vertices: int) -> bytes:
+    """Return the section, once `unpack_directory` has read it: what a file holds, every reader opens.
+
+    Raises:
+        InputError: it has more, or longer, things than a file may hold.
+    """
+    data = pack_json(
         {
             "version": VERSION,
             "parts": [_part_values(part) for part in directory.parts],
@@ -113,6 +117,11 @@ def pack_directory(directory: Directory) -> bytes:
             "metadata": to_plain(directory.metadata),
         }
     )
+    try:
+        unpack_directory(data, n_vertices)
+    except FormatError as exc:
+        raise InputError(f"what lies beside the positions cannot be written: {exc}") from exc
+    return data
 
 
 def unpack_directory(data: bytes, n_vertices: int, budget: Budget = UNLIMITED) -> Directory:

@@ -169,7 +169,7 @@ class AssetCoder:
         )
         return dataclasses.replace(
             encoded.bitstream,
-            sections={**sections, SECTION: pack_directory(directory)},
+            sections={**sections, SECTION: pack_directory(directory, len(permutation))},
             outline=_with_counts(encoded.bitstream.outline, arrangement, len(parts)),
         )
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
@@ -36,7 +35,7 @@ from gvpipe.budget import Budget
 from gvpipe.codec import FrameReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.errors import InputError, corrupt_section, in_file
-from gvpipe.forks import ForkLock
+from gvpipe.forks import ForkLock, kept
 from gvpipe.mesh.hierarchy import keep_hierarchy
 
 if TYPE_CHECKING:  # decoders load when a file has something for them: most have not
@@ -89,7 +88,7 @@ class AssetReader:
             self._made_attributes.clear()
             self._made_fields.clear()
 
-    @cached_property
+    @kept
     def _arrangement(self) -> Arrangement:
         from gvpipe.attributes.triangle_order import decode_arrangement
 
@@ -105,7 +104,7 @@ class AssetReader:
             return self._reader.faces
         return self._arrangement.faces
 
-    @cached_property
+    @kept
     def polygons(self) -> Int32 | None:
         """``(P,)`` corners of each polygon, None if all are triangles."""
         if SECTION not in self._bitstream.sections:
@@ -116,7 +115,7 @@ class AssetReader:
         except InputError as exc:
             raise corrupt_section(ARRANGEMENT, str(exc)) from exc
 
-    @cached_property
+    @kept
     def parts(self) -> tuple[Part, ...]:
         """The named meshes of the scene."""
         parts = self.directory.parts
@@ -134,7 +133,7 @@ class AssetReader:
         """What the parts look like."""
         return self.directory.materials
 
-    @cached_property
+    @kept
     def images(self) -> tuple[Image, ...]:
         """What the materials' textures show."""
         return read_images(self.directory, self._bitstream)
@@ -144,7 +143,7 @@ class AssetReader:
         """What the scene says of itself."""
         return self.directory.metadata
 
-    @cached_property
+    @kept
     def _surface(self) -> Surface:
         from gvpipe.attributes.surface import Surface
 

@@ -7,11 +7,11 @@ edge between the two other vertices.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from gvpipe.arrays import Float32, Int32, Int64
+from gvpipe.forks import kept
 from gvpipe.mesh.topology import opposite_corners
 from gvpipe.mesh.unique_rows import row_ids
 
@@ -32,7 +32,7 @@ class Surface:
     positions: Float32 | None = None
     n_parts: int = 1
 
-    @cached_property
+    @kept
     def places(self) -> Int64:
         """``(V,)`` a number for each vertex, equal where positions are; without positions all differ."""
         if self.positions is None:
@@ -49,7 +49,7 @@ class Surface:
         positions = None if self.positions is None else self.positions[self.faces.ravel()[first[by_corner]]]
         return Surface(faces, len(first), positions, self.n_parts)
 
-    @cached_property
+    @kept
     def opposite(self) -> Int64:
         """`opposite_corners` of the faces."""
         return opposite_corners(self.faces)

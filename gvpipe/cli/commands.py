@@ -26,6 +26,7 @@ from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_sett
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.cli.process import Ended, collect_seldom, ending_by_exception, replace_closed_streams
 from gvpipe.errors import GvpipeError, InputError, TopologyChange
+from gvpipe.text import escaped
 
 if TYPE_CHECKING:
     from gvpipe.api import Report
@@ -45,12 +46,10 @@ def main() -> None:
             status = cli(standalone_mode=False, prog_name="gvpipe")
     except GvpipeError as exc:
         status = _fail(_one_line(exc), 1)
-    except click.UsageError as exc:
-        exc.show()
-        status = 2
     except click.ClickException as exc:
+        vars(exc)["message"] = escaped(exc.message, has_lines=True)  # it may name a file
         exc.show()
-        status = 1
+        status = 2 if isinstance(exc, click.UsageError) else 1
     except (click.Abort, KeyboardInterrupt) as exc:
         status = _fail(f"interrupted; {_left(exc.__cause__ or exc)}", 130)
     except Ended as exc:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gvpipe.errors import OutputError
+from gvpipe.text import escaped
 
 if TYPE_CHECKING:
     from gvpipe.codec import Progress
@@ -58,7 +59,7 @@ class Output:
     def note(self, line: str) -> None:
         """Print what the user should know, one line."""
         if not self.quiet:
-            click.echo(f"Note: {line}", err=True)
+            click.echo(f"Note: {escaped(line)}", err=True)
 
     def json(self, values: dict[str, Any]) -> None:
         """Print a result as one JSON object, if that is asked for."""
@@ -129,7 +130,7 @@ def is_verbose(arguments: list[str]) -> bool:
 def _print(text: object, beside: bool) -> None:
     """Print a result; raises `OutputError`, but leaves a reader that left to `gvpipe.cli.commands.main`."""
     try:
-        click.echo(text, err=beside)
+        click.echo(escaped(str(text), has_lines=True), err=beside)
     except BrokenPipeError:
         raise
     except OSError as exc:
@@ -141,7 +142,8 @@ class _Noting(logging.Handler):
     """Prints what a logger says as notes, while bars may be on the screen."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        print(f"Note: {record.getMessage()}", file=sys.stderr)  # click would write behind the bars' back, and they erase that
+        # click would write behind the bars' back, and they erase that
+        print(f"Note: {escaped(record.getMessage())}", file=sys.stderr)
 
 
 class _Stages:
@@ -157,6 +159,7 @@ class _Stages:
         click.echo(f"total: {time.perf_counter() - self._started:.2f} s", err=True)
 
     def __call__(self, stage: str, done: float) -> None:
+        stage = escaped(stage)
         if stage == self._stage:
             return
         now = time.perf_counter()
@@ -168,12 +171,14 @@ class _Stages:
 @contextlib.contextmanager
 def _bars() -> Iterator[Progress]:
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import Progress as Bars
 
     with Bars(console=Console(stderr=True), transient=True) as bars:
         tasks: dict[str, Any] = {}
 
         def show(stage: str, done: float) -> None:
+            stage = escape(escaped(stage))
             for name, task in tasks.items():
                 if name != stage:
                     bars.update(task, completed=1.0)

@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +27,7 @@ from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, pack_block
+from gvpipe.forks import kept
 from gvpipe.mesh.unique_rows import smallest_first
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class PointMesh:
     lattice: Int32
     point_faces: Int32
 
-    @cached_property
+    @kept
     def graph(self) -> Graph:
         """The points' edges."""
         from gvpipe.mesh.graph_kernels import link_vertices
@@ -70,7 +70,7 @@ class WeldedMesh(PointMesh):
     faces: Int32
     point: Int64
 
-    @cached_property
+    @kept
     def members(self) -> Int64:
         """``(P,)`` the first vertex of each point."""
         return np.asarray(np.unique(self.point, return_index=True)[1])

@@ -10,8 +10,8 @@ from typing import Any
 
 from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.errors import CorruptFile, corrupt_section, quote
+from gvpipe.text import text_fault
 
-MAX_TEXT = 1 << 16  # characters
 BYTES_PER_CHARACTER = 32  # of parsed JSON, at most: "{}," is an object of 64 bytes and its place in a list
 SECONDS_PER_CHARACTER = 0.2e-6
 
@@ -49,8 +49,10 @@ class JsonObject:
     def text(self, key: str, default: str | None = None) -> str:
         """Return a text; ``default`` where it is missing."""
         value = self._values.get(key, default)
-        if not isinstance(value, str) or len(value) > MAX_TEXT:
+        if not isinstance(value, str):
             raise self.wrong(key, "a text")
+        if fault := text_fault(value):
+            raise self.corrupt(f"{key!r} {fault}")
         return value
 
     def choice(self, key: str, choices: tuple[str, ...], default: str | None = None) -> str:

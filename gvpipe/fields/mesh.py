@@ -7,11 +7,11 @@ triangles alone, so nothing is sent.
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass
 
 from gvpipe.arrays import Int32
 from gvpipe.fields.dual_mesh import dual_triangles
+from gvpipe.forks import kept
 from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.spatial_neighbours import hierarchy_order
@@ -36,7 +36,7 @@ class FieldMesh:
         """R: V or T."""
         return self.n_vertices if self.domain == "vertex" else len(self.faces)
 
-    @functools.cached_property
+    @kept
     def causal(self) -> CausalOrder:
         """The order of the R rows, and what each is predicted from."""
         if self.domain == "vertex":

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
@@ -19,6 +18,7 @@ from gvpipe.arrays import Float64, Int32, UInt8
 from gvpipe.atomic import unnamed_path
 from gvpipe.codec import Progress
 from gvpipe.errors import InputError
+from gvpipe.forks import kept
 from gvpipe.part_choice import only_parts
 from gvpipe.rasterizer.camera import Camera, framing, middle_of, used_vertices
 from gvpipe.rasterizer.renderer import Renderer, check_size
@@ -84,11 +84,11 @@ class Film:
             camera = replace(camera, target=(float(x), float(y), float(z)))
         return camera
 
-    @cached_property
+    @kept
     def _first_middle(self) -> Float64:
         return self._middle(0)
 
-    @cached_property
+    @kept
     def _used(self) -> Int32:
         return used_vertices(self.sequence)
 

@@ -27,5 +27,5 @@ def carry_asset(player: Player, encoded: Encoded, codec: Codec) -> Bitstream:
         return bitstream
     directory = unpack_directory(bitstream.section(SECTION), bitstream.n_vertices)
     listed = tuple(dataclasses.replace(each, bound=2 * each.bound) for each in directory.fields)
-    section = pack_directory(dataclasses.replace(directory, fields=listed))
+    section = pack_directory(dataclasses.replace(directory, fields=listed), bitstream.n_vertices)
     return dataclasses.replace(bitstream, sections={**bitstream.sections, SECTION: section})

@@ -9,7 +9,7 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
 from gvpipe.asset_coding.directory import Directory, Listed, ListedImage, pack_directory, unpack_directory
 from gvpipe.container.json_object import pack_json
-from gvpipe.errors import CorruptFile
+from gvpipe.errors import CorruptFile, InputError
 
 WHOLE = Directory(
     parts=(Part("a", (0, 4), (0, 0), 1), Part("ü", (4, 9), (0, 0), None, "a")),
@@ -39,7 +39,7 @@ WHOLE = Directory(
 
 @pytest.mark.parametrize("directory", [WHOLE, Directory()])
 def test_what_is_packed_is_unpacked(directory: Directory) -> None:
-    assert unpack_directory(pack_directory(directory), 9) == directory
+    assert unpack_directory(pack_directory(directory, 9), 9) == directory
 
 
 def test_a_newer_version_is_told_apart() -> None:
@@ -74,5 +74,5 @@ def test_what_cannot_be_is_corrupt(values: dict[str, Any]) -> None:
 
 def test_two_of_one_name_are_corrupt() -> None:
     twice = Directory(attributes=(WHOLE.attributes[0], WHOLE.attributes[0]))
-    with pytest.raises(CorruptFile, match="one name"):
-        unpack_directory(pack_directory(twice), 9)
+    with pytest.raises(InputError, match="one name"):
+        pack_directory(twice, 9)

@@ -89,7 +89,7 @@ def test_a_directory_that_lies(bitstream: Bitstream) -> None:
         dataclasses.replace(directory, parts=directory.parts[:1]),
     ):
         with pytest.raises(FormatError):
-            read_all(with_section(bitstream, SECTION, pack_directory(changed)))
+            read_all(with_section(bitstream, SECTION, pack_directory(changed, bitstream.n_vertices)))
 
 
 def test_what_a_newer_version_wrote_is_skipped_and_told(bitstream: Bitstream) -> None:
@@ -100,7 +100,7 @@ def test_what_a_newer_version_wrote_is_skipped_and_told(bitstream: Bitstream) ->
     assert "all of it" in file_notes(asset.directory, bitstream)[0]
     directory = unpack_directory(bitstream.section(SECTION), bitstream.n_vertices)
     newer = tuple(dataclasses.replace(each, coding=9) if each.name == "stress" else each for each in directory.fields)
-    packed = pack_directory(dataclasses.replace(directory, fields=newer))
+    packed = pack_directory(dataclasses.replace(directory, fields=newer), bitstream.n_vertices)
     asset = AssetReader(with_section(bitstream, SECTION, packed), reader)
     assert list(asset.fields) == ["flow", "state"]
     assert "stress" in file_notes(asset.directory, bitstream)[0]

@@ -49,7 +49,7 @@ def test_a_result_comes_back() -> None:
     parts = unpack(pack(result))
     again = rebuild(result.target_context, result.signature.args, parts)
     assert again.signature.return_type == result.signature.return_type
-    for name in (*code_file.TEXTS, *code_file.PLAIN, "args", "abi_tags", "argtypes", "restype"):
+    for name in (*code_file.TEXTS, *code_file.PLAIN, "args", "argtypes", "restype"):
         assert getattr(again.fndesc, name) == getattr(result.fndesc, name)
     assert not {b"pickle", b"c__builtin__"} & {parts.code[:64], parts.bitcode[:64]}
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import cached_property, partial
+from functools import partial
 from itertools import chain, islice
 
 import numpy as np
@@ -34,6 +34,7 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
 from gvpipe.corrections.displacements import DisplacementReader, PointVertices
 from gvpipe.errors import CorruptFile, corrupt
+from gvpipe.forks import kept
 from gvpipe.media.video import Plane, VideoReader
 from gvpipe.sequence import are_finite
 
@@ -89,7 +90,7 @@ class McgvReader:
         self._decoded = surface
         return surface
 
-    @cached_property
+    @kept
     def _motion(self) -> Motion:
         return self._read_blended() if self._header.prediction == "blended" else self._read_affine()
 
@@ -169,7 +170,7 @@ class McgvReader:
             raise corrupt(f"frames {start} to {stop - 1} do not decode to finite positions")
         return result
 
-    @cached_property
+    @kept
     def _outliers(self) -> DisplacementReader:
         bitstream, surface = self._bitstream, self._surface
         shared = PointVertices.of(surface.vertices, surface.slot, surface.n_slots)

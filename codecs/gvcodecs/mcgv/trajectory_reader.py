@@ -6,7 +6,6 @@ The first frame of a segment costs the segment's pictures; each after that one p
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -26,6 +25,7 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.segments import segment_starts
 from gvpipe.errors import CorruptFile
+from gvpipe.forks import kept
 from gvpipe.media.video import VideoReader
 from gvpipe.trajectory.basis import Basis
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES
@@ -94,11 +94,11 @@ class TrajectoryReader:
         """``(T, 3) int32`` triangles."""
         return self._surface.faces
 
-    @cached_property
+    @kept
     def _surface(self) -> DecodedBase:
         return read_surface(self._bitstream, self._header)
 
-    @cached_property
+    @kept
     def _shared(self) -> _Shared:
         surface, header = self._surface, self._header
         n_components = max(self._images.components)

@@ -6,7 +6,6 @@ Points are numbered in the codec's order, which is a walk over the surface (Drac
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +14,7 @@ from scipy import sparse
 from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighbours_in
 from gvpipe.arrays import Int32, Int64, Integers
 from gvpipe.connectivity.welded_mesh import PointMesh
+from gvpipe.forks import kept
 from gvpipe.mesh.topology import adjacency_of, graph_of, weld
 
 if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
@@ -44,7 +44,7 @@ class Points:
         joined = sparse.csr_array(adjacency_of(mesh.graph)[moves][:, moves])
         return cls(faces[(faces >= 0).all(axis=1)], graph_of(joined))
 
-    @cached_property
+    @kept
     def neighbours(self) -> sparse.csr_array:
         """The points' symmetric adjacency ``(P, P)``."""
         return adjacency_of(self.graph)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from functools import cached_property
 
 from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.encode_job import Job
@@ -13,6 +12,7 @@ from gvcodecs.mcgv.encoding.coded_route import Coded
 from gvcodecs.mcgv.encoding.error_measuring import measure_decoded, measure_predicted
 from gvcodecs.mcgv.encoding.routes import code
 from gvpipe.codec import Encoded
+from gvpipe.forks import kept
 from gvpipe.rate_control.step_search import StepTrial
 
 ROUNDING = math.sqrt(1 / 12)  # steps, root mean square, that rounding to steps leaves
@@ -39,7 +39,7 @@ class StepTrials:
             self._done[step] = StepTrial(encoded, step, error)
         return self._done[step]
 
-    @cached_property
+    @kept
     def alone(self) -> StepTrials:
         """Of the same candidate without pictures."""
         start = dataclasses.replace(self.candidate.start, pictures=False)

@@ -14,11 +14,10 @@ have the size of the motion that they cause, so that one quantisation step suits
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 
 from gvpipe.arrays import Float64, Floats, Int32
+from gvpipe.forks import kept
 from gvpipe.trajectory.basis import row_blocks
 
 ROWS = 1 << 14  # vertices whose products with all transforms are held at a time
@@ -55,7 +54,7 @@ class AffinePredictor:
         self._rank = np.empty(len(base), np.intp)
         self._rank[self._order] = np.arange(len(base))
 
-    @cached_property
+    @kept
     def coordinates(self) -> Float64:
         """``(V, 3)`` base points in their cluster's frame, in the given order."""
         return np.ascontiguousarray(self._coordinates[self._rank, :3])
@@ -75,7 +74,7 @@ class AffinePredictor:
                 result[:, k] += (self._inverses[k] @ (moved[part] - still)).reshape(4, len(frames), 3).swapaxes(0, 1)
         return result
 
-    @cached_property
+    @kept
     def _inverses(self) -> list[Float64]:
         """Pseudo-inverses ``(4, m)`` of the clusters' coordinates."""
         return [np.asarray(np.linalg.pinv(self._coordinates[part], rcond=FLAT)) for part in self._slices]

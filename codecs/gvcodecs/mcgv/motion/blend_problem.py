@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -12,6 +11,7 @@ from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighb
 from gvcodecs.mcgv.motion.skinning import TOTAL, Weights, homogeneous, solve_normal
 from gvcodecs.mcgv.motion.weight_coding import encode_weights
 from gvpipe.arrays import Float64
+from gvpipe.forks import kept
 
 
 @dataclass(frozen=True)
@@ -56,12 +56,12 @@ class Problem:
     price: float
     cluster_price: float
 
-    @cached_property
+    @kept
     def homogeneous(self) -> Float64:
         """``(P, 4)`` base positions and 1."""
         return homogeneous(self.base)
 
-    @cached_property
+    @kept
     def causal(self) -> CausalNeighbours:
         """Each point's neighbours of lower number."""
         return causal_neighbours(self.neighbours)

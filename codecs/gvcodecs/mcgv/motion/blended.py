@@ -6,7 +6,7 @@ import dataclasses
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,7 @@ from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
 from gvpipe.ahead import halves, run_ahead
 from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.forks import kept
 from gvpipe.trajectory.sparse_rows import as_rows
 
 if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
@@ -180,7 +181,7 @@ class BlendedMotion:
         places = samples.vertices[span], samples.slots[span], samples.surface.base, samples.surface.point
         rebuild_without_pictures(*places, blend.homogeneous, blend.weights, transforms, positions)
 
-    @cached_property
+    @kept
     def _points(self) -> list[SkinnedPoints]:
         """What each span needs for frames with pictures."""
         from gvcodecs.mcgv.motion.reconstruction_kernels import skinned_points

@@ -2,6 +2,9 @@
 
 import { corrupt, quote } from "../format/errors.js";
 
+/** Control characters, lone surrogates, separators of lines, and marks that turn the direction of writing round. */
+const UNSHOWN = /[\p{Cc}\p{Cs}\p{Zl}\p{Zp}\u202a-\u202e\u2066-\u2069]/u;
+
 export class AssetEntry {
   /** @param {object} given JSON value @param {string} where for messages */
   constructor(given, where) {
@@ -10,9 +13,9 @@ export class AssetEntry {
     this.given = given;
   }
 
-  /** A text. Without a default the member is needed; so below. */
+  /** A text that can be shown (`gvpipe.text`). Without a default the member is needed; so below. */
   text(name, otherwise) {
-    return this.#read(name, otherwise, (value) => typeof value === "string" && value.length < 65536);
+    return this.#read(name, otherwise, (value) => typeof value === "string" && value.length < 65536 && !UNSHOWN.test(value));
   }
 
   word(name, words, otherwise) {
