@@ -298,6 +298,21 @@ class MeshSequence:
         exact = None if self._exact is None else Guarded(self.read_absolute, *given)
         return self._derived(Guarded(self.read, *given), exact, **changes)
 
+    def reading_from(self, positions: Frames, exact: Frames | None, **changes: Any) -> MeshSequence:
+        """Return the same sequence, whose frames come from elsewhere.
+
+        Args:
+            positions: ``(F, V, 3) float32``, relative to the origin.
+            exact: the same in float64, with the origin added, if `is_rounded`.
+            changes: of what lies beside.
+        """
+        return self._derived(positions, exact, **changes)
+
+    @property
+    def is_rounded(self) -> bool:
+        """Whether `read_absolute` has more digits than `read`."""
+        return self._exact is not None
+
     def _derived(self, positions: Frames, exact: Frames | None, **changes: Any) -> MeshSequence:
         result = replace(self, positions=positions, **changes)
         object.__setattr__(result, "_exact", exact)

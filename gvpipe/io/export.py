@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from gvpipe.asset.field import Field
 from gvpipe.atomic import output_error, unnamed_path
-from gvpipe.errors import InputError
+from gvpipe.errors import InputError, OutputError
 from gvpipe.io.formats import FRAME_FORMATS
+from gvpipe.io.mesh import FrameEncoder
 from gvpipe.io.pattern import match_pattern
 from gvpipe.io.scene_formats import WRITERS
 from gvpipe.sequence import CHUNK_BYTES, MeshSequence
@@ -49,23 +51,69 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> tuple[str
             f"{target.with_name(target.stem + '_%04d' + target.suffix)}"
         )
     encoder = entry.encoder(sequence, _shared_name(pattern.before if pattern else target.stem))
-    if pattern is not None:
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as exc:
-            raise output_error(target.parent, exc) from exc
-    for name, data in encoder.beside.items():
-        with unnamed_path(target.with_name(name)) as temporary:
-            temporary.write_bytes(data)
+    made = _Made(target.parent)
+    try:
+        if pattern is not None:
+            made.folder()
+        for name, data in encoder.beside.items():
+            made.file(target.with_name(name), data)
+        _write_each(sequence, encoder, made, lambda frame: target.with_name(pattern.name(start + frame)) if pattern else target)
+    except OutputError as exc:
+        whole = made.undo()
+        if not whole:
+            raise
+        raise OutputError(f"{exc}; frames {start} to {start + whole - 1} are whole, the others are not there") from exc
+    return encoder.notes
+
+
+def _write_each(sequence: MeshSequence, encoder: FrameEncoder, made: _Made, place: Callable[[int], Path]) -> None:
+    """Write all frames."""
     wanted = {name: sequence.fields[name] for name in encoder.fields}
     for first, stop in _spans(sequence, wanted):
         block = sequence.read(first, stop)
         fields = {name: field.read(first, stop) for name, field in wanted.items()}
         for i, positions in enumerate(block):
             data = encoder.encode(positions, {name: values[i] for name, values in fields.items()})
-            with unnamed_path(target.with_name(pattern.name(start + first + i)) if pattern else target) as temporary:
-                temporary.write_bytes(data)
-    return encoder.notes
+            made.file(place(first + i), data)
+            made.n_frames += 1
+
+
+class _Made:
+    """What a series has written: each file as a whole; while no frame is, nothing stays that was not there before.
+
+    Args:
+        folder: of all files.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._new: list[Path] = []
+        self.n_frames = 0
+
+    def folder(self) -> None:
+        """Make the folder and those above it."""
+        missing = [path for path in (self._folder, *self._folder.parents) if not path.exists()]
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as exc:
+            raise output_error(self._folder, exc) from exc
+        finally:
+            self._new += [path for path in reversed(missing) if path.is_dir()]
+
+    def file(self, path: Path, data: bytes) -> None:
+        """Write a file; raises `OutputError`."""
+        is_new = not path.exists()
+        with unnamed_path(path) as temporary:
+            temporary.write_bytes(data)
+        self._new += [path] if is_new else []
+
+    def undo(self) -> int:
+        """Return how many frames are whole; without any, remove what is new."""
+        if not self.n_frames:
+            for path in reversed(self._new):
+                with contextlib.suppress(OSError):
+                    path.rmdir() if path.is_dir() else path.unlink()
+        return self.n_frames
 
 
 def _shared_name(before: str) -> str:

@@ -28,7 +28,7 @@ from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.material import with_uv
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
-from gvpipe.atomic import atomic_path, output_error
+from gvpipe.atomic import atomic_files
 from gvpipe.attributes.surface_normals import surface_normals
 from gvpipe.errors import InputError
 from gvpipe.io.frame_normals import frame_normals
@@ -71,13 +71,9 @@ def write_openvat(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
         f"{path.stem}_vnrm.png": normals,
         f"{path.stem}-remap_info.json": _remap_info(low, high, sequence.n_frames),
     }
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as exc:
-        raise output_error(path, exc) from exc
-    for name, data in files.items():
-        with atomic_path(path / name) as temporary:
-            temporary.write_bytes(data)
+    with atomic_files(path) as folder:
+        for name, data in files.items():
+            (folder / name).write_bytes(data)
     return _notes(sequence, turn, kept, float((high - low).max()) / FULL / 2)
 
 

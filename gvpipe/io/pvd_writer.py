@@ -8,13 +8,14 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from gvpipe.arrays import Float64
-from gvpipe.atomic import unnamed_path
+from gvpipe.atomic import atomic_files
+from gvpipe.errors import OutputError
 from gvpipe.io.export import write_frames
 from gvpipe.sequence import MeshSequence
 
 
 def write_pvd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
-    """Write ``walk.pvd`` and ``walk/walk_0000.vtp``...; the list is written last.
+    """Write ``walk.pvd`` and ``walk/walk_0000.vtp``...: all of them, or none.
 
     Returns what the format cannot hold, a line each.
 
@@ -23,15 +24,17 @@ def write_pvd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     """
     digits = max(4, len(str(sequence.n_frames - 1)))
     name = path.stem.replace("%", "_").replace("#", "_").replace("$", "_")  # no second pattern in the name
-    folder = path.with_name(name)
-    notes = write_frames(sequence, str(folder / f"{name}_%0{digits}d.vtp"))
     listed = "".join(
         f'<DataSet timestep="{time:.17g}" part="0" file={quoteattr(f"{name}/{name}_{frame:0{digits}d}.vtp")}/>\n'
         for frame, time in enumerate(frame_times(sequence))
     )
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian"><Collection>\n'
-    with unnamed_path(path) as temporary:
-        temporary.write_text(f"{head}{listed}</Collection></VTKFile>\n", "utf-8")
+    with atomic_files(path.parent) as folder:
+        try:
+            notes = write_frames(sequence, str(folder / name / f"{name}_%0{digits}d.vtp"))
+        except OutputError as exc:
+            raise OutputError(str(exc).replace(str(folder), str(path.parent)).partition("; frames ")[0]) from exc
+        (folder / path.name).write_text(f"{head}{listed}</Collection></VTKFile>\n", "utf-8")
     return notes
 
 

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from gvpipe.arrays import Array, Int64
-from gvpipe.atomic import atomic_path
 from gvpipe.io.losses import renamed_note
 from gvpipe.io.pvd_writer import frame_times
 from gvpipe.io.simulation.hdf import import_h5py
 from gvpipe.io.simulation.poly_content import ROLES, PolyContent, poly_content
 from gvpipe.io.simulation.vtkhdf import POLY_GROUPS, ROOT, UNIT
+from gvpipe.io.writing_process import write_by
 from gvpipe.sequence import MeshSequence
 
 VERSION = (2, 3)
@@ -28,13 +28,21 @@ CHUNK = 1 << 16  # rows of a compressed chunk at most
 def write_vtkhdf(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     """Write a sequence with its attributes and fields; returns what the format cannot hold, a line each.
 
+    HDF5 dies where it cannot write, so it runs in a process of its own.
+
     Raises:
         InputError: h5py is missing.
         OutputError: the file cannot be written.
     """
+    import_h5py(str(path))
+    return write_by(__name__, "write_here", sequence, path)
+
+
+def write_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str, ...]:
+    """The same in this process; a file that cannot be written is left as it is."""
     h5py = import_h5py(str(path))
     content = poly_content(sequence, "VTKHDF", has_units=True)
-    with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
+    with h5py.File(path, "w") as file:
         root = file.create_group(ROOT)
         root.attrs["Version"] = np.array(VERSION, np.int64)
         root.attrs["Type"] = np.bytes_("PolyData")

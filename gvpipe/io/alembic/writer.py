@@ -6,20 +6,20 @@ sets of their names.
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gvpipe import notes
-from gvpipe.atomic import atomic_path
-from gvpipe.errors import InputError, OutputError
+from gvpipe.errors import InputError
 from gvpipe.io.alembic.archive import EXTRA
 from gvpipe.io.alembic.param_writer import ParamWriter, filled, is_held
-from gvpipe.io.damage import reason_of
 from gvpipe.io.losses import renamed_note, shadow_note, shadowed, unit_note
 from gvpipe.io.scene_export import ExportMesh, export_layer, export_meshes, uncovered
 from gvpipe.io.scene_normals import SceneNormals
+from gvpipe.io.writing_process import write_by
 from gvpipe.notes import not_held
 from gvpipe.sequence import MeshSequence
 
@@ -29,22 +29,22 @@ BYTES = 16 << 20  # of a field's frames at a time
 def write_alembic(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     """Write a sequence as .abc; returns what the format cannot hold.
 
+    Alembic's library dies where it cannot write, so it runs in a process of its own.
+
     Raises:
         InputError: alembic3d is missing, or a position is not finite.
         OutputError: the file cannot be written.
     """
-    try:
-        import alembic3d  # noqa: F401
-    except ImportError as exc:
-        raise InputError(f"{path}: {EXTRA}") from exc
-    meshes = export_meshes(sequence, path.stem)
+    if importlib.util.find_spec("alembic3d") is None:
+        raise InputError(f"{path}: {EXTRA}")
+    return write_by(__name__, "write_here", sequence, path)
+
+
+def write_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str, ...]:
+    """The same in this process; a file that cannot be written is left as it is."""
+    meshes = export_meshes(sequence, name)
     normals = SceneNormals(sequence, "Alembic")
-    try:
-        with atomic_path(path) as temporary:
-            # the library closes the file when its objects are gone
-            taken = _write_archive(sequence, meshes, normals, str(temporary))
-    except RuntimeError as exc:
-        raise OutputError(f"cannot write {path}: {reason_of(exc)}; check the folder and the disk") from exc
+    taken = _write_archive(sequence, meshes, normals, str(path))  # the library closes the file when its objects are gone
     return (*normals.notes, *_notes(sequence, meshes), *_name_notes(sequence, taken))
 
 
