@@ -2,7 +2,7 @@
 
 The content goes to a temporary file in the same folder, is flushed to the disk and then takes the final name in one
 step. An interrupted or failed write leaves no half file and never damages an older one. What is only needed for a while goes
-to a temporary folder.
+to a temporary folder. Its process holds a lock on it, so that the next one knows what a killed one has left behind.
 
 Where the system has files without names (Linux, most file systems), the content goes to one of those (`unnamed_path`). Then
 nothing is left even if the process is killed. Libraries that look at the name, or that replace the file, need `atomic_path`.
@@ -15,6 +15,7 @@ import errno
 import os
 import secrets
 import shutil
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -25,6 +26,8 @@ from gvpipe.errors import OutputError
 PREFIX = "gvpipe-"  # of the names of temporary folders
 LASTING_PREFIX = "gvpipe-play-"  # of those that stay for a while
 LASTING_SECONDS = 24 * 3600
+YOUNG_SECONDS = 60  # between making a folder and its lock there is a moment
+_locks: dict[str, int] = {}  # descriptors that hold the locks of this process's folders
 REMEDIES = {
     errno.ENOSPC: "free some space or choose another disk",
     errno.EDQUOT: "free some space or choose another disk",
@@ -136,7 +139,7 @@ def temporary_folder() -> Iterator[str]:
     try:
         yield folder
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        remove_folder(folder)
 
 
 @contextlib.contextmanager
@@ -148,7 +151,7 @@ def lasting_folder() -> Iterator[str]:
     Raises:
         OutputError: no folder can be made there.
     """
-    _remove_old_folders()
+    _remove_folders(LASTING_PREFIX, LASTING_SECONDS)
     folder = new_folder(LASTING_PREFIX)
     try:
         yield folder
@@ -164,23 +167,66 @@ def output_error(path: str | os.PathLike[str], exc: OSError) -> OutputError:
 
 
 def new_folder(prefix: str) -> str:
-    """Make a folder among the system's temporary files; raises `OutputError`."""
+    """Make a folder among the system's temporary files, which counts as used until this process removes it or ends.
+
+    Raises:
+        OutputError: none can be made there.
+    """
     try:
-        return tempfile.mkdtemp(prefix=prefix)
+        folder = tempfile.mkdtemp(prefix=prefix)
     except OSError as exc:
         raise output_error(tempfile.gettempdir(), exc) from exc
+    if prefix != LASTING_PREFIX and (lock := _lock(folder)) is not None:
+        _locks[os.path.realpath(folder)] = lock
+    return folder
 
 
-def _remove_old_folders() -> None:
-    """Remove what `lasting_folder` made long ago, for this user."""
-    oldest = time.time() - LASTING_SECONDS
+def remove_folder(folder: str) -> None:
+    """Remove what `new_folder` made."""
+    real = os.path.realpath(folder)
+    shutil.rmtree(folder, ignore_errors=True)
+    if (lock := _locks.pop(real, None)) is not None:
+        os.close(lock)
+
+
+def remove_abandoned_folders() -> None:
+    """Remove temporary folders whose processes were killed: the user's own, a minute old, and locked by nobody."""
+    _remove_folders(PREFIX, YOUNG_SECONDS if sys.platform != "win32" else LASTING_SECONDS)
+
+
+def _remove_folders(prefix: str, seconds: float) -> None:
+    """Remove this user's folders with a prefix that are so old, and that nobody uses."""
+    oldest = time.time() - seconds
     with contextlib.suppress(OSError), os.scandir(tempfile.gettempdir()) as entries:
         for entry in entries:
-            if not entry.name.startswith(LASTING_PREFIX) or not entry.is_dir(follow_symlinks=False):
+            is_other = prefix == PREFIX and entry.name.startswith(LASTING_PREFIX)
+            if not entry.name.startswith(prefix) or is_other or not entry.is_dir(follow_symlinks=False):
                 continue
             found = entry.stat(follow_symlinks=False)
             if found.st_mtime < oldest and (not hasattr(os, "getuid") or found.st_uid == os.getuid()):
-                shutil.rmtree(entry.path, ignore_errors=True)
+                lock = _lock(entry.path)
+                if lock is not None or sys.platform == "win32":
+                    shutil.rmtree(entry.path, ignore_errors=True)
+                if lock is not None:
+                    os.close(lock)
+
+
+def _lock(folder: str) -> int | None:
+    """A descriptor that holds a folder's lock; None if another process has it, or the system has no such locks."""
+    if sys.platform == "win32":
+        return None
+    import fcntl
+
+    try:
+        held = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(held)
+        return None
+    return held
 
 
 def _target(path: str | os.PathLike[str]) -> Path:

@@ -11,8 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from gvpipe import atomic
 from gvpipe.atomic import atomic_path, lasting_folder, temporary_folder, unnamed_path
 from gvpipe.errors import OutputError
+from gvpipe.isolation.python import run_python
 
 
 def test_atomic_path(tmp_path: Path) -> None:
@@ -116,3 +118,25 @@ def test_no_place_for_temporary_files(tmp_path: Path, monkeypatch: pytest.Monkey
         temporary_folder(),
     ):
         pass
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no locks of folders")
+def test_what_killed_processes_leave_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the next command; folders that a process uses stay, as do young ones, and those of others."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    long_ago = time.time() - 3600
+    code = "import os, signal, tempfile; from gvpipe.atomic import temporary_folder as t\nwith t() as f:\n"
+    code += "    open(os.path.join(f, 'left'), 'w').close(); os.kill(os.getpid(), signal.SIGKILL)"
+    assert run_python(["-c", code], {"TMPDIR": str(tmp_path)}).status == -9
+    (left,) = tmp_path.iterdir()
+    atomic.remove_abandoned_folders()
+    assert left.exists()  # it is young
+    os.utime(left, (long_ago, long_ago))
+    (tmp_path / "gvpipe-link").symlink_to(left)
+    (tmp_path / "other-folder").mkdir()
+    with atomic.temporary_folder() as used:
+        for path in (used, tmp_path / "other-folder"):
+            os.utime(path, (long_ago, long_ago))
+        code = "from gvpipe.cli import main; main()"
+        run_python(["-c", code, "codecs"], {"TMPDIR": str(tmp_path)})
+        assert os.path.isdir(used) and not left.exists() and (tmp_path / "other-folder").exists()

@@ -16,6 +16,7 @@ from folders import GOLDEN
 from sequences import held, partly_still, patched, rigid, waving
 
 import gvpipe
+from gvpipe.isolation.python import run_python
 
 CURRENT: dict[str, tuple[str, dict[str, Any]]] = {
     "laplacian-2-still": ("laplacian", {"segment": 7}),
@@ -68,3 +69,21 @@ def test_golden_file_decodes_to_the_same_positions(name: str, tmp_path: Path, re
         assert np.array_equal(np.asarray(attribute), np.asarray(wanted.attributes[name])), name
     for name, field in decoded.fields.items():
         assert np.allclose(field[:], wanted.fields[name][:], rtol=0, atol=1e-5), name
+
+
+PLAIN = """
+import sys, warnings
+import numpy as np
+warnings.simplefilter("error")
+import gvpipe
+for path in sys.argv[1:]:
+    expected = np.load(path.replace(".mp4", ".npz"))["vertices"]
+    assert np.abs(gvpipe.open(path)[:] - expected).max() < 1e-5, path
+"""
+
+
+@pytest.mark.parametrize("names", ["pdct-3-live", pytest.param("*", marks=pytest.mark.slow)])
+def test_kernels_that_are_not_compiled_decode_the_same(names: str) -> None:
+    """By ``NUMBA_DISABLE_JIT``, where kernels are Python: a sound file is not called corrupt."""
+    done = run_python(["-c", PLAIN, *map(str, sorted(GOLDEN.glob(f"{names}.mp4")))], {"NUMBA_DISABLE_JIT": "1"})
+    assert done.status == 0, done.err

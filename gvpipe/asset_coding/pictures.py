@@ -11,6 +11,7 @@ from gvpipe.errors import InputError, SettingError
 
 FORMATS = {"webp": "image/webp", "jpeg": "image/jpeg", "png": "image/png"}
 QUALITY = 90  # of WebP and JPEG
+MOST_SIDES = {"webp": 16383, "jpeg": 65500}  # pixels that a format, or its library, has a place for
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,17 @@ def limit_image(image: Image, limit: TextureLimit) -> Image:
     if not is_small:
         picture.thumbnail((limit.side, limit.side), Pillow.Resampling.LANCZOS)
     chosen = limit.format or image.media_type.removeprefix("image/")
-    return replace(image, media_type=FORMATS.get(chosen, FORMATS["png"]), data=_pack(picture, chosen))
+    most = MOST_SIDES.get(chosen, max(picture.size))
+    if max(picture.size) > most:
+        raise InputError(
+            f"image {image.name!r} has {picture.width} x {picture.height} pixels; {chosen} holds {most} a side: "
+            f"give a side, too (textures {most},{chosen})"
+        )
+    try:
+        data = _pack(picture, chosen)
+    except (OSError, ValueError) as exc:
+        raise InputError(f"image {image.name!r} cannot be written as {chosen} ({exc}); choose another format") from exc
+    return replace(image, media_type=FORMATS.get(chosen, FORMATS["png"]), data=data)
 
 
 def _pack(picture: object, chosen: str) -> bytes:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.errors import GvpipeError, InputError, printable
+from gvpipe.isolation.plain_files import open_plain
 from gvpipe.tasks.executor import Work
 
 BLOCK = 1 << 20  # bytes that are hashed at a time
@@ -110,7 +111,7 @@ def _add(digest: Any, file: str) -> None:
 
 def _blocks(file: str) -> Iterator[bytes]:
     try:
-        with open(file, "rb") as opened:
+        with open_plain(file) as opened:
             while block := opened.read(BLOCK):
                 yield block
     except OSError as exc:

@@ -134,7 +134,7 @@ def _lock(file: IO[bytes], path: Path) -> None:
 def _parse(line: bytes, where: str) -> Entry:
     try:
         values = json.loads(line)
-    except ValueError as exc:
+    except (ValueError, RecursionError) as exc:
         raise InputError(f"{where}: it is no JSON, so this is no manifest; {REMEDY}") from exc
     if not isinstance(values, dict):
         raise InputError(f"{where}: it is {quote(values)}, so this is no manifest; {REMEDY}")

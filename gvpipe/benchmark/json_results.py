@@ -33,6 +33,8 @@ def read_results(path: str | os.PathLike[str], parse: Callable[[Any], Results]) 
         raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check the path") from exc
     except UnicodeDecodeError as exc:
         raise _no_results(path, "it is no text") from exc
+    except RecursionError as exc:
+        raise _no_results(path, "its JSON is nested too deeply") from exc
     except json.JSONDecodeError as exc:
         raise _no_results(path, f"line {exc.lineno} is no JSON") from exc
     except WrongValue as exc:

@@ -5,12 +5,12 @@ The process writes its memory to a file as it ends: what the system tells of an 
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from gvpipe.atomic import temporary_folder
 from gvpipe.errors import InputError
 from gvpipe.isolation.python import TimeoutExpired, run_python
 
@@ -44,7 +44,7 @@ def measure_command(words: Sequence[str], limit: float | None = None) -> Cost | 
     Raises:
         InputError: the command failed.
     """
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         told = Path(folder, "peak")
         before, started = _children_seconds(), time.perf_counter()
         try:

@@ -7,13 +7,13 @@ few frames, and for each number of frames of a small mesh. A command before all 
 from __future__ import annotations
 
 import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import gvpipe
 from gvpipe import files
+from gvpipe.atomic import temporary_folder
 from gvpipe.benchmark.own_process import measure_command
 from gvpipe.benchmark.scale_report import ScalePoint, ScaleReport
 from gvpipe.benchmark.sweep import describe_machine, settings_of
@@ -55,7 +55,7 @@ def run(
     rows = [[(each, FEW_FRAMES) for each in sorted(vertices)], [(FEW_VERTICES, each) for each in sorted(frames)]]
     points = []
     n_all, n_done = len(codecs) * sum(map(len, rows)), 0
-    with tempfile.TemporaryDirectory() as place:
+    with temporary_folder() as place:
         folder = Path(place)
         sources = {size: _write(folder, size) for size in (WARM, *rows[0], *rows[1])}
         for codec in codecs:

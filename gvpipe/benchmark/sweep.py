@@ -21,7 +21,7 @@ import numpy as np
 
 import gvpipe
 from gvpipe import api, files
-from gvpipe.atomic import output_error
+from gvpipe.atomic import output_error, temporary_folder
 from gvpipe.benchmark.memory import peak_mb
 from gvpipe.benchmark.report import BenchReport, Curve
 from gvpipe.codec import Progress
@@ -86,7 +86,7 @@ def measure_curve(source: str, codec: str, qualities: list[float], texts: dict[s
     sequence = files.read(source)
     settings = settings_of(codec, sorted(qualities), texts)
     points = []
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         warm = Path(folder) / "warm.mp4"
         api.encode(sequence.part(0, min(WARM_FRAMES, sequence.n_frames)), warm, settings[0])
         api.decode(warm)

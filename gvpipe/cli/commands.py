@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gvpipe import __version__
+from gvpipe.atomic import remove_abandoned_folders
 from gvpipe.cli.benchmarks import bench, plot
 from gvpipe.cli.console import Output, is_verbose, output_options, unlimited_option
 from gvpipe.cli.conversion import convert
@@ -77,6 +78,7 @@ def main() -> None:
 @click.version_option(__version__, prog_name="gvpipe")
 def cli() -> None:
     """Turn animated triangle meshes into small MP4 geometry videos, and back."""
+    remove_abandoned_folders()
 
 
 @cli.command()

@@ -26,6 +26,7 @@ from gvpipe.container.sources import check_target
 from gvpipe.datasets.sample_names import DESCRIPTION, VIDEO, is_plain, key_of
 from gvpipe.errors import FormatError, InputError, OutputError
 from gvpipe.io.numbering import natural_key
+from gvpipe.isolation.plain_files import open_plain
 
 SHARD_BYTES = 1_000_000_000
 BLOCK = tarfile.BLOCKSIZE
@@ -83,11 +84,11 @@ def pack(
     for name, value in (("shard_bytes", shard_bytes), ("shard_sequences", shard_sequences)):
         if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
             raise InputError(f"{name} is {value!r}; a whole number of 1 or more is needed")
-    files = _find(Path(check_path(folder, "the folder of geometry videos")))
+    left_out: dict[str, str] = {}
+    files = _find(Path(check_path(folder, "the folder of geometry videos")), left_out)
     is_numbered = _check_pattern(pattern)
     if not is_numbered:
         shard_bytes, shard_sequences = len(files) << 40, None
-    left_out: dict[str, str] = {}
     samples = _Ahead(_samples(files, left_out, progress, unlimited))
     shards: list[str] = []
     while samples.has_next():
@@ -161,8 +162,10 @@ def _samples(files: dict[str, Path], left_out: dict[str, str], progress: Progres
         if progress:
             progress("pack", k / len(files))
         try:
-            data = path.read_bytes()
+            with open_plain(path, follows=False) as file:
+                data = file.read()
             description = {**_beside(path), **describe(read_bytes(data, str(path), unlimited))}
+            text = _as_json(description, path)
             _member(f"{key}.{DESCRIPTION}", 0).tobuf(tarfile.USTAR_FORMAT)
         except (FormatError, InputError) as exc:
             left_out[str(path)] = str(exc)
@@ -171,19 +174,20 @@ def _samples(files: dict[str, Path], left_out: dict[str, str], progress: Progres
         except ValueError:
             left_out[str(path)] = f"{path}: its path is too long for a tar file; choose a shorter name"
         else:
-            text = json.dumps(description, separators=(",", ":"), ensure_ascii=False).encode()
             yield _Sample({f"{key}.{VIDEO}": data, f"{key}.{DESCRIPTION}": text})
 
 
 def _beside(path: Path) -> dict[str, Any]:
     """The JSON object beside a file; empty if there is none."""
     beside = path.with_suffix(f".{DESCRIPTION}")
-    if not beside.is_file():
+    if not os.path.lexists(beside):
         return {}
-    if beside.stat().st_size > MAX_DESCRIPTION:
+    with open_plain(beside, follows=False) as file:
+        data = file.read(MAX_DESCRIPTION + 1)
+    if len(data) > MAX_DESCRIPTION:
         raise InputError(f"{beside} has more than {MAX_DESCRIPTION} bytes; shorten it")
     try:
-        found = json.loads(beside.read_bytes())
+        found = json.loads(data)
     except (ValueError, RecursionError) as exc:
         raise InputError(f"{beside} is not JSON ({exc}); mend or remove it") from exc
     if not isinstance(found, dict):
@@ -191,8 +195,16 @@ def _beside(path: Path) -> dict[str, Any]:
     return found
 
 
-def _find(folder: Path) -> dict[str, Path]:
-    """The geometry videos of a folder by key, in natural order; hidden ones are left out."""
+def _as_json(description: dict[str, Any], path: Path) -> bytes:
+    try:
+        return json.dumps(description, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+    except ValueError as exc:  # half a character, say; or NaN, which is no JSON
+        beside = path.with_suffix(f".{DESCRIPTION}")
+        raise InputError(f"{beside} holds what no JSON file in UTF-8 can hold ({exc}); mend or remove it") from exc
+
+
+def _find(folder: Path, left_out: dict[str, str]) -> dict[str, Path]:
+    """The geometry videos of a folder by key, in natural order; hidden ones are left out, others as ``left_out`` gets told."""
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; give the one that has the .mp4 files")
     found = [path for path in folder.rglob("*") if path.suffix.lower() == f".{VIDEO}" and path.is_file()]
@@ -204,7 +216,10 @@ def _find(folder: Path) -> dict[str, Path]:
     for path in sorted(visible, key=lambda path: natural_key(path.as_posix())):
         key = key_of(PurePosixPath(path.as_posix()))
         if not is_plain(key):
-            raise InputError(f"{relative[path]}: its name has characters that a shard's member may not have; rename it")
+            left_out[str(relative[path])] = (
+                f"{relative[path]}: its name has characters that a shard's member may not have; rename it"
+            )
+            continue
         if key in files:
             raise InputError(
                 f"{files[key]} and {relative[path]} both have the key {key!r}, since keys have no dots; rename one"

@@ -9,13 +9,14 @@ from __future__ import annotations
 import os
 import tarfile
 from collections.abc import Iterator
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple, cast
 
 from gvpipe.datasets.sample_names import DESCRIPTION, VIDEO, is_plain, split_name
 from gvpipe.errors import CorruptFile, FormatError, InputError, TruncatedFile, corrupt, quote
 
 BLOCK = tarfile.BLOCKSIZE
 MAX_MEMBERS = 1 << 24
+MAX_HEADER = 1 << 20  # bytes of a long name, or of what else precedes a member
 PARSER_ERRORS = (tarfile.TarError, RecursionError, OverflowError, ValueError, MemoryError)
 REMEDY = "get the shard again from its source, or pack it again"
 
@@ -91,9 +92,23 @@ def _members(path: str) -> Iterator[tuple[str, Place]]:
 def _open(file: BinaryIO) -> tarfile.TarFile:
     """An archive; opening reads its first header."""
     try:
-        return tarfile.TarFile(fileobj=file)
+        return tarfile.TarFile(fileobj=cast(Any, _Headers(file)))
     except PARSER_ERRORS as exc:
         raise CorruptFile(f"it is no tar file ({exc}); give a shard as gvpipe pack writes it") from exc
+
+
+class _Headers:
+    """A file of which a parser reads headers alone, none of them long: a name may say that it has gigabytes."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self.mode = file, "rb"
+        self.seek, self.tell = file.seek, file.tell
+
+    def read(self, n: int = -1) -> bytes:
+        """Read some bytes; raises `tarfile.TarError` for more than `MAX_HEADER`."""
+        if not 0 <= n <= MAX_HEADER:
+            raise tarfile.HeaderError(f"a header of {n} bytes, above {MAX_HEADER}")
+        return self._file.read(n)
 
 
 def _next(archive: tarfile.TarFile, start: int) -> tarfile.TarInfo | None:

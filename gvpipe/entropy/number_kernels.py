@@ -32,7 +32,7 @@ def new_number_mixing(n_contexts: int, n_groups: int) -> Mixing:
 @compiled
 def mix_hash(value: int, other: int) -> int:
     """A hash below 2**32 of one, and of any integer of a magnitude below 2**31."""
-    mixed = ((value ^ (other & RANGE)) * FACTOR) & RANGE  # 64 bits may wrap round: the lower 32 stay
+    mixed = ((int(value) ^ (int(other) & RANGE)) * FACTOR) & RANGE  # 64 bits may wrap round: the lower 32 stay
     return mixed ^ (mixed >> 15)
 
 

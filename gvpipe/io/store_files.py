@@ -13,7 +13,6 @@ import contextlib
 import errno
 import glob
 import os
-import shutil
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -22,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import fsspec
 
-from gvpipe.atomic import new_folder
+from gvpipe.atomic import new_folder, remove_folder
 from gvpipe.container.store_source import asking
 from gvpipe.errors import GvpipeError, InputError
 from gvpipe.forks import ForkLock
@@ -200,4 +199,4 @@ def _empty(path: Path) -> None:
 def _remove(folder: Path, owner: int) -> None:
     """Remove a folder, unless it is that of the process which this one was forked from."""
     if os.getpid() == owner:
-        shutil.rmtree(folder, ignore_errors=True)
+        remove_folder(str(folder))

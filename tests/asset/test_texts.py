@@ -38,7 +38,7 @@ def sequence_of(text: str) -> MeshSequence:
     return MeshSequence(
         np.zeros((1, 3, 3), np.float32) + np.eye(3, dtype=np.float32),
         np.array([[0, 1, 2]]),
-        attributes={text: gvpipe.Attribute([[0.0], [1.0], [2.0]], unit=text), "uv": [[0, 0], [1, 0], [0, 1.0]]},
+        attributes={text: gvpipe.Attribute(np.arange(3, dtype=np.float32), unit=text), "uv": [[0, 0], [1, 0], [0, 1.0]]},
         fields={text: gvpipe.Field(np.zeros((1, 3), np.float32), unit=text)},
         parts=(gvpipe.Part(text, (0, 3), (0, 1), 0, text),),
         materials=(gvpipe.Material(text),),
@@ -97,14 +97,15 @@ def test_files_with_strange_names_are_refused(place: str, text: str) -> None:
     if place == "text" and "\n" in text:
         pytest.skip("texts have lines")
     images = [{"name": "a", "media_type": "image/png", "section": "image.0"}]
-    values: dict[str, Any] = {
+    places: dict[str, dict[str, Any]] = {
         "part": {"parts": [{"name": text, "vertices": [0, 3], "material": None}]},
         "material": {"materials": [{"name": text}]},
         "texture": {"materials": [{"base_color_texture": {"image": 0, "uv": text}}], "images": images},
         "metadata": {"metadata": {"source": text}},
         "text": {"metadata": {"texts": {"a": text}}},
         "key": {"metadata": {"texts": {text: "a"}}},
-    }[place]
+    }
+    values = places[place]
     plain = {"parts": [], "geometry": False, "attributes": [], "fields": [], "materials": [], "images": [], "metadata": {}}
     with pytest.raises(CorruptFile, match="which is not shown|more than 65535 characters"):
         unpack_directory(pack_json({"version": 1, **plain, **values}), 3)

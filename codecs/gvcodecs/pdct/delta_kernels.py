@@ -129,7 +129,7 @@ def find_contexts(layout: Layout, learning: Learning, axis: int, values: Int64, 
         level = 0
         while level < N_LEVELS - 1 and SLOW_LEVELS[level] <= near >> 1:
             level += 1
-        recent_level = (recent > 0) + (recent > 1) + (recent > 3) + (recent > 7)
+        recent_level = int(recent > 0) + int(recent > 1) + int(recent > 3) + int(recent > 7)
         own[i] = (layout.kinds[i] * N_LEVELS + level) * N_RECENT + recent_level
 
 

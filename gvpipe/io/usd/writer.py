@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from gvpipe import notes
 from gvpipe.arrays import Float32
-from gvpipe.atomic import atomic_path, unnamed_path
+from gvpipe.atomic import atomic_path, temporary_folder, unnamed_path
 from gvpipe.errors import InputError, OutputError
 from gvpipe.io.damage import reason_of
 from gvpipe.io.losses import renamed_note, shadow_note, shadowed, unit_note
@@ -61,7 +60,7 @@ def _write_package(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     from pxr import Sdf, Usd
 
     zip_writer: Any = getattr(Sdf, "ZipFileWriter", None) or Usd.ZipFileWriter  # it moved
-    with tempfile.TemporaryDirectory(prefix="gvpipe-") as held:
+    with temporary_folder() as held:
         folder = Path(held)
         stage = folder / "scene.usdc"
         said = _write_stage(sequence, stage, path.stem, "textures")
