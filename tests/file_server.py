@@ -27,6 +27,8 @@ class Served:
         rate: bits per second; 0: as fast as it can.
         held: what lies behind so many bytes is sent once ``go`` is set.
         go: see ``held``.
+        drip: seconds between single bytes; 0: they come together.
+        redirect: an address to send readers to; "": none.
         sent: ``(offset, bytes)`` of each answer.
         n_refused: answers that were a status.
     """
@@ -40,6 +42,8 @@ class Served:
     rate: float = 0.0
     held: int = 1 << 62
     go: threading.Event = field(default_factory=threading.Event)
+    drip: float = 0.0
+    redirect: str = ""
     sent: list[tuple[int, int]] = field(default_factory=list)
     n_refused: int = 0
 
@@ -87,6 +91,11 @@ def answer(handler: http.server.BaseHTTPRequestHandler, served: Served) -> None:
         served.n_refused += 1
         handler.send_error(served.status)
         return
+    if served.redirect:
+        handler.send_response(302)
+        handler.send_header("Location", served.redirect)
+        handler.end_headers()
+        return
     start, stop = 0, size
     if wanted and served.ranges:
         first, last = wanted.removeprefix("bytes=").split("-")
@@ -108,6 +117,10 @@ def answer(handler: http.server.BaseHTTPRequestHandler, served: Served) -> None:
     with contextlib.suppress(OSError):
         begun = time.perf_counter()
         at = start
+        while served.drip and at < stop:
+            handler.wfile.write(served.data[at : at + 1])
+            at += 1
+            time.sleep(served.drip)
         while at < stop and (at < served.held or served.go.wait(HELD)):
             end = min(at + CHUNK, stop, served.held if at < served.held else stop)
             handler.wfile.write(served.data[at:end])

@@ -1,7 +1,7 @@
 """A file on a web server, read by HTTP Range: what is asked for, in blocks, of which the last are kept.
 
-Any server will do. One that does not know Range sends the whole file: then it is read as it comes, into a temporary file.
-``urllib`` of the standard library does all of it; so redirects, proxies and certificates are those of Python.
+Any server will do. One that does not know Range sends the whole file: then it is read as it comes, into a temporary file, up to
+`MOST`. `gvpipe.container.http_request` says how long an answer may take.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ import http.client
 import re
 import tempfile
 import urllib.error
-import urllib.request
 import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from typing import IO, Any
 
+from gvpipe.container.http_request import Answer, TooSlow
 from gvpipe.errors import REMEDY, CorruptFile, InputError, TruncatedFile, printable, quote
 from gvpipe.forks import ForkLock, renew_after_fork
 
 BLOCK = 1 << 16  # bytes
 KEPT_BLOCKS = 512  # 32 MB
-TIMEOUT = 30.0  # seconds without a byte
+MOST = 1 << 30  # bytes of a file that has to come as a whole
 CONTENT_RANGE = re.compile(r"bytes (\d{1,18})-(\d{1,18})/(\d{1,18})")
 OPEN_AGAIN = "open it again"
 IDENTITY = "identity"  # a body that is the file itself
@@ -35,13 +35,14 @@ class HttpSource:
     Args:
         url: of the file.
         received: called with the number of bytes that have come so far, after each answer.
+        most: bytes of a file that has to come as a whole; None: any.
 
     Raises:
         InputError: no such server or file, or it cannot be read.
     """
 
-    def __init__(self, url: str, received: Callable[[int], None] = lambda count: None) -> None:
-        self._url, self._tell = url, received
+    def __init__(self, url: str, received: Callable[[int], None] = lambda count: None, most: int | None = MOST) -> None:
+        self._url, self._tell, self._most = url, received, most
         self._lock = ForkLock()
         self._blocks: OrderedDict[int, bytes] = OrderedDict()
         self._received = 0
@@ -52,7 +53,7 @@ class HttpSource:
             answer = self._request(0, BLOCK)
             self._validators = _validators(answer.headers)
             if answer.status != 206:
-                self._arriving = _Arriving(answer)
+                self._arriving = _Arriving(answer, self._most)
                 self.size: int = self._arriving.size
             else:
                 with answer:
@@ -99,6 +100,8 @@ class HttpSource:
         """Return the whole file, which is not kept."""
         with self._lock:
             if self._arriving is None and self.size > BLOCK:  # else it is here already
+                with self._asking():
+                    _check_size(self.size, self._most)
                 return self._fetch(0, self.size)
         return self.read(0, self.size)
 
@@ -106,7 +109,7 @@ class HttpSource:
         with self._asking():
             if self._is_forked:
                 answer = self._request(0, None)
-                arriving = self._arriving = _Arriving(answer)
+                arriving = self._arriving = _Arriving(answer, self._most)
                 self._is_forked = False
                 if arriving.size != self.size or _validators(answer.headers) != self._validators:
                     raise CorruptFile(f"the server has another file by now; {OPEN_AGAIN}")
@@ -136,19 +139,19 @@ class HttpSource:
                 raise CorruptFile(f"the server has another file by now; {OPEN_AGAIN}")
             return self._body(answer, length)
 
-    def _request(self, offset: int, length: int | None) -> Any:
+    def _request(self, offset: int, length: int | None) -> Answer:
         headers = {"Accept-Encoding": IDENTITY, "User-Agent": "gvpipe"}
         if length is not None:
             headers["Range"] = f"bytes={offset}-{offset + length - 1}"
-        answer = urllib.request.urlopen(urllib.request.Request(self._url, headers=headers), timeout=TIMEOUT)
+        answer = Answer(self._url, headers, length)
         coding = answer.headers.get("Content-Encoding", IDENTITY)
         if coding.strip().lower() not in ("", IDENTITY):
             answer.close()
             raise InputError(f"the server sends the file with Content-Encoding {quote(coding)}; have it send .mp4 as it is")
         return answer
 
-    def _body(self, answer: Any, length: int) -> bytes:
-        data = bytes(answer.read(length))
+    def _body(self, answer: Answer, length: int) -> bytes:
+        data = answer.read(length)
         if len(data) != length:
             raise TruncatedFile(f"the connection was cut after {len(data)} of {length} bytes; try again")
         self._received += len(data)
@@ -163,6 +166,8 @@ class HttpSource:
         except urllib.error.HTTPError as exc:
             with exc:
                 raise _refused(self._url, exc.code, exc.reason) from exc
+        except TooSlow as exc:
+            raise TruncatedFile(f"{exc}; try again, or download the file first") from exc
         except (ConnectionError, TimeoutError, http.client.IncompleteRead) as exc:
             raise TruncatedFile(f"the connection was cut ({type(exc).__name__}); try again") from exc
         except InputError as exc:
@@ -175,12 +180,13 @@ class HttpSource:
 class _Arriving:
     """A whole file as it comes, kept in a temporary file: for servers that do not know Range."""
 
-    def __init__(self, answer: Any) -> None:
+    def __init__(self, answer: Answer, most: int | None) -> None:
         length = answer.headers.get("Content-Length", "")
         if not (length.isascii() and length.isdecimal() and len(length) < 19):
             answer.close()
             raise InputError("the server sends neither parts of the file nor its length; download it first")
-        self.size, self.received = int(length), 0
+        self.size, self.received, self._most = int(length), 0, most
+        answer.allow(self.size)
         self._answer = answer
         self._file: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  closed with the last reference to this object
         for each in (self._file, answer):
@@ -188,6 +194,7 @@ class _Arriving:
 
     def read(self, offset: int, length: int) -> bytes:
         """Wait until bytes have come, and return them."""
+        _check_size(offset + length, self._most)
         self._file.seek(0, 2)
         while self.received < offset + length:
             data = self._answer.read(min(BLOCK, offset + length - self.received))
@@ -197,6 +204,15 @@ class _Arriving:
             self.received += len(data)
         self._file.seek(offset)
         return self._file.read(length)
+
+
+def _check_size(size: int, most: int | None) -> None:
+    """Refuse to fetch so many bytes, of a file that cannot be read in parts."""
+    if most is not None and size > most:
+        raise InputError(
+            f"{size} bytes have to come before it can be read, above {most}; if you trust its source, allow more by "
+            "--unlimited (Python: unlimited=True), or download it first"
+        )
 
 
 def _total(headers: Any, offset: int) -> int:

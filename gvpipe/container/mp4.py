@@ -201,9 +201,9 @@ def _read_address(url: str, unlimited: bool) -> Bitstream:
 def _source_at(url: str, budget: Budget) -> HttpSource | StoreSource:
     """The bytes at an address; modules load late, since urllib takes as long as all the rest."""
     if is_url(url):
-        from gvpipe.container.http_source import HttpSource
+        from gvpipe.container.http_source import MOST, HttpSource
 
-        return HttpSource(url, budget.grow)
+        return HttpSource(url, budget.grow, MOST if budget.is_limited else None)
     from gvpipe.container.store_source import StoreSource
 
     return StoreSource(url, budget.grow)

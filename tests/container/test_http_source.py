@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import pickle
+import socket
+import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +17,7 @@ from file_server import Served, serving
 from sequences import waving
 
 import gvpipe
-from gvpipe.container import http_source
+from gvpipe.container import http_request, http_source
 from gvpipe.container.http_source import HttpSource
 from gvpipe.errors import CorruptFile, GvpipeError, InputError, NotGeometryVideo, TruncatedFile
 
@@ -165,7 +170,7 @@ def test_a_connection_that_was_cut_once_is_tried_again(server: tuple[str, Served
     with gvpipe.open(url) as video:
         plain, calls = HttpSource._body, []
 
-        def cut_once(self: HttpSource, answer: object, length: int) -> bytes:
+        def cut_once(self: HttpSource, answer: Any, length: int) -> bytes:
             calls.append(length)
             if len(calls) == 1:
                 raise TruncatedFile("the connection was cut")
@@ -193,3 +198,70 @@ def test_what_came_so_far_is_the_budget(server: tuple[str, Served]) -> None:
         video[75]
         assert video.bitstream.budget.n_bytes == served.n_sent
     assert not gvpipe.open(url, unlimited=True).bitstream.budget.is_limited
+
+
+def test_a_server_that_sends_a_byte_now_and_then(server: tuple[str, Served], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Never silent for long, and never done: the whole answer has a limit, and what a user waits for does not count."""
+    monkeypatch.setattr(http_request, "LEAST_SECONDS", 1.0)
+    monkeypatch.setattr(http_request, "LEAST_RATE", 1e9)
+    url, served = server
+    served.drip = 0.05
+    begun = time.monotonic()
+    assert "takes more than 1 s" in message(url)
+    assert time.monotonic() - begun < 10
+
+
+def test_headers_that_never_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(http_request, "LEAST_SECONDS", 0.5)
+    monkeypatch.setattr(http_request, "LEAST_RATE", 1e9)
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def answer() -> None:
+            with contextlib.suppress(OSError):
+                connection, _ = listening.accept()
+                with connection:
+                    connection.sendall(b"HTTP/1.1 200 OK\r\n")
+                    for number in range(200):
+                        connection.sendall(b"X-%d: y\r\n" % number)
+                        time.sleep(0.05)
+
+        thread = threading.Thread(target=answer, daemon=True)
+        thread.start()
+        begun = time.monotonic()
+        assert "takes more than" in message(f"http://127.0.0.1:{listening.getsockname()[1]}/a.mp4")
+        assert time.monotonic() - begun < 5
+        thread.join(20)
+
+
+def test_a_pause_between_reads_does_not_count(files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(http_request, "LEAST_SECONDS", 0.3)
+    with serving(files[1].read_bytes()) as (url, served):
+        served.ranges = False
+        with gvpipe.open(url) as video:
+            time.sleep(0.5)
+            assert video[75].shape == (100, 3)
+
+
+@pytest.mark.parametrize("ranges", [False, True])
+def test_a_large_file_that_has_to_come_whole(ranges: bool, files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(http_source, "MOST", 1 << 12)
+    with serving(files[0].read_bytes() + bytes(1 << 20)) as (url, served):
+        served.ranges = ranges
+        assert "have to come before it can be read, above 4096" in message(url)
+        assert served.n_sent < 1 << 20 or not ranges
+        with pytest.raises(GvpipeError):  # the bytes behind the file are none
+            gvpipe.open(url, unlimited=True)
+
+
+def test_a_large_file_in_parts(files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(http_source, "MOST", 1 << 10)
+    monkeypatch.setattr(http_source, "BLOCK", 256)
+    with serving(files[1].read_bytes()) as (url, _), gvpipe.open(url) as video:
+        assert video[75].shape == (100, 3)
+
+
+@pytest.mark.parametrize("target", ["ftp://127.0.0.1/a.mp4", "file:///etc/hostname", "data:text/plain,a"])
+def test_redirects_lead_to_http_alone(target: str, server: tuple[str, Served]) -> None:
+    url, served = server
+    served.redirect = target
+    assert "cannot be read" in message(url) or "302" in message(url)

@@ -2,8 +2,10 @@
 
 import { GeometryVideoError } from "./errors.js";
 
-const PATIENCE = 30; // s without a byte
-const ROOM = 1 << 28; // bytes that are set aside because an answer says that so many come
+/** How long an answer may take: seconds without a byte, seconds in all, and the bytes per second of long ones, which may take longer. */
+export const TIMES = { silence: 30, least: 60, rate: 1e4 };
+
+const MOST = 1 << 28; // bytes of an answer, if nobody says how many are asked for
 
 /** From this status on, a server may come back. */
 export const OUTAGE = 500;
@@ -16,23 +18,32 @@ export function closed() {
 /**
  * @param {string|URL} url
  * @param {AbortSignal} signal ends it
- * @param {{what?: string, remedy?: string, init?: RequestInit}} [options] `what` is asked for, and what helps if it does not come: for messages
+ * @param {{what?: string, remedy?: string, init?: RequestInit, most?: number}} [options] `what` is asked for, and what helps if it does not
+ *   come: for messages; `most` bytes are taken of the answer
  * @returns {Promise<{response: Response, read: () => Promise<Uint8Array|null>, bytes: () => Promise<Uint8Array>, close: () => void,
  *   refused: () => GeometryVideoError}>} `read`: the next bytes, null at the end; `bytes`: all of them; `refused`: an error of this status
  * @throws {GeometryVideoError} kind "load": the connection fails; of `read` and `bytes`, too
  * @throws {unknown} the signal's reason
  */
-export async function request(url, signal, { what = String(url), remedy = "try again", init = {} } = {}) {
+export async function request(url, signal, { what = String(url), remedy = "try again", init = {}, most = MOST } = {}) {
   const own = new AbortController();
   const follow = () => own.abort(signal.reason);
   const end = () => signal.removeEventListener("abort", follow);
   signal.throwIfAborted();
   signal.addEventListener("abort", follow);
 
+  let waited = 0; // ms, in all
+  let taken = 0; // bytes of the body
   async function watched(promise) {
-    const timer = setTimeout(() => own.abort(new Error(`nothing came for ${PATIENCE} s`)), 1000 * PATIENCE);
+    const begun = performance.now();
+    const left = 1000 * (TIMES.least + taken / TIMES.rate) - waited;
+    const silent = 1000 * TIMES.silence <= left;
+    const why = silent ? `nothing came for ${TIMES.silence} s` : `it comes too slowly`;
+    const timer = setTimeout(() => own.abort(new Error(why)), Math.max(0, Math.min(1000 * TIMES.silence, left)));
     try {
-      return await promise;
+      const result = await promise;
+      waited += performance.now() - begun;
+      return result;
     } catch (error) {
       end();
       signal.throwIfAborted();
@@ -48,11 +59,15 @@ export async function request(url, signal, { what = String(url), remedy = "try a
     body ??= response.body?.getReader();
     const { done, value } = body ? await watched(body.read()) : { done: true };
     if (done) end();
+    else if ((taken += value.length) > most) {
+      close();
+      throw new GeometryVideoError("load", `${what} has more than ${most} bytes, which is all that a page takes of it; open it in Python`);
+    }
     return done ? null : value;
   }
   async function bytes() {
     const length = Number(response.headers.get("Content-Length"));
-    const room = new Uint8Array(length <= ROOM ? length : 0);
+    const room = new Uint8Array(length <= most ? length : 0);
     const parts = []; // behind the room
     let filled = 0;
     for (let part = await read(); part; part = await read()) {

@@ -290,7 +290,7 @@ export class StreamFile {
     const wanted = `bytes ${offset} to ${offset + length - 1} of ${this.url}`;
     if (this.incoming) return this.#await(offset, length, wanted);
     const init = { cache: this.live ? "no-store" : "default", headers: { Range: `bytes=${offset}-${offset + length - 1}` } };
-    const asked = await request(this.url, this.signal, { what: wanted, init });
+    const asked = await request(this.url, this.signal, { what: wanted, init, most: length });
     const { response } = asked;
     if (response.status !== PARTIAL) throw asked.refused(); // 200: the whole file would come
     const data = await asked.bytes();
