@@ -7,7 +7,7 @@ import pytest
 from PIL import Image as Pillow
 
 from gvpipe.asset.material import Image, image_size
-from gvpipe.asset_coding.pictures import TextureLimit, limit_image
+from gvpipe.asset_coding.pictures import MOST_SIDES, TextureLimit, limit_image
 from gvpipe.errors import InputError, SettingError
 
 
@@ -56,3 +56,17 @@ def test_limits() -> None:
     assert TextureLimit.parse(None) == TextureLimit()
     assert TextureLimit.parse(1024) == TextureLimit(1024)
     assert TextureLimit.parse("512, webp") == TextureLimit(512, "webp")
+
+
+@pytest.mark.parametrize("picture_format", ["webp", "jpeg"])
+def test_a_picture_that_a_format_cannot_hold(picture_format: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(MOST_SIDES, picture_format, 50)
+    with pytest.raises(InputError, match=rf"64 x 32 pixels; {picture_format} holds 50 a side: .*textures 50,{picture_format}"):
+        limit_image(made(), TextureLimit.parse(picture_format))
+    assert image_size(limit_image(made(), TextureLimit.parse(f"50,{picture_format}")).data) == (50, 25)
+
+
+def test_the_largest_webp() -> None:
+    wide = made(16384, 1)
+    with pytest.raises(InputError, match="16384 x 1 pixels; webp holds 16383 a side"):
+        limit_image(wide, TextureLimit.parse("webp"))
