@@ -62,7 +62,7 @@ class Report:
     Args:
         bpvf: bits per vertex and frame of the whole file.
         seconds: the whole as ``encode``, then each stage.
-        not_carried: names of attributes and fields of the sequence that the file does not hold.
+        not_carried: names of attributes and fields of the sequence that the file does not hold, and what the source has beside.
         sections: as in `Info`.
         tried: where a target was given, or codec ``auto``: every encode that was measured (`gvpipe.rate_control.trials.Trial`).
         reason: why the encode in the file was chosen among those.
@@ -221,7 +221,7 @@ def encode(
         bytes=size,
         bpvf=8 * size / (bitstream.n_vertices * bitstream.n_frames),
         seconds={"encode": time.perf_counter() - clock.started, **clock.seconds},
-        not_carried=sorted(asset.plan.left_out),
+        not_carried=[*sorted(asset.plan.left_out), *sequence.not_carried],
         sections=bytes_by_part(bitstream, size),
         tried=[trial.to_json() for trial in coded.tried],
         reason=coded.reason,

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 
 ROUNDED = 1e-5  # part of the diagonal: what float32 may round without a word
 DEFAULT_FPS = 30.0
+MOST_NAMED = 12  # names in a note
 ASSUMED_FPS = f"the input has no frame rate; {DEFAULT_FPS:g} frames per second were assumed (fps, --fps)"
 
 
@@ -61,6 +62,12 @@ def not_held(format_name: str, names: Sequence[str]) -> tuple[str, ...]:
 def not_carried(names: Sequence[str]) -> tuple[str, ...]:
     """Of attributes that the file has no place for."""
     return (f"the file does not carry {', '.join(names)}",) if names else ()
+
+
+def left_behind(names: Sequence[str]) -> tuple[str, ...]:
+    """Of what a source has beside what is read."""
+    shown = ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")
+    return (f"the source has what is not carried: {shown}",) if names else ()
 
 
 def over_budget(reason: str) -> str:

@@ -67,6 +67,7 @@ class MeshSequence:
         materials: what the parts look like.
         images: what the materials' textures show.
         metadata: up axis, unit, start time, source, texts.
+        not_carried: what the source has and the sequence has not, by name.
 
     Raises:
         InputError: a wrong shape, no frame, no vertex, an index out of range, an fps that is not a positive number, a
@@ -97,6 +98,7 @@ class MeshSequence:
     materials: tuple[Material, ...] = ()
     images: tuple[Image, ...] = ()
     metadata: Metadata = NO_METADATA
+    not_carried: tuple[str, ...] = ()
     _exact: Frames | None = field(default=None, init=False)  # absolute; what float32 rounded
     _rounding: float = field(default=0.0, init=False)
 

@@ -27,6 +27,7 @@ class SourceInfo:
         time_range: seconds of the first and the last frame.
         clips: names of the animations of a glTF file, of the takes of an FBX file.
         clip_ranges: first and last second of each clip.
+        not_carried: what the source has beside what is read, by name.
     """
 
     vertices: int
@@ -46,6 +47,7 @@ class SourceInfo:
     time_range: list[float]
     clips: list[str]
     clip_ranges: list[list[float]]
+    not_carried: list[str]
     notes: list[str]
 
     def to_json(self) -> dict[str, Any]:
@@ -88,6 +90,7 @@ def source_info(
         time_range=_time_range(sequence),
         clips=[clip.name for clip in clips],
         clip_ranges=[[clip.start, clip.stop] for clip in clips],
+        not_carried=list(sequence.not_carried),
         notes=list(sequence.notes),
         **list_things(things),
     )

@@ -1,7 +1,8 @@
 """Materials after glTF's metallic-roughness model, and the images that their textures show.
 
-Source: Khronos, glTF 2.0 specification, section 3.9 (materials), and its extensions KHR_texture_transform and
-KHR_materials_unlit.
+Source: Khronos, glTF 2.0 specification, section 3.9 (materials), and its extensions KHR_texture_transform, KHR_materials_unlit,
+_emissive_strength, _clearcoat, _transmission, _volume, _ior, _specular, _sheen, _iridescence, _anisotropy, _dispersion and
+_diffuse_transmission.
 """
 
 from __future__ import annotations
@@ -96,6 +97,18 @@ class Material:
         alpha_mode: ``"opaque"``, ``"mask"`` (cut out below ``alpha_cutoff``) or ``"blend"``.
         double_sided: whether back faces show.
         unlit: whether it shows its base colour without light.
+        emissive_strength: factor of ``emissive`` that is in it already, as KHR_materials_emissive_strength has it.
+        clearcoat, clearcoat_roughness: 0..1, a layer above all; ``clearcoat_normal_texture`` is its own.
+        transmission: 0..1, light that passes.
+        thickness, attenuation_distance: model units, 0: a thin wall, a medium without loss; attenuation_color: linear RGB.
+        ior: index of refraction.
+        specular: 0..1, specular_color: linear RGB, of reflections of what is no metal.
+        sheen_color: linear RGB, sheen_roughness: 0..1, of cloth.
+        iridescence: 0..1, iridescence_ior, iridescence_thickness_minimum, iridescence_thickness_maximum (nm): of a thin film.
+        anisotropy_strength: 0..1, anisotropy_rotation: radians.
+        dispersion: 20 over the Abbe number.
+        diffuse_transmission: 0..1, diffuse_transmission_color: linear RGB, light that passes and is scattered.
+        other fields that end in ``_texture``: as the factor of that name, or None.
     """
 
     name: str = ""
@@ -112,6 +125,41 @@ class Material:
     alpha_cutoff: float = 0.5
     double_sided: bool = False
     unlit: bool = False
+    emissive_strength: float = 1.0
+    clearcoat: float = 0.0
+    clearcoat_texture: Texture | None = None
+    clearcoat_roughness: float = 0.0
+    clearcoat_roughness_texture: Texture | None = None
+    clearcoat_normal_texture: Texture | None = None
+    transmission: float = 0.0
+    transmission_texture: Texture | None = None
+    thickness: float = 0.0
+    thickness_texture: Texture | None = None
+    attenuation_distance: float = 0.0
+    attenuation_color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    ior: float = 1.5
+    specular: float = 1.0
+    specular_texture: Texture | None = None
+    specular_color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    specular_color_texture: Texture | None = None
+    sheen_color: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sheen_color_texture: Texture | None = None
+    sheen_roughness: float = 0.0
+    sheen_roughness_texture: Texture | None = None
+    iridescence: float = 0.0
+    iridescence_texture: Texture | None = None
+    iridescence_ior: float = 1.3
+    iridescence_thickness_minimum: float = 100.0
+    iridescence_thickness_maximum: float = 400.0
+    iridescence_thickness_texture: Texture | None = None
+    anisotropy_strength: float = 0.0
+    anisotropy_rotation: float = 0.0
+    anisotropy_texture: Texture | None = None
+    dispersion: float = 0.0
+    diffuse_transmission: float = 0.0
+    diffuse_transmission_texture: Texture | None = None
+    diffuse_transmission_color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    diffuse_transmission_color_texture: Texture | None = None
 
     @property
     def textures(self) -> dict[str, Texture]:
@@ -138,9 +186,12 @@ def _check_material(given: Material, n_images: int, name: str) -> Material:
     material: Material = from_plain(Material, to_plain(given), name)  # every field of its type
     name = f"{name} ({material.name!r})"
     check_word("alpha mode", material.alpha_mode, ALPHA_MODES, name)
-    factors = (*material.base_color, *material.emissive, material.metallic, material.roughness, material.alpha_cutoff)
-    if len(factors) != 10 or not _are_numbers(factors):
-        raise InputError(f"{name} has too few factors, or one that is not a number up to {MAX_FACTOR:g}")
+    for field in fields(material):
+        value = getattr(material, field.name)
+        numbers = value if isinstance(value, tuple) else (value,) if isinstance(value, float) else ()
+        count = len(field.default) if isinstance(field.default, tuple) else len(numbers)
+        if len(numbers) != count or not _are_numbers(numbers):
+            raise InputError(f"{name}: {field.name} has too few factors, or one that is not a number up to {MAX_FACTOR:g}")
     for role, texture in material.textures.items():
         if not 0 <= texture.image < n_images:
             raise InputError(f"{name}: {role} shows image {texture.image}; there are {n_images} images")

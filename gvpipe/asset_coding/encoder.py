@@ -18,8 +18,9 @@ from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.listing import count_polygons
 from gvpipe.asset.material import Image, image_size
-from gvpipe.asset.metadata import NO_METADATA
+from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part
+from gvpipe.asset.texts import Cleaner
 from gvpipe.asset_coding.bounds import Precision, check_names, precision
 from gvpipe.asset_coding.directory import (
     ARRANGEMENT,
@@ -52,6 +53,8 @@ from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence
 
 MOVING = ("scalar", "vector")  # kinds of fields that may follow from positions
+
+NOT_CARRIED = "not carried"  # name of the metadata's text
 
 
 @dataclass(frozen=True)
@@ -127,7 +130,7 @@ class AssetCoder:
         """Whether there is nothing beside positions and triangles."""
         given = self._sequence
         is_bare = not (self.plan.attributes or self.plan.fields or given.parts or given.materials or given.images)
-        return is_bare and given.polygons is None and given.metadata == NO_METADATA
+        return is_bare and given.polygons is None and _with_losses(given) == NO_METADATA
 
     def add(self, encoded: Encoded, codec: Codec, is_final: bool = True) -> Bitstream:
         """Return the bitstream with the asset's sections; those that it has are replaced.
@@ -165,7 +168,7 @@ class AssetCoder:
             fields=fields,
             materials=self._sequence.materials,
             images=tuple(images),
-            metadata=self._sequence.metadata,
+            metadata=_with_losses(self._sequence),
         )
         return dataclasses.replace(
             encoded.bitstream,
@@ -268,6 +271,14 @@ def _listed(
     coding: int = CODED,
 ) -> Listed:
     return Listed(name, given.kind, given.domain, components, given.dtype.name, given.unit, bound, coding, section, span)
+
+
+def _with_losses(sequence: MeshSequence) -> Metadata:
+    """The metadata, with a text of what the source has beside what the file carries, which ``gvpipe info`` shows."""
+    if not sequence.not_carried:
+        return sequence.metadata
+    said = Cleaner(sequence.name).text(", ".join(sequence.not_carried))
+    return dataclasses.replace(sequence.metadata, texts={**sequence.metadata.texts, NOT_CARRIED: said})
 
 
 def _with_counts(outline: Outline | None, arrangement: Arrangement, n_parts: int) -> Outline | None:

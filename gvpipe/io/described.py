@@ -42,5 +42,6 @@ class Described:
     materials: tuple[Material, ...]
     images: tuple[Image, ...]
     metadata: Metadata
+    not_carried: tuple[str, ...]
     rounding: float
     moves_normals: bool

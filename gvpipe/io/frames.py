@@ -57,4 +57,5 @@ def read_frames(
         first.materials,
         first.images,
         first.metadata,
+        first.not_carried,
     )

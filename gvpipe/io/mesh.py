@@ -56,6 +56,7 @@ class Mesh:
         polygons, parts, materials, images, metadata: as in `MeshSequence`.
         animated: numbers by name that may change from file to file; every file of a sequence has the same names. Each is
             computed when it is called for.
+        not_carried: as in `MeshSequence`.
     """
 
     positions: Floats
@@ -68,6 +69,7 @@ class Mesh:
     images: tuple[Image, ...] = ()
     metadata: Metadata = NO_METADATA
     animated: Mapping[str, Callable[[], FrameValues]] = field(default_factory=dict)
+    not_carried: tuple[str, ...] = ()
 
 
 Loader = Callable[[Path], Mesh]  # one per sequence: it may remember its first file to read the others faster

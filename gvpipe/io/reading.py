@@ -54,8 +54,10 @@ def read(
         sequence = read_stored(path, lambda copy: _read(copy, options))
     else:
         sequence = _read(path, options)
-    cut = cut_notes(sequence.images)
-    return replace(sequence, notes=(*sequence.notes, *cut)) if cut else sequence
+    from gvpipe.notes import left_behind
+
+    said = (*cut_notes(sequence.images), *left_behind(sequence.not_carried))
+    return replace(sequence, notes=(*sequence.notes, *said)) if said else sequence
 
 
 def _read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], options: ReadOptions) -> MeshSequence:

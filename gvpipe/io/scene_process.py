@@ -86,6 +86,7 @@ def read_scene(process: LibraryProcess, where: str, options: ReadOptions) -> Mes
         held.materials,
         held.images,
         held.metadata,
+        held.not_carried,
     )
 
 

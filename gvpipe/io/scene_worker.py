@@ -55,6 +55,7 @@ class Scene:
             sequence.materials,
             sequence.images,
             sequence.metadata,
+            sequence.not_carried,
             sequence.rounding,
             moves_normals,
         )

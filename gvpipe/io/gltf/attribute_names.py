@@ -17,6 +17,11 @@ FLOATS, STORED, MEANT = "floats", "as stored", "fractions as float32, others as 
 Read = Callable[[str, tuple[str, ...], str], Array]  # name in the file, types, one of the three above -> (V, components)
 
 
+def is_taken(name: str) -> bool:
+    """Whether an attribute of that name is read."""
+    return name == "POSITION" or bool(own_name(name)) or SET.fullmatch(name) is not None
+
+
 def own_name(name: str) -> str:
     """gvpipe's name of a glTF attribute: ``TEXCOORD_1`` is ``uv1``, ``_HEAT`` is ``HEAT``; ``""`` for joints and weights.
 

@@ -15,8 +15,14 @@ from gvpipe.io.gltf.accessors import Accessors
 from gvpipe.io.gltf.document import Document
 from gvpipe.io.gltf.interpolation import MODES, Curve
 from gvpipe.io.gltf.json_fields import Json, child, index, integer, objects, text
+from gvpipe.io.gltf.pointers import animated_property
 
-WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}  # components of an animated property; weights have any number
+WIDTHS = {
+    "translation": 3,
+    "rotation": 4,
+    "scale": 3,
+    "visible": 1,
+}  # components of an animated property; weights have any number
 VALUE_TYPES = ("SCALAR", "VEC3", "VEC4")
 LATEST = 1e7  # seconds
 FPS = "fps"  # among the extras of animations that gvpipe writes
@@ -62,7 +68,10 @@ def clip_names(document: Document) -> list[str]:
     return [
         text(clip, "name") or f"animation_{number}"
         for number, clip in enumerate(clips)
-        if any("node" in child(channel, "target", "a channel") for channel in objects(clip, "channels", f"animation_{number}"))
+        if any(
+            animated_property(document, child(channel, "target", "a channel"), "a channel")
+            for channel in objects(clip, "channels", f"animation_{number}")
+        )
     ]
 
 
@@ -103,12 +112,15 @@ def read_clip(accessors: Accessors, number: int, morph_counts: dict[int, int]) -
     for i, channel in enumerate(objects(clip, "channels", where)):
         name = f"{where}, channel {i}"
         target = child(channel, "target", name)
-        node, path = index(target, "node", name, n_nodes), text(target, "path")
-        width = WIDTHS.get(path) or (morph_counts.get(node, 0) if path == "weights" and node is not None else 0)
-        if node is None or not width:
-            continue  # of a camera or a light, by an extension
-        sampler = samplers[integer(channel, "sampler", name, most=len(samplers) - 1)]
-        curves[node, path] = _read_curve(accessors, sampler, width, path, name)
+        index(target, "node", name, n_nodes)
+        for node, path in animated_property(accessors.document, target, name):
+            if node >= n_nodes:
+                raise ValueError(f"{name} moves node {node}, but there are only {n_nodes}")
+            width = WIDTHS.get(path) or (morph_counts.get(node, 0) if path == "weights" else 0)
+            if not width:
+                continue  # of a mesh that is not shown, say
+            sampler = samplers[integer(channel, "sampler", name, most=len(samplers) - 1)]
+            curves[node, path] = _read_curve(accessors, sampler, width, path, name)
     extras = clip.get("extras")
     stated = extras.get(FPS) if isinstance(extras, dict) else None
     fps = float(stated) if isinstance(stated, int | float) and 0 < stated <= MOST_FPS else 0.0
@@ -116,7 +128,7 @@ def read_clip(accessors: Accessors, number: int, morph_counts: dict[int, int]) -
 
 
 def _read_curve(accessors: Accessors, sampler: Json, width: int, path: str, name: str) -> Curve:
-    mode = text(sampler, "interpolation", "LINEAR")
+    mode = "STEP" if path == "visible" else text(sampler, "interpolation", "LINEAR")
     if mode not in MODES:
         raise ValueError(f"{name} is interpolated by {mode!r}; one of {', '.join(MODES)} is needed")
     times = accessors.read_floats(integer(sampler, "input", name), ("SCALAR",), f"{name}, times")[:, 0].astype(np.float64)

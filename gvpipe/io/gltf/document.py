@@ -26,10 +26,12 @@ MAGIC = b"glTF"
 HEADER = struct.Struct("<4sII")  # magic, version, bytes of the file
 CHUNK = struct.Struct("<II")  # bytes, type
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
-KNOWN = {  # required extensions that are read, or that do not change geometry
+TAKEN = {  # extensions that are read
     "KHR_draco_mesh_compression", "KHR_mesh_quantization", "KHR_texture_transform", "KHR_texture_basisu", "EXT_texture_webp",
-    "EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_lights_punctual", "KHR_xmp_json_ld", "KHR_animation_pointer",
+    "EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_animation_pointer", "KHR_node_visibility",
+    "EXT_mesh_gpu_instancing",
 }  # fmt: skip
+KNOWN = {*TAKEN, "KHR_lights_punctual", "KHR_xmp_json_ld"}  # required ones that are read, or that do not change geometry
 LOOKS = "KHR_materials_"
 LEAST_BUDGET, BUDGET_RATIO = 64 << 20, 1000  # bytes that a file may decode to, at least and by its own bytes
 

@@ -6,12 +6,13 @@ Images keep their bytes, unless neither glTF nor an extension has their kind: th
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from gvpipe.asset.material import Image, Material, Texture
 from gvpipe.io.gltf.glb import Glb
 from gvpipe.io.gltf.json_fields import Json
+from gvpipe.io.gltf.looks import DEFAULTS, LAYERS, STRENGTH, UNLIT, field_name
 from gvpipe.io.gltf.materials import NEAREST, WRAPS
 
 CORE = ("image/png", "image/jpeg")
@@ -59,7 +60,9 @@ def _material(glb: Glb, material: Material, types: list[str], uv_sets: Mapping[s
             {scale: texture.scale} if scale and texture.scale != 1 else {}
         )
 
-    strength = max(1.0, *material.emissive)
+    strength, glow = material.emissive_strength, max(material.emissive)
+    if strength <= 0 or glow > strength * (1 + 1e-9):
+        strength = max(1.0, glow)
     item: Json = {
         "name": material.name,
         "pbrMetallicRoughness": {
@@ -72,7 +75,7 @@ def _material(glb: Glb, material: Material, types: list[str], uv_sets: Mapping[s
         "normalTexture": info(material.normal_texture, "scale"),
         "occlusionTexture": info(material.occlusion_texture, "strength"),
         "emissiveTexture": info(material.emissive_texture),
-        "emissiveFactor": [value / strength for value in material.emissive] if any(material.emissive) else None,
+        "emissiveFactor": [min(1.0, value / strength) for value in material.emissive] if any(material.emissive) else None,
         "alphaMode": material.alpha_mode.upper() if material.alpha_mode != "opaque" else None,
         "alphaCutoff": material.alpha_cutoff if material.alpha_mode == "mask" else None,
         "doubleSided": material.double_sided or None,
@@ -80,13 +83,29 @@ def _material(glb: Glb, material: Material, types: list[str], uv_sets: Mapping[s
     }
     surface = item["pbrMetallicRoughness"]
     item["pbrMetallicRoughness"] = {key: value for key, value in surface.items() if value != {}}
-    if material.unlit:
-        glb.use("KHR_materials_unlit")
-        item["extensions"]["KHR_materials_unlit"] = {}
-    if strength > 1:
-        glb.use("KHR_materials_emissive_strength")
-        item["extensions"]["KHR_materials_emissive_strength"] = {"emissiveStrength": strength}
+    layers = _layers(material, info)
+    layers |= {UNLIT: {}} if material.unlit else {}
+    layers |= {STRENGTH: {"emissiveStrength": strength}} if strength != 1 else {}
+    for name, members in layers.items():
+        glb.use(name)
+        item["extensions"][name] = members
     return {key: value for key, value in item.items() if value not in (None, {}, "")}
+
+
+def _layers(material: Material, info: Callable[[Texture | None, str], Json]) -> Json:
+    """The extensions that a material needs, with the members that have no default."""
+    found: Json = {}
+    for name, members in LAYERS.items():
+        given: Json = {}
+        for member in members:
+            field = field_name(member)
+            value = getattr(material, field)
+            if value == DEFAULTS[field]:
+                continue
+            made = info(value, "scale" if field.endswith("normal_texture") else "") if isinstance(value, Texture) else value
+            given |= {member: list(made) if isinstance(made, tuple) else made} if made != {} else {}
+        found |= {name: given} if given else {}
+    return found
 
 
 def _texture_info(glb: Glb, texture: Texture, kind: str, uv_set: int) -> Json:

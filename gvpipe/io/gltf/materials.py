@@ -2,18 +2,20 @@
 
 Images keep their bytes. A texture with an image as WebP and another shows the WebP; KTX2 is read where nothing else is.
 
-Source: Khronos, glTF 2.0 specification, section 3.9; KHR_texture_transform, KHR_materials_unlit, KHR_texture_basisu,
-KHR_materials_emissive_strength, EXT_texture_webp.
+Source: Khronos, glTF 2.0 specification, section 3.9; KHR_texture_transform, KHR_texture_basisu, EXT_texture_webp, and the
+extensions of `gvpipe.io.gltf.looks`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 from gvpipe.asset.material import Image, Material, Texture
 from gvpipe.io.gltf.document import Document, MissingFile
 from gvpipe.io.gltf.json_fields import Json, child, extension, flag, index, integer, number, numbers, text
+from gvpipe.io.gltf.looks import DEFAULTS, LAYERS, STRENGTH, UNLIT, field_name
 
 WRAPS = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
 NEAREST = 9728
@@ -57,7 +59,7 @@ def _read_material(document: Document, material: Json, where: str, used: list[in
         used.extend([made.image] if made else [])
         return made
 
-    strength = number(extension(material, "KHR_materials_emissive_strength", where), "emissiveStrength", where, 1.0)
+    strength = number(extension(material, STRENGTH, where), "emissiveStrength", where, 1.0)
     emissive = numbers(material, "emissiveFactor", where, [0.0] * 3) * strength
     mode = text(material, "alphaMode", "OPAQUE").lower()
     red, green, blue, alpha = numbers(surface, "baseColorFactor", where, [1.0] * 4).tolist()
@@ -75,8 +77,28 @@ def _read_material(document: Document, material: Json, where: str, used: list[in
         mode if mode in ("opaque", "mask", "blend") else "opaque",
         number(material, "alphaCutoff", where, 0.5),
         flag(material, "doubleSided"),
-        "KHR_materials_unlit" in child(material, "extensions", where),
+        UNLIT in child(material, "extensions", where),
+        1.0 if strength == max(1.0, *emissive.tolist()) else strength,  # what follows from the colour is not kept
+        **_read_layers(material, where, texture),
     )
+
+
+def _read_layers(material: Json, where: str, texture: Callable[[Json, str, str], Texture | None]) -> dict[str, Any]:
+    """Fields of the material's extensions."""
+    found: dict[str, Any] = {}
+    for name, members in LAYERS.items():
+        given = extension(material, name, where)
+        for member in members if given else ():
+            field = field_name(member)
+            default = DEFAULTS[field]
+            if default is None:
+                found[field] = texture(given, member, "scale" if field.endswith("normal_texture") else "")
+            elif isinstance(default, tuple):
+                red, green, blue = numbers(given, member, where, list(default)).tolist()
+                found[field] = red, green, blue
+            else:
+                found[field] = number(given, member, where, default)
+    return found
 
 
 def _read_texture(document: Document, info: Json, where: str, scale: str) -> Texture | None:

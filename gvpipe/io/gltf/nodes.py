@@ -13,6 +13,7 @@ import numpy as np
 from gvpipe.arrays import Bool, Float64, Int64
 from gvpipe.io.gltf.document import Document
 from gvpipe.io.gltf.json_fields import Json, indices, numbers, text
+from gvpipe.io.gltf.pointers import is_visible
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +28,7 @@ class Nodes:
         scales: ``(N, 3)``.
         matrices: ``(N, 4, 4)``, local transforms at rest.
         names: of the nodes, ``""`` for none.
+        visible: ``(N,)`` whether each is at rest; a node that is not hides what hangs on it.
     """
 
     parents: Int64
@@ -36,6 +38,7 @@ class Nodes:
     scales: Float64
     matrices: Float64
     names: tuple[str, ...]
+    visible: Bool
 
     def world(self, local: Float64) -> Float64:
         """World transforms ``(N, 4, 4)`` from local ones."""
@@ -43,6 +46,13 @@ class Nodes:
         for level in self.levels[1:]:
             world[level] = world[self.parents[level]] @ local[level]
         return world
+
+    def chain(self, node: int) -> list[int]:
+        """A node and all those above it."""
+        result = [node]
+        while self.parents[result[-1]] >= 0:
+            result.append(int(self.parents[result[-1]]))
+        return result
 
     def below(self, moved: Bool) -> Bool:
         """Which nodes are moved ``(N,)`` themselves or hang on one that is."""
@@ -75,7 +85,8 @@ def read_nodes(document: Document) -> Nodes:
     is_composed = np.array(["matrix" not in node for node in items], bool)
     matrices[is_composed] = composed[is_composed]
     names = tuple(text(node, "name") for node in items)
-    return Nodes(parents, _levels(parents), translations, rotations, scales, matrices, names)
+    visible = np.array([is_visible(node, f"node {number}") for number, node in enumerate(items)], bool)
+    return Nodes(parents, _levels(parents), translations, rotations, scales, matrices, names, visible)
 
 
 def scene_order(document: Document, nodes: Nodes) -> list[int]:

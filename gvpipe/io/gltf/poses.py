@@ -8,6 +8,7 @@ Source: Khronos, glTF 2.0 specification, sections 3.7.2.2 (morph targets), 3.7.3
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +19,7 @@ from gvpipe.io.gltf.clips import Clip
 from gvpipe.io.gltf.geometry import Block
 from gvpipe.io.gltf.nodes import Nodes, compose
 from gvpipe.io.gltf.skins import Skin
+from gvpipe.io.hiding import collapse
 
 BLOCK_BYTES = 32 << 20  # transforms and positions worked on at a time
 BYTES_MATRIX = 128  # 4 x 4 float64
@@ -33,6 +35,7 @@ class Placed:
         skin: or None.
         weights: ``(M,)`` of the morph targets at rest.
         start: number of its first vertex in the scene.
+        instance: ``(4, 4)`` what is done before the node's transform, of a mesh that is repeated; None: nothing.
     """
 
     node: int
@@ -40,6 +43,7 @@ class Placed:
     skin: Skin | None
     weights: Float64
     start: int
+    instance: Float64 | None = None
 
 
 class Poses:
@@ -56,6 +60,7 @@ class Poses:
         self._rest = nodes.world(nodes.matrices)
         self._tracks = _Tracks(nodes, clip, self._rest, _needed(nodes, placed))
         self._skins = [None if one.skin is None else _influence_matrix(one) for one in placed]
+        self._is_hidden = {node: hidden for node in {one.node for one in placed} if (hidden := find_hidden(nodes, clip, node))}
         self.n_vertices = placed[-1].start + len(placed[-1].block.positions)
         skinned = max((len(one.block.positions) for one in placed if one.skin), default=0)
         self._bytes_frame = BYTES_MATRIX * (len(nodes.parents) + skinned) + 48 * self.n_vertices
@@ -71,7 +76,12 @@ class Poses:
     def as_stored(self) -> Float32 | None:
         """Positions ``(V, 3)`` as the file has them, None if anything moves them."""
         moves = (
-            self._tracks.count or one.skin or one.weights.any() or not _is_identity(self._rest[one.node])
+            self._tracks.count
+            or self._is_hidden
+            or one.skin
+            or one.weights.any()
+            or one.instance is not None
+            or not _is_identity(self._rest[one.node])
             for one in self._placed
         )
         morphs = any((one.node, "weights") in self._clip.curves for one in self._placed)
@@ -83,7 +93,7 @@ class Poses:
         """What turns each block's vectors at a time: ``(3, 3)``, or ``(V, 3, 3)`` of a skin."""
         world = self._tracks.world(np.array([time]))
         return [
-            world.of(one.node)[0, :3, :3] if one.skin is None else self._blended(one, i, world)[:, 0, :, :3]
+            _placing(one, world)[0, :3, :3] if one.skin is None else self._blended(one, i, world)[:, 0, :, :3]
             for i, one in enumerate(self._placed)
         ]
 
@@ -106,9 +116,11 @@ class Poses:
                     blended = self._blended(one, i, world).transpose(1, 0, 2, 3)  # (n, V, 3, 4)
                     span[:] = np.einsum("nvij,nvj->nvi", blended[..., :3], span) + blended[..., 3]
                 else:
-                    matrices = world.of(one.node)
+                    matrices = _placing(one, world)
                     if len(matrices) > 1 or not _is_identity(matrices[0]):  # float32 passes exactly where nothing moves it
                         span[:] = span @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
+                if one.node in self._is_hidden:
+                    collapse(span, self._is_hidden[one.node](times))
 
     def _morph(self, one: Placed, times: Float64, span: Float64) -> None:
         if not one.block.morphs:
@@ -130,6 +142,29 @@ class Poses:
         matrix: Any = self._skins[number]
         product = matrix @ palette.reshape(len(palette), -1)
         return np.asarray(product.reshape(len(one.block.positions), -1, 3, 4))
+
+
+def find_hidden(nodes: Nodes, clip: Clip, node: int) -> Callable[[Float64], Bool] | None:
+    """What says at which times ``(n,)`` a node is hidden, itself or by one above it; None if it never is."""
+    chain = nodes.chain(node)
+    curves = [clip.curves[one, "visible"] for one in chain if (one, "visible") in clip.curves]
+    is_off = any(not nodes.visible[one] for one in chain if (one, "visible") not in clip.curves)
+    if not curves and not is_off:
+        return None
+
+    def at(times: Float64) -> Bool:
+        hidden = np.full(len(times), is_off)
+        for curve in curves:
+            hidden |= curve.at(times)[:, 0] < 0.5
+        return hidden
+
+    return at
+
+
+def _placing(one: Placed, world: _World) -> Float64:
+    """``(1 or n, 4, 4)`` that take a block without a skin to the world."""
+    matrices = world.of(one.node)
+    return matrices if one.instance is None else np.asarray(matrices @ one.instance)
 
 
 class _World:

@@ -71,6 +71,7 @@ class GltfLoader:
             scene.images,
             scene.metadata,
             {name: partial(_values, attributes, name) for name in names if not _is_static(name)},
+            scene.not_carried,
         )
 
 
@@ -178,6 +179,7 @@ def _sequence(path: Path, scene: Scene, fps: float | None, names: list[str]) -> 
         materials=scene.materials,
         images=scene.images,
         metadata=scene.metadata,
+        not_carried=scene.not_carried,
     )
 
 

@@ -7,7 +7,7 @@ nodes show has vertices for each of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,14 +20,15 @@ from gvpipe.io.gltf.accessors import Accessors
 from gvpipe.io.gltf.clips import NO_CLIP, Clip, find_clip, read_clip
 from gvpipe.io.gltf.document import Document
 from gvpipe.io.gltf.geometry import GltfMesh, read_mesh, read_weights
+from gvpipe.io.gltf.instances import read_instances
 from gvpipe.io.gltf.json_fields import child, index, text
+from gvpipe.io.gltf.left_behind import left_behind
 from gvpipe.io.gltf.materials import Looks, read_materials
 from gvpipe.io.gltf.nodes import Nodes, read_nodes, scene_order
-from gvpipe.io.gltf.poses import Placed, Poses
+from gvpipe.io.gltf.poses import Placed, Poses, find_hidden
 from gvpipe.io.gltf.skins import Skin, read_skin
 from gvpipe.io.gltf.vectors import handedness
-
-INSTANCING = "EXT_mesh_gpu_instancing"
+from gvpipe.io.hiding import hidden_note
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,7 @@ class Scene:
         faces: ``(T, 3)``.
         placed: its blocks of vertices.
         linear: what turns each block's vectors at the clip's start.
-        parts, materials, images, metadata, notes: as in `MeshSequence`.
+        parts, materials, images, metadata, notes, not_carried: as in `MeshSequence`.
     """
 
     poses: Poses
@@ -53,6 +54,7 @@ class Scene:
     images: tuple[Image, ...]
     metadata: Metadata
     notes: tuple[str, ...]
+    not_carried: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +81,13 @@ def read_scene(document: Document, clip: str | None = None, is_still: bool = Fal
     accessors = Accessors(document)
     nodes = read_nodes(document)
     shown = _shown_meshes(accessors, nodes, moving_alone)
-    placed = [one for each in shown for one in each.placed]
-    moves = NO_CLIP
+    moves, number = NO_CLIP, None
     if not is_still:
-        counts = {one.node: len(one.block.morphs) for one in placed}
-        moves = read_clip(accessors, find_clip(document, clip), counts)
+        counts = {one.node: len(one.block.morphs) for each in shown for one in each.placed}
+        number = find_clip(document, clip)
+        moves = read_clip(accessors, number, counts)
+    shown, hiding = _without_hidden(nodes, moves, shown)
+    placed = [one for each in shown for one in each.placed]
     poses = Poses(nodes, moves, placed)
     linear = poses.linear(moves.start)
     faces, parts = _triangles(nodes, shown, linear)
@@ -100,7 +104,8 @@ def read_scene(document: Document, clip: str | None = None, is_still: bool = Fal
         looks.materials,
         looks.images,
         NO_METADATA if moving_alone else _metadata(document, moves.name, moves.start),
-        () if moving_alone else (*_notes(document, shown), *looks.notes),
+        () if moving_alone else (*_notes(document, shown), *hiding, *looks.notes),
+        () if moving_alone else left_behind(document, number),
     )
 
 
@@ -124,16 +129,38 @@ def _shown_meshes(accessors: Accessors, nodes: Nodes, moving_alone: bool) -> lis
             skins[skin_number] = read_skin(accessors, skin_number)
         mesh = meshes[number]
         weights = read_weights(items[node], len(mesh.weights), where) if "weights" in items[node] else mesh.weights
-        placed = []
-        for block in mesh.blocks:
-            skin = None if skin_number is None or block.joints is None else skins[skin_number]
-            document.budget.spend(48 * len(block.positions), where)
-            placed.append(Placed(node, block, skin, weights[: len(block.morphs)], n_vertices))
-            n_vertices += len(block.positions)
-        shown.append(Shown(node, mesh, tuple(placed)))
+        for instance in read_instances(accessors, items[node], where):
+            placed = []
+            for block in mesh.blocks:
+                skin = None if skin_number is None or block.joints is None else skins[skin_number]
+                document.budget.spend(48 * len(block.positions), where)
+                placed.append(Placed(node, block, skin, weights[: len(block.morphs)], n_vertices, instance))
+                n_vertices += len(block.positions)
+            shown.append(Shown(node, mesh, tuple(placed)))
     if not n_vertices:
         raise ValueError("it has no triangle mesh in its scene")
     return shown
+
+
+def _without_hidden(nodes: Nodes, clip: Clip, shown: list[Shown]) -> tuple[list[Shown], tuple[str, ...]]:
+    """Those that are visible at any time of the clip, and what to say of the others; all of them if none is."""
+    keys = [curve.times for (_, path), curve in clip.curves.items() if path == "visible"]
+    times = np.unique(np.concatenate([[clip.start], *keys]))
+    hidden = [find_hidden(nodes, clip, each.node) for each in shown]
+    spans = [np.zeros(len(times), bool) if one is None else one(times) for one in hidden]
+    kept = [each for each, span in zip(shown, spans, strict=True) if not span.all()]
+    if not kept:
+        return shown, ("all of its meshes are hidden; they were read as they are",)
+    result, start = [], 0
+    for each in kept:
+        placed = []
+        for one in each.placed:
+            placed.append(replace(one, start=start))
+            start += len(one.block.positions)
+        result.append(replace(each, placed=tuple(placed)))
+    n_left, n_passing = len(shown) - len(kept), sum(bool(span.any()) and not span.all() for span in spans)
+    left = (f"{n_left} of {len(shown)} meshes are hidden; they were left out",) if n_left else ()
+    return result, (*left, *hidden_note(n_passing))
 
 
 def _triangles(nodes: Nodes, shown: list[Shown], linear: list[Float64]) -> tuple[Int32, tuple[Part, ...]]:
@@ -172,10 +199,7 @@ def _metadata(document: Document, clip: str, start: float) -> Metadata:
 
 
 def _notes(document: Document, shown: list[Shown]) -> tuple[str, ...]:
-    instanced = [node for node in document.items("nodes") if INSTANCING in child(node, "extensions", "a node")]
     lines = notes.left_out(sum(each.mesh.n_others for each in shown))
-    if instanced:
-        lines += (f"{len(instanced)} of its nodes repeat their mesh by {INSTANCING}; it was read once each",)
     n_scenes = len(document.items("scenes"))
     if n_scenes > 1:
         lines += (f"it has {n_scenes} scenes; number {document.tree.get('scene', 0)}, which it shows, was read alone",)

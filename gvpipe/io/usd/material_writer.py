@@ -10,6 +10,7 @@ from gvpipe.io.usd.names import identifier, name_prim
 from gvpipe.sequence import MeshSequence
 
 WRAPS = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp"}
+DEFAULT_IOR = 1.5
 
 
 class MaterialWriter:
@@ -69,6 +70,14 @@ class MaterialWriter:
         self._input(surface, "roughness", types.Float, rough, both, "g", (1.0, rough, metal, 1.0))
         glow = material.emissive
         self._input(surface, "emissiveColor", types.Color3f, Gf.Vec3f(*glow), material.emissive_texture, "rgb", (*glow, 1.0))
+        coat, coat_roughness = material.clearcoat, material.clearcoat_roughness
+        if coat:
+            one = (coat, 1.0, 1.0, 1.0)
+            self._input(surface, "clearcoat", types.Float, coat, material.clearcoat_texture, "r", one)
+            rough_texture, other = material.clearcoat_roughness_texture, (1.0, coat_roughness, 1.0, 1.0)
+            self._input(surface, "clearcoatRoughness", types.Float, coat_roughness, rough_texture, "g", other)
+        if material.ior != DEFAULT_IOR:
+            surface.CreateInput("ior", types.Float).Set(material.ior)
         if material.normal_texture:
             self._input(surface, "normal", types.Normal3f, None, material.normal_texture, "rgb", None)
         if material.occlusion_texture:

@@ -1,7 +1,7 @@
 """UsdPreviewSurface materials as gvpipe's, and the textures that they show.
 
-Source: Pixar, UsdPreviewSurface specification, version 2.6. Its specular workflow, clear coat, displacement and index of
-refraction have no place in glTF's metallic-roughness model and are left out.
+Source: Pixar, UsdPreviewSurface specification, version 2.6. Its specular workflow and displacement have no place in glTF's
+metallic-roughness model and are left out.
 """
 
 from __future__ import annotations
@@ -84,6 +84,8 @@ class Materials:
         threshold, _ = self._number(surface, "opacityThreshold", 0.0)
         metallic, metallic_texture = self._number(surface, "metallic", 0.0)
         roughness, roughness_texture = self._number(surface, "roughness", 0.5)
+        coat, coat_texture = self._number(surface, "clearcoat", 0.0)
+        coat_roughness, coat_roughness_texture = self._number(surface, "clearcoatRoughness", 0.01 if coat else 0.0)
         self._note_losses(name, surface, base_texture, opacity_texture)
         combined = self.textures.combine(metallic_texture, roughness_texture)
         seen = opacity < 1 or opacity_texture is not None
@@ -100,6 +102,11 @@ class Materials:
             emissive_texture.texture if emissive_texture else None,
             "mask" if threshold > 0 else "blend" if seen else "opaque",
             threshold if threshold > 0 else 0.5,
+            clearcoat=coat,
+            clearcoat_texture=coat_texture.texture if coat_texture else None,
+            clearcoat_roughness=coat_roughness,
+            clearcoat_roughness_texture=coat_roughness_texture.texture if coat_roughness_texture else None,
+            ior=self._number(surface, "ior", 1.5)[0],
         )
 
     def _note_losses(self, name: str, surface: Any, base: Any, opacity: Any) -> None:

@@ -8,7 +8,48 @@ const TEXTURES = [
   "normal_texture",
   "occlusion_texture",
   "emissive_texture",
+  "clearcoat_texture",
+  "clearcoat_roughness_texture",
+  "clearcoat_normal_texture",
+  "transmission_texture",
+  "thickness_texture",
+  "specular_texture",
+  "specular_color_texture",
+  "sheen_color_texture",
+  "sheen_roughness_texture",
+  "iridescence_texture",
+  "iridescence_thickness_texture",
+  "anisotropy_texture",
+  "diffuse_transmission_texture",
+  "diffuse_transmission_color_texture",
 ];
+
+/** Numbers beside those of glTF's own model, and colours, with their defaults. */
+export const LAYERS = {
+  emissive_strength: 1,
+  clearcoat: 0,
+  clearcoat_roughness: 0,
+  transmission: 0,
+  thickness: 0,
+  attenuation_distance: 0,
+  ior: 1.5,
+  specular: 1,
+  sheen_roughness: 0,
+  iridescence: 0,
+  iridescence_ior: 1.3,
+  iridescence_thickness_minimum: 100,
+  iridescence_thickness_maximum: 400,
+  anisotropy_strength: 0,
+  anisotropy_rotation: 0,
+  dispersion: 0,
+  diffuse_transmission: 0,
+};
+export const LAYER_COLOURS = {
+  attenuation_color: [1, 1, 1],
+  specular_color: [1, 1, 1],
+  sheen_color: [0, 0, 0],
+  diffuse_transmission_color: [1, 1, 1],
+};
 const HUGE = 3.5e38; // above float32's largest number
 
 /**
@@ -37,6 +78,8 @@ export function readMaterials(list, nImages) {
       double_sided: entry.flag("double_sided", false),
       unlit: entry.flag("unlit", false),
     };
+    for (const [name, value] of Object.entries(LAYERS)) material[name] = entry.number(name, value, -HUGE, HUGE);
+    for (const [name, value] of Object.entries(LAYER_COLOURS)) material[name] = entry.numbers(name, 3, value, -HUGE, HUGE);
     for (const role of TEXTURES) {
       material[role] = given[role] == null ? null : readTexture(new AssetEntry(given[role], `material ${number}, ${role}`), nImages);
     }

@@ -1,0 +1,38 @@
+"""What a reader met in a file and did not take: each thing once, by name, with how often it was met."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+
+
+class LeftBehind:
+    """Collects names; a reader that skips anything says so here, and everything that lists them follows.
+
+    They become `MeshSequence.not_carried`, a note, `not_carried` of `gvpipe encode --json`, and a text of the file.
+
+    Examples:
+        >>> left = LeftBehind()
+        >>> left.add("cameras"), left.add("KHR_lights_punctual", 2), left.add("cameras")
+        (None, None, None)
+        >>> left.names
+        ('KHR_lights_punctual (2)', 'cameras (2)')
+    """
+
+    def __init__(self) -> None:
+        self._counts: Counter[str] = Counter()
+
+    def add(self, name: str, count: int = 1) -> None:
+        """Note that something was met, so many times."""
+        if count > 0:
+            self._counts[name] += count
+
+    def add_all(self, names: Iterable[str]) -> None:
+        """Note several things."""
+        for name in names:
+            self.add(name)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What was met, in alphabetical order, with the number of times where there are several."""
+        return tuple(name if count == 1 else f"{name} ({count})" for name, count in sorted(self._counts.items()))
