@@ -16,6 +16,7 @@ from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.errors import InputError, TopologyChange
 from gvpipe.forks import ForkLock
 from gvpipe.io.damage import reading
+from gvpipe.io.hiding import collapse
 from gvpipe.io.mapped_pages import forget_pages
 from gvpipe.origin import choose_origin, narrow, rounding
 from gvpipe.sequence import check_finite
@@ -33,6 +34,10 @@ class Motion(Protocol):
 
     def at(self, time: float) -> Array:
         """Positions ``(n, 3)`` in world space at a time of the file's own."""
+        ...
+
+    def is_hidden(self, time: float) -> bool:
+        """Whether it is not shown then; one that stands still is never asked again."""
         ...
 
 
@@ -118,6 +123,9 @@ class SceneFrames:
         if len(positions) != motion.n_vertices:
             what = f"mesh {motion.name!r} has {len(positions)} vertices at {moment}, {motion.n_vertices} at first"
             raise TopologyChange.at(f"{self._where}: {what}", frame, self._start)
+        if motion.is_hidden(time):
+            positions = np.array(positions)
+            collapse(positions[None], np.ones(1, bool))
         return positions
 
 

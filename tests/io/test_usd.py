@@ -238,7 +238,8 @@ def test_meshes_that_are_not_shown_are_left_out(tmp_path: Path) -> None:
     """
     read = io.read(stage(tmp_path, body))
     assert [part.name for part in read.parts] == ["seen"]
-    assert any("no meshes were left out: 1 Sphere" in note for note in read.notes)
+    assert read.not_carried == ("Sphere prims",)
+    assert any("not carried: Sphere prims" in note for note in read.notes)
     assert any("2 of 3 meshes are invisible, guides or proxies" in note for note in read.notes)
 
 

@@ -31,7 +31,8 @@ class Node:
         schema: its schema.
         parents: the transforms above it, the nearest first.
         archive: what all of it is read from.
-        is_hidden: whether it, or a node above it, is marked as hidden.
+        is_hidden: whether it, or a node above it, is marked as hidden at first.
+        hiding: the properties that say so, of it and of nodes above it, the nearest first.
     """
 
     path: str
@@ -41,6 +42,7 @@ class Node:
     parents: tuple[Node, ...]
     archive: Any
     is_hidden: bool
+    hiding: tuple[Any, ...]
 
 
 def open_archive(path: Path) -> Any:
@@ -83,11 +85,13 @@ def find_meshes(archive: Any) -> tuple[list[Node], list[str]]:
     """Return the polygon meshes and subdivision cages in the order of the archive, and names of schemas that were left out."""
     found: list[Node] = []
     others: list[str] = []
-    _collect(archive, archive.getTop(), (), False, (found, others))
+    _collect(archive, archive.getTop(), (), (False, ()), (found, others))
     return found, others
 
 
-def _collect(archive: Any, item: Any, parents: tuple[Node, ...], is_hidden: bool, into: tuple[list[Node], list[str]]) -> None:
+def _collect(
+    archive: Any, item: Any, parents: tuple[Node, ...], hiding: tuple[bool, tuple[Any, ...]], into: tuple[list[Node], list[str]]
+) -> None:
     from alembic3d import AbcGeom
 
     if len(parents) > MAX_DEPTH:
@@ -95,11 +99,12 @@ def _collect(archive: Any, item: Any, parents: tuple[Node, ...], is_hidden: bool
     for number in range(item.getNumChildren()):
         child = item.getChild(number)
         kind = child.getMetaData().get("schema")
-        hidden = _is_hidden(child, is_hidden)
+        held = AbcGeom.GetVisibilityProperty(child)
+        hidden = _is_hidden(child, hiding[0]), (held, *hiding[1]) if held.valid() else hiding[1]
         above = parents
         if kind == XFORM or kind in MESHES:
             typed = getattr(AbcGeom, MESHES.get(kind, "IXform"))(item, child.getName())
-            node = Node(child.getFullName(), kind, typed, typed.getSchema(), parents, archive, hidden)
+            node = Node(child.getFullName(), kind, typed, typed.getSchema(), parents, archive, *hidden)
             if kind == XFORM:
                 above = (node, *parents)
             else:

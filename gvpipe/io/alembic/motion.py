@@ -15,6 +15,7 @@ from gvpipe.io.alembic.archive import Node, sample_of
 from gvpipe.io.alembic.numbers import as_matrix
 
 CLOSE = 1e-6  # seconds within which a time is a sample's
+DEFERRED, HIDDEN = -1, 0  # of visibility: as the parent, and hidden
 
 
 class AlembicMotion:
@@ -25,6 +26,8 @@ class AlembicMotion:
         self.name = node.path
         self._positions = node.schema.getPositionsProperty()
         self.moves = self._positions.getNumSamples() > 1 or any(parent.schema.getNumSamples() > 1 for parent in node.parents)
+        self.flickers = any(held.getNumSamples() > 1 for held in node.hiding)
+        self.moves = self.moves or self.flickers
         self._world: Float64 | None = None  # of transforms that stand still
         self.n_vertices = len(_sample(self._positions, 0)) if self._positions.getNumSamples() else 0
 
@@ -36,7 +39,7 @@ class AlembicMotion:
         """Times of all samples that move it or change its polygons, seconds."""
         mesh = self.node.schema
         topology = [each for each in (mesh.getFaceCountsProperty(), mesh.getFaceIndicesProperty()) if not each.isConstant()]
-        for schema in (self._positions, *topology, *(parent.schema for parent in self.node.parents)):
+        for schema in (self._positions, *topology, *(parent.schema for parent in self.node.parents), *self.node.hiding):
             if schema.getNumSamples() > 1:
                 sampling = schema.getTimeSampling()
                 yield from (sampling.getSampleTime(i) for i in range(schema.getNumSamples()))
@@ -51,6 +54,22 @@ class AlembicMotion:
                 points = points + part * (after - points)
         world = self.world(time)
         return points if (world == np.eye(4)).all() else np.asarray(points @ world[:3, :3] + world[3, :3])
+
+    def is_hidden(self, time: float) -> bool:
+        """Whether it is not shown at a time, seconds; one whose visibility never changes is shown."""
+        for held in self.node.hiding if self.flickers else ():
+            state = int(sample_of(held, held.getTimeSampling().getFloorIndex(time + CLOSE, held.getNumSamples())))
+            if state != DEFERRED:
+                return state == HIDDEN
+        return False
+
+    @property
+    def is_never_shown(self) -> bool:
+        """Whether it is hidden at all times."""
+        if not self.flickers:
+            return self.node.is_hidden
+        moments = {held.getTimeSampling().getSampleTime(k) for held in self.node.hiding for k in range(held.getNumSamples())}
+        return all(self.is_hidden(moment) for moment in moments)
 
     def world(self, time: float) -> Float64:
         """``(4, 4)`` from the mesh's space into the world's, applied to rows."""

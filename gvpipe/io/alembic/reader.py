@@ -20,6 +20,8 @@ from gvpipe.io.alembic.motion import AlembicMotion, around
 from gvpipe.io.alembic.numbers import as_integers
 from gvpipe.io.alembic.params import changing_normals, layers_of, sampled_of
 from gvpipe.io.damage import reading
+from gvpipe.io.hiding import hidden_note
+from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_fields import join_fields, misfit_note
 from gvpipe.io.scene_frames import SceneFrames, even_times, first_frame_of
@@ -49,7 +51,7 @@ def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> tuple[MeshSe
     where = str(path)
     nodes, others = find_meshes(archive)
     motions = [motion for motion in map(AlembicMotion, nodes) if motion.n_vertices]
-    shown = [motion for motion in motions if not motion.node.is_hidden]
+    shown = [motion for motion in motions if not motion.is_never_shown]
     if not motions:
         held = f"; it holds {', '.join(sorted(set(others)))}" if others else ""
         raise InputError(f"{where} has no polygon mesh{held}; a mesh with triangles is needed")
@@ -60,9 +62,9 @@ def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> tuple[MeshSe
     cages = sum("SubD" in motion.node.kind for motion in motions)
     if cages:
         notes.append(f"{cages} of {len(motions)} meshes are cages of subdivision surfaces; the cages were read as they are")
-    drawn = sorted(set(others) & {"Points", "Curve", "NuPatch"})
-    if drawn:
-        notes.append(f"{', '.join(drawn)} beside the meshes were left out")
+    notes += hidden_note(sum(motion.flickers for motion in motions))
+    left = LeftBehind()
+    left.add_all(f"{kind} objects" for kind in others)
     samples = np.unique(np.fromiter((time for motion in motions for time in motion.samples()), np.float64))
     times, fps, time_notes = even_times(samples, options.fps, DEFAULT_FPS, where)
     first, stop = options.span(len(times), where)
@@ -92,6 +94,7 @@ def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> tuple[MeshSe
         polygons=joined.polygons,
         materials=tuple(Material(name) for name in materials),
         metadata=_metadata(archive, path, start),
+        not_carried=left.names,
     )
     return sequence, any(changing_normals(motion.node.schema) for motion in motions)
 

@@ -39,10 +39,11 @@ class Placed(NamedTuple):
 
 
 class Posed(NamedTuple):
-    """One mesh at a time: rows of three coordinates, and where they go."""
+    """One mesh at a time: rows of three coordinates, where they go, and whether it is hidden then."""
 
     positions: Numbers
     placed: Placed
+    is_hidden: bool
 
 
 class Table(NamedTuple):
@@ -107,6 +108,7 @@ class Described(NamedTuple):
         materials: of the scene.
         contents: pictures inside the file, by key.
         fps, unit, up, creator: of the scene; the unit in metres.
+        others: how many there are of each kind of thing that is not read.
     """
 
     meshes: list[Mesh]
@@ -117,3 +119,4 @@ class Described(NamedTuple):
     unit: float
     up: str
     creator: str
+    others: dict[str, int]

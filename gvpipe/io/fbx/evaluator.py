@@ -11,6 +11,7 @@ from gvpipe.io.fbx.library import columns, hold, integers, listed, vectors
 from gvpipe.io.simulation.side_files import side_file
 
 UP = {0: "x", 1: "x", 2: "y", 3: "y", 4: "z", 5: "z"}
+OTHERS = ("lights", "cameras", "nurbs_curves", "nurbs_surfaces", "line_curves", "constraints", "audio_clips")
 MAPS = (
     "base_color",
     "base_factor",
@@ -32,6 +33,7 @@ class FbxScene:
         self._scene = _load(ufbx, path)
         self._nodes = listed(self._scene.nodes)
         self._shown, self._n_hidden = _with_mesh(self._nodes)
+        self._may_hide = all(self._nodes[index].visible for index in self._shown)  # else all are hidden, and all are shown
         self._takes = listed(self._scene.anim_stacks)
         self._anim = hold(self._scene.anim)
 
@@ -60,13 +62,17 @@ class FbxScene:
             float(settings.unit_meters),
             UP.get(int(hold(settings.axes).up), ""),
             str(hold(self._scene.metadata).creator),
+            {kind.replace("_", " "): len(found) for kind in OTHERS if (found := listed(getattr(self._scene, kind)))},
         )
 
     def positions(self, time: float) -> list[Posed]:
         """Positions of each mesh at a time, seconds."""
         now, posed = self._evaluate(time)
         nodes = [posed[index] for index in self._shown]
-        result = [Posed(vectors(hold(hold(node.mesh).skinned_position).values), _placed(node)) for node in nodes]
+        result = [
+            Posed(vectors(hold(hold(node.mesh).skinned_position).values), _placed(node), self._may_hide and not node.visible)
+            for node in nodes
+        ]
         now.free()
         return result
 

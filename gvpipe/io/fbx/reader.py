@@ -14,6 +14,7 @@ from gvpipe.io.fbx.answers import Described, Take
 from gvpipe.io.fbx.materials import read_material
 from gvpipe.io.fbx.meshes import scene_mesh, uv_names, world_positions
 from gvpipe.io.fbx.textures import Textures
+from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.library_process import LibraryProcess
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_frames import SceneFrames, frame_times
@@ -31,11 +32,13 @@ class _Poses:
     def __init__(self, process: LibraryProcess) -> None:
         self._process = process
         self._time: float | None = None
-        self._now: list[Array] = []
+        self._now: list[tuple[Array, bool]] = []
 
-    def at(self, time: float) -> list[Array]:
+    def at(self, time: float) -> list[tuple[Array, bool]]:
+        """Positions of each, and whether it is hidden."""
         if self._time != time:
-            self._now, self._time = list(map(world_positions, self._process.ask("positions", time))), time
+            found = self._process.ask("positions", time)
+            self._now, self._time = [(world_positions(posed), bool(posed.is_hidden)) for posed in found], time
         return self._now
 
 
@@ -48,7 +51,11 @@ class FbxMotion:
 
     def at(self, time: float) -> Array:
         """Positions ``(n, 3)`` in world space."""
-        return self._poses.at(time)[self._number]
+        return self._poses.at(time)[self._number][0]
+
+    def is_hidden(self, time: float) -> bool:
+        """Whether it is not shown."""
+        return self._poses.at(time)[self._number][1]
 
 
 def read_by(process: LibraryProcess, path: Path, options: ReadOptions) -> MeshSequence:
@@ -88,6 +95,9 @@ def _read_by(process: LibraryProcess, path: Path, options: ReadOptions) -> MeshS
     joined = join(meshes, where)
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
     hidden = (f"{held.n_hidden} meshes are hidden; they were left out",) if held.n_hidden else ()
+    left = LeftBehind()
+    for kind, count in held.others.items():
+        left.add(kind, count)
     texts = {"fbx creator": held.creator} | ({"fbx take": take.name} if take else {})
     unit = held.unit if np.isfinite(held.unit) and held.unit > 0 else None
     return MeshSequence(
@@ -103,6 +113,7 @@ def _read_by(process: LibraryProcess, path: Path, options: ReadOptions) -> MeshS
         materials=materials,
         images=tuple(textures.images),
         metadata=Metadata(held.up, unit, float(times[0]), path.name, texts),
+        not_carried=left.names,
     )
 
 

@@ -86,7 +86,11 @@ def read_scene(document: Document, clip: str | None = None, is_still: bool = Fal
         counts = {one.node: len(one.block.morphs) for each in shown for one in each.placed}
         number = find_clip(document, clip)
         moves = read_clip(accessors, number, counts)
-    shown, hiding = _without_hidden(nodes, moves, shown)
+    visible, hiding = _without_hidden(nodes, moves, shown)
+    if not visible:  # a file that shows nothing shows all
+        curves = {key: curve for key, curve in moves.curves.items() if key[1] != "visible"}
+        nodes, moves = replace(nodes, visible=np.ones_like(nodes.visible)), replace(moves, curves=curves)
+    shown = visible or shown
     placed = [one for each in shown for one in each.placed]
     poses = Poses(nodes, moves, placed)
     linear = poses.linear(moves.start)
@@ -143,14 +147,14 @@ def _shown_meshes(accessors: Accessors, nodes: Nodes, moving_alone: bool) -> lis
 
 
 def _without_hidden(nodes: Nodes, clip: Clip, shown: list[Shown]) -> tuple[list[Shown], tuple[str, ...]]:
-    """Those that are visible at any time of the clip, and what to say of the others; all of them if none is."""
+    """Those that are visible at any time of the clip, and what to say of the others."""
     keys = [curve.times for (_, path), curve in clip.curves.items() if path == "visible"]
     times = np.unique(np.concatenate([[clip.start], *keys]))
     hidden = [find_hidden(nodes, clip, each.node) for each in shown]
     spans = [np.zeros(len(times), bool) if one is None else one(times) for one in hidden]
     kept = [each for each, span in zip(shown, spans, strict=True) if not span.all()]
     if not kept:
-        return shown, ("all of its meshes are hidden; they were read as they are",)
+        return [], ("all of its meshes are hidden; they were read as they are",)
     result, start = [], 0
     for each in kept:
         placed = []

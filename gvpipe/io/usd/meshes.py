@@ -9,63 +9,81 @@ import numpy as np
 
 from gvpipe.arrays import Array, Int64
 from gvpipe.errors import TopologyChange
+from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.scene_frames import first_frame_of
+from gvpipe.io.usd.instances import Instance, find_instances
 from gvpipe.io.usd.materials import Materials
+from gvpipe.io.usd.motion import visibility_samples
 
 HIDDEN_PURPOSES = ("guide", "proxy")
+TAKEN = {  # types of prims that are read, or that only hold others
+    "Xform", "Scope", "Material", "Shader", "NodeGraph", "GeomSubset", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Found:
-    """The meshes of a stage that are read, and what the user should know of the others."""
+    """The meshes of a stage that are read, and what the user should know of the others.
 
-    meshes: tuple[Any, ...]
+    Args:
+        meshes: each with the instance of a point instancer that shows it, or None.
+        notes: a line each.
+        not_carried: names of what else the stage has.
+    """
+
+    meshes: tuple[tuple[Any, Instance | None], ...]
     notes: tuple[str, ...]
+    not_carried: tuple[str, ...]
 
 
 def find_meshes(stage: Any) -> Found:
-    """Find the meshes, in the order of the stage, those in instances too.
+    """Find the meshes, in the order of the stage, those in instances and those that point instancers show too.
 
     Meshes that are never visible, guides and proxies are left out, unless there are no others.
     """
     from pxr import Usd, UsdGeom
 
-    shown: list[Any] = []
-    hidden: list[Any] = []
-    others: dict[str, int] = {}
-    n_instancers = flickering = 0
-    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
-        n_instancers += prim.IsA(UsdGeom.PointInstancer)
-        if not prim.IsA(UsdGeom.Mesh):
-            if prim.IsA(UsdGeom.Gprim):
-                others[prim.GetTypeName()] = others.get(prim.GetTypeName(), 0) + 1
+    shown: list[tuple[Any, Instance | None]] = []
+    hidden: list[tuple[Any, Instance | None]] = []
+    left = LeftBehind()
+    prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
+    for prim in prims:
+        if prim.IsA(UsdGeom.PointInstancer):
+            prims.PruneChildren()  # what lies below is shown where its points are
+            found, n_nested = find_instances(prim, stage.GetStartTimeCode())
+            left.add("point instancers in prototypes", n_nested)
+            pairs: list[tuple[Any, Instance | None]] = [*found]
+        elif prim.IsA(UsdGeom.Mesh):
+            pairs = [(UsdGeom.Mesh(prim), None)]
+        else:
+            kind = str(prim.GetTypeName())
+            if kind and kind not in TAKEN:
+                left.add(f"{kind} prims")
             continue
-        changes = _visibility_changes(prim)
-        flickering += changes
-        drawn = UsdGeom.Imageable(prim)
-        is_hidden = not changes and drawn.ComputeVisibility(stage.GetStartTimeCode()) == UsdGeom.Tokens.invisible
-        is_hidden = is_hidden or drawn.ComputePurpose() in HIDDEN_PURPOSES
-        (hidden if is_hidden else shown).append(UsdGeom.Mesh(prim))
+        for mesh, instance in pairs:
+            root = instance.instancer.prim if instance else mesh.GetPrim()
+            is_hidden = _is_never_visible(root, stage) or UsdGeom.Imageable(mesh).ComputePurpose() in HIDDEN_PURPOSES
+            (hidden if is_hidden else shown).append((mesh, instance))
     notes = []
     if hidden and shown:
         some = f"{len(hidden)} of {len(hidden) + len(shown)} meshes"
-        notes.append(f"{some} are invisible, guides or proxies; they were left out, such as {_path(hidden[0])}")
+        notes.append(f"{some} are invisible, guides or proxies; they were left out, such as {_path(hidden[0][0])}")
     elif hidden:
         notes.append(f"all {len(hidden)} meshes are invisible, guides or proxies; they were read nevertheless")
-    if flickering:
-        notes.append(f"meshes whose visibility changes over time are shown always: {flickering}")
-    if others:
-        held = ", ".join(f"{count} {kind}" for kind, count in sorted(others.items()))
-        notes.append(f"prims that are no meshes were left out: {held}")
-    if n_instancers:
-        notes.append(
-            f"point instancers were not expanded ({n_instancers}); their prototypes were read once each, where they stand"
-        )
     meshes = shown or hidden
-    cages = sum(mesh.GetSubdivisionSchemeAttr().Get() not in (None, "none") for mesh in meshes)
+    cages = sum(mesh.GetSubdivisionSchemeAttr().Get() not in (None, "none") for mesh, _ in meshes)
     if cages:
         notes.append(f"{cages} of {len(meshes)} meshes are cages of subdivision surfaces; the cages were read as they are")
-    return Found(tuple(meshes), tuple(notes))
+    return Found(tuple(meshes), tuple(notes), left.names)
+
+
+def _is_never_visible(prim: Any, stage: Any) -> bool:
+    from pxr import UsdGeom
+
+    invisible = UsdGeom.Tokens.invisible
+    drawn = UsdGeom.Imageable(prim)
+    times = visibility_samples(prim) or [stage.GetStartTimeCode()]
+    return all(drawn.ComputeVisibility(time) == invisible for time in times)
 
 
 def polygons_of(mesh: Any, times: Array, where: str, start: int = 0) -> tuple[Int64, Int64]:
@@ -110,17 +128,6 @@ def groups_of(mesh: Any, n_polygons: int, materials: Materials) -> tuple[Int64, 
         groups[indices[groups[indices] == 0]] = len(bound)
         bound.append(materials.of(subset.GetPrim()))
     return groups, tuple(bound)
-
-
-def _visibility_changes(prim: Any) -> bool:
-    from pxr import UsdGeom
-
-    while prim and not prim.IsPseudoRoot():
-        drawn = UsdGeom.Imageable(prim)
-        if drawn and drawn.GetVisibilityAttr().ValueMightBeTimeVarying():
-            return True
-        prim = prim.GetParent()
-    return False
 
 
 def _integers(attribute: Any, time: float) -> Int64:

@@ -91,6 +91,8 @@ class UsdMotion:
         self._shapes = BlendShapes(self._query) if self._query and self._query.HasBlendShapes() else None
         self.moves = self._points.ValueMightBeTimeVarying() or bool(self._skeleton and self._skeleton.moves)
         self.moves = self.moves or any(part.TransformMightBeTimeVarying() for part in self._ancestors())
+        self._hiding = visibility_samples(self.prim)
+        self.moves = self.moves or bool(self._hiding)
         topology = (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr())
         self._topology = [each for each in topology if each.ValueMightBeTimeVarying()]
         self._is_deformed = self._points.ValueMightBeTimeVarying() or bool(self._query)
@@ -105,6 +107,18 @@ class UsdMotion:
         yield from self._skeleton.samples() if self._skeleton else ()
         for part in self._ancestors():
             yield from part.GetTimeSamples()
+        yield from self._hiding
+
+    @property
+    def flickers(self) -> bool:
+        """Whether it is hidden for a while."""
+        return bool(self._hiding)
+
+    def is_hidden(self, time: float) -> bool:
+        """Whether it is not visible at a time code; a mesh whose visibility never changes is shown."""
+        from pxr import UsdGeom
+
+        return bool(self._hiding and UsdGeom.Imageable(self.prim).ComputeVisibility(time) == UsdGeom.Tokens.invisible)
 
     def at(self, time: float) -> Array:
         """Positions ``(n, 3)`` in world space at a time code.
@@ -173,6 +187,19 @@ class UsdMotion:
             if prim.IsA(UsdGeom.Xformable):
                 yield UsdGeom.Xformable(prim)
             prim = prim.GetParent()
+
+
+def visibility_samples(prim: Any) -> list[float]:
+    """Times at which the visibility of a prim may change, its own or that of one above it."""
+    from pxr import UsdGeom
+
+    found: list[float] = []
+    while prim and not prim.IsPseudoRoot():
+        drawn = UsdGeom.Imageable(prim)
+        if drawn and drawn.GetVisibilityAttr().ValueMightBeTimeVarying():
+            found += drawn.GetVisibilityAttr().GetTimeSamples()
+        prim = prim.GetParent()
+    return found
 
 
 class BlendShapes:

@@ -11,11 +11,13 @@ import numpy as np
 from gvpipe.arrays import Float64
 from gvpipe.asset.metadata import Metadata
 from gvpipe.errors import InputError
+from gvpipe.io.hiding import hidden_note
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_fields import join_fields, misfit_note
 from gvpipe.io.scene_frames import SceneFrames
 from gvpipe.io.scene_layers import join_layers
 from gvpipe.io.scene_mesh import SceneMesh, join
+from gvpipe.io.usd.instances import InstanceMotion
 from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.meshes import find_meshes, groups_of, polygons_of
 from gvpipe.io.usd.motion import Skins, UsdMotion
@@ -51,7 +53,14 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
     skins, materials = Skins(stage), Materials(stage, path)
     places = UsdGeom.XformCache()
     start = float(stage.GetStartTimeCode())
-    motions = [UsdMotion(mesh, skins, places, start) for mesh in found.meshes]
+
+    def moved(number: int, time: float) -> UsdMotion:
+        mesh, instance = found.meshes[number]
+        if instance is None:
+            return UsdMotion(mesh, skins, places, time)
+        return InstanceMotion(mesh, skins, places, time, instance)
+
+    motions = [moved(number, start) for number in range(len(found.meshes))]
     kept = [number for number, motion in enumerate(motions) if motion.n_vertices]
     if not kept:
         raise InputError(f"{where} has no polygon mesh; a mesh with triangles is needed")
@@ -61,17 +70,18 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
     first, stop = options.span(len(times), where)
     times = times[first:stop]
     if float(times[0]) != start:  # meshes may have other vertices then
-        motions = [UsdMotion(found.meshes[number], skins, places, float(times[0])) for number in kept]
+        motions = [moved(number, float(times[0])) for number in kept]
     frames = SceneFrames(motions, times, where, "time code", first, [layer.realPath for layer in stage.GetUsedLayers()])
-    read = [_read_mesh(found.meshes[number], motion, materials, (times, where, first)) for number, motion in
+    read = [_read_mesh(found.meshes[number][0], motion, materials, (times, where, first)) for number, motion in
             zip(kept, motions, strict=True)]  # fmt: skip
     meshes = [mesh for mesh, _ in read]
     joined = join(meshes, where)
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
-    sampled = [sampled_of(found.meshes[number], mesh, float(times[0])) for number, mesh in zip(kept, meshes, strict=True)]
+    sampled = [sampled_of(found.meshes[number][0], mesh, float(times[0])) for number, mesh in zip(kept, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times, where)
     misfits = misfit_note("primvars", [*(names for _, names in read), torn])
     drawn, images = materials.drawn()
+    hiding = hidden_note(sum(motion.flickers for motion in motions))
     sequence = MeshSequence(
         frames,
         joined.faces,
@@ -79,13 +89,21 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
         attributes,
         where,
         frames.origin,
-        (*found.notes, *time_notes, *materials.notes(), *layer_notes, *misfits),
+        (
+            *found.notes,
+            *hiding,
+            *time_notes,
+            *materials.notes(),
+            *layer_notes,
+            *misfits,
+        ),
         fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,
         materials=drawn,
         images=images,
         metadata=_metadata(stage, path, float(times[0])),
+        not_carried=found.not_carried,
     )
     return sequence, any(_has_moving_normals(motion.prim) for motion in motions)
 
