@@ -38,6 +38,7 @@ class Info:
         materials: names.
         images: name, media type, width, height and bytes.
         metadata: up axis, unit, start time, source, texts.
+        not_carried: what the source had beside what the file carries.
         notes: what a user should know, a line each.
     """
 
@@ -62,6 +63,7 @@ class Info:
     materials: list[str]
     images: list[dict[str, Any]]
     metadata: dict[str, Any]
+    not_carried: list[str]
     notes: list[str]
 
     def to_json(self) -> dict[str, Any]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from gvpipe.asset.attribute import check_word
 from gvpipe.errors import InputError
 
 UP_AXES = ("", "x", "y", "z")
+NOT_CARRIED = "not carried"  # name of a text: what the source had beside what its file carries
+SEPARATOR = "; "
 
 
 @dataclass(frozen=True)
@@ -42,3 +44,16 @@ class Metadata:
 
 
 NO_METADATA = Metadata()
+
+
+def with_losses(metadata: Metadata, names: Sequence[str]) -> Metadata:
+    """The metadata with a text of what a file does not carry of its source."""
+    if not names:
+        return metadata
+    return replace(metadata, texts={**metadata.texts, NOT_CARRIED: SEPARATOR.join(names)})
+
+
+def losses_of(metadata: Metadata) -> list[str]:
+    """Mirror of `with_losses`."""
+    text = metadata.texts.get(NOT_CARRIED, "")
+    return text.split(SEPARATOR) if text else []

@@ -18,7 +18,7 @@ from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.listing import count_polygons
 from gvpipe.asset.material import Image, image_size
-from gvpipe.asset.metadata import NO_METADATA, Metadata
+from gvpipe.asset.metadata import NO_METADATA, Metadata, with_losses
 from gvpipe.asset.part import Part
 from gvpipe.asset.texts import Cleaner
 from gvpipe.asset_coding.bounds import Precision, check_names, precision
@@ -53,8 +53,6 @@ from gvpipe.registry import open_reader
 from gvpipe.sequence import MeshSequence
 
 MOVING = ("scalar", "vector")  # kinds of fields that may follow from positions
-
-NOT_CARRIED = "not carried"  # name of the metadata's text
 
 
 @dataclass(frozen=True)
@@ -274,11 +272,8 @@ def _listed(
 
 
 def _with_losses(sequence: MeshSequence) -> Metadata:
-    """The metadata, with a text of what the source has beside what the file carries, which ``gvpipe info`` shows."""
-    if not sequence.not_carried:
-        return sequence.metadata
-    said = Cleaner(sequence.name).text(", ".join(sequence.not_carried))
-    return dataclasses.replace(sequence.metadata, texts={**sequence.metadata.texts, NOT_CARRIED: said})
+    """The metadata, with what the source has beside what the file carries, which ``gvpipe info`` shows."""
+    return Cleaner(sequence.name).metadata(with_losses(sequence.metadata, sequence.not_carried))
 
 
 def _with_counts(outline: Outline | None, arrangement: Arrangement, n_parts: int) -> Outline | None:

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from gvpipe.asset.listing import Things, list_things
+from gvpipe.asset.metadata import losses_of
 from gvpipe.asset.part import Part
 from gvpipe.asset_coding.directory import VERSION, Directory, Listed, file_notes, read_images
 from gvpipe.container.bitstream import Bitstream
@@ -29,6 +30,7 @@ def list_asset(directory: Directory, outline: Outline, bitstream: Bitstream) -> 
     parts = _parts(directory.parts, outline.part_triangles) if is_read else []
     polygons = outline.polygons if is_read else {}
     return {
+        "not_carried": losses_of(directory.metadata),
         **list_things(Things(parts, polygons, directory.materials, read_images(directory, bitstream), directory.metadata)),
         "attributes": _listed(directory.attributes, bitstream),
         "fields": [

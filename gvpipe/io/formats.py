@@ -26,7 +26,8 @@ class FrameFormat:
 
 
 VTK_XML = (".vtp", ".vtu", ".vts", ".vtr", ".vti", ".pvtp", ".pvtu")
-STEPS = (".vtk", *VTK_XML)  # of simulations, that lists with times may name
+BLOCKS = (".vtm", ".vtpc")  # that name files of their blocks
+STEPS = (".vtk", *VTK_XML, *BLOCKS)  # of simulations, that lists with times may name
 BY_MESHIO = (
     ".msh", ".inp", ".bdf", ".fem", ".nas", ".mesh", ".meshb", ".su2", ".avs", ".vol", ".f3grid", ".mdpa", ".tec",
 )  # fmt: skip
@@ -41,6 +42,7 @@ FRAME_FORMATS = {
     ".vtk": FrameFormat(late("simulation.frame_loader", "legacy_loader")),
     **dict.fromkeys(VTK_XML, FrameFormat(late("simulation.frame_loader", "xml_loader"))),
     ".vtp": FrameFormat(late("simulation.frame_loader", "xml_loader"), late("simulation.vtp_writer", "encode_vtp")),
+    **dict.fromkeys(BLOCKS, FrameFormat(late("simulation.frame_loader", "block_loader"))),
     **dict.fromkeys(BY_MESHIO, FrameFormat(late("simulation.frame_loader", "meshio_loader"))),
 }
 

@@ -57,5 +57,14 @@ def read_frames(
         first.materials,
         first.images,
         first.metadata,
-        first.not_carried,
+        (*first.not_carried, *_changes(files[first_file:stop])),
     )
+
+
+def _changes(files: Sequence[Path]) -> tuple[str, ...]:
+    """What changes from frame to frame, of formats that have more than the first frame's kept."""
+    if files[0].suffix.lower() != ".obj":
+        return ()
+    from gvpipe.io.obj_changes import changing_materials
+
+    return changing_materials(files)

@@ -8,9 +8,11 @@
 | ``Pm``, ``Pr``, else ``Ns`` | metallic, roughness: 1 - sqrt(Ns / 1000), as Blender has it |
 | ``map_Pr -imfchan g``, ``map_Pm -imfchan b`` of one picture | metallic-roughness texture |
 | ``norm``, else ``map_Bump`` or ``bump`` | normal texture; ``-bm`` is its scale |
+| ``Pc``, ``Pcr``, ``Ps``, ``aniso``, ``anisor`` | clear coat and its roughness, sheen, anisotropy and its rotation |
 | ``-o``, ``-s``, ``-clamp on`` of a map | offset, tiling, wrap |
 
-``Ka``, ``Ks``, ``Ni``, ``Tf`` and ``illum`` have no counterpart. Maps without one are named in a note.
+``Ka``, ``Ks``, ``Ni`` and ``illum`` have no counterpart. Maps without one are named in a note, other statements among what is
+not carried.
 
 Sources: Wavefront, "Advanced Visualizer" manual, appendix B1 (MTL); the PBR extension after Clara.io's documentation.
 """
@@ -27,6 +29,9 @@ from gvpipe.io.pictures import Pictures
 NUMBERS = {"-o": 3, "-s": 3, "-t": 3, "-mm": 2}  # options with up to so many numbers; others have one word
 WORDS = ("-blendu", "-blendv", "-boost", "-cc", "-clamp", "-imfchan", "-texres", "-bm", "-type", "-colorspace")
 ALIASES = {"bump": "map_bump", "map_tr": "map_d", "map_ns": "map_Ns"}
+KNOWN = {  # statements that are read, and those that nearly every file has and that have no counterpart
+    "kd", "d", "tr", "ke", "ns", "pm", "pr", "pc", "pcr", "ps", "aniso", "anisor", "ka", "ks", "ni", "illum", "sharpness",
+}  # fmt: skip
 KNOWN_MAPS = ("map_kd", "map_d", "map_ke", "map_pr", "map_pm", "map_bump", "norm")
 
 
@@ -78,6 +83,8 @@ def _material(name: str, statements: dict[str, str], pictures: Pictures) -> Mate
     emissive = _color(statements.get("ke", ""), 0.0)
     if "map_ke" in maps and not any(emissive):
         emissive = (1.0, 1.0, 1.0)
+    sheen = _number(statements.get("ps", ""), 0)
+    pictures.left.add_all(f"material statement {key}" for key in statements if key not in maps and key not in KNOWN)
     shine = min(max(_number(statements.get("ns", ""), 0), 0), 1000)
     normal = maps.get("norm") or maps.get("map_bump")
     packed = _packed(maps.get("map_pr"), maps.get("map_pm"))
@@ -97,6 +104,11 @@ def _material(name: str, statements: dict[str, str], pictures: Pictures) -> Mate
         emissive=emissive,
         emissive_texture=_texture(maps.get("map_ke"), name, pictures),
         alpha_mode="blend" if alpha < 1 or is_cut_out else "opaque",
+        clearcoat=_number(statements.get("pc", ""), 0),
+        clearcoat_roughness=_number(statements.get("pcr", ""), 0),
+        sheen_color=(sheen, sheen, sheen),
+        anisotropy_strength=_number(statements.get("aniso", ""), 0),
+        anisotropy_rotation=2 * math.pi * _number(statements.get("anisor", ""), 0),
     )
 
 

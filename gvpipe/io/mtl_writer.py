@@ -7,7 +7,7 @@ double sides, materials without light, mirrored and unfiltered textures, rotatio
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 from gvpipe.asset.material import Material, Texture
 
@@ -44,6 +44,7 @@ def _statements(material: Material, pictures: Sequence[str]) -> list[str]:
         f"Pm {material.metallic!r}",
         f"d {1.0 if material.alpha_mode == 'opaque' else alpha!r}",
         "illum 2",
+        *([f"Pc {material.clearcoat!r}", f"Pcr {material.clearcoat_roughness!r}"] if material.clearcoat else []),
     ]
     for role, keywords in MAPS.items():
         texture = material.textures.get(role)
@@ -64,11 +65,20 @@ def _options(texture: Texture, role: str) -> str:
     return options + (f"-bm {texture.scale!r} " if role == "normal_texture" and texture.scale != 1 else "")
 
 
+def _has_layers(material: Material) -> bool:
+    """Whether a material has what neither glTF's own model nor a clear coat is."""
+    names = [each.name for each in fields(Material)]
+    plain = {*names[: names.index("emissive_strength") + 1], "clearcoat", "clearcoat_roughness"}
+    return any(getattr(material, each.name) != each.default for each in fields(Material) if each.name not in plain)
+
+
 def _lost(material: Material) -> set[str]:
     """What MTL has no statement for, in words."""
     lost = set()
     if material.occlusion_texture:
         lost.add("occlusion textures")
+    if _has_layers(material):
+        lost.add("transmission, sheen and other layers of materials")
     if material.alpha_mode == "mask":
         lost.add("alpha thresholds")
     if material.double_sided or material.unlit:

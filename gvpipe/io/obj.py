@@ -80,7 +80,7 @@ class ObjLoader:
         self._faces, self._corners = faces, corners
         # relative indices depend on where the face lines stand, so equal lines need not mean equal faces
         self._face_lines = b"" if b"-" in face_lines.tobytes() else face_lines.tobytes()
-        materials, images, notes = load_materials(named, keys, path)
+        materials, images, notes, left = load_materials(named, keys, path)
         attributes: dict[str, Any] = {}
         for name, keyword, index in (("uv", b"vt", corners.vt), ("normal", b"vn", corners.vn)):
             if (index != -1).any():
@@ -103,6 +103,7 @@ class ObjLoader:
             materials,
             images,
             animated=animated,
+            not_carried=(*lines.strange(), *left),
         )
 
 

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Bool, Float64, Int64, UInt8
+from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.text import count_tokens, line_spans, parse_floats, parse_integers, token_starts
 
+TABLES = (b"v", b"vt", b"vn", b"f")  # keywords of lines of numbers
 NAMED = (b"o", b"g", b"usemtl", b"mtllib")  # keywords of lines that end in a name, which may hold a #
 
 
@@ -80,6 +82,19 @@ class Lines:
             if keyword in NAMED:
                 found.append((line, keyword.decode(), decode_name(name)))
         return found
+
+    def strange(self) -> tuple[str, ...]:
+        """Statements that are not read, by name: lines, points, curves and others; of smoothing groups, those that smooth."""
+        left = LeftBehind()
+        is_open = self._heads[0] > ord(" ")
+        for keyword in TABLES:
+            is_open &= ~self.is_kind(keyword)
+        for line in np.flatnonzero(is_open).tolist():
+            keyword, *rest = self._text[self._starts[line] : self._ends[line]].tobytes().split() or [b""]
+            is_plain = keyword == b"s" and rest in ([b"off"], [b"0"], [b"1"])
+            if keyword not in NAMED and not is_plain:
+                left.add(f"statement {decode_name(keyword)[:20]!r}")
+        return left.names
 
     def faces(self, text: UInt8, starts: Int64) -> Faces:
         """The face lines, relative indices resolved."""

@@ -107,14 +107,14 @@ def _vertex_ranges(keys: list[Key], used: list[tuple[int, int]]) -> list[tuple[i
 
 def load_materials(
     named: Named, keys: list[Key], path: Path
-) -> tuple[tuple[Material, ...], tuple[Image, ...], tuple[str, ...]]:
-    """The materials that faces use, in the order of their files, their images, and notes.
+) -> tuple[tuple[Material, ...], tuple[Image, ...], tuple[str, ...], tuple[str, ...]]:
+    """The materials that faces use, in the order of their files, their images, notes, and what is not carried.
 
     A material that no file describes has a plain look, and a note says so.
     """
     used = {key.material for key in keys} - {""}
     if not used:
-        return (), (), ()
+        return (), (), (), ()
     pictures = Pictures(path.parent)
     described: dict[str, Material] = {}
     for library in dict.fromkeys(name for _, keyword, name in named if keyword == "mtllib"):
@@ -126,7 +126,12 @@ def load_materials(
         pictures.notes.append(
             f"{path.name} uses material {absent[0]!r}{more}, which no .mtl file beside it describes; it looks plain"
         )
-    return (*described.values(), *(Material(name) for name in absent)), tuple(pictures.images), tuple(pictures.notes)
+    return (
+        (*described.values(), *(Material(name) for name in absent)),
+        tuple(pictures.images),
+        tuple(pictures.notes),
+        pictures.left.names,
+    )
 
 
 def _read_library(library: str, path: Path, used: set[str], pictures: Pictures) -> list[Material]:

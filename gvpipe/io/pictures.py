@@ -14,6 +14,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from gvpipe.asset.material import Image
 from gvpipe.errors import InputError
 from gvpipe.io.fetching import fetch
+from gvpipe.io.left_behind import LeftBehind
 
 MAX_BYTES = 1 << 29  # of a picture file
 UNSAFE = re.compile(r"[^\w. ()-]+")
@@ -52,6 +53,7 @@ class Pictures:
     def __init__(self, folder: Path) -> None:
         self.images: list[Image] = []
         self.notes: list[str] = []
+        self.left = LeftBehind()  # statements of material files
         self._folder = folder
         self._numbers: dict[str, int | None] = {}
         self._paths: dict[Path, int] = {}

@@ -7,6 +7,7 @@
 | ``s t``, ``u v`` or ``texture_u texture_v`` of a vertex, ``texcoord`` of a face | ``uv`` of the first frame |
 | ``red green blue [alpha]`` of a face | ``color`` per triangle |
 | any other number of a vertex or a face | an attribute, or a field, of its name; ``a_0 a_1 a_2`` are one vector ``a`` |
+| strips of triangles (element ``tristrips``), where there are no faces | faces |
 | ``comment TextureFile picture.png`` | a material that shows the picture |
 
 A face's number is that of all triangles that the face is cut into.
@@ -26,6 +27,7 @@ from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.asset.attribute import MAX_COMPONENTS, Attribute
 from gvpipe.asset.material import Material, Texture
 from gvpipe.asset.part import Part
+from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.mesh import FrameValues, Mesh, as_color, as_faces, as_normals, as_polygons, fan, indexed
 from gvpipe.io.pictures import Pictures
 from gvpipe.io.ply_elements import Columns, Lists, read_comments, read_elements
@@ -55,10 +57,13 @@ class PlyLoader:
         """
         data = path.read_bytes()
         elements = read_elements(data)
-        for name in ("vertex", "face"):
-            if not elements.get(name):
-                raise ValueError(f"it has no element {name!r}")
-        vertex, face = elements["vertex"], elements["face"]
+        if not elements.get("vertex"):
+            raise ValueError("it has no element 'vertex'")
+        vertex, face, taken = elements["vertex"], elements.get("face", {}), {"vertex", "face"}
+        if not face and elements.get("tristrips"):
+            face, taken = _from_strips(elements["tristrips"]), {"vertex", "tristrips"}
+        if not face:
+            raise ValueError("it has no element 'face'")
         positions = _stack(vertex, tuple("xyz"))
         if positions is None:
             raise ValueError("its vertices lack x, y or z")
@@ -83,7 +88,37 @@ class PlyLoader:
             material,
             tuple(pictures.images),
             animated=animated,
+            not_carried=_left_behind(elements, taken),
         )
+
+
+def _from_strips(strips: Columns) -> Columns:
+    """Triangle strips as faces: -1 ends a strip, and every second triangle is turned round."""
+    corners = _polygons(strips)[1]
+    values, lengths = corners.values.astype(np.int64), corners.lengths
+    ends = np.zeros(len(values), bool)
+    ends[np.cumsum(lengths)[lengths > 0] - 1] = True  # a list ends its last strip, too
+    is_break = values < 0
+    # a triangle begins where neither it nor the two after it are a break, or lie in another list
+    n = max(0, len(values) - 2)
+    whole = ~(is_break[:n] | is_break[1 : n + 1] | is_break[2 : n + 2] | ends[:n] | ends[1 : n + 1])
+    at = np.flatnonzero(whole)
+    starts = np.concatenate([[0], np.flatnonzero(is_break | ends) + 1])
+    odd = (at - starts[np.searchsorted(starts, at, side="right") - 1]) % 2
+    triangles = np.stack([values[at], values[at + 1 + odd], values[at + 2 - odd]], axis=1)
+    distinct = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)  # strips are joined by triangles without area
+    kept = triangles[distinct]
+    return {INDEX_NAMES[0]: Lists(kept.reshape(-1), np.full(len(kept), 3, np.int64))}
+
+
+def _left_behind(elements: dict[str, Columns], taken: set[str]) -> tuple[str, ...]:
+    """Elements that are not read."""
+    left = LeftBehind()
+    for name, columns in elements.items():
+        if name not in taken:
+            column = next(iter(columns.values()), np.zeros(0))
+            left.add(f"element {name!r}", len(column.lengths if isinstance(column, Lists) else column))
+    return left.names
 
 
 def _polygons(face: Columns) -> tuple[str, Lists]:

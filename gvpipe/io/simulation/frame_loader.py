@@ -7,7 +7,9 @@ from functools import partial
 from pathlib import Path
 
 from gvpipe.io.damage import FRAME_AGAIN, reading
+from gvpipe.io.formats import BLOCKS
 from gvpipe.io.mesh import FrameValues, Mesh
+from gvpipe.io.simulation.blocks import load_multi_block
 from gvpipe.io.simulation.cells import Cells
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
 from gvpipe.io.simulation.legacy import load_legacy
@@ -43,6 +45,7 @@ class SurfaceLoader:
             polygons=surface.polygons,
             parts=block_parts(step, surface),
             animated={name: partial(_guarded, path, name, read) for name, read in surface_values(step, surface).items()},
+            not_carried=surface.not_carried,
         )
 
 
@@ -60,6 +63,16 @@ def legacy_loader() -> SurfaceLoader:
 def xml_loader() -> SurfaceLoader:
     """What loads files of VTK's XML formats."""
     return SurfaceLoader(load_xml_grid)
+
+
+def block_loader() -> SurfaceLoader:
+    """What loads VTK's multi-block files."""
+    return SurfaceLoader(load_multi_block)
+
+
+def dataset_loader(suffix: str) -> Callable[[Path], Dataset]:
+    """What parses files of one time step of an extension of `gvpipe.io.formats.STEPS`."""
+    return load_legacy if suffix == ".vtk" else load_multi_block if suffix in BLOCKS else load_xml_grid
 
 
 def meshio_loader() -> SurfaceLoader:

@@ -23,7 +23,7 @@ from gvpipe.io.mesh import FrameValues, left_note
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
 from gvpipe.io.simulation.surface import Surface, extract_surface
-from gvpipe.io.simulation.times import time_steps
+from gvpipe.io.simulation.times import empty_note, time_steps
 from gvpipe.origin import choose_origin, narrow, rounding
 from gvpipe.sequence import MeshSequence, check_finite
 
@@ -158,6 +158,9 @@ def read_steps(steps: Steps, path: Path, options: ReadOptions, notes: tuple[str,
         InputError: no step, or the first frame cannot be read.
     """
     first, stop = options.span(steps.n_steps, str(path))
+    if options.frames is None:
+        first, empty = _without_empty(steps, first, stop, path)
+        notes = (*notes, *empty)
     frames = StepFrames(steps, first, stop, path)
     attributes, fields, left = _split(frames, str(path))
     times = steps.times
@@ -174,7 +177,19 @@ def read_steps(steps: Steps, path: Path, options: ReadOptions, notes: tuple[str,
         block_parts(frames.first, frames.surface),
         frames.surface.polygons,
         metadata=Metadata(up, None, timing.start, path.name, timing.texts),
+        not_carried=frames.surface.not_carried,
     )
+
+
+def _without_empty(steps: Steps, first: int, stop: int, path: Path) -> tuple[int, tuple[str, ...]]:
+    """The first step that has cells, and a note if those before it have none."""
+    start = first
+    while first < stop - 1:
+        with reading(path, "", f"frame {first}"):
+            if len(steps.open(first).cells().types):
+                break
+        first += 1
+    return first, empty_note(first - start)
 
 
 def _split(frames: StepFrames, where: str) -> tuple[dict[str, Attribute], dict[str, Field], list[str]]:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.arrays import Array, Bool, Floats, Int32, Int64
+from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.mesh import as_polygons, fan
 from gvpipe.io.simulation.cells import (
     HIGHER_ORDER,
@@ -43,6 +44,7 @@ class Surface:
         polygons: corners of each polygon, as of `gvpipe.MeshSequence`.
         cells: ``(T,)`` the grid's cell of each triangle, rising.
         notes: what was left out, a line each.
+        not_carried: what a surface cannot have, by name.
     """
 
     points: Int64
@@ -50,6 +52,7 @@ class Surface:
     polygons: Int32 | None
     cells: Int64
     notes: tuple[str, ...]
+    not_carried: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +90,9 @@ def extract_surface(cells: Cells, points: Floats) -> Surface:
     number = np.zeros(len(points), np.int64)
     number[used] = np.arange(len(used))
     faces = number[nodes][fan(counts)].astype(np.int32)
-    return Surface(used, faces, as_polygons(counts), np.repeat(owners, counts - 2), _notes(cells, n_covered))
+    return Surface(
+        used, faces, as_polygons(counts), np.repeat(owners, counts - 2), _notes(cells, n_covered), _inside(cells, used)
+    )
 
 
 def _check_types(cells: Cells) -> None:
@@ -105,6 +110,16 @@ def _notes(cells: Cells, n_covered: int) -> tuple[str, ...]:
         notes += (f"{n_covered} flat cells are faces of volume cells; they were left out",)
     higher = int(np.isin(cells.types, list(HIGHER_ORDER)).sum())
     return (*notes, f"{higher} cells of higher order were read by their corners") if higher else notes
+
+
+def _inside(cells: Cells, used: Int64) -> tuple[str, ...]:
+    """What is inside of volume cells, beside their surface."""
+    left = LeftBehind()
+    is_solid = np.isin(cells.types, list(VOLUMES))
+    left.add("volume cells", int(is_solid.sum()))
+    nodes = np.unique(cells.nodes[np.repeat(is_solid, cells.sizes)])
+    left.add("inner points", len(np.setdiff1d(nodes, used, assume_unique=True)))
+    return left.names
 
 
 def _flat_faces(cells: Cells) -> list[_Faces]:

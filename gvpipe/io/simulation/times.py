@@ -67,3 +67,9 @@ def time_steps(times: Float64 | None, n_frames: int, fps: float | None) -> Timin
 def _whole(rate: float) -> float:
     """A rate without the rounding of the times that it was computed from."""
     return float(round(rate)) if round(rate) > 0 and abs(rate - round(rate)) < EVEN * rate else float(f"{rate:.9g}")
+
+
+def empty_note(n_steps: int) -> tuple[str, ...]:
+    """Of steps without cells before the first that has some."""
+    first = "the first step has" if n_steps == 1 else f"the first {n_steps} steps have"
+    return (f"{first} no cells; the sequence begins behind",) if n_steps else ()

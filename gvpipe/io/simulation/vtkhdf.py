@@ -1,4 +1,4 @@
-"""VTKHDF files (.vtkhdf, .hdf) of one poly data or one unstructured grid, with any number of time steps.
+"""VTKHDF files (.vtkhdf, .hdf) of poly data and unstructured grids, one or several blocks, with any number of time steps.
 
 Numbers of all steps stand one after the other; `Steps` says where each step starts. A step has parts, whose sizes stand in
 `NumberOf...`. Source: Kitware, VTK file formats, "VTKHDF file format", versions 1.0 to 2.6.
@@ -14,6 +14,7 @@ import numpy as np
 from gvpipe.arrays import Array, Float64, Floats, Int64
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
+from gvpipe.io.simulation.blocks import join_blocks
 from gvpipe.io.simulation.cells import Cells, join_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 from gvpipe.io.simulation.hdf import HdfFile, open_hdf
@@ -22,6 +23,9 @@ from gvpipe.io.simulation.xml_grids import POLY_CELLS, ROLES, as_points
 from gvpipe.sequence import MeshSequence
 
 ROOT = "VTKHDF"
+KINDS = ("UnstructuredGrid", "PolyData")
+COLLECTIONS = ("PartitionedDataSetCollection", "MultiBlockDataSet")
+MAX_BLOCKS = 10_000
 UNIT = "Units"  # attribute of an array; gvpipe's own
 LONGEST_UNIT = 100  # characters
 POLY_GROUPS = {"Vertices": POLY_CELLS["Verts"], "Lines": POLY_CELLS["Lines"], "Polygons": POLY_CELLS["Polys"],
@@ -41,25 +45,52 @@ def read_vtkhdf(path: Path, options: ReadOptions) -> MeshSequence:
     """
     file = open_hdf(path)
     with reading(path, "VTKHDF"):
-        steps = VtkHdfSteps(file)
+        steps = BlockSteps(file) if file.attribute(ROOT, "Type") in COLLECTIONS else VtkHdfSteps(file)
     return read_steps(steps, path, options)
 
 
-class VtkHdfSteps:
-    """The time steps of a file; raises `ValueError` for what it is not."""
+class BlockSteps:
+    """The time steps of a file of several blocks, each a group of its own; raises `ValueError` for what it is not."""
 
     def __init__(self, file: HdfFile) -> None:
-        self._file = file
+        names = [name for name in file.names(ROOT) if file.attribute(f"{ROOT}/{name}", "Type") in KINDS]
+        if not names:
+            raise ValueError("it has no block of PolyData or UnstructuredGrid")
+        if len(names) > MAX_BLOCKS:
+            raise ValueError(f"it has {len(names)} blocks; at most {MAX_BLOCKS} are read")
+        self._blocks = {name: VtkHdfSteps(file, f"{ROOT}/{name}") for name in names}
+        moving = {name: each for name, each in self._blocks.items() if each.times is not None}
+        self.times: Float64 | None = next((each.times for each in moving.values()), None)
+        self.n_steps = next((each.n_steps for each in moving.values()), 1)
+        for name, each in moving.items():
+            if each.n_steps != self.n_steps:
+                raise ValueError(f"block {name!r} has {each.n_steps} time steps, another has {self.n_steps}")
+
+    def open(self, step: int) -> Dataset:
+        """A step of all blocks; one that has no time steps is the same in all."""
+        return join_blocks([(name, each.open(min(step, each.n_steps - 1))) for name, each in self._blocks.items()])
+
+
+class VtkHdfSteps:
+    """The time steps of a data set; raises `ValueError` for what it is not.
+
+    Args:
+        file: that it lies in.
+        root: its group.
+    """
+
+    def __init__(self, file: HdfFile, root: str = ROOT) -> None:
+        self._file, self._root = file, root
         self._tables: dict[str, Int64 | None] = {}  # whole arrays of sizes and offsets
-        if file.find(ROOT) is None:
+        if file.find(root) is None:
             raise ValueError("it has no group VTKHDF, so it is another kind of HDF5 file")
-        self.kind = file.attribute(ROOT, "Type")
-        if self.kind not in ("UnstructuredGrid", "PolyData"):
+        self.kind = file.attribute(root, "Type")
+        if self.kind not in KINDS:
             raise ValueError(f"it is a {self.kind[:40] or 'nothing'}; PolyData and UnstructuredGrid are read")
-        self._is_temporal = file.find(f"{ROOT}/Steps") is not None
+        self._is_temporal = file.find(f"{root}/Steps") is not None
         self.times: Float64 | None = None
         if self._is_temporal:
-            self.times = file.read(f"{ROOT}/Steps/Values").astype(np.float64).reshape(-1)
+            self.times = file.read(f"{root}/Steps/Values").astype(np.float64).reshape(-1)
         self.n_steps = 1 if self.times is None else len(self.times)
         if self.n_steps > MAX_STEPS:
             raise ValueError(f"it has {self.n_steps} time steps; at most {MAX_STEPS} are read")
@@ -83,7 +114,7 @@ class VtkHdfSteps:
     def _sizes(self, name: str) -> Int64:
         held = self._tables.get(name)
         if held is None:
-            held = self._file.read(f"{ROOT}/{name}").astype(np.int64).reshape(-1)
+            held = self._file.read(f"{self._root}/{name}").astype(np.int64).reshape(-1)
             if held.min(initial=0) < 0:
                 raise ValueError(f"{name!r} holds {int(held.min())}")
             self._tables[name] = held
@@ -110,7 +141,7 @@ class VtkHdfSteps:
 
     def _offsets(self, name: str) -> Int64 | None:
         """The offsets of all steps, a row each; None: the file has none of that name."""
-        path = f"{ROOT}/Steps/{name}"
+        path = f"{self._root}/Steps/{name}"
         if path not in self._tables:
             is_there = self._file.find(path) is not None
             read = self._file.read(path, 0, self.n_steps).astype(np.int64) if is_there else None
@@ -118,7 +149,7 @@ class VtkHdfSteps:
         return self._tables[path]
 
     def _points(self, start: int, count: int) -> Floats:
-        points = self._file.read(f"{ROOT}/Points", start, start + count)
+        points = self._file.read(f"{self._root}/Points", start, start + count)
         if points.ndim != 2 or points.shape[1] != 3:
             raise ValueError(f"its points have shape {points.shape}; three coordinates each are needed")
         return as_points(points)
@@ -140,7 +171,9 @@ class VtkHdfSteps:
                 pieces = self._pieces("", step, (first, stop), 0, None)
                 cells = join_cells(pieces, point_starts)
             else:
-                groups = [(name, kind) for name, kind in POLY_GROUPS.items() if self._file.find(f"{ROOT}/{name}") is not None]
+                groups = [
+                    (name, kind) for name, kind in POLY_GROUPS.items() if self._file.find(f"{self._root}/{name}") is not None
+                ]
                 found = [
                     self._pieces(f"{name}/", step, (first, stop), list(POLY_GROUPS).index(name), kind) for name, kind in groups
                 ]
@@ -161,10 +194,10 @@ class VtkHdfSteps:
         for number in range(first, stop):
             n_cells, n_nodes = int(cells_of_part[number]), int(nodes_of_part[number])
             start = cell + number  # each part has one offset more than cells
-            offsets = self._file.read(f"{ROOT}/{group}Offsets", start, start + n_cells + 1).astype(np.int64).reshape(-1)
-            nodes = self._file.read(f"{ROOT}/{group}Connectivity", node, node + n_nodes).astype(np.int64).reshape(-1)
+            offsets = self._file.read(f"{self._root}/{group}Offsets", start, start + n_cells + 1).astype(np.int64).reshape(-1)
+            nodes = self._file.read(f"{self._root}/{group}Connectivity", node, node + n_nodes).astype(np.int64).reshape(-1)
             types = (
-                self._file.read(f"{ROOT}/Types", cell, cell + n_cells).astype(np.uint8).reshape(-1)
+                self._file.read(f"{self._root}/Types", cell, cell + n_cells).astype(np.uint8).reshape(-1)
                 if kind is None
                 else np.full(n_cells, kind, np.uint8)
             )
@@ -173,11 +206,11 @@ class VtkHdfSteps:
         return pieces
 
     def _data(self, group: str, step: int, start: int, count: int) -> dict[str, DataArray]:
-        roles = {self._file.attribute(f"{ROOT}/{group}", role): kind for role, kind in ROLES.items()}
+        roles = {self._file.attribute(f"{self._root}/{group}", role): kind for role, kind in ROLES.items()}
         made = {}
-        for name in self._file.names(f"{ROOT}/{group}"):
+        for name in self._file.names(f"{self._root}/{group}"):
             at = self._offset(f"{group}Offsets/{name}", step, start)
-            path = f"{ROOT}/{group}/{name}"
+            path = f"{self._root}/{group}/{name}"
             unit = self._file.attribute(path, UNIT)[:LONGEST_UNIT]
             made[name] = DataArray(partial(self._rows, path, at, count), roles.get(name, ""), unit)
         return made
