@@ -110,6 +110,43 @@ export interface Material {
   readonly normal_texture: Texture | null;
   readonly occlusion_texture: Texture | null;
   readonly emissive_texture: Texture | null;
+  /** Factor of `emissive`, which is in it already. */
+  readonly emissive_strength: number;
+  readonly clearcoat: number;
+  readonly clearcoat_texture: Texture | null;
+  readonly clearcoat_roughness: number;
+  readonly clearcoat_roughness_texture: Texture | null;
+  readonly clearcoat_normal_texture: Texture | null;
+  readonly transmission: number;
+  readonly transmission_texture: Texture | null;
+  readonly thickness: number;
+  readonly thickness_texture: Texture | null;
+  /** 0: without end. */
+  readonly attenuation_distance: number;
+  readonly attenuation_color: [number, number, number];
+  readonly ior: number;
+  readonly specular: number;
+  readonly specular_texture: Texture | null;
+  readonly specular_color: [number, number, number];
+  readonly specular_color_texture: Texture | null;
+  readonly sheen_color: [number, number, number];
+  readonly sheen_color_texture: Texture | null;
+  readonly sheen_roughness: number;
+  readonly sheen_roughness_texture: Texture | null;
+  readonly iridescence: number;
+  readonly iridescence_texture: Texture | null;
+  readonly iridescence_ior: number;
+  readonly iridescence_thickness_minimum: number;
+  readonly iridescence_thickness_maximum: number;
+  readonly iridescence_thickness_texture: Texture | null;
+  readonly anisotropy_strength: number;
+  readonly anisotropy_rotation: number;
+  readonly anisotropy_texture: Texture | null;
+  readonly dispersion: number;
+  readonly diffuse_transmission: number;
+  readonly diffuse_transmission_texture: Texture | null;
+  readonly diffuse_transmission_color: [number, number, number];
+  readonly diffuse_transmission_color_texture: Texture | null;
 }
 
 export interface Image {

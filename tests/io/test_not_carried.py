@@ -1,0 +1,102 @@
+"""OBJ, MTL and PLY: what is met and not taken is named, in every place that lists it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import gvpipe
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvt 1 1\nusemtl a\nf 1/1 2/2 3/3\nf 2/2 4/4 3/3\n"
+
+
+def scan(folder: Path, n_frames: int = 3, shared: bool = False) -> Path:
+    """Frames with a material file and a picture each, as scanners write them."""
+    for frame in range(n_frames):
+        Image.new("RGB", (8, 8), (80 * frame, 0, 0)).save(folder / f"t{frame}.png")
+        (folder / f"m{frame}.mtl").write_text(f"newmtl a\nmap_Kd t{0 if shared else frame}.png\n")
+        (folder / f"f{frame}.obj").write_text(f"mtllib m{frame}.mtl\n{SQUARE}")
+    return folder
+
+
+def test_materials_of_later_frames(tmp_path: Path, run: Any) -> None:
+    found = gvpipe.read(scan(tmp_path))
+    assert found.not_carried == ("materials and textures of later frames",)
+    made = json.loads(run("encode", tmp_path, tmp_path / "a.mp4", "--codec", "pca", "--json").out)
+    assert made["not_carried"] == ["materials and textures of later frames"]
+    assert "materials and textures of later frames" in run("info", tmp_path / "a.mp4").out
+    assert json.loads(run("info", tmp_path / "a.mp4", "--json").out)["not_carried"] == made["not_carried"]
+    assert "materials and textures of later frames" in run("info", str(tmp_path / "f%d.obj")).err
+
+
+def test_equal_materials_of_frames(tmp_path: Path) -> None:
+    assert gvpipe.read(scan(tmp_path, shared=True)).not_carried == ()
+    assert gvpipe.read(tmp_path / "f1.obj").not_carried == ()
+
+
+def test_statements_of_obj(tmp_path: Path) -> None:
+    text = f"# a comment\ns off\ns 1\n{SQUARE}s 3\nl 1 2 3\nl 2 3\np 1\ncurv 0 1 1 2\nACME thing\n"
+    (tmp_path / "a.obj").write_text(text)
+    named = ("statement 'ACME'", "statement 'curv'", "statement 'l' (2)", "statement 'p'", "statement 's'")
+    assert gvpipe.read(tmp_path / "a.obj").not_carried == named
+    (tmp_path / "b.obj").write_text(f"s off\ng group\no thing\n{SQUARE}")
+    assert gvpipe.read(tmp_path / "b.obj").not_carried == ()
+
+
+def test_statements_of_material_files(tmp_path: Path) -> None:
+    mtl = "newmtl a\nKd 1 1 1\nNi 1.5\nillum 2\nPc 0.5\nPcr 0.25\nPs 0.125\naniso 0.5\nTf 1 0 0\nacme 7\n"
+    (tmp_path / "m.mtl").write_text(mtl)
+    (tmp_path / "a.obj").write_text(f"mtllib m.mtl\n{SQUARE}")
+    found = gvpipe.read(tmp_path / "a.obj")
+    assert found.not_carried == ("material statement acme", "material statement tf")
+    (material,) = found.materials
+    assert (material.clearcoat, material.clearcoat_roughness, material.anisotropy_strength) == (0.5, 0.25, 0.5)
+    assert material.sheen_color == (0.125,) * 3
+    gvpipe.write(found, tmp_path / "out.obj")
+    assert gvpipe.read(tmp_path / "out.obj").materials[0].clearcoat == 0.5
+
+
+def ply(strips: list[list[int]], binary: bool, extra: str = "") -> bytes:
+    """A file of triangle strips."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 2, 0], [1, 2, 0]], "<f4")
+    form = "binary_little_endian" if binary else "ascii"
+    head = f"ply\nformat {form} 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
+    head += f"element tristrips {len(strips)}\nproperty list int int vertex_indices\n{extra}end_header\n"
+    if binary:
+        rows = b"".join(np.array([len(strip), *strip], "<i4").tobytes() for strip in strips)
+        return head.encode() + points.tobytes() + rows
+    rows = [*(" ".join(map(str, point)) for point in points.tolist()), *(" ".join(map(str, [len(s), *s])) for s in strips)]
+    return (head + "\n".join(rows) + "\n").encode()
+
+
+STRIPS = {
+    "one": ([[0, 1, 2, 3]], [[0, 1, 2], [1, 3, 2]]),
+    "ended by -1": ([[0, 1, 2, -1, 2, 3, 4, 5, -1]], [[0, 1, 2], [2, 3, 4], [3, 5, 4]]),
+    "several": ([[0, 1, 2], [2, 3, 4], []], [[0, 1, 2], [2, 3, 4]]),
+    "joined by empty triangles": ([[0, 1, 2, 2, 3, 3, 4, 5]], [[0, 1, 2], [3, 4, 5]]),
+    "short ones": ([[0, 1, -1, 0, 1, 2], [3, 4], [1, 3, 2]], [[0, 1, 2], [1, 3, 2]]),
+}
+
+
+@pytest.mark.parametrize("binary", [False, True])
+@pytest.mark.parametrize(("strips", "faces"), STRIPS.values(), ids=STRIPS)
+def test_triangle_strips_of_ply(strips: list[list[int]], faces: list[list[int]], binary: bool, tmp_path: Path) -> None:
+    if not binary and any(not strip for strip in strips):
+        strips = [strip for strip in strips if strip]
+    (tmp_path / "a.ply").write_bytes(ply(strips, binary))
+    found = gvpipe.read(tmp_path / "a.ply")
+    made = [sorted(face) for face in found.faces.tolist()]
+    assert made == [sorted(face) for face in faces] and found.not_carried == ()
+    normals = np.cross(*(found.read(0, 1)[0][found.faces[:, k]] - found.read(0, 1)[0][found.faces[:, 0]] for k in (1, 2)))
+    assert (normals[:, 2] > 0).all()  # none is turned round
+
+
+def test_other_elements_of_ply(tmp_path: Path) -> None:
+    data = ply([[0, 1, 2, 3]], False, "element edge 2\nproperty int a\nproperty int b\n")
+    (tmp_path / "a.ply").write_bytes(data + b"0 1\n1 2\n")
+    assert gvpipe.read(tmp_path / "a.ply").not_carried == ("element 'edge' (2)",)
