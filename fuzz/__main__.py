@@ -17,6 +17,8 @@ from fuzz.session import KINDS, Session
 from fuzz.targets import Options
 from fuzz.worker import memory_folder
 
+OF_PARSERS = click.Choice(["", "video", "mesh", "web", "strange"])
+
 
 @click.command()
 @click.option("--seconds", default=600.0, show_default=True, help="How long cases run, by the clock.")
@@ -25,7 +27,9 @@ from fuzz.worker import memory_folder
 @click.option("--first", default=0, help="Number of the first case of each parser.")
 @click.option("--target", "targets", multiple=True, help="A parser; may be given several times. All by default.")
 @click.option("--without", multiple=True, help="A parser to leave out; may be given several times.")
-@click.option("--kind", type=click.Choice(["", "video", "mesh", "web"]), default="", help="Parsers of one kind alone.")
+@click.option(
+    "--kind", type=click.Choice(["", "video", "mesh", "web", "strange"]), default="", help="Parsers of one kind alone."
+)
 @click.option("--workers", default=os.cpu_count() or 1, show_default=True, help="Processes.")
 @click.option("--seeds", default=str(FOLDER), help="Folder of seed files; made when it is missing.")
 @click.option("--more", default="", help="A folder of mesh files that are seeds too.")

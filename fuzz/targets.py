@@ -19,7 +19,8 @@ class Options:
         seed: of the random numbers.
         targets: names of parsers; none: all.
         without: names of parsers that are left out.
-        kind: ``video`` (Python's parsers of geometry videos), ``mesh``, ``web`` (the player's); "": all.
+        kind: ``video`` (Python's parsers of geometry videos), ``mesh``, ``web`` (the player's), ``strange`` (names, answers of
+            servers, files of machine code); "": all.
         workers: processes.
         seeds: folder of the seed files.
         found: folder for cases that fail.
@@ -57,6 +58,7 @@ def load_targets(options: Options) -> list[Target]:
     from fuzz.mesh_files import mesh_targets
     from fuzz.seeds import TESTS, load_live, load_seeds
     from fuzz.shards import shard_seeds, shard_target
+    from fuzz.strange import strange_targets
     from fuzz.streams import stream_target
     from fuzz.videos import video_targets
 
@@ -71,6 +73,7 @@ def load_targets(options: Options) -> list[Target]:
         "video": [*video_targets(videos), stream_target(streams), live_target(growing), shard_target(shards)],
         "mesh": mesh_targets(meshes),
         "web": browser_targets(videos, streams, growing),
+        "strange": strange_targets((TESTS / "golden" / "pdct-1.mp4").read_bytes()),
     }
     targets = [target for kind, group in kinds.items() if options.kind in ("", kind) for target in group]
     unknown = {*options.targets, *options.without} - {target.name for target in targets}

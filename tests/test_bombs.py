@@ -201,6 +201,7 @@ BOMBS: dict[str, tuple[Callable[[], Bitstream], str]] = {
     "many runs": (many_runs, "OverBudget: .*16777216 distinct frames"),
     "a deflated list": (deflated_list, "OverBudget: .*section 'asset'"),
 }
+SLOWEST = 2.0  # times as long as the budget says, on machines of half the speed that it was measured on
 TABLES = {"many samples": many_samples, "many keys": many_keys}
 
 
@@ -226,7 +227,7 @@ def test_a_bomb_is_refused_cheaply(name: str, measured: dict[str, tuple[Path, st
     path, error, memory, seconds = measured[name]
     n_bytes = path.stat().st_size
     assert memory <= max(LEAST_BYTES, BYTES_PER_BYTE * n_bytes), f"{memory / 1e6:.0f} MB for {n_bytes} bytes: {error}"
-    assert seconds <= max(LEAST_SECONDS, SECONDS_PER_BYTE * n_bytes), f"{seconds:.1f} s for {n_bytes} bytes: {error}"
+    assert seconds <= SLOWEST * max(LEAST_SECONDS, SECONDS_PER_BYTE * n_bytes), f"{seconds:.1f} s for {n_bytes} bytes: {error}"
     wanted = BOMBS[name][1] if name in BOMBS else "CorruptFile: .*table"
     assert re.match(wanted, error), error
     if not error.startswith("CorruptFile"):

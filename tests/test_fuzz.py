@@ -27,6 +27,7 @@ from fuzz.reduction import reduce_parts
 from fuzz.seeds import load_live
 from fuzz.session import Session
 from fuzz.shards import shard_seeds, shard_target
+from fuzz.strange import strange_targets
 from fuzz.streams import split_stream, stream_target
 from fuzz.targets import Options
 from fuzz.videos import FILE, VIDEO, join_video, split_video, video_targets
@@ -194,3 +195,16 @@ def test_the_web_players_readers(tmp_path: Path) -> None:
     with pytest.raises(RefusedByPlayer, match=rf"{FILE}.*'order'"):
         node.read(case)
     node.close()
+
+
+@pytest.mark.parametrize("number", range(3), ids=["names", "http", "kernels"])
+def test_names_answers_and_files_of_kernels(number: int, tmp_path: Path) -> None:
+    """Sound ones are taken, mutated ones are taken or refused."""
+    target = strange_targets((GOLDEN / "pdct-1.mp4").read_bytes())[number]
+    judge(target, write_files(target.join(target.seeds[0].parts), tmp_path / "case"), 10**5)  # what loads costs once
+    verdicts = [
+        judge(target, write_files(target.join(target.case(1, k)[1]), tmp_path / "case"), 10**5)
+        for k in range(len(target.seeds) + 40)
+    ]
+    assert {verdict.kind for verdict in verdicts} <= {ACCEPTED, REFUSED}, verdicts
+    assert verdicts[0].kind == ACCEPTED, verdicts[0]

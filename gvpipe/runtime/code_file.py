@@ -156,7 +156,7 @@ def _type(text: Any) -> Any:
     if isinstance(text, str):
         return NUMBERS[text]
     match text:
-        case ["array", dtype, int(ndim), str(layout), bool(mutable), bool(aligned)]:
+        case ["array", dtype, int(ndim), "C" | "F" | "A" as layout, bool(mutable), bool(aligned)]:
             of: Any = types.Array  # numba's annotations list the layouts
             return of(_type(dtype), ndim, layout, readonly=not mutable, aligned=aligned)
         case ["tuple", list(parts)]:
