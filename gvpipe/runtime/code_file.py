@@ -16,6 +16,7 @@ import functools
 import hashlib
 import importlib
 import json
+import re
 import struct
 import sys
 from typing import Any, NamedTuple
@@ -33,6 +34,7 @@ DIGEST = 32  # bytes of a SHA-256
 NUMBERS = {str(kind): kind for kind in (types.none, types.boolean, *types.number_domain)}
 IMPORTED = ("gvpipe.", "gvcodecs.", "numba.", "numpy.")  # packages of modules that a file may load
 TEXTS = ("modname", "qualname", "unique_name", "env_name", "mangled_name")  # of numba's description of a function
+NUMBER_TYPE = re.compile(r"[<>|=]?[biufc?][0-9]{0,2}")  # NumPy parses much more
 PLAIN = ("native", "inline", "noalias", "uid")
 
 
@@ -196,6 +198,8 @@ def _environment(name: str, module: str, constants: list[str]) -> Any:
     """The environment of that name; a new one if there is none yet."""
     found = lookup_environment(name)
     if found is None:
+        if not all(NUMBER_TYPE.fullmatch(each) for each in constants):
+            raise ValueError(f"environment {name!r} has constants that are no types of numbers")
         found = Environment(_module(module).__dict__)
         found.consts[:] = [np.dtype(each) for each in constants]
         found.env_name = name
