@@ -186,7 +186,6 @@ class _Arriving:
             answer.close()
             raise InputError("the server sends neither parts of the file nor its length; download it first")
         self.size, self.received, self._most = int(length), 0, most
-        answer.allow(self.size)
         self._answer = answer
         self._file: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  closed with the last reference to this object
         for each in (self._file, answer):
@@ -195,6 +194,8 @@ class _Arriving:
     def read(self, offset: int, length: int) -> bytes:
         """Wait until bytes have come, and return them."""
         _check_size(offset + length, self._most)
+        if self.received < offset + length:
+            self._answer.allow(offset + length)  # not the length that the server names, which may be any
         self._file.seek(0, 2)
         while self.received < offset + length:
             data = self._answer.read(min(BLOCK, offset + length - self.received))

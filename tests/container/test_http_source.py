@@ -233,6 +233,45 @@ def test_headers_that_never_end(monkeypatch: pytest.MonkeyPatch) -> None:
         thread.join(20)
 
 
+def test_the_page_of_a_redirect_is_not_read() -> None:
+    """It is as long as its server likes."""
+    begun = time.monotonic()
+    with answering(b"HTTP/1.1 302 Found\r\nLocation: /x\r\nContent-Length: 10000000000\r\n\r\n") as url:
+        assert "302" in message(url)
+    assert time.monotonic() - begun < 10
+
+
+def test_a_length_that_a_server_names_buys_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(http_request, "LEAST_SECONDS", 0.5)
+    monkeypatch.setattr(http_request, "LEAST_RATE", 1e9)
+    begun = time.monotonic()
+    with answering(b"HTTP/1.1 200 OK\r\nContent-Length: 1000000000000\r\n\r\n") as url:
+        assert "takes more than" in message(url)
+    assert time.monotonic() - begun < 10
+
+
+@contextlib.contextmanager
+def answering(head: bytes) -> Iterator[str]:
+    """A server that answers with a head, then a byte now and then for 20 s."""
+
+    def answer(connection: socket.socket) -> None:
+        with contextlib.suppress(OSError), connection:
+            connection.recv(1 << 16)
+            connection.sendall(head)
+            for _ in range(400):
+                connection.sendall(b"a")
+                time.sleep(0.05)
+
+    def listen() -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                threading.Thread(target=answer, args=listening.accept()[:1], daemon=True).start()
+
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        threading.Thread(target=listen, daemon=True).start()
+        yield f"http://127.0.0.1:{listening.getsockname()[1]}/a.mp4"
+
+
 def test_a_pause_between_reads_does_not_count(files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(http_request, "LEAST_SECONDS", 0.3)
     with serving(files[1].read_bytes()) as (url, served):

@@ -68,8 +68,7 @@ def ply(strips: list[list[int]], binary: bool, extra: str = "") -> bytes:
     head = f"ply\nformat {form} 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
     head += f"element tristrips {len(strips)}\nproperty list int int vertex_indices\n{extra}end_header\n"
     if binary:
-        rows = b"".join(np.array([len(strip), *strip], "<i4").tobytes() for strip in strips)
-        return head.encode() + points.tobytes() + rows
+        return head.encode() + points.tobytes() + b"".join(np.array([len(strip), *strip], "<i4").tobytes() for strip in strips)
     rows = [*(" ".join(map(str, point)) for point in points.tolist()), *(" ".join(map(str, [len(s), *s])) for s in strips)]
     return (head + "\n".join(rows) + "\n").encode()
 

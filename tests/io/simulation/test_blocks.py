@@ -150,7 +150,10 @@ def test_first_steps_without_cells(tmp_path: Path) -> None:
 def test_what_is_inside_of_volumes_is_named(tmp_path: Path) -> None:
     axis = np.arange(4)
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
-    at = lambda i, j, k: 16 * i + 4 * j + k  # noqa: E731
+
+    def at(i: int, j: int, k: int) -> int:
+        return 16 * i + 4 * j + k
+
     cells = [
         [at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j + 1, k),
          at(i, j, k + 1), at(i + 1, j, k + 1), at(i + 1, j + 1, k + 1), at(i, j + 1, k + 1)]
