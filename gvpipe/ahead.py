@@ -1,7 +1,7 @@
 """Work that other threads do before its results are asked for.
 
 It suits parts of a file that decode alone, such as clips and groups of pictures: kernels and FFmpeg let other threads run.
-Threads end when the iterator is used up or dropped; one that is half read does not go on in a forked child.
+Threads end when the iterator is used up, or soon after it is dropped; one that is half read does not go on in a forked child.
 """
 
 from __future__ import annotations
@@ -55,7 +55,10 @@ def halves(n: int, many: int = MANY) -> list[slice]:
 
 
 class _Ahead(Generic[Item, Result]):
-    """Results in turn; who drops it waits for what has begun, since that may read the caller's files."""
+    """Results in turn. Once it is dropped nothing further is begun, and what has begun ends by itself.
+
+    Nobody waits then: the garbage collector may drop it anywhere, even while `threading` holds locks that ending threads need.
+    """
 
     def __init__(self, function: Callable[[Item], Result], items: Sequence[Item], ahead: int, n_threads: int) -> None:
         self._function, self._rest = function, iter(items)
@@ -81,14 +84,14 @@ class _Ahead(Generic[Item, Result]):
         return result
 
     def __del__(self) -> None:
-        self._end()
+        self._end(wait=False)
 
     def _begin(self, n: int) -> None:
         self._pending.extend(self._pool.submit(self._function, item) for item in islice(self._rest, n))
 
-    def _end(self) -> None:
+    def _end(self, wait: bool = True) -> None:
         self._pending.clear()
-        self._pool.shutdown(cancel_futures=True)
+        self._pool.shutdown(wait, cancel_futures=True)
 
 
 def _until_one_fails(function: Callable[[Item], Result]) -> Callable[[Item], Result]:

@@ -249,6 +249,28 @@ def test_repeated_frames_play_in_order(decoder: str, module: Callable[..., Any],
 
 
 @slow
+def test_playing_begins_with_the_frame_sought(module: Callable[..., Any], site: tuple[Path, str]) -> None:
+    """Whatever the clock says: 1232.4 ms - 5 / 24 s + 5 / 24 s is less than 1232.4 ms in floating point."""
+    path = encode_file(site, held(waving(10, len(LENGTHS)), LENGTHS))
+    first = module(
+        """delete window.VideoDecoder;
+        const video = await GeometryVideo.load(args[0]);
+        const first = [];
+        for (const start of args[1]) {
+          await video.frame(5);
+          let now = start;
+          const nextTick = (tick) => setTimeout(() => tick((now += 1000 / 60)));
+          const show = (positions, k) => (video.pause(), first.push(k));
+          await new Promise((resolve, reject) => video.play((p, k) => (show(p, k), resolve()), { nextTick }).catch(reject));
+        }
+        return first;""",
+        path.name,
+        [1232.4 - 1000 / 60, 1233.0 - 1000 / 60, 1233.3 - 1000 / 60],
+    )
+    assert first == [5, 5, 5]
+
+
+@slow
 def test_overlapping_requests_are_answered_in_turn(module: Callable[..., Any], site: tuple[Path, str]) -> None:
     path = encode_file(site, waving(10, 24))
     same = module(

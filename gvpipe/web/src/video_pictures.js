@@ -219,10 +219,10 @@ export class VideoPictures {
   /** The same by seeking to whatever is due: slower, and exact where it is not known which picture of a playing video is drawn. */
   async #playBySeeking(playing, first, { show, ended, nextTick = nextRepaint }, rate, loop) {
     let now = await new Promise(nextTick);
-    const start = now - (1000 * first) / (this.fps * rate);
+    const start = now;
     let before = this.hasRepeats ? -1 : this.shown;
     while (this.playing === playing) {
-      const due = Math.floor(((now - start) * this.fps * rate) / 1000);
+      const due = first + Math.floor(((now - start) * this.fps * rate) / 1000);
       const frame = loop ? due % this.frames : Math.min(due, this.frames - 1);
       if (frame !== before) {
         const picture = this.repeated.distinctOf(frame);
