@@ -13,6 +13,6 @@ class MachineCodeHook(BuildHookInterface):  # type: ignore[misc,type-arg]  # hat
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Called before the wheel is written; ``version`` is "editable" or "standard"."""
-        if version == "standard" and any(Path(self.root, "gvpipe", "kernels").glob("*.nbc")):
+        if version == "standard" and any(Path(self.root, "gvpipe", "runtime", "kernels").glob("*.nbc")):
             build_data["pure_python"] = False
             build_data["infer_tag"] = True

@@ -17,8 +17,8 @@ from fuzz.live import live_target
 from fuzz.parts import BrokenPromise, Seed, Target
 from fuzz.streams import stream_target
 from fuzz.videos import JSON, video_targets
-from gvpipe.budget import LEAST_SECONDS, SECONDS_PER_BYTE
 from gvpipe.container.bitstream import HEADER
+from gvpipe.foundation.budget import LEAST_SECONDS, SECONDS_PER_BYTE
 
 SCRIPT = Path(__file__).with_name("browser.mjs")
 BUNDLE = Path(gvpipe.__file__).parent / "web" / "bundle" / "geometry-video.js"

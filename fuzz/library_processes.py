@@ -22,7 +22,7 @@ import sys
 from pathlib import Path
 from typing import Any, cast
 
-from gvpipe.io import library_process
+from gvpipe.io.library import process as library_process
 
 LOADED = (
     "gvpipe.io.alembic.reader",
@@ -45,7 +45,7 @@ _servers: dict[int, socket.socket] = {}  # by the process that started them
 
 
 class ForkedProcess:
-    """What `gvpipe.io.library_process` needs of a process."""
+    """What `gvpipe.io.library.process` needs of a process."""
 
     def __init__(self, module: str, path: Path) -> None:
         requests, ours = os.pipe()

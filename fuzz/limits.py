@@ -15,7 +15,7 @@ from pathlib import Path
 from fuzz.library_processes import library_cost
 from fuzz.parts import BrokenPromise, Target
 from fuzz.results import check_text
-from gvpipe.budget import BYTES_PER_BYTE, SECONDS_PER_BYTE
+from gvpipe.foundation.budget import BYTES_PER_BYTE, SECONDS_PER_BYTE
 
 PEAK = re.compile(rb"VmHWM:\s+(\d+) kB")
 RESIDENT = re.compile(rb"VmRSS:\s+(\d+) kB")

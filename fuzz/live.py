@@ -18,7 +18,7 @@ from gvpipe.container.bitstream import CHECKSUM, HEADER, PREFIX
 from gvpipe.container.boxes import uuid_head
 from gvpipe.container.live_layout import HEAD_BYTES, LIVE_UUID, ClipRow, read_rows
 from gvpipe.container.stream_layout import DATA_UUID, FRAGMENT, ROOM_UUID, WHOLE, Place, index_size, pack_index, unpack_index
-from gvpipe.errors import FormatError
+from gvpipe.foundation.errors import FormatError
 
 HEAD, INDEX, TABLE = "(head)", "(index)", "(table)"
 CLIP = "clip."

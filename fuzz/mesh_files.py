@@ -13,8 +13,8 @@ from fuzz.library_processes import fork_library_processes
 from fuzz.mutation import Change, Rng, mutate_bytes, mutate_json, mutate_text
 from fuzz.parts import Parts, Seed, Target
 from fuzz.results import check_asset, check_faces, check_positions
-from gvpipe.errors import InputError
-from gvpipe.io.library_worker import LEAST_MEMORY, LEAST_SECONDS
+from gvpipe.foundation.errors import InputError
+from gvpipe.io.library.worker import LEAST_MEMORY, LEAST_SECONDS
 
 MESH = "mesh.obj"  # what a point cache belongs to
 CACHES = (".pc2", ".mdd", ".npy")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.budget import LEAST_BYTES, LEAST_SECONDS
+from gvpipe.foundation.budget import LEAST_BYTES, LEAST_SECONDS
 
 Parts = dict[str, bytes]  # a file taken apart; checksums and lengths are made when it is put together
 Mutate = Callable[[Parts, np.random.Generator, "tuple[Seed, ...]"], Parts]

@@ -7,8 +7,8 @@ import unicodedata
 import numpy as np
 
 from fuzz.parts import BrokenPromise
-from gvpipe.arrays import Array
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.arrays import Array
+from gvpipe.model.sequence import MeshSequence
 
 LONGEST_MESSAGE = 1000  # characters
 UNSHOWN = ("Cc", "Cs", "Zl", "Zp")  # Unicode's categories of what no terminal should be sent

@@ -18,7 +18,7 @@ from fuzz.mesh_files import CACHES, MESH
 from fuzz.parts import Parts, Seed
 from fuzz.streams import split_stream
 from fuzz.videos import split_video
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = ROOT / "tests"

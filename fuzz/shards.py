@@ -23,7 +23,7 @@ from gvpipe.container.bitstream import CHECKSUM, HEADER
 from gvpipe.container.boxes import uuid_head
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.mp4 import BOX_UUID, file_bytes, read_file
-from gvpipe.errors import FormatError, InputError
+from gvpipe.foundation.errors import FormatError, InputError
 
 FILE = "a.tar"
 BLOCK = tarfile.BLOCKSIZE

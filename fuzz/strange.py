@@ -23,8 +23,8 @@ import gvpipe
 from fuzz.mutation import mutate_bytes, mutate_json, mutate_text
 from fuzz.parts import BrokenPromise, Parts, Seed, Target
 from gvpipe.asset_coding.directory import Directory, ListedImage, pack_directory, unpack_directory
-from gvpipe.errors import FormatError, InputError
-from gvpipe.text import escaped, text_fault
+from gvpipe.foundation.errors import FormatError, InputError
+from gvpipe.foundation.text import escaped, text_fault
 
 TEXTS = ["part", "parent", "material", "attribute", "field", "unit", "source", "key", "several\nlines"]
 STRANGE = ["\x1b[2J", "\u202e", "\u2066x\u2069", "\u2028", "\0", "x" * 70_000, "\U0001f600" * 40_000, "", "\ud800", "a\tb\r"]

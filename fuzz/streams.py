@@ -17,7 +17,7 @@ from gvpipe.container.bitstream import CHECKSUM, HEADER, MAGIC, PREFIX
 from gvpipe.container.boxes import BOX, uuid_head
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.stream_layout import COUNT, DATA_UUID, FRAGMENT, INDEX_UUID, PLACE, VERSION, WHOLE
-from gvpipe.errors import FormatError
+from gvpipe.foundation.errors import FormatError
 
 HEAD, INDEX = "(head)", "(index)"
 MOOF, MDAT = "(moof {})", "(mdat {})"

@@ -20,9 +20,9 @@ from fuzz.parts import Parts, Seed, Target
 from fuzz.results import check_asset, check_faces, check_positions, check_text
 from gvpipe.container.bitstream import CHECKSUM, ENTRY, HEADER, MAGIC, PREFIX, VERSION
 from gvpipe.container.mp4 import BOX_UUID
-from gvpipe.errors import FormatError
-from gvpipe.player import Player
-from gvpipe.video_info import info
+from gvpipe.foundation.errors import FormatError
+from gvpipe.playback.player import Player
+from gvpipe.playback.video_info import info
 
 FILE = "case.mp4"
 VIDEO = "(video)"

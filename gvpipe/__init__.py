@@ -14,7 +14,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from gvpipe.version import __version__ as __version__
+from gvpipe.foundation.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from gvpipe.api import Report, Restreamed, decode, encode, open, render, restream
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from gvpipe.asset.metadata import Metadata
     from gvpipe.asset.part import Part
     from gvpipe.batch.runs import BatchReport, encode_all
-    from gvpipe.errors import GvpipeError
-    from gvpipe.files import read, write
-    from gvpipe.live import LiveEncoder, open_live
+    from gvpipe.foundation.errors import GvpipeError
     from gvpipe.metrics.comparison import Comparison, compare
-    from gvpipe.player import Player
+    from gvpipe.model.sequence import MeshSequence
+    from gvpipe.playback.files import read, write
+    from gvpipe.playback.live import LiveEncoder, open_live
+    from gvpipe.playback.player import Player
+    from gvpipe.playback.video_info import Info, info
     from gvpipe.rasterizer.camera import Camera
     from gvpipe.rasterizer.renderer import Renderer
-    from gvpipe.sequence import MeshSequence
-    from gvpipe.video_info import Info, info
     from gvpipe.web import ExportReport, export_html
 
 __all__ = [
@@ -77,15 +77,15 @@ _HOMES = {
     "gvpipe.asset.metadata": ("Metadata",),
     "gvpipe.asset.part": ("Part",),
     "gvpipe.batch.runs": ("BatchReport", "encode_all"),
-    "gvpipe.errors": ("GvpipeError",),
-    "gvpipe.files": ("read", "write"),
-    "gvpipe.live": ("LiveEncoder", "open_live"),
+    "gvpipe.foundation.errors": ("GvpipeError",),
+    "gvpipe.playback.files": ("read", "write"),
+    "gvpipe.playback.live": ("LiveEncoder", "open_live"),
     "gvpipe.metrics.comparison": ("Comparison", "compare"),
-    "gvpipe.player": ("Player",),
+    "gvpipe.playback.player": ("Player",),
     "gvpipe.rasterizer.camera": ("Camera",),
     "gvpipe.rasterizer.renderer": ("Renderer",),
-    "gvpipe.sequence": ("MeshSequence",),
-    "gvpipe.video_info": ("Info", "info"),
+    "gvpipe.model.sequence": ("MeshSequence",),
+    "gvpipe.playback.video_info": ("Info", "info"),
     "gvpipe.web": ("ExportReport", "export_html"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

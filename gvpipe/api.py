@@ -12,29 +12,30 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gvpipe import notes
-from gvpipe.arguments import StrPath, check_path, show
 from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
 from gvpipe.asset_coding.options import AssetOptions
-from gvpipe.budget import Budget
-from gvpipe.codec import Codec, Encoded, Progress
+from gvpipe.coding.codec import Codec, Encoded
+from gvpipe.coding.registry import check_mapped, encode_sequence, is_mapped, make_codec, segment_parts
+from gvpipe.coding.segment_memory import fit_segments
 from gvpipe.container.bitstream import BARE, LIVE, PLAIN, STREAM, Bitstream
 from gvpipe.container.mp4 import bytes_by_part, read_file, write_file
 from gvpipe.container.sources import check_target, check_video_target, is_remote, is_stored
-from gvpipe.errors import InputError, OverBudget, SettingError, in_file
-from gvpipe.files import Source, frame_range, read
+from gvpipe.foundation import notes
+from gvpipe.foundation.arguments import StrPath, check_path, show
+from gvpipe.foundation.budget import Budget
+from gvpipe.foundation.errors import InputError, OverBudget, SettingError, in_file
+from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import frame_diagonal
-from gvpipe.player import Player
+from gvpipe.model.sequence import MeshSequence
+from gvpipe.playback.files import Source, frame_range, read
+from gvpipe.playback.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
 from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
 from gvpipe.rate_control.search import meet
 from gvpipe.rate_control.targets import Target, parse_bound, read_bound
 from gvpipe.rate_control.trials import Trial
-from gvpipe.registry import check_mapped, encode_sequence, is_mapped, make_codec, segment_parts
 from gvpipe.rendering.poster import poster_of
-from gvpipe.segment_map import segments_mapped_by
-from gvpipe.segment_memory import fit_segments
-from gvpipe.sequence import MeshSequence
+from gvpipe.runtime.segment_map import segments_mapped_by
 from gvpipe.tasks.choice import AUTO_WORKERS, count_cores, open_executor
 from gvpipe.tasks.executor import Executor
 from gvpipe.tasks.segments import RemoteSegments, SharedSegments
@@ -161,7 +162,7 @@ def encode(
         path: the ``.mp4`` to write; an older file is replaced once the new one is complete.
         codec: its id, with ``settings`` by name, or its settings object. Several, or ``"auto"`` for all that serve the purpose
             with settings that all have: the one with the smallest file that meets the target, by default the KG error of their
-            quality (`gvpipe.quality_scale`). None: ``"auto"`` if a purpose is given, else ``"mcgv"``.
+            quality (`gvpipe.coding.quality_scale`). None: ``"auto"`` if a purpose is given, else ``"mcgv"``.
         progress: called with a stage's name and the part of it that is done.
         fps: overrides the source's frames per second.
         target_rmse: largest root mean square error, as a part of frame 0's diagonal.

@@ -29,7 +29,7 @@ RATE = 10e6  # bits per second
 CHUNK = 1 << 13
 READER = """
 import sys, time
-import gvpipe, gvpipe.player, gvpipe.registry
+import gvpipe, gvpipe.playback.player, gvpipe.coding.registry
 warm, url = sys.argv[1:]
 with gvpipe.open(warm) as video:
     video[0]  # compiled loops are loaded

@@ -16,8 +16,8 @@ from PIL import Image as Pillow
 
 import gvpipe
 from gvpipe.container.mp4 import read_file, write_file
-from gvpipe.player import Player
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
+from gvpipe.playback.player import Player
 
 FAST: dict[str, Any] = {"preset": "ultrafast", "clusters": 3, "gop": 4}
 

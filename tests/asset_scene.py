@@ -7,13 +7,13 @@ import io
 import numpy as np
 from PIL import Image as Pillow
 
-from gvpipe.arrays import Array
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, Material, Texture
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.arrays import Array
+from gvpipe.model.sequence import MeshSequence
 
 N = 6  # quads along each side of each sheet
 N_FRAMES = 10

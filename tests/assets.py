@@ -13,7 +13,7 @@ from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, Material, Texture
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 POINTS = np.array([[x, y, 0.25 * x * y] for y in range(3) for x in range(3)], np.float32)
 QUADS = [[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6]]

@@ -9,7 +9,7 @@ from sequences import grid
 
 from gvcodecs.pdct import Pdct, StreamEncoder
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 
 def decode(bitstream: Bitstream) -> np.ndarray:

@@ -16,8 +16,8 @@ from hypothesis import settings
 import gvpipe
 from fuzz.library_processes import fork_library_processes
 from gvpipe.cli.commands import main
-from gvpipe.io import library_process
-from gvpipe.sequence import MeshSequence
+from gvpipe.io.library import process as library_process
+from gvpipe.model.sequence import MeshSequence
 
 # the same examples in every run, however busy the machine; --hypothesis-profile=default draws others
 settings.register_profile("same", derandomize=True, deadline=None)

@@ -16,7 +16,7 @@ from fbx_files import FBX
 from gltf_files import File, take_apart
 
 from gvpipe import io
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 MARK = 7.25
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, MARK]], np.float32)

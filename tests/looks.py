@@ -11,7 +11,7 @@ from shapes import SQUARE, sheet
 
 from gvpipe.asset.material import Image, Material
 from gvpipe.asset.part import Part
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 UV = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)  # of a sheet's corners, (0, 0) at the lower left
 

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 FLOATS = st.floats(width=32, allow_nan=False, allow_infinity=False)
 POSITIONS = hnp.arrays(np.float32, st.tuples(st.integers(1, 4), st.integers(3, 6), st.just(3)), elements=FLOATS)

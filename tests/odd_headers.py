@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from gvpipe.asset_coding.reader import AssetReader
-from gvpipe.budget import Budget
+from gvpipe.coding.registry import open_reader
 from gvpipe.container.bitstream import CHECKSUM, ENTRY, MAGIC, PREFIX, VERSION, Bitstream
-from gvpipe.registry import open_reader
+from gvpipe.foundation.budget import Budget
 
 ODD = (
     *(

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 import gvpipe
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 BUNDLE = Path(gvpipe.__file__).parent / "web" / "bundle"
 MODULE_PAGE = """<!doctype html><link rel="icon" href="data:,"><script type="module">

@@ -12,7 +12,7 @@ from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, Material, Texture
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 FACES = np.array([[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [6, 7, 8]], np.int32)  # two quads, and a triangle of its own
 POLYGONS = np.array([4, 4, 3], np.int32)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 
 def grid(n: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:

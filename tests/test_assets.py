@@ -11,7 +11,7 @@ from asset_scene import scene
 
 import gvpipe
 from gvpipe.asset.polygons import polygon_corners
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.metrics.correspondence import match_corners
 
 CODECS: list[tuple[str, dict[str, Any]]] = [

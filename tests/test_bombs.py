@@ -26,27 +26,27 @@ from tubes import operator_of
 import gvpipe
 from gvcodecs.laplacian.laplace_kernels import thin_rows
 from gvcodecs.laplacian.normal_equations import NO_LIMIT, NormalEquations, count_fill, most_products
-from gvpipe.arrays import Int32
 from gvpipe.asset_coding.directory import CODED
 from gvpipe.attributes.attribute_coding import encode_attribute
 from gvpipe.attributes.surface import Surface
-from gvpipe.budget import BYTES_PER_BYTE, LEAST_BYTES, LEAST_SECONDS, SECONDS_PER_BYTE, Budget
+from gvpipe.coding.corrections.displacements import decode_group
 from gvpipe.connectivity.topology_only import HEADER as MESH
 from gvpipe.connectivity.topology_only import encode_mesh
 from gvpipe.container import mp4
 from gvpipe.container.bitstream import Bitstream, unpack_payload
 from gvpipe.container.cursor import pack_block, varint
-from gvpipe.corrections.displacements import decode_group
 from gvpipe.entropy.integers import encode_integers
-from gvpipe.errors import CorruptFile, OverBudget
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.head import Head
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.reader import FieldReader
 from gvpipe.fields.values import FieldBound
-from gvpipe.files import read_runs
+from gvpipe.foundation.arrays import Int32
+from gvpipe.foundation.budget import BYTES_PER_BYTE, LEAST_BYTES, LEAST_SECONDS, SECONDS_PER_BYTE, Budget
+from gvpipe.foundation.errors import CorruptFile, OverBudget
 from gvpipe.media.video import PROFILES, VideoReader
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
+from gvpipe.playback.files import read_runs
 
 WARM = ("laplacian-2-still", "mcgv-3-jpeg", "mcgv-4-rigid", "pca-2-still", "pdct-2-seams")
 ZERO = encode_integers(np.zeros(1, np.int64))  # however many zeros
@@ -293,7 +293,7 @@ def test_segments_of_fields_have_a_limit() -> None:
 
 @pytest.mark.parametrize("kind", ["constant", "ramp"])
 def test_fields_that_take_no_bytes_are_read_within_the_budget(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gvpipe.budget.LEAST_BYTES", 1 << 20)
+    monkeypatch.setattr("gvpipe.foundation.budget.LEAST_BYTES", 1 << 20)
     mesh, n_frames = FieldMesh(grid(12)[1], 144), 500
     slope = np.linspace(0, 1, n_frames, dtype=np.float32) if kind == "ramp" else np.zeros(n_frames, np.float32)
     values = np.broadcast_to(20 + slope[:, None, None], (n_frames, 144, 1))
@@ -304,8 +304,8 @@ def test_fields_that_take_no_bytes_are_read_within_the_budget(kind: str, monkeyp
 
 
 def test_a_file_whose_attributes_are_refused_gets_a_note(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gvpipe.budget.LEAST_BYTES", 2 << 20)
-    monkeypatch.setattr("gvpipe.budget.BYTES_PER_BYTE", 0)
+    monkeypatch.setattr("gvpipe.foundation.budget.LEAST_BYTES", 2 << 20)
+    monkeypatch.setattr("gvpipe.foundation.budget.BYTES_PER_BYTE", 0)
     positions, faces = grid(30)
     wide = MeshSequence(np.stack([positions, positions + 1]), faces, 24, attributes={"wide": np.zeros((900, 40), np.uint8)})
     assert not gvpipe.encode(dataclasses.replace(wide, attributes={}), tmp_path / "a.mp4", "pca").notes

@@ -15,13 +15,21 @@ import pytest
 from sequences import awkward, same_triangles, waving
 
 import gvpipe
-from gvpipe.codec import Codec
+from gvpipe.coding.codec import Codec
+from gvpipe.coding.registry import codec_class, codec_ids, open_reader
 from gvpipe.container import bitstream as payloads
 from gvpipe.container import mp4
-from gvpipe.errors import CorruptFile, FormatError, NewerVersion, NotGeometryVideo, SettingError, StrippedFile, TruncatedFile
+from gvpipe.foundation.errors import (
+    CorruptFile,
+    FormatError,
+    NewerVersion,
+    NotGeometryVideo,
+    SettingError,
+    StrippedFile,
+    TruncatedFile,
+)
 from gvpipe.metrics.comparison import compare
-from gvpipe.registry import codec_class, codec_ids, open_reader
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 # the largest rmse, as a part of frame 0's diagonal, at the default quality: each codec's own statement
 BOUNDS = {"laplacian": 1e-3, "mcgv": 2e-3, "pca": 1e-3, "pdct": 1e-3}

@@ -8,21 +8,21 @@ from importlib import import_module
 import pytest
 
 MODULES = [
-    "gvpipe.codec",
+    "gvpipe.coding.codec",
     "gvpipe.container.cursor",
     "gvpipe.entropy.block_coder",
     "gvpipe.entropy.grouping",
     "gvpipe.entropy.integers",
     "gvpipe.entropy.parametric_tables",
     "gvpipe.entropy.series",
-    "gvpipe.errors",
+    "gvpipe.foundation.errors",
     "gvpipe.mesh.lattice",
     "gvpipe.mesh.unique_rows",
     "gvpipe.metrics.comparison",
-    "gvpipe.quality_scale",
+    "gvpipe.coding.quality_scale",
     "gvpipe.rate_control.step_search",
-    "gvpipe.repeated_frames",
-    "gvpipe.sequence",
+    "gvpipe.coding.repeated_frames",
+    "gvpipe.model.sequence",
     "gvpipe.trajectory.still_vertices",
     "gvpipe.trajectory.temporal_neighbours",
 ]

@@ -32,7 +32,7 @@ from fuzz.streams import split_stream, stream_target
 from fuzz.targets import Options
 from fuzz.videos import FILE, VIDEO, join_video, split_video, video_targets
 from fuzz.worker import write_files
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 ASSET = GOLDEN / "pdct-2-asset.mp4"
 STILL = GOLDEN / "mcgv-4-still.mp4"

@@ -16,7 +16,7 @@ from folders import GOLDEN
 from sequences import held, partly_still, patched, rigid, waving
 
 import gvpipe
-from gvpipe.isolation.python import run_python
+from gvpipe.foundation.isolation.python import run_python
 
 CURRENT: dict[str, tuple[str, dict[str, Any]]] = {
     "laplacian-2-still": ("laplacian", {"segment": 7}),

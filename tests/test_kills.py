@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 import gvpipe
-from gvpipe.atomic import unnamed_path
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.atomic import unnamed_path
+from gvpipe.model.sequence import MeshSequence
 
 KILLS = int(os.environ.get("GVPIPE_KILLS", "40"))
 WAIT = 120  # seconds

@@ -73,8 +73,8 @@ def test_links_lead_to_files(page: Path) -> None:
 def test_the_reference_page_has_the_public_interface() -> None:
     page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
     shown = set(re.findall(r"^::: (.*)$", page, re.MULTILINE))
-    # `gvpipe.errors` shows all errors
-    assert {f"gvpipe.{name}" for name in gvpipe.__all__ if name != "GvpipeError"} | {"gvpipe.errors"} <= shown
+    # `gvpipe.foundation.errors` shows all errors
+    assert {f"gvpipe.{name}" for name in gvpipe.__all__ if name != "GvpipeError"} | {"gvpipe.foundation.errors"} <= shown
 
 
 def test_every_decision_is_in_the_index() -> None:

@@ -18,7 +18,7 @@ import hashlib, os, sys
 import numpy as np
 import gvpipe
 from gvpipe.container.mp4 import read_file
-from gvpipe.registry import open_reader
+from gvpipe.coding.registry import open_reader
 
 for path in sys.argv[1:]:
     digest = hashlib.sha256()

@@ -14,11 +14,11 @@ from folders import DATA
 from sequences import awkward, held, partly_still, waving
 
 import gvpipe
-from gvpipe.codec import GroupReader, LevelReader
-from gvpipe.errors import CorruptFile
-from gvpipe.registry import codec_class, encode_sequence, open_reader
-from gvpipe.repeated_frames import RepeatedFrames, find_repeated_frames, read_repeated_frames
-from gvpipe.sequence import MeshSequence
+from gvpipe.coding.codec import GroupReader, LevelReader
+from gvpipe.coding.registry import codec_class, encode_sequence, open_reader
+from gvpipe.coding.repeated_frames import RepeatedFrames, find_repeated_frames, read_repeated_frames
+from gvpipe.foundation.errors import CorruptFile
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.still_vertices import find_still
 
 AWKWARD = awkward()
@@ -228,7 +228,7 @@ def test_levels_and_groups_of_held_frames() -> None:
 def test_holds_across_chunks_and_lazily(monkeypatch: pytest.MonkeyPatch) -> None:
     lengths = [2, 1, 5, 1, 3]
     sequence = held(waving(4, 5), lengths)
-    monkeypatch.setattr("gvpipe.sequence.CHUNK_BYTES", 12 * 16 * 2)
+    monkeypatch.setattr("gvpipe.model.sequence.CHUNK_BYTES", 12 * 16 * 2)
     holds = find_repeated_frames(sequence)
     assert holds is not None
     assert holds.lengths.tolist() == lengths
@@ -238,7 +238,7 @@ def test_holds_across_chunks_and_lazily(monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.parametrize("lengths", [[5, 0, 5], [3, 4], [12, -2], [1] * 11, [1 << 38, 5]])
 def test_wrong_holds_are_refused(lengths: list[int]) -> None:
-    from gvpipe.repeated_frames import add_repeated_frames
+    from gvpipe.coding.repeated_frames import add_repeated_frames
 
     bitstream = codec_class("pca")().encode(waving(4, 10)).bitstream
     wrong = add_repeated_frames(bitstream, RepeatedFrames(np.array(lengths)), 2)
@@ -248,7 +248,7 @@ def test_wrong_holds_are_refused(lengths: list[int]) -> None:
 
 @pytest.mark.parametrize("codec", ["pca", "laplacian", "pdct", "mcgv"])
 def test_damaged_sections_raise_format_errors_only(codec: str) -> None:
-    from gvpipe.errors import FormatError
+    from gvpipe.foundation.errors import FormatError
 
     bitstream = encode_sequence(codec_class(codec)(), held(partly_still(), [2, *[1] * 19])).bitstream
     assert {"still", "holds"} <= set(bitstream.sections)

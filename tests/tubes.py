@@ -12,7 +12,7 @@ from gvcodecs.laplacian.laplace_operators import laplacian
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.mesh.graph_kernels import link_vertices
 from gvpipe.metrics.comparison import compare
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.product_kernels import Rows
 
 CODING = CoefficientCoding("mean-value", "kalman", 16, "hierarchy", 0.75, 1 / 16, 1.2, 1.5)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from sequences import grid
 
-from gvpipe.arrays import Array, Float32
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.reader import FieldReader
 from gvpipe.fields.segment import MODES
 from gvpipe.fields.values import FieldBound
+from gvpipe.foundation.arrays import Array, Float32
 
 SHEET, SHEET_FACES = grid(9)
 MESH = FieldMesh(SHEET_FACES, len(SHEET))

@@ -30,8 +30,8 @@ from check_scenes import check_file, mesh_beside
 from check_simulations import ASSETS, Asset, from_reference
 
 import gvpipe
-from gvpipe.errors import GvpipeError, InputError
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import GvpipeError, InputError
+from gvpipe.model.sequence import MeshSequence
 
 PAGE = Path(__file__).parent.parent / "docs" / "formats.md"
 MARKED = re.compile(r"(<!-- assets -->\n).*?(<!-- end -->)", re.DOTALL)

@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 
 import gvpipe
-from gvpipe.arrays import Array, Float64
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array, Float64
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf import read_poses
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 LIMIT = 1e-5  # part of the diagonal, beyond which an asset is marked
 

@@ -21,7 +21,7 @@ import numpy as np
 
 import gvpipe
 from gvpipe.asset.polygons import polygon_corners
-from gvpipe.errors import GvpipeError
+from gvpipe.foundation.errors import GvpipeError
 from gvpipe.metrics.correspondence import match_corners
 
 SLACK = 1 + 1e-5  # of a bound: what float32 rounds

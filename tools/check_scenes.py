@@ -22,11 +22,11 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64
 from gvpipe.asset.part import Part
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array, Float64
+from gvpipe.foundation.errors import InputError
 from gvpipe.io import READERS, read
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 KINDS = ("usd", "abc", "pointcache")
 LIMIT = 1e-5

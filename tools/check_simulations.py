@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.io import read
-from gvpipe.sequence import MeshSequence, describe
+from gvpipe.model.sequence import MeshSequence, describe
 
 Array = NDArray[Any]
 

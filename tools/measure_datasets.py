@@ -34,10 +34,10 @@ from scipy.spatial import cKDTree
 
 import gvpipe
 from gvpipe import datasets
-from gvpipe.arrays import Float32
 from gvpipe.benchmark.sweep import describe_machine
+from gvpipe.foundation.arrays import Float32
 from gvpipe.metrics.vertex_errors import frame_diagonal
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 Storage = tuple[Callable[[MeshSequence], bytes], Callable[[bytes], Float32]]  # a sequence to bytes, and to positions
 

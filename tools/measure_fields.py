@@ -21,12 +21,12 @@ from typing import NamedTuple
 import numpy as np
 
 import gvpipe
-from gvpipe.arrays import Array
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.reader import FieldReader
 from gvpipe.fields.segment import MODES
 from gvpipe.fields.values import FieldBound
+from gvpipe.foundation.arrays import Array
 
 Peers = dict[tuple[str, str], tuple[float, str]]
 

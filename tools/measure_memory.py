@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import gvpipe
-from gvpipe.arrays import Float32
+from gvpipe.foundation.arrays import Float32
 
 MOST = 1e9  # bytes
 WAVES = (

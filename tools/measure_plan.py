@@ -17,7 +17,7 @@ from typing import Any
 
 import gvpipe
 from gvpipe.benchmark.sweep import describe_machine
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 N_FRAMES = 16
 MAX_ERROR = "0.1%"

@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 import gvpipe
+from gvpipe.coding.registry import segment_parts
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import load, read_file, write_file
-from gvpipe.registry import segment_parts
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "samples"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))

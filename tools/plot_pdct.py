@@ -15,7 +15,7 @@ import numpy as np
 import gvpipe
 from gvcodecs.pdct import Pdct
 from gvpipe.metrics.comparison import compare
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 CLUSTERS = (5, 10, 20, 40, 60, 80)
 KEPT = (0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0)

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.arguments import did_you_mean, show
-from gvpipe.arrays import Array, Int32, Integers
-from gvpipe.errors import InputError
+from gvpipe.foundation.arguments import did_you_mean, show
+from gvpipe.foundation.arrays import Array, Int32, Integers
+from gvpipe.foundation.errors import InputError
 
 DOMAINS = ("vertex", "corner", "triangle", "part")
 KINDS = ("uv", "normal", "tangent", "color", "scalar", "vector", "label")

@@ -8,9 +8,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gvpipe.arrays import Array
 from gvpipe.asset.attribute import KINDS, MAX_COMPONENTS, as_values, check_kind, check_text, check_word
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.errors import InputError
 
 DOMAINS = ("vertex", "triangle")
 DTYPES = ("float32", "int8", "uint8", "int16", "uint16", "int32", "uint32")

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int32
 from gvpipe.asset.material import Image, Material, image_size
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
+from gvpipe.foundation.arrays import Int32
 
 
 class Things(NamedTuple):

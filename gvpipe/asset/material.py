@@ -12,10 +12,10 @@ from collections.abc import Collection
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from gvpipe.arguments import show
 from gvpipe.asset.attribute import check_word
 from gvpipe.asset.plain import from_plain, to_plain
-from gvpipe.errors import InputError
+from gvpipe.foundation.arguments import show
+from gvpipe.foundation.errors import InputError
 
 ALPHA_MODES = ("opaque", "mask", "blend")
 WRAPS = ("repeat", "mirror", "clamp")

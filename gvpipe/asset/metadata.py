@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from gvpipe.asset.attribute import check_word
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 UP_AXES = ("", "x", "y", "z")
 NOT_CARRIED = "not carried"  # name of a text: what the source had beside what its file carries

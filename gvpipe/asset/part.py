@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Int32
 from gvpipe.asset.attribute import check_text
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Int32
+from gvpipe.foundation.errors import InputError
 
 
 @dataclass(frozen=True)

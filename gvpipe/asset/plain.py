@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.errors import InputError
-from gvpipe.text import text_fault
+from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.text import text_fault
 
 LARGEST = float(np.finfo(np.float64).max)  # an integer of JSON may exceed it
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arguments import show
-from gvpipe.arrays import Int32, Int64
 from gvpipe.asset.part import Part
-from gvpipe.errors import InputError
+from gvpipe.foundation.arguments import show
+from gvpipe.foundation.arrays import Int32, Int64
+from gvpipe.foundation.errors import InputError
 
 
 def as_polygons(given: Any, faces: Int32, parts: tuple[Part, ...], where: str) -> Int32 | None:

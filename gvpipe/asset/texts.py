@@ -2,7 +2,7 @@
 
 A text has at most `MAX_TEXT` code units of UTF-16 (as JavaScript counts), and no character that a terminal or a page should not
 be sent: control characters, lone surrogates, separators of lines, marks that turn the direction of writing round
-(`gvpipe.text`). Texts of `gvpipe.Metadata` may have several lines.
+(`gvpipe.foundation.text`). Texts of `gvpipe.Metadata` may have several lines.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, Material, Texture
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
-from gvpipe.errors import InputError
-from gvpipe.text import MAX_TEXT, cut_text, escaped, text_fault
+from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.text import MAX_TEXT, cut_text, escaped, text_fault
 
 Value = TypeVar("Value")
 Kind = TypeVar("Kind", Part, Material, Texture, Metadata, Image, Attribute, Field)

@@ -14,8 +14,8 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from gvpipe.arguments import did_you_mean
-from gvpipe.errors import SettingError
+from gvpipe.foundation.arguments import did_you_mean
+from gvpipe.foundation.errors import SettingError
 
 TEXELS = 0.25
 UV = 1 / 8192

@@ -17,17 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Int64
 from gvpipe.asset.attribute import DOMAINS, KINDS, MAX_COMPONENTS
 from gvpipe.asset.field import DOMAINS as FIELD_DOMAINS
 from gvpipe.asset.material import Image, Material, check_materials
 from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part
 from gvpipe.asset.plain import from_plain, to_plain
-from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.json_object import JsonObject, pack_json, unpack_json
-from gvpipe.errors import FormatError, InputError, corrupt_section, printable
+from gvpipe.foundation.arrays import Int64
+from gvpipe.foundation.budget import UNLIMITED, Budget
+from gvpipe.foundation.errors import FormatError, InputError, corrupt_section, printable
 
 SECTION, ARRANGEMENT = "asset", "arrangement"
 CODED, SURFACE, OCTAHEDRAL = 1, 2, 3  # codings of fields; attributes have the first

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.listing import count_polygons
@@ -42,15 +41,16 @@ from gvpipe.attributes.attribute_coding import encode_attribute
 from gvpipe.attributes.corner_sharing import entries_of
 from gvpipe.attributes.surface import Surface
 from gvpipe.attributes.triangle_order import Arrangement, SourceCorners, encode_arrangement
-from gvpipe.codec import Codec, Encoded, FrameReader
+from gvpipe.coding.codec import Codec, Encoded, FrameReader
+from gvpipe.coding.registry import open_reader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.outline import Outline
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.octahedral import angular_bound, to_octahedral
 from gvpipe.fields.values import FieldBound
-from gvpipe.registry import open_reader
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.arrays import Array, Int32, Int64
+from gvpipe.model.sequence import MeshSequence
 
 MOVING = ("scalar", "vector")  # kinds of fields that may follow from positions
 

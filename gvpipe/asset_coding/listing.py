@@ -13,7 +13,7 @@ from gvpipe.asset.part import Part
 from gvpipe.asset_coding.directory import VERSION, Directory, Listed, file_notes, read_images
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.outline import Outline
-from gvpipe.errors import corrupt
+from gvpipe.foundation.errors import corrupt
 
 
 def list_asset(directory: Directory, outline: Outline, bitstream: Bitstream) -> dict[str, Any]:

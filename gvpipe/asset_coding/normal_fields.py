@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int64
 from gvpipe.asset.field import Field
 from gvpipe.asset_coding.scan import chunks
 from gvpipe.attributes.surface import Surface
 from gvpipe.attributes.surface_normals import RULES, find_rule, largest_error, surface_normals
-from gvpipe.codec import FrameReader
+from gvpipe.coding.codec import FrameReader
 from gvpipe.container.cursor import Cursor
+from gvpipe.foundation.arrays import Array, Int64
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from gvpipe.asset.material import Image
-from gvpipe.errors import InputError, SettingError
+from gvpipe.foundation.errors import InputError, SettingError
 
 FORMATS = {"webp": "image/webp", "jpeg": "image/jpeg", "png": "image/png"}
 QUALITY = 90  # of WebP and JPEG

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Int32
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, Material
@@ -31,12 +30,13 @@ from gvpipe.asset_coding.directory import (
     read_images,
     vertex_starts,
 )
-from gvpipe.budget import Budget
-from gvpipe.codec import FrameReader
+from gvpipe.coding.codec import FrameReader
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.errors import InputError, corrupt_section, in_file
-from gvpipe.forks import ForkLock, kept
+from gvpipe.foundation.arrays import Array, Float32, Int32
+from gvpipe.foundation.budget import Budget
+from gvpipe.foundation.errors import InputError, corrupt_section, in_file
 from gvpipe.mesh.hierarchy import keep_hierarchy
+from gvpipe.runtime.forks import ForkLock, kept
 
 if TYPE_CHECKING:  # decoders load when a file has something for them: most have not
     from gvpipe.attributes.surface import Surface

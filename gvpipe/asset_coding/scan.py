@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gvpipe.arrays import Array
 from gvpipe.asset.field import Field
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.errors import InputError
 
 CHUNK_BYTES = 16 << 20
 

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.attributes import storage as stores
 from gvpipe.attributes.attribute_input import check_attribute
 from gvpipe.attributes.corner_sharing import decode_sharing, encode_sharing, entries_of
@@ -21,6 +20,7 @@ from gvpipe.attributes.storage import RANKS, Storage
 from gvpipe.attributes.surface import Surface
 from gvpipe.attributes.value_coding import decode_codes, encode_codes
 from gvpipe.container.cursor import Cursor, pack_block
+from gvpipe.foundation.arrays import Array, Int32, Int64
 from gvpipe.mesh.unique_rows import row_ids
 
 SPLIT, WELDED = 0, 1  # layouts of a vertex attribute

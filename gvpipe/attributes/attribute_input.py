@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int32
 from gvpipe.attributes.corner_sharing import entries_of
 from gvpipe.attributes.entry_layout import DOMAINS, count_values
 from gvpipe.attributes.storage import MAX_COMPONENTS, TYPES
 from gvpipe.attributes.surface import Surface
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array, Int32
+from gvpipe.foundation.errors import InputError
 
 KINDS = ("uv", "normal", "tangent", "color", "scalar", "vector", "label")
 

@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.attributes.surface import Surface
 from gvpipe.container.cursor import Cursor, varint
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array, Int32, Int64
+from gvpipe.foundation.errors import InputError
 from gvpipe.mesh.unique_rows import row_ids
 
 if TYPE_CHECKING:

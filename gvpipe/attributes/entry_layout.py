@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.arrays import Int32, Int64
 from gvpipe.attributes.surface import Surface
+from gvpipe.foundation.arrays import Int32, Int64
 from gvpipe.mesh.topology import opposite_corners
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Int32, Int64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Bool, Int32, Int64
+from gvpipe.runtime.compiled import compiled
 
 MOST_RANKED = 8  # corners of a polygon whose options are ranked
 

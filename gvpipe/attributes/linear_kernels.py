@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Float64, Int32, Int64
 from gvpipe.attributes.match_kernels import (
     N_CLASSES,
     Entries,
@@ -21,9 +20,10 @@ from gvpipe.attributes.match_kernels import (
     remember,
     residual_context,
 )
-from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
+from gvpipe.foundation.arrays import Float32, Float64, Int32, Int64
 from gvpipe.mesh.entry_kernels import EntryOrder
+from gvpipe.runtime.compiled import compiled
 
 LAST, MEAN, PARALLELOGRAM, CONFORMAL, AFFINE = range(5)  # methods
 LEAST_HEIGHT = 0.25  # of a triangle whose map is trusted, in heights of the triangle that is predicted by it

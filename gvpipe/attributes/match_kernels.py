@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int64
-from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
+from gvpipe.foundation.arrays import Int64
 from gvpipe.mesh.entry_kernels import EntryOrder
+from gvpipe.runtime.compiled import compiled
 
 TWINS, NEIGHBOURS = 1, 2  # flags: which entries are candidates
 MAX_CANDIDATES = 6

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Float64, Int32
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Float32, Float64, Int32
+from gvpipe.runtime.compiled import compiled
 
 AREA, ANGLE, UNIFORM, FLAT = range(4)  # rules
 

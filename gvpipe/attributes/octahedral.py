@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Float64, Int64
+from gvpipe.foundation.arrays import Array, Float32, Float64, Int64
 
 MAX_N = 1 << 20
 STEP_N = 1.02  # factor between the lattices that are tried

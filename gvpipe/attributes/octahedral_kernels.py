@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Float64, Int32, Int64
 from gvpipe.attributes.match_kernels import Entries, code_match, near_magnitude, new_history, remember, residual_context
-from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
+from gvpipe.foundation.arrays import Float32, Float64, Int32, Int64
+from gvpipe.runtime.compiled import compiled
 
 LAST, MEAN, SURFACE, PLACE, SURFACE_CORRECTED, PLACE_CORRECTED = range(6)  # methods
 

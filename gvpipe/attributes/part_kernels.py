@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from gvpipe.arrays import Int64
-from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
+from gvpipe.foundation.arrays import Int64
+from gvpipe.runtime.compiled import compiled
 
 N_PART_CONTEXTS = 3
 

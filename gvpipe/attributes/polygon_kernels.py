@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int64
 from gvpipe.attributes.fan_kernels import (
     MOST_RANKED,
     Arranged,
@@ -23,8 +22,9 @@ from gvpipe.attributes.fan_kernels import (
     try_walk,
     walk_fan,
 )
-from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
+from gvpipe.foundation.arrays import Int64
+from gvpipe.runtime.compiled import compiled
 
 MAX_OPTIONS = 3 * (MOST_RANKED - 2)
 SIZES, RANKS, EXPLICIT = 0, 6, 27  # first contexts of a polygon's size, of its option, of what is coded without options

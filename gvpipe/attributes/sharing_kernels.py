@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int32, Int64
-from gvpipe.compiled import compiled
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
+from gvpipe.foundation.arrays import Int32, Int64
 from gvpipe.mesh.corner_kernels import next_corner, previous_corner
 from gvpipe.mesh.corner_lists import list_corners
+from gvpipe.runtime.compiled import compiled
 
 SAME, NEW, OLDER = 0, 1, 2  # symbols; an older entry's number is added to the last
 UNLINKED, UNKNOWN, JOINED, CUT = 0, 1, 2, 3  # what is known of the edge between two corners of a fan

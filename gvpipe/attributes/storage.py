@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Int64, UInt64
 from gvpipe.attributes import octahedral
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
+from gvpipe.foundation.arrays import Array, Float32, Int64, UInt64
 
 INTEGERS, FLOATS, STEPS, DIRECTIONS, TANGENTS, RANKS = range(6)
 TYPES = tuple(np.dtype(name) for name in ("f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8"))

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Int32, Int64
-from gvpipe.forks import kept
+from gvpipe.foundation.arrays import Float32, Int32, Int64
 from gvpipe.mesh.topology import opposite_corners
 from gvpipe.mesh.unique_rows import row_ids
+from gvpipe.runtime.forks import kept
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Float64
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array, Float32, Float64
+from gvpipe.foundation.errors import InputError
 
 RULES = ("area", "angle", "uniform", "flat")
 Normals = Callable[[Array, Array, Array, str], Float32]

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.container.cursor import Cursor, pack_block
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array, Int32, Int64
+from gvpipe.foundation.errors import InputError
 from gvpipe.mesh.topology import opposite_corners
 from gvpipe.mesh.unique_rows import row_ids
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int64
 from gvpipe.attributes.entry_layout import EntryLayout
 from gvpipe.attributes.storage import DIRECTIONS, FLOATS, TANGENTS, Storage, float_values
 from gvpipe.container.cursor import Cursor
+from gvpipe.foundation.arrays import Int64
 from gvpipe.mesh.topology import opposite_corners
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gvpipe.errors import GvpipeError, InputError, printable
-from gvpipe.isolation.plain_files import open_plain
+from gvpipe.foundation.errors import GvpipeError, InputError, printable
+from gvpipe.foundation.isolation.plain_files import open_plain
 from gvpipe.tasks.executor import Work
 
 BLOCK = 1 << 20  # bytes that are hashed at a time
@@ -25,7 +25,7 @@ class Task:
     """A sequence to encode.
 
     Args:
-        source: as `gvpipe.files.read` takes it, absolute.
+        source: as `gvpipe.playback.files.read` takes it, absolute.
         target: of the file to write, absolute.
         done_hash: of the input that the file was made of, None if there is no such file.
     """

@@ -12,10 +12,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from gvpipe.arguments import StrPath, check_path
 from gvpipe.batch.manifest import NAME
 from gvpipe.container.sources import check_source, check_target
-from gvpipe.errors import InputError
+from gvpipe.foundation.arguments import StrPath, check_path
+from gvpipe.foundation.errors import InputError
 from gvpipe.io import READERS
 from gvpipe.io.formats import FRAME_FORMATS
 
@@ -29,7 +29,7 @@ class Job:
 
     Args:
         output: below the folder of all outputs, with ``/`` between folders.
-        source: as `gvpipe.files.read` takes it.
+        source: as `gvpipe.playback.files.read` takes it.
     """
 
     output: str

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from gvpipe.atomic import output_error
-from gvpipe.errors import InputError, quote
+from gvpipe.foundation.atomic import output_error
+from gvpipe.foundation.errors import InputError, quote
 
 NAME = "manifest.jsonl"
 REMEDY = "write to another folder, or remove the manifest to encode all anew"
@@ -28,7 +28,7 @@ class Entry:
     """A line.
 
     Args:
-        input: as `gvpipe.files.read` takes it.
+        input: as `gvpipe.playback.files.read` takes it.
         hash: SHA-256 of the input's bytes, as hexadecimal digits; None: it could not be read.
         output: below the manifest's folder, with ``/`` between folders.
         error: why there is no output; None: it is there.

@@ -14,16 +14,17 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.api import checked_keywords
-from gvpipe.arguments import StrPath, check_path
-from gvpipe.atomic import output_error
 from gvpipe.batch.encoding import Done, Task, prepare
 from gvpipe.batch.inputs import Job, find_jobs
 from gvpipe.batch.manifest import Entry, Manifest, open_manifest
-from gvpipe.codec import Codec, Progress
+from gvpipe.coding.codec import Codec
+from gvpipe.foundation.arguments import StrPath, check_path
+from gvpipe.foundation.atomic import output_error
+from gvpipe.foundation.progress import Progress
+from gvpipe.foundation.version import __version__
 from gvpipe.rate_control.purposes import own_settings
 from gvpipe.tasks.choice import count_cores, open_executor
 from gvpipe.tasks.executor import Executor, Outcome, WorkerDied
-from gvpipe.version import __version__
 
 STAGE = "sequences"
 

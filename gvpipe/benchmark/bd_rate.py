@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 
 
 def logarithms(points: Iterable[dict[str, Any]], measure: str) -> tuple[Float64, Float64]:

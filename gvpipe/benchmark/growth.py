@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Float64
 from gvpipe.benchmark.scale_report import ScalePoint
+from gvpipe.foundation.arrays import Float64
 
 
 class Line(NamedTuple):

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from gvpipe.atomic import unnamed_path
-from gvpipe.errors import InputError
+from gvpipe.foundation.atomic import unnamed_path
+from gvpipe.foundation.errors import InputError
 
 NUMBER = int | float | None
 Results = TypeVar("Results")

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from gvpipe.atomic import temporary_folder
-from gvpipe.errors import InputError
-from gvpipe.isolation.python import TimeoutExpired, run_python
+from gvpipe.foundation.atomic import temporary_folder
+from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.isolation.python import TimeoutExpired, run_python
 
 ENTRY = """
 import sys

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from gvpipe.atomic import output_error, unnamed_path
-from gvpipe.errors import InputError
+from gvpipe.foundation.atomic import output_error, unnamed_path
+from gvpipe.foundation.errors import InputError
 
 
 def draw_pictures(folder: str | os.PathLike[str], pictures: Mapping[str, Callable[[], Any]]) -> list[Path]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from gvpipe.benchmark.pictures import draw_pictures
 from gvpipe.benchmark.report import BenchReport, Curve
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,15 +12,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import gvpipe
-from gvpipe import files
-from gvpipe.atomic import temporary_folder
 from gvpipe.benchmark.own_process import measure_command
 from gvpipe.benchmark.scale_report import ScalePoint, ScaleReport
 from gvpipe.benchmark.sweep import describe_machine, settings_of
 from gvpipe.benchmark.torus import make_torus
-from gvpipe.codec import Progress
 from gvpipe.container.segments import count_longest
-from gvpipe.video_info import info
+from gvpipe.foundation.atomic import temporary_folder
+from gvpipe.foundation.progress import Progress
+from gvpipe.playback import files
+from gvpipe.playback.video_info import info
 
 CODECS = ("mcgv", "mcgv:prediction=affine", "pca", "laplacian", "pdct")
 VERTICES = (1_000, 10_000, 100_000, 1_000_000)  # each in FEW_FRAMES

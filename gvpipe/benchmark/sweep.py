@@ -20,15 +20,16 @@ from typing import Any
 import numpy as np
 
 import gvpipe
-from gvpipe import api, files
-from gvpipe.atomic import output_error, temporary_folder
+from gvpipe import api
 from gvpipe.benchmark.memory import peak_mb
 from gvpipe.benchmark.report import BenchReport, Curve
-from gvpipe.codec import Progress
-from gvpipe.errors import GvpipeError, InputError
+from gvpipe.coding.registry import codec_class, codec_ids
+from gvpipe.foundation.atomic import output_error, temporary_folder
+from gvpipe.foundation.errors import GvpipeError, InputError
+from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.comparison import compare
+from gvpipe.playback import files
 from gvpipe.rate_control.purposes import VARIANTS
-from gvpipe.registry import codec_class, codec_ids
 from gvpipe.tasks.executor import Work, WorkerDied
 from gvpipe.tasks.processes import Processes
 

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from gvpipe.arrays import Float32
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.arrays import Float32
+from gvpipe.model.sequence import MeshSequence
 
 FPS = 30.0
 RADIUS = 0.4  # of the ring

@@ -6,15 +6,15 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gvpipe.source_info import SourceInfo
-    from gvpipe.video_info import Info
+    from gvpipe.io.source_info import SourceInfo
+    from gvpipe.playback.video_info import Info
 
 MOST = 12  # names in a line
 
 
 def shape_lines(info: Info | SourceInfo) -> Iterator[str]:
     """Yield the numbers of vertices, triangles and frames, and where frame 0 lies."""
-    from gvpipe.notes import count, show_origin
+    from gvpipe.foundation.notes import count, show_origin
 
     low, high = info.bounding_box["min"], info.bounding_box["max"]
     place = f", relative to {show_origin(info.origin)}" if any(info.origin) else ""

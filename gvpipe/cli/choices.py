@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gvpipe.part_choice import parts_alone
+from gvpipe.model.part_choice import parts_alone
 
 if TYPE_CHECKING:
-    from gvpipe.codec import Progress
-    from gvpipe.sequence import MeshSequence
+    from gvpipe.foundation.progress import Progress
+    from gvpipe.model.sequence import MeshSequence
 
 
 def parse_frames(text: str | None) -> tuple[int, int | None] | None:

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gvpipe import __version__
-from gvpipe.atomic import remove_abandoned_folders
 from gvpipe.cli.benchmarks import bench, plot
 from gvpipe.cli.console import Output, is_verbose, output_options, unlimited_option
 from gvpipe.cli.conversion import convert
@@ -26,12 +25,13 @@ from gvpipe.cli.encode_all import encode_all
 from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_settings
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.cli.process import Ended, collect_seldom, ending_by_exception, replace_closed_streams
-from gvpipe.errors import GvpipeError, InputError, TopologyChange
-from gvpipe.text import escaped
+from gvpipe.foundation.atomic import remove_abandoned_folders
+from gvpipe.foundation.errors import GvpipeError, InputError, TopologyChange
+from gvpipe.foundation.text import escaped
 
 if TYPE_CHECKING:
     from gvpipe.api import Report
-    from gvpipe.sequence import MeshSequence
+    from gvpipe.model.sequence import MeshSequence
     from gvpipe.web import ExportReport
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
@@ -117,9 +117,10 @@ def encode(
     'walk/$F4.obj'), a geometry video, or - for an .npz or a geometry video on standard input. Stores that fsspec knows are
     read, too (s3://bucket/walk.npz). OUTPUT - is standard output.
     """
-    from gvpipe import api, files
+    from gvpipe import api
     from gvpipe.cli.process import give_back_memory
     from gvpipe.cli.splitting import write_runs
+    from gvpipe.playback import files
 
     if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
         message = f"{len(sources) + 1} files are given, and the last, {target}, is no .mp4; end with the output's name"
@@ -174,7 +175,7 @@ def _encode_live(sources: tuple[str, ...], target: str, options: dict[str, Any],
 
 def _print_report(out: Output, report: Report, name: str, target: str) -> None:
     """Print what an encode did, as text and notes."""
-    from gvpipe import notes
+    from gvpipe.foundation import notes
     from gvpipe.rate_control.purposes import name_with
 
     for note in report.notes:
@@ -226,9 +227,11 @@ def decode(
     folder of vertex animation textures (.openvat), or a pattern of frame files such as out/%04d.obj (also .ply, .stl, .off,
     .glb, .vtp), or - for an .npz on standard output. FILE - is a geometry video on standard input.
     """
-    from gvpipe import api, files, notes
+    from gvpipe import api
     from gvpipe.asset_coding.directory import UNFINISHED
     from gvpipe.cli.choices import chosen, chosen_frames
+    from gvpipe.foundation import notes
+    from gvpipe.playback import files
 
     out = out.carrying(target)
     first, last = chosen_frames(start, stop, frames)
@@ -285,7 +288,7 @@ def pack(folder: str, target: str, shard_size: str, shard_count: int | None, unl
     """
     from gvpipe import datasets
     from gvpipe.cli.choices import parse_bytes
-    from gvpipe.notes import count
+    from gvpipe.foundation.notes import count
 
     limit = parse_bytes("--shard-size", shard_size)
     with out.progress() as progress:
@@ -322,9 +325,9 @@ def info(
 
     Of shards (shard.tar, 'shard-*.tar') it sums up the sequences, and checks each.
     """
-    from gvpipe import video_info
     from gvpipe.cli.asset_lines import asset_lines, shape_lines
     from gvpipe.cli.choices import parse_frames
+    from gvpipe.playback import video_info
 
     if source.lower().endswith(".tar"):
         from gvpipe.cli.shards import show_shards
@@ -359,7 +362,7 @@ def info(
 def _source_info(source: str, path: str, given: tuple[Any, ...], out: Output) -> None:
     """Print what is read of an input that is no geometry video; ``given`` are further arguments of `source_info`."""
     from gvpipe.cli.asset_lines import asset_lines, shape_lines, time_lines
-    from gvpipe.source_info import source_info
+    from gvpipe.io.source_info import source_info
 
     found = source_info(path, *given)
     out.json(found.to_json())
@@ -392,9 +395,9 @@ def compare(
     out: Output,
 ) -> None:
     """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos, one may be - for standard input."""
-    from gvpipe import files
     from gvpipe.cli.choices import parse_frames
     from gvpipe.metrics import comparison
+    from gvpipe.playback import files
 
     if reference == distorted == PIPE:
         raise click.UsageError("both are -, and there is one standard input", click.get_current_context())
@@ -485,7 +488,7 @@ def play(source: str, up: str | None, unlimited: bool, out: Output) -> None:
     from pathlib import Path
 
     from gvpipe import web
-    from gvpipe.atomic import lasting_folder
+    from gvpipe.foundation.atomic import lasting_folder
     from gvpipe.web.browser import open_page
 
     with source_path(source) as path, lasting_folder() as folder, out.progress() as progress:
@@ -550,8 +553,8 @@ def codecs(out: Output) -> None:
     """List the codecs and their settings, and the settings that --codec auto tries beside the defaults."""
     import dataclasses
 
+    from gvpipe.coding.registry import codec_class, codec_ids
     from gvpipe.rate_control.purposes import VARIANTS
-    from gvpipe.registry import codec_class, codec_ids
 
     with out.progress():
         found = {name: codec_class(name) for name in codec_ids()}
@@ -577,7 +580,7 @@ def warmup(installed: bool, portable: bool, out: Output) -> None:
     """Compile what commands need, so that the first ones do not wait: for images and installations of many users."""
     import dataclasses
 
-    from gvpipe.warmup import warm_up
+    from gvpipe.cli.warmup import warm_up
 
     with out.progress() as progress:
         found = warm_up(installed, portable, progress)

@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gvpipe.errors import OutputError
-from gvpipe.text import escaped
+from gvpipe.foundation.errors import OutputError
+from gvpipe.foundation.text import escaped
 
 if TYPE_CHECKING:
-    from gvpipe.codec import Progress
+    from gvpipe.foundation.progress import Progress
 
-COMPILER = "gvpipe.compiled"  # its logger; the module itself imports numba
+COMPILER = "gvpipe.runtime.compiled"  # its logger; the module itself imports numba
 VERBOSE = ("--verbose", "-v")
 
 Command = Callable[..., None]
@@ -82,7 +82,7 @@ class Output:
 
     @contextlib.contextmanager
     def _listening(self) -> Iterator[None]:
-        """Note that kernels are being compiled, which takes long and shows no progress (`gvpipe.compiled`)."""
+        """Note that kernels are being compiled, which takes long and shows no progress (`gvpipe.runtime.compiled`)."""
         if self.quiet:
             yield
             return

@@ -13,11 +13,11 @@ import click
 
 from gvpipe.cli.console import Output, output_options, unlimited_option
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
-from gvpipe.errors import InputError
-from gvpipe.notes import shape as shape_of
+from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.notes import shape as shape_of
 
 if TYPE_CHECKING:
-    from gvpipe.sequence import MeshSequence
+    from gvpipe.model.sequence import MeshSequence
 
 
 @click.command()
@@ -54,8 +54,8 @@ def convert(
     INPUT is what `gvpipe encode` takes; OUTPUT is what `gvpipe decode` takes. No codec is between, so that nothing changes but
     what a format cannot hold, which is said.
     """
-    from gvpipe import files
     from gvpipe.cli.choices import chosen, chosen_frames, parse_frames
+    from gvpipe.playback import files
 
     out = out.carrying(target)
     first, last = chosen_frames(start, stop, frames)
@@ -92,9 +92,9 @@ def convert(
 
 def _convert_split(source: str, target: str, options: dict[str, Any], parts: tuple[str, ...], out: Output) -> None:
     """Convert each run of frames of one topology."""
-    from gvpipe import files
     from gvpipe.cli.choices import chosen
     from gvpipe.cli.splitting import write_runs
+    from gvpipe.playback import files
 
     with source_path(source) as given, out.progress() as progress:
         runs = files.read_runs(given, **options)
@@ -125,7 +125,8 @@ def _convert_split(source: str, target: str, options: dict[str, Any], parts: tup
 
 def _level_reader(source: str, lod: int, unlimited: bool) -> Callable[..., MeshSequence]:
     """What reads frames of a level of detail of a geometry video, at a frame rate."""
-    from gvpipe import api, files
+    from gvpipe import api
+    from gvpipe.playback import files
 
     if not is_video(source):
         raise InputError(f"{source} has no levels of detail; encode it with --codec pca, whose files have them")
@@ -140,7 +141,7 @@ def _level_reader(source: str, lod: int, unlimited: bool) -> Callable[..., MeshS
 
 def _check_target(source: str, target: str) -> None:
     """Refuse an output that is a geometry video, or that would replace the input while it is read."""
-    from gvpipe.io.pattern import match_pattern
+    from gvpipe.io.frames.pattern import match_pattern
 
     if Path(target).suffix.lower() in VIDEO_SUFFIXES:
         raise InputError(f"{target} is a geometry video, which convert does not write; use gvpipe encode")

@@ -27,7 +27,7 @@ def encode_all(
     that fails is listed in the end, and the exit status is 1.
     """
     from gvpipe.batch.runs import encode_all
-    from gvpipe.notes import count
+    from gvpipe.foundation.notes import count
 
     asked = parse_encoding(options)
 

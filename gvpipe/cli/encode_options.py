@@ -11,7 +11,7 @@ import click
 from gvpipe.cli.console import unlimited_option
 
 if TYPE_CHECKING:
-    from gvpipe.codec import Codec
+    from gvpipe.coding.codec import Codec
 
 Command = Callable[..., None]
 
@@ -77,9 +77,9 @@ class Encoding:
 
     Args:
         codec: settings, or those of all codecs to choose from.
-        reading: keywords of `gvpipe.files.read`, but for ``unlimited``.
+        reading: keywords of `gvpipe.playback.files.read`, but for ``unlimited``.
         making: keywords of `gvpipe.api.encode` for what is made of it.
-        unlimited: as for `gvpipe.files.read`.
+        unlimited: as for `gvpipe.playback.files.read`.
     """
 
     codec: Codec | list[Codec]
@@ -108,8 +108,8 @@ def parse_encoding(options: dict[str, Any]) -> Encoding:
         SettingError: no such codec or setting, or a value out of its range.
     """
     from gvpipe.cli.choices import parse_bytes, parse_frames
+    from gvpipe.coding.registry import codec_class
     from gvpipe.rate_control.purposes import candidates
-    from gvpipe.registry import codec_class
 
     targets = {name: options[name] for name in TARGETS}
     if sum(value is not None for value in targets.values()) > 1:

@@ -10,10 +10,10 @@ from typing import IO, Any
 
 import numpy as np
 
-from gvpipe.arrays import Float32
 from gvpipe.cli.pipes import PIPE, STDIN
 from gvpipe.cli.process import Ended
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Float32
+from gvpipe.foundation.errors import InputError
 
 BYTES_PER_VERTEX = 12
 CODEC = "pdct"
@@ -54,9 +54,9 @@ def encode_live(
         InputError: something else is given, the mesh cannot be read, or standard input ends inside a frame.
         OutputError: the file cannot be written.
     """
-    from gvpipe.files import read
-    from gvpipe.live import open_live
-    from gvpipe.registry import codec_class
+    from gvpipe.coding.registry import codec_class
+    from gvpipe.playback.files import read
+    from gvpipe.playback.live import open_live
 
     if sources != (PIPE,) or target == PIPE:
         raise InputError(f"--live reads frames on {STDIN} and writes a file: gvpipe encode --live --mesh body.obj - OUTPUT.mp4")

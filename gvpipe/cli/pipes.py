@@ -12,9 +12,9 @@ import shutil
 import sys
 from collections.abc import Iterator
 
-from gvpipe.atomic import output_error, temporary_folder
 from gvpipe.container.sources import is_remote
-from gvpipe.errors import GvpipeError, InputError, OutputError
+from gvpipe.foundation.atomic import output_error, temporary_folder
+from gvpipe.foundation.errors import GvpipeError, InputError, OutputError
 
 PIPE = "-"
 VIDEO_SUFFIXES = (".mp4", ".m4v")

@@ -8,7 +8,7 @@ from gvpipe.cli.console import Output
 def show_shards(source: str, unlimited: bool, out: Output) -> None:
     """Sum up shards, and check every sample in them; raises as `gvpipe.datasets.summarise`."""
     from gvpipe.datasets.summary import summarise
-    from gvpipe.notes import count
+    from gvpipe.foundation.notes import count
 
     with out.progress() as progress:
         found = summarise(source, progress, unlimited=unlimited)

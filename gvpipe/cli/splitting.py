@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from gvpipe.atomic import atomic_files
-from gvpipe.errors import InputError, OutputError
+from gvpipe.foundation.atomic import atomic_files
+from gvpipe.foundation.errors import InputError, OutputError
 
 if TYPE_CHECKING:
     from gvpipe.io.runs import Run
@@ -27,7 +27,7 @@ def write_runs(runs: Sequence[Run], target: str, write: Callable[[Run, Path], Re
     Raises:
         InputError, OutputError: a run cannot be written, or two runs need files of one name; nothing is left.
     """
-    from gvpipe.io.pattern import match_pattern
+    from gvpipe.io.frames.pattern import match_pattern
 
     folder, name = (Path(target), "%04d.obj") if target.endswith("/") else (Path(target).parent, Path(target).name)
     names = [name] * len(runs) if match_pattern(name) else run_names(name, len(runs))

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int64
 from gvpipe.connectivity.base_mesh import MAX_PER_BYTE, check_draco_header
 from gvpipe.connectivity.topology_only import decode_triangles, encode_triangles
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.cursor import Cursor, pack_block, varint
+from gvpipe.foundation.arrays import Array, Int64
 from gvpipe.mesh.topology import opposite_corners
 
 if TYPE_CHECKING:

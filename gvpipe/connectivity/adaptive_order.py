@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int64
 from gvpipe.connectivity.vertex_order import REACH, neighbour_lists
-from gvpipe.errors import corrupt_section
+from gvpipe.foundation.arrays import Array, Int64
+from gvpipe.foundation.errors import corrupt_section
 
 if TYPE_CHECKING:
     from gvpipe.connectivity.visit_kernels import NeighbourLists

@@ -18,14 +18,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.ahead import beside
-from gvpipe.arrays import Array, Int32
-from gvpipe.budget import Budget
 from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order, neighbour_lists, places_of
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor
-from gvpipe.errors import CorruptFile, InputError, corrupt_section
+from gvpipe.foundation.arrays import Array, Int32
+from gvpipe.foundation.budget import Budget
+from gvpipe.foundation.errors import CorruptFile, InputError, corrupt_section
 from gvpipe.mesh.unique_rows import are_distinct, decode_table, encode_table, left_out, row_ids, smallest_first, used_vertices
+from gvpipe.runtime.ahead import beside
 
 HEADER = struct.Struct("<4I")
 COMPRESSION_LEVEL = 10  # Draco's best; 20 ms for 10k vertices

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int64
-from gvpipe.compiled import compiled
 from gvpipe.connectivity.seam_corners import SeamCorners
+from gvpipe.foundation.arrays import Array, Int64
+from gvpipe.runtime.compiled import compiled
 
 LOOK = 32  # corners before, of the same point, that are looked at
 SAME, SINGLE, LATER, NEW = range(4)  # why a vertex is likely, best first

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array
 from gvpipe.connectivity.seam_corners import are_first, find_seam_corners
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import corrupt_section
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.errors import corrupt_section
 
 
 def encode_across_edges(numbers: Array, point_faces: Array, counts: Array) -> bytes:

@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Int64, UInt8
-from gvpipe.compiled import compiled
 from gvpipe.connectivity.visit_kernels import NeighbourLists, search_visits
 from gvpipe.entropy.decision_kernels import Mixing, put, take
 from gvpipe.entropy.number_kernels import code_number, mix_hash
+from gvpipe.foundation.arrays import Bool, Int64, UInt8
+from gvpipe.runtime.compiled import compiled
 
 N_CONTEXTS = 7
 N_GROUPS = 3  # by how long a repetition has been right

@@ -17,11 +17,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64, UInt8
-from gvpipe.compiled import compiled
 from gvpipe.entropy.decision_kernels import Mixing
 from gvpipe.entropy.number_kernels import MAX_LENGTH, code_number, mix_hash
+from gvpipe.foundation.arrays import Int64, UInt8
 from gvpipe.mesh.entry_kernels import EntryOrder
+from gvpipe.runtime.compiled import compiled
 
 N_CONTEXTS = 8
 N_GROUPS = 3 * 3  # by coordinate, and by how long a repetition has been right

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Array, Bool, Int64
+from gvpipe.foundation.arrays import Array, Bool, Int64
 
 
 class SeamCorners(NamedTuple):

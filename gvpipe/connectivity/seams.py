@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int64
 from gvpipe.connectivity import adaptive_order
 from gvpipe.connectivity.edge_seams import decode_across_edges, encode_across_edges
 from gvpipe.connectivity.seam_corners import SeamCorners, are_first, find_seam_corners
@@ -32,7 +31,8 @@ from gvpipe.connectivity.vertex_order import (
     places_of,
 )
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import corrupt_section
+from gvpipe.foundation.arrays import Array, Int64
+from gvpipe.foundation.errors import corrupt_section
 from gvpipe.mesh.unique_rows import corners_from_smallest
 
 if TYPE_CHECKING:

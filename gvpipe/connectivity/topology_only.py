@@ -27,8 +27,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.ahead import beside
-from gvpipe.arrays import Array, Int32
 from gvpipe.connectivity.base_mesh import (
     COMPRESSION_LEVEL,
     MAX_PER_BYTE,
@@ -42,8 +40,10 @@ from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import CorruptFile, corrupt_section
+from gvpipe.foundation.arrays import Array, Int32
+from gvpipe.foundation.errors import CorruptFile, corrupt_section
 from gvpipe.mesh.unique_rows import decode_table, encode_table, left_out, smallest_first, used_vertices
+from gvpipe.runtime.ahead import beside
 
 HEADER = struct.Struct("<6I")
 

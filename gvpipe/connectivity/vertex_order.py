@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.arrays import Array
 from gvpipe.connectivity.visit_symbols import N_SYMBOLS, quantised, split_ranks, weights_of
-from gvpipe.errors import InputError, corrupt_section
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.errors import InputError, corrupt_section
 from gvpipe.mesh.unique_rows import are_distinct, sort_rows
 
 if TYPE_CHECKING:

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Int32, Int64, UInt32, UInt64
-from gvpipe.compiled import compiled, inlined
 from gvpipe.connectivity.visit_symbols import ESCAPE, EXACT_RANKS
 from gvpipe.entropy.range_decoder import decode_symbols, decode_uniform
+from gvpipe.foundation.arrays import Bool, Int32, Int64, UInt32, UInt64
 from gvpipe.mesh.graph_kernels import SHORT_LIST, Graph, count_sides, list_sides
+from gvpipe.runtime.compiled import compiled, inlined
 
 
 class NeighbourLists(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64
+from gvpipe.foundation.arrays import Array, Float64
 
 EXACT_RANKS = 8  # ranks below this have a symbol of their own; above, two symbols per octave and the rest as plain bits
 ESCAPE = EXACT_RANKS + 2 * 5  # the last symbol, after five octaves (8..255): not found within the reach of a search

@@ -19,16 +19,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.ahead import beside
-from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.connectivity import adaptive_mesh
 from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base, keep_mesh, may_run_beside
 from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, pack_block
-from gvpipe.forks import kept
+from gvpipe.foundation.arrays import Array, Int32, Int64
 from gvpipe.mesh.unique_rows import smallest_first
+from gvpipe.runtime.ahead import beside
+from gvpipe.runtime.forks import kept
 
 if TYPE_CHECKING:
     from gvpipe.mesh.graph_kernels import Graph

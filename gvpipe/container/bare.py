@@ -20,7 +20,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.bitstream import (
     CHECKSUM,
     HEADER,
@@ -35,7 +34,8 @@ from gvpipe.container.bitstream import (
 from gvpipe.container.boxes import BOX
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.json_object import JsonObject, unpack_json
-from gvpipe.errors import TruncatedFile, corrupt
+from gvpipe.foundation.budget import UNLIMITED, Budget
+from gvpipe.foundation.errors import TruncatedFile, corrupt
 
 VERSION = 3  # of the container
 START = MAGIC + struct.pack("<H", VERSION)

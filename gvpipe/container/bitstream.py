@@ -20,15 +20,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.json_object import JsonObject, unpack_json
 from gvpipe.container.outline import KEY, Outline
-from gvpipe.errors import CorruptFile, NewerVersion, TruncatedFile, corrupt, corrupt_section
+from gvpipe.foundation.budget import UNLIMITED, Budget
+from gvpipe.foundation.errors import CorruptFile, NewerVersion, TruncatedFile, corrupt, corrupt_section
 
 if TYPE_CHECKING:
+    from gvpipe.container.shared_parts import SharedParts
     from gvpipe.media.video import Fragments
-    from gvpipe.shared_parts import SharedParts
 
 MAGIC = b"gvpipe\r\n"
 VERSION = 1
@@ -65,7 +65,7 @@ class Bitstream:
         fps: frames per second.
         header: what else the codec's reader must know, as JSON values.
         sections: the codec's binary data by name.
-        origin: what to add to positions, model units (`gvpipe.origin`); the same for every codec.
+        origin: what to add to positions, model units (`gvpipe.model.origin`); the same for every codec.
         outline: what `gvpipe.info` tells of the mesh; None: not known before it is decoded.
         video: an MP4 file whose one track holds the codec's images; empty for codecs that have none, whose files show a
             poster (`gvpipe.rendering.poster`) instead.
@@ -74,8 +74,8 @@ class Bitstream:
         n_bytes: of the file that it was read from, 0 if it was not.
         is_unfinished: it has the first frames of a file that is still written, or was left so, and no video
             (`gvpipe.container.live_layout`).
-        budget: what its readers may take (`gvpipe.budget`).
-        shared: what files of one data set have in common (`gvpipe.shared_parts`), None for a file alone.
+        budget: what its readers may take (`gvpipe.foundation.budget`).
+        shared: what files of one data set have in common (`gvpipe.container.shared_parts`), None for a file alone.
     """
 
     codec: str

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.errors import CorruptFile, corrupt_section
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.errors import CorruptFile, corrupt_section
 
 MAX_VARINT_BYTES = 10
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from gvpipe.container.boxes import BOX, read_box
-from gvpipe.errors import CorruptFile, corrupt
+from gvpipe.foundation.errors import CorruptFile, corrupt
 
 INSIDE = {b"moof": (b"mfhd", b"traf"), b"traf": (b"tfhd", b"tfdt", b"trun")}  # each once
 RUN = struct.Struct(">II")  # version and flags, pictures

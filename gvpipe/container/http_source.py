@@ -17,8 +17,8 @@ from collections.abc import Callable, Iterator
 from typing import IO, Any
 
 from gvpipe.container.http_request import Answer, TooSlow
-from gvpipe.errors import REMEDY, CorruptFile, InputError, TruncatedFile, printable, quote
-from gvpipe.forks import ForkLock, renew_after_fork
+from gvpipe.foundation.errors import REMEDY, CorruptFile, InputError, TruncatedFile, printable, quote
+from gvpipe.runtime.forks import ForkLock, renew_after_fork
 
 BLOCK = 1 << 16  # bytes
 KEPT_BLOCKS = 512  # 32 MB

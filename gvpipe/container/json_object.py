@@ -8,9 +8,9 @@ import zlib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from gvpipe.budget import UNLIMITED, Budget
-from gvpipe.errors import CorruptFile, corrupt_section, quote
-from gvpipe.text import text_fault
+from gvpipe.foundation.budget import UNLIMITED, Budget
+from gvpipe.foundation.errors import CorruptFile, corrupt_section, quote
+from gvpipe.foundation.text import text_fault
 
 BYTES_PER_CHARACTER = 32  # of parsed JSON, at most: "{}," is an object of 64 bytes and its place in a list
 SECONDS_PER_CHARACTER = 0.2e-6

@@ -24,12 +24,12 @@ from uuid import UUID
 
 import numpy as np
 
-from gvpipe.budget import Budget
 from gvpipe.container.bitstream import HEADER, MAX_FRAMES, MAX_SECTIONS, Bitstream, read_header
 from gvpipe.container.boxes import BOX, UUID_BYTES, Box, read_box
 from gvpipe.container.sources import Source
 from gvpipe.container.stream_layout import FRAGMENT, MAX_INDEX, Place, StoredSections, check_places, unpack_index
-from gvpipe.errors import TruncatedFile, corrupt, corrupt_section
+from gvpipe.foundation.budget import Budget
+from gvpipe.foundation.errors import TruncatedFile, corrupt, corrupt_section
 
 LIVE_UUID = UUID("d5f0b1c8-6a1e-4c57-9f43-2b7a90c4e861")
 ROW = struct.Struct("<III")
@@ -66,7 +66,7 @@ def read_live(source: Source, room: Box, budget: Budget) -> Bitstream:
         budget: of the file.
 
     Raises:
-        NewerVersion, TruncatedFile, CorruptFile, OverBudget: see `gvpipe.errors`; no clip is there yet.
+        NewerVersion, TruncatedFile, CorruptFile, OverBudget: see `gvpipe.foundation.errors`; no clip is there yet.
     """
     source.let_grow()
     box = read_box(source.read, room.stop, source.size)

@@ -15,7 +15,6 @@ from typing import IO
 
 import numpy as np
 
-from gvpipe.atomic import output_error, unnamed_path
 from gvpipe.container.bitstream import HEADER, Bitstream, pack_header
 from gvpipe.container.boxes import BOX, UUID_BYTES, uuid_head
 from gvpipe.container.fragments import Fragment, split_fragments
@@ -34,6 +33,7 @@ from gvpipe.container.stream_layout import (
     pack_index,
 )
 from gvpipe.container.track import inspect, remux_fragments
+from gvpipe.foundation.atomic import output_error, unnamed_path
 
 HEADER_ROOM = 1024  # bytes for the section "header" of the finished file
 NO_ID = "0" * 32  # content id of a file that is not finished

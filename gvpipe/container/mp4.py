@@ -24,8 +24,6 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 from uuid import UUID
 
-from gvpipe.atomic import unnamed_path
-from gvpipe.budget import Budget
 from gvpipe.container import bare
 from gvpipe.container.bitstream import VERSION, Bitstream, check_version, pack_header, pack_payload, unpack_payload
 from gvpipe.container.boxes import BOX, LARGE, Box, uuid_head
@@ -37,7 +35,18 @@ from gvpipe.container.sources import DOWNLOAD_FIRST, BytesSource, FileSource, So
 from gvpipe.container.stream_layout import ROOM_UUID, find_index, pack_stream, read_stream
 from gvpipe.container.stream_layout import VERSION as STREAM_VERSION
 from gvpipe.container.track import TAG_PREFIX, Track, inspect, remux, remux_fragments
-from gvpipe.errors import REMEDY, FormatError, InputError, NewerVersion, NotGeometryVideo, StrippedFile, TruncatedFile, corrupt
+from gvpipe.foundation.atomic import unnamed_path
+from gvpipe.foundation.budget import Budget
+from gvpipe.foundation.errors import (
+    REMEDY,
+    FormatError,
+    InputError,
+    NewerVersion,
+    NotGeometryVideo,
+    StrippedFile,
+    TruncatedFile,
+    corrupt,
+)
 
 if TYPE_CHECKING:
     from gvpipe.container.http_source import HttpSource
@@ -92,11 +101,12 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False) -> Bitstrea
 
     Args:
         path: of the file, or its address (``https://...``, with fsspec also ``s3://...`` and others).
-        unlimited: let it take whatever memory and work it asks for; by default its size limits both (`gvpipe.budget`).
+        unlimited: let it take whatever memory and work it asks for; by default its size limits both
+            (`gvpipe.foundation.budget`).
 
     Raises:
         InputError: there is no such file, or it cannot be read.
-        NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile, OverBudget: see `gvpipe.errors`.
+        NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile, OverBudget: see `gvpipe.foundation.errors`.
     """
     if is_remote(path):
         return _read_address(str(path), unlimited)

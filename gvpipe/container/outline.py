@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from gvpipe.arrays import Floats
 from gvpipe.container.json_object import JsonObject
+from gvpipe.foundation.arrays import Floats
 
 KEY = "outline"
 LARGEST = 3.5e38  # above float32's largest number

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gvpipe.errors import CorruptFile, corrupt
+from gvpipe.foundation.errors import CorruptFile, corrupt
 
 MAX_EDITS = 4  # encoders of other tools write one or two
 HEAD = struct.Struct(">I")  # entries, after version and flags

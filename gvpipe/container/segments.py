@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 
 MAX_SEGMENT = 100_000  # frames
 SMALLEST_STEP, LARGEST_STEP = 2.0**-131, 2.0**129  # model units; no step of a float32 model lies beyond

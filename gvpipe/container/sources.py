@@ -9,8 +9,8 @@ import stat
 from pathlib import Path
 from typing import Protocol
 
-from gvpipe.arguments import check_path
-from gvpipe.errors import FormatError, InputError, OutputError, TruncatedFile
+from gvpipe.foundation.arguments import check_path
+from gvpipe.foundation.errors import FormatError, InputError, OutputError, TruncatedFile
 
 SCHEMES = ("http://", "https://")
 ADDRESS = re.compile(r"([a-z][a-z0-9+.-]+:)/", re.IGNORECASE)  # two letters or more: C:/ is a drive

@@ -14,8 +14,8 @@ from typing import Any
 
 import fsspec
 
-from gvpipe.errors import REMEDY, CorruptFile, GvpipeError, InputError, TruncatedFile, printable
-from gvpipe.forks import renew_after_fork
+from gvpipe.foundation.errors import REMEDY, CorruptFile, GvpipeError, InputError, TruncatedFile, printable
+from gvpipe.runtime.forks import renew_after_fork
 
 FIRST = 1 << 16  # bytes that are fetched at first and kept: headers and the index of most files
 LONGEST = 200  # characters of a reason

@@ -24,7 +24,6 @@ from uuid import UUID
 
 import numpy as np
 
-from gvpipe.budget import Budget
 from gvpipe.container.bitstream import CHECKSUM, HEADER, MAGIC, MAX_NAME, MAX_SECTIONS, NAME, PREFIX, Bitstream, read_header
 from gvpipe.container.boxes import BOX, LONGEST_HEAD, Box, read_box, uuid_head
 from gvpipe.container.cursor import Cursor
@@ -33,7 +32,8 @@ from gvpipe.container.sample_tables import check_no_samples
 from gvpipe.container.segments import SegmentParts
 from gvpipe.container.sources import Source
 from gvpipe.container.track import TAG_PREFIX
-from gvpipe.errors import NewerVersion, TruncatedFile, corrupt, corrupt_section
+from gvpipe.foundation.budget import Budget
+from gvpipe.foundation.errors import NewerVersion, TruncatedFile, corrupt, corrupt_section
 
 VERSION = 2  # of the container
 INDEX_UUID = UUID("3c0a7e35-8f0d-4a86-9b0e-1f5b8f1f6f52")
@@ -150,7 +150,8 @@ def read_stream(source: Source, index: Box, budget: Budget) -> Bitstream:
         budget: of the file.
 
     Raises:
-        NewerVersion, TruncatedFile, CorruptFile, OverBudget: see `gvpipe.errors`; here for the index, later for the rest.
+        NewerVersion, TruncatedFile, CorruptFile, OverBudget: see `gvpipe.foundation.errors`; here for the index, later for the
+            rest.
     """
     places, fragments, head = _read_index(source, index)
     moov = head[head.find(b"moov") - 4 :]

@@ -10,9 +10,9 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import IO, Any
 
-from gvpipe.budget import UNLIMITED, Budget
-from gvpipe.errors import corrupt
-from gvpipe.media.picture_limits import IN_MEMORY, picture_limits
+from gvpipe.foundation.budget import UNLIMITED, Budget
+from gvpipe.foundation.errors import corrupt
+from gvpipe.foundation.picture_limits import IN_MEMORY, picture_limits
 
 TAG = "comment"
 TAG_PREFIX = "gvpipe "

@@ -13,17 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arguments import show
-from gvpipe.arrays import Float32, Int32
-from gvpipe.codec import ClosableReader, FrameReader, LevelReader
+from gvpipe.coding.codec import ClosableReader, FrameReader, LevelReader
+from gvpipe.coding.registry import open_reader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_bytes
+from gvpipe.container.shared_parts import SharedParts
 from gvpipe.container.sources import FileSource
 from gvpipe.datasets.shard_index import Place, Sample, index_shard
-from gvpipe.errors import FormatError, InputError, corrupt, in_file, quote
-from gvpipe.player import Player
-from gvpipe.registry import open_reader
-from gvpipe.shared_parts import SharedParts
+from gvpipe.foundation.arguments import show
+from gvpipe.foundation.arrays import Float32, Int32
+from gvpipe.foundation.errors import FormatError, InputError, corrupt, in_file, quote
+from gvpipe.playback.player import Player
 
 ALL = slice(None)
 MAX_JSON = 1 << 24  # bytes of a sample's description

@@ -6,11 +6,11 @@ import glob
 import os
 from collections.abc import Sequence
 
-from gvpipe.arguments import StrPath, check_path
 from gvpipe.container.sources import check_source
 from gvpipe.datasets.dataset import Dataset
-from gvpipe.errors import InputError
-from gvpipe.io.numbering import natural_key
+from gvpipe.foundation.arguments import StrPath, check_path
+from gvpipe.foundation.errors import InputError
+from gvpipe.io.frames.numbering import natural_key
 
 
 def open(shards: StrPath | Sequence[StrPath], *, unlimited: bool = False) -> Dataset:

@@ -17,16 +17,16 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from gvpipe.arguments import StrPath, check_path
-from gvpipe.atomic import unnamed_path
-from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_bytes
 from gvpipe.container.sources import check_target
 from gvpipe.datasets.sample_names import DESCRIPTION, VIDEO, is_plain, key_of
-from gvpipe.errors import FormatError, InputError, OutputError
-from gvpipe.io.numbering import natural_key
-from gvpipe.isolation.plain_files import open_plain
+from gvpipe.foundation.arguments import StrPath, check_path
+from gvpipe.foundation.atomic import unnamed_path
+from gvpipe.foundation.errors import FormatError, InputError, OutputError
+from gvpipe.foundation.isolation.plain_files import open_plain
+from gvpipe.foundation.progress import Progress
+from gvpipe.io.frames.numbering import natural_key
 
 SHARD_BYTES = 1_000_000_000
 BLOCK = tarfile.BLOCKSIZE

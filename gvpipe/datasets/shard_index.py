@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from typing import Any, BinaryIO, NamedTuple, cast
 
 from gvpipe.datasets.sample_names import DESCRIPTION, VIDEO, is_plain, split_name
-from gvpipe.errors import CorruptFile, FormatError, InputError, TruncatedFile, corrupt, quote
+from gvpipe.foundation.errors import CorruptFile, FormatError, InputError, TruncatedFile, corrupt, quote
 
 BLOCK = tarfile.BLOCKSIZE
 MAX_MEMBERS = 1 << 24

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from gvpipe.arguments import StrPath
-from gvpipe.codec import Progress
 from gvpipe.datasets.dataset import Dataset
 from gvpipe.datasets.opening import find_shards
+from gvpipe.foundation.arguments import StrPath
+from gvpipe.foundation.progress import Progress
 
 FLOAT32_POSITION = 12  # bytes
 ERRORS = ("max_diag", "kg", "rmse_diag")  # keys of `gvpipe compare --json`

@@ -17,11 +17,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64, Integers, UInt8
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy import parametric_tables
 from gvpipe.entropy.open_stream import open_stream
 from gvpipe.entropy.tokens import CHUNK, MAX_BITS, MAX_TOKENS, TABLE_TOTAL, check_sizes, model
+from gvpipe.foundation.arrays import Int64, Integers, UInt8
 
 PARAMETRIC = 1  # kind of a table that two numbers describe
 

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int64, UInt8, UInt32, UInt64
-from gvpipe.compiled import compiled
 from gvpipe.entropy.range_decoder import decode_bits, decode_symbols
 from gvpipe.entropy.tokens import CHUNK, DIRECT
+from gvpipe.foundation.arrays import Int64, UInt8, UInt32, UInt64
+from gvpipe.runtime.compiled import compiled
 
 NO_TABLE, NO_DATA, OUT_OF_RANGE = 1, 2, 3  # what can be wrong; the last one is for callers to find
 

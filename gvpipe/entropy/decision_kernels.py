@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int64, UInt8
-from gvpipe.compiled import compiled
 from gvpipe.entropy.logistic_tables import LIMIT, squash_table, stretch_table
+from gvpipe.foundation.arrays import Int64, UInt8
+from gvpipe.runtime.compiled import compiled
 
 ONE_BITS = 22  # of a context's probability
 TOP = 1 << 24  # range below which a byte leaves

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.arrays import Integers
+from gvpipe.foundation.arrays import Integers
 
 
 def group_by_context(contexts: Integers) -> list[tuple[int, NDArray[np.intp]]]:

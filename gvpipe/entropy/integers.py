@@ -20,10 +20,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.arrays import Int64, Integers
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.grouping import group_by_context
 from gvpipe.entropy.tokens import DIRECT, MAX_TOKENS, TABLE_TOTAL, model, tokenise, untokenise
+from gvpipe.foundation.arrays import Int64, Integers
 
 MAX_CONTEXTS = 1 << 16
 _EMPTY = np.zeros(0, np.intp)

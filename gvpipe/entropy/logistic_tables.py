@@ -11,7 +11,7 @@ from decimal import Context, Decimal
 
 import numpy as np
 
-from gvpipe.arrays import Int64
+from gvpipe.foundation.arrays import Int64
 
 LIMIT = 2815  # largest logit, 1 / 256: a probability of 65535 / 65536
 SPACING = 16  # logits between two exact values; between them squash is linear

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64, UInt8
-from gvpipe.compiled import compiled
 from gvpipe.entropy.decision_kernels import RANGE, Mixing, code_decision, code_plain, new_mixing
+from gvpipe.foundation.arrays import Int64, UInt8
+from gvpipe.runtime.compiled import compiled
 
 MAX_LENGTH = 40  # bits of a magnitude
 MODELLED = 3  # bits below the highest that contexts predict; lower ones are alike

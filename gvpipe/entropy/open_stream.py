@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.arrays import Int64
 from gvpipe.container.cursor import Cursor
+from gvpipe.foundation.arrays import Int64
 
 if TYPE_CHECKING:
     from gvpipe.entropy.block_kernels import BlockStream

@@ -13,8 +13,8 @@ import functools
 
 import numpy as np
 
-from gvpipe.arrays import Int64
 from gvpipe.entropy.tokens import DIRECT
+from gvpipe.foundation.arrays import Int64
 
 N_TOKENS = 40  # magnitudes below 2**15
 RATIO_BITS = 12

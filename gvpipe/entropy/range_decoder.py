@@ -16,8 +16,8 @@ import functools
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int64, UInt32, UInt64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Float64, Int64, UInt32, UInt64
+from gvpipe.runtime.compiled import compiled
 
 PRECISION = 24
 TOTAL = 1 << PRECISION

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Int64
 from gvpipe.container.cursor import Cursor
 from gvpipe.entropy.open_stream import open_stream
 from gvpipe.entropy.serial_tables import bits_of, read_tables, write_tables
 from gvpipe.entropy.tokens import CHUNK, MAX_TOKENS, model, tokenise
+from gvpipe.foundation.arrays import Int64
 
 
 class SerialEncoder:

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int64
-from gvpipe.compiled import compiled
 from gvpipe.entropy.block_kernels import NO_DATA, NO_TABLE, OUT_OF_RANGE, BlockStream
 from gvpipe.entropy.range_decoder import decode_bits, decode_symbol
 from gvpipe.entropy.tokens import CHUNK, DIRECT
+from gvpipe.foundation.arrays import Int64
+from gvpipe.runtime.compiled import compiled
 
 
 class SerialCoder(NamedTuple):

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy import parametric_tables
 from gvpipe.entropy.tokens import MAX_TOKENS, TABLE_TOTAL
+from gvpipe.foundation.arrays import Int64
 
 TOTALS = (64, 256, 1024, TABLE_TOTAL)  # that are tried, beside the counts themselves
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64
 from gvpipe.container.cursor import Cursor
 from gvpipe.entropy.integers import decode_integers, encode_integers
+from gvpipe.foundation.arrays import Int64
 
 MAX_CLASS = 63
 FIRST_CLASS = 63  # of the first frame's differences, where these have a context of their own

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64, UInt8
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Int64, UInt8
+from gvpipe.runtime.compiled import compiled
 
 
 @compiled

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Int64, Integers
 from gvpipe.container.cursor import Cursor
+from gvpipe.foundation.arrays import Int64, Integers
 
 DIRECT = 16  # values of u that are tokens of their own
 TABLE_TOTAL = 4096  # frequencies are scaled to about this total

@@ -22,10 +22,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.container.cursor import Cursor, varint
-from gvpipe.errors import InputError
 from gvpipe.fields.mesh import FieldMesh
+from gvpipe.foundation.arrays import Array, Float32, Float64
+from gvpipe.foundation.errors import InputError
 
 LINEAR, MAGNITUDE = range(2)
 SIGNALS = (6, 1)  # of each kind

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int32
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Int32
 from gvpipe.mesh.corner_lists import list_corners
+from gvpipe.runtime.compiled import compiled
 
 LARGEST_FAN = 64  # triangles; larger fans are left alone: chaining one is quadratic in its size
 

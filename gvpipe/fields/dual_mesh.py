@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int32
+from gvpipe.foundation.arrays import Int32
 
 
 def dual_triangles(faces: Int32, n_vertices: int) -> Int32:

@@ -9,15 +9,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.budget import Budget
-from gvpipe.errors import InputError
 from gvpipe.fields.derived import Motion, Positions, Span
 from gvpipe.fields.head import Head, longest_segment
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.segment import MODES, Place, cost
 from gvpipe.fields.segment_encoder import encode_segment
 from gvpipe.fields.values import MAX_COMPONENTS, FieldBound, check_finite, narrow
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.budget import Budget
+from gvpipe.foundation.errors import InputError
 
 Read = Callable[[int, int], Array]
 Progress = Callable[[float], None]

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array, Bool
-from gvpipe.errors import corrupt_section
 from gvpipe.fields.residual_coding import decode_residuals, encode_residuals
+from gvpipe.foundation.arrays import Array, Bool
+from gvpipe.foundation.errors import corrupt_section
 from gvpipe.trajectory.causal_order import CausalOrder
 
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gvpipe.arrays import Int32
 from gvpipe.fields.dual_mesh import dual_triangles
-from gvpipe.forks import kept
+from gvpipe.foundation.arrays import Int32
 from gvpipe.mesh.hierarchy import build_hierarchy
+from gvpipe.runtime.forks import kept
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.spatial_neighbours import hierarchy_order
 

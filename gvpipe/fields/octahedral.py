@@ -16,9 +16,9 @@ import math
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Float64
-from gvpipe.errors import InputError
 from gvpipe.fields.values import FieldBound
+from gvpipe.foundation.arrays import Array, Float32, Float64
+from gvpipe.foundation.errors import InputError
 
 ROUNDING = 1e-6  # angle that float32 coordinates and vectors may err by, radians
 SMALLEST = 1e-3  # degrees: float32 vectors hold little less

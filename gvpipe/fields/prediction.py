@@ -30,7 +30,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float64, Int64
+from gvpipe.foundation.arrays import Bool, Float64, Int64
 from gvpipe.trajectory.causal_order import CausalOrder
 
 

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float64, Int64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Bool, Float64, Int64
+from gvpipe.runtime.compiled import compiled
 from gvpipe.trajectory.causal_order import CausalOrder
 
 N_SHARED = 5  # signals whose weights pass from row to row

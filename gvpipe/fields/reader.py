@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.segments import segments_between
-from gvpipe.errors import InputError
 from gvpipe.fields.derived import Motion, Positions, Span
 from gvpipe.fields.head import read_head
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.segment import Place, decode_segment, read_mode
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.budget import UNLIMITED, Budget
+from gvpipe.foundation.errors import InputError
 
 
 class FieldReader:

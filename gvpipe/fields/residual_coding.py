@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Int64
-from gvpipe.errors import corrupt_section
+from gvpipe.foundation.arrays import Bool, Int64
+from gvpipe.foundation.errors import corrupt_section
 from gvpipe.trajectory.causal_order import CausalOrder
 
 if TYPE_CHECKING:

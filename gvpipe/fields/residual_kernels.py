@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Int64, UInt8
-from gvpipe.compiled import compiled
 from gvpipe.entropy.decision_kernels import PLACE, Mixing, code_decision, code_plain, finish, start_encoder
+from gvpipe.foundation.arrays import Bool, Int64, UInt8
+from gvpipe.runtime.compiled import compiled
 from gvpipe.trajectory.causal_order import CausalOrder
 
 N_CONTEXTS = 7

@@ -30,18 +30,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64, Int64
-from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.segments import LARGEST_STEP
 from gvpipe.entropy.integers import decode_integers
-from gvpipe.errors import InputError, corrupt_section
 from gvpipe.fields.derived import Derivation, Span
 from gvpipe.fields.holes import decode_holes
 from gvpipe.fields.prediction import STEPS, WHOLE, Kind, restore_values
 from gvpipe.fields.residual_coding import decode_residuals
 from gvpipe.fields.trajectories import decode_trajectories
 from gvpipe.fields.values import from_numbers
+from gvpipe.foundation.arrays import Array, Float64, Int64
+from gvpipe.foundation.budget import UNLIMITED, Budget
+from gvpipe.foundation.errors import InputError, corrupt_section
 from gvpipe.trajectory.causal_order import CausalOrder
 
 EXACT, PREDICTION, TRAJECTORIES, DERIVED = range(4)

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Bool, Float64, Int64
 from gvpipe.container.cursor import pack_block, varint
 from gvpipe.entropy.integers import encode_integers
-from gvpipe.errors import InputError
 from gvpipe.fields.derived import SIGNALS, fit_derivation
 from gvpipe.fields.holes import encode_holes, fill_holes
 from gvpipe.fields.prediction import STEPS, WHOLE, Kind, predict_values
@@ -18,6 +16,8 @@ from gvpipe.fields.residual_coding import LARGEST, encode_residuals
 from gvpipe.fields.segment import DERIVED, EXACT, MODES, PREDICTION, STEP, TRAJECTORIES, Place, by_component, decode_segment
 from gvpipe.fields.trajectories import SHARES, WORTH, encode_trajectories
 from gvpipe.fields.values import FieldBound, choose_step, choose_unit, keeps_bound, to_integers
+from gvpipe.foundation.arrays import Array, Bool, Float64, Int64
+from gvpipe.foundation.errors import InputError
 from gvpipe.trajectory.causal_order import CausalOrder
 
 EXPLAINED = 0.25  # energy of changes that may be left where values follow from positions

@@ -16,11 +16,11 @@ import struct
 
 import numpy as np
 
-from gvpipe.arrays import Float64
-from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.segments import LARGEST_STEP, SMALLEST_STEP
 from gvpipe.fields.residual_coding import LARGEST, decode_residuals, encode_residuals
+from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.trajectory.basis import Basis, decode_basis, reduce_trajectories
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.prediction import predict_vectors

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Bool, Float64, Int64
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array, Bool, Float64, Int64
+from gvpipe.foundation.errors import InputError
 
 TYPES = tuple(map(np.dtype, ("<f4", "|i1", "|u1", "<i2", "<u2", "<i4", "<u4")))
 MARGIN = 2.0**-14  # part of the bound that is kept for other machines' rounding

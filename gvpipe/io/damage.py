@@ -12,9 +12,9 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from gvpipe.arguments import did_you_mean
 from gvpipe.container.sources import NO_FILE
-from gvpipe.errors import InputError, TopologyChange, printable
+from gvpipe.foundation.arguments import did_you_mean
+from gvpipe.foundation.errors import InputError, TopologyChange, printable
 
 AGAIN, FRAME_AGAIN = "export it again", "export this frame again"
 WHOLE = "it may be cut short, so export it again"

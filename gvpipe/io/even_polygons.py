@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int32
 from gvpipe.asset.polygons import polygon_starts
+from gvpipe.foundation.arrays import Array, Int32
 
 
 def is_even(values: Array, polygons: Int32) -> bool:

@@ -33,10 +33,10 @@ BY_MESHIO = (
 )  # fmt: skip
 
 FRAME_FORMATS = {
-    ".obj": FrameFormat(late("obj", "ObjLoader"), late("obj_writer", "encode_obj")),
-    ".ply": FrameFormat(late("ply", "PlyLoader"), late("ply_writer", "encode_ply")),
+    ".obj": FrameFormat(late("obj.reader", "ObjLoader"), late("obj.writer", "encode_obj")),
+    ".ply": FrameFormat(late("ply.reader", "PlyLoader"), late("ply.writer", "encode_ply")),
     ".stl": FrameFormat(late("stl", "StlLoader"), late("stl", "encode_stl")),
-    ".off": FrameFormat(late("off", "OffLoader"), late("off_writer", "encode_off")),
+    ".off": FrameFormat(late("off.reader", "OffLoader"), late("off.writer", "encode_off")),
     ".glb": FrameFormat(late("gltf", "GltfLoader"), late("gltf", "encode_glb")),
     ".gltf": FrameFormat(late("gltf", "GltfLoader")),
     ".vtk": FrameFormat(late("simulation.frame_loader", "legacy_loader")),

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 
 from gvpipe.asset.metadata import NO_METADATA
-from gvpipe.notes import not_held
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.notes import not_held
+from gvpipe.model.sequence import MeshSequence
 
 LISTED = 5  # names in a note
 

@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.arrays import Array, Bool, Float32, Floats, Int32, Int64, Integers, UInt8
 from gvpipe.asset.attribute import MAX_COMPONENTS, Attribute
 from gvpipe.asset.material import Image, Material
 from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part
 from gvpipe.asset.polygons import polygon_starts
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.arrays import Array, Bool, Float32, Floats, Int32, Int64, Integers, UInt8
+from gvpipe.model.sequence import MeshSequence
 
 
 class FrameValues(NamedTuple):

@@ -23,21 +23,21 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Float64, UInt16
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.material import with_uv
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
-from gvpipe.atomic import atomic_files
 from gvpipe.attributes.surface_normals import surface_normals
-from gvpipe.errors import InputError
-from gvpipe.io.frame_normals import frame_normals
+from gvpipe.foundation.arrays import Array, Float32, Float64, UInt16
+from gvpipe.foundation.atomic import atomic_files
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.normal_writing import SplitNormals
 from gvpipe.io.gltf.scene_writing import world_matrix
 from gvpipe.io.gltf.split import Split, split_vertices
 from gvpipe.io.gltf.writer import encode_glb
 from gvpipe.io.losses import lost_notes
-from gvpipe.sequence import MeshSequence
+from gvpipe.io.normals.of_frames import frame_normals
+from gvpipe.model.sequence import MeshSequence
 
 LARGEST = 8192  # pixels of a side: what graphics cards and engines take everywhere
 FULL = 65535

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from gvpipe.asset.material import Image
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.fetching import fetch
 from gvpipe.io.left_behind import LeftBehind
 

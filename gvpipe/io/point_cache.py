@@ -24,13 +24,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.arrays import Array, Float32
-from gvpipe.atomic import unnamed_path
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array, Float32
+from gvpipe.foundation.atomic import unnamed_path
+from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.notes import ASSUMED_FPS, DEFAULT_FPS, origin_left_out
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
-from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS, origin_left_out
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 PC2_HEAD = struct.Struct("<12siiffi")
 PC2_MAGIC, PC2_VERSION = b"POINTCACHE2\0", 1

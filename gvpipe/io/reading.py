@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gvpipe.container.sources import check_source, is_stored
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.cut_pictures import cut_notes
 from gvpipe.io.damage import check_file, reading
 from gvpipe.io.formats import FRAME_FORMATS
@@ -18,7 +18,7 @@ from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene_formats import HAVE_CLIPS, IN_PROCESSES, OPENVAT, POINT_CACHES, SCENES, SIMULATIONS, scene_readers
 
 if TYPE_CHECKING:
-    from gvpipe.sequence import MeshSequence
+    from gvpipe.model.sequence import MeshSequence
 
 
 def read(
@@ -54,7 +54,7 @@ def read(
         sequence = read_stored(path, lambda copy: _read(copy, options))
     else:
         sequence = _read(path, options)
-    from gvpipe.notes import left_behind
+    from gvpipe.foundation.notes import left_behind
 
     said = (*cut_notes(sequence.images), *left_behind(sequence.not_carried))
     return replace(sequence, notes=(*sequence.notes, *said)) if said else sequence
@@ -88,7 +88,7 @@ def _read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], optio
 
 
 def _read_frames(path: str | list[str], options: ReadOptions) -> MeshSequence:
-    from gvpipe.io.frames import read_frames
+    from gvpipe.io.frames.reader import read_frames
 
     return read_frames(path, options.fps, options.frames)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from gvpipe.errors import TopologyChange
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import TopologyChange
+from gvpipe.model.sequence import MeshSequence
 
 ReadFrames = Callable[[tuple[int, int | None]], MeshSequence]
 

@@ -11,7 +11,7 @@ from gvpipe.io.late import late
 from gvpipe.io.options import ReadOptions
 
 if TYPE_CHECKING:
-    from gvpipe.sequence import MeshSequence
+    from gvpipe.model.sequence import MeshSequence
 
 MeshReader = Callable[[str | os.PathLike[str]], "MeshSequence"]
 SceneReader = Callable[[Path, ReadOptions], Optional["MeshSequence"]]  # None for a file that is one frame
@@ -22,7 +22,7 @@ SCENES = (*USD, ".abc")  # whose topology may change
 IN_PROCESSES = (*SCENES, ".fbx")  # their readers start one, then turn what is raised into errors themselves
 GLTF = (".glb", ".gltf")
 SIMULATIONS: dict[str, SceneReader] = {
-    **dict.fromkeys((".pvd", ".series"), late("step_lists", "read_step_list")),
+    **dict.fromkeys((".pvd", ".series"), late("simulation.step_lists", "read_step_list")),
     **dict.fromkeys((".vtkhdf", ".hdf"), late("simulation.vtkhdf", "read_vtkhdf")),
     **dict.fromkeys((".xdmf", ".xmf"), late("simulation.xdmf", "read_xdmf")),
     **dict.fromkeys((".e", ".exo", ".ex2"), late("simulation.exodus", "read_exodus")),
@@ -34,15 +34,15 @@ HAVE_CLIPS = (*GLTF, ".fbx")
 SCENE_SUFFIXES = (".npz", *SCENES, ".fbx", *SIMULATIONS, *POINT_CACHES)  # that are no frames
 
 WRITERS: dict[str, SceneWriter] = {
-    ".npz": late("npz", "write_npz"),
+    ".npz": late("npz.archive", "write_npz"),
     ".glb": late("gltf", "write_animated"),
     **dict.fromkeys(USD, late("usd.writer", "write_usd")),
     ".abc": late("alembic.writer", "write_alembic"),
     ".pc2": late("point_cache", "write_pc2"),
     ".mdd": late("point_cache", "write_mdd"),
     ".npy": late("point_cache", "write_npy"),
-    ".pvd": late("pvd_writer", "write_pvd"),
-    ".vtkhdf": late("vtkhdf_writer", "write_vtkhdf"),
+    ".pvd": late("simulation.pvd_writer", "write_pvd"),
+    ".vtkhdf": late("simulation.vtkhdf_writer", "write_vtkhdf"),
     OPENVAT: late("openvat", "write_openvat"),
 }
 
@@ -50,7 +50,7 @@ WRITERS: dict[str, SceneWriter] = {
 def scene_readers(read_mesh: MeshReader) -> dict[str, SceneReader]:
     """Readers by extension; ``read_mesh`` reads the mesh that belongs to a point cache."""
     return {
-        ".npz": lambda path, options: late("npz", "read_npz")(path, options.fps),
+        ".npz": lambda path, options: late("npz.archive", "read_npz")(path, options.fps),
         **dict.fromkeys(GLTF, late("gltf", "read_animated")),
         **dict.fromkeys(USD, late("usd.process", "read_usd")),
         ".abc": late("alembic.process", "read_alembic"),

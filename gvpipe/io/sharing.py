@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int32, Int64
+from gvpipe.foundation.arrays import Array, Int32, Int64
 from gvpipe.mesh.unique_rows import row_ids
 
 

@@ -19,13 +19,13 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Float64, Int32, Int64
 from gvpipe.asset.part import Part
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array, Float32, Float64, Int32, Int64
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.losses import lost_notes
 from gvpipe.io.mesh import FrameEncoder, Mesh, as_faces
-from gvpipe.origin import choose_origin, narrow
-from gvpipe.sequence import MeshSequence, check_finite
+from gvpipe.model.origin import choose_origin, narrow
+from gvpipe.model.sequence import MeshSequence, check_finite
 
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 HEADER_BYTES = 80

@@ -21,17 +21,17 @@ from typing import TYPE_CHECKING, Any
 
 import fsspec
 
-from gvpipe.atomic import new_folder, remove_folder
 from gvpipe.container.store_source import asking
-from gvpipe.errors import GvpipeError, InputError
-from gvpipe.forks import ForkLock
+from gvpipe.foundation.atomic import new_folder, remove_folder
+from gvpipe.foundation.errors import GvpipeError, InputError
 from gvpipe.io.fetching import serve
-from gvpipe.io.pattern import match_pattern
+from gvpipe.io.frames.pattern import match_pattern
+from gvpipe.runtime.forks import ForkLock
 
 if TYPE_CHECKING:
-    from gvpipe.arrays import Array
     from gvpipe.asset.field import FieldFrames
-    from gvpipe.sequence import MeshSequence
+    from gvpipe.foundation.arrays import Array
+    from gvpipe.model.sequence import MeshSequence
 
 PREFIX = "gvpipe-store-"  # of temporary folders
 NO_NAME = (errno.ENAMETOOLONG, errno.EEXIST, errno.ENOTDIR, errno.EISDIR, errno.EINVAL)  # of names that a disk cannot hold

@@ -13,7 +13,7 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.arrays import Bool, Float32, Float64, Int64, UInt8
+from gvpipe.foundation.arrays import Bool, Float32, Float64, Int64, UInt8
 
 
 def clean_lines(data: bytes, named: Collection[bytes] = ()) -> bytes:

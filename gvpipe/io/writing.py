@@ -6,11 +6,11 @@ import os
 from pathlib import Path
 
 from gvpipe.container.sources import check_target
-from gvpipe.io.export import write_frames
 from gvpipe.io.formats import FRAME_FORMATS
-from gvpipe.io.pattern import match_pattern
+from gvpipe.io.frames.pattern import match_pattern
+from gvpipe.io.frames.writer import write_frames
 from gvpipe.io.scene_formats import OPENVAT, WRITERS
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 
 def write(sequence: MeshSequence, path: str | os.PathLike[str], start: int = 0) -> tuple[str, ...]:

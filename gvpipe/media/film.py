@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.arrays import UInt8
+from gvpipe.foundation.arrays import UInt8
 from gvpipe.media.video import PROFILES, PlainPackets, VideoWriter, check_x264, has_x264, x264_options
 
 FILM = {"preset": "medium", "crf": "20"}  # x264 codes for the eye

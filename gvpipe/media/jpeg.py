@@ -12,8 +12,8 @@ import struct
 
 import numpy as np
 
-from gvpipe.arrays import UInt8
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.arrays import UInt8
+from gvpipe.foundation.errors import CorruptFile
 
 START_OF_IMAGE, END_OF_IMAGE = b"\xff\xd8", b"\xff\xd9"
 SEGMENT = struct.Struct(">BBH")  # 0xFF, marker, length with itself

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array
+from gvpipe.foundation.arrays import Array
 
 
 def encode_png16(pixels: Array) -> bytes:

@@ -28,12 +28,12 @@ from typing import IO, TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.ahead import run_ahead
-from gvpipe.arrays import Float64, Floats, Integers, UInt8
-from gvpipe.budget import UNLIMITED, Budget
-from gvpipe.errors import CorruptFile, InputError, corrupt
+from gvpipe.foundation.arrays import Float64, Floats, Integers, UInt8
+from gvpipe.foundation.budget import UNLIMITED, Budget
+from gvpipe.foundation.errors import CorruptFile, InputError, corrupt
+from gvpipe.foundation.picture_limits import BYTES_PER_PIXEL, IN_MEMORY, picture_limits
 from gvpipe.media.jpeg import decode_jpeg, encode_jpeg
-from gvpipe.media.picture_limits import BYTES_PER_PIXEL, IN_MEMORY, picture_limits
+from gvpipe.runtime.ahead import run_ahead
 
 if TYPE_CHECKING:
     import av

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int32
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Int32
+from gvpipe.runtime.compiled import compiled
 
 
 class CornerLists(NamedTuple):

@@ -19,9 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int32, Int64
-from gvpipe.compiled import compiled, inlined
-from gvpipe.lanes import prefetch
+from gvpipe.foundation.arrays import Int32, Int64
 from gvpipe.mesh.fans import (
     BIG,
     CORNER,
@@ -44,6 +42,8 @@ from gvpipe.mesh.fans import (
     remaining_triangles,
 )
 from gvpipe.mesh.hole_filling import Hole, empty_hole, fill_hole, find_ring
+from gvpipe.runtime.compiled import compiled, inlined
+from gvpipe.runtime.lanes import prefetch
 
 MAX_RING = 12  # most neighbours of a vertex that is removed
 MAX_NEIGHBOURS = 20  # most vertices kept about a vertex: its ring, then what lies across the ring, then what touches the ring

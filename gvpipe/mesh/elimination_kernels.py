@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int32, Int64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Int32, Int64
+from gvpipe.runtime.compiled import compiled
 
 NONE = -1
 

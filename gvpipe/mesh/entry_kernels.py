@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Int32, Int64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Bool, Int32, Int64
 from gvpipe.mesh.corner_kernels import next_corner, previous_corner
 from gvpipe.mesh.corner_lists import list_corners
+from gvpipe.runtime.compiled import compiled
 
 LEVELS = 4  # entries that complete this many triangles less one, or more, are alike
 NONE = -1

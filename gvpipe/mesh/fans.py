@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int32
-from gvpipe.compiled import compiled, inlined
+from gvpipe.foundation.arrays import Int32
+from gvpipe.runtime.compiled import compiled, inlined
 
 HUB = 256  # triangles; an edge between two vertices that have more counts as there, unsearched
 BIG = 64  # sides; fans with fewer have no marked ones

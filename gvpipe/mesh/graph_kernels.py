@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int32, Int64, Integers
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Int32, Int64, Integers
+from gvpipe.runtime.compiled import compiled
 
 SHORT_LIST = 64  # neighbours that are sorted by insertion
 

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.ahead import run_ahead
-from gvpipe.arrays import Int32
-from gvpipe.budget import Budget
+from gvpipe.foundation.arrays import Int32
+from gvpipe.foundation.budget import Budget
+from gvpipe.runtime.ahead import run_ahead
 
 if TYPE_CHECKING:
     from gvpipe.mesh.decimation import Decimation

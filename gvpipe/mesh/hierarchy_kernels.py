@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int32
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Int32
 from gvpipe.mesh.decimation import Decimation, decimate
 from gvpipe.mesh.traversal import traverse
+from gvpipe.runtime.compiled import compiled
 
 MIN_BLOCK = 48  # vertices; smaller waves are joined to one block, since a block is coded at once
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int32
-from gvpipe.compiled import compiled, inlined
+from gvpipe.foundation.arrays import Int32
 from gvpipe.mesh.fans import DEGREE, NEXT_VERTEX, PREVIOUS_VERTEX, REGULAR_DEGREE, START, Fans, has_edge
+from gvpipe.runtime.compiled import compiled, inlined
 
 
 class Hole(NamedTuple):

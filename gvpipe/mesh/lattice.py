@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Floats, Int32, Integers
+from gvpipe.foundation.arrays import Float64, Floats, Int32, Integers
 
 
 @dataclass(frozen=True)

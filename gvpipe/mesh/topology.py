@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from gvpipe.arrays import Array, Int32, Int64, Integers
+from gvpipe.foundation.arrays import Array, Int32, Int64, Integers
 from gvpipe.mesh.unique_rows import row_ids
 
 if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Int32
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Bool, Int32
 from gvpipe.mesh.corner_lists import CornerLists, list_corners
+from gvpipe.runtime.compiled import compiled
 
 
 class Traversal(NamedTuple):

@@ -9,8 +9,8 @@ import zlib
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.errors import corrupt_section
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.errors import corrupt_section
 
 
 def used_vertices(faces: Array, n_vertices: int) -> Array:

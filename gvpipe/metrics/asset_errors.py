@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64, Int64, Integers
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
+from gvpipe.foundation.arrays import Array, Float64, Int64, Integers
 from gvpipe.metrics.correspondence import match_corners
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 ANGLES = ("normal", "tangent")
 BLOCK_BYTES = 16 << 20

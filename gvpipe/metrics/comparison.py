@@ -15,16 +15,16 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from gvpipe.arguments import show
-from gvpipe.arrays import Integers
-from gvpipe.errors import InputError
+from gvpipe.foundation.arguments import show
+from gvpipe.foundation.arrays import Integers
+from gvpipe.foundation.errors import InputError
 from gvpipe.mesh.topology import unique_edges
 from gvpipe.metrics.asset_errors import AssetErrors, compare_attributes, compare_fields
 from gvpipe.metrics.correspondence import canonical_triangles, match_vertices
 from gvpipe.metrics.hausdorff import Hausdorff
 from gvpipe.metrics.sted import Sted
 from gvpipe.metrics.vertex_errors import BLOCK_BYTES, VertexErrors, frame_diagonal, ratio
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 FramesDone = Callable[[int, int], None]
 """Called with the frames done, and the frames in all."""

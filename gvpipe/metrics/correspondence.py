@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from gvpipe.arrays import Bool, Float64, Int32, Int64, Integers
+from gvpipe.foundation.arrays import Bool, Float64, Int32, Int64, Integers
 from gvpipe.mesh.unique_rows import row_ids, smallest_first
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 FRAMES = 24  # evenly spaced frames whose positions make a vertex' path
 ROUNDS = 50

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from gvpipe.arrays import Float64, Int32
+from gvpipe.foundation.arrays import Float64, Int32
 from gvpipe.metrics.triangle_search import TriangleSearch
 
 FIRST_BATCH = 64  # samples searched before the best distance is looked at again; doubles from batch to batch

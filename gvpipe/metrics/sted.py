@@ -15,7 +15,7 @@ import math
 import numpy as np
 from scipy import sparse
 
-from gvpipe.arrays import Float64, Int32
+from gvpipe.foundation.arrays import Float64, Int32
 
 RING_DISTANCE = 1  # d: an edge belongs to vertex v if both its ends are at most this many edges from v
 WINDOW = 5  # w: consecutive temporal edges whose deviation is taken together (6 frames: 0.2 s at 30 fps)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gvpipe.arrays import Float64, Int32, Integers
+from gvpipe.foundation.arrays import Float64, Int32, Integers
 
 MAX_PAIRS = 200_000  # (point, triangle) pairs measured at a time: about 50 MB of temporaries
 NEAREST = 8  # triangles by centroid that give a first bound in the full search

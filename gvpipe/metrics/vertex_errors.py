@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Float64
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.arrays import Float32, Float64
+from gvpipe.model.sequence import MeshSequence
 
 BLOCK_BYTES = 4 << 20  # float64 positions of one side worked on at a time: the temporaries of a block stay in cache
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array, Bool, Float32
+from gvpipe.foundation.arrays import Array, Bool, Float32
 
 
 def reach_alpha(alpha: Array, uv: Float32, limit: float) -> Bool:

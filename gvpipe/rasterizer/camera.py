@@ -13,8 +13,8 @@ from typing import Protocol
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Float64, Int32
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Float32, Float64, Int32
+from gvpipe.foundation.errors import InputError
 
 VIEWS = {  # azimuth and elevation, degrees
     "three-quarter": (35.0, 18.0),

@@ -14,9 +14,9 @@ import math
 
 import numpy as np
 
-from gvpipe.arguments import did_you_mean
-from gvpipe.arrays import Float64
-from gvpipe.errors import InputError
+from gvpipe.foundation.arguments import did_you_mean
+from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.errors import InputError
 from gvpipe.rasterizer.colours import error_colours, to_linear, to_srgb
 
 STEPS = 256

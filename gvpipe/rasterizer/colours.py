@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Floats, UInt8
+from gvpipe.foundation.arrays import Float64, Floats, UInt8
 
 LEVELS = 4096  # of linear light that are told apart: the darkest sRGB steps are 1/3295 wide
 BACKGROUND = (0.95, 0.95, 0.95)  # sRGB, 0..1, as all here

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Int32
 from gvpipe.asset.attribute import Attribute
+from gvpipe.foundation.arrays import Float32, Int32
 from gvpipe.mesh.topology import weld
 
 STEPS = 512  # of a normal's coordinate: normals that differ by less, a tenth of a degree, are one

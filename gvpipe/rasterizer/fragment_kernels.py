@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Array
 from gvpipe.rasterizer.scene import BASE, BLENDED, ROLES, TESTED, Fragments, Look, Scene
+from gvpipe.runtime.compiled import compiled
 
 SNAP_BITS = 8
 SNAP = 1 << SNAP_BITS

@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Array
 from gvpipe.rasterizer.scene import CLAY, EMISSIVE, METALLIC_ROUGHNESS, OCCLUSION, UNLIT, Fragments, Look, Paint
+from gvpipe.runtime.compiled import compiled
 
 # picture axes: right, up, towards the eye
 KEY = (-0.46, 0.62, 0.635)  # the light, from the upper left

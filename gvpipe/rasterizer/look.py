@@ -7,10 +7,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gvpipe.arrays import Array, Bool, Float32, Float64, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.material import WRAPS, Image, Material, Texture
 from gvpipe.asset.part import Part
+from gvpipe.foundation.arrays import Array, Bool, Float32, Float64, Int32, Int64
 from gvpipe.rasterizer.alpha_ranges import reach_alpha
 from gvpipe.rasterizer.colours import to_linear
 from gvpipe.rasterizer.scene import BLENDED, CLAY, CULLED, NO_LOOK, ROLES, TESTED, UNLIT, Look

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from gvpipe.arrays import Array
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Array
 from gvpipe.rasterizer.scene import NORMAL, Fragments, Look, Scene
+from gvpipe.runtime.compiled import compiled
 
 Triple = tuple[float, float, float]
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Array
 from gvpipe.rasterizer.fragment_kernels import HALF, SNAP, SNAP_BITS, base_colours, empty_fragments, weigh
 from gvpipe.rasterizer.scene import BASE, CULLED, TESTED, Fragments, Look, Projection, Scene, View, ZBuffer
 from gvpipe.rasterizer.texture_kernels import sample_role
+from gvpipe.runtime.compiled import compiled
 
 FARTHEST = float(1 << 20)  # samples: keeps products of two differences of snapped corners within 60 bits
 NEAREST = 1e-3  # of the distance: what is nearer to the eye counts as behind it

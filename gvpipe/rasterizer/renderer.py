@@ -19,15 +19,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Floats, Int32, UInt8
-from gvpipe.errors import InputError
-from gvpipe.forks import renew_after_fork
+from gvpipe.foundation.arrays import Float32, Floats, Int32, UInt8
+from gvpipe.foundation.errors import InputError
 from gvpipe.rasterizer.camera import Camera
 from gvpipe.rasterizer.colormaps import colormap
 from gvpipe.rasterizer.colours import BACK, BACKGROUND, FRONT, HOLE, srgb_codes, to_linear
 from gvpipe.rasterizer.corner_normals import shared_normals
 from gvpipe.rasterizer.look import Asset, look_of, see_through
 from gvpipe.rasterizer.scene import NO_LOOK, Look, Paint, Projection, Scene, View, ZBuffer
+from gvpipe.runtime.forks import renew_after_fork
 
 SHADINGS = ("smooth", "flat")
 SIZE_RANGE = (16, 8192)  # pixels, of either side

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float32, Float64, Int32, Int64, UInt8
+from gvpipe.foundation.arrays import Bool, Float32, Float64, Int32, Int64, UInt8
 from gvpipe.rasterizer.textures import NO_TEXELS, Texels
 
 ROLES = ("base_color_texture", "metallic_roughness_texture", "occlusion_texture", "emissive_texture", "normal_texture")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Array
 from gvpipe.rasterizer.fragment_kernels import base_colours, empty_fragments, gather, merge, weigh
 from gvpipe.rasterizer.light_kernels import light_materials, light_paint, resolve
 from gvpipe.rasterizer.normal_kernels import bump_normals, seen_normals
 from gvpipe.rasterizer.scene import NORMAL, ROLES, Fragments, Look, Paint, Scene
 from gvpipe.rasterizer.texture_kernels import sample_role
+from gvpipe.runtime.compiled import compiled
 
 STRETCH = 512  # pixels of a row that are shaded together: their fragments stay in the processor's cache
 N_ROLES = len(ROLES)

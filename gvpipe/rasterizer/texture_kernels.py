@@ -13,11 +13,11 @@ import math
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Array
 from gvpipe.rasterizer.fragment_kernels import place_texture
 from gvpipe.rasterizer.scene import METALLIC_ROUGHNESS, OCCLUSION, Fragments, Look
 from gvpipe.rasterizer.textures import FULL
+from gvpipe.runtime.compiled import compiled
 
 MAX_TAPS = 8
 LARGEST = 1e18  # squared texels of a footprint; keeps what is no number out of the levels

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Int32, Int64
 from gvpipe.asset.material import Image, image_size
+from gvpipe.foundation.arrays import Array, Float32, Int32, Int64
 from gvpipe.rasterizer.colours import to_linear
 
 MAX_PIXELS = 1 << 26  # of an image that is decoded, and of all texels: 8192 x 8192

@@ -17,14 +17,15 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, cast
 
-from gvpipe.codec import Codec, Progress
-from gvpipe.errors import InputError
-from gvpipe.quality_scale import error_of
+from gvpipe.coding.codec import Codec
+from gvpipe.coding.quality_scale import error_of
+from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.progress import Progress
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rate_control.purposes import describe
 from gvpipe.rate_control.search import Choice, meet
 from gvpipe.rate_control.targets import Target
 from gvpipe.rate_control.trials import Trial
-from gvpipe.sequence import MeshSequence
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -10,10 +10,10 @@ import dataclasses
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
 
-from gvpipe.arguments import did_you_mean
-from gvpipe.codec import Codec
-from gvpipe.errors import SettingError
-from gvpipe.registry import codec_ids
+from gvpipe.coding.codec import Codec
+from gvpipe.coding.registry import codec_ids
+from gvpipe.foundation.arguments import did_you_mean
+from gvpipe.foundation.errors import SettingError
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

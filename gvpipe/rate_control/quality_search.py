@@ -23,14 +23,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from gvpipe.errors import InputError
-from gvpipe.quality_scale import fall_at, on_scale
+from gvpipe.coding.quality_scale import fall_at, on_scale
+from gvpipe.foundation.errors import InputError
 from gvpipe.rate_control.targets import NAMES, Target
 from gvpipe.rate_control.trials import Trial
 
 TOLERANCE = 0.03  # how far on its allowed side of the target a result may lie
 MOST_ENCODES = 8
-RATE_SLOPE = 0.025  # assumed change of the logarithm of the size per unit of quality; of the error: `gvpipe.quality_scale`
+RATE_SLOPE = (
+    0.025  # assumed change of the logarithm of the size per unit of quality; of the error: `gvpipe.coding.quality_scale`
+)
 SMALL_MISS = 0.35  # logarithm: a first trial that misses its target error by no more was corrected by no other
 SLOPES = 0.25, 4.0  # times the assumed slope: between two trials
 FIRST_SLOPES = 0.7, 1.3  # the same between such a first trial and the second

@@ -6,14 +6,15 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from gvpipe.codec import Codec, Progress
+from gvpipe.coding.codec import Codec
+from gvpipe.coding.quality_scale import quality_of
+from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import frame_diagonal, measure_spread
-from gvpipe.quality_scale import quality_of
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rate_control.quality_search import TOLERANCE, find_quality
 from gvpipe.rate_control.smallest_search import LEAST_GAIN, find_smallest
 from gvpipe.rate_control.targets import NAMES, Target
 from gvpipe.rate_control.trials import Trial, Trials
-from gvpipe.sequence import MeshSequence
 
 if TYPE_CHECKING:
     from gvpipe.asset_coding.encoder import AssetCoder

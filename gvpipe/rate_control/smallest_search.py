@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from gvpipe.quality_scale import BELOW, on_scale
+from gvpipe.coding.quality_scale import BELOW, on_scale
 from gvpipe.rate_control.trials import Trial
 
 MOST_ENCODES = 8

@@ -15,9 +15,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from gvpipe.codec import Encoded, FrameReader
+from gvpipe.coding.codec import Encoded, FrameReader
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 ROUNDS = 3  # encodes at most
 MOST_CHANGE = 4.0  # times, of a step at once

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from gvpipe.errors import InputError, SettingError
+from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.metrics.vertex_errors import frame_diagonal
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rate_control.trials import Trial
-from gvpipe.sequence import MeshSequence
 
 NAMES = {
     "rmse": "an rmse (of the diagonal) of",

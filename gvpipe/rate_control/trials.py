@@ -1,7 +1,7 @@
 """Encodes of one sequence at several qualities, each measured: the size of its whole file and the errors of its frames.
 
-The bitstream is decoded in memory, as by any reader. A memo (`gvpipe.codec.Memo`) keeps what does not depend on quality. With
-a bound, every trial gets the corrections that keep it (`gvpipe.corrections.bound`).
+The bitstream is decoded in memory, as by any reader. A memo (`gvpipe.coding.codec.Memo`) keeps what does not depend on quality.
+With a bound, every trial gets the corrections that keep it (`gvpipe.coding.corrections.bound`).
 """
 
 from __future__ import annotations
@@ -12,18 +12,19 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from gvpipe.arrays import Integers
-from gvpipe.codec import Codec, Encoded, FrameReader, Memo, Progress
+from gvpipe.coding.codec import Codec, Encoded, FrameReader, Memo
+from gvpipe.coding.corrections.bound import SECTION, Bound, encode_corrections
+from gvpipe.coding.registry import encode_sequence, open_reader
+from gvpipe.coding.repeated_frames import RepeatedFramesReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import file_size
-from gvpipe.corrections.bound import SECTION, Bound, encode_corrections
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Integers
+from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import Errors, measure_errors
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rate_control.purposes import own_settings
-from gvpipe.registry import encode_sequence, open_reader
 from gvpipe.rendering.poster import poster_of
-from gvpipe.repeated_frames import RepeatedFramesReader
-from gvpipe.sequence import MeshSequence
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -133,7 +134,7 @@ class Trials:
         """Decode a finished file's bitstream, if there is a bound, and measure every vertex.
 
         Args:
-            permutation: ``(V,)`` that of its encode (`gvpipe.codec.Encoded`).
+            permutation: ``(V,)`` that of its encode (`gvpipe.coding.codec.Encoded`).
             bitstream: as read from the file.
 
         Raises:

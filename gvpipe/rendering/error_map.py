@@ -10,13 +10,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gvpipe.arrays import Float64, UInt8
+from gvpipe.foundation.arrays import Float64, UInt8
 from gvpipe.metrics.comparison import aligned
 from gvpipe.metrics.vertex_errors import frame_diagonal
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import sampled, used_vertices
 from gvpipe.rasterizer.colormaps import colormap
 from gvpipe.rendering.legend import paint_legend
-from gvpipe.sequence import MeshSequence
 
 
 class ErrorMap:

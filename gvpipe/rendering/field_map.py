@@ -7,14 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gvpipe.arguments import did_you_mean
-from gvpipe.arrays import Array, Float64, UInt8
 from gvpipe.asset.field import Field
-from gvpipe.errors import InputError
+from gvpipe.foundation.arguments import did_you_mean
+from gvpipe.foundation.arrays import Array, Float64, UInt8
+from gvpipe.foundation.errors import InputError
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import used_vertices
 from gvpipe.rasterizer.colormaps import colormap
 from gvpipe.rendering.legend import paint_legend, round_ticks
-from gvpipe.sequence import MeshSequence
 
 SYMMETRIC = "symmetric"
 Range = tuple[float, float] | str | None

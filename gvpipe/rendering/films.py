@@ -14,18 +14,18 @@ from typing import Protocol
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int32, UInt8
-from gvpipe.atomic import unnamed_path
-from gvpipe.codec import Progress
-from gvpipe.errors import InputError
-from gvpipe.forks import kept
-from gvpipe.part_choice import only_parts
+from gvpipe.foundation.arrays import Float64, Int32, UInt8
+from gvpipe.foundation.atomic import unnamed_path
+from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.progress import Progress
+from gvpipe.model.part_choice import only_parts
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import Camera, framing, middle_of, used_vertices
 from gvpipe.rasterizer.renderer import Renderer, check_size
 from gvpipe.rendering.error_map import ErrorMap
 from gvpipe.rendering.field_map import FieldMap, Range
 from gvpipe.rendering.picture_files import STILL, WRITERS
-from gvpipe.sequence import MeshSequence
+from gvpipe.runtime.forks import kept
 
 STILL_SAMPLES, FILM_SAMPLES = 3, 2  # per pixel and axis
 TURN_SECONDS = 4.0  # a turntable's shortest turn

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gvpipe.arrays import Float64, UInt8
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Float64, UInt8
+from gvpipe.foundation.errors import InputError
 from gvpipe.rasterizer.colours import BACKGROUND
 
 SMALLEST = (160, 120)  # pixels, of a picture with a legend

@@ -9,8 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from gvpipe.arrays import UInt8
-from gvpipe.codec import Progress
+from gvpipe.foundation.arrays import UInt8
+from gvpipe.foundation.progress import Progress
 
 STILL = ".png"  # the format of one picture
 GIF_FPS = 50.0  # browsers slow down GIFs that are faster

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Int32, UInt8
+from gvpipe.foundation.arrays import Float32, Int32, UInt8
 from gvpipe.media.film import hold_picture
 from gvpipe.media.video import PROFILES
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import framing
 from gvpipe.rasterizer.renderer import Renderer
-from gvpipe.sequence import MeshSequence
 
 SIZE = 128  # pixels, of both sides
 SAMPLES = 3  # per pixel and axis

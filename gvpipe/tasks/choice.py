@@ -6,7 +6,7 @@ import contextlib
 import os
 from collections.abc import Iterator
 
-from gvpipe.errors import SettingError
+from gvpipe.foundation.errors import SettingError
 from gvpipe.tasks.executor import Executor
 
 MOST_WORKERS = 1024

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.tasks.executor import Outcome, Prepare, Work, WorkerDied
 
 PACKAGE = "gvpipe"

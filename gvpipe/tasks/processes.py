@@ -16,8 +16,8 @@ from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import Any, Self
 
-from gvpipe.atomic import temporary_folder
-from gvpipe.isolation.python import Process, TimeoutExpired, start_python
+from gvpipe.foundation.atomic import temporary_folder
+from gvpipe.foundation.isolation.python import Process, TimeoutExpired, start_python
 from gvpipe.tasks.executor import ATTEMPTS, Outcome, Prepare, WorkerDied
 from gvpipe.tasks.worker import PREPARE, PROTOCOL, TASK, receive, send
 

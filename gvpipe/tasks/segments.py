@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from gvpipe.errors import GvpipeError, InputError
-from gvpipe.segment_map import Report
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import GvpipeError, InputError
+from gvpipe.model.sequence import MeshSequence
+from gvpipe.runtime.segment_map import Report
 from gvpipe.tasks.executor import Executor, Outcome, Work, WorkerDied
 
 PROTOCOL = 5  # of pickle
@@ -26,7 +26,7 @@ REMEDY = "give workers more memory, or take fewer frames per segment (--segment)
 
 @dataclass(frozen=True)
 class RemoteSegments:
-    """Codes segments elsewhere, as `gvpipe.segment_map.SegmentMap`.
+    """Codes segments elsewhere, as `gvpipe.runtime.segment_map.SegmentMap`.
 
     Args:
         executor: the workers.
@@ -65,7 +65,7 @@ class RemoteSegments:
 
 @dataclass(frozen=True)
 class SharedSegments:
-    """Codes segments here, and shares them out once they prove to be much work; as `gvpipe.segment_map.SegmentMap`.
+    """Codes segments here, and shares them out once they prove to be much work; as `gvpipe.runtime.segment_map.SegmentMap`.
 
     Args:
         remote: codes them elsewhere.

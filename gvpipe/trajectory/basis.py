@@ -26,10 +26,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Floats, Int64
-from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
+from gvpipe.foundation.arrays import Float64, Floats, Int64
+from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_vectors, encode_vectors
 from gvpipe.trajectory.gram import descending_eigenvectors, is_tall, smaller_gram
 from gvpipe.trajectory.temporal_neighbours import temporal_order

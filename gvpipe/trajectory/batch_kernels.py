@@ -1,4 +1,4 @@
-"""Batches of feature vectors that do not predict one another: kernels work on them side by side (`gvpipe.lanes`).
+"""Batches of feature vectors that do not predict one another: kernels work on them side by side (`gvpipe.runtime.lanes`).
 
 A window of the causal order is sorted by how long the chain of predictions before each vector is. What comes out at one depth
 is put together, up to `LANES` at a time, with all that its predictions start from.
@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int32
-from gvpipe.compiled import compiled, inlined
-from gvpipe.lanes import LANES, prefetch
+from gvpipe.foundation.arrays import Float64, Int32
+from gvpipe.runtime.compiled import compiled, inlined
+from gvpipe.runtime.lanes import LANES, prefetch
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.prediction_kernels import VectorCoding
 

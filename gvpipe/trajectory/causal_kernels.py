@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Bool
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Bool
+from gvpipe.runtime.compiled import compiled
 from gvpipe.trajectory.causal_order import CausalOrder
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from gvpipe.arrays import Float64, Int32
+from gvpipe.foundation.arrays import Float64, Int32
 
 
 class CausalOrder(NamedTuple):

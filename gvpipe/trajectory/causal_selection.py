@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Bool
+from gvpipe.foundation.arrays import Bool
 from gvpipe.trajectory.causal_order import CausalOrder
 
 

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int64
-from gvpipe.codec import Memo, Progress
+from gvpipe.coding.codec import Memo
+from gvpipe.coding.quality_scale import error_of
 from gvpipe.connectivity.base_mesh import EncodedMesh
 from gvpipe.connectivity.topology_only import Topology, encode_mesh
+from gvpipe.foundation.arrays import Float64, Int64
+from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import measure_spread
-from gvpipe.quality_scale import error_of
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.basis import Basis, row_blocks, squared_errors
 from gvpipe.trajectory.welding import find_points
 
@@ -37,7 +38,7 @@ class CodedConnectivity:
     spread: float
 
     def target_error(self, quality: float) -> float:
-        """Root mean square error of a vertex, model units, that a quality asks for (`gvpipe.quality_scale`)."""
+        """Root mean square error of a vertex, model units, that a quality asks for (`gvpipe.coding.quality_scale`)."""
         return self.spread * error_of(quality) / 100
 
 

@@ -21,12 +21,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvpipe.ahead import run_ahead
-from gvpipe.arrays import Float64, Int32, Integers
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Float64, Int32, Integers
+from gvpipe.foundation.errors import InputError
+from gvpipe.runtime.ahead import run_ahead
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.contexts import LARGEST, MAX_LEVEL, N_CONTEXTS, ONE, Residuals, context_inputs, level_bounds
 from gvpipe.trajectory.prediction import predict_vectors

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int32, Int64, Integers, UInt8
-from gvpipe.compiled import compiled
 from gvpipe.entropy.block_kernels import OUT_OF_RANGE, BlockStream, fill_block
+from gvpipe.foundation.arrays import Int32, Int64, Integers, UInt8
+from gvpipe.runtime.compiled import compiled
 from gvpipe.trajectory.contexts import (
     ENTRY_BITS,
     FLOOR_NEAR,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int32, Int64
+from gvpipe.foundation.arrays import Int32, Int64
 from gvpipe.trajectory.causal_order import CausalOrder
 
 SHORT = (16, 10, 6, 4)  # weights of a vector's earlier components, the latest first

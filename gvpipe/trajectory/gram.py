@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 
 
 def is_tall(matrix: Float64) -> bool:

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float64
-from gvpipe.compiled import compiled, inlined
-from gvpipe.lanes import LANES, load, same, store
+from gvpipe.foundation.arrays import Bool, Float64
+from gvpipe.runtime.compiled import compiled, inlined
+from gvpipe.runtime.lanes import LANES, load, same, store
 from gvpipe.trajectory.batch_kernels import WINDOW, Batch, empty_batch, fetch, gather, in_fours, sort_window
 from gvpipe.trajectory.prediction_kernels import VectorCoding, code_component, most_neighbours
 

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int64
+from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.trajectory.causal_order import CausalOrder
 
 PREDICTORS = ("navg", "lsp", "rbf", "kalman")

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int64
-from gvpipe.compiled import compiled, inlined
+from gvpipe.foundation.arrays import Float64, Int64
+from gvpipe.runtime.compiled import compiled, inlined
 from gvpipe.trajectory.causal_order import CausalOrder
 
 ROUND_UP = 0.42  # added before a residual's magnitude is cut to whole steps: 0.5 would cost 1.5 % more at equal error

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Float64, Int32, Int64
-from gvpipe.compiled import compiled, inlined
-from gvpipe.lanes import COORDINATES, load_point, same_point, store_point
+from gvpipe.foundation.arrays import Float32, Float64, Int32, Int64
+from gvpipe.runtime.compiled import compiled, inlined
+from gvpipe.runtime.lanes import COORDINATES, load_point, same_point, store_point
 
 BLOCK = 1024  # columns at a time: a block of four vectors stays in the cache
 MANY_FRAMES = 4  # for which it pays to turn coefficients

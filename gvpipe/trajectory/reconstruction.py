@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.ahead import halves, run_ahead
-from gvpipe.arrays import Float32, Float64, Integers
 from gvpipe.container.segments import segments_between
-from gvpipe.errors import corrupt
+from gvpipe.foundation.arrays import Float32, Float64, Integers
+from gvpipe.foundation.errors import corrupt
+from gvpipe.runtime.ahead import halves, run_ahead
 from gvpipe.trajectory.basis import Basis
 
 LARGE = 1 << 18  # positions; fewer do not pay for other threads

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 
 if TYPE_CHECKING:
     from scipy import sparse

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int32
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Float64, Int32
 from gvpipe.mesh.hierarchy_kernels import Hierarchy, proper_triangles
 from gvpipe.mesh.traversal import traverse
+from gvpipe.runtime.compiled import compiled
 from gvpipe.trajectory.causal_order import CausalOrder
 
 OVERSHOOT = 0.2

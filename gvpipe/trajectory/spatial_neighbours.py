@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.ahead import halves, run_ahead
-from gvpipe.arrays import Int32
+from gvpipe.foundation.arrays import Int32
+from gvpipe.runtime.ahead import halves, run_ahead
 from gvpipe.trajectory.causal_order import CausalOrder
 
 if TYPE_CHECKING:

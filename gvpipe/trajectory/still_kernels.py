@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Float64
+from gvpipe.runtime.compiled import compiled
 from gvpipe.trajectory.basis import LEAST, RIDGE
 from gvpipe.trajectory.product_kernels import solve_definite, weighted_sums
 

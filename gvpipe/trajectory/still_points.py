@@ -16,15 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float32, Float64, Int32, Integers
-from gvpipe.budget import UNLIMITED, Budget
-from gvpipe.codec import Memo
+from gvpipe.coding.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.segments import LARGEST_STEP, SMALLEST_STEP
-from gvpipe.errors import corrupt_section
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.arrays import Bool, Float32, Float64, Int32, Integers
+from gvpipe.foundation.budget import UNLIMITED, Budget
+from gvpipe.foundation.errors import corrupt_section
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.basis import Basis
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.coded_points import CodedConnectivity

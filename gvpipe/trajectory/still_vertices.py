@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Bool
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.arrays import Bool
+from gvpipe.model.sequence import MeshSequence
 
 
 def find_still(sequence: MeshSequence) -> Bool:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.ahead import AHEAD
-from gvpipe.arrays import Float32, Int64
+from gvpipe.foundation.arrays import Float32, Int64
 from gvpipe.mesh.topology import components
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
+from gvpipe.runtime.ahead import AHEAD
 
 ROUNDS = 64  # groups that leave a group one by one, in one chunk; what is left then is compared exactly
 NEAREST = 8  # distinct positions searched around each, itself among them

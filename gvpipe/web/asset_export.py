@@ -7,9 +7,9 @@ import dataclasses
 from gvpipe.asset_coding.directory import SECTION, pack_directory, unpack_directory
 from gvpipe.asset_coding.encoder import AssetCoder
 from gvpipe.asset_coding.options import AssetOptions
-from gvpipe.codec import Codec, Encoded
+from gvpipe.coding.codec import Codec, Encoded
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.player import Player
+from gvpipe.playback.player import Player
 
 
 def carry_asset(player: Player, encoded: Encoded, codec: Codec) -> Bitstream:

@@ -4,9 +4,9 @@ What: page = ``page.html`` with the player's bundle (deflated, in digits of base
 opens from a disk. Why: browsers load no modules and fetch no files for a page that is itself a file. Base 85 takes a fifteenth
 less than base 64, which the element knows (``src="#id"``).
 
-A codec knows which of its files browsers play (`gvpipe.registry.browser_obstacle`). Any other file, and one for which that is
-asked, is decoded and encoded anew at a Karni-Gotsman error that is small beside that of files. The error that this adds is
-measured and reported.
+A codec knows which of its files browsers play (`gvpipe.coding.registry.browser_obstacle`). Any other file, and one for which
+that is asked, is decoded and encoded anew at a Karni-Gotsman error that is small beside that of files. The error that this adds
+is measured and reported.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from gvpipe.atomic import unnamed_path
-from gvpipe.codec import Progress
+from gvpipe.coding.quality_scale import error_of, quality_of
+from gvpipe.coding.registry import browser_obstacle, make_codec
 from gvpipe.container.bitstream import BARE, STREAM, Bitstream
 from gvpipe.container.mp4 import file_bytes
 from gvpipe.container.sources import check_target, is_remote
-from gvpipe.errors import InputError, OutputError
-from gvpipe.player import Player
-from gvpipe.quality_scale import error_of, quality_of
+from gvpipe.foundation.atomic import unnamed_path
+from gvpipe.foundation.errors import InputError, OutputError
+from gvpipe.foundation.progress import Progress
+from gvpipe.playback.player import Player
 from gvpipe.rate_control.purposes import SERVES, WEB
 from gvpipe.rate_control.trials import Trial, Trials
-from gvpipe.registry import browser_obstacle, make_codec
 from gvpipe.rendering.poster import poster_of
 from gvpipe.web.asset_export import carry_asset
 
@@ -86,11 +86,11 @@ def export_html(
         source: the geometry video, of any codec, or its address (``https://...``).
         target: the ``.html`` to write; an older file is replaced once the new one is complete.
         up: the axis that stands upright in the first view, ``y`` or ``z``; None: the file's own, else ``y``.
-        quality: 0..100, of the conversion where there is one: the error that it may add (`gvpipe.quality_scale`); `QUALITY` if
-            None.
+        quality: 0..100, of the conversion where there is one: the error that it may add (`gvpipe.coding.quality_scale`);
+            `QUALITY` if None.
         progress: called with a stage's name and the part of it that is done.
         convert: encode the file anew in any case, in the profile that all browsers play.
-        unlimited: let the geometry video take whatever memory and work it asks for (`gvpipe.player.Player`).
+        unlimited: let the geometry video take whatever memory and work it asks for (`gvpipe.playback.player.Player`).
 
     Raises:
         InputError: there is no such file, or an argument cannot be used.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gvpipe.asset.attribute import Attribute, as_attribute
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 ROWS = {"vertex": 4, "corner": 6, "triangle": 2, "part": 1}
 

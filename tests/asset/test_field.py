@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gvpipe.arrays import Array
 from gvpipe.asset.field import Field, as_field
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.errors import InputError
 
 ROWS = {"vertex": 4, "corner": 6, "triangle": 2, "part": 1}
 

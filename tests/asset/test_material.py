@@ -6,7 +6,7 @@ import pytest
 from PIL import Image as Pillow
 
 from gvpipe.asset.material import Image, Material, Texture, check_materials, image_size
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 
 def picture(width: int = 2, height: int = 3, kind: str = "PNG") -> bytes:

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from gvpipe.asset.metadata import Metadata
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 
 @pytest.mark.parametrize(

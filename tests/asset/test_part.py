@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gvpipe.asset.part import Part, check_parts
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 FACES = np.array([[0, 1, 2], [3, 4, 5]], np.int32)
 GOOD = (Part("a", (0, 3), (0, 1), 0), Part("b", (3, 6), (1, 2), None, "a"))

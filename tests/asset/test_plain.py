@@ -12,7 +12,7 @@ from gvpipe.asset.material import Material, Texture
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
 from gvpipe.asset.plain import from_plain, to_plain
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 TEXTURE = Texture(3, "uv1", 0.5, ("mirror", "clamp"), "nearest", (0.25, 1.0), 1.5, (2.0, 3.0))
 ALL = (

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from gvpipe.asset.part import Part
 from gvpipe.asset.polygons import as_polygons, polygon_corners, polygon_starts
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.mesh import fan
 
 FACES = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6]], np.int32)

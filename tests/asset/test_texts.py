@@ -15,9 +15,9 @@ from gvpipe.asset.texts import Cleaner
 from gvpipe.asset_coding.directory import Directory, ListedImage, pack_directory, unpack_directory
 from gvpipe.cli.console import Output
 from gvpipe.container.json_object import pack_json
-from gvpipe.errors import CorruptFile, InputError
-from gvpipe.sequence import MeshSequence
-from gvpipe.text import cut_text, escaped, text_fault
+from gvpipe.foundation.errors import CorruptFile, InputError
+from gvpipe.foundation.text import cut_text, escaped, text_fault
+from gvpipe.model.sequence import MeshSequence
 
 STRANGE = (
     "\x1b]0;PWN\x07\x1b[2J",

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from gvpipe.asset_coding.bounds import NOT_KEPT, Precision, check_names, precision
-from gvpipe.errors import SettingError
+from gvpipe.foundation.errors import SettingError
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
 from gvpipe.asset_coding.directory import Directory, Listed, ListedImage, pack_directory, unpack_directory
 from gvpipe.container.json_object import pack_json
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.foundation.errors import CorruptFile, InputError
 
 WHOLE = Directory(
     parts=(Part("a", (0, 4), (0, 0), 1), Part("ü", (4, 9), (0, 0), None, "a")),

@@ -7,10 +7,10 @@ import pytest
 from sequences import waving
 
 import gvpipe
-from gvpipe.arrays import Array
 from gvpipe.asset_coding.normal_fields import NormalRule, pack_rule, unpack_rule
 from gvpipe.attributes.surface import Surface
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.errors import CorruptFile
 from gvpipe.metrics.asset_errors import angles
 
 

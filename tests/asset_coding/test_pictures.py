@@ -8,7 +8,7 @@ from PIL import Image as Pillow
 
 from gvpipe.asset.material import Image, image_size
 from gvpipe.asset_coding.pictures import MOST_SIDES, TextureLimit, limit_image
-from gvpipe.errors import InputError, SettingError
+from gvpipe.foundation.errors import InputError, SettingError
 
 
 def made(width: int = 64, height: int = 32, kind: str = "PNG", mode: str = "RGB") -> Image:

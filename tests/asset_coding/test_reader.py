@@ -12,11 +12,11 @@ from asset_scene import scene
 import gvpipe
 from gvpipe.asset_coding.directory import SECTION, Directory, file_notes, pack_directory, unpack_directory
 from gvpipe.asset_coding.reader import AssetReader
+from gvpipe.coding.registry import open_reader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.json_object import pack_json
 from gvpipe.container.mp4 import read_file
-from gvpipe.errors import CorruptFile, FormatError
-from gvpipe.registry import open_reader
+from gvpipe.foundation.errors import CorruptFile, FormatError
 
 MUTATIONS = 25  # of each section
 

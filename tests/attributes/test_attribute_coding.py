@@ -16,7 +16,7 @@ from shapes import ball
 from gvpipe.attributes.attribute_coding import WELDED, decode_attribute, encode_attribute
 from gvpipe.attributes.entry_layout import DOMAINS, count_values
 from gvpipe.attributes.surface import Surface
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.foundation.errors import CorruptFile, InputError
 
 Values = NDArray[Any]
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from gvpipe.attributes.corner_sharing import GUIDED, LOOSE, SHARED, WHOLE, decode_sharing, encode_sharing, entries_of
 from gvpipe.attributes.surface import Surface
 from gvpipe.container.cursor import Cursor
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.foundation.errors import CorruptFile, InputError
 
 
 @each_surface

@@ -7,7 +7,7 @@ import pytest
 from shapes import ball
 
 from gvpipe.attributes.surface_normals import RULES, find_rule, start_free_normals, surface_normals
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 
 def test_normals_of_a_ball_point_outwards() -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sequences import grid
 
 from gvpipe.attributes.triangle_order import decode_arrangement, encode_arrangement
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.foundation.errors import CorruptFile, InputError
 
 Ints = NDArray[Any]
 Polygons = list[list[int]]

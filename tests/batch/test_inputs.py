@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gvpipe.batch.inputs import find_jobs
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 FILES = (
     "captures/a/run.glb",

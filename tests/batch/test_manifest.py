@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from gvpipe.batch.manifest import NAME, Entry, open_manifest
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 SETTINGS = {"codecs": [{"id": "pca", "quality": 75.0}]}
 ENTRY = Entry("in/a.npz", "ab", "a.mp4", None, 5, 0.1, "0.1.0", SETTINGS)

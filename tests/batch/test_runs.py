@@ -19,7 +19,7 @@ import gvpipe
 from gvpipe.batch import runs
 from gvpipe.batch.encoding import hash_input
 from gvpipe.batch.runs import encode_all
-from gvpipe.errors import InputError, SettingError
+from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.tasks.executor import Outcome, Prepare, WorkerDied
 
 Run = Callable[..., Any]

@@ -10,7 +10,7 @@ import pytest
 
 from gvpipe.benchmark.plots import draw, read_peers
 from gvpipe.benchmark.report import BenchReport
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 PEERS = "seq,codec,bpvf,kg,rmse_rel\nsheet,other,4.0,0.5,1e-3\nsheet,other,9.0,0.05,1e-4\nsheet,exact,96,0,0\n,,x,,\n"
 

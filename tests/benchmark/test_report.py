@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gvpipe.benchmark.report import BenchReport
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 WRONG = {
     b"": "line 1 is no JSON",

@@ -16,7 +16,7 @@ from gvpipe.benchmark.scale_plots import draw, row_of
 from gvpipe.benchmark.scale_report import ScalePoint, ScaleReport, table
 from gvpipe.benchmark.torus import make_torus
 from gvpipe.cli.commands import cli
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 POINTS = [
     ScalePoint("pca", n, 16, 10 * n, 16, n / 1000, n / 1000, 300 + n / 100, n / 2000, n / 2000, 200 + n / 100)

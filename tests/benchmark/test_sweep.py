@@ -14,8 +14,8 @@ import gvpipe
 from gvpipe.benchmark import sweep
 from gvpipe.benchmark.report import BenchReport
 from gvpipe.benchmark.tables import tables
-from gvpipe.errors import GvpipeError, InputError, SettingError
-from gvpipe.registry import codec_ids
+from gvpipe.coding.registry import codec_ids
+from gvpipe.foundation.errors import GvpipeError, InputError, SettingError
 
 Run = Callable[..., Finished]
 

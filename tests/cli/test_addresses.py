@@ -10,7 +10,7 @@ import pytest
 from file_server import serving
 
 import gvpipe
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 Run = Callable[..., Any]
 

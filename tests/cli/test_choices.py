@@ -16,7 +16,7 @@ from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.part import Part
 from gvpipe.cli.choices import chosen, chosen_frames
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 Run = Callable[..., Any]
 OUTPUTS = [

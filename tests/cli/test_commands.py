@@ -22,9 +22,9 @@ import pytest
 from file_server import serving
 
 import gvpipe
-from gvpipe.errors import CorruptFile, FormatError, NotGeometryVideo, StrippedFile, TruncatedFile
-from gvpipe.registry import codec_class, codec_ids
-from gvpipe.sequence import MeshSequence
+from gvpipe.coding.registry import codec_class, codec_ids
+from gvpipe.foundation.errors import CorruptFile, FormatError, NotGeometryVideo, StrippedFile, TruncatedFile
+from gvpipe.model.sequence import MeshSequence
 
 FAST = ("--set", "preset=ultrafast", "--set", "clusters=3", "--set", "gop=4")
 HEAVY = ("numpy", "scipy", "cv2", "av", "numba", "trimesh", "xatlas", "DracoPy", "constriction", "PIL")
@@ -423,7 +423,7 @@ LIMITED = """
 import os, resource, sys
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import write_file
-from gvpipe.errors import OutputError
+from gvpipe.foundation.errors import OutputError
 from gvpipe.media.video import PROFILES, VideoWriter
 import numpy as np
 planes = np.random.default_rng(0).integers(0, 256, (12, 96, 96), dtype=np.uint8)

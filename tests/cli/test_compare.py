@@ -13,7 +13,7 @@ import pytest
 from gltf_files import two_clips
 
 import gvpipe
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 Run = Callable[..., Any]
 

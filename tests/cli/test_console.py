@@ -6,8 +6,8 @@ import logging
 
 import pytest
 
-from gvpipe import compiled
 from gvpipe.cli.console import COMPILER, Output
+from gvpipe.runtime import compiled
 
 LOGGER = logging.getLogger(COMPILER)
 

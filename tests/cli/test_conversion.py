@@ -13,7 +13,7 @@ import pytest
 
 import gvpipe
 from gvpipe.asset.part import Part
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 Run = Callable[..., Any]
 

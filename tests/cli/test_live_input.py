@@ -18,7 +18,7 @@ from sequences import waving
 
 import gvpipe
 from gvpipe.cli.commands import cli
-from gvpipe.errors import FormatError, InputError
+from gvpipe.foundation.errors import FormatError, InputError
 
 SEQUENCE = waving(6, 7)
 FRAMES = SEQUENCE.read(0, 7).astype("<f4").tobytes()

@@ -14,7 +14,7 @@ import pytest
 
 import gvpipe
 from gvpipe.cli import main
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 Piped = Callable[..., tuple[int, bytes, str]]
 OPTIONS = ("--set", "preset=ultrafast", "--set", "clusters=3", "--set", "gop=4")

@@ -12,7 +12,7 @@ from sequences import waving
 import gvpipe
 from gvpipe.cli.choices import parse_bytes
 from gvpipe.cli.commands import cli
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.foundation.errors import CorruptFile, InputError
 
 
 def test_pack_and_info(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from asset_scene import scene
 from gltf_files import assemble, take_apart, two_clips
 
 import gvpipe
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 Run = Callable[..., Any]
 

@@ -12,10 +12,10 @@ import pytest
 from sequences import grid
 
 import gvpipe
-from gvpipe.atomic import atomic_files
-from gvpipe.errors import InputError, OutputError, TopologyChange
+from gvpipe.foundation.atomic import atomic_files
+from gvpipe.foundation.errors import InputError, OutputError, TopologyChange
 from gvpipe.io.runs import find_runs
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 Run = Callable[..., Any]
 SIZES = (5, 5, 5, 7, 7, 4)  # sheets of so many vertices a side, frame after frame

@@ -13,7 +13,7 @@ from sequences import grid
 from gvpipe.connectivity.adaptive_mesh import decode_adaptive_mesh, encode_adaptive_mesh
 from gvpipe.connectivity.adaptive_order import decode_adaptive_order, encode_adaptive_order
 from gvpipe.connectivity.welded_mesh import decode_points, encode_points
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 
 FLAT = np.array([[0, 1, 2], [0, 0, 1], [1, 1, 1], [0, 1, 2]])  # doubled and collapsed triangles
 

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gvpipe.arrays import Array, Int32
 from gvpipe.connectivity import base_mesh
 from gvpipe.connectivity.base_mesh import decode_base, encode_base
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.foundation.arrays import Array, Int32
+from gvpipe.foundation.errors import CorruptFile, InputError
 
 TETRAHEDRON = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
 

@@ -16,9 +16,9 @@ from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.connectivity.welded_mesh import WeldedMesh, decode_points, encode_points
 from gvpipe.container.cursor import varint
 from gvpipe.entropy.integers import encode_integers
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 from gvpipe.mesh.lattice import Lattice
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.welding import find_points
 
 Ints = NDArray[Any]

@@ -16,7 +16,7 @@ import gvpipe
 from gvpipe.container import bare
 from gvpipe.container.cursor import pack_block
 from gvpipe.container.mp4 import read_file
-from gvpipe.errors import CorruptFile, FormatError, NewerVersion, SettingError, TruncatedFile
+from gvpipe.foundation.errors import CorruptFile, FormatError, NewerVersion, SettingError, TruncatedFile
 
 SEQUENCE = waving(8, 6)
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from gvpipe.container.bitstream import ENTRY, MAGIC, PREFIX, Bitstream, pack_payload, unpack_payload
-from gvpipe.errors import CorruptFile, FormatError, NewerVersion, TruncatedFile
+from gvpipe.foundation.errors import CorruptFile, FormatError, NewerVersion, TruncatedFile
 
 
 def small_stream() -> Bitstream:

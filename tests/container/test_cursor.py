@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from gvpipe.container.bitstream import ENTRY
 from gvpipe.container.cursor import Cursor, varint
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 
 
 @settings(max_examples=120)

@@ -19,7 +19,7 @@ from sequences import waving
 import gvpipe
 from gvpipe.container import http_request, http_source
 from gvpipe.container.http_source import HttpSource
-from gvpipe.errors import CorruptFile, GvpipeError, InputError, NotGeometryVideo, TruncatedFile
+from gvpipe.foundation.errors import CorruptFile, GvpipeError, InputError, NotGeometryVideo, TruncatedFile
 
 BLOCK = 256
 

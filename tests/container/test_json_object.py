@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from gvpipe.container.json_object import JsonObject, pack_json, unpack_json
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 
 VALUES = {"text": "a", "flag": True, "number": 0.5, "list": [1, 2], "objects": [{"a": 1}], "texts": {"k": "v"}, "huge": 2**80}
 

@@ -13,7 +13,7 @@ from odd_headers import budget_of, header_of, odd_texts, payload_of, read_all
 
 from gvpipe.container.bitstream import unpack_payload
 from gvpipe.container.mp4 import read_file
-from gvpipe.errors import FormatError
+from gvpipe.foundation.errors import FormatError
 
 KINDS = ("mcgv-1-jpeg", "mcgv-4-klt", "pca-2-still")
 OTHERS = sorted({path.stem for path in GOLDEN.glob("*.mp4")} - set(KINDS))

@@ -8,7 +8,7 @@ import pytest
 from folders import GOLDEN
 
 from gvpipe.container.sample_tables import check_tables
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 
 
 def table(kind: bytes, *numbers: int) -> bytes:

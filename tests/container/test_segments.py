@@ -8,7 +8,7 @@ import pytest
 
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import LARGEST_STEP, MAX_SEGMENT, SMALLEST_STEP, read_segments, read_steps
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 
 
 def bitstream(n_frames: int, **header: Any) -> Bitstream:

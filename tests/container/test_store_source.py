@@ -17,7 +17,7 @@ from sequences import waving
 import gvpipe
 from gvpipe.cli.commands import cli
 from gvpipe.container.store_source import FIRST
-from gvpipe.errors import CorruptFile, InputError, NotGeometryVideo, TruncatedFile
+from gvpipe.foundation.errors import CorruptFile, InputError, NotGeometryVideo, TruncatedFile
 
 fsspec = pytest.importorskip("fsspec")
 WAVES = waving(30, 120)

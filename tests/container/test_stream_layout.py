@@ -17,12 +17,12 @@ from sequences import held, waving
 import gvpipe
 from fuzz.streams import join_stream, split_stream
 from fuzz.videos import FILE
+from gvpipe.coding.registry import segment_parts
 from gvpipe.container import mp4
 from gvpipe.container.fragments import count_pictures, split_fragments
 from gvpipe.container.sources import FileSource
 from gvpipe.container.stream_layout import FRAGMENT, INDEX_UUID, find_index
-from gvpipe.errors import CorruptFile, FormatError, InputError, NewerVersion, StrippedFile, TruncatedFile
-from gvpipe.registry import segment_parts
+from gvpipe.foundation.errors import CorruptFile, FormatError, InputError, NewerVersion, StrippedFile, TruncatedFile
 
 FILES = ["mcgv-5-h264", "mcgv-4-jpeg", "mcgv-4-klt-10", "mcgv-4-outliers", "mcgv-5-rigid", "pca-2-still", "pca-1-kalman"]
 FILES += ["laplacian-1", "laplacian-2-still", "pdct-2-asset", "pdct-2-still"]

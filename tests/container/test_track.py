@@ -10,7 +10,7 @@ from folders import GOLDEN
 
 from gvpipe.container import mp4
 from gvpipe.container.track import inspect, remux_fragments
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 from gvpipe.rendering.poster import make_poster
 
 

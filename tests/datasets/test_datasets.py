@@ -18,8 +18,8 @@ from sequences import waving
 
 import gvpipe
 from gvpipe import datasets
-from gvpipe.errors import CorruptFile, FormatError, InputError, OutputError, TruncatedFile
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import CorruptFile, FormatError, InputError, OutputError, TruncatedFile
+from gvpipe.model.sequence import MeshSequence
 
 NAMES = ("cats/walk.v2", "s2", "s10")
 WAVING = waving(9, 6)

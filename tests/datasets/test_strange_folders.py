@@ -15,9 +15,9 @@ from gvpipe.batch.encoding import hash_input
 from gvpipe.batch.manifest import NAME
 from gvpipe.datasets.packing import pack
 from gvpipe.datasets.shard_index import MAX_HEADER, index_shard
-from gvpipe.errors import CorruptFile, InputError
-from gvpipe.isolation.plain_files import open_plain
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import CorruptFile, InputError
+from gvpipe.foundation.isolation.plain_files import open_plain
+from gvpipe.model.sequence import MeshSequence
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links need rights, and there are no pipes with names")
 

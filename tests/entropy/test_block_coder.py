@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 
 
 def test_blocks_decode_one_by_one_and_any_prefix_of_them() -> None:

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gvpipe.arrays import Int64
 from gvpipe.entropy.decision_kernels import (
     code_decision,
     finish,
@@ -18,6 +17,7 @@ from gvpipe.entropy.decision_kernels import (
     take,
 )
 from gvpipe.entropy.logistic_tables import LIMIT, squash_table, stretch_table
+from gvpipe.foundation.arrays import Int64
 
 
 def encode(bits: Int64, slots: Int64, n_mixers: int = 2) -> bytes:

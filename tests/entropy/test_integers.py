@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 
 VALUES = st.one_of(st.integers(-20, 20), st.integers(-(2**39) + 1, 2**39 - 1), st.integers(-5000, 5000))
 

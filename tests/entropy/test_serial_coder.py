@@ -10,7 +10,7 @@ from gvpipe.entropy.serial_coder import SerialDecoder, SerialEncoder, encode_ser
 from gvpipe.entropy.serial_kernels import code_value, refuse
 from gvpipe.entropy.serial_tables import read_tables, write_tables
 from gvpipe.entropy.tokens import MAX_TOKENS
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 
 
 def some_values(n: int, seed: int = 0) -> np.ndarray:

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from waves import EXACT, MESH, encode, wave
 
 from gvpipe.container.cursor import varint
-from gvpipe.errors import CorruptFile
 from gvpipe.fields.reader import FieldReader
 from gvpipe.fields.segment import MODES
 from gvpipe.fields.trajectories import STEP, decode_trajectories
 from gvpipe.fields.values import FieldBound
+from gvpipe.foundation.errors import CorruptFile
 
 VALUES = wave(n_frames=10, n_components=2)
 HOLED = np.where(np.arange(81)[None, :, None] % 5, VALUES, np.nan)

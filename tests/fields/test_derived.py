@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from waves import EXACT, MESH, SHEET, SHEET_FACES, encode
 
-from gvpipe.arrays import Array, Float32
-from gvpipe.errors import CorruptFile, InputError
 from gvpipe.fields import derived, head
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.reader import FieldReader
 from gvpipe.fields.values import FieldBound
+from gvpipe.foundation.arrays import Array, Float32
+from gvpipe.foundation.errors import CorruptFile, InputError
 
 F = 24
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from waves import EXACT, MESH, SHEET, decode, encode, wave
 
-from gvpipe.errors import InputError
 from gvpipe.fields.values import FieldBound
+from gvpipe.foundation.errors import InputError
 
 
 def _with_holes(seed: int = 0, share: float = 0.1) -> tuple[np.ndarray, np.ndarray]:

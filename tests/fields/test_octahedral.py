@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from waves import MESH, SHEET, decode, encode
 
-from gvpipe.errors import InputError
 from gvpipe.fields.octahedral import angular_bound, from_octahedral, to_octahedral
+from gvpipe.foundation.errors import InputError
 
 
 def _random(seed: int, shape: tuple[int, ...]) -> np.ndarray:

@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from waves import EXACT, MESH, SHEET, SHEET_FACES, decode, encode, wave
 
-from gvpipe.errors import InputError
 from gvpipe.fields import head
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.reader import FieldReader
 from gvpipe.fields.segment import MODES as ALL_MODES
 from gvpipe.fields.values import FieldBound, to_integers
+from gvpipe.foundation.errors import InputError
 
 MODES = ALL_MODES[:3]  # without positions
 FIELDS = sorted((DATA / "fields").glob("*.npz"))

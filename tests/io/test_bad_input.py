@@ -20,7 +20,7 @@ from input_files import EXTRAS, KINDS, MARK, NEED_MESH, PACKAGES, TEXTS, is_inst
 from PIL import Image
 
 from gvpipe import io
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 SUFFIXES = [
     pytest.param(name, marks=pytest.mark.skipif(not is_installed(name), reason="its package is missing")) for name in KINDS

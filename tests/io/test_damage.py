@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from gvpipe import io
-from gvpipe.arrays import Array
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.damage import reading
-from gvpipe.io.scene_fields import FieldFrames, Sampled
-from gvpipe.io.scene_mesh import Fans
+from gvpipe.io.scene.fields import FieldFrames, Sampled
+from gvpipe.io.scene.mesh import Fans
 
 
 def test_odd_numbers_make_no_warnings() -> None:

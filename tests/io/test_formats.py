@@ -19,10 +19,10 @@ from hypothesis import given
 from mesh_files import FACES, FRAME_SUFFIXES, POSITIONS, fast, grid, same_bits
 
 from gvpipe import io
-from gvpipe.errors import InputError, OutputError
+from gvpipe.foundation.errors import InputError, OutputError
 from gvpipe.io.formats import FRAME_FORMATS
-from gvpipe.io.turned_normals import TurnedNormals
-from gvpipe.sequence import MeshSequence
+from gvpipe.io.normals.turned import TurnedNormals
+from gvpipe.model.sequence import MeshSequence
 
 # frame files, both ways
 
@@ -165,7 +165,7 @@ def test_output_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_formats_load_only_when_needed() -> None:
     """A process that runs a library starts fast: other formats, SciPy and compiled loops stay out."""
-    heavy = {"numba", "scipy", "trimesh", "gvpipe.io.gltf", "gvpipe.io.obj", "urllib.request"}
+    heavy = {"numba", "scipy", "trimesh", "gvpipe.io.gltf", "gvpipe.io.obj.reader", "urllib.request"}
     workers = ", ".join(f"gvpipe.io.{name}.worker" for name in ("alembic", "fbx", "usd"))
     code = f"import sys, {workers}; sys.exit(str({heavy} & set(sys.modules) or ''))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False).stderr.strip() == ""

@@ -12,7 +12,7 @@ import gvpipe
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.part import Part
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 FRAMES = np.random.default_rng(3).random((3, 6, 3), np.float32)
 FACES = np.array([[0, 1, 2], [3, 4, 5]], np.int32)

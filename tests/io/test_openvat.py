@@ -16,9 +16,9 @@ from assets import asset
 import gvpipe
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.metadata import Metadata
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.openvat import texture_size
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 TYPES = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}

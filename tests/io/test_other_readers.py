@@ -19,7 +19,7 @@ from folders import DATA
 
 import gvpipe
 from gvpipe.metrics.vertex_errors import frame_diagonal
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 N_FRAMES = 5
 THREE = Path(gvpipe.__file__).parent / "web" / "node_modules" / "three"

@@ -11,8 +11,8 @@ from mesh_files import same_bits
 from scenes import FACES, scene
 
 from gvpipe import io
-from gvpipe.errors import InputError
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import InputError
+from gvpipe.model.sequence import MeshSequence
 
 SUFFIXES = [".pc2", ".mdd", ".npy"]
 

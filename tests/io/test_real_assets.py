@@ -10,8 +10,8 @@ from assets import assert_same_attribute, assert_same_static
 from folders import DATA
 
 from gvpipe import io
-from gvpipe.errors import InputError
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import InputError
+from gvpipe.model.sequence import MeshSequence
 
 ASSETS = DATA / "assets"
 STILL = sorted(path for path in ASSETS.glob("fbx/*/*.obj"))

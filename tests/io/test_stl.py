@@ -11,7 +11,7 @@ from mesh_files import grid, same_bits
 
 from gvpipe import io
 from gvpipe.asset.part import Part
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 
 def test_stl_is_welded_in_order_of_appearance(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from sequences import waving
 
 import gvpipe
 from gvpipe.cli.commands import cli
-from gvpipe.errors import InputError, OutputError, TopologyChange
+from gvpipe.foundation.errors import InputError, OutputError, TopologyChange
 from gvpipe.io.fetching import fetch
 
 fsspec = pytest.importorskip("fsspec")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 from gvpipe.media.jpeg import END_OF_IMAGE, decode_jpeg, encode_jpeg
 
 SIZES = [(8, 8), (16, 48), (50, 34), (1, 1), (7, 129)]

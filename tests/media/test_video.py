@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sequences import waving
 
 import gvpipe
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.foundation.errors import CorruptFile, InputError
 from gvpipe.media.film import hold_picture
 from gvpipe.media.video import PROFILES, Profile, VideoReader, VideoWriter
 

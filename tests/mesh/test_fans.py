@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gvpipe.arrays import Int32
+from gvpipe.foundation.arrays import Int32
 from gvpipe.mesh.fans import (
     BIG,
     CORNER,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from sequences import random_mesh
 
-from gvpipe.arrays import Array
 from gvpipe.benchmark.torus import make_torus
+from gvpipe.foundation.arrays import Array
 from gvpipe.mesh.decimation import FAR
 from gvpipe.mesh.hierarchy import build_hierarchy
 

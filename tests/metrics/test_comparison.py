@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gvpipe import sequence
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.metrics import comparison
 from gvpipe.metrics.comparison import Comparison, compare
-from gvpipe.sequence import MeshSequence
+from gvpipe.model import sequence
+from gvpipe.model.sequence import MeshSequence
 
 SEEDS = st.integers(0, 2**32 - 1)
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], np.int32)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from sequences import awkward, waving
 
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.metrics.comparison import compare
 from gvpipe.metrics.correspondence import match_vertices
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 SEQUENCES = {
     "waving": waving(),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gvpipe.metrics import sted
 from gvpipe.metrics.comparison import compare
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 
 def _deviation(weights: list[float], values: list[float]) -> float:

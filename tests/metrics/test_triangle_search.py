@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gvpipe.arrays import Int32
+from gvpipe.foundation.arrays import Int32
 from gvpipe.metrics import triangle_search
 from gvpipe.metrics.comparison import compare
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 Float64 = NDArray[np.float64]
 

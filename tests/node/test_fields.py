@@ -16,7 +16,6 @@ from folders import DATA, SAMPLES
 from waves import EXACT, SHEET, SHEET_FACES, wave
 
 import gvpipe
-from gvpipe.arrays import Array, Float32
 from gvpipe.asset_coding.directory import OCTAHEDRAL, Listed
 from gvpipe.fields import head
 from gvpipe.fields.encoder import encode_field
@@ -24,7 +23,8 @@ from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.octahedral import angular_bound, from_octahedral, to_octahedral
 from gvpipe.fields.reader import FieldReader
 from gvpipe.fields.values import FieldBound
-from gvpipe.player import Player
+from gvpipe.foundation.arrays import Array, Float32
+from gvpipe.playback.player import Player
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no node")
 N_FRAMES = 21

@@ -18,12 +18,12 @@ from sequences import awkward, held, patched, waving
 
 import gvpipe
 from gvcodecs.mcgv.header import Header
-from gvpipe.codec import LevelReader
+from gvpipe.coding.codec import LevelReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file, write_file
 from gvpipe.media.video import VideoReader
-from gvpipe.player import _Level
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
+from gvpipe.playback.player import _Level
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no node")
 REAL = ("samba", "chicken", "cow", "kaykit_spin", "fox_run")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from sequences import waving
 
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import UP_AXES, VIEWS, Camera, framing
-from gvpipe.sequence import MeshSequence
 
 
 @pytest.mark.parametrize("up", UP_AXES)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.rasterizer.colormaps import COLORMAPS, STEPS, colormap
 from gvpipe.rasterizer.colours import error_colours, to_linear
 

@@ -13,10 +13,10 @@ from shapes import EMPTY, FRONT_VIEW, SQUARE, ball, sheet
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.material import Image, Material, Texture
 from gvpipe.asset.part import Part
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import Camera
 from gvpipe.rasterizer.colours import BACKGROUND, to_linear, to_srgb
 from gvpipe.rasterizer.renderer import MAX_LAYERS, Renderer
-from gvpipe.sequence import MeshSequence
 
 UNLIT = Material(unlit=True, double_sided=True)
 

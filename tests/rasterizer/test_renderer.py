@@ -10,7 +10,7 @@ import pytest
 from sequences import waving
 from shapes import FRONT_VIEW, SQUARE, ball, sheet
 
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.rasterizer.camera import Camera, framing
 from gvpipe.rasterizer.renderer import Renderer
 from gvpipe.rendering.films import parse_size

@@ -16,11 +16,11 @@ import gvpipe
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.material import Image, Material, Texture
 from gvpipe.asset.part import Part
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import Camera
 from gvpipe.rasterizer.colours import BACKGROUND, to_linear, to_srgb
 from gvpipe.rasterizer.renderer import Renderer
 from gvpipe.rasterizer.textures import MAX_SIDE, decode_image, pack
-from gvpipe.sequence import MeshSequence
 
 RED, GREEN, BLUE, WHITE = (200, 30, 20), (30, 180, 40), (20, 40, 190), (230, 230, 230)
 GREY = np.rint(255 * to_srgb(np.array(0.5)))  # half of full light

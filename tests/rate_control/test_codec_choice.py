@@ -12,15 +12,15 @@ from conftest import Finished
 from sequences import waving
 
 import gvpipe
-from gvpipe.codec import Codec
-from gvpipe.errors import InputError, SettingError
-from gvpipe.quality_scale import error_of
+from gvpipe.coding.codec import Codec
+from gvpipe.coding.quality_scale import error_of
+from gvpipe.coding.registry import codec_class
+from gvpipe.foundation.errors import InputError, SettingError
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rate_control import codec_choice
 from gvpipe.rate_control.codec_choice import choose_codec
 from gvpipe.rate_control.purposes import PURPOSES, candidates, describe
 from gvpipe.rate_control.targets import Target
-from gvpipe.registry import codec_class
-from gvpipe.sequence import MeshSequence
 
 Run = Callable[..., Finished]
 

@@ -18,17 +18,17 @@ from hypothesis import strategies as st
 from sequences import awkward, waving
 
 import gvpipe
-from gvpipe.codec import Encoded, Memo
+from gvpipe.coding.codec import Encoded, Memo
+from gvpipe.coding.registry import codec_class, codec_ids, open_reader
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.errors import InputError, SettingError
+from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.metrics.vertex_errors import Errors
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rate_control.quality_search import MOST_ENCODES, MOST_SCATTERED, TOLERANCE, find_quality
 from gvpipe.rate_control.smallest_search import find_smallest
 from gvpipe.rate_control.step_search import root_mean_square
 from gvpipe.rate_control.targets import Target, parse_bound
 from gvpipe.rate_control.trials import Trial
-from gvpipe.registry import codec_class, codec_ids, open_reader
-from gvpipe.sequence import MeshSequence
 
 EMPTY = Encoded(Bitstream("none", 1, 1, 1, 0, 30.0), np.arange(1))
 each_codec = pytest.mark.parametrize("codec", codec_ids())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gvpipe.codec import Encoded
+from gvpipe.coding.codec import Encoded
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.rate_control.step_search import BAND, Anchor, StepTrial, find_step, step_between
 

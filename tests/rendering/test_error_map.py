@@ -10,10 +10,10 @@ import pytest
 from sequences import waving
 
 import gvpipe
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.colours import error_colours
 from gvpipe.rendering.error_map import ErrorMap
-from gvpipe.sequence import MeshSequence
 
 
 def test_error_map_measures_in_percent_of_the_diagonal() -> None:

@@ -13,13 +13,13 @@ from shapes import FRONT_VIEW, SQUARE, sheet
 
 import gvpipe
 from gvpipe.asset.field import Field
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.colormaps import colormap
 from gvpipe.rasterizer.colours import HOLE, to_linear
 from gvpipe.rasterizer.renderer import Renderer
 from gvpipe.rendering.field_map import FieldMap, parse_range
 from gvpipe.rendering.legend import MOST_TICKS, round_ticks
-from gvpipe.sequence import MeshSequence
 
 Run = Callable[..., Any]
 

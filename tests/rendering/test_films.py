@@ -19,12 +19,12 @@ import gvpipe
 from gvpipe.asset.material import Image as AssetImage
 from gvpipe.asset.material import Material, Texture
 from gvpipe.asset.metadata import Metadata
-from gvpipe.errors import InputError, OutputError
+from gvpipe.foundation.errors import InputError, OutputError
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import Camera, framing
 from gvpipe.rasterizer.renderer import Renderer
 from gvpipe.rendering.films import Film
 from gvpipe.rendering.poster import make_poster, paint
-from gvpipe.sequence import MeshSequence
 
 Run = Callable[..., Any]
 

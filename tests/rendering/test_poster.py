@@ -8,10 +8,10 @@ import av
 import numpy as np
 import pytest
 
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import framing
 from gvpipe.rasterizer.renderer import Renderer
 from gvpipe.rendering.poster import make_poster, paint
-from gvpipe.sequence import MeshSequence
 
 
 def test_poster_is_a_grey_picture_of_the_mesh_that_lasts(sequence: MeshSequence) -> None:

@@ -11,9 +11,9 @@ import pytest
 from numba.core import types
 from numba.core.types import containers
 
-from gvpipe.compiled import compiled
 from gvpipe.runtime import code_file
 from gvpipe.runtime.code_file import HEAD, Unstorable, pack, rebuild, unpack
+from gvpipe.runtime.compiled import compiled
 
 NAMED = ValueError, KeyError, TypeError, AttributeError, ImportError
 

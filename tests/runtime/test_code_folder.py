@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gvpipe.isolation.python import run_python
+from gvpipe.foundation.isolation.python import run_python
 from gvpipe.runtime import code_folder
 from gvpipe.runtime.code_folder import _choose, _fault, own_folder, why_none
 

@@ -14,7 +14,7 @@ from sequences import waving
 
 import gvpipe
 from gvpipe.batch.runs import encode_all
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.tasks import cluster
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # Dask's own

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import task_functions
 
-from gvpipe.errors import InputError, SettingError
+from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.tasks.choice import open_executor
 from gvpipe.tasks.executor import WorkerDied
 from gvpipe.tasks.processes import Processes

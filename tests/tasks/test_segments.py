@@ -14,12 +14,12 @@ from click.testing import CliRunner
 from sequences import held, partly_still, waving
 
 import gvpipe
-from gvpipe import files
-from gvpipe.budget import Budget
 from gvpipe.cli.commands import cli
-from gvpipe.errors import InputError, SettingError
-from gvpipe.segment_map import map_segments, segments_mapped_by
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.budget import Budget
+from gvpipe.foundation.errors import InputError, SettingError
+from gvpipe.model.sequence import MeshSequence
+from gvpipe.playback import files
+from gvpipe.runtime.segment_map import map_segments, segments_mapped_by
 from gvpipe.tasks.executor import Outcome, Prepare, WorkerDied
 from gvpipe.tasks.segments import RemoteSegments, SharedSegments
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 from gvpipe.trajectory import coefficient_coding
 from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
 from gvpipe.trajectory.temporal_neighbours import temporal_order

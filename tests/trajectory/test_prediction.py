@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 from gvpipe.trajectory.batch_kernels import sort_window
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.kalman_kernels import predict_in_batches

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gvpipe.arrays import Float64
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.errors import CorruptFile
 from gvpipe.trajectory import reconstruction
 from gvpipe.trajectory.basis import Basis
 from gvpipe.trajectory.product_kernels import MANY_FRAMES, TILE

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from sequences import waving
 
 import gvpipe
-import gvpipe.sequence
+import gvpipe.model.sequence
 from gvpipe.container.cursor import varint
 from gvpipe.entropy.integers import encode_integers
-from gvpipe.errors import CorruptFile
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import CorruptFile
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.still_vertices import decode_flags, encode_flags, find_still
 
 NO_FACES = np.zeros((0, 3), np.int32)
@@ -103,7 +103,7 @@ def test_garbage(data: bytes, n: int) -> None:
 
 @pytest.mark.parametrize("frames_of_a_chunk", [100, 1, 2])
 def test_still_vertices_have_one_position(frames_of_a_chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gvpipe.sequence, "CHUNK_BYTES", 12 * 30 * frames_of_a_chunk)
+    monkeypatch.setattr(gvpipe.model.sequence, "CHUNK_BYTES", 12 * 30 * frames_of_a_chunk)
     draw = np.random.default_rng(2)
     frames = np.repeat(draw.random((1, 30, 3)).astype(np.float32), 7, axis=0)
     frames[draw.integers(1, 7, 9), np.arange(9), draw.integers(0, 3, 9)] += np.float32(1e-6)  # once, and back

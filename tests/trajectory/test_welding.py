@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-import gvpipe.sequence
-from gvpipe.sequence import MeshSequence
+import gvpipe.model.sequence
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory import welding
 from gvpipe.trajectory.welding import _group_nearby, find_points
 
@@ -33,7 +33,7 @@ class Lazy:
 def frames_of_a_chunk(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[int | None]:
     """Sequences of 40 vertices come in chunks of so many frames."""
     if request.param:
-        monkeypatch.setattr(gvpipe.sequence, "CHUNK_BYTES", 12 * 40 * request.param)
+        monkeypatch.setattr(gvpipe.model.sequence, "CHUNK_BYTES", 12 * 40 * request.param)
     yield request.param
 
 
@@ -129,7 +129,7 @@ def test_an_explosion_from_one_place(frames_of_a_chunk: int | None) -> None:
 
 
 def test_chunks_are_left_out_once_all_vertices_are_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gvpipe.sequence, "CHUNK_BYTES", 12 * 40)
+    monkeypatch.setattr(gvpipe.model.sequence, "CHUNK_BYTES", 12 * 40)
     lazy = Lazy(np.random.default_rng(0).random((30, 40, 3)).astype(np.float32))
     assert np.array_equal(find_points(MeshSequence(lazy, NO_FACES)), np.arange(40))
     assert lazy.loaded <= 2

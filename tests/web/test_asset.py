@@ -20,13 +20,13 @@ from sequences import awkward, waving
 
 import gvpipe
 from gvpipe import Attribute, Field, Image, Material, Part, Texture
+from gvpipe.coding.registry import codec_class
 from gvpipe.container.mp4 import read_file
 from gvpipe.fields import head
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.reader import FieldReader
-from gvpipe.player import Player
-from gvpipe.registry import codec_class
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
+from gvpipe.playback.player import Player
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())]
 READ = f"""{TEXT} const video = await GeometryVideo.load(args[0]);

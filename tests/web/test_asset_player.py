@@ -19,7 +19,7 @@ from PIL import Image as Pillow
 
 import gvpipe
 from gvpipe import Attribute, Field, Image, Material, Part, Texture
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())]
 RED, GREEN, BLUE, WHITE = [230, 20, 20], [10, 200, 30], [20, 30, 220], [240, 240, 240]

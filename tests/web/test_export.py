@@ -26,11 +26,11 @@ from sequences import waving
 
 import gvpipe
 from gvcodecs.mcgv import browser
-from gvpipe.errors import CorruptFile, InputError, OutputError
+from gvpipe.coding.quality_scale import error_of
+from gvpipe.coding.registry import codec_class
+from gvpipe.foundation.errors import CorruptFile, InputError, OutputError
 from gvpipe.media.jpeg import decode_jpeg
-from gvpipe.quality_scale import error_of
 from gvpipe.rate_control.trials import Trial, Trials
-from gvpipe.registry import codec_class
 from gvpipe.web.export import MOST_ENCODES
 
 WEB = Path(gvpipe.__file__).parent / "web"

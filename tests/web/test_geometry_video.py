@@ -22,13 +22,13 @@ from sequences import awkward, held, patched, rigid, waving
 import gvpipe
 from gvcodecs.mcgv.base.surface import read_surface
 from gvcodecs.mcgv.header import Header
+from gvpipe.coding.corrections.bound import Bound, encode_corrections
+from gvpipe.coding.registry import make_codec, open_reader
+from gvpipe.coding.repeated_frames import RepeatedFrames, add_repeated_frames
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_file, write_file
-from gvpipe.corrections.bound import Bound, encode_corrections
-from gvpipe.errors import CorruptFile
-from gvpipe.registry import make_codec, open_reader
-from gvpipe.repeated_frames import RepeatedFrames, add_repeated_frames
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import CorruptFile
+from gvpipe.model.sequence import MeshSequence
 
 pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())
 slow = pytest.mark.slow  # the default run has one test of exact positions and one of the player

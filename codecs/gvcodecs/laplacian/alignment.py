@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Integers
+from gvpipe.foundation.arrays import Float64, Integers
 
 
 class Groups:

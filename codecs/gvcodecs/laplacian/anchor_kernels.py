@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Int32
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Bool, Int32
 from gvpipe.mesh.hierarchy_kernels import Hierarchy
+from gvpipe.runtime.compiled import compiled
 from gvpipe.trajectory.causal_kernels import keep_ranks
 from gvpipe.trajectory.causal_order import CausalOrder
 

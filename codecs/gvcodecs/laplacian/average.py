@@ -21,9 +21,9 @@ import numpy as np
 from gvcodecs.laplacian.alignment import Groups, rotations
 from gvcodecs.laplacian.edge_shape import EdgeShapeSum
 from gvcodecs.laplacian.shape_fit import fit_shape
-from gvpipe.arrays import Float64, Int32
+from gvpipe.foundation.arrays import Float64, Int32
 from gvpipe.mesh.topology import adjacency, components
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 BLOCK = 8  # frames aligned at a time, to the mean of those before
 ALIGNED = 64  # frames aligned at most, evenly spread: they give no more than a start

@@ -17,10 +17,10 @@ from gvcodecs.laplacian.coefficients import decode_coefficients, encode_coeffici
 from gvcodecs.laplacian.domain import Surface, build_domain
 from gvcodecs.laplacian.header import CoefficientCoding
 from gvcodecs.laplacian.mesh_scale import edge_lengths
-from gvpipe.arrays import Float64
-from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block
-from gvpipe.errors import InputError, corrupt_section
+from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.budget import UNLIMITED, Budget
+from gvpipe.foundation.errors import InputError, corrupt_section
 
 NAME = "average"
 SPACING = 256  # points per anchor

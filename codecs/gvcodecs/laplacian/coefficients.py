@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from gvcodecs.laplacian.domain import Domain
 from gvcodecs.laplacian.header import CoefficientCoding
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from gvcodecs.laplacian.neighbour_search import causal_around
 from gvcodecs.laplacian.rigid_kernels import rigid_weights
-from gvpipe.arrays import Bool, Float64, Int32
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Bool, Float64, Int32
 from gvpipe.mesh.graph_kernels import Graph
 from gvpipe.mesh.hierarchy_kernels import Hierarchy
+from gvpipe.runtime.compiled import compiled
 from gvpipe.trajectory.causal_order import CausalOrder
 
 REACH = 160  # points that the search for causal neighbours visits at most

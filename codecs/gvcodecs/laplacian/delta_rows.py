@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float64, Int32
+from gvpipe.foundation.arrays import Bool, Float64, Int32
 from gvpipe.trajectory.causal_order import CausalOrder
 
 if TYPE_CHECKING:

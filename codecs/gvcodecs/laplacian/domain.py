@@ -13,8 +13,8 @@ from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian
 from gvcodecs.laplacian.header import CoefficientCoding
 from gvcodecs.laplacian.laplace_operators import laplacian
 from gvcodecs.laplacian.normal_equations import STEPS, count_fill, most_products
-from gvpipe.arrays import Bool, Float64, Int32
-from gvpipe.budget import UNLIMITED, Budget
+from gvpipe.foundation.arrays import Bool, Float64, Int32
+from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.mesh.topology import unique_edges
 from gvpipe.trajectory.causal_order import CausalOrder

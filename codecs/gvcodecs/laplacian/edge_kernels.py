@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Array
+from gvpipe.runtime.compiled import compiled
 
 COLLAPSED = 0.01  # height over edge of faces whose vote counts half
 TINY = 1e-300

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Float64, Int32
+from gvpipe.foundation.arrays import Float32, Float64, Int32
 from gvpipe.mesh.topology import unique_edges
 
 

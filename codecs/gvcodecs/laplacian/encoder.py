@@ -41,13 +41,14 @@ from gvcodecs.laplacian.header import (
 )
 from gvcodecs.laplacian.laplace_operators import OPERATORS
 from gvcodecs.laplacian.reader import LaplacianReader
-from gvpipe.arrays import Int64
-from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
+from gvpipe.coding.codec import BaseCodec, Encoded, FrameReader, Memo
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_parts
+from gvpipe.foundation.arrays import Int64
+from gvpipe.foundation.progress import Progress
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rate_control.step_search import NEAR, Anchor, StepTrial, find_step, first_step, step_between
-from gvpipe.segment_map import map_segments
-from gvpipe.sequence import MeshSequence
+from gvpipe.runtime.segment_map import map_segments
 from gvpipe.trajectory.basis import MAX_COMPONENTS, reduce_trajectories
 from gvpipe.trajectory.coded_points import CodedConnectivity, code_connectivity, read_trajectories, sum_squared_errors
 from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
@@ -63,7 +64,7 @@ class Laplacian(BaseCodec):
     """Settings of the geometric-Laplacian codec.
 
     Errors are small between neighbours and grow from anchor to anchor, on thin parts and small meshes the most. So the error
-    that quality asks for (`gvpipe.quality_scale`) is met by a loop: encode, measure, correct the step. A given number of
+    that quality asks for (`gvpipe.coding.quality_scale`) is met by a loop: encode, measure, correct the step. A given number of
     ``components`` sets the error itself, and the step is not corrected.
 
     Raises:
@@ -73,9 +74,9 @@ class Laplacian(BaseCodec):
     id: ClassVar[str] = "laplacian"
     version: ClassVar[int] = VERSION_STILL
     summary: ClassVar[str] = "trajectory PCA through geometric Laplacians: smallest files at equal perceived distortion"
-    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
-    maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.segment_map`)
-    memory_factor: ClassVar[float] = 11.0  # of a segment's positions as float32 (`gvpipe.segment_memory`)
+    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
+    maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.runtime.segment_map`)
+    memory_factor: ClassVar[float] = 11.0  # of a segment's positions as float32 (`gvpipe.coding.segment_memory`)
 
     quality: float = 75.0  # 0..100, higher is better
     operator: str = "mean-value"  # mean-value, cotangent or tutte

@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gvcodecs.laplacian.normal_equations import NormalEquations
-from gvpipe.arrays import Bool, Float64, Int32
-from gvpipe.budget import UNLIMITED, Budget
+from gvpipe.foundation.arrays import Bool, Float64, Int32
+from gvpipe.foundation.budget import UNLIMITED, Budget
 
 if TYPE_CHECKING:
     from gvpipe.trajectory.product_kernels import Rows

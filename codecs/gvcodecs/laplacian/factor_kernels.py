@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gvcodecs.laplacian.operator_kernels import Lower
-from gvpipe.arrays import Float64, Int32, Int64
-from gvpipe.compiled import compiled
-from gvpipe.lanes import LANES, load, same, store
+from gvpipe.foundation.arrays import Float64, Int32, Int64
+from gvpipe.runtime.compiled import compiled
+from gvpipe.runtime.lanes import LANES, load, same, store
 
 NONE = -1
 AT_ONCE = 64  # columns

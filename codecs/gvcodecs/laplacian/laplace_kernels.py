@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float64, Int32
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Bool, Float64, Int32
 from gvpipe.mesh.graph_kernels import Graph
+from gvpipe.runtime.compiled import compiled
 from gvpipe.trajectory.product_kernels import Rows
 
 MEAN_VALUE, COTANGENT, TUTTE = 0, 1, 2  # operators

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from gvpipe.arrays import Float64, Int32
+from gvpipe.foundation.arrays import Float64, Int32
 
 if TYPE_CHECKING:
     from gvpipe.mesh.graph_kernels import Graph

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gvcodecs.laplacian.vectors import norm
-from gvpipe.arrays import Float64, Int32
+from gvpipe.foundation.arrays import Float64, Int32
 
 
 def edge_lengths(points: Float64, edges: Int32) -> Float64:

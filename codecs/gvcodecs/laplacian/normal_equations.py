@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int32, Int64
-from gvpipe.budget import ALLOW, UNLIMITED, Budget
-from gvpipe.errors import OverBudget
+from gvpipe.foundation.arrays import Float64, Int32, Int64
+from gvpipe.foundation.budget import ALLOW, UNLIMITED, Budget
+from gvpipe.foundation.errors import OverBudget
 
 if TYPE_CHECKING:
     from gvcodecs.laplacian.factor_kernels import Factors

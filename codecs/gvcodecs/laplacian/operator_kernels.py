@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int32, Int64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Float64, Int32, Int64
+from gvpipe.runtime.compiled import compiled
 from gvpipe.trajectory.product_kernels import Rows
 
 NONE = -1

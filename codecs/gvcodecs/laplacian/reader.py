@@ -13,11 +13,11 @@ from gvcodecs.laplacian.coefficients import decode_coefficients
 from gvcodecs.laplacian.domain import Domain, Surface, build_domain, build_surface
 from gvcodecs.laplacian.header import Header
 from gvcodecs.laplacian.normal_equations import Singular
-from gvpipe.arrays import Float32, Int32
 from gvpipe.connectivity.topology_only import open_mesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
-from gvpipe.errors import corrupt_section
+from gvpipe.foundation.arrays import Float32, Int32
+from gvpipe.foundation.errors import corrupt_section
 from gvpipe.mesh.hierarchy import keep_hierarchy
 from gvpipe.trajectory.basis import decode_basis
 from gvpipe.trajectory.reconstruction import Segment, read_frames

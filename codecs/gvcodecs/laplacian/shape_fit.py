@@ -19,7 +19,7 @@ from scipy import sparse
 
 from gvcodecs.laplacian.edge_shape import EdgeShape
 from gvcodecs.laplacian.vectors import dot
-from gvpipe.arrays import Float64, Integers
+from gvpipe.foundation.arrays import Float64, Integers
 
 BENDING = 0.1  # squared relative length error that a squared radian weighs as much as
 SHORTEST = 2e-2  # least length that divides, in mean edge lengths

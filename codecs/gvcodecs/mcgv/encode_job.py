@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gvcodecs.mcgv.settings import Settings
-from gvpipe.codec import Memo, Progress
-from gvpipe.sequence import MeshSequence
+from gvpipe.coding.codec import Memo
+from gvpipe.foundation.progress import Progress
+from gvpipe.model.sequence import MeshSequence
 
 LARGE = 1_500_000  # vertices of all frames
 HEAVY = 1 << 18  # vertices

@@ -17,14 +17,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gvcodecs.mcgv.browser import browser_obstacle
 from gvcodecs.mcgv.encode_job import Job
-from gvcodecs.mcgv.reader_choice import open_reader, segment_parts
+from gvcodecs.mcgv.reader import browser_obstacle, open_reader, segment_parts
 from gvcodecs.mcgv.settings import Settings
-from gvpipe.codec import Encoded, FrameReader, Memo, Progress
+from gvpipe.coding.codec import Encoded, FrameReader, Memo
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import SegmentParts
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.progress import Progress
+from gvpipe.model.sequence import MeshSequence
 
 
 @dataclass(frozen=True)

@@ -34,10 +34,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
+from gvpipe.connectivity.lattice_field import read_lattice
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.lattice_field import read_lattice
 from gvpipe.container.segments import HUGE, TINY
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 from gvpipe.media.video import MAX_SIDE, PROFILES, Profile
 from gvpipe.mesh.lattice import Lattice
 

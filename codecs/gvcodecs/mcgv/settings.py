@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 
 from gvcodecs.mcgv.header import MAX_CLUSTERS, PLACEMENTS, PREDICTIONS
 from gvcodecs.mcgv.trajectory_header import TRANSFORMS
-from gvpipe.codec import BaseCodec
+from gvpipe.coding.codec import BaseCodec
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT
-from gvpipe.errors import SettingError
+from gvpipe.foundation.errors import SettingError
 from gvpipe.media.video import PROFILES, Profile
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 BLOCKS = {"h264": 16, "jpeg": 8}  # sides of the image coders' blocks, pixels
 MAX_TILED = 1 << 15  # points: beyond, xatlas takes longer than all else, and chart labels are a tenth of a smooth mesh's file
@@ -34,7 +34,7 @@ class Settings(BaseCodec):
     version: ClassVar[int] = 5
     holds_version: ClassVar[int] = 3  # the oldest whose readers know repeated frames
     summary: ClassVar[str] = "multi-chart geometry video: residual images of a blended affine prediction, as H.264 or JPEG"
-    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
+    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
 
     quality: float = 75.0  # 0..100, higher is better
     image: str = "h264"  # h264: predictive; jpeg: every frame decodes alone

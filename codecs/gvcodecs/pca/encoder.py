@@ -20,14 +20,15 @@ import numpy as np
 
 from gvcodecs.pca.header import MAX_SEGMENTS, VERSION_STILL, Header
 from gvcodecs.pca.reader import PcaReader, causal_order, coarse_levels
-from gvpipe.arrays import Int64
-from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
+from gvpipe.coding.codec import BaseCodec, Encoded, FrameReader, Memo
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_parts
+from gvpipe.foundation.arrays import Int64
+from gvpipe.foundation.progress import Progress
 from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.mesh.hierarchy_kernels import Hierarchy
-from gvpipe.segment_map import map_segments
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
+from gvpipe.runtime.segment_map import map_segments
 from gvpipe.trajectory.basis import MAX_COMPONENTS, Reduced, reduce_trajectories
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.causal_selection import leave_out
@@ -43,7 +44,8 @@ LEFT = 0.93  # part of the error asked of `reduce_trajectories` that is left: sm
 class Pca(BaseCodec):
     """Settings of the trajectory PCA codec.
 
-    The error that quality asks for (`gvpipe.quality_scale`) is met without a loop: how it follows from the step is known well.
+    The error that quality asks for (`gvpipe.coding.quality_scale`) is met without a loop: how it follows from the step is known
+    well.
 
     Raises:
         SettingError: a value out of its range.
@@ -52,9 +54,9 @@ class Pca(BaseCodec):
     id: ClassVar[str] = "pca"
     version: ClassVar[int] = VERSION_STILL
     summary: ClassVar[str] = "trajectory PCA with geometric predictors: smallest files, levels of detail"
-    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
-    maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.segment_map`)
-    memory_factor: ClassVar[float] = 5.0  # of a segment's positions as float32 (`gvpipe.segment_memory`)
+    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
+    maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.runtime.segment_map`)
+    memory_factor: ClassVar[float] = 5.0  # of a segment's positions as float32 (`gvpipe.coding.segment_memory`)
 
     quality: float = 75.0  # 0..100, higher is better
     predictor: str = "kalman"  # kalman, or the paper's rbf, lsp, navg

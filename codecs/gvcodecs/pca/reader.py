@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gvcodecs.pca.header import Header
-from gvpipe.arrays import Float32, Int32
 from gvpipe.connectivity.topology_only import Topology, open_mesh
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Float32, Int32
+from gvpipe.foundation.errors import InputError
 from gvpipe.mesh.hierarchy import build_hierarchy, keep_hierarchy, level_faces
 from gvpipe.trajectory.basis import decode_basis
 from gvpipe.trajectory.causal_order import CausalOrder

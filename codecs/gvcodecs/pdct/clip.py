@@ -33,13 +33,13 @@ from gvcodecs.pdct.delta_coding import DeltaDecoder, DeltaEncoder
 from gvcodecs.pdct.dictionary import BaseFrame, Dictionary, frames_of
 from gvcodecs.pdct.labels import decode_labels, encode_labels
 from gvcodecs.pdct.seed_coding import decode_seeds, encode_seeds
-from gvpipe.arrays import Float32, Float64, Int64
-from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.container.segments import HUGE, TINY
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.entropy.tokens import tokenise
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Float32, Float64, Int64
+from gvpipe.foundation.budget import UNLIMITED, Budget
+from gvpipe.foundation.errors import InputError
 from gvpipe.mesh.lattice import Lattice
 
 HEAD = struct.Struct("<6d")

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvcodecs.pdct.local_frames import local_frames
-from gvpipe.arrays import Float32, Float64, Int32, Int64
+from gvpipe.foundation.arrays import Float32, Float64, Int32, Int64
 
 SAMPLES = 24  # frames, evenly spaced, that clustering looks at
 THIN = 1e-4  # a triangle whose height is below this part of its longest side is degenerate

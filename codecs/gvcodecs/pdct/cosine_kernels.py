@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Float64
+from gvpipe.runtime.compiled import compiled
 
 EIGHTH = 0.78539816339744830962  # of a full turn, radians
 N_TERMS = 9  # of the series of sine and cosine within an eighth of a turn: exact to a unit in the last place or two

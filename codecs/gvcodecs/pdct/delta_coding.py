@@ -22,10 +22,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gvpipe.arrays import Float64, Int64, UInt8, UInt32
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.range_decoder import start
 from gvpipe.entropy.tokens import model, tokenise
+from gvpipe.foundation.arrays import Float64, Int64, UInt8, UInt32
 
 if TYPE_CHECKING:
     from gvcodecs.pdct.delta_kernels import Layout

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Int64, UInt8, UInt32, UInt64
-from gvpipe.compiled import compiled
 from gvpipe.entropy.range_decoder import TOTAL, decode_symbols
 from gvpipe.entropy.tokens import DIRECT
+from gvpipe.foundation.arrays import Int64, UInt8, UInt32, UInt64
+from gvpipe.runtime.compiled import compiled
 
 MAX_BITS = 36  # bit length of the largest folded value
 N_TOKENS = DIRECT + 2 * (MAX_BITS - 4)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int32, Int64, Integers
+from gvpipe.foundation.arrays import Float64, Int32, Int64, Integers
 from gvpipe.mesh.lattice import Lattice
 
 if TYPE_CHECKING:

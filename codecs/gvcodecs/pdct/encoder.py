@@ -23,18 +23,19 @@ from gvcodecs.pdct.dictionary import BaseFrame
 from gvcodecs.pdct.header import MAX_CLIPS, VERSION_LIVE, VERSION_POINTS, Header, surface_of, surface_of_points
 from gvcodecs.pdct.reader import PdctReader
 from gvcodecs.pdct.still_points import SECTION, encode_still
-from gvpipe.arrays import Float32, Int32, Int64
-from gvpipe.codec import BaseCodec, Encoded, FrameReader, Memo, Progress
+from gvpipe.coding.codec import BaseCodec, Encoded, FrameReader, Memo
+from gvpipe.coding.quality_scale import error_of
 from gvpipe.connectivity.base_mesh import EncodedMesh, encode_base
 from gvpipe.connectivity.welded_mesh import WeldedMesh, encode_points
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_parts
+from gvpipe.foundation.arrays import Float32, Int32, Int64
+from gvpipe.foundation.progress import Progress
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.metrics.vertex_errors import measure_spread
-from gvpipe.quality_scale import error_of
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.rate_control.step_search import NEAR, Anchor, StepTrial, find_step, first_step, root_mean_square, step_between
-from gvpipe.segment_map import map_segments
-from gvpipe.sequence import MeshSequence
+from gvpipe.runtime.segment_map import map_segments
 from gvpipe.trajectory.still_vertices import find_still
 from gvpipe.trajectory.welding import find_points
 
@@ -49,8 +50,8 @@ SMALLEST = 1e-9  # step, part of a clip's diagonal
 class Pdct(BaseCodec):
     """Settings of the predictive DCT codec.
 
-    The error that quality asks for (`gvpipe.quality_scale`) is met by a loop: encode, measure, correct the step of the delta
-    coefficients. With ``kept``, which sets the error itself, the step is not corrected.
+    The error that quality asks for (`gvpipe.coding.quality_scale`) is met by a loop: encode, measure, correct the step of the
+    delta coefficients. With ``kept``, which sets the error itself, the step is not corrected.
 
     Raises:
         SettingError: a value out of its range.
@@ -60,9 +61,9 @@ class Pdct(BaseCodec):
     version: ClassVar[int] = VERSION_LIVE
     holds_version: ClassVar[int] = VERSION_POINTS
     summary: ClassVar[str] = "predictive DCT in local coordinate frames: streams frame by frame, short clips"
-    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.repeated_frames`)
-    maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.segment_map`)
-    memory_factor: ClassVar[float] = 7.0  # of a segment's positions as float32 (`gvpipe.segment_memory`)
+    holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
+    maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.runtime.segment_map`)
+    memory_factor: ClassVar[float] = 7.0  # of a segment's positions as float32 (`gvpipe.coding.segment_memory`)
 
     quality: float = 75.0  # 0..100, higher is better
     clusters: int = 0  # N, seed triangles per clip, 1..1024; 0: one per 200 vertices, 20..64
@@ -125,7 +126,7 @@ class Pdct(BaseCodec):
         return numbered_parts(("clip",), Header.of(bitstream).clips)
 
     def start_live(self, frame: Float32, faces: Int32, fps: float) -> ClipCoder:
-        """Code frames that come one by one, the first of which is ``frame (V, 3)`` (`gvpipe.codec.LiveCoder`)."""
+        """Code frames that come one by one, the first of which is ``frame (V, 3)`` (`gvpipe.coding.codec.LiveCoder`)."""
         return ClipCoder(self, frame, faces, fps)
 
     def open_step(self, diagonal: float) -> float:

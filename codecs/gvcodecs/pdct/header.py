@@ -21,11 +21,11 @@ import numpy as np
 
 from gvcodecs.pdct.dictionary import BaseFrame
 from gvpipe.connectivity.base_mesh import BaseMesh
+from gvpipe.connectivity.lattice_field import read_lattice
 from gvpipe.connectivity.welded_mesh import WeldedMesh
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.lattice_field import read_lattice
 from gvpipe.container.segments import MAX_SEGMENT, count_segments, read_segments, segment_starts
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 from gvpipe.mesh.lattice import Lattice
 
 VERSION_POINTS = 2  # vertices that share a trajectory are one point; sections `still` and `holds`

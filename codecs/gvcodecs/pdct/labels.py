@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
+from gvpipe.foundation.arrays import Int64
 
 
 def encode_labels(labels: Int64, n_clusters: int) -> bytes:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Floats, Integers
+from gvpipe.foundation.arrays import Float64, Floats, Integers
 
 
 def local_frames(triangles: Floats | Integers) -> tuple[Float64, Float64]:

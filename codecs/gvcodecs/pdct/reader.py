@@ -9,12 +9,12 @@ import numpy as np
 from gvcodecs.pdct.clip import count_bytes, decode_clip
 from gvcodecs.pdct.header import VERSION_POINTS, Header, surface_of, surface_of_points
 from gvcodecs.pdct.still_points import SECTION, decode_still
-from gvpipe.ahead import AHEAD, run_ahead
-from gvpipe.arrays import Float32, Int32, Int64
 from gvpipe.connectivity.base_mesh import read_base
 from gvpipe.connectivity.welded_mesh import read_points
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segments_between
+from gvpipe.foundation.arrays import Float32, Int32, Int64
+from gvpipe.runtime.ahead import AHEAD, run_ahead
 
 BYTES_PER_POINT, SECONDS_PER_POINT = 200, 1e-6  # of the base frame, its traversal, still points
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64
 from gvpipe.container.cursor import Cursor
 from gvpipe.entropy.series import decode_series, encode_series
+from gvpipe.foundation.arrays import Int64
 
 ORDERS = (1, 2)
 MAX_COORDINATE = 1 << 30  # lattice steps from the lattice's origin

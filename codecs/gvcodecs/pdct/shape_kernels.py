@@ -8,8 +8,8 @@ import numpy as np
 
 from gvcodecs.pdct.cosine_kernels import invert_cosines
 from gvcodecs.pdct.delta_kernels import UNIT, Layout
-from gvpipe.arrays import Float32, Float64, Int64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Float32, Float64, Int64
+from gvpipe.runtime.compiled import compiled
 
 LARGEST = float(np.finfo(np.float32).max)
 FINE_PART = 16  # the lowest 1/16 of a cluster's frequencies can have a finer step

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.pdct.dictionary import BaseFrame
-from gvpipe.arrays import Bool, Float32
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.segments import LARGEST_STEP, SMALLEST_STEP
 from gvpipe.entropy.integers import decode_integers, encode_integers
+from gvpipe.foundation.arrays import Bool, Float32
 from gvpipe.trajectory.still_vertices import decode_flags, encode_flags
 
 SECTION = "still"

@@ -22,14 +22,14 @@ from gvcodecs.pdct.dictionary import BaseFrame
 from gvcodecs.pdct.encoder import ClipCoder, Pdct
 from gvcodecs.pdct.header import surface_of
 from gvcodecs.pdct.reader import BYTES_PER_POINT, SECONDS_PER_POINT
-from gvpipe.arrays import Float32, Floats, Int32, Integers
-from gvpipe.budget import Budget
 from gvpipe.connectivity.base_mesh import BaseMesh, decode_base, keep_mesh
+from gvpipe.connectivity.lattice_field import read_lattice
 from gvpipe.container.json_object import JsonObject
-from gvpipe.container.lattice_field import read_lattice
 from gvpipe.container.segments import MAX_SEGMENT
-from gvpipe.errors import CorruptFile, InputError, NewerVersion, NotGeometryVideo, TruncatedFile
-from gvpipe.sequence import check_finite
+from gvpipe.foundation.arrays import Float32, Floats, Int32, Integers
+from gvpipe.foundation.budget import Budget
+from gvpipe.foundation.errors import CorruptFile, InputError, NewerVersion, NotGeometryVideo, TruncatedFile
+from gvpipe.model.sequence import check_finite
 
 MAGIC = b"gvpdct\r\n"
 VERSION = 1
@@ -110,7 +110,7 @@ class StreamReader:
 
     `feed` the bytes, and iterate over what it returns: the frames that have become complete, ``(V, 3) float32``, model units.
 
-    The bytes that have come so far limit what the mesh and each clip may cost (`gvpipe.budget`).
+    The bytes that have come so far limit what the mesh and each clip may cost (`gvpipe.foundation.budget`).
 
     Args:
         unlimited: let them take whatever memory and work they ask for.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.damage import WHOLE, reading
 
 EXTRA = "Alembic files need the package alembic3d; install it by: pip install 'gvpipe[alembic]'"

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64
+from gvpipe.foundation.arrays import Array, Float64
 from gvpipe.io.alembic.archive import Node, sample_of
 from gvpipe.io.alembic.numbers import as_matrix
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64, Int64
+from gvpipe.foundation.arrays import Array, Float64, Int64
 
 
 def as_numbers(held: Any) -> Array:

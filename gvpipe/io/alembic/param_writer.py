@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int64
-from gvpipe.io.scene_export import as_unit_range
-from gvpipe.io.scene_mesh import Layer
+from gvpipe.foundation.arrays import Array, Int64
+from gvpipe.io.scene.export import as_unit_range
+from gvpipe.io.scene.mesh import Layer
 
 SCOPES = {
     "constant": "kConstantScope",

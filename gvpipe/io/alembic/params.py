@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64
+from gvpipe.foundation.arrays import Array, Float64
 from gvpipe.io.alembic.numbers import as_integers, as_numbers
-from gvpipe.io.scene_fields import Sampled
-from gvpipe.io.scene_mesh import Layer, SceneMesh
+from gvpipe.io.scene.fields import Sampled
+from gvpipe.io.scene.mesh import Layer, SceneMesh
 
 SCOPES = {
     "kUniformScope": "polygon",

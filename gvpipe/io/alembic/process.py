@@ -6,13 +6,13 @@ import importlib.util
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.alembic.archive import EXTRA
-from gvpipe.io.library_process import LibraryProcess
+from gvpipe.io.library.process import LibraryProcess
 from gvpipe.io.options import ReadOptions
 
 if TYPE_CHECKING:
-    from gvpipe.sequence import MeshSequence
+    from gvpipe.model.sequence import MeshSequence
 
 WORKER = "gvpipe.io.alembic.worker"
 DIED = "Alembic's library died of it"
@@ -24,6 +24,6 @@ def read_alembic(path: Path, options: ReadOptions) -> MeshSequence:
         raise InputError(f"{path}: {EXTRA}")
     process = LibraryProcess(path, WORKER, "Alembic", DIED)
     process.start()
-    from gvpipe.io.scene_process import read_scene  # NumPy loads here while it loads there
+    from gvpipe.io.scene.process import read_scene  # NumPy loads here while it loads there
 
     return read_scene(process, str(path), options)

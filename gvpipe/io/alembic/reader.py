@@ -11,24 +11,24 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int64
 from gvpipe.asset.material import Material
 from gvpipe.asset.metadata import Metadata
-from gvpipe.errors import InputError, TopologyChange
+from gvpipe.foundation.arrays import Float64, Int64
+from gvpipe.foundation.errors import InputError, TopologyChange
+from gvpipe.foundation.notes import DEFAULT_FPS
 from gvpipe.io.alembic.archive import Node, find_meshes, open_archive, sample_of
 from gvpipe.io.alembic.motion import AlembicMotion, around
 from gvpipe.io.alembic.numbers import as_integers
 from gvpipe.io.alembic.params import changing_normals, layers_of, sampled_of
 from gvpipe.io.damage import reading
-from gvpipe.io.hiding import hidden_note
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_fields import join_fields, misfit_note
-from gvpipe.io.scene_frames import SceneFrames, even_times, first_frame_of
-from gvpipe.io.scene_layers import join_layers
-from gvpipe.io.scene_mesh import SceneMesh, join
-from gvpipe.notes import DEFAULT_FPS
-from gvpipe.sequence import MeshSequence
+from gvpipe.io.scene.fields import join_fields, misfit_note
+from gvpipe.io.scene.frames import SceneFrames, even_times, first_frame_of
+from gvpipe.io.scene.hiding import hidden_note
+from gvpipe.io.scene.layers import join_layers
+from gvpipe.io.scene.mesh import SceneMesh, join
+from gvpipe.model.sequence import MeshSequence
 
 
 def read_archive(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from gvpipe.foundation.isolation.confinement import confine
 from gvpipe.io.alembic.reader import read_archive
-from gvpipe.io.library_worker import limited_time
+from gvpipe.io.library.worker import limited_time
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_worker import serve_scene
-from gvpipe.isolation.confinement import confine
-from gvpipe.sequence import MeshSequence
+from gvpipe.io.scene.worker import serve_scene
+from gvpipe.model.sequence import MeshSequence
 
 
 def read_limited(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:

@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe import notes
-from gvpipe.errors import InputError
+from gvpipe.foundation import notes
+from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.notes import not_held
 from gvpipe.io.alembic.archive import EXTRA
 from gvpipe.io.alembic.param_writer import ParamWriter, filled, is_held
+from gvpipe.io.library.writing_process import write_by
 from gvpipe.io.losses import renamed_note, shadow_note, shadowed, unit_note
-from gvpipe.io.scene_export import ExportMesh, export_layer, export_meshes, uncovered
-from gvpipe.io.scene_normals import SceneNormals
-from gvpipe.io.writing_process import write_by
-from gvpipe.notes import not_held
-from gvpipe.sequence import MeshSequence
+from gvpipe.io.scene.export import ExportMesh, export_layer, export_meshes, uncovered
+from gvpipe.io.scene.normals import SceneNormals
+from gvpipe.model.sequence import MeshSequence
 
 BYTES = 16 << 20  # of a field's frames at a time
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.fbx.answers import Described, Map, Mesh, Picture, Placed, Posed, Shown, Table, Take
 from gvpipe.io.fbx.library import columns, hold, integers, listed, vectors
 from gvpipe.io.simulation.side_files import side_file

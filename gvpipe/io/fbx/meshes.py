@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64
+from gvpipe.foundation.arrays import Array, Float64
 from gvpipe.io.fbx.answers import Mesh, Numbers, Placed, Posed, Table
-from gvpipe.io.scene_mesh import Layer, SceneMesh
+from gvpipe.io.scene.mesh import Layer, SceneMesh
 
 
 def scene_mesh(mesh: Mesh, materials: dict[int, int]) -> SceneMesh:

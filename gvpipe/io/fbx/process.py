@@ -6,13 +6,13 @@ import importlib.util
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gvpipe.errors import InputError
-from gvpipe.io.library_process import LibraryProcess
+from gvpipe.foundation.errors import InputError
+from gvpipe.io.library.process import LibraryProcess
 from gvpipe.io.options import ReadOptions
 
 if TYPE_CHECKING:
     from gvpipe.io.fbx.answers import Take
-    from gvpipe.sequence import MeshSequence
+    from gvpipe.model.sequence import MeshSequence
 
 
 def read_fbx(path: Path, options: ReadOptions) -> MeshSequence:

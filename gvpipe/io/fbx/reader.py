@@ -6,21 +6,21 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64
 from gvpipe.asset.metadata import Metadata
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array, Float64
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.damage import reading, unknown_name
 from gvpipe.io.fbx.answers import Described, Take
 from gvpipe.io.fbx.materials import read_material
 from gvpipe.io.fbx.meshes import scene_mesh, uv_names, world_positions
 from gvpipe.io.fbx.textures import Textures
 from gvpipe.io.left_behind import LeftBehind
-from gvpipe.io.library_process import LibraryProcess
+from gvpipe.io.library.process import LibraryProcess
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_frames import SceneFrames, frame_times
-from gvpipe.io.scene_layers import join_layers
-from gvpipe.io.scene_mesh import join
-from gvpipe.sequence import MeshSequence
+from gvpipe.io.scene.frames import SceneFrames, frame_times
+from gvpipe.io.scene.layers import join_layers
+from gvpipe.io.scene.mesh import join
+from gvpipe.model.sequence import MeshSequence
 
 DEFAULT_RATE = 24.0  # frames per second of a file that has none
 EXPERIMENTAL = "FBX is read by ufbx, whose Python package is experimental"
@@ -43,7 +43,7 @@ class _Poses:
 
 
 class FbxMotion:
-    """How one mesh moves; see `gvpipe.io.scene_frames.Motion`."""
+    """How one mesh moves; see `gvpipe.io.scene.frames.Motion`."""
 
     def __init__(self, poses: _Poses, number: int, name: str, n_vertices: int, moves: bool) -> None:
         self._poses, self._number = poses, number

@@ -6,7 +6,7 @@ import mimetypes
 from pathlib import Path, PureWindowsPath
 
 from gvpipe.asset.material import Image, Texture
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.fbx.answers import Picture
 from gvpipe.io.simulation.side_files import side_file
 

@@ -1,4 +1,4 @@
-"""The process that runs ufbx; see `gvpipe.io.fbx.library` for why it has one, `gvpipe.io.library_process` for requests.
+"""The process that runs ufbx; see `gvpipe.io.fbx.library` for why it has one, `gvpipe.io.library.process` for requests.
 
 A request is the name of a method of `gvpipe.io.fbx.evaluator.FbxScene` and its arguments.
 """
@@ -12,9 +12,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from gvpipe.foundation.isolation.confinement import confine
 from gvpipe.io.fbx.evaluator import FbxScene
-from gvpipe.io.library_worker import serve
-from gvpipe.isolation.confinement import confine
+from gvpipe.io.library.worker import serve
 
 METHODS = ("takes", "choose", "describe", "positions")
 

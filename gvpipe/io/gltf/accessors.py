@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32
+from gvpipe.foundation.arrays import Array, Float32
 from gvpipe.io.gltf.document import Document
 from gvpipe.io.gltf.json_fields import Json, child, extension, flag, integer, text
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from gvpipe.arrays import Array
+from gvpipe.foundation.arrays import Array
 
 SET = re.compile(r"(TEXCOORD|COLOR|JOINTS|WEIGHTS)_(\d{1,3})")
 VECTORS = ("VEC2", "VEC3", "VEC4")

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array
 from gvpipe.asset.attribute import Attribute
+from gvpipe.foundation.arrays import Array
 
 EXACT = 1 << 24  # integers up to here are exact as float32
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 from gvpipe.io.damage import unknown_name
 from gvpipe.io.gltf.accessors import Accessors
 from gvpipe.io.gltf.document import Document

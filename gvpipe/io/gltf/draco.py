@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int64
+from gvpipe.foundation.arrays import Array, Int64
 from gvpipe.io.gltf.accessors import WIDTHS, Accessors, as_fractions
 from gvpipe.io.gltf.attribute_names import FLOATS, STORED, Read
 from gvpipe.io.gltf.json_fields import Json, child, integer

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Float64, Int32, Int64
+from gvpipe.foundation.arrays import Array, Float32, Float64, Int32, Int64
 from gvpipe.io.gltf.accessors import Accessors
 from gvpipe.io.gltf.attribute_names import ANY, FLOATS, KINDS, MEANT, SET, STORED, Read, own_name
 from gvpipe.io.gltf.json_fields import Json, child, extension, index, integer, objects, text

@@ -14,7 +14,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from gvpipe.arrays import Array
+from gvpipe.foundation.arrays import Array
 from gvpipe.io.gltf.document import BINARY_CHUNK, CHUNK, HEADER, JSON_CHUNK, MAGIC
 from gvpipe.io.gltf.json_fields import Json
 

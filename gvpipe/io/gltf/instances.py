@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 from gvpipe.io.gltf.accessors import Accessors
 from gvpipe.io.gltf.json_fields import Json, child, extension, index
 from gvpipe.io.gltf.nodes import compose, normalized

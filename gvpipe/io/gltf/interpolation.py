@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 from gvpipe.io.gltf.nodes import normalized
 
 MODES = ("LINEAR", "STEP", "CUBICSPLINE")

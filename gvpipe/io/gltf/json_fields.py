@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arguments import show
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arguments import show
+from gvpipe.foundation.arrays import Float64
 
 Json = dict[str, Any]
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array, UInt8
+from gvpipe.foundation.arrays import Array, UInt8
 from gvpipe.io.gltf.document import Document
 from gvpipe.io.gltf.json_fields import Json, integer, text
 from gvpipe.io.gltf.meshopt_filters import FILTERS

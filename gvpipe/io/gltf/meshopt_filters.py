@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gvpipe.arrays import Array, Floats, UInt8
+from gvpipe.foundation.arrays import Array, Floats, UInt8
 
 
 def _numbers(elements: UInt8, letter: str) -> Array:

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Array
+from gvpipe.runtime.compiled import compiled
 
 GROUP = 16  # elements that share a number of bits
 BLOCK_BYTES, MOST_ELEMENTS = 8192, 256  # of a block

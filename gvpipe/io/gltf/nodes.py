@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float64, Int64
+from gvpipe.foundation.arrays import Bool, Float64, Int64
 from gvpipe.io.gltf.document import Document
 from gvpipe.io.gltf.json_fields import Json, indices, numbers, text
 from gvpipe.io.gltf.pointers import is_visible

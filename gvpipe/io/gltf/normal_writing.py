@@ -1,4 +1,4 @@
-"""Normals of each frame of a GLB, one for each of its split vertices (`split`), as `gvpipe.io.frame_normals` gives them."""
+"""Normals of each frame of a GLB, one for each of its split vertices (`split`), as `gvpipe.io.normals.of_frames` gives them."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Int64
-from gvpipe.io.frame_normals import FrameNormals, frame_normals, turned_note
+from gvpipe.foundation.arrays import Array, Float32, Int64
 from gvpipe.io.gltf.attribute_writing import GltfAttribute, as_gltf
 from gvpipe.io.gltf.split import Split
-from gvpipe.sequence import MeshSequence
+from gvpipe.io.normals.of_frames import FrameNormals, frame_normals, turned_note
+from gvpipe.model.sequence import MeshSequence
 
 NORMAL = "NORMAL"
 

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float32, Float64, Int64
+from gvpipe.foundation.arrays import Bool, Float32, Float64, Int64
 from gvpipe.io.gltf.clips import Clip
 from gvpipe.io.gltf.geometry import Block
 from gvpipe.io.gltf.nodes import Nodes, compose
 from gvpipe.io.gltf.skins import Skin
-from gvpipe.io.hiding import collapse
+from gvpipe.io.scene.hiding import collapse
 
 BLOCK_BYTES = 32 << 20  # transforms and positions worked on at a time
 BYTES_MATRIX = 128  # 4 x 4 float64

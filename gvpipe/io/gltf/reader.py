@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Float64, Floats, Int64
 from gvpipe.asset.attribute import guess_kind
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array, Float32, Float64, Floats, Int64
+from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.notes import DEFAULT_FPS
 from gvpipe.io.damage import reading
 from gvpipe.io.gltf.accessors import Accessors
 from gvpipe.io.gltf.clips import Clip, clip_names, clip_times, key_rate
@@ -24,9 +25,8 @@ from gvpipe.io.gltf.scene import Scene, read_scene
 from gvpipe.io.gltf.scene_attributes import attribute_names, scene_attributes
 from gvpipe.io.mesh import FrameValues, Mesh
 from gvpipe.io.options import NO_OPTIONS, ReadOptions
-from gvpipe.notes import DEFAULT_FPS
-from gvpipe.origin import choose_origin
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.origin import choose_origin
+from gvpipe.model.sequence import MeshSequence
 
 MAX_FRAMES = 1_000_000
 JUMP = 1 / 240  # seconds: keys closer than this are a jump, not a rate

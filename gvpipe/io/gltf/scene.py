@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gvpipe import notes
-from gvpipe.arrays import Float64, Int32
 from gvpipe.asset.material import Image, Material
 from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part
+from gvpipe.foundation import notes
+from gvpipe.foundation.arrays import Float64, Int32
 from gvpipe.io.gltf.accessors import Accessors
 from gvpipe.io.gltf.clips import NO_CLIP, Clip, find_clip, read_clip
 from gvpipe.io.gltf.document import Document
@@ -28,7 +28,7 @@ from gvpipe.io.gltf.nodes import Nodes, read_nodes, scene_order
 from gvpipe.io.gltf.poses import Placed, Poses, find_hidden
 from gvpipe.io.gltf.skins import Skin, read_skin
 from gvpipe.io.gltf.vectors import handedness
-from gvpipe.io.hiding import hidden_note
+from gvpipe.io.scene.hiding import hidden_note
 
 
 @dataclass(frozen=True, eq=False)

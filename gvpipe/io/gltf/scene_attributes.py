@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array
+from gvpipe.foundation.arrays import Array
 from gvpipe.io.gltf.accessors import as_fractions
 from gvpipe.io.gltf.poses import Placed
 from gvpipe.io.gltf.scene import Scene

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.asset.metadata import Metadata
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array, Float32, Float64
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.attribute_writing import GltfAttribute, as_gltf, name_attributes
 from gvpipe.io.gltf.glb import INDICES, VERTICES, Glb
 from gvpipe.io.gltf.json_fields import Json
@@ -22,7 +22,7 @@ from gvpipe.io.gltf.nodes import compose
 from gvpipe.io.gltf.normal_writing import NORMAL, SplitNormals, split_normals
 from gvpipe.io.gltf.split import Shape, Split, split_vertices
 from gvpipe.io.losses import lost_notes
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 HALF = float(np.sqrt(0.5))
 TURNS = {"z": (-HALF, 0.0, 0.0, HALF), "x": (0.0, 0.0, HALF, HALF)}  # quaternions that take an up axis to Y

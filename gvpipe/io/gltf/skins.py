@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int64
+from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.io.gltf.accessors import Accessors
 from gvpipe.io.gltf.json_fields import indices, integer
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int32, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.part import Part
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.arrays import Array, Int32, Int64
+from gvpipe.model.sequence import MeshSequence
 
 
 @dataclass(frozen=True, eq=False)

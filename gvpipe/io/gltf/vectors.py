@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Float64, Int32
+from gvpipe.foundation.arrays import Array, Float32, Float64, Int32
 from gvpipe.io.gltf.nodes import normalized
 
 

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32
-from gvpipe.atomic import unnamed_path
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array, Float32
+from gvpipe.foundation.atomic import unnamed_path
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.attribute_writing import GltfAttribute
 from gvpipe.io.gltf.clips import FPS
 from gvpipe.io.gltf.glb import VERTICES, Glb
@@ -24,7 +24,7 @@ from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.normal_writing import NORMAL
 from gvpipe.io.gltf.scene_writing import Prepared, Written, frame_attributes, prepare, write_scene
 from gvpipe.io.mesh import FrameEncoder
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 MANY_TARGETS = 2048  # layers of a texture in most browsers, which hold a target each
 ROUNDING = 1e-6  # of a normal: triangles that do not turn may turn it by as much

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from gvpipe.arrays import Array
+from gvpipe.foundation.arrays import Array
 from gvpipe.io.simulation.cells import Cells, join_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 from gvpipe.io.simulation.side_files import side_file

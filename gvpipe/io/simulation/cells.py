@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int64, UInt8
+from gvpipe.foundation.arrays import Array, Int64, UInt8
 
 # cells by the number of their dimensions; types in neither list are refused
 POINTS_AND_LINES = frozenset((0, 1, 2, 3, 4, 21, 35, 68, 75))

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Array, Floats
 from gvpipe.asset.attribute import MAX_COMPONENTS, WIDTHS
 from gvpipe.asset.part import Part
+from gvpipe.foundation.arrays import Array, Floats
 from gvpipe.io.mesh import FrameValues
 from gvpipe.io.simulation.cells import Cells
 from gvpipe.io.simulation.surface import Surface

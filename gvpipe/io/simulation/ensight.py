@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64, Floats
+from gvpipe.foundation.arrays import Array, Float64, Floats
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.cells import Cells, equal_cells, join_cells, structured_cells
@@ -24,7 +24,7 @@ from gvpipe.io.simulation.ensight_file import EnsightFile
 from gvpipe.io.simulation.limits import check_bytes
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.steps import read_steps
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 # elements: VTK's type and the number of nodes
 ELEMENTS = {"point": (1, 1), "bar2": (3, 2), "bar3": (21, 3), "tria3": (5, 3), "tria6": (22, 6), "quad4": (9, 4),

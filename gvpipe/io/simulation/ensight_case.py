@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 
 LARGEST_CASE = 64 << 20  # bytes
 VARIABLE = re.compile(r"(scalar|vector|tensor symm|tensor asym) per (node|element):?\s*(.*)", re.IGNORECASE)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.arrays import Array
+from gvpipe.foundation.arrays import Array
 from gvpipe.io.simulation.limits import check_bytes
 
 TEXT = 80  # bytes of a text in a binary file

@@ -16,14 +16,14 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64, Floats
+from gvpipe.foundation.arrays import Array, Float64, Floats
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.cells import Cells, equal_cells, join_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 from gvpipe.io.simulation.netcdf import NetCdf, open_netcdf, texts
 from gvpipe.io.simulation.steps import read_steps
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 # VTK's type by the start of an element's name and its number of nodes
 SHAPES: dict[str, dict[int, int]] = {

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.damage import WHOLE, reading
 from gvpipe.io.simulation.limits import check_bytes
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.arrays import Array, Floats, Int64
+from gvpipe.foundation.arrays import Array, Floats, Int64
 from gvpipe.io.simulation.cells import Cells, join_cells, structured_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 from gvpipe.io.simulation.limits import check_bytes

@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Array, Floats
-from gvpipe.errors import InputError
-from gvpipe.io.library_process import LibraryProcess
+from gvpipe.foundation.arrays import Array, Floats
+from gvpipe.foundation.errors import InputError
+from gvpipe.io.library.process import LibraryProcess
 from gvpipe.io.simulation.cells import Cells, equal_cells, join_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 

@@ -8,9 +8,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from gvpipe.io.library_worker import bytes_below, limit_memory, serve
+from gvpipe.foundation.isolation.confinement import confine, watch_opens
+from gvpipe.io.library.worker import bytes_below, limit_memory, serve
 from gvpipe.io.simulation.meshio_files import Arrays, read_by_meshio
-from gvpipe.isolation.confinement import confine, watch_opens
 
 
 @cache

@@ -9,8 +9,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gvpipe.arrays import Array
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.damage import WHOLE, reading
 from gvpipe.io.simulation.hdf import SIGNATURE, HdfFile, open_hdf
 from gvpipe.io.simulation.limits import check_bytes

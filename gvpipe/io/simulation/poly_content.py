@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int64
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.polygons import polygon_corners, polygon_starts
+from gvpipe.foundation.arrays import Array, Int64
 from gvpipe.io.losses import lost_notes, shadow_note, shadowed
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 SAME = 0.01  # part of the range by which values inside of a polygon may differ
 ROLES = {"normal": "Normals", "uv": "TCoords"}

@@ -12,20 +12,20 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32, Float64, Floats
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.metadata import Metadata
-from gvpipe.errors import InputError, TopologyChange
-from gvpipe.forks import ForkLock
+from gvpipe.foundation.arrays import Array, Float32, Float64, Floats
+from gvpipe.foundation.errors import InputError, TopologyChange
 from gvpipe.io.damage import reading
 from gvpipe.io.mesh import FrameValues, left_note
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
 from gvpipe.io.simulation.surface import Surface, extract_surface
 from gvpipe.io.simulation.times import empty_note, time_steps
-from gvpipe.origin import choose_origin, narrow, rounding
-from gvpipe.sequence import MeshSequence, check_finite
+from gvpipe.model.origin import choose_origin, narrow, rounding
+from gvpipe.model.sequence import MeshSequence, check_finite
+from gvpipe.runtime.forks import ForkLock
 
 SAMPLES = 3  # steps that are compared with the first before all are
 Result = TypeVar("Result")

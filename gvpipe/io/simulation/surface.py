@@ -14,7 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Array, Bool, Floats, Int32, Int64
+from gvpipe.foundation.arrays import Array, Bool, Floats, Int32, Int64
+from gvpipe.foundation.notes import left_out
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.mesh import as_polygons, fan
 from gvpipe.io.simulation.cells import (
@@ -29,7 +30,6 @@ from gvpipe.io.simulation.cells import (
     Cells,
 )
 from gvpipe.mesh.unique_rows import row_ids
-from gvpipe.notes import left_out
 
 QUADRATIC_POLYGON = 36
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Float64
-from gvpipe.notes import ASSUMED_FPS, DEFAULT_FPS
+from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.notes import ASSUMED_FPS, DEFAULT_FPS
 
 EVEN = 1e-3  # part of the mean step: steps that differ by less are even, as rounded decimals are
 SLOWEST, FASTEST = 1e-6, 100_000.0  # frames per second that a sequence can have

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64, Floats, Int64
+from gvpipe.foundation.arrays import Array, Float64, Floats, Int64
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.blocks import join_blocks
@@ -20,7 +20,7 @@ from gvpipe.io.simulation.dataset import DataArray, Dataset
 from gvpipe.io.simulation.hdf import HdfFile, open_hdf
 from gvpipe.io.simulation.steps import read_steps
 from gvpipe.io.simulation.xml_grids import POLY_CELLS, ROLES, as_points
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 ROOT = "VTKHDF"
 KINDS = ("UnstructuredGrid", "PolyData")

@@ -12,11 +12,11 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float32
+from gvpipe.foundation.arrays import Array, Float32
 from gvpipe.io.mesh import FrameEncoder
 from gvpipe.io.simulation.poly_content import ROLES, PolyContent, poly_content
 from gvpipe.io.simulation.xml_arrays import TYPES
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 BLOCK = 1 << 20  # bytes of a block before compression
 LEVEL = 1  # of compression: level 6 takes three to six times as long, and saves 2 % of triangles

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64, Floats
+from gvpipe.foundation.arrays import Array, Float64, Floats
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.cells import SIZES, Cells, equal_cells
@@ -22,7 +22,7 @@ from gvpipe.io.simulation.dataset import DataArray, Dataset
 from gvpipe.io.simulation.steps import read_steps
 from gvpipe.io.simulation.xdmf_items import Items
 from gvpipe.io.simulation.xml_root import parse_xml
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 LARGEST_XML = 256 << 20  # bytes
 INCLUDE = "{http://www.w3.org/2001/XInclude}include"

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from gvpipe.arrays import Array
+from gvpipe.foundation.arrays import Array
 from gvpipe.io.simulation.hdf import HdfFile, open_hdf
 from gvpipe.io.simulation.limits import check_bytes
 from gvpipe.io.simulation.side_files import side_file

@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from gvpipe.arrays import Array
+from gvpipe.foundation.arrays import Array
 from gvpipe.io.simulation.limits import check_bytes
 from gvpipe.io.simulation.xml_root import parse_xml
 

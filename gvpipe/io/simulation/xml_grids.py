@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from gvpipe.arrays import Array, Floats
+from gvpipe.foundation.arrays import Array, Floats
 from gvpipe.io.simulation.cells import Cells, join_cells, structured_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 from gvpipe.io.simulation.limits import check_bytes

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float64
+from gvpipe.foundation.arrays import Bool, Float64
 from gvpipe.io.usd.motion import Skins, UsdMotion
 
 MOST = 1_000_000  # instances of a stage

@@ -7,7 +7,7 @@ from typing import Any
 
 from gvpipe.asset.material import Material, Texture
 from gvpipe.io.usd.names import identifier, name_prim
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 WRAPS = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp"}
 DEFAULT_IOR = 1.5

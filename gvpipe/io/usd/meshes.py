@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Int64
-from gvpipe.errors import TopologyChange
+from gvpipe.foundation.arrays import Array, Int64
+from gvpipe.foundation.errors import TopologyChange
 from gvpipe.io.left_behind import LeftBehind
-from gvpipe.io.scene_frames import first_frame_of
+from gvpipe.io.scene.frames import first_frame_of
 from gvpipe.io.usd.instances import Instance, find_instances
 from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.motion import visibility_samples

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64
+from gvpipe.foundation.arrays import Array, Float64
 
 
 class Skins:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
-from gvpipe.io.scene_export import ExportMesh, as_unit_range, export_layer
-from gvpipe.io.scene_mesh import Layer
+from gvpipe.foundation.arrays import Array
+from gvpipe.io.scene.export import ExportMesh, as_unit_range, export_layer
+from gvpipe.io.scene.mesh import Layer
 from gvpipe.io.usd.primvars import UV_NAME
 
 INTERPOLATIONS = {"constant": "constant", "polygon": "uniform", "vertex": "vertex", "corner": "faceVarying"}

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Array, Float64
 from gvpipe.asset.attribute import MAX_COMPONENTS
-from gvpipe.io.scene_fields import Sampled
-from gvpipe.io.scene_mesh import Layer, SceneMesh
+from gvpipe.foundation.arrays import Array, Float64
+from gvpipe.io.scene.fields import Sampled
+from gvpipe.io.scene.mesh import Layer, SceneMesh
 
 DOMAINS = {"constant": "constant", "uniform": "polygon", "varying": "vertex", "vertex": "vertex", "faceVarying": "corner"}
 UV_NAME = re.compile(r"^(st|uv|map|uvmap|uvset|texcoord)[_\d]*$", re.IGNORECASE)

@@ -6,13 +6,13 @@ import importlib.util
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gvpipe.errors import InputError
-from gvpipe.io.library_process import LibraryProcess
+from gvpipe.foundation.errors import InputError
+from gvpipe.io.library.process import LibraryProcess
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.usd.signature import EXTRA, check_signature
 
 if TYPE_CHECKING:
-    from gvpipe.sequence import MeshSequence
+    from gvpipe.model.sequence import MeshSequence
 
 WORKER = "gvpipe.io.usd.worker"
 DIED = "OpenUSD died of it, or of its limit of memory; export it again, or read it with --unlimited"
@@ -25,6 +25,6 @@ def read_usd(path: Path, options: ReadOptions) -> MeshSequence:
     check_signature(path)
     process = LibraryProcess(path, WORKER, "USD", DIED)
     process.start()
-    from gvpipe.io.scene_process import read_scene  # NumPy loads here while it loads there
+    from gvpipe.io.scene.process import read_scene  # NumPy loads here while it loads there
 
     return read_scene(process, str(path), options)

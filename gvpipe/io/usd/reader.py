@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Float64
 from gvpipe.asset.metadata import Metadata
-from gvpipe.errors import InputError
-from gvpipe.io.hiding import hidden_note
+from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_fields import join_fields, misfit_note
-from gvpipe.io.scene_frames import SceneFrames
-from gvpipe.io.scene_layers import join_layers
-from gvpipe.io.scene_mesh import SceneMesh, join
+from gvpipe.io.scene.fields import join_fields, misfit_note
+from gvpipe.io.scene.frames import SceneFrames
+from gvpipe.io.scene.hiding import hidden_note
+from gvpipe.io.scene.layers import join_layers
+from gvpipe.io.scene.mesh import SceneMesh, join
 from gvpipe.io.usd.instances import InstanceMotion
 from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.meshes import find_meshes, groups_of, polygons_of
@@ -24,7 +24,7 @@ from gvpipe.io.usd.motion import Skins, UsdMotion
 from gvpipe.io.usd.names import name_of, parent_path
 from gvpipe.io.usd.primvars import layers_of, sampled_of
 from gvpipe.io.usd.stage import check_inside, open_stage, stage_times, usd_errors
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 
 def read_stage(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import zipfile
 from pathlib import Path
 
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 EXTRA = "USD files need the package usd-core; install it by: pip install 'gvpipe[usd]'"
 SIGNATURES = {  # first bytes by extension; .usd is text or binary

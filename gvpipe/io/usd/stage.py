@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.arrays import Float64
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_frames import between_note, frame_times
+from gvpipe.io.scene.frames import between_note, frame_times
 
 TOO_LARGE = "it asks for more memory than files of its size may take; export it again, or read it with --unlimited"
 MISSING = ("ErrorInvalidAssetPath", "ErrorInvalidSublayerPath")  # of composition: a file that is not there
@@ -38,7 +38,7 @@ def open_stage(path: Path) -> Any:
                 named = re.search(r"@(.*?)@", str(error))
                 file = _beside(stage, named[1]) if named else ""
                 if os.path.exists(file) and not is_inside(file, Path(os.path.realpath(path)).parent):
-                    raise _outside(path, file)  # `gvpipe.isolation.confinement` kept it from being opened
+                    raise _outside(path, file)  # `gvpipe.foundation.isolation.confinement` kept it from being opened
                 raise InputError(
                     f"{path} refers to {named[1] if named else 'a file'}, which cannot be read; put it in its place, or export "
                     "again as one file"

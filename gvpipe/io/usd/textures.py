@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.asset.material import Image, Texture
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.usd.stage import is_inside
 
 MEDIA_TYPES = {

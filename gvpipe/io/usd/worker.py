@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from gvpipe.io.library_worker import bytes_below, limit_memory, limited_time
+from gvpipe.foundation.isolation.confinement import confine
+from gvpipe.io.library.worker import bytes_below, limit_memory, limited_time
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_worker import serve_scene
+from gvpipe.io.scene.worker import serve_scene
 from gvpipe.io.usd.reader import read_stage
 from gvpipe.io.usd.signature import SIGNATURES
-from gvpipe.isolation.confinement import confine
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 THREADS = 4  # of OpenUSD: each one's stack counts as memory
 

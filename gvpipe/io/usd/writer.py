@@ -12,19 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe import notes
-from gvpipe.arrays import Float32
-from gvpipe.atomic import atomic_path, temporary_folder, unnamed_path
-from gvpipe.errors import InputError, OutputError
+from gvpipe.foundation import notes
+from gvpipe.foundation.arrays import Float32
+from gvpipe.foundation.atomic import atomic_path, temporary_folder, unnamed_path
+from gvpipe.foundation.errors import InputError, OutputError
 from gvpipe.io.damage import reason_of
 from gvpipe.io.losses import renamed_note, shadow_note, shadowed, unit_note
-from gvpipe.io.scene_export import ExportMesh, export_meshes, uncovered
-from gvpipe.io.scene_normals import SceneNormals
+from gvpipe.io.scene.export import ExportMesh, export_meshes, uncovered
+from gvpipe.io.scene.normals import SceneNormals
 from gvpipe.io.usd.material_writer import MaterialWriter
 from gvpipe.io.usd.names import ADDED, identifier, name_prim
 from gvpipe.io.usd.primvar_writer import primvar_names, write_field, write_normals, write_primvars
 from gvpipe.io.usd.signature import EXTRA
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 ROOT = "root"  # of meshes that have no common node
 CLOSE = 1e-4  # time codes: programs cut 0.9999988, which a float32 start time gives, down to 0

@@ -107,7 +107,7 @@ export const STREAM_LAYOUT_INDEX_UUID = [60, 10, 126, 53, 143, 13, 74, 134, 155,
 export const STREAM_LAYOUT_ROOM_UUID = [60, 10, 126, 53, 143, 13, 74, 134, 155, 14, 31, 91, 143, 31, 111, 83];
 export const STREAM_LAYOUT_MAX_INDEX = 33554432;
 
-// gvpipe.corrections.displacements
+// gvpipe.coding.corrections.displacements
 export const DISPLACEMENTS_MAX_POSITIONS = 1048576;
 export const DISPLACEMENTS_NEAR = 3;
 
@@ -151,7 +151,7 @@ export const TOKENS_DIRECT = 16;
 export const TOKENS_TABLE_TOTAL = 4096;
 export const TOKENS_MAX_TOKENS = 88;
 
-// gvpipe.errors
+// gvpipe.foundation.errors
 export const ERRORS_REMEDY = "get the file again from its source";
 
 // gvpipe.fields.derived
@@ -201,7 +201,7 @@ export const HIERARCHY_SECONDS_PER_TRIANGLE = 2e-06;
 export const COLORMAPS_MAGMA = "\n000004 030311 0a0822 130d33 1d1146 28115a 36106a 430f76 50127c 5d177f 691c81 762181 822681 8f2a81 9c2e7f a9327d b63779 c33b75\ncf4170 db486a e65163 ee5c5e f5695c f9785d fb8761 fd9668 fea571 feb47b fec387 fed194 fde0a2 fceeb0 fcfdbf\n";
 export const COLORMAPS_VIRIDIS = "\n440154 470d60 48186a 482374 472d7b 453681 424086 3f4989 3b528b 375a8d 33638d 2f6a8e 2c728e 297a8e 26818e 23898e 21908c 1f988b\n1f9f88 21a685 28ae80 31b57b 3ebc74 4cc26c 5dc963 6ece58 82d34c 96d83f abdc32 c0df24 d5e21a eae51a fde725\n";
 
-// gvpipe.repeated_frames
+// gvpipe.coding.repeated_frames
 export const REPEATED_FRAMES_SECTION = "holds";
 
 // gvpipe.trajectory.basis
@@ -279,8 +279,8 @@ export const LAPLACIAN_NORMAL_EQUATIONS_SECONDS_PER_SOLVED = 5e-10;
 // gvcodecs.mcgv.base.surface
 export const SURFACE_STILL = "still";
 
-// gvcodecs.mcgv.browser
-export const BROWSER_VERSION = 5;
+// gvcodecs.mcgv.reader
+export const READER_BROWSER_VERSION = 5;
 
 // gvcodecs.mcgv.header
 export const HEADER_OF_PICTURES = ["placement", "profile", "block", "width", "height", "residual_step"];
@@ -327,7 +327,7 @@ export const TRAJECTORIES_PLANES = 3;
 // gvcodecs.mcgv.trajectory_header
 export const TRAJECTORY_HEADER_MAX_FINENESS = 256;
 
-// gvcodecs.mcgv.trajectory_reader
+// gvcodecs.mcgv.decoding.trajectory_reader
 export const TRAJECTORY_READER_BYTES_PER_SAMPLE = 48;
 export const TRAJECTORY_READER_SECONDS_PER_SAMPLE = 1e-07;
 

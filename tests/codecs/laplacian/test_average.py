@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from sequences import awkward, grid, waving
 
-import gvpipe.sequence
+import gvpipe.model.sequence
 from gvcodecs.laplacian.alignment import Groups, rotations
 from gvcodecs.laplacian.average import average_mesh
 from gvcodecs.laplacian.edge_shape import EdgeShape, EdgeShapeSum, find_hinges
 from gvcodecs.laplacian.shape_fit import _measure
 from gvpipe.mesh.topology import unique_edges
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 MESHES = awkward()
 
@@ -184,7 +184,7 @@ def test_frames_are_read_once_and_a_chunk_at_a_time(monkeypatch: pytest.MonkeyPa
             return sequence.positions[key]
 
     whole = average_mesh(sequence, sequence.faces)
-    monkeypatch.setattr(gvpipe.sequence, "CHUNK_BYTES", 7 * 12 * sequence.n_vertices)
+    monkeypatch.setattr(gvpipe.model.sequence, "CHUNK_BYTES", 7 * 12 * sequence.n_vertices)
     parts = average_mesh(MeshSequence(Lazy(), sequence.faces), sequence.faces)
     assert reads == [(first, min(first + 7, 90)) for first in range(0, 90, 7)]
     assert np.abs(lengths(parts, sequence.faces) / lengths(whole, sequence.faces) - 1).max() < 2e-3

@@ -12,8 +12,8 @@ from tubes import CODING, surface_of, tube
 import gvpipe
 from gvcodecs.laplacian.average_coding import decode_average, encode_average
 from gvcodecs.laplacian.mesh_scale import edge_lengths
-from gvpipe.errors import InputError
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import InputError
+from gvpipe.model.sequence import MeshSequence
 
 
 def test_what_is_too_far_to_be_decoded_is_not_written(tmp_path: Path) -> None:

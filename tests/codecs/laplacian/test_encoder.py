@@ -13,9 +13,9 @@ from tubes import decoded, kg, tube
 
 from gvcodecs.laplacian import Laplacian
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.errors import FormatError, SettingError
+from gvpipe.foundation.errors import FormatError, SettingError
 from gvpipe.metrics.comparison import compare
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 
 def moving(n_frames: int = 16, shake: float = 5e-4) -> MeshSequence:

@@ -13,7 +13,7 @@ from gvcodecs.laplacian import Laplacian
 from gvcodecs.laplacian.domain import build_domain
 from gvcodecs.laplacian.extended_laplacian import ExtendedLaplacian
 from gvcodecs.laplacian.laplace_kernels import MAX_NEIGHBOURS, thin_rows
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.sparse_rows import as_rows
 
 

@@ -24,9 +24,9 @@ from gvcodecs.laplacian.normal_equations import (
     most_products,
 )
 from gvcodecs.laplacian.operator_kernels import Lower
-from gvpipe.arrays import Float64, Int32
-from gvpipe.budget import Budget
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.arrays import Float64, Int32
+from gvpipe.foundation.budget import Budget
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.product_kernels import Rows
 from gvpipe.trajectory.sparse_rows import as_rows
 

@@ -16,12 +16,12 @@ from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.initial_skinning import fit_skinning
 from gvcodecs.mcgv.motion import blended
 from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
-from gvpipe.codec import Memo
+from gvpipe.coding.codec import Memo
+from gvpipe.coding.quality_scale import error_of
+from gvpipe.coding.registry import open_reader
 from gvpipe.container import bitstream
 from gvpipe.metrics.vertex_errors import measure_errors
-from gvpipe.quality_scale import error_of
-from gvpipe.registry import open_reader
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 
 @pytest.mark.parametrize("scale", [1e-38, 1e-30, 1e-10, 1e10, 1e30, 3e37])

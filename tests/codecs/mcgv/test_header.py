@@ -11,10 +11,10 @@ from folders import GOLDEN
 from sequences import waving
 
 from gvcodecs.mcgv import Mcgv
+from gvpipe.coding.registry import open_reader
 from gvpipe.container.mp4 import read_file
-from gvpipe.errors import CorruptFile, FormatError, NewerVersion
-from gvpipe.registry import open_reader
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import CorruptFile, FormatError, NewerVersion
+from gvpipe.model.sequence import MeshSequence
 
 
 def test_hostile_codec_headers(sequence: MeshSequence) -> None:

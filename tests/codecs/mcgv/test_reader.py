@@ -9,19 +9,20 @@ import numpy as np
 import pytest
 from sequences import patched
 
-from gvcodecs.mcgv import Mcgv, trajectory_reader
-from gvcodecs.mcgv import reader as mcgv_reader
+from gvcodecs.mcgv import Mcgv
 from gvcodecs.mcgv.base.surface import read_surface
+from gvcodecs.mcgv.decoding import frame_reader as mcgv_reader
+from gvcodecs.mcgv.decoding import trajectory_reader
+from gvcodecs.mcgv.decoding.frame_reader import read_layout
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.layout import kd_tree
 from gvcodecs.mcgv.motion import blended
-from gvcodecs.mcgv.reader import read_layout
-from gvpipe.budget import THRIFTY, UNLIMITED
+from gvpipe.coding.registry import open_reader
 from gvpipe.connectivity import base_mesh
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.errors import CorruptFile
-from gvpipe.registry import open_reader
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.budget import THRIFTY, UNLIMITED
+from gvpipe.foundation.errors import CorruptFile
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.still_vertices import encode_flags, find_still
 from gvpipe.trajectory.welding import find_points
 

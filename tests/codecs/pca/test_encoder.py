@@ -10,10 +10,10 @@ from perturbation import perturb_predictions
 
 from gvcodecs.pca import Pca
 from gvcodecs.pca.reader import PcaReader
+from gvpipe.coding.quality_scale import error_of
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.errors import FormatError, InputError, SettingError
-from gvpipe.quality_scale import error_of
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import FormatError, InputError, SettingError
+from gvpipe.model.sequence import MeshSequence
 
 
 def grid(side: int) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ from clips import decode, error, two_plates
 from sequences import waving
 
 from gvcodecs.pdct import Pdct
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.welding import find_points
 
 

@@ -9,7 +9,7 @@ from sequences import waving
 
 from gvcodecs.pdct import Pdct
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.errors import CorruptFile, GvpipeError
+from gvpipe.foundation.errors import CorruptFile, GvpipeError
 
 
 def test_hostile_clips_raise_package_errors() -> None:

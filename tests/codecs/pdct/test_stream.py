@@ -14,7 +14,7 @@ from sequences import awkward, waving
 
 from gvcodecs.pdct import Pdct, StreamEncoder, StreamReader
 from gvcodecs.pdct.stream import CLIP, HEAD, MAGIC
-from gvpipe.errors import CorruptFile, FormatError, InputError, NotGeometryVideo, OverBudget, TruncatedFile
+from gvpipe.foundation.errors import CorruptFile, FormatError, InputError, NotGeometryVideo, OverBudget, TruncatedFile
 
 
 @pytest.mark.parametrize("packet", [1, 700, 1 << 20])

@@ -14,7 +14,7 @@ from PIL import Image
 from scipy.spatial import KDTree
 
 import gvpipe.io
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 pytest.importorskip("ufbx")
 

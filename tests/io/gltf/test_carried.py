@@ -15,9 +15,9 @@ from PIL import Image
 
 import gvpipe
 from gvpipe.asset.material import Material, Texture
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.looks import LAYERS, field_name
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 POINTER = "KHR_animation_pointer"
 VISIBILITY = "KHR_node_visibility"

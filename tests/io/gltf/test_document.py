@@ -15,7 +15,7 @@ from folders import DATA
 from gltf_files import CORNERS, File, assemble, morphing, skinned, square_file, take_apart
 
 import gvpipe
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 BROKEN = DATA / "assets" / "gltf_broken"
 

@@ -10,7 +10,7 @@ import pytest
 from gltf_files import CORNERS, TWO, File
 
 import gvpipe
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 
 def packed(data: bytes) -> File:

@@ -11,7 +11,7 @@ from gltf_files import CORNERS, TWO, File
 from numpy.typing import NDArray
 
 import gvpipe
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.meshopt import decode_attributes, decode_indices, decode_triangles
 from gvpipe.io.gltf.meshopt_filters import colors, floats, quaternions, unit_vectors
 

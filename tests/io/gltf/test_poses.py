@@ -10,7 +10,7 @@ import pytest
 from gltf_files import CORNERS, morphing, skinned, square_file
 
 import gvpipe
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 TURN = [0, 0, np.sqrt(0.5), np.sqrt(0.5)]  # a quarter turn about z
 

@@ -12,7 +12,7 @@ from gltf_files import CORNERS, TWO, File, square_file, take_apart
 from mesh_files import same_bits
 
 import gvpipe
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 
 def waving() -> File:

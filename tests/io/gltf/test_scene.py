@@ -9,7 +9,7 @@ import pytest
 from gltf_files import CORNERS, TRIANGLE, File
 
 import gvpipe
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 
 def test_nodes_become_parts_in_their_order(tmp_path: Path) -> None:

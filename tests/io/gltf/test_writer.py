@@ -17,7 +17,7 @@ from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, Material, Texture
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 
 def picture(folder: Path, kind: str, color: tuple[int, int, int]) -> bytes:

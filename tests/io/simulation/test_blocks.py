@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import gvpipe
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 GRID = """<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian"><UnstructuredGrid>
 <Piece NumberOfPoints="{n}" NumberOfCells="{m}"><Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">{points}

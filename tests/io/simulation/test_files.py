@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import gvpipe.io
-from gvpipe.arrays import Array
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.exodus import group_vectors, read_exodus
 

@@ -11,8 +11,8 @@ import pytest
 import gvpipe.io
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
-from gvpipe.errors import InputError
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import InputError
+from gvpipe.model.sequence import MeshSequence
 
 h5py = pytest.importorskip("h5py")
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import gvpipe.io
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.simulation.meshio_files import MeshioLoader
 
 meshio: Any = pytest.importorskip("meshio")

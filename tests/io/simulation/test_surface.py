@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from gvpipe.arrays import Array
+from gvpipe.foundation.arrays import Array
 from gvpipe.io.simulation.cells import VOLUMES, Cells, equal_cells, join_cells, structured_cells
 from gvpipe.io.simulation.surface import Surface, extract_surface
 

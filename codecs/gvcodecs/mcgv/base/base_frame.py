@@ -9,12 +9,12 @@ import numpy as np
 from gvcodecs.mcgv.base.base_lattice import base_step, choose_lattice, quantise_base
 from gvcodecs.mcgv.base.welded_points import Points
 from gvcodecs.mcgv.encode_job import Job
-from gvpipe.arrays import Bool, Float64, Int32, Int64
 from gvpipe.connectivity.base_mesh import EncodedMesh
 from gvpipe.connectivity.welded_mesh import WeldedMesh, encode_points
 from gvpipe.container.segments import cut
+from gvpipe.foundation.arrays import Bool, Float64, Int32, Int64
 from gvpipe.mesh.lattice import Lattice
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.still_vertices import encode_flags, find_still
 from gvpipe.trajectory.welding import find_points
 

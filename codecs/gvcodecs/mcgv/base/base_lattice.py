@@ -9,7 +9,7 @@ import numpy as np
 from gvcodecs.mcgv.base.distinct_positions import keep_apart
 from gvcodecs.mcgv.base.regular_spacing import align_step
 from gvcodecs.mcgv.settings import Settings
-from gvpipe.arrays import Float32, Int32
+from gvpipe.foundation.arrays import Float32, Int32
 from gvpipe.mesh.lattice import Lattice
 
 AFFINE_BITS = 12  # along the longest side, the paper's

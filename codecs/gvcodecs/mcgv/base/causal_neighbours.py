@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from scipy import sparse
 
-from gvpipe.arrays import Int64
+from gvpipe.foundation.arrays import Int64
 from gvpipe.mesh.topology import graph_of
 
 if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s

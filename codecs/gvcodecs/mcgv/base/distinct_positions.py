@@ -11,7 +11,7 @@ import itertools
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float32, Float64, Int32, Int64
+from gvpipe.foundation.arrays import Bool, Float32, Float64, Int32, Int64
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.mesh.unique_rows import row_ids
 

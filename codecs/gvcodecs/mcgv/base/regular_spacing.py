@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float32, Float64
+from gvpipe.foundation.arrays import Float32, Float64
 
 MAX_VALUES = 512  # distinct coordinates along an axis of what is regular
 RECURRING = 3  # points a coordinate at least, on average

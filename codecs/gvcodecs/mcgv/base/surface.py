@@ -15,11 +15,11 @@ import numpy as np
 
 from gvcodecs.mcgv.base.welded_points import Points, weld_vertices
 from gvcodecs.mcgv.header import Header
-from gvpipe.arrays import Float32, Float64, Int32, Int64
 from gvpipe.connectivity.base_mesh import read_base
 from gvpipe.connectivity.welded_mesh import open_points
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.errors import CorruptFile, corrupt
+from gvpipe.foundation.arrays import Float32, Float64, Int32, Int64
+from gvpipe.foundation.errors import CorruptFile, corrupt
 from gvpipe.trajectory.still_vertices import decode_flags
 
 STILL = "still"  # section: which points never move

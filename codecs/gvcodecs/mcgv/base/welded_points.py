@@ -12,10 +12,10 @@ import numpy as np
 from scipy import sparse
 
 from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighbours_in
-from gvpipe.arrays import Int32, Int64, Integers
 from gvpipe.connectivity.welded_mesh import PointMesh
-from gvpipe.forks import kept
+from gvpipe.foundation.arrays import Int32, Int64, Integers
 from gvpipe.mesh.topology import adjacency_of, graph_of, weld
+from gvpipe.runtime.forks import kept
 
 if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
     from gvpipe.mesh.graph_kernels import Graph

@@ -15,7 +15,7 @@ from gvcodecs.mcgv.motion.contract import CodedMotion
 from gvcodecs.mcgv.pictures.frames import CodedFrames
 from gvcodecs.mcgv.pictures.outliers import SECTION
 from gvcodecs.mcgv.settings import Settings
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ import numpy as np
 from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.motion.contract import predicted_chunks
-from gvcodecs.mcgv.reader_choice import open_reader
-from gvpipe.ahead import halves, run_ahead
-from gvpipe.arrays import Float32, Float64
-from gvpipe.budget import THRIFTY
+from gvcodecs.mcgv.reader import open_reader
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.foundation.arrays import Float32, Float64
+from gvpipe.foundation.budget import THRIFTY
 from gvpipe.rate_control.step_search import root_mean_square
+from gvpipe.runtime.ahead import halves, run_ahead
 
 
 def measure_decoded(job: Job, start: Start, bitstream: Bitstream) -> float:

@@ -15,7 +15,7 @@ from gvcodecs.mcgv.layout.kd_tree import choose_size, place_points
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.packing import pack
 from gvcodecs.mcgv.layout.tiles import place_charts
-from gvpipe.arrays import Int32, Integers
+from gvpipe.foundation.arrays import Int32, Integers
 
 
 def lay_out(job: Job, start: Start, partition: Int32, groups: Integers) -> Layout:

@@ -11,9 +11,9 @@ from gvcodecs.mcgv.encoding.candidate import Candidate
 from gvcodecs.mcgv.encoding.coded_route import Coded
 from gvcodecs.mcgv.encoding.error_measuring import measure_decoded, measure_predicted
 from gvcodecs.mcgv.encoding.routes import code
-from gvpipe.codec import Encoded
-from gvpipe.forks import kept
+from gvpipe.coding.codec import Encoded
 from gvpipe.rate_control.step_search import StepTrial
+from gvpipe.runtime.forks import kept
 
 ROUNDING = math.sqrt(1 / 12)  # steps, root mean square, that rounding to steps leaves
 

@@ -19,9 +19,9 @@ from gvcodecs.mcgv.encoding.candidate import Candidate, CandidateAnchor
 from gvcodecs.mcgv.encoding.initial_skinning import fit_skinning
 from gvcodecs.mcgv.encoding.step_trials import StepTrials, encode
 from gvcodecs.mcgv.encoding.without_pictures import approach, omit_pictures, refine
-from gvpipe.codec import Encoded
+from gvpipe.coding.codec import Encoded
+from gvpipe.coding.quality_scale import error_of
 from gvpipe.metrics.vertex_errors import measure_spread
-from gvpipe.quality_scale import error_of
 from gvpipe.rate_control.step_search import SLOPE, StepTrial, find_step, nearest
 
 GUESS = {"blended": 3.5, "affine": 1.65}  # steps by the error that they leave, root mean square over vertices

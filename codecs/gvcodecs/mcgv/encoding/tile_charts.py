@@ -7,7 +7,7 @@ from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.layout.chart_coding import number_charts
 from gvcodecs.mcgv.layout.chart_parameterization import parameterize
 from gvcodecs.mcgv.motion.point_motions import Motions, SampledMotions, find_motions
-from gvpipe.arrays import Int64
+from gvpipe.foundation.arrays import Int64
 
 PART = 250  # points of a part by motion that charts refine: xatlas takes more than ten times as long per point for all at once
 

@@ -14,9 +14,9 @@ from __future__ import annotations
 import numpy as np
 
 from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours
-from gvpipe.arrays import Int64, Integers
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
+from gvpipe.foundation.arrays import Int64, Integers
 
 SECTION = "charts"
 CONTEXTS = 5

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvcodecs.mcgv.layout.chart_parameterization import Atlas
-from gvpipe.arrays import Float64, Int64
+from gvpipe.foundation.arrays import Float64, Int64
 
 
 def share_blocks(atlas: Atlas, clusters: NDArray[np.integer], room: float) -> Atlas:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Int64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Int64
+from gvpipe.runtime.compiled import compiled
 
 MAX_NEAR = 8  # causal neighbours that count: the last ones
 

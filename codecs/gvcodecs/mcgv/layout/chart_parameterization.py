@@ -17,7 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from gvcodecs.mcgv.layout.xatlas_process import run_xatlas
-from gvpipe.arrays import Float64, Int32, Int64
+from gvpipe.foundation.arrays import Float64, Int32, Int64
 from gvpipe.mesh.topology import adjacency
 
 PATCH = 1 << 13  # triangles that xatlas gets at once: its time grows with their square

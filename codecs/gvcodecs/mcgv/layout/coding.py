@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from gvcodecs.mcgv.layout.layout import Layout
-from gvpipe.arrays import Int32, Int64
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.arrays import Int32, Int64
+from gvpipe.foundation.errors import CorruptFile
 
 CONTEXTS = 4  # of a pixel's y: 0, 1, 2..3 or more columns from the slot before
 

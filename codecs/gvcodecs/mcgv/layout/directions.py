@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from gvpipe.arrays import Int64
+from gvpipe.foundation.arrays import Int64
 
 COMMON = 90  # a multiple of every direction's squared length
 

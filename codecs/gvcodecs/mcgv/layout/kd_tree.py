@@ -22,9 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvcodecs.mcgv.layout.layout import Layout
-from gvpipe.ahead import run_ahead
-from gvpipe.arrays import Bool, Int64, Integers
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.foundation.arrays import Bool, Int64, Integers
+from gvpipe.foundation.errors import CorruptFile, InputError
+from gvpipe.runtime.ahead import run_ahead
 
 FRAME = 4  # pixels: side of the squares that share one pair of directions
 MOMENT_BITS = 10  # of deviations in second moments: their sums stay exact in a double for 2**24 vertices

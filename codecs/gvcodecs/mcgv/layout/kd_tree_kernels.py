@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gvcodecs.mcgv.layout.directions import COMMON, DIRECTIONS, WEIGHTS
-from gvpipe.arrays import Int64
-from gvpipe.compiled import compiled, inlined
+from gvpipe.foundation.arrays import Int64
+from gvpipe.runtime.compiled import compiled, inlined
 
 RUN = 12  # points that are sorted by insertion
 SPARSE = 4  # places for each point, up to which they are counted

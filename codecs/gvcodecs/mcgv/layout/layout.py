@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gvpipe.arrays import Int64
+from gvpipe.foundation.arrays import Int64
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from gvcodecs.mcgv.layout.chart_parameterization import Atlas
 from gvcodecs.mcgv.layout.kd_tree import cut
 from gvcodecs.mcgv.layout.layout import Layout
-from gvpipe.arrays import Bool, Float64, Int64
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Bool, Float64, Int64
+from gvpipe.foundation.errors import InputError
 
 FIT_ROUNDS = 8  # densities tried to fit a given image size
 

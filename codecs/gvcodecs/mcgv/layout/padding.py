@@ -17,7 +17,7 @@ import numpy as np
 
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding_kernels import factor_blocks, fill_blocks
-from gvpipe.arrays import Float32, Floats, Int32
+from gvpipe.foundation.arrays import Float32, Floats, Int32
 
 
 class Padding:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Bool, Float32, Int32, Int64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Bool, Float32, Int32, Int64
+from gvpipe.runtime.compiled import compiled
 
 
 @compiled

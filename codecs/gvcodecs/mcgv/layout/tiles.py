@@ -20,7 +20,7 @@ import numpy as np
 from gvcodecs.mcgv.layout.directions import DIRECTIONS, spreads, widest_pairs
 from gvcodecs.mcgv.layout.kd_tree import Cells, check_room, fill, moment_shift, second_moments
 from gvcodecs.mcgv.layout.layout import Layout
-from gvpipe.arrays import Int64, Integers
+from gvpipe.foundation.arrays import Int64, Integers
 
 
 def place_charts(points: Integers, charts: Integers, width: int, height: int, block: int) -> Layout:

@@ -16,8 +16,8 @@ import numpy as np
 
 from gvcodecs.mcgv.layout import xatlas_worker
 from gvcodecs.mcgv.layout.xatlas_worker import Charts, Mesh
-from gvpipe.errors import InputError
-from gvpipe.isolation.python import TimeoutExpired, run_python
+from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.isolation.python import TimeoutExpired, run_python
 
 ATTEMPTS = 4
 SECONDS = 600.0  # that an attempt may take, whatever the meshes

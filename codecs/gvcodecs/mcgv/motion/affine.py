@@ -18,9 +18,9 @@ from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.motion.affine_coding import decode_transforms, dequantise, encode_transforms, quantise
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
 from gvcodecs.mcgv.motion.contract import CodedMotion, Fill, Samples, locate, shared_out
-from gvpipe.arrays import Array, Float64, Int32
-from gvpipe.codec import Progress
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.foundation.arrays import Array, Float64, Int32
+from gvpipe.foundation.progress import Progress
 
 BYTES_PER_NUMBER, SECONDS_PER_NUMBER = 64, 0.1e-6  # of transforms
 

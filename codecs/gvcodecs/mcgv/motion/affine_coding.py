@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int64
 from gvpipe.container.cursor import Cursor
 from gvpipe.entropy.series import decode_series, encode_series
+from gvpipe.foundation.arrays import Float64, Int64
 
 ORDERS = (1, 2, 3)
 

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Floats, Int32
-from gvpipe.forks import kept
+from gvpipe.foundation.arrays import Float64, Floats, Int32
+from gvpipe.runtime.forks import kept
 from gvpipe.trajectory.basis import row_blocks
 
 ROWS = 1 << 14  # vertices whose products with all transforms are held at a time

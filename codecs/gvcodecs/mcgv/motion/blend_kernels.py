@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int32
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Float64, Int32
+from gvpipe.runtime.compiled import compiled
 from gvpipe.trajectory.product_kernels import Rows
 
 FLAT = 1e-6  # of a cluster's energy: what directions in which it has no extent count for

@@ -10,8 +10,8 @@ from scipy import sparse
 from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighbours
 from gvcodecs.mcgv.motion.skinning import TOTAL, Weights, homogeneous, solve_normal
 from gvcodecs.mcgv.motion.weight_coding import encode_weights
-from gvpipe.arrays import Float64
-from gvpipe.forks import kept
+from gvpipe.foundation.arrays import Float64
+from gvpipe.runtime.forks import kept
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,10 @@ from gvcodecs.mcgv.motion.contract import CodedMotion, Fill, Samples, locate, sh
 from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import Trajectories, decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
-from gvpipe.ahead import halves, run_ahead
-from gvpipe.arrays import Array, Float32, Float64
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.forks import kept
+from gvpipe.foundation.arrays import Array, Float32, Float64
+from gvpipe.runtime.ahead import halves, run_ahead
+from gvpipe.runtime.forks import kept
 from gvpipe.trajectory.sparse_rows import as_rows
 
 if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s

@@ -2,7 +2,7 @@
 
 Few clusters share points, so that the matrix is sparse. A block is one entry of an ordinary sparse factorisation: columns are
 eliminated in an order that leaves few blocks, and each waits at the row that it changes next. Blocks of the factor are kept
-turned. So four numbers of one block, a row of `gvpipe.lanes`, are multiplied with one number of another.
+turned. So four numbers of one block, a row of `gvpipe.runtime.lanes`, are multiplied with one number of another.
 
 Encoders alone solve these equations: decoders are told the transforms.
 """
@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int32, Int64
-from gvpipe.compiled import compiled, inlined
-from gvpipe.lanes import COORDINATES, load_point, same_point, store_point
+from gvpipe.foundation.arrays import Float64, Int32, Int64
+from gvpipe.runtime.compiled import compiled, inlined
+from gvpipe.runtime.lanes import COORDINATES, load_point, same_point, store_point
 
 NONE = -1
 BLOCK = COORDINATES * COORDINATES

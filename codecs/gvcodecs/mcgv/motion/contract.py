@@ -13,9 +13,9 @@ import numpy as np
 
 from gvcodecs.mcgv.base.surface import DecodedBase
 from gvcodecs.mcgv.layout.layout import Layout
-from gvpipe.ahead import AHEAD
-from gvpipe.arrays import Array, Float32, Float64, Int64
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.arrays import Array, Float32, Float64, Int64
+from gvpipe.model.sequence import MeshSequence
+from gvpipe.runtime.ahead import AHEAD
 
 Fill = Callable[[Float32], None]
 PREDICTED = 1 << 18  # vertices of all frames that are predicted at once: more are of no use, and take 100 bytes each

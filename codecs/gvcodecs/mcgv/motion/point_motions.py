@@ -23,9 +23,9 @@ from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.motion.blend_problem import Fitted, Problem, Trial, renumber
 from gvcodecs.mcgv.motion.segmentation import SEED, local_motions
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights
-from gvpipe.arrays import Float64, Int64
+from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.mesh.topology import components, k_ring
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.gram import descending_eigenvectors, is_tall, smaller_gram
 
 RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gvcodecs.mcgv.motion.skinning import TOTAL, Weights
-from gvpipe.arrays import Array, Float32, Float64, Int32, Int64
-from gvpipe.compiled import compiled
-from gvpipe.lanes import COORDINATES, load_point, prefetch, same_point, store_point
+from gvpipe.foundation.arrays import Array, Float32, Float64, Int32, Int64
+from gvpipe.runtime.compiled import compiled
+from gvpipe.runtime.lanes import COORDINATES, load_point, prefetch, same_point, store_point
 
 AT_ONCE, SOON = 256, 24  # vertices that are fetched at once, and how far ahead they are asked for
 

@@ -26,9 +26,9 @@ from scipy import sparse
 from scipy.spatial import KDTree
 
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
-from gvpipe.arrays import Float64, Int32, Int64, Integers
+from gvpipe.foundation.arrays import Float64, Int32, Int64, Integers
 from gvpipe.mesh.topology import k_ring
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.basis import row_blocks
 from gvpipe.trajectory.gram import descending_eigenvectors
 

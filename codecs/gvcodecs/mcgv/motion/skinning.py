@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy import sparse
 
-from gvpipe.arrays import Float64, Int32
+from gvpipe.foundation.arrays import Float64, Int32
 
 if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
     from gvcodecs.mcgv.motion.cluster_system_kernels import NormalEquations

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Float64
-from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, varint
+from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.trajectory.basis import (
     Basis,
     count_components,

@@ -28,7 +28,7 @@ from gvcodecs.mcgv.motion.point_motions import Motions, SampledMotions
 from gvcodecs.mcgv.motion.segmentation import SEED
 from gvcodecs.mcgv.motion.skinning import TOTAL, Weights
 from gvcodecs.mcgv.motion.weight_coding import Prices, guess_prices, learn_prices
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 from gvpipe.mesh.topology import k_ring
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gvcodecs.mcgv.motion.cluster_system_kernels import NormalEquations
-from gvpipe.arrays import Float64, Int32, Int64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Float64, Int32, Int64
+from gvpipe.runtime.compiled import compiled
 
 
 @compiled

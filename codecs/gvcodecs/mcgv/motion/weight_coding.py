@@ -17,9 +17,9 @@ import numpy as np
 
 from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights
-from gvpipe.arrays import Bool, Float64, Int64
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
+from gvpipe.foundation.arrays import Bool, Float64, Int64
 
 if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
     from gvcodecs.mcgv.motion.weight_kernels import WeightNumbers

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL
-from gvpipe.arrays import Float64, Int64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Float64, Int64
+from gvpipe.runtime.compiled import compiled
 
 MAX_CANDIDATES = 10  # clusters that a fit considers
 LEAST_GAIN = 1e-3  # of the error: a further cluster must gain this much to be tried

@@ -13,8 +13,8 @@ import numpy as np
 
 from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights
-from gvpipe.arrays import Int64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Int64
+from gvpipe.runtime.compiled import compiled
 
 MAX_NEIGHBOURS = 8  # causal neighbours that count: the last ones
 MAX_LISTED = INFLUENCES * MAX_NEIGHBOURS

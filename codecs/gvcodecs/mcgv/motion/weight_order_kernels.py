@@ -7,8 +7,8 @@ import numpy as np
 from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, Weights
 from gvcodecs.mcgv.motion.weight_kernels import Listed, list_clusters, new_list, rank_of
-from gvpipe.arrays import Int64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Int64
+from gvpipe.runtime.compiled import compiled
 
 
 def sort_by_rank(causal: CausalNeighbours, weights: Weights) -> None:

@@ -35,9 +35,9 @@ from gvcodecs.mcgv.motion.weight_fit_kernels import (
 )
 from gvcodecs.mcgv.motion.weight_kernels import Listed, expect, list_clusters, new_list, rank_of, suggest
 from gvcodecs.mcgv.motion.weight_order_kernels import sort_border
-from gvpipe.ahead import halves, run_ahead
-from gvpipe.arrays import Float64, Int32, Int64
-from gvpipe.compiled import compiled
+from gvpipe.foundation.arrays import Float64, Int32, Int64
+from gvpipe.runtime.ahead import halves, run_ahead
+from gvpipe.runtime.compiled import compiled
 
 FIRST = np.arange(INFLUENCES)  # the list's first clusters are the first candidates
 

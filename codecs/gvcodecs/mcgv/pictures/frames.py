@@ -12,7 +12,7 @@ from gvcodecs.mcgv.layout.padding import Padding
 from gvcodecs.mcgv.motion.contract import CodedMotion, predicted_chunks
 from gvcodecs.mcgv.pictures.outliers import OutlierWriter
 from gvcodecs.mcgv.pictures.quantiser import ImageQuantiser, Magnitudes, choose_quantiser
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 from gvpipe.media.video import B_FRAMES, Plane, Profile, VideoWriter
 
 PIXELS = 1 << 19  # of pictures that are made at a time: they may be many times as large as positions

@@ -2,8 +2,8 @@
 
 What: pictures hold coordinates up to their outermost level; what a coordinate exceeds it by is coded beside them as a whole
 multiple of the effective step (`quality`), about the error that the image coder makes elsewhere. Section ``outliers`` is that
-of `gvpipe.corrections.displacements`. Why: one badly predicted vertex would stretch the range that the levels are spread over,
-and the largest residual is 9 to 40 times the standard deviation.
+of `gvpipe.coding.corrections.displacements`. Why: one badly predicted vertex would stretch the range that the levels are spread
+over, and the largest residual is 9 to 40 times the standard deviation.
 
 Departure: Mamou, Zaharia and Preteux ("Multi-Chart Geometry Video", 2007, section 4.3) give all residuals one range.
 """
@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.arrays import Float64, Int64
-from gvpipe.corrections.displacements import Displacements, encode_displacements, encode_group, most_frames
+from gvpipe.coding.corrections.displacements import Displacements, encode_displacements, encode_group, most_frames
+from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.media.video import Profile
 
 SECTION = "outliers"

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 from gvpipe.media.video import QP_RANGE, Profile
 
 QP_STEP = 0.625  # H.264's quantiser step at QP 0, levels of an orthonormal transform; it doubles every 6 QP

@@ -30,11 +30,11 @@ from scipy import sparse
 
 from gvcodecs.mcgv.motion.skinning import BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import decode_coefficients, encode_coefficients
-from gvpipe.arrays import Float64, Int64
-from gvpipe.budget import UNLIMITED, Budget
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.errors import InputError
+from gvpipe.foundation.arrays import Float64, Int64
+from gvpipe.foundation.budget import UNLIMITED, Budget
+from gvpipe.foundation.errors import InputError
 from gvpipe.trajectory.basis import Basis, decode_basis, reduce_trajectories
 from gvpipe.trajectory.sparse_rows import multiply
 

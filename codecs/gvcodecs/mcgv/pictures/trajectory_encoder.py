@@ -22,7 +22,7 @@ from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
 from gvcodecs.mcgv.motion.weight_coding import encode_weights
 from gvcodecs.mcgv.pictures.trajectories import PLANES, count_pictures, encode_segment
 from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 from gvpipe.media.video import Plane, Profile, VideoWriter
 
 FINENESS = {"h264-8": 3, "h264-10": 6}  # levels per step: rounding to levels adds a ninth or a thirty-sixth to a step's noise

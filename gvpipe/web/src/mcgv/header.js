@@ -1,7 +1,7 @@
 /** What the reader of an `mcgv` bitstream must know beside its sections. Mirrors `gvcodecs.mcgv.header.Header`. */
 
 import {
-  BROWSER_VERSION as VERSION,
+  READER_BROWSER_VERSION as VERSION,
   SEGMENTS_HUGE as HUGE,
   HEADER_MAX_CLUSTERS as MAX_CLUSTERS,
   HEADER_MAX_SEGMENTS as MAX_SEGMENTS,

@@ -12,7 +12,7 @@ from gvcodecs.mcgv import Mcgv
 from gvcodecs.mcgv.base.base_lattice import choose_lattice
 from gvcodecs.mcgv.base.distinct_positions import keep_apart
 from gvpipe.mesh.lattice import Lattice
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.welding import find_points
 
 

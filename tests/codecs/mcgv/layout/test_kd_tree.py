@@ -12,8 +12,8 @@ from surfaces import awkward_surfaces, check_layout
 from gvcodecs.mcgv.layout import kd_tree
 from gvcodecs.mcgv.layout.kd_tree import FRAME, choose_size, place_points, second_moments
 from gvcodecs.mcgv.layout.kd_tree_kernels import Halving, place_cells
-from gvpipe.arrays import Int64
-from gvpipe.errors import CorruptFile, InputError
+from gvpipe.foundation.arrays import Int64
+from gvpipe.foundation.errors import CorruptFile, InputError
 from gvpipe.mesh.lattice import Lattice
 
 

@@ -20,7 +20,7 @@ from gvcodecs.mcgv.layout.coding import (
     encode_slot_clusters,
 )
 from gvcodecs.mcgv.layout.packing import distinct_pixels, pack
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 
 @pytest.mark.parametrize("name", awkward_surfaces())

@@ -21,11 +21,11 @@ from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.layout.chart_coding import decode_charts, encode_charts, number_charts
 from gvcodecs.mcgv.layout.kd_tree import choose_size
 from gvcodecs.mcgv.layout.tiles import place_charts
-from gvpipe.errors import CorruptFile, InputError, SettingError
+from gvpipe.coding.registry import open_reader
+from gvpipe.foundation.errors import CorruptFile, InputError, SettingError
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.mesh.topology import adjacency
 from gvpipe.rate_control.step_search import root_mean_square
-from gvpipe.registry import open_reader
 
 
 @pytest.mark.parametrize("name", awkward_surfaces())

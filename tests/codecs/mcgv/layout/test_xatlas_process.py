@@ -15,7 +15,7 @@ import pytest
 from gvcodecs.mcgv.layout import xatlas_process, xatlas_worker
 from gvcodecs.mcgv.layout.xatlas_process import run_xatlas
 from gvcodecs.mcgv.layout.xatlas_worker import Mesh
-from gvpipe.errors import InputError
+from gvpipe.foundation.errors import InputError
 
 # one that writes its own name into a file each time, and works from the second time on
 SECOND_TIME = """

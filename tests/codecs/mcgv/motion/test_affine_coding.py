@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gvcodecs.mcgv.motion.affine_coding import decode_transforms, dequantise, encode_transforms, quantise
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 
 
 @pytest.mark.parametrize("scale", [0, 1, 3, 1000, 1e8])

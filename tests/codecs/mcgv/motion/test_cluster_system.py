@@ -9,7 +9,7 @@ from gvcodecs.mcgv.motion.blend_kernels import find_energies, invert_factors
 from gvcodecs.mcgv.motion.cluster_system_kernels import NormalEquations
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, RIDGE, ClusterSystem, homogeneous
 from gvcodecs.mcgv.motion.skinning_fit_kernels import normal_equations
-from gvpipe.arrays import Float64
+from gvpipe.foundation.arrays import Float64
 
 
 def equations(n_points: int, n_clusters: int, is_flat: bool, seed: int) -> tuple[NormalEquations, Float64]:

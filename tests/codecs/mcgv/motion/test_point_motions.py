@@ -11,7 +11,7 @@ from gvcodecs.mcgv.motion.point_motions import FEW_SITES, MOST_SITES, SPACING, M
 from gvcodecs.mcgv.motion.skinning import TOTAL, Blend, BlendFit
 from gvcodecs.mcgv.motion.skinning_fit import fit_blend
 from gvpipe.mesh.topology import adjacency
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 STEP = 0.01
 

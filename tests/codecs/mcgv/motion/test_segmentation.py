@@ -11,7 +11,7 @@ from gvcodecs.mcgv.motion import affine_fit, segmentation
 from gvcodecs.mcgv.motion.affine_fit import AffinePredictor
 from gvcodecs.mcgv.motion.segmentation import LocalAffineFit, local_motions, segment
 from gvpipe.mesh.topology import adjacency, k_ring
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 
 def walk(faces: NDArray[np.int32], start: int, k: int) -> set[int]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gvcodecs.mcgv.motion.skinning_coding import decode_trajectories, encode_trajectories
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 
 
 @pytest.mark.parametrize(("n_clusters", "n_frames"), [(1, 1), (3, 2), (5, 40), (40, 9)])

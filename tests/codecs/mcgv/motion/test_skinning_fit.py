@@ -16,7 +16,7 @@ from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights, g
 from gvcodecs.mcgv.motion.weight_fit_kernels import prepare
 from gvcodecs.mcgv.motion.weight_selection import PointMotions, Ring, choose
 from gvpipe.mesh.topology import adjacency
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 
 def test_choice_finds_the_weights_of_a_blend() -> None:

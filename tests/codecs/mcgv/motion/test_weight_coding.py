@@ -13,8 +13,8 @@ from gvcodecs.mcgv.motion.skinning import Weights
 from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
 from gvcodecs.mcgv.motion.weight_kernels import MAX_LISTED, cluster_of, rank_of
 from gvcodecs.mcgv.motion.weight_order_kernels import sort_by_rank
-from gvpipe.arrays import Int32
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.arrays import Int32
+from gvpipe.foundation.errors import CorruptFile
 
 
 @settings(deadline=None)  # the first call compiles

@@ -13,12 +13,12 @@ from sequences import held, rigid, waving
 import gvpipe
 from gvcodecs.mcgv import Mcgv
 from gvcodecs.mcgv.motion.blended import CHUNK
-from gvpipe.codec import Memo
+from gvpipe.coding.codec import Memo
+from gvpipe.coding.quality_scale import error_of
+from gvpipe.coding.registry import encode_sequence, open_reader
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.errors import CorruptFile
-from gvpipe.quality_scale import error_of
-from gvpipe.registry import encode_sequence, open_reader
-from gvpipe.sequence import MeshSequence
+from gvpipe.foundation.errors import CorruptFile
+from gvpipe.model.sequence import MeshSequence
 
 
 @pytest.fixture(scope="module")

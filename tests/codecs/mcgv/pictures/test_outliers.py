@@ -15,12 +15,12 @@ from sequences import waving
 
 from gvcodecs.mcgv import Mcgv
 from gvcodecs.mcgv.pictures.outliers import SECTION, OutlierWriter
+from gvpipe.coding.corrections.displacements import DisplacementReader
+from gvpipe.coding.registry import open_reader
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.corrections.displacements import DisplacementReader
-from gvpipe.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile
 from gvpipe.media.video import PROFILES
-from gvpipe.registry import open_reader
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 FAST: dict[str, Any] = {"preset": "ultrafast", "gop": 8, "clusters": 12}
 

@@ -22,13 +22,13 @@ from gvcodecs.mcgv.pictures.trajectories import (
     decode_segment,
     encode_segment,
 )
+from gvpipe.coding.registry import open_reader
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.container.mp4 import read_file
 from gvpipe.entropy.integers import encode_integers
-from gvpipe.errors import CorruptFile, SettingError
+from gvpipe.foundation.errors import CorruptFile, SettingError
 from gvpipe.media.video import VideoReader
-from gvpipe.registry import open_reader
-from gvpipe.sequence import MeshSequence
+from gvpipe.model.sequence import MeshSequence
 
 
 def one_cluster(base: np.ndarray) -> BlendFit:

@@ -1,0 +1,1 @@
+"""What every codec shares: the contract, the registry, and what is coded around any codec."""

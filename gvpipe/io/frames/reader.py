@@ -1,0 +1,70 @@
+"""Sequences of frame files: the files found, the first one read, the others when they are needed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from gvpipe.foundation.notes import ASSUMED_FPS, DEFAULT_FPS, given_order
+from gvpipe.io.frames.columns import split_columns
+from gvpipe.io.frames.discovery import find_frames, order_list, sibling_note
+from gvpipe.io.frames.frame_files import FrameFiles
+from gvpipe.io.options import ReadOptions
+from gvpipe.model.sequence import MeshSequence
+
+
+def read_frames(
+    path: str | Sequence[str], fps: float | None = None, span: tuple[int, int | None] | None = None
+) -> MeshSequence:
+    """Read a folder, glob, pattern, list or single file of frames; what is static is that of the first.
+
+    Args:
+        path: what names the files.
+        fps: frames per second.
+        span: number of the first file that is read, and of the one after the last (None: all that follow).
+
+    Raises:
+        InputError: no frames, gaps, mixed formats, or a first frame that cannot be read.
+    """
+    noticed: tuple[str, ...] = ()
+    if isinstance(path, str):
+        files, name = find_frames(path), path
+        if len(files) == 1 and os.path.isfile(path):
+            noticed = sibling_note(Path(path))
+    else:
+        files, is_kept = order_list([Path(file) for file in path])
+        name = f"{files[0]} and {len(files) - 1} more"
+        noticed = (given_order(len(files)),) if is_kept else ()
+    first_file, stop = ReadOptions(frames=span).span(len(files), name)
+    frames = FrameFiles(files[first_file:stop], first_file)
+    first = frames.first
+    columns = split_columns(frames)
+    frames.forget_animated()
+    if fps is None and len(files) > 1:
+        noticed = (*noticed, ASSUMED_FPS)
+    return MeshSequence(
+        frames,
+        first.faces,
+        DEFAULT_FPS if fps is None else fps,
+        {**{name: each for name, each in first.attributes.items() if name not in columns.fields}, **columns.attributes},
+        name,
+        frames.origin,
+        (*noticed, *first.notes, *columns.notes),
+        columns.fields,
+        first.parts,
+        first.polygons,
+        first.materials,
+        first.images,
+        first.metadata,
+        (*first.not_carried, *_changes(files[first_file:stop])),
+    )
+
+
+def _changes(files: Sequence[Path]) -> tuple[str, ...]:
+    """What changes from frame to frame, of formats that have more than the first frame's kept."""
+    if files[0].suffix.lower() != ".obj":
+        return ()
+    from gvpipe.io.obj.changes import changing_materials
+
+    return changing_materials(files)

@@ -1,0 +1,92 @@
+"""A process of its own for a library that dies where it cannot write: HDF5 and Alembic do on a full disk.
+
+The process gets a sequence without its frames, and asks for those that it writes. A message from there is a pickle: ``(ask,
+what, start, stop)``, or how it ended, as `gvpipe.io.library.writing_worker` says. Messages from here are the sequence and
+arrays.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import pickle
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gvpipe.asset.field import Field
+from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.atomic import atomic_path
+from gvpipe.foundation.errors import InputError, OutputError
+from gvpipe.io.library import process as library_process
+from gvpipe.io.library.writing_worker import ASK, DONE, EXACT, INPUT, POSITIONS, Asked
+from gvpipe.model.sequence import MeshSequence
+
+WORKER = "gvpipe.io.library.writing_worker"
+LITTLE_SPACE = 1 << 20  # bytes that are left on a disk that counts as full
+
+
+def write_by(module: str, function: str, sequence: MeshSequence, path: Path) -> tuple[str, ...]:
+    """Write a file by ``function(sequence, temporary path, name)`` of a module, in a process of its own.
+
+    The name is the file's, without folder and extension. Returns what the function returns.
+
+    Raises:
+        InputError: as the function raises it.
+        OutputError: the file cannot be written; nothing of it is left.
+    """
+    with atomic_path(path) as temporary:
+        process = library_process.start_process(WORKER, path)
+        assert process.stdin is not None and process.stdout is not None  # they are pipes
+        try:
+            state, result = _serve(process, (module, function, _without_frames(sequence), temporary, path), sequence)
+        except (EOFError, OSError, pickle.UnpicklingError) as exc:
+            raise OutputError(f"cannot write {path}: {_why(path)}") from exc
+        finally:
+            process.kill()
+            process.wait()
+            for pipe in (process.stdin, process.stdout):
+                with contextlib.suppress(OSError):
+                    pipe.close()
+        if state != DONE:
+            raise (InputError if state == INPUT else OutputError)(str(result).replace(str(temporary), str(path)))
+    notes: tuple[str, ...] = result
+    return notes
+
+
+def _serve(process: Any, request: Any, sequence: MeshSequence) -> tuple[str, Any]:
+    """Answer what the process asks until it says how it ended."""
+    while True:
+        pickle.dump(request, process.stdin, protocol=5)
+        process.stdin.flush()
+        state, *given = pickle.load(process.stdout)
+        if state != ASK:
+            return state, given[0]
+        request = _frames(sequence, *given)
+
+
+def _frames(sequence: MeshSequence, what: str, start: int, stop: int) -> Array:
+    if what == POSITIONS:
+        return sequence.read(start, stop)
+    if what == EXACT:
+        return sequence.read_absolute(start, stop)
+    return np.asarray(sequence.fields[what].values[start:stop])
+
+
+def _without_frames(sequence: MeshSequence) -> MeshSequence:
+    """The sequence whose frames and fields are asked for."""
+    fields = {
+        name: Field(Asked(name, each.values.shape, each.values.dtype), each.domain, each.kind, each.unit, name=name)
+        for name, each in sequence.fields.items()
+    }
+    exact = Asked(EXACT, sequence.shape, "f8") if sequence.is_rounded else None
+    return sequence.reading_from(Asked(POSITIONS, sequence.shape, "f4"), exact, fields=fields)
+
+
+def _why(path: Path) -> str:
+    """Why the process may have died."""
+    with contextlib.suppress(OSError):
+        if shutil.disk_usage(path.parent).free < LITTLE_SPACE:
+            return "No space left on device; free some space or choose another disk"
+    return "its library died of it, as it does on a full disk; check the folder and the disk"

@@ -1,0 +1,1 @@
+"""NumPy archives: all that a sequence has."""

@@ -1,0 +1,135 @@
+"""What gvpipe reads of a file that is no geometry video: the sequence that `gvpipe.read` returns, listed."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gvpipe.asset.listing import Things, count_polygons, list_things
+from gvpipe.foundation.arguments import StrPath
+from gvpipe.io import read
+from gvpipe.io.clips import list_clips
+from gvpipe.model.sequence import MeshSequence
+
+
+@dataclass(frozen=True)
+class SourceInfo:
+    """What a source of a sequence holds; keys that `gvpipe.Info` has too mean the same.
+
+    Args:
+        bytes: of the file; None for a folder or several files.
+        attributes, fields: as in `gvpipe.Info`, without bound and bytes.
+        time_range: seconds of the first and the last frame.
+        clips: names of the animations of a glTF file, of the takes of an FBX file.
+        clip_ranges: first and last second of each clip.
+        not_carried: what the source has beside what is read, by name.
+    """
+
+    vertices: int
+    triangles: int
+    frames: int
+    fps: float
+    bounding_box: dict[str, list[float]]
+    bytes: int | None
+    origin: list[float]
+    parts: list[dict[str, Any]]
+    attributes: list[dict[str, Any]]
+    fields: list[dict[str, Any]]
+    polygons: dict[str, int]
+    materials: list[str]
+    images: list[dict[str, Any]]
+    metadata: dict[str, Any]
+    time_range: list[float]
+    clips: list[str]
+    clip_ranges: list[list[float]]
+    not_carried: list[str]
+    notes: list[str]
+
+    def to_json(self) -> dict[str, Any]:
+        """The information as JSON values."""
+        return dataclasses.asdict(self)
+
+
+def source_info(
+    path: StrPath,
+    clip: str | None = None,
+    mesh: StrPath | None = None,
+    frames: tuple[int, int | None] | None = None,
+    unlimited: bool = False,
+    fps: float | None = None,
+) -> SourceInfo:
+    """Return what gvpipe reads of a source; only the first of the frames is evaluated.
+
+    Args:
+        path, clip, mesh, frames, unlimited, fps: as of `gvpipe.read`.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    name = os.fspath(path)
+    sequence = read(name, fps, clip, mesh, frames, unlimited)
+    first = sequence[0]
+    clips = list_clips(name)
+    polygons = count_polygons(sequence.polygons)
+    things = Things(sequence.parts, polygons, sequence.materials, sequence.images, sequence.metadata)
+    return SourceInfo(
+        vertices=sequence.n_vertices,
+        triangles=len(sequence.faces),
+        frames=sequence.n_frames,
+        fps=sequence.fps,
+        bounding_box={"min": first.min(axis=0).tolist(), "max": first.max(axis=0).tolist()},
+        bytes=os.path.getsize(name) if os.path.isfile(name) else None,
+        origin=sequence.origin.tolist(),
+        attributes=_attributes(sequence),
+        fields=_fields(sequence),
+        time_range=_time_range(sequence),
+        clips=[clip.name for clip in clips],
+        clip_ranges=[[clip.start, clip.stop] for clip in clips],
+        not_carried=list(sequence.not_carried),
+        notes=list(sequence.notes),
+        **list_things(things),
+    )
+
+
+def _time_range(sequence: MeshSequence) -> list[float]:
+    """Seconds of the first and the last frame, by the file's own times where its steps are uneven."""
+    start, listed = sequence.metadata.start_time, sequence.metadata.texts.get("times", "").split()
+    with contextlib.suppress(ValueError):  # a text of that name may hold anything
+        times = [float(time) for time in listed]
+        if len(times) == sequence.n_frames and np.isfinite(times).all():
+            return [times[0], times[-1]]
+    return [start, start + (sequence.n_frames - 1) / sequence.fps]
+
+
+def _attributes(sequence: MeshSequence) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": name,
+            "kind": each.kind,
+            "domain": each.domain,
+            "components": each.shape[1],
+            "type": each.dtype.name,
+            "unit": each.unit,
+        }
+        for name, each in sequence.attributes.items()
+    ]
+
+
+def _fields(sequence: MeshSequence) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": name,
+            "kind": each.kind,
+            "domain": each.domain,
+            "components": each.n_components,
+            "type": each.dtype.name,
+            "unit": each.unit,
+            "range": None if each.range is None else list(each.range),
+        }
+        for name, each in sequence.fields.items()
+    ]

@@ -1,0 +1,1 @@
+"""A mesh sequence, and what is made of one without coding it."""

@@ -1,0 +1,1 @@
+"""Frames from files: players, files that are still written, and what a file says of itself."""

@@ -1,0 +1,121 @@
+"""Mesh sequences from files and to files: ``gvpipe.read`` and ``gvpipe.write``.
+
+Nothing heavy is imported here, so that the process of a library starts first, and what a file does not need never loads.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gvpipe.container.sources import VIDEO_SUFFIXES, is_remote
+from gvpipe.foundation.arguments import StrPath, check_path, show
+from gvpipe.foundation.errors import InputError
+
+if TYPE_CHECKING:
+    from gvpipe.io.runs import Run
+    from gvpipe.model.sequence import MeshSequence
+    from gvpipe.playback.player import Player
+
+Source = StrPath | Sequence[StrPath]
+
+
+def read(
+    path: Source,
+    fps: float | None = None,
+    clip: str | None = None,
+    mesh: StrPath | None = None,
+    frames: tuple[int, int | None] | None = None,
+    *,
+    unlimited: bool = False,
+) -> MeshSequence:
+    """Read a mesh sequence, or a geometry video as one.
+
+    Args:
+        path: an ``.npz``, an ``.mp4``, a scene (animated glTF, USD, Alembic), a point cache (``.pc2``, ``.mdd``, ``.npy``), or
+            frame files as a folder, a glob, a ``%04d`` pattern, a list or one file.
+        fps: frames per second; overrides the file's. Frame files have 30 by default, glTF files the rate of their keys.
+        clip: name of the animation to read, of a glTF or FBX file that has several; None: the first.
+        mesh: a file with the triangles of a point cache.
+        frames: first frame that is read, and the one after the last (None: all that follow).
+        unlimited: as for `open`, of a geometry video; of a USD file, whether it may take any memory.
+
+    Raises:
+        InputError, FormatError: the path or what it holds cannot be used.
+        TypeError: it is no path.
+    """
+    from gvpipe.io.reading import read as read_sequence
+
+    if isinstance(path, list | tuple):
+        for file in path:
+            check_path(file, "a file of gvpipe.read's list")
+        if len(path) != 1:
+            return read_sequence(path, fps, clip, mesh, frames, unlimited)
+        path = path[0]
+    one = check_path(path, "what gvpipe.read is given", "a list of frame files or ")
+    if Path(one).suffix.lower() not in VIDEO_SUFFIXES and not is_remote(one):
+        return read_sequence(one, fps, clip, mesh, frames, unlimited)
+    if clip is not None:
+        raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
+    if mesh is not None:
+        raise InputError(f"{one} has triangles of its own; mesh={os.fspath(mesh)!r} is for point caches")
+    from gvpipe.playback.player import Player
+
+    sequence = Player(one, unlimited=unlimited).sequence()
+    if frames is not None:
+        sequence = sequence.part(*frame_range(sequence, *frames))
+    return sequence if fps is None else sequence.with_fps(fps)
+
+
+def read_runs(
+    path: Source,
+    fps: float | None = None,
+    clip: str | None = None,
+    mesh: StrPath | None = None,
+    frames: tuple[int, int | None] | None = None,
+    *,
+    unlimited: bool = False,
+) -> list[Run]:
+    """Read an input whose vertices or triangles may change, as one sequence for each run of frames where they do not.
+
+    The arguments are those of `read`. A run has ``start``, ``stop`` and ``sequence``.
+
+    Raises:
+        InputError, FormatError: the path or what it holds cannot be used.
+    """
+    from gvpipe.io.runs import find_runs
+
+    return find_runs(lambda span: read(path, fps, clip, mesh, span, unlimited=unlimited), frames)
+
+
+def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> list[str]:
+    """Write a mesh sequence as ``.npz``, or as frame files named by a pattern (``out/%04d.obj``), numbered from ``start``.
+
+    Returns notes: what the format cannot hold, a line each.
+
+    Raises:
+        InputError: the path names no format that can be written.
+        OutputError: a file cannot be written; nothing half-written is left.
+        TypeError: the first argument is no sequence, or the second no path.
+    """
+    from gvpipe.model.sequence import MeshSequence
+
+    if not isinstance(sequence, MeshSequence):
+        raise TypeError(f"gvpipe.write's sequence is {show(sequence)}; a MeshSequence is needed")
+    check_path(path, "gvpipe.write's path")
+    from gvpipe.io.writing import write as write_sequence
+
+    return list(write_sequence(sequence, path, start))
+
+
+def frame_range(video: Player | MeshSequence, start: int, stop: int | None) -> tuple[int, int]:
+    """Return the range with its end filled in; raises `InputError` unless it holds frames of the video, and only those."""
+    stop = len(video) if stop is None else stop
+    if not 0 <= start < stop <= len(video):
+        from gvpipe.playback.player import Player
+
+        name = video.path if isinstance(video, Player) else video.name
+        raise InputError(f"{name}: frames {start}:{stop} asked for; 0 <= start < stop <= {len(video)} is needed")
+    return start, stop

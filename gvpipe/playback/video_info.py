@@ -1,0 +1,108 @@
+"""What a geometry video is and where its bytes go.
+
+The file says most of it itself (`gvpipe.container.outline`). What decodes meshes is loaded for files that do not: those of the
+bare layout, and those made before files had it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from dataclasses import dataclass
+from typing import Any
+
+from gvpipe.asset_coding.directory import read_directory
+from gvpipe.asset_coding.listing import list_asset
+from gvpipe.container.mp4 import bytes_by_part, read_file
+from gvpipe.container.outline import Outline
+from gvpipe.foundation.arguments import StrPath, check_path
+from gvpipe.foundation.errors import in_file
+
+
+@dataclass(frozen=True)
+class Info:
+    """What a geometry video is.
+
+    Args:
+        bounding_box: frame 0's corners, model units, relative to ``origin``.
+        bpvf: bits per vertex and frame of the whole file.
+        sections: bytes of every part of the file, which add up to ``bytes``.
+        levels: vertex counts of the levels of detail, the mesh itself first.
+        settings: the bitstream's header.
+        layout: ``plain``, ``stream`` (`restream`), or ``live``: still written, or left unfinished (`gvpipe.playback.live`).
+        origin: to add to positions, model units.
+        parts: name, ranges of vertices and triangles, name of the material, parent.
+        attributes: name, kind, domain, components, type, unit, bound (degrees for normals) and bytes of each.
+        fields: the same, with range.
+        polygons: how many faces have each number of corners.
+        materials: names.
+        images: name, media type, width, height and bytes.
+        metadata: up axis, unit, start time, source, texts.
+        not_carried: what the source had beside what the file carries.
+        notes: what a user should know, a line each.
+    """
+
+    codec: str
+    version: int
+    vertices: int
+    triangles: int
+    frames: int
+    fps: float
+    bounding_box: dict[str, list[float]]
+    bytes: int
+    bpvf: float
+    sections: dict[str, int]
+    levels: list[int]
+    settings: dict[str, Any]
+    layout: str
+    origin: list[float]
+    parts: list[dict[str, Any]]
+    attributes: list[dict[str, Any]]
+    fields: list[dict[str, Any]]
+    polygons: dict[str, int]
+    materials: list[str]
+    images: list[dict[str, Any]]
+    metadata: dict[str, Any]
+    not_carried: list[str]
+    notes: list[str]
+
+    def to_json(self) -> dict[str, Any]:
+        """The information as JSON values."""
+        return dataclasses.asdict(self)
+
+
+def info(path: StrPath, *, unlimited: bool = False) -> Info:
+    """Return what a geometry video is and where its bytes go; ``unlimited`` as for `gvpipe.open`.
+
+    Raises:
+        InputError: no such file.
+        FormatError: not a geometry video, or a damaged one.
+    """
+    bitstream = read_file(check_path(path, "the geometry video"), unlimited)
+    outline = bitstream.outline or _decode(path, unlimited)
+    size = bitstream.n_bytes
+    with in_file(os.fspath(path)):
+        return Info(
+            codec=bitstream.codec,
+            version=bitstream.version,
+            layout=bitstream.layout,
+            vertices=bitstream.n_vertices,
+            triangles=bitstream.n_triangles,
+            frames=bitstream.n_frames,
+            fps=bitstream.fps,
+            bounding_box={"min": list(outline.box[:3]), "max": list(outline.box[3:])},
+            bytes=size,
+            bpvf=8 * size / (bitstream.n_vertices * bitstream.n_frames),
+            sections=bytes_by_part(bitstream, size),
+            levels=[bitstream.n_vertices, *outline.levels],
+            settings=dict(bitstream.header),
+            origin=list(bitstream.origin),
+            **list_asset(read_directory(bitstream), outline, bitstream),
+        )
+
+
+def _decode(path: StrPath, unlimited: bool) -> Outline:
+    from gvpipe.playback.player import Player
+
+    with Player(path, unlimited=unlimited) as player:
+        return player.outline()
