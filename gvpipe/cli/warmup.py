@@ -62,18 +62,15 @@ def warm_up(installed: bool = False, portable: bool = False, progress: Callable[
             processor is known for this machine.
         GvpipeError: a task failed.
     """
-    from gvpipe.runtime.code_folder import why_none
-    from gvpipe.runtime.machine_code import INSTALLED, own_folder, portable_settings
+    from gvpipe.runtime.code_folder import own_folder, why_none
 
-    start, settings = time.perf_counter(), portable_settings() if portable else {}
+    start = time.perf_counter()
     if portable and not installed:
         raise InputError("portable code is looked for in the installation alone; add --installed")
-    if portable and not settings:
-        raise InputError("no portable processor is known for this machine; leave out --portable")
-    folder = INSTALLED if installed else own_folder()
+    folder, settings = _installed_folder(portable) if installed else (own_folder(), {})
     if folder is None:
         raise InputError(f"no safe folder takes machine code ({why_none()}); set NUMBA_CACHE_DIR to one of your own")
-    before = set(folder.glob("*.nbc"))
+    before = set(folder.rglob("*.nbc"))  # numba's own cache has a folder in it
     if installed:
         with atomic_files(folder) as made, temporary_folder() as empty:
             _run_tasks({**settings, "NUMBA_CACHE_DIR": empty}, progress)
@@ -81,9 +78,23 @@ def warm_up(installed: bool = False, portable: bool = False, progress: Callable[
                 Path(made, path.name).write_bytes(path.read_bytes())
     else:
         _run_tasks({}, progress)
-    after = set(folder.glob("*.nbc"))
+    after = set(folder.rglob("*.nbc"))
     size = sum(path.stat().st_size for path in after)
     return Warmed(str(folder), len(after), len(after - before), size, time.perf_counter() - start)
+
+
+def _installed_folder(portable: bool) -> tuple[Path, dict[str, str]]:
+    """The folder of the installation, and the environment that compiles for the portable processor if that is asked for."""
+    from gvpipe.runtime.kernel_form import Form, kernel_form
+
+    if kernel_form() is not Form.QUICK:
+        raise InputError("kernels are not quick here, and only those can be kept in the installation; leave out --installed")
+    from gvpipe.runtime.machine_code import INSTALLED, portable_settings
+
+    settings = portable_settings() if portable else {}
+    if portable and not settings:
+        raise InputError("no portable processor is known for this machine; leave out --portable")
+    return INSTALLED, settings
 
 
 def _run_tasks(environment: dict[str, str], progress: Callable[[str, float], None] | None) -> None:

@@ -148,7 +148,7 @@ def _type_text(kind: Any) -> Any:
         return ["named", made.__module__, made.__qualname__, [_type_text(each) for each in kind]]
     if isinstance(kind, BaseTuple):
         return ["tuple", [_type_text(each) for each in kind]]
-    if type(kind).__module__ == "gvpipe.runtime.lanes":
+    if type(kind).__module__ == "gvpipe.runtime.vector_rows":
         return ["row", kind.lanes]
     raise Unstorable(str(kind))
 
@@ -166,7 +166,7 @@ def _type(text: Any) -> Any:
         case ["named", str(module), str(name), list(parts)]:
             return BaseTuple.from_types(tuple(map(_type, parts)), _class(module, name))
         case ["row", int(lanes)]:
-            return _class("gvpipe.runtime.lanes", "_RowType")(lanes)
+            return _class("gvpipe.runtime.vector_rows", "_RowType")(lanes)
     raise ValueError(f"{text!r} is no type")
 
 

@@ -11,10 +11,9 @@ import contextlib
 import functools
 import os
 import stat
+import sys
 import tempfile
 from pathlib import Path
-
-from numba.misc.appdirs import AppDirs
 
 VARIABLE = "NUMBA_CACHE_DIR"
 PRIVATE = 0o700
@@ -35,10 +34,7 @@ def why_none() -> str:
 @functools.cache
 def _choose(given: str) -> tuple[Path | None, str]:
     """The first folder that is safe and takes files, made if it is missing; and why the one that was wanted is not."""
-    if given:
-        wanted = [Path(given) / "gvpipe"]
-    else:
-        wanted = [Path(AppDirs("gvpipe", appauthor=False).user_cache_dir) / "kernels", BESIDE]
+    wanted = [Path(given) / "gvpipe"] if given else [_system_caches() / "gvpipe" / "kernels", BESIDE]
     reasons = []
     for folder in wanted:
         try:
@@ -50,6 +46,16 @@ def _choose(given: str) -> tuple[Path | None, str]:
         except OSError as exc:
             reasons.append(f"{folder}: {exc.strerror or exc}")
     return None, reasons[0]
+
+
+def _system_caches() -> Path:
+    """The user's folder for what can be made again; Windows puts a program's below its own."""
+    home = Path(os.path.expanduser("~"))  # stays "~" where there is none
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
+    if sys.platform == "darwin":
+        return home / "Library" / "Caches"
+    return Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
 
 
 def _make(folder: Path) -> str:

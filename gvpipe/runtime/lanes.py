@@ -1,4 +1,4 @@
-"""Several numbers at once in kernels: as many equal computations side by side, with the bits that each has alone.
+"""Several numbers at once in kernels: equal computations side by side, each with the bits that it has alone.
 
 LLVM makes vector instructions of long loops over slices. Loops of a few turns, as over a small matrix, stay scalar. So kernels
 that solve many small systems put eight of them side by side, number k of all of them in one row of `LANES`, and work on rows;
@@ -9,150 +9,34 @@ kernels that move points have rows of `COORDINATES`, the last of which is unused
 - `same` and `same_point` make a row of one number;
 - `prefetch` asks the memory for what is needed soon, and nothing waits for it.
 
-A processor with narrower registers takes several instructions a row.
+A processor with narrower registers takes several instructions a row. `gvpipe.runtime.kernel_form` decides what a row is: a
+vector (`gvpipe.runtime.vector_rows`), or an array (`gvpipe.runtime.plain_rows`).
 """
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable
-from typing import Any, cast
-
-import numpy as np
-from llvmlite import ir
-from numba.core import config, types
-from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, register_model
-
-from gvpipe.foundation.arrays import Float64, Int32
+from gvpipe.runtime.kernel_form import Form, kernel_form
+from gvpipe.runtime.plain_rows import Load, Prefetch, Same, Store
 
 LANES, COORDINATES = 8, 4  # numbers in a row
-OPERATORS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul", operator.truediv: "fdiv"}
-
-Load = Callable[[Float64, int], Float64]
-Store = Callable[[Float64, int, Float64], None]
-Same = Callable[[float], Float64]
-Prefetch = Callable[[Float64 | Int32, int, int], None]
-READ, KEEP, DATA = 0, 3, 1  # what `prefetch` is for, in LLVM's words
 
 
-class _RowType(types.Type):
-    """Of a row of ``lanes`` numbers."""
+def _make() -> tuple[tuple[Load, Store, Same], tuple[Load, Store, Same], Prefetch]:
+    """Rows of `LANES`, rows of `COORDINATES`, and what asks for memory."""
+    form = kernel_form()
+    if form is Form.QUICK:
+        from gvpipe.runtime import vector_rows
 
-    def __init__(self, lanes: int) -> None:
-        self.lanes = lanes
-        super().__init__(f"Row{lanes}")
+        return vector_rows.make_rows(LANES), vector_rows.make_rows(COORDINATES), vector_rows.make_prefetch()
+    from gvpipe.runtime import plain_rows
 
+    rows, points, prefetch = plain_rows.make_rows(LANES), plain_rows.make_rows(COORDINATES), plain_rows.prefetch
+    if form is Form.PLAIN:
+        import numba
 
-@register_model(_RowType)
-class _RowModel(models.PrimitiveModel):  # type: ignore[misc]
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _vector(kind.lanes))
-
-
-def _vector(lanes: int) -> Any:
-    return ir.VectorType(ir.DoubleType(), lanes)
-
-
-def _make_rows(lanes: int) -> tuple[Load, Store, Same]:
-    """Teach numba rows of so many numbers; return what loads, stores and makes them."""
-    row_type = _RowType(lanes)
-
-    def load(_typing: Any, array: Any, at: Any) -> tuple[Any, Any]:
-        """The row of a flat array that begins at a place."""
-
-        def generate(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-            row = builder.load(_pointer(context, builder, sig, given, lanes))
-            row.align = 8
-            return row
-
-        return row_type(array, types.intp), generate
-
-    def store(_typing: Any, array: Any, at: Any, row: Any) -> tuple[Any, Any]:
-        """Put a row into a flat array from a place on."""
-
-        def generate(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-            builder.store(given[2], _pointer(context, builder, sig, given, lanes)).align = 8
-            return context.get_dummy_value()
-
-        return types.void(array, types.intp, row_type), generate
-
-    def same(_typing: Any, number: Any) -> tuple[Any, Any]:
-        """A row of one number."""
-
-        def generate(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-            row = ir.Constant(_vector(lanes), ir.Undefined)
-            for lane in range(lanes):
-                row = builder.insert_element(row, given[0], ir.Constant(ir.IntType(32), lane))
-            return row
-
-        return row_type(types.float64), generate
-
-    for function, instruction in OPERATORS.items():
-        _add_operator(function, instruction, row_type)
-    return cast(Load, intrinsic(load)), cast(Store, intrinsic(store)), cast(Same, intrinsic(same))
+        compile = numba.njit
+        return tuple(map(compile, rows)), tuple(map(compile, points)), compile(prefetch)
+    return rows, points, prefetch
 
 
-def _make_prefetch() -> Prefetch:
-    """What asks for the numbers about a place in an array ``(n, m)``, which is not looked at."""
-
-    def prefetch(_typing: Any, array: Any, row: Any, column: Any) -> tuple[Any, Any]:
-        def generate(context: Any, builder: Any, sig: Any, given: Any) -> Any:
-            array = context.make_array(sig.args[0])(context, builder, given[0])
-            columns = builder.extract_value(array.shape, 1)
-            at = builder.add(builder.mul(given[1], columns), given[2])
-            place = builder.bitcast(builder.gep(array.data, [at]), ir.IntType(8).as_pointer())
-            number = ir.IntType(32)
-            kind = ir.FunctionType(ir.VoidType(), [place.type, number, number, number])
-            function = builder.module.globals.get("llvm.prefetch.p0i8") or ir.Function(
-                builder.module, kind, "llvm.prefetch.p0i8"
-            )
-            builder.call(function, [place, *(ir.Constant(number, each) for each in (READ, KEEP, DATA))])
-            return context.get_dummy_value()
-
-        return types.void(array, types.intp, types.intp), generate
-
-    return cast(Prefetch, intrinsic(prefetch))
-
-
-def _pointer(context: Any, builder: Any, sig: Any, given: Any, lanes: int) -> Any:
-    array = context.make_array(sig.args[0])(context, builder, given[0])
-    return builder.bitcast(builder.gep(array.data, [given[1]]), _vector(lanes).as_pointer())
-
-
-def _add_operator(function: Any, instruction: str, row_type: Any) -> None:
-    """Teach numba an operator of two rows."""
-
-    class Template(ConcreteTemplate):  # type: ignore[misc]
-        cases = (signature(row_type, row_type, row_type),)
-
-    def lower(_context: Any, builder: Any, _sig: Any, given: Any) -> Any:
-        return getattr(builder, instruction)(*given)
-
-    infer_global(function)(Template)
-    lower_builtin(function, row_type, row_type)(lower)
-
-
-def _make_plain_rows(lanes: int) -> tuple[Load, Store, Same]:
-    """As `_make_rows`, where kernels are Python."""
-
-    def load(array: Float64, at: int) -> Float64:
-        return array[at : at + lanes].copy()
-
-    def store(array: Float64, at: int, row: Float64) -> None:
-        array[at : at + lanes] = row
-
-    def same(number: float) -> Float64:
-        return np.full(lanes, number)
-
-    return load, store, same
-
-
-def _plain_prefetch(array: Float64 | Int32, row: int, column: int) -> None:
-    """As `prefetch`, where kernels are Python."""
-
-
-_make = _make_plain_rows if config.DISABLE_JIT else _make_rows
-load, store, same = _make(LANES)
-load_point, store_point, same_point = _make(COORDINATES)
-prefetch = _plain_prefetch if config.DISABLE_JIT else _make_prefetch()
+(load, store, same), (load_point, store_point, same_point), prefetch = _make()

@@ -43,6 +43,7 @@ from numba.core.runtime import rtsys
 from numba.core.sigutils import normalize_signature
 
 from gvpipe.runtime import borrowing
+from gvpipe.runtime.announcements import announce_damaged
 from gvpipe.runtime.code_file import Unstorable, pack, rebuild, spelt, unpack
 from gvpipe.runtime.code_folder import own_folder as own_folder
 
@@ -104,13 +105,16 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compile result for argument types, None if there is none that fits."""
         rtsys.initialize(target_context)  # the rest of numba's context serves compilation, and takes 0.1 s
-        found = None
         for path in self._places(sig, target_context.codegen()) if self._is_enabled else ():
-            with contextlib.suppress(Exception):  # LLVM and the linker may raise any
-                found = rebuild(target_context, tuple(normalize_signature(sig)[0]), unpack(_read(path)))
+            try:
+                data = _read(path)
+            except OSError:
+                continue
+            try:
+                return rebuild(target_context, tuple(normalize_signature(sig)[0]), unpack(data))
+            except Exception as exc:  # LLVM and the linker may raise any
+                announce_damaged(exc)
                 break
-        if found is not None:
-            return found
         self._on_miss()
         return None
 

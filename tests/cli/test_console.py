@@ -7,7 +7,7 @@ import logging
 import pytest
 
 from gvpipe.cli.console import COMPILER, Output
-from gvpipe.runtime import compiled
+from gvpipe.runtime import announcements
 
 LOGGER = logging.getLogger(COMPILER)
 
@@ -29,12 +29,12 @@ def test_compiling_is_noted_where_progress_is_shown(
     """On standard error, as one line; nothing listens afterwards."""
     monkeypatch.setattr("sys.stderr.isatty", lambda: is_terminal)
     with out.progress():
-        LOGGER.info(compiled.ONCE)
-    LOGGER.info(compiled.ONCE)
+        LOGGER.info(announcements.ONCE)
+    LOGGER.info(announcements.ONCE)
     printed = capsys.readouterr()
-    assert printed.out == "" and " ".join(printed.err.split()).count(f"Note: {compiled.ONCE}") == is_noted
+    assert printed.out == "" and " ".join(printed.err.split()).count(f"Note: {announcements.ONCE}") == is_noted
     assert not LOGGER.handlers and LOGGER.level == logging.NOTSET
 
 
 def test_the_logger_is_that_of_the_compiler() -> None:
-    assert compiled.LOGGER is LOGGER
+    assert announcements.LOGGER is LOGGER

@@ -14,7 +14,7 @@ from folders import ROOT
 from gvpipe.cli import warmup
 from gvpipe.cli.commands import cli
 from gvpipe.foundation.errors import GvpipeError, InputError
-from gvpipe.runtime import machine_code
+from gvpipe.runtime import code_folder, machine_code
 
 
 def test_only_what_is_looked_for_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -23,7 +23,7 @@ def test_only_what_is_looked_for_is_compiled(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(machine_code, "PORTABLE", {})
     with pytest.raises(InputError, match="leave out --portable"):
         warmup.warm_up(installed=True, portable=True)
-    monkeypatch.setattr(machine_code, "own_folder", lambda: None)
+    monkeypatch.setattr(code_folder, "own_folder", lambda: None)
     with pytest.raises(InputError, match="set NUMBA_CACHE_DIR"):
         warmup.warm_up()
 

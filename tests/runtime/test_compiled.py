@@ -16,8 +16,7 @@ from typing import Any
 import pytest
 from numba.core import config
 
-from gvpipe.runtime import compiled as module
-from gvpipe.runtime import machine_code
+from gvpipe.runtime import announcements, machine_code
 from gvpipe.runtime.compiled import compiled
 
 KERNELS = """
@@ -174,11 +173,27 @@ def test_a_file_that_cannot_be_replaced(kernels: Any) -> None:
 
 def test_no_folder_takes_files(kernels: Any, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
     monkeypatch.setattr(machine_code, "own_folder", lambda: None)
-    monkeypatch.setattr(module, "why_none", lambda: "none is there")
-    module._announce.cache_clear()
+    monkeypatch.setattr(announcements, "why_none", lambda: "none is there")
+    announcements._announce.cache_clear()
     with caplog.at_level(logging.INFO, logger="gvpipe.runtime.compiled"):
         assert kernels().double(2) == 4
-    assert caplog.messages == [module.ONCE, module.EVERY_TIME.format("none is there")]
+    assert caplog.messages == [announcements.ONCE, announcements.EVERY_TIME.format("none is there")]
+
+
+def test_a_file_that_does_not_load_is_said(kernels: Any, caplog: pytest.LogCaptureFixture) -> None:
+    """Else a machine whose files never load would compile in every run, and nobody would know why."""
+    kernel = kernels().double
+    assert kernel(2) == 4
+    (path,) = files(kernel)
+    path.write_bytes(b"no code")
+    announcements._announce.cache_clear()
+    announcements._announce_damaged.cache_clear()
+    with caplog.at_level(logging.INFO, logger="gvpipe.runtime.compiled"):
+        assert kernels().double(3) == 6
+    damaged, once = caplog.messages
+    assert damaged.startswith("a file of machine code does not load (ValueError: ") and once == announcements.ONCE
+    again = kernels().double
+    assert again(3) == 6 and hits(again) == 1  # the file was replaced
 
 
 def test_functions_without_a_file() -> None:
@@ -187,8 +202,8 @@ def test_functions_without_a_file() -> None:
 
 def test_compiling_is_logged_once(kernels: Any, caplog: pytest.LogCaptureFixture) -> None:
     """At level INFO, so that a library's user sees nothing unasked; loading code from files is not logged."""
-    for wanted in ([module.ONCE], []):
-        module._announce.cache_clear()
+    for wanted in ([announcements.ONCE], []):
+        announcements._announce.cache_clear()
         caplog.clear()
         with caplog.at_level(logging.INFO, logger="gvpipe.runtime.compiled"):
             loaded = kernels()

@@ -53,13 +53,17 @@ def digest() -> str:
     return whole.hexdigest()
 
 
-def test_kernels_that_are_not_compiled_give_the_same() -> None:
+@pytest.mark.parametrize(
+    "form",
+    [{"NUMBA_DISABLE_JIT": "1"}, pytest.param({"GVPIPE_KERNELS": "plain"}, marks=pytest.mark.slow)],
+    ids=["python", "plain"],
+)
+def test_kernels_of_other_forms_give_the_same(form: dict[str, str]) -> None:
     paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
     run = subprocess.run(
         [sys.executable, "-c", "import test_lanes as t; print(t.digest())"],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": paths},
+        env={**os.environ, **form, "PYTHONPATH": paths},
         capture_output=True,
         text=True,
-        check=True,
     )
-    assert run.stdout.split() == [digest()]
+    assert run.stdout.strip() == digest(), run.stderr

@@ -13,7 +13,7 @@ export class AssetEntry {
     this.given = given;
   }
 
-  /** A text that can be shown (`gvpipe.text`). Without a default the member is needed; so below. */
+  /** A text that can be shown (`gvpipe.foundation.text`). Without a default the member is needed; so below. */
   text(name, otherwise) {
     return this.#read(name, otherwise, (value) => typeof value === "string" && value.length < 65536 && !UNSHOWN.test(value));
   }

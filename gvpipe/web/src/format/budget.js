@@ -1,5 +1,5 @@
 /**
- * What a file may cost before it is refused: memory and work that follow from its size. Mirrors `gvpipe.budget`; `docs/format.md`, section 0.
+ * What a file may cost before it is refused: memory and work that follow from its size. Mirrors `gvpipe.foundation.budget`; `docs/format.md`, section 0.
  * Readers say what they are about to allocate, from counts, before they do. A page has no way to allow more.
  */
 

@@ -1,6 +1,6 @@
 /**
  * Sparse displacements of vertices, in whole multiples of a step. Mirrors the decoding half of
- * `gvpipe.corrections.displacements`; `docs/format.md`, section 9.
+ * `gvpipe.coding.corrections.displacements`; `docs/format.md`, section 9.
  */
 
 import {

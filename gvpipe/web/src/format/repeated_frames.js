@@ -1,6 +1,6 @@
 /**
  * Frames that repeat the frame before them: the file codes only *distinct* frames, and for how many frames each is shown. Mirrors
- * `gvpipe.repeated_frames`; `docs/format.md`, section 10.
+ * `gvpipe.coding.repeated_frames`; `docs/format.md`, section 10.
  */
 
 import { REPEATED_FRAMES_SECTION as SECTION } from "../constants.js";

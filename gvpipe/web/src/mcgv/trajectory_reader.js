@@ -1,5 +1,5 @@
 /**
- * From trajectory images back to frames, any of them, in any order, by Python's kernels. Mirrors `gvcodecs.mcgv.trajectory_reader`.
+ * From trajectory images back to frames, any of them, in any order, by Python's kernels. Mirrors `gvcodecs.mcgv.decoding.trajectory_reader`.
  * Frames are distinct ones here (`format/repeated_frames.js`).
  *
  * It runs beside the page, which alone can decode pictures: those of segment s are its section `pictures.s`, levels of all pixels.

@@ -1,0 +1,1 @@
+"""Files of simulations: cells, surfaces, time steps, and a module per format."""
