@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.coding.codec import Codec, Encoded
-from gvpipe.coding.registry import check_mapped, encode_sequence, is_mapped, make_codec, segment_parts
+from gvpipe.coding.registry import check_mapped, codec_class, encode_sequence, make_codec, segment_parts
 from gvpipe.coding.segment_memory import fit_segments
 from gvpipe.container.bitstream import BARE, LIVE, PLAIN, STREAM, Bitstream
 from gvpipe.container.mp4 import bytes_by_part, read_file, write_file
@@ -42,8 +42,6 @@ from gvpipe.tasks.segments import RemoteSegments, SharedSegments
 
 COSTLY_VERTEX = 400  # bytes of memory, with its triangles: less than any codec takes
 COSTLY_ATTRIBUTES = 4000  # bytes of memory, of a vertex with attributes of 40 components in all
-SLOW_VERTEX = {"laplacian": 20e-6}  # seconds that a reader asks for: less than `laplacian` takes where others take memory
-USUAL_VERTEX = 12e-6  # of other codecs, about what they take of a few frames
 
 if TYPE_CHECKING:
     from gvpipe.asset_coding.encoder import AssetCoder
@@ -470,7 +468,7 @@ def _segments_coded_by(
 
 def _may_share(given: Codec | Sequence[Codec], source: MeshSequence | Source) -> bool:
     """Whether workers may code segments: of a source that they can read, by a codec whose segments are independent."""
-    return isinstance(given, Codec) and is_mapped(given) and not isinstance(source, MeshSequence) and count_cores() > 1
+    return isinstance(given, Codec) and given.maps_segments and not isinstance(source, MeshSequence) and count_cores() > 1
 
 
 def _absolute(source: Source) -> Source:
@@ -551,14 +549,14 @@ def _refusal(path: StrPath, bitstream: Bitstream, size: int) -> list[str]:
     """A note if the file that was written is refused without ``unlimited``; looked at where vertices are many for its size."""
     budget, n_vertices = Budget(size), bitstream.n_vertices
     costly = COSTLY_ATTRIBUTES if ASSET_SECTION in bitstream.sections else COSTLY_VERTEX
-    slow = SLOW_VERTEX.get(bitstream.codec, USUAL_VERTEX)
+    slow = codec_class(bitstream.codec).seconds_per_vertex
     if costly * n_vertices < budget.memory and slow * n_vertices < budget.seconds:
         return []
     try:
         with Player(path) as video:
             _ = video[0], [*video.attributes.values()], [field[0:1] for field in video.fields.values()]
     except OverBudget as exc:
-        return [notes.over_budget(str(exc).partition(": ")[2].partition(";")[0])]
+        return [notes.over_budget(exc.asked)]
     return []
 
 

@@ -141,7 +141,7 @@ class AssetCoder:
         """
         if self.is_empty:
             return encoded.bitstream
-        reader, same_bits = open_reader(encoded.bitstream), getattr(codec, "same_bits", True)
+        reader, same_bits = open_reader(encoded.bitstream), codec.same_bits
         permutation = np.asarray(encoded.permutation, np.int64)
         place = np.empty(len(permutation), np.int32)
         place[permutation] = np.arange(len(permutation))

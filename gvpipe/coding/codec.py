@@ -9,10 +9,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from inspect import get_annotations
+from types import FunctionType
 from typing import Any, ClassVar, Protocol, Self, TypeVar, cast, runtime_checkable
 
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.outline import Outline
+from gvpipe.container.segments import SegmentParts
 from gvpipe.foundation.arguments import did_you_mean
 from gvpipe.foundation.arrays import Float32, Int32, Integers
 from gvpipe.foundation.errors import SettingError
@@ -21,6 +24,7 @@ from gvpipe.model.sequence import MeshSequence
 from gvpipe.runtime.blas import one_blas_thread
 
 Result = TypeVar("Result")
+OWN = ("id", "version", "summary", "reader")  # what each codec gives
 
 
 class Memo:
@@ -146,19 +150,19 @@ class FrameReader(Protocol):
 
 @runtime_checkable
 class Codec(Protocol):
-    """A codec's settings, and what it does with them.
-
-    A class attribute ``holds = True``, after the section of that name, says that the codec never sees repeated frames: run
-    lengths around it code them (`gvpipe.coding.repeated_frames`). Its ``version`` then knows of them; ``holds_version`` names
-    an older one that does, too. A class attribute ``same_bits = False`` says that machines may decode slightly different
-    positions, and ``maps_segments = True`` that segments are coded by `gvpipe.runtime.segment_map.map_segments`, which may do
-    it elsewhere. ``memory_factor`` is the memory that a segment takes, for each byte of its positions
-    (`gvpipe.coding.segment_memory`).
-    """
+    """A codec's settings, and what it does with them; see `BaseCodec`, which has defaults for most of it."""
 
     id: ClassVar[str]
     version: ClassVar[int]
     summary: ClassVar[str]
+    holds: ClassVar[bool]
+    holds_version: ClassVar[int | None]
+    same_bits: ClassVar[bool]
+    maps_segments: ClassVar[bool]
+    memory_factor: ClassVar[float | None]
+    seconds_per_vertex: ClassVar[float]
+    has_levels: ClassVar[bool]
+    codes_live: ClassVar[bool]
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
     @property
@@ -184,9 +188,78 @@ class Codec(Protocol):
         """Open a bitstream that this codec wrote, by its contents alone; raises `CorruptFile`."""
         ...
 
+    @classmethod
+    def browser_obstacle(cls, bitstream: Bitstream) -> str:
+        """Return what keeps browsers from playing a bitstream of this codec, in a few words; ``""`` if they play it."""
+        ...
 
-class Settings:
-    """Base of codecs' dataclasses: makes settings from texts, and checks ranges."""
+    @classmethod
+    def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
+        """Return what each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
+        ...
+
+    def start_live(self, frame: Float32, faces: Int32, fps: float) -> LiveCoder:
+        """Begin to code frames ``(V, 3)`` that come one by one, where ``codes_live``; ``frame`` is the first."""
+        ...
+
+
+class BaseCodec:
+    """Base of codecs: frozen dataclasses of settings.
+
+    A codec gives ``id``, ``version`` and ``summary`` as class attributes, and the methods `_encode` and `reader`. All else has
+    a default here. A class attribute or class method that is none of these is refused: misspelt, it would change nothing.
+
+    Attributes:
+        holds: it never sees repeated frames: run lengths around it code them (`gvpipe.coding.repeated_frames`).
+        same_bits: all machines decode the same positions, to the bit.
+        holds_version: the oldest version whose files may have such run lengths; None: this one.
+        maps_segments: its segments are coded by `gvpipe.runtime.segment_map.map_segments`, which may do it elsewhere.
+        memory_factor: memory that encoding a segment takes, for each byte of its positions as float32
+            (`gvpipe.coding.segment_memory`); None: it takes all frames at a time.
+        seconds_per_vertex: that its reader asks for (`gvpipe.foundation.budget`), at least.
+        has_levels: its files have levels of detail.
+        codes_live: it codes frames as they come (`start_live`).
+    """
+
+    id: ClassVar[str]
+    version: ClassVar[int]
+    summary: ClassVar[str]
+    holds: ClassVar[bool] = False
+    holds_version: ClassVar[int | None] = None
+    same_bits: ClassVar[bool] = True
+    maps_segments: ClassVar[bool] = False
+    memory_factor: ClassVar[float | None] = None
+    seconds_per_vertex: ClassVar[float] = 12e-6
+    has_levels: ClassVar[bool] = False
+    codes_live: ClassVar[bool] = False
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        settings = {name for name, kind in get_annotations(cls).items() if "ClassVar" not in str(kind)}
+        known = [*OWN, *(name for name in vars(BaseCodec) if not name.startswith("_"))]
+        for name, value in vars(cls).items():
+            is_own = name.startswith("_") or name in settings or isinstance(value, FunctionType | property)
+            if not is_own and name not in known:
+                raise TypeError(f"{cls.__qualname__}.{name} means nothing to gvpipe{did_you_mean(name, known)}")
+
+    @one_blas_thread  # quicker, and the same bytes whatever the number of cores
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Encoded:
+        """Code a sequence; see `Codec.encode`."""
+        return self._encode(sequence, progress or silent, memo or Memo(is_shared=False))
+
+    @classmethod
+    def browser_obstacle(cls, bitstream: Bitstream) -> str:
+        """What keeps browsers from playing its files; see `Codec.browser_obstacle`. Here: their player lacks the codec."""
+        return bitstream.codec
+
+    @classmethod
+    def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
+        """What each segment has; see `Codec.segment_parts`. Here: nothing of its own."""
+        return SegmentParts()
+
+    def start_live(self, frame: Float32, faces: Int32, fps: float) -> LiveCoder:
+        """Begin to code frames as they come; see `Codec.start_live`."""
+        raise NotImplementedError
 
     @classmethod
     def from_texts(cls, texts: Mapping[str, str]) -> Self:
@@ -213,15 +286,6 @@ class Settings:
         if getattr(self, name) not in choices:
             value = getattr(self, name)
             raise SettingError(f"{name} is {value!r}; one of {', '.join(choices)} is needed{did_you_mean(value, choices)}")
-
-
-class BaseCodec(Settings):
-    """Base of codecs' dataclasses: the first and the last step of every encode."""
-
-    @one_blas_thread  # quicker, and the same bytes whatever the number of cores
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Encoded:
-        """Code a sequence; see `Codec.encode`."""
-        return self._encode(sequence, progress or silent, memo or Memo(is_shared=False))
 
     def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         raise NotImplementedError
@@ -256,6 +320,10 @@ class BaseCodec(Settings):
             outline=Outline.around(sequence.read(0, 1)[0], levels),
             video=video,
         )
+
+
+Settings = BaseCodec
+"""The name that the base class had when it was of settings alone."""
 
 
 def check_name(key: str, names: Iterable[str], also: Iterable[str] = ()) -> None:

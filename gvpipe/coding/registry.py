@@ -76,9 +76,9 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
             f"it was made by version {bitstream.version} of codec {bitstream.codec!r}, this gvpipe has version "
             f"{codec.version}; upgrade gvpipe"
         )
-    if bitstream.is_unfinished and not hasattr(codec, "start_live"):
+    if bitstream.is_unfinished and not codec.codes_live:
         raise corrupt(f"it is not finished, and files of codec {bitstream.codec!r} do not grow")
-    holds = read_repeated_frames(bitstream) if _is_held(codec) else None
+    holds = read_repeated_frames(bitstream) if codec.holds else None
     distinct = bitstream if holds is None else dataclasses.replace(bitstream, n_frames=holds.n_distinct)
     reader = correct(distinct, codec.reader(distinct))
     return reader if holds is None else RepeatedFramesReader(reader, holds)
@@ -87,29 +87,23 @@ def open_reader(bitstream: Bitstream) -> FrameReader:
 def browser_obstacle(bitstream: Bitstream) -> str:
     """Return what keeps browsers from playing a bitstream, in a few words; ``""`` if they play it.
 
-    Codecs whose files they play answer by a class method of this name; files of all others need a conversion.
-
     Raises:
         SettingError: no codec of that id is installed.
     """
-    ask = getattr(codec_class(bitstream.codec), "browser_obstacle", None)
-    return str(ask(bitstream)) if ask else bitstream.codec
+    return str(codec_class(bitstream.codec).browser_obstacle(bitstream))
 
 
 def segment_parts(bitstream: Bitstream) -> SegmentParts:
     """Return what each segment has of a bitstream; of fields, which positions do not need, that they may come late.
-
-    Codecs answer by a class method of this name; of others, segments have nothing of their own.
 
     Raises:
         SettingError: no codec of that id is installed.
         CorruptFile: the header is not what that codec writes.
     """
     codec = codec_class(bitstream.codec)
-    holds = read_repeated_frames(bitstream) if _is_held(codec) else None
+    holds = read_repeated_frames(bitstream) if codec.holds else None
     distinct = bitstream if holds is None else dataclasses.replace(bitstream, n_frames=holds.n_distinct)
-    ask = getattr(codec, "segment_parts", None)
-    parts: SegmentParts = ask(distinct) if ask else SegmentParts()
+    parts: SegmentParts = codec.segment_parts(distinct)
     return dataclasses.replace(parts, late=tuple(name for name in bitstream.sections if name.startswith(FIELDS)))
 
 
@@ -122,24 +116,20 @@ def encode_sequence(
         InputError: what the codec raises.
     """
     memo = memo or Memo(is_shared=False)
-    holds = memo("holds", lambda: find_repeated_frames(sequence)) if _is_held(codec) else None
+    holds = memo("holds", lambda: find_repeated_frames(sequence)) if codec.holds else None
     if holds is None:
         return codec.encode(sequence, progress, memo)
     encoded = codec.encode(holds.distinct(sequence), progress, memo)
-    version = max(encoded.bitstream.version, getattr(codec, "holds_version", codec.version))
+    oldest = codec.version if codec.holds_version is None else codec.holds_version
+    version = max(encoded.bitstream.version, oldest)
     return Encoded(add_repeated_frames(encoded.bitstream, holds, version), encoded.permutation)
-
-
-def is_mapped(codec: Codec) -> bool:
-    """Whether a codec's segments can be coded elsewhere (`gvpipe.runtime.segment_map`)."""
-    return bool(getattr(codec, "maps_segments", False))
 
 
 def check_mapped(codecs: Codec | Sequence[Codec]) -> None:
     """Raise `SettingError` unless the segments of all these codecs can be coded elsewhere (`gvpipe.runtime.segment_map`)."""
     for codec in [codecs] if isinstance(codecs, Codec) else codecs:
-        if not is_mapped(codec):
-            others = [name for name in codec_ids() if getattr(codec_class(name), "maps_segments", False)]
+        if not codec.maps_segments:
+            others = [name for name in codec_ids() if codec_class(name).maps_segments]
             raise SettingError(
                 f"codec {codec.id} fits all frames together, so workers cannot share them; choose codec {' or '.join(others)}, "
                 "or encode many sequences side by side (gvpipe encode-all)"
@@ -149,8 +139,3 @@ def check_mapped(codecs: Codec | Sequence[Codec]) -> None:
 @functools.cache
 def _entries() -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in entry_points(group=GROUP)}
-
-
-def _is_held(codec: Codec | type[Any]) -> bool:
-    """Whether repeated frames are coded around the codec."""
-    return bool(getattr(codec, "holds", False))

@@ -44,9 +44,9 @@ def fit_segments(codecs: Codec | Sequence[Codec], n_vertices: int, memory: int) 
 
 
 def _fit(codec: Codec, n_vertices: int, memory: int) -> Codec:
-    factor = getattr(codec, "memory_factor", None)
+    factor = codec.memory_factor
     if factor is None:
-        others = " or ".join(name for name in codec_ids() if hasattr(codec_class(name), "memory_factor"))
+        others = " or ".join(name for name in codec_ids() if codec_class(name).memory_factor is not None)
         raise SettingError(
             f"codec {codec.id} fits all frames together, so shorter segments save no memory; leave memory out, or choose "
             f"{others}"

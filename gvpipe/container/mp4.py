@@ -118,7 +118,7 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False) -> Bitstrea
             budget, index = Budget(None if unlimited else source.size), find_index(source)
             return _read(file, source.size, budget) if index is None else _read_parts(source, index, budget)
     except FormatError as exc:
-        raise type(exc)(f"{path}: {exc}") from exc
+        raise exc.within(str(path)) from exc
     except IsADirectoryError as exc:
         raise InputError(f"{path} is a folder and no geometry video; {ENCODE_FIRST}") from exc
     except FileNotFoundError as exc:
@@ -134,7 +134,7 @@ def read_bytes(data: bytes, name: str, unlimited: bool = False) -> Bitstream:
         budget, index = Budget(None if unlimited else source.size), find_index(source)
         return _read(io.BytesIO(data), source.size, budget) if index is None else _read_parts(source, index, budget)
     except FormatError as exc:
-        raise type(exc)(f"{name}: {exc}") from exc
+        raise exc.within(name) from exc
 
 
 def bytes_by_part(bitstream: Bitstream, size: int) -> dict[str, int]:
@@ -203,9 +203,9 @@ def _read_address(url: str, unlimited: bool) -> Bitstream:
         data = source.read_all()
         return _read(io.BytesIO(data), len(data), budget)
     except NotGeometryVideo as exc:
-        raise NotGeometryVideo(f"{url}: {str(exc).replace(ENCODE_FIRST, DOWNLOAD_FIRST)}") from exc
+        raise NotGeometryVideo(exc.what, DOWNLOAD_FIRST, url) from exc
     except FormatError as exc:
-        raise type(exc)(f"{url}: {exc}") from exc
+        raise exc.within(url) from exc
 
 
 def _source_at(url: str, budget: Budget) -> HttpSource | StoreSource:
@@ -229,7 +229,7 @@ def _read(file: IO[bytes], size: int, budget: Budget) -> Bitstream:
     if layout.payload is None:
         if _is_tagged(file, layout):
             raise StrippedFile(f"its geometry was stripped, as remuxing or re-encoding does; {REMEDY}")
-        raise NotGeometryVideo(f"an MP4 file, but not one that gvpipe wrote; {ENCODE_FIRST}")
+        raise NotGeometryVideo("an MP4 file, but not one that gvpipe wrote", ENCODE_FIRST)
     file.seek(0)
     video = file.read(layout.video_end)
     file.seek(layout.payload[0])
@@ -295,7 +295,7 @@ def _find_payload(file: IO[bytes], size: int) -> _Layout:
         file.seek(position)
         head = file.read(BOX.size)
         if position == 0 and head[4:8] != b"ftyp"[: max(0, len(head) - 4)]:
-            raise NotGeometryVideo(f"not an MP4 file, so no geometry video; {ENCODE_FIRST}")
+            raise NotGeometryVideo("not an MP4 file, so no geometry video", ENCODE_FIRST)
         if len(head) < BOX.size:
             if found:
                 raise corrupt(f"{len(head)} stray bytes follow its last box")

@@ -185,7 +185,7 @@ class Dataset:
         try:
             return self._sources[self._places[number][0]].read(*place)
         except FormatError as exc:
-            raise type(exc)(f"byte {place.offset} of the shard: {exc}") from exc
+            raise exc.within(f"byte {place.offset} of the shard") from exc
 
     def _name(self, number: int) -> str:
         """A sample in messages: its shard and its key."""

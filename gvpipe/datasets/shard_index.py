@@ -56,7 +56,7 @@ def index_shard(path: str) -> list[Sample]:
                 raise corrupt(f"member {quote(name)} at byte {place.offset} occurs twice")
             kinds[kind][key] = place
     except FormatError as exc:
-        raise type(exc)(f"{path}: {exc}") from exc
+        raise exc.within(str(path)) from exc
     except OSError as exc:
         raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check the path and its permissions") from exc
     return [Sample(key, place, descriptions.get(key, Place(0, 0))) for key, place in videos.items()]

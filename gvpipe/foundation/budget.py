@@ -118,7 +118,9 @@ class Budget:
 
     def _refused(self, what: str, asked: str, allowed: str) -> OverBudget:
         size = _bytes(self.n_bytes or 0)
-        return OverBudget(f"{what} takes about {asked}; a file of {size} may take {allowed}; {ALLOW}")
+        refused = OverBudget(f"{what} takes about {asked}; a file of {size} may take {allowed}", ALLOW)
+        refused.asked = f"{what} takes about {asked}"
+        return refused
 
 
 UNLIMITED = Budget(None)

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Self
 
 from gvpipe.foundation.text import escaped
 
@@ -93,7 +94,23 @@ class OutputError(GvpipeError):
 
 
 class FormatError(GvpipeError):
-    """The file cannot be read as a geometry video."""
+    """The file cannot be read as a geometry video.
+
+    Attributes:
+        what: what is wrong with it.
+        remedy: what its user can do; may be empty.
+        file: its name; empty where it has none, or where the name is not known yet (`within`).
+    """
+
+    def __init__(self, what: str = "", remedy: str = "", file: str = "") -> None:
+        self.what, self.remedy, self.file = what, remedy, file
+        super().__init__(": ".join(filter(None, (file, "; ".join(filter(None, (what, remedy)))))))
+
+    def within(self, file: str) -> Self:
+        """The same error of a file of that name, or of what lies in it."""
+        named = type(self)(self.what, self.remedy, ": ".join(filter(None, (file, self.file))))
+        named.__dict__.update(self.__dict__, file=named.file)
+        return named
 
 
 class NotGeometryVideo(FormatError):
@@ -117,7 +134,13 @@ class CorruptFile(FormatError):
 
 
 class OverBudget(FormatError):
-    """The file takes more memory or work than its size warrants (`gvpipe.foundation.budget`)."""
+    """The file takes more memory or work than its size warrants (`gvpipe.foundation.budget`).
+
+    Attributes:
+        asked: the step that was refused, and what it takes.
+    """
+
+    asked = ""
 
 
 def corrupt(what: str) -> CorruptFile:
@@ -127,7 +150,7 @@ def corrupt(what: str) -> CorruptFile:
         >>> str(corrupt("its video is damaged"))
         'its video is damaged; get the file again from its source'
     """
-    return CorruptFile(f"{what}; {REMEDY}")
+    return CorruptFile(what, REMEDY)
 
 
 def corrupt_section(name: str, what: str) -> CorruptFile:
@@ -143,4 +166,4 @@ def in_file(path: str) -> Iterator[None]:
     except FormatError as exc:
         if not path:
             raise
-        raise type(exc)(f"{path}: {exc}") from exc
+        raise exc.within(path) from exc

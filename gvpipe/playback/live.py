@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gvpipe.coding.codec import Codec, LiveCoder
-from gvpipe.coding.registry import make_codec
+from gvpipe.coding.registry import codec_class, codec_ids, make_codec
 from gvpipe.container.live_writer import LiveWriter
 from gvpipe.container.segments import MAX_SEGMENT
 from gvpipe.container.sources import check_video_target
@@ -115,8 +115,7 @@ class LiveEncoder:
         _check_free(self.path)
         first = MeshSequence(positions[None], self._faces, self.fps, name=FRAMES)
         frame = first.read(0, 1)[0]
-        start: Any = self._codec
-        coder: LiveCoder = start.start_live(frame, first.faces, self.fps)
+        coder = self._codec.start_live(frame, first.faces, self.fps)
         x, y, z = first.origin.tolist()
         bitstream = replace(coder.bitstream, origin=(x, y, z))
         self._writer = LiveWriter(
@@ -168,8 +167,9 @@ def _live_codec(codec: str, fps: float, settings: dict[str, Any]) -> Codec:
     if "clip" not in settings and "segment" not in settings:
         settings = {**settings, "segment": min(max(1, round(CLIP_SECONDS * fps)), MAX_SEGMENT)}
     made = make_codec(codec, settings, ("path", "faces", "fps", "codec"))
-    if not hasattr(made, "start_live"):
-        raise SettingError(f"codec {codec} needs all frames at once; pdct codes them as they come")
+    if not made.codes_live:
+        others = " or ".join(name for name in codec_ids() if codec_class(name).codes_live)
+        raise SettingError(f"codec {codec} needs all frames at once; {others} codes them as they come")
     return made
 
 

@@ -20,7 +20,7 @@ from gvpipe.asset.part import Part
 from gvpipe.asset_coding.directory import Directory, file_notes
 from gvpipe.asset_coding.reader import AssetReader
 from gvpipe.coding.codec import GroupReader, LevelReader
-from gvpipe.coding.registry import open_reader
+from gvpipe.coding.registry import codec_class, codec_ids, open_reader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_bytes, read_file
 from gvpipe.container.outline import Outline
@@ -158,7 +158,8 @@ class Player:
         if lod == 0:
             return self.sequence()
         if not isinstance(self._reader, LevelReader):
-            raise InputError(f"{self.path}: no level of detail {lod}, only 0; files of codec pca have coarser ones")
+            others = " or ".join(name for name in codec_ids() if codec_class(name).has_levels)
+            raise InputError(f"{self.path}: no level of detail {lod}, only 0; files of codec {others} have coarser ones")
         if not 0 < lod < len(self.levels):
             raise InputError(f"{self.path}: no level of detail {lod}; there are levels 0..{len(self.levels) - 1}")
         with in_file(self.path):

@@ -25,7 +25,7 @@ from folders import GOLDEN, ROOT, SAMPLES
 from sequences import waving
 
 import gvpipe
-from gvcodecs.mcgv import browser
+from gvcodecs.mcgv.reader import BROWSER_VERSION
 from gvpipe.coding.quality_scale import error_of
 from gvpipe.coding.registry import codec_class
 from gvpipe.foundation.errors import CorruptFile, InputError, OutputError
@@ -210,7 +210,7 @@ def test_what_cannot_be_exported(run: Run, video: Path, tmp_path: Path) -> None:
 
 def test_player_reads_what_encode_writes() -> None:
     """When this fails, a new version of the codec is waiting for src/mcgv/ to read it."""
-    assert codec_class("mcgv").version <= browser.VERSION
+    assert codec_class("mcgv").version <= BROWSER_VERSION
 
 
 def test_the_player_s_constants_are_python_s() -> None:

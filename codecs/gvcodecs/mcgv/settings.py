@@ -32,7 +32,7 @@ class Settings(BaseCodec):
 
     id: ClassVar[str] = "mcgv"
     version: ClassVar[int] = 5
-    holds_version: ClassVar[int] = 3  # the oldest whose readers know repeated frames
+    holds_version: ClassVar[int | None] = 3  # the oldest whose readers know repeated frames
     summary: ClassVar[str] = "multi-chart geometry video: residual images of a blended affine prediction, as H.264 or JPEG"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
 

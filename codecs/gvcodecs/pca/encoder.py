@@ -56,7 +56,8 @@ class Pca(BaseCodec):
     summary: ClassVar[str] = "trajectory PCA with geometric predictors: smallest files, levels of detail"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
     maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.runtime.segment_map`)
-    memory_factor: ClassVar[float] = 5.0  # of a segment's positions as float32 (`gvpipe.coding.segment_memory`)
+    has_levels: ClassVar[bool] = True
+    memory_factor: ClassVar[float | None] = 5.0  # of a segment's positions as float32 (`gvpipe.coding.segment_memory`)
 
     quality: float = 75.0  # 0..100, higher is better
     predictor: str = "kalman"  # kalman, or the paper's rbf, lsp, navg

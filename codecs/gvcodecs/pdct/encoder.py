@@ -59,11 +59,12 @@ class Pdct(BaseCodec):
 
     id: ClassVar[str] = "pdct"
     version: ClassVar[int] = VERSION_LIVE
-    holds_version: ClassVar[int] = VERSION_POINTS
+    holds_version: ClassVar[int | None] = VERSION_POINTS
     summary: ClassVar[str] = "predictive DCT in local coordinate frames: streams frame by frame, short clips"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
     maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.runtime.segment_map`)
-    memory_factor: ClassVar[float] = 7.0  # of a segment's positions as float32 (`gvpipe.coding.segment_memory`)
+    codes_live: ClassVar[bool] = True
+    memory_factor: ClassVar[float | None] = 7.0  # of a segment's positions as float32 (`gvpipe.coding.segment_memory`)
 
     quality: float = 75.0  # 0..100, higher is better
     clusters: int = 0  # N, seed triangles per clip, 1..1024; 0: one per 200 vertices, 20..64

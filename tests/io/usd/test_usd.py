@@ -513,8 +513,8 @@ def test_memory_follows_from_the_size(tmp_path: Path, monkeypatch: pytest.Monkey
 def start_with_little_memory(module: str, path: Path) -> subprocess.Popen[bytes]:
     """A process whose limit is 64 times smaller, so that a test need not fill a gigabyte."""
     code = (
-        "import runpy\nfrom gvpipe.io import library_worker\n"
-        "library_worker.LEAST_MEMORY >>= 6\nlibrary_worker.MEMORY_PER_BYTE = 10\n"
+        "import runpy\nfrom gvpipe.io.library import worker\n"
+        "worker.LEAST_MEMORY >>= 6\nworker.MEMORY_PER_BYTE = 10\n"
         f"runpy.run_module({module!r}, run_name='__main__')"
     )
     return subprocess.Popen(

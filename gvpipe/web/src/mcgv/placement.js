@@ -1,4 +1,4 @@
-/** The slots' pixels where a blend moves them. Mirrors `gvcodecs.mcgv.reader.read_layout`. */
+/** The slots' pixels where a blend moves them. Mirrors `gvcodecs.mcgv.decoding.frame_reader.read_layout`. */
 
 import { corrupt } from "../format/errors.js";
 import { decodeCharts } from "./chart_coding.js";
