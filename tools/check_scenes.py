@@ -34,6 +34,7 @@ OTHERS = {  # files beside an entry's main one, and what they lack of what its r
     "arm_blendshapes/arm.usda": "its blend shapes",
     "sublayer/crowd_geometry.usd": "its animation",
     "sphere_skin_inch/sphere_skin.usda": "the transform of the scene that refers to it",
+    "pi_basic/pi_basic.usda": "no instances",
 }
 BAKED = ("arm_baked.usda", "lbs.baked.usda", "blendshapes.baked.usda")
 
@@ -122,11 +123,14 @@ def distance(sequence: MeshSequence, path: Path, is_baked: bool) -> float | None
     if "mesh_names" not in reference or not ("timecodes" in reference or "sample_times" in reference):
         return None
     times = reference["timecodes"] if "timecodes" in reference else reference["times"]
+    names, offsets = reference["mesh_names"].tolist(), reference["mesh_offsets"]
+    visible = reference["visible"] if "visible" in reference else np.ones((len(times), len(names)), bool)
+    expected = np.where(np.repeat(visible, np.diff(offsets), axis=1)[..., None], expected, np.nan)  # hidden meshes are points
     if is_baked:
         whole = times == np.rint(times)
         times, expected = times[whole], expected[whole]
     found = np.stack([at(float(moment)) for moment in times])
-    return _by_mesh(sequence, found, reference["mesh_names"].tolist(), reference["mesh_offsets"], expected) / diagonal
+    return _by_mesh(sequence, found, names, offsets, expected) / diagonal
 
 
 def _by_mesh(sequence: MeshSequence, found: Float64, names: list[str], offsets: Array, expected: Array) -> float:
@@ -136,7 +140,7 @@ def _by_mesh(sequence: MeshSequence, found: Float64, names: list[str], offsets: 
     if len(shared) < len(spans):
         return float("inf")
     return max(
-        float(np.abs(found[:, start:stop] - expected[:, offsets[number] : offsets[number + 1]]).max())
+        float(np.nanmax(np.abs(found[:, start:stop] - expected[:, offsets[number] : offsets[number + 1]]), initial=0.0))
         for number, (start, stop) in shared
     )
 
