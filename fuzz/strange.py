@@ -182,7 +182,7 @@ def parse_kernel(path: Path) -> None:
     before = set(sys.modules)
     try:
         described = code_file.unpack(path.read_bytes()).described
-        code_file._type(described["result"])
+        code_file.type_of_text(described["result"])
         for each in (described["environment"], *described["environments"]):
             code_file._environment(*each)
     except (ValueError, KeyError, TypeError, AttributeError, ImportError, IndexError, RecursionError) as exc:

@@ -35,6 +35,7 @@ from gvpipe.rate_control.search import meet
 from gvpipe.rate_control.targets import Target, parse_bound, read_bound
 from gvpipe.rate_control.trials import Trial
 from gvpipe.rendering.poster import poster_of
+from gvpipe.runtime import first_kernels
 from gvpipe.runtime.segment_map import segments_mapped_by
 from gvpipe.tasks.choice import AUTO_WORKERS, count_cores, open_executor
 from gvpipe.tasks.executor import Executor
@@ -198,6 +199,7 @@ def encode(
         workers = count_cores() if is_shared and memory is None and _may_share(given, source) else None
     if scheduler is not None or not (workers is None or is_shared):
         check_mapped(given)
+    first_kernels.expect(given.id if isinstance(given, Codec) else given[0].id)
     clock = _StageClock(progress)
     with open_executor(scheduler, workers) as executor:
         options = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited}
@@ -238,6 +240,7 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
         FormatError: not a geometry video, or a damaged one.
     """
     player = Player(path, unlimited=unlimited)
+    first_kernels.expect(player.bitstream.codec)
     start, stop = frame_range(player, start, stop)
     if lod:
         whole = player.level(lod)

@@ -10,6 +10,7 @@ from gvpipe.connectivity.visit_symbols import ESCAPE, EXACT_RANKS
 from gvpipe.entropy.range_decoder import decode_symbols, decode_uniform
 from gvpipe.foundation.arrays import Bool, Int32, Int64, UInt32, UInt64
 from gvpipe.mesh.graph_kernels import SHORT_LIST, Graph, count_sides, list_sides
+from gvpipe.mesh.sorting_kernels import sort_numbers, sort_order
 from gvpipe.runtime.compiled import compiled, inlined
 
 
@@ -136,17 +137,21 @@ def _sort(points: Int64, ends: Int64, apart: Int64, lists: NeighbourLists) -> No
 
 @compiled
 def _sort_long(points: Int64, v: int, own: Int32, target: Int32) -> int:
-    """Fill ``target``, which may be the same memory, with a list in order, nobody twice; return how many these are."""
-    ordered = own[np.argsort(own, kind="mergesort")]
-    apart = np.empty(len(own), np.int64)
-    for i in range(len(own)):
-        apart[i] = _squared_distance(points, v, ordered[i])
-    ordered = ordered[np.argsort(apart, kind="mergesort")]
+    """Fill ``target``, which may be the same memory, with a list in order, nobody twice; return how many. ``own`` is lost."""
+    sort_numbers(own)
     n = 0
     for i in range(len(own)):
-        if i == 0 or ordered[i] != ordered[i - 1]:
-            target[n] = ordered[i]
+        if i == 0 or own[i] != own[n - 1]:
+            own[n] = own[i]
             n += 1
+    apart = np.empty(n, np.int64)
+    for i in range(n):
+        apart[i] = _squared_distance(points, v, own[i])
+    ordered = np.empty(n, np.int32)
+    for i, k in enumerate(sort_order(apart)):
+        ordered[i] = own[k]
+    for i in range(n):
+        target[i] = ordered[i]
     return n
 
 

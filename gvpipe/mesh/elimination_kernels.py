@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.foundation.arrays import Int32, Int64
+from gvpipe.mesh.sorting_kernels import sort_numbers, sort_order
 from gvpipe.runtime.compiled import compiled
 
 NONE = -1
@@ -124,7 +125,7 @@ def factor_pattern(starts: Int64, rows: Int32, n_entries: int) -> tuple[Int64, I
                     found[end] = found[k]
                     end += 1
             c = sibling[c]
-        found[first:end].sort()
+        sort_numbers(found[first:end])
         if end > first:
             sibling[j] = child[found[first]]
             child[found[first]] = j
@@ -282,7 +283,7 @@ def _join_alike(graph: QuotientGraph, lists: Int32, pivot: int, stamp: int) -> N
             keys[k] = graph.size[i]
             for j in range(graph.start[i], graph.start[i] + graph.size[i]):
                 keys[k] += lists[j] * (lists[j] % 1021 + 1)
-    order = np.argsort(keys, kind="mergesort")
+    order = sort_order(keys)
     for a in range(n):
         i = lists[first + order[a]]
         if graph.weight[i] == 0 or a + 1 == n or keys[order[a + 1]] != keys[order[a]]:

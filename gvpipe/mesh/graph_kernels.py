@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.foundation.arrays import Int32, Int64, Integers
+from gvpipe.mesh.sorting_kernels import sort_numbers
 from gvpipe.runtime.compiled import compiled
 
 SHORT_LIST = 64  # neighbours that are sorted by insertion
@@ -57,14 +58,6 @@ def list_sides(faces: Integers, ends: Int64, neighbours: Int32) -> None:
 
 
 @compiled
-def sort_stably(numbers: Int32) -> None:
-    """Sort numbers; a merge sort, since a file could give an order in which numba's quicksort takes quadratic time."""
-    ordered = numbers[np.argsort(numbers, kind="mergesort")]
-    for i in range(len(numbers)):
-        numbers[i] = ordered[i]
-
-
-@compiled
 def _sort_lists(starts: Int64, neighbours: Int32) -> None:
     """Sort each list, leave out the vertex itself and who is there twice, and close up the gaps."""
     kept = 0
@@ -72,7 +65,7 @@ def _sort_lists(starts: Int64, neighbours: Int32) -> None:
         first, stop = starts[v], starts[v + 1]
         starts[v] = kept
         if stop - first > SHORT_LIST:
-            sort_stably(neighbours[first:stop])
+            sort_numbers(neighbours[first:stop])
         begin = kept
         for i in range(first, stop):
             y = neighbours[i]

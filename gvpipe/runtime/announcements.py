@@ -8,7 +8,7 @@ import logging
 from gvpipe.runtime.code_folder import why_none
 
 LOGGER = logging.getLogger("gvpipe.runtime.compiled")
-ONCE = "compiling kernels, once after installation; the first commands take up to a minute longer, on slow machines two"
+ONCE = "compiling kernels, once after installation; the first commands take half a minute longer, on slow machines a minute"
 EVERY_TIME = (
     "compiling kernels in every run, since no safe folder takes machine code ({}); set NUMBA_CACHE_DIR to one of your own"
 )

@@ -7,7 +7,7 @@ The file is the SHA-256 of the rest, three lengths (8 bytes each, little-endian)
 3. LLVM's bitcode, which only kernels that call this one need.
 
 Types of arguments are in the file as text, to be compared with those that the caller has. The type of the result is written by
-`_type_text`. Environments are the objects of Python that machine code refers to; those of kernels hold types of numbers alone.
+`text_of_type`. Environments are the objects of Python that machine code refers to; those of kernels hold types of numbers.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def pack(result: Any) -> bytes:
             "symbols": _defined(result.library._get_module_for_linking()),
             "library": name,
             "types": [spelt(each) for each in signature.args],
-            "result": _type_text(signature.return_type),
+            "result": text_of_type(signature.return_type),
             "function": {key: getattr(described, key) for key in (*TEXTS, *PLAIN)},
             "arguments": list(described.args),
             "tags": list(described.abi_tags),
@@ -102,7 +102,7 @@ def rebuild(target_context: Any, arguments: tuple[Any, ...], parts: Code) -> Any
     described = parts.described
     if described["types"] != [spelt(each) for each in arguments]:
         raise ValueError("it is the code for other arguments")
-    signature = typing.signature(_type(described["result"]), *arguments)
+    signature = typing.signature(type_of_text(described["result"]), *arguments)
     library = described["library"], "object", (parts.code, _nothing())
     environments = tuple(_environment(*each) for each in described["environments"])
     given = library, _function(described, signature), _environment(*described["environment"]), signature
@@ -137,34 +137,34 @@ def _function(described: dict[str, Any], signature: Any) -> Any:
     return made
 
 
-def _type_text(kind: Any) -> Any:
+def text_of_type(kind: Any) -> Any:
     """A type as JSON: a number's name, or a list whose first entry says what it is."""
     if str(kind) in NUMBERS:
         return str(kind)
     if isinstance(kind, types.Array) and type(kind) is types.Array:
-        return ["array", _type_text(kind.dtype), kind.ndim, kind.layout, kind.mutable, kind.aligned]
+        return ["array", text_of_type(kind.dtype), kind.ndim, kind.layout, kind.mutable, kind.aligned]
     if isinstance(kind, BaseNamedTuple):
         made = kind.instance_class
-        return ["named", made.__module__, made.__qualname__, [_type_text(each) for each in kind]]
+        return ["named", made.__module__, made.__qualname__, [text_of_type(each) for each in kind]]
     if isinstance(kind, BaseTuple):
-        return ["tuple", [_type_text(each) for each in kind]]
+        return ["tuple", [text_of_type(each) for each in kind]]
     if type(kind).__module__ == "gvpipe.runtime.vector_rows":
         return ["row", kind.lanes]
     raise Unstorable(str(kind))
 
 
-def _type(text: Any) -> Any:
+def type_of_text(text: Any) -> Any:
     """The type that a text says."""
     if isinstance(text, str):
         return NUMBERS[text]
     match text:
         case ["array", dtype, int(ndim), "C" | "F" | "A" as layout, bool(mutable), bool(aligned)]:
             of: Any = types.Array  # numba's annotations list the layouts
-            return of(_type(dtype), ndim, layout, readonly=not mutable, aligned=aligned)
+            return of(type_of_text(dtype), ndim, layout, readonly=not mutable, aligned=aligned)
         case ["tuple", list(parts)]:
-            return BaseTuple.from_types(tuple(map(_type, parts)))
+            return BaseTuple.from_types(tuple(map(type_of_text, parts)))
         case ["named", str(module), str(name), list(parts)]:
-            return BaseTuple.from_types(tuple(map(_type, parts)), _class(module, name))
+            return BaseTuple.from_types(tuple(map(type_of_text, parts)), _class(module, name))
         case ["row", int(lanes)]:
             return _class("gvpipe.runtime.vector_rows", "_RowType")(lanes)
     raise ValueError(f"{text!r} is no type")

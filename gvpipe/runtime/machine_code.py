@@ -44,6 +44,7 @@ from numba.core.sigutils import normalize_signature
 
 from gvpipe.runtime import borrowing
 from gvpipe.runtime.announcements import announce_damaged
+from gvpipe.runtime.claims import claims_in
 from gvpipe.runtime.code_file import Unstorable, pack, rebuild, spelt, unpack
 from gvpipe.runtime.code_folder import own_folder as own_folder
 
@@ -105,7 +106,36 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compile result for argument types, None if there is none that fits."""
         rtsys.initialize(target_context)  # the rest of numba's context serves compilation, and takes 0.1 s
-        for path in self._places(sig, target_context.codegen()) if self._is_enabled else ():
+        if not self._is_enabled:
+            self._on_miss()
+            return None
+        found = self._load(sig, target_context)
+        if found is not None:
+            return found
+        self._on_miss()
+        folder = own_folder()
+        if folder is None:
+            return None
+        name = self._name(sig, _processor(target_context.codegen()))
+        has_waited = not claims_in(folder).take(name, 0) and claims_in(folder).take(name)
+        found = self._load(sig, target_context) if has_waited else None
+        if found is not None:
+            claims_in(folder).release(name)
+        return found
+
+    def is_wanted(self, sig: Any, target_context: Any) -> bool:
+        """Whether there is no code for some types, and no other process compiles it now."""
+        folder = own_folder()
+        if folder is None or any(path.is_file() for path in self._places(sig, target_context.codegen())):
+            return False
+        name = self._name(sig, _processor(target_context.codegen()))
+        is_free = claims_in(folder).take(name, 0)
+        if is_free:
+            claims_in(folder).release(name)
+        return is_free
+
+    def _load(self, sig: Any, target_context: Any) -> Any:
+        for path in self._places(sig, target_context.codegen()):
             try:
                 data = _read(path)
             except OSError:
@@ -115,23 +145,24 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
             except Exception as exc:  # LLVM and the linker may raise any
                 announce_damaged(exc)
                 break
-        self._on_miss()
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Store a compile result, if a folder takes it."""
         folder = own_folder()
-        if not self._is_enabled or data.library.has_dynamic_globals:  # addresses of this process
-            return
         if folder is None:
-            self._on_refusal()
+            if self._is_enabled:
+                self._on_refusal()
             return
         path = folder / self._name(sig, _processor(data.codegen))
         try:
-            _write(path, pack(data))
-            _remove_old(folder, self._stem())
+            if self._is_enabled and not data.library.has_dynamic_globals:  # addresses of this process
+                _write(path, pack(data))
+                _remove_old(folder, self._stem())
         except (OSError, Unstorable):
             self.disable()
+        finally:
+            claims_in(folder).release(path.name)
 
     def _places(self, sig: Any, codegen: Any) -> Iterator[Path]:
         """Where code for argument types may be."""

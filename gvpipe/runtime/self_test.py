@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.foundation.arrays import Float64
+from gvpipe.runtime.announcements import announce_compiling
 from gvpipe.runtime.code_file import pack, rebuild, unpack
 from gvpipe.runtime.quick_kernels import quick
 from gvpipe.runtime.vector_rows import make_prefetch, make_rows
@@ -37,7 +38,7 @@ def combine(pair: Pair, results: Float64) -> float:
 
 def check_quick_kernels() -> None:
     """Raise whatever numba and llvmlite raise, or `ArithmeticError` for a wrong result, where quick kernels do not work."""
-    kernel = quick(combine)
+    kernel = quick(combine, on_miss=announce_compiling)
     pair, results = Pair(np.arange(1.0, 10.0), np.arange(3.0, 12.0) / 7), np.zeros(LANES)
     total = kernel(pair, results)
     one, other = pair.one[1:], pair.other[:LANES]

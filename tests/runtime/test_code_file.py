@@ -71,13 +71,13 @@ def test_a_result_comes_back() -> None:
     ids=str,
 )
 def test_types_as_text(kind: Any) -> None:
-    text = json.loads(json.dumps(code_file._type_text(kind)))
-    assert code_file._type(text) == kind
+    text = json.loads(json.dumps(code_file.text_of_type(kind)))
+    assert code_file.type_of_text(text) == kind
 
 
 def test_types_that_have_no_text() -> None:
     with pytest.raises(Unstorable):
-        code_file._type_text(types.unicode_type)
+        code_file.text_of_type(types.unicode_type)
 
 
 CHANGES: dict[str, dict[str, Any]] = {
