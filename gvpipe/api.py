@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,10 +50,7 @@ if TYPE_CHECKING:
     from gvpipe.rasterizer.camera import Camera
 
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
-ASSET = ("attributes", "fields", "textures", "clip", "mesh", "frames", "unlimited")
-RUNNING = ("memory", "workers", "scheduler")
 LAYOUTS = ("stream", "bare")
-KEYWORDS = ("source", "path", "codec", "progress", "fps", *TARGETS, "purpose", *LAYOUTS, *ASSET, *RUNNING)  # of `encode`
 
 
 @dataclass(frozen=True)
@@ -228,6 +226,10 @@ def encode(
         reason=coded.reason,
         notes=[*_notes(sequence, target, asset.plan.left_out), *_refusal(path, bitstream, size)],
     )
+
+
+KEYWORDS = tuple(name for name in signature(encode).parameters if name != "settings")
+"""All of `encode` that is no setting of a codec."""
 
 
 def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0, *, unlimited: bool = False) -> MeshSequence:

@@ -53,6 +53,15 @@ def test_one_version() -> None:
     assert re.findall(r"^version: (.+)$", citation, re.MULTILINE) == [gvpipe.__version__] == [version("gvpipe")]
 
 
+def test_docstrings_name_their_subject() -> None:
+    """Who reads "Of a plane." over a function must look for what of it is meant."""
+    starts = re.compile(r'"""Of ')
+    for source in ("gvpipe", "codecs/gvcodecs"):
+        for path in (ROOT / source).rglob("*.py"):
+            if "node_modules" not in path.parts:
+                assert not starts.search(path.read_text(encoding="utf-8")), path
+
+
 def test_every_folder_of_modules_is_a_package() -> None:
     """Import contracts do not see others."""
     folders = {path.parent for source in ("gvpipe", "codecs/gvcodecs") for path in (ROOT / source).rglob("*.py")}

@@ -255,7 +255,7 @@ class Origins:
     triangles: Int64
 
     def of(self, domain: str) -> Int64 | None:
-        """Of a domain; None for parts, which keep their order."""
+        """The source's row of each row of a domain; None for parts, which keep their order."""
         return {"vertex": self.vertices, "corner": self.corners, "triangle": self.triangles}.get(domain)
 
 

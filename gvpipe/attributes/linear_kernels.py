@@ -215,7 +215,7 @@ def _across(
 
 @compiled
 def _coordinates(linear: Linear, x: int, ends: tuple[int, int]) -> tuple[float, float, float]:
-    """Of vertex x over an edge: place along it and height, in units of its length; then the length's square."""
+    """Coordinates of vertex x over an edge: place along it and height, in units of its length; then the length's square."""
     a, b = ends
     squared = dot = height = 0.0
     for axis in range(3):

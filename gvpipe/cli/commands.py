@@ -339,7 +339,8 @@ def info(
 
     with source_path(source) as path, out.progress():
         if not is_video(path):
-            _source_info(source, path, (clip, mesh, parse_frames(frames), unlimited, fps), out)
+            reading = {"clip": clip, "mesh": mesh, "frames": parse_frames(frames), "unlimited": unlimited, "fps": fps}
+            _source_info(source, path, reading, out)
             return
         if any(each is not None for each in (clip, mesh, frames, fps)):
             raise click.UsageError("--clip, --mesh, --frames and --fps are for sources; a geometry video is shown whole")
@@ -359,12 +360,12 @@ def info(
     _print_sections(out, found.sections, found.vertices * found.frames)
 
 
-def _source_info(source: str, path: str, given: tuple[Any, ...], out: Output) -> None:
-    """Print what is read of an input that is no geometry video; ``given`` are further arguments of `source_info`."""
+def _source_info(source: str, path: str, reading: dict[str, Any], out: Output) -> None:
+    """Print what is read of an input that is no geometry video; ``reading`` are further arguments of `source_info`."""
     from gvpipe.cli.asset_lines import asset_lines, shape_lines, time_lines
     from gvpipe.io.source_info import source_info
 
-    found = source_info(path, *given)
+    found = source_info(path, **reading)
     out.json(found.to_json())
     out.text(shown(source, STDIN) + ("" if found.bytes is None else f": {_size(found.bytes)}"))
     for line in [*shape_lines(found), *asset_lines(found), *time_lines(found)]:

@@ -89,7 +89,7 @@ class Encoding:
 
     @property
     def keywords(self) -> dict[str, Any]:
-        """Of `gvpipe.api.encode`, all but the codec."""
+        """Keywords for `gvpipe.api.encode`, all but the codec."""
         return {**self.reading, **self.making, "unlimited": self.unlimited}
 
 

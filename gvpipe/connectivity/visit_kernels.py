@@ -178,7 +178,7 @@ def fill_by_distance(graph: Graph, neighbours: Int32) -> None:
 
 @inlined
 def _squared_distance(points: Int64, v: int, y: int) -> int:
-    """Of two vertices; it may wrap round beyond 30 bits, at both ends alike."""
+    """The squared distance of two vertices; beyond 30 bits it may wrap round, in the encoder and in the decoder alike."""
     dx, dy, dz = points[y, 0] - points[v, 0], points[y, 1] - points[v, 1], points[y, 2] - points[v, 2]
     return int(dx * dx + dy * dy + dz * dz)
 

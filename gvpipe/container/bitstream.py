@@ -98,7 +98,7 @@ class Bitstream:
 
     @property
     def layout(self) -> str:
-        """Of its file: ``plain``, ``stream``, ``bare``, or ``live``: a stream that is not finished."""
+        """The layout of its file: ``plain``, ``stream``, ``bare``, or ``live``, a stream that is not finished."""
         if self.is_unfinished:
             return LIVE
         if self.fragments is not None:

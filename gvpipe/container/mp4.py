@@ -220,7 +220,7 @@ def _source_at(url: str, budget: Budget) -> HttpSource | StoreSource:
 
 
 def _read_parts(source: Source, index: Box, budget: Budget) -> Bitstream:
-    """Of a file in the stream layout, finished or not."""
+    """Read a file in the stream layout, finished or not."""
     return (read_live if index.uuid == ROOM_UUID.bytes else read_stream)(source, index, budget)
 
 

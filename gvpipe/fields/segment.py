@@ -120,7 +120,7 @@ def decode_segment(data: bytes, shape: tuple[int, ...], dtype: np.dtype[np.gener
         result[:, :, constant] = cursor.array(dtype.str, int(constant.sum()))
     if n_rows and not constant.all():
         with np.errstate(over="ignore", invalid="ignore"):  # of damaged bytes; what is not finite is refused below
-            numbers = _decode_numbers(cursor, (mode, dtype.kind != "f"), (int((~constant).sum()), frames), place)
+            numbers = _decode_numbers(cursor, mode, dtype.kind != "f", int((~constant).sum()), frames, place)
         values = from_numbers(numbers, dtype, mode == EXACT)
         if values is None:
             raise cursor.corrupt("a value is out of its type's range")
@@ -145,17 +145,17 @@ def read_mode(data: bytes, name: str) -> str:
     return MODES[mode]
 
 
-def _decode_numbers(cursor: Cursor, way: tuple[int, bool], kept: tuple[int, Int64], place: Place) -> Float64:
+def _decode_numbers(cursor: Cursor, mode: int, is_whole: bool, n_components: int, of_frames: Int64, place: Place) -> Float64:
     """Numbers ``(D, R, K)`` of the K components that are not constant.
 
     Args:
         cursor: at the step.
-        way: the mode, and whether values are integers.
-        kept: K and the distinct frame of each frame.
+        mode: of `MODES`, its number.
+        is_whole: whether values are integers.
+        n_components: K.
+        of_frames: the distinct frame of each frame.
         place: where the segment belongs.
     """
-    mode, is_whole = way
-    n_components, of_frames = kept
     causal, n_frames = place.causal, int(of_frames[-1]) + 1
     (step,) = cursor.struct(STEP)
     if not 0 < step <= LARGEST_STEP:  # NaN neither

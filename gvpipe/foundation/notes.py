@@ -25,29 +25,29 @@ def shape(n_frames: int, n_vertices: int) -> str:
 
 
 def left_out(n_primitives: int) -> tuple[str, ...]:
-    """Of points and lines beside the triangles."""
+    """The note for points and lines beside the triangles."""
     return (f"{n_primitives} of its primitives are points or lines; they were left out",) if n_primitives else ()
 
 
 def one_of_many(name: str, count: int, choice: str) -> str:
-    """Of a single file that looks like one frame of many; ``choice`` is what would name them all."""
+    """The note for a single file that looks like one frame of many; ``choice`` would name them all."""
     return f"{name} is 1 of {count} numbered files and was read alone; all of them are '{choice}'"
 
 
 def given_order(count: int) -> str:
-    """Of a list of files whose names do not say an order."""
+    """The note for a list of files whose names do not say an order."""
     return f"the names of the {count} files are not one numbered series; they are frames in the order given"
 
 
 def loose_bound(bound: float, diagonal: float) -> tuple[str, ...]:
-    """Of a largest error that allows everything."""
+    """The note for a largest error that allows everything."""
     if not bound > diagonal > 0:
         return ()
     return (f"the largest error allowed, {bound:g}, is larger than the object, whose diagonal is {diagonal:g}",)
 
 
 def rounded(rounding: float, diagonal: float) -> tuple[str, ...]:
-    """Of positions that reach so far, for the object's size, that float32 deforms it even from the best origin."""
+    """The note for positions that are so far apart that float32 deforms the object, even from the best origin."""
     if not rounding > ROUNDED * diagonal > 0:
         return ()
     part = f"{100 * rounding / diagonal:.2g} % of the object's diagonal"
@@ -55,33 +55,33 @@ def rounded(rounding: float, diagonal: float) -> tuple[str, ...]:
 
 
 def not_held(format_name: str, names: Sequence[str]) -> tuple[str, ...]:
-    """Of what a file format has no place for."""
+    """Notes for what a file format has no place for."""
     return (f"{format_name} has no place for {', '.join(names)}; left out (.npz holds everything)",) if names else ()
 
 
 def not_carried(names: Sequence[str]) -> tuple[str, ...]:
-    """Of attributes that the file has no place for."""
+    """The note for attributes that the file has no place for."""
     return (f"the file does not carry {', '.join(names)}",) if names else ()
 
 
 def left_behind(names: Sequence[str]) -> tuple[str, ...]:
-    """Of what a source has beside what is read."""
+    """The note for what a source has beside what is read."""
     shown = ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")
     return (f"the source has what is not carried: {shown}",) if names else ()
 
 
 def over_budget(reason: str) -> str:
-    """Of a file that is refused because it is very small for what it holds."""
+    """The note for a file that is refused because it is very small for what it holds."""
     return f"the file is so small for its mesh that reading it needs --unlimited ({reason})"
 
 
 def coarser_level(lod: int, names: Sequence[str]) -> tuple[str, ...]:
-    """Of what a level of detail has no place for."""
+    """The note for what a level of detail has no place for."""
     return (f"level of detail {lod} leaves out {', '.join(names)}",) if names else ()
 
 
 def origin_left_out(origin: Sequence[float]) -> str:
-    """Of positions that were written without their origin."""
+    """The note for positions that were written without their origin."""
     return f"positions are relative to {show_origin(origin)}, which was left out"
 
 

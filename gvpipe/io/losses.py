@@ -38,19 +38,19 @@ def shadowed(sequence: MeshSequence) -> list[str]:
 
 
 def shadow_note(names: Sequence[str], format_name: str) -> tuple[str, ...]:
-    """Of attributes that have the name of a field."""
+    """The note for attributes that have the name of a field."""
     return (f"{format_name} has one value of a name; the fields {', '.join(names)} stand for the attributes",) if names else ()
 
 
 def renamed_note(names: Iterable[tuple[str, str]], format_name: str) -> tuple[str, ...]:
-    """Of names that a format does not allow, has already, or gives a meaning of its own: pairs of the old and the new one."""
+    """The note for names that a format does not allow, has already, or gives a meaning: pairs of the old and the new one."""
     changed = [f"{old!r} is {new!r}" for old, new in dict.fromkeys(names) if old != new]
     more = f" and {len(changed) - LISTED} more" if len(changed) > LISTED else ""
     return (f"names were changed for {format_name}: {', '.join(changed[:LISTED])}{more}",) if changed else ()
 
 
 def unit_note(sequence: MeshSequence, format_name: str) -> tuple[str, ...]:
-    """Of attributes and fields whose units have no place."""
+    """The note for attributes and fields whose units have no place."""
     every = (*sequence.attributes.items(), *sequence.fields.items())
     units = list(dict.fromkeys(f"{name} ({one.unit})" for name, one in every if one.unit))
     listed = ", ".join(units[:LISTED]) + (f" and {len(units) - LISTED} more" if len(units) > LISTED else "")

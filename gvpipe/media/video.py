@@ -87,7 +87,7 @@ class Profile:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Of a plane."""
+        """The type of a plane's samples."""
         return np.dtype(np.uint8 if self.depth == 8 else np.uint16)
 
     def clip(self, samples: Integers) -> Integers:

@@ -175,19 +175,19 @@ class Player:
     def sequence(self) -> MeshSequence:
         """The video as a sequence whose frames, and frames of fields, are decoded when they are read."""
         return MeshSequence(
-            self,
-            self.faces,
-            self.fps,
-            self.attributes,
-            self.path,
-            self.origin,
-            self.notes,
-            self.fields,
-            self.parts,
-            self.polygons,
-            self.materials,
-            self.images,
-            self.metadata,
+            positions=self,
+            faces=self.faces,
+            fps=self.fps,
+            attributes=self.attributes,
+            name=self.path,
+            origin=self.origin,
+            notes=self.notes,
+            fields=self.fields,
+            parts=self.parts,
+            polygons=self.polygons,
+            materials=self.materials,
+            images=self.images,
+            metadata=self.metadata,
         )
 
     def __len__(self) -> int:

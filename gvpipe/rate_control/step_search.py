@@ -19,13 +19,15 @@ from gvpipe.coding.codec import Encoded, FrameReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.model.sequence import MeshSequence
 
+CLOSE_ENOUGH = 0.9, 1.06  # part of the target error, for codecs whose errors scatter by a few percent
 ROUNDS = 3  # encodes at most
+SLOPE = 0.8  # of log(error) over log(step), assumed at first
+SLOPES = 0.4, 1.5  # slopes that are believed: two errors that scatter may give any
 MOST_CHANGE = 4.0  # times, of a step at once
-SLOPE, SLOPES = 0.8, (0.4, 1.5)  # of the error's logarithm over the step's: assumed at first, and believed
-BAND = 0.9, 1.06  # part of the target error that is close enough, for codecs whose errors scatter by a few percent
-FLAT = 0.2  # slope below which errors hardly follow steps
-FINEST = 0.85  # part of the target error, from which on an error may stay where a larger one saves too little
-NEAR = 2.0  # times, an error beside a measured one for which the step in proportion is believed
+FLAT_SLOPE = 0.2  # below it, errors hardly follow steps
+FINE_ENOUGH = 0.85  # part of the target error, from which on an error may stay where a larger one saves too little
+HOPELESS = 2  # encodes in turn whose rest is above the target: steps that round everything to 0 look so once
+PROPORTIONAL = 2.0  # times, an error beside a measured one for which the step in proportion is believed
 LEAST_ERROR = 1e-300  # instead of 0, which has no logarithm
 
 
@@ -49,7 +51,7 @@ class StepTrial:
 
     @property
     def bitstream(self) -> Bitstream:
-        """Of the encode."""
+        """The bitstream of the encode."""
         return self.encoded.bitstream
 
 
@@ -77,7 +79,7 @@ class Flat:
         """From two steps and the errors that they left, model units; None where errors follow steps, or fall."""
         (step, error), (other, other_error) = before, after
         factor = (other_error**2 - error**2) / (other**2 - step**2)
-        if not factor > 0 or math.log(other_error / error) / math.log(other / step) >= FLAT:
+        if not factor > 0 or math.log(other_error / error) / math.log(other / step) >= FLAT_SLOPE:
             return None
         return cls(math.sqrt(max(error**2 - factor * step**2, 0.0)), factor)
 
@@ -89,16 +91,94 @@ class Flat:
 AnyAnchor = TypeVar("AnyAnchor", bound=Anchor)
 
 
-def find_step(
-    attempt: Callable[[float], StepTrial],
-    step: float,
-    target_error: float,
-    band: tuple[float, float] = BAND,
-    slope: float = 1.0,
-    rounds: int = ROUNDS,
-    levels_off: bool = False,
-    cost: Callable[[StepTrial], float] | None = None,
-) -> StepTrial:
+@dataclass(frozen=True)
+class Goal:
+    """What a search for a step is to reach.
+
+    Args:
+        target_error: root mean square, model units.
+        close_enough: least and most part of it that ends the search.
+        slope: of log(error) over log(step), assumed until two are measured.
+        rounds: most encodes.
+        levels_off: whether errors may level off at fine steps, as those of blends do: then `Flat` tells the next step, and an
+            error that no step leaves ends the search.
+        cost: of an encode, its error counted. Where errors hardly follow steps, steps grow only as long as that falls, if the
+            error is near already. None: until the error is close enough.
+    """
+
+    target_error: float
+    close_enough: tuple[float, float] = CLOSE_ENOUGH
+    slope: float = 1.0
+    rounds: int = ROUNDS
+    levels_off: bool = False
+    cost: Callable[[StepTrial], float] | None = None
+
+    @property
+    def middle(self) -> float:
+        """The error that is aimed at, model units: the geometric mean of those that are close enough."""
+        return self.target_error * math.sqrt(self.close_enough[0] * self.close_enough[1])
+
+    def is_close(self, error: float) -> bool:
+        """Whether an error, model units, ends the search."""
+        return self.close_enough[0] <= error / self.target_error <= self.close_enough[1]
+
+
+class StepSearch:
+    """What is known of errors over steps, and which step comes next. Encodes take memory, so that none is kept here."""
+
+    def __init__(self, goal: Goal) -> None:
+        self.goal = goal
+        self.slope = goal.slope
+        self._flat: Flat | None = None
+        self._measured: list[tuple[float, float]] = []  # steps and errors
+        self._costs: list[float] = []
+        self._n_hopeless = 0
+
+    @property
+    def rest(self) -> float:
+        """Error that is left however fine the step, model units, about; 0 where errors follow steps."""
+        return self._flat.rest if self._flat else 0.0
+
+    def note(self, trial: StepTrial, step: float) -> None:
+        """Take an encode of a step into account."""
+        goal = self.goal
+        self._costs.append(goal.cost(trial) if goal.cost else math.inf)
+        self._measured.append((step, max(trial.error, LEAST_ERROR)))
+        if len(self._measured) > 1 and step != self._measured[-2][0]:
+            before, after = self._measured[-2:]
+            self.slope = _slope_between(before, after)
+            self._flat = Flat.of(before, after) if goal.levels_off else None
+        is_hopeless = self._flat is not None and self._flat.rest > goal.close_enough[1] * goal.target_error
+        self._n_hopeless = self._n_hopeless + 1 if is_hopeless else 0
+
+    def is_done(self) -> bool:
+        """Whether no further encode pays."""
+        is_enough = len(self._measured) >= self.goal.rounds or self.goal.is_close(self._measured[-1][1])
+        return is_enough or self._n_hopeless == HOPELESS or self._is_dearer()
+
+    def next_step(self) -> float:
+        """The step to try next, model units."""
+        step, error = self._measured[-1]
+        if self._flat and self._flat.rest < self.goal.middle:
+            return min(max(self._flat.step(self.goal.middle), step / MOST_CHANGE), step * MOST_CHANGE)
+        return step * _change(error, self.goal.middle, self.slope)
+
+    def best(self) -> tuple[float, float]:
+        """The step whose error is nearest to the goal, and that error."""
+        if self._is_dearer():
+            return self._measured[-2]
+        return min(reversed(self._measured), key=lambda one: abs(math.log(one[1]) - math.log(self.goal.middle)))
+
+    def _is_dearer(self) -> bool:
+        """Whether a larger step cost more, where errors hardly follow steps and the one before was fine enough."""
+        if not self._flat:
+            return False
+        goal, (before, last) = self.goal, (error for _, error in self._measured[-2:])
+        is_between = FINE_ENOUGH * goal.target_error < before < last <= goal.middle
+        return is_between and self._costs[-1] > self._costs[-2]
+
+
+def find_step(attempt: Callable[[float], StepTrial], step: float, goal: Goal) -> StepTrial:
     """Encode with one step after the other until the error is close enough; return the encode that came closest.
 
     One encode is held at a time. Where none is close enough and the last is not the closest, that one is made again.
@@ -106,44 +186,21 @@ def find_step(
     Args:
         attempt: codes and measures with a step, model units.
         step: the first.
-        target_error: root mean square, model units.
-        band: least and most part of it that is close enough.
-        slope: of the error's logarithm over the step's, assumed until two are measured.
-        rounds: most encodes.
-        levels_off: whether errors may level off at fine steps, as those of blends do: then `Flat` tells the next step, and an
-            error that no step leaves ends the search.
-        cost: of an encode, its error counted. Where errors hardly follow steps, steps grow only as long as that falls, if the
-            error is near already. None: until the error is close enough.
+        goal: what is close enough.
     """
-    middle = target_error * math.sqrt(band[0] * band[1])
-    measured: list[tuple[float, float]] = []  # steps and errors, not encodes, which take memory
-    flat: Flat | None = None
-    price, price_before, n_hopeless = math.inf, math.inf, 0
-    while True:
-        last = attempt(step)
-        price_before, price = price, cost(last) if cost else math.inf
-        measured.append((step, max(last.error, LEAST_ERROR)))
-        if len(measured) > 1 and step != measured[-2][0]:
-            slope = _slope(measured[-2], measured[-1])
-            flat = Flat.of(measured[-2], measured[-1]) if levels_off else None
-        n_hopeless = n_hopeless + 1 if flat and flat.rest > band[1] * target_error else 0
-        if flat and FINEST * target_error < measured[-2][1] < measured[-1][1] <= middle and price > price_before:
-            measured = measured[-2:-1]
-            break
-        if len(measured) >= rounds or band[0] <= measured[-1][1] / target_error <= band[1]:
-            break
-        if n_hopeless == 2:  # once proves nothing: errors level off at steps that round everything to 0, too
-            break
-        if flat and flat.rest < middle:
-            step = min(max(flat.step(middle), step / MOST_CHANGE), step * MOST_CHANGE)
-        else:
-            step *= _change(measured[-1][1], middle, slope)
+    search = StepSearch(goal)
+    last = attempt(step)
+    search.note(last, step)
+    while not search.is_done():
+        step = search.next_step()
         del last
-    best, error = min(reversed(measured), key=lambda one: abs(math.log(one[1]) - math.log(middle)))
+        last = attempt(step)
+        search.note(last, step)
+    best, error = search.best()
     if best != step:  # seldom: it comes out as before
         del last
         last = attempt(best)
-    return StepTrial(last.encoded, best, error, slope, flat.rest if flat else 0.0)
+    return StepTrial(last.encoded, best, error, search.slope, search.rest)
 
 
 def step_between(anchors: Sequence[Anchor], target_error: float) -> float | None:
@@ -161,7 +218,11 @@ def step_between(anchors: Sequence[Anchor], target_error: float) -> float | None
             part = math.log(target_error / low.error) / math.log(high.error / low.error)
             return low.step * math.exp(part * math.log(high.step / low.step))
     near = nearest(anchors, target_error)
-    return near.step * target_error / near.error if near and 1 / NEAR <= target_error / near.error <= NEAR else None
+    return (
+        near.step * target_error / near.error
+        if near and 1 / PROPORTIONAL <= target_error / near.error <= PROPORTIONAL
+        else None
+    )
 
 
 def first_step(anchors: Sequence[Anchor], target_error: float, ratio: float) -> float:
@@ -185,8 +246,8 @@ def root_mean_square(sequence: MeshSequence, reader: FrameReader) -> float:
     return math.sqrt(total / (sequence.n_frames * sequence.n_vertices))
 
 
-def _slope(before: tuple[float, float], after: tuple[float, float]) -> float:
-    """Of the error's logarithm over the step's, so far as it is believed; given are steps and errors."""
+def _slope_between(before: tuple[float, float], after: tuple[float, float]) -> float:
+    """The slope of log(error) over log(step) between two ``(step, error)``, kept within `SLOPES`."""
     slope = math.log(after[1] / before[1]) / math.log(after[0] / before[0])
     return min(max(slope, SLOPES[0]), SLOPES[1])
 

@@ -30,7 +30,7 @@ FAILED = "numba {} and llvmlite {} lack what quick kernels need ({}); plain ones
 
 
 class Form(enum.Enum):
-    """Of kernels, as the table above says."""
+    """The forms of kernels, as the table above says."""
 
     QUICK = "quick"
     PLAIN = "plain"

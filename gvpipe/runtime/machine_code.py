@@ -172,7 +172,7 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
         if INSTALLED.is_dir():
             yield INSTALLED / name
             if stands_in():
-                yield INSTALLED / self._name(sig, _portable()[:2])
+                yield INSTALLED / self._name(sig, (_portable()[0], ""))
 
     def _name(self, sig: Any, processor: tuple[str, str]) -> str:
         """The name of the file for argument types on a processor: LLVM's name of it, and features beside those of that name."""
@@ -187,7 +187,7 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
 @functools.cache
 def stands_in() -> bool:
     """Whether code for the portable processor serves here; not if ``NUMBA_CPU_NAME`` or ``NUMBA_CPU_FEATURES`` is set."""
-    name, _, needed = _portable()
+    name, needed = _portable()
     if not name or config.CPU_NAME is not None or config.CPU_FEATURES is not None:
         return False
     features = binding.get_host_cpu_features() if needed else {}
@@ -196,14 +196,13 @@ def stands_in() -> bool:
 
 def portable_settings() -> dict[str, str]:
     """The environment variables with which numba compiles for the portable processor; none where there is no such."""
-    name, features, _ = _portable()
-    return {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": features} if name else {}
+    name, _ = _portable()
+    return {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""} if name else {}
 
 
-def _portable() -> tuple[str, str, tuple[str, ...]]:
-    """LLVM's name of the portable processor, features beside those of that name, and the features that it has."""
-    name, needed = PORTABLE.get(platform.machine().lower(), ("", ()))
-    return name, "", needed
+def _portable() -> tuple[str, tuple[str, ...]]:
+    """LLVM's name of the portable processor, and the features that it has."""
+    return PORTABLE.get(platform.machine().lower(), ("", ()))
 
 
 def _processor(codegen: Any) -> tuple[str, str]:

@@ -18,7 +18,7 @@ READ, KEEP, DATA = 0, 3, 1  # what `prefetch` is for, in LLVM's words
 
 
 class _RowType(types.Type):
-    """Of a row of ``lanes`` numbers."""
+    """The type of a row of ``lanes`` numbers."""
 
     def __init__(self, lanes: int) -> None:
         self.lanes = lanes

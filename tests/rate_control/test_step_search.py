@@ -7,7 +7,7 @@ import pytest
 
 from gvpipe.coding.codec import Encoded
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.rate_control.step_search import BAND, Anchor, StepTrial, find_step, step_between
+from gvpipe.rate_control.step_search import CLOSE_ENOUGH, Anchor, Goal, StepTrial, find_step, step_between
 
 EMPTY = Encoded(Bitstream("none", 1, 1, 1, 0, 30.0), np.arange(1))
 
@@ -18,8 +18,8 @@ def pretend(step: float, exponent: float) -> StepTrial:
 
 @pytest.mark.parametrize("exponent", [0.6, 1.0, 1.3])
 def test_steps_are_mended_until_the_error_is_close(exponent: float) -> None:
-    aimed = find_step(lambda step: pretend(step, exponent), 1.0, 1.0)
-    assert BAND[0] <= aimed.error <= BAND[1]
+    aimed = find_step(lambda step: pretend(step, exponent), 1.0, Goal(1.0))
+    assert CLOSE_ENOUGH[0] <= aimed.error <= CLOSE_ENOUGH[1]
 
 
 def test_errors_that_do_not_follow_the_step_end_the_loop() -> None:
@@ -29,7 +29,7 @@ def test_errors_that_do_not_follow_the_step_end_the_loop() -> None:
         tried.append(step)
         return StepTrial(EMPTY, step, 0.0)
 
-    assert find_step(attempt, 1.0, 1e30).step in tried
+    assert find_step(attempt, 1.0, Goal(1e30)).step in tried
     assert len(tried) == 3
 
 
@@ -37,9 +37,9 @@ def test_errors_that_do_not_follow_the_step_end_the_loop() -> None:
 def test_errors_that_hardly_follow_the_step_are_met(factor: float) -> None:
     """As of blends, which leave most of the error however fine the step."""
     found = find_step(
-        lambda step: StepTrial(EMPTY, step, (0.8**2 + factor * step**2) ** 0.5), 1.0, 1.0, rounds=6, levels_off=True
+        lambda step: StepTrial(EMPTY, step, (0.8**2 + factor * step**2) ** 0.5), 1.0, Goal(1.0, rounds=6, levels_off=True)
     )
-    assert BAND[0] <= found.error <= BAND[1]
+    assert CLOSE_ENOUGH[0] <= found.error <= CLOSE_ENOUGH[1]
 
 
 def test_an_error_that_no_step_leaves_is_not_looked_for() -> None:
@@ -49,22 +49,26 @@ def test_an_error_that_no_step_leaves_is_not_looked_for() -> None:
         tried.append(step)
         return StepTrial(EMPTY, step, (0.8**2 + 0.01 * step**2) ** 0.5)
 
-    found = find_step(attempt, 1.0, 0.5, rounds=6, levels_off=True)
+    found = find_step(attempt, 1.0, Goal(0.5, rounds=6, levels_off=True))
     assert len(tried) == 3 and found.step == min(tried)
-    assert found.rest == pytest.approx(0.8) and find_step(lambda step: pretend(step, 1.0), 1.0, 1.0).rest == 0
+    assert found.rest == pytest.approx(0.8) and find_step(lambda step: pretend(step, 1.0), 1.0, Goal(1.0)).rest == 0
 
 
 @pytest.mark.parametrize("first", [3.0, 4.0, 6.0, 8.0])
 def test_an_error_just_above_the_rest_is_met(first: float) -> None:
     found = find_step(
-        lambda step: StepTrial(EMPTY, step, (0.95**2 + 0.01 * step**2) ** 0.5), first, 1.0, (0.9, 0.99), 0.8, 5, levels_off=True
+        lambda step: StepTrial(EMPTY, step, (0.95**2 + 0.01 * step**2) ** 0.5),
+        first,
+        Goal(1.0, (0.9, 0.99), 0.8, 5, levels_off=True),
     )
     assert found.error <= 0.99
 
 
 def test_steps_that_round_everything_away_do_not_end_the_search() -> None:
-    found = find_step(lambda step: StepTrial(EMPTY, step, step / (1 + step**2) ** 0.5), 8.0, 0.3, rounds=5, levels_off=True)
-    assert BAND[0] <= found.error / 0.3 <= BAND[1]
+    found = find_step(
+        lambda step: StepTrial(EMPTY, step, step / (1 + step**2) ** 0.5), 8.0, Goal(0.3, rounds=5, levels_off=True)
+    )
+    assert CLOSE_ENOUGH[0] <= found.error / 0.3 <= CLOSE_ENOUGH[1]
 
 
 @pytest.mark.parametrize("pays", [False, True])
@@ -74,9 +78,15 @@ def test_steps_that_save_too_little_are_not_taken(pays: bool) -> None:
     def attempt(step: float) -> StepTrial:
         return StepTrial(EMPTY, step, (0.8**2 + 0.01 * step**2) ** 0.5)
 
-    found = find_step(attempt, 1.0, 0.93, rounds=6, levels_off=True, cost=lambda trial: -trial.step if pays else trial.step)
-    assert BAND[0] <= found.error / 0.93 <= BAND[1] if pays else found.step == 1.0 and found.error < BAND[0] * 0.93
-    far = find_step(attempt, 1.0, 1.2, rounds=6, levels_off=True, cost=lambda trial: trial.step)
+    found = find_step(
+        attempt, 1.0, Goal(0.93, rounds=6, levels_off=True, cost=lambda trial: -trial.step if pays else trial.step)
+    )
+    assert (
+        CLOSE_ENOUGH[0] <= found.error / 0.93 <= CLOSE_ENOUGH[1]
+        if pays
+        else found.step == 1.0 and found.error < CLOSE_ENOUGH[0] * 0.93
+    )
+    far = find_step(attempt, 1.0, Goal(1.2, rounds=6, levels_off=True, cost=lambda trial: trial.step))
     assert far.error > 0.9  # the first is too far from what was asked for
 
 
@@ -88,7 +98,7 @@ def test_the_closest_encode_is_made_again_where_it_is_not_the_last() -> None:
         tried.append(step)
         return StepTrial(EMPTY, step, errors[len(tried) - 1] if len(tried) <= 3 else 1.2)
 
-    found = find_step(attempt, 1.0, 1.0)
+    found = find_step(attempt, 1.0, Goal(1.0))
     assert (found.step, found.error) == (1.0, 1.2) and tried[3:] == [1.0]
 
 

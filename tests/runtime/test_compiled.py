@@ -217,7 +217,7 @@ def test_code_of_the_installation(kernels: Any, monkeypatch: pytest.MonkeyPatch,
     assert kernel(2) == 4
     (made,) = files(kernel)
     (signature,) = kernel.signatures
-    portable = kernel._cache._name(signature, machine_code._portable()[:2])
+    portable = kernel._cache._name(signature, (machine_code._portable()[0], ""))
     (tmp_path / "installed").mkdir()
     for name, stands_in, found in ((made.name, False, 1), (portable, True, 1), (portable, False, 0)):
         monkeypatch.setattr(machine_code, "stands_in", lambda value=stands_in: value)

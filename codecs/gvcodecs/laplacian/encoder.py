@@ -47,7 +47,7 @@ from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_p
 from gvpipe.foundation.arrays import Int64
 from gvpipe.foundation.progress import Progress
 from gvpipe.model.sequence import MeshSequence
-from gvpipe.rate_control.step_search import NEAR, Anchor, StepTrial, find_step, first_step, step_between
+from gvpipe.rate_control.step_search import PROPORTIONAL, Anchor, Goal, StepTrial, find_step, first_step, step_between
 from gvpipe.runtime.segment_map import map_segments
 from gvpipe.trajectory.basis import MAX_COMPONENTS, reduce_trajectories
 from gvpipe.trajectory.coded_points import CodedConnectivity, code_connectivity, read_trajectories, sum_squared_errors
@@ -111,10 +111,9 @@ class Laplacian(BaseCodec):
         found_step = step_between(anchors, target_error)
         if found_step is not None or not start.still.n_moving or self.components:
             return self._code(sequence, start, found_step or FIRST * target_error, report).encoded
-        trial = find_step(
-            lambda asked: self._code(sequence, start, asked, report), first_step(anchors, target_error, FIRST), target_error
-        )
-        if trial.error > target_error / NEAR:  # else the step hardly matters, and tells nothing of other errors
+        first = first_step(anchors, target_error, FIRST)
+        trial = find_step(lambda asked: self._code(sequence, start, asked, report), first, Goal(target_error))
+        if trial.error > target_error / PROPORTIONAL:  # else the step hardly matters, and tells nothing of other errors
             anchors.append(Anchor(trial.step, trial.error))
         return trial.encoded
 

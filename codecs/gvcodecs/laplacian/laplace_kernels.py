@@ -95,7 +95,7 @@ def _mean_value(points: Float64, a: int, b: int, c: int, shortest: float) -> flo
 
 @compiled
 def _cotangent(points: Float64, a: int, b: int, c: int, shortest: float) -> float:
-    """Of the angle at a."""
+    """The cotangent of the angle at a."""
     cosine, sine = _angle(points, a, b, c)
     product = max(np.sqrt(_squared(points, a, b)) * np.sqrt(_squared(points, a, c)), shortest * shortest)
     weight: float = cosine / max(sine, FLATTEST * product)

@@ -94,7 +94,7 @@ class Settings(BaseCodec):
 
     @property
     def video_profile(self) -> Profile:
-        """Of the pictures."""
+        """The profile of the pictures' video."""
         return PROFILES["jpeg" if self.image == "jpeg" else "h264-10" if self.profile == "precise" else "h264-8"]
 
     @property

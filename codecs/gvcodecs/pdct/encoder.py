@@ -34,7 +34,16 @@ from gvpipe.foundation.progress import Progress
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.model.sequence import MeshSequence
-from gvpipe.rate_control.step_search import NEAR, Anchor, StepTrial, find_step, first_step, root_mean_square, step_between
+from gvpipe.rate_control.step_search import (
+    PROPORTIONAL,
+    Anchor,
+    Goal,
+    StepTrial,
+    find_step,
+    first_step,
+    root_mean_square,
+    step_between,
+)
 from gvpipe.runtime.segment_map import map_segments
 from gvpipe.trajectory.still_vertices import find_still
 from gvpipe.trajectory.welding import find_points
@@ -106,8 +115,8 @@ class Pdct(BaseCodec):
             report("measure", 0)
             return StepTrial(encoded, step, root_mean_square(own, self.reader(encoded.bitstream)))
 
-        trial = find_step(attempt, first_step(anchors, target_error, FIRST), target_error)
-        if trial.error > target_error / NEAR:  # else the step hardly matters, and tells nothing of other errors
+        trial = find_step(attempt, first_step(anchors, target_error, FIRST), Goal(target_error))
+        if trial.error > target_error / PROPORTIONAL:  # else the step hardly matters, and tells nothing of other errors
             anchors.append(Anchor(trial.step, trial.error))
         return trial.encoded
 
@@ -264,6 +273,6 @@ def _code_clip(clips: _Clips, task: tuple[tuple[int, int], Clusters | None]) -> 
 
 
 def diagonal_of(frames: Float32) -> float:
-    """Of the bounding box of ``frames (..., V, 3)``, model units."""
+    """The diagonal of the bounding box of ``frames (..., V, 3)``, model units."""
     points = frames.reshape(-1, 3)
     return float(np.linalg.norm(points.max(axis=0).astype(np.float64) - points.min(axis=0)))

@@ -96,6 +96,6 @@ def join_fields(
 
 
 def misfit_note(what: str, names: Iterable[Iterable[str]]) -> tuple[str, ...]:
-    """Of attributes and fields that were left out, whose names are given mesh by mesh; ``what`` the format calls them."""
+    """The note for attributes and fields that were left out, by mesh; ``what`` is the format's word for them."""
     left = list(dict.fromkeys(name for own in names for name in own))
     return (f"{what} that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()

@@ -158,7 +158,7 @@ def even_times(samples: Float64, fps: float | None, default: float, where: str) 
 
 
 def between_note(samples: Float64, start: float, step: float, fps: float, codes: float) -> tuple[str, ...]:
-    """Of samples that lie between frames; ``codes`` units of time are a second."""
+    """The note for samples that lie between frames; ``codes`` units of time are a second."""
     at = (samples - start) / step
     between = int((np.abs(at - np.rint(at)) > 1e-2).sum())
     if not between:

@@ -70,6 +70,6 @@ def _whole(rate: float) -> float:
 
 
 def empty_note(n_steps: int) -> tuple[str, ...]:
-    """Of steps without cells before the first that has some."""
+    """The note for steps without cells before the first that has some."""
     first = "the first step has" if n_steps == 1 else f"the first {n_steps} steps have"
     return (f"{first} no cells; the sequence begins behind",) if n_steps else ()

@@ -61,7 +61,7 @@ class Start:
 
     @property
     def key(self) -> str:
-        """Of the base frame, for memos."""
+        """The base frame's name in memos."""
         return f"{self.lattice.step} {len(self.base)}"
 
     def moving(self) -> tuple[Int64, Int64]:

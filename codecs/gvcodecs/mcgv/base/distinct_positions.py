@@ -45,7 +45,7 @@ def keep_apart(lattice: Lattice, first: Float32) -> Int32:
 
 
 def _first_at(points: Int64, rank: Float64) -> Int64:
-    """Of the rows at each of ``points (n, 3)``, the one of the lowest ``rank (n,)``, then the first."""
+    """The row of the lowest ``rank (n,)``, then the first, of those at each of ``points (n, 3)``."""
     ids = row_ids(points)[0]
     order = np.lexsort((rank, ids))
     return np.asarray(order[np.diff(ids[order], prepend=-1) > 0])

@@ -31,7 +31,7 @@ class CandidateAnchor(Anchor):
 
     @classmethod
     def of(cls, candidate: Candidate, trial: StepTrial) -> CandidateAnchor:
-        """Of an encode of a candidate."""
+        """The anchor that an encode of a candidate gives."""
         return cls(trial.step, trial.error, candidate, trial.slope)
 
 

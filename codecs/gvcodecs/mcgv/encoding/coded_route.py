@@ -38,7 +38,7 @@ class Coded:
 
     @classmethod
     def of_frames(cls, layout: Layout, motion: CodedMotion, frames: CodedFrames, placed: Mapping[str, bytes]) -> Coded:
-        """Of pictures that are frames, and of the sections that tell where their points are."""
+        """What routes with pictures of frames end with; ``placed`` are the sections that say where their points are."""
         fields = {"clusters": motion.n_clusters, "transform_step": motion.step, "residual_step": frames.step}
         sections = {**motion.sections, **placed}
         if frames.outliers:

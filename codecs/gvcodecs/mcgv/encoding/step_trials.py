@@ -41,7 +41,7 @@ class StepTrials:
 
     @kept
     def alone(self) -> StepTrials:
-        """Of the same candidate without pictures."""
+        """Trials of the same candidate without pictures."""
         start = dataclasses.replace(self.candidate.start, pictures=False)
         return StepTrials(self.job, dataclasses.replace(self.candidate, start=start))
 

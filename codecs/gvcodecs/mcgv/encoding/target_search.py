@@ -18,21 +18,12 @@ from gvcodecs.mcgv.encoding.bitstream_sizes import cost
 from gvcodecs.mcgv.encoding.candidate import Candidate, CandidateAnchor
 from gvcodecs.mcgv.encoding.initial_skinning import fit_skinning
 from gvcodecs.mcgv.encoding.step_trials import StepTrials, encode
+from gvcodecs.mcgv.encoding.tuning import SLOPE, TUNING
 from gvcodecs.mcgv.encoding.without_pictures import approach, omit_pictures, refine
 from gvpipe.coding.codec import Encoded
 from gvpipe.coding.quality_scale import error_of
 from gvpipe.metrics.vertex_errors import measure_spread
-from gvpipe.rate_control.step_search import SLOPE, StepTrial, find_step, nearest
-
-GUESS = {"blended": 3.5, "affine": 1.65}  # steps by the error that they leave, root mean square over vertices
-BAND = {"blended": (0.9, 0.99), "affine": (1.0, 1.1)}  # of the target error: the published mode is no finer than asked
-FINE = 0.81  # part of the target error, from which on the first encode of a large sequence is kept
-FAR = 0.75, 1.4  # of the target error: what a blend is kept for that needs no pictures
-NEAR = 0.8, 1.4  # the same of others
-MAX_MOVE = math.log(4)  # of the step's logarithm, at once
-REUSED = 0.35  # of the error's logarithm, away from that measured: up to there a blend serves another quality
-SECOND = 0.9  # part of the target error that the second blend is fitted for
-LEAST = 1e-9  # part of the target error, below which an error is none
+from gvpipe.rate_control.step_search import Goal, StepTrial, find_step, nearest
 
 
 def encode_to_target(job: Job) -> Encoded:
@@ -40,7 +31,7 @@ def encode_to_target(job: Job) -> Encoded:
     target_error = error_of(job.settings.quality) / 100 * job.memo("spread", lambda: measure_spread(job.sequence))
     anchors = job.memo("anchors", list[CandidateAnchor])
     anchor = nearest(anchors, target_error)
-    if anchor and (not anchor.candidate.fitted or abs(anchor.distance(target_error)) < REUSED):
+    if anchor and (not anchor.candidate.fitted or abs(anchor.distance(target_error)) < TUNING.reuse_within):
         return _reuse(job, anchor, target_error)  # what was measured at another quality serves this one
     trials, trial = _aim(job, target_error)
     anchors.append(CandidateAnchor.of(trials.candidate, trial))
@@ -59,19 +50,19 @@ def _reuse(job: Job, anchor: CandidateAnchor, target_error: float) -> Encoded:
 
 def _aim(job: Job, target_error: float) -> tuple[StepTrials, StepTrial]:
     """Code with the step that leaves about a target error, model units."""
-    trials, step = _begin(job, GUESS[job.settings.prediction] * target_error, target_error, target_error)
+    trials, step = _begin(job, TUNING.guess(job.settings.prediction) * target_error, target_error, target_error)
     if trials.candidate.fitted:
-        trials, step = _fit_again(trials, step, target_error)
-    band = BAND[job.settings.prediction]
+        trials, step = _fit_for_error(trials, step, target_error)
+    goal = Goal(target_error, TUNING.close_enough(job.settings.prediction), SLOPE)
     if job.settings.may_omit_pictures:
-        found = omit_pictures(trials, step, target_error, band)
+        found = omit_pictures(trials, step, target_error, goal.close_enough)
         if found:
             return found
     if job.settings.is_blended and job.is_large:
         first = trials(step)
-        if FINE <= first.error / target_error <= band[1]:
+        if TUNING.large_first <= first.error / target_error <= goal.close_enough[1]:
             return trials, first
-    return trials, find_step(trials, step, target_error, band, SLOPE)
+    return trials, find_step(trials, step, goal)
 
 
 def _begin(job: Job, step: float, target_error: float, fitted_for: float) -> tuple[StepTrials, float]:
@@ -83,18 +74,23 @@ def _begin(job: Job, step: float, target_error: float, fitted_for: float) -> tup
     return StepTrials(job, Candidate(start, fitted)), step
 
 
-def _fit_again(trials: StepTrials, step: float, target_error: float) -> tuple[StepTrials, float]:
+def _fit_for_error(trials: StepTrials, step: float, target_error: float) -> tuple[StepTrials, float]:
     """Where the error is far off, another step wants another blend, and another base frame; return what costs less."""
-    if trials.are_pictures_idle(step) and FAR[0] <= trials.alone(step).error / target_error <= FAR[1]:
+    if trials.are_pictures_idle(step) and _lies_in(trials.alone(step).error / target_error, TUNING.keeps_bare_blend):
         return trials, step
     first = trials(step)
-    if NEAR[0] <= first.error / target_error <= NEAR[1]:
+    if _lies_in(first.error / target_error, TUNING.keeps_blend):
         return trials, step
-    factor = _limited(math.log(SECOND * target_error / max(first.error, LEAST * target_error)))
+    factor = _limited(math.log(TUNING.second_blend * target_error / max(first.error, TUNING.no_error * target_error)))
     others, other_step = _begin(trials.job, step * factor, target_error, 0.0)
     return (trials, step) if cost(first) < cost(others(other_step)) else (others, other_step)
 
 
 def _limited(move: float) -> float:
     """The factor of a step whose logarithm moves by so much, or as far as it may at once."""
-    return math.exp(min(max(move, -MAX_MOVE), MAX_MOVE))
+    most = math.log(TUNING.most_change)
+    return math.exp(min(max(move, -most), most))
+
+
+def _lies_in(value: float, bounds: tuple[float, float]) -> bool:
+    return bounds[0] <= value <= bounds[1]

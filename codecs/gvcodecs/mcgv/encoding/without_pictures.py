@@ -14,33 +14,19 @@ from gvcodecs.mcgv.encoding.bitstream_sizes import cost, count_bytes, count_pict
 from gvcodecs.mcgv.encoding.candidate import Candidate, CandidateAnchor, rebase
 from gvcodecs.mcgv.encoding.initial_skinning import fit_skinning
 from gvcodecs.mcgv.encoding.step_trials import StepTrials
+from gvcodecs.mcgv.encoding.tuning import SLOPE, TUNING
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.mesh.lattice import Lattice
-from gvpipe.rate_control.step_search import SLOPE, StepTrial, find_step
-
-MAX_ROUNDS = 5  # encodes in one search
-BAND = 0.9, 0.99  # of the target error, as `target_search.BAND`
-NARROW = 0.935, 0.955  # of the target error, where a quality is sought
-SPARED = 0.02  # part of the bytes that pictures must take for an encode without them to be tried
-FINER_THAN = 0.95  # part of the target error that a blend alone is to leave at the second attempt
-COARSEST = 1.0, 1.3  # times the target error, lattice steps of base frames
-LARGE_BASE = 0.25  # part of the bytes that a base frame must take for the second of them to be tried
-REBASED = 1.2  # times the lattice step of a base frame, another one is tried
-PUBLISHED = 0.43  # lattice steps, root mean square, that the published mode's base frame leaves at least
-MAX_TRANSFORMS = 0.25  # part of the bytes that transforms may take for a finer error to be tried: rigid motion takes less
-FINE_LATTICES = 1.05, 1.2, 1.35, 1.5  # times that error, lattice steps of base frames: the smallest mesh is taken
-FINE_WORTH = 0.3  # bytes may grow by the quotient of the errors to this power: motion that is not rigid costs 0.5 and more
-HOPELESS = 1.5  # times that error: where a blend leaves more at any step, none is tried
-FINE_BAND = 0.88, 1.0  # of that error, which is close enough
+from gvpipe.rate_control.step_search import Goal, StepTrial, find_step
 
 
 def approach(trials: StepTrials, anchor: CandidateAnchor, step: float, target_error: float) -> StepTrial:
     """Come close to a target error from an anchor; it follows the step less: base frame and blend have errors of their own."""
-    return find_step(trials, step, target_error, NARROW, anchor.slope, MAX_ROUNDS, levels_off=True)
+    return find_step(trials, step, Goal(target_error, TUNING.bare_error, anchor.slope, TUNING.bare_rounds, levels_off=True))
 
 
 def omit_pictures(
-    trials: StepTrials, step: float, target_error: float, band: tuple[float, float]
+    trials: StepTrials, step: float, target_error: float, close_enough: tuple[float, float]
 ) -> tuple[StepTrials, StepTrial] | None:
     """Meet a target error, model units, without pictures; None where pictures pay, or the blend cannot reach it.
 
@@ -48,7 +34,7 @@ def omit_pictures(
         trials: of a blend with pictures.
         step: that leaves about this error, model units.
         target_error: root mean square over vertices, model units.
-        band: least and most part of it that is close enough.
+        close_enough: least and most part of it that ends a search.
     """
     alone, idle = trials.alone, trials.are_pictures_idle(step)
     if idle and alone(step).error > target_error:  # pictures of this step would not mend it, a better blend may
@@ -56,13 +42,13 @@ def omit_pictures(
         idle = alone(step).error <= target_error
     if not idle and not _are_pictures_dear(trials, step, target_error):
         return None
-    trial = _find(alone, step, target_error, band)
+    trial = _find(alone, step, target_error, close_enough)
     if trial.error > target_error or (not idle and cost(trial) >= cost(trials(step))):
         return None
     return (
         (alone, trial)
         if trials.job.is_large
-        else _fit_again(*_choose_base(alone, trial, target_error, band), target_error, band)
+        else _fit_on_base(*_choose_base(alone, trial, target_error, close_enough), target_error, close_enough)
     )
 
 
@@ -72,26 +58,27 @@ def refine(trials: StepTrials, trial: StepTrial) -> StepTrial:
     Parts that move rigidly are exact but for the rounding of base and transforms. The published mode leaves that error at every
     quality, so that a default file would else be the worse one.
     """
-    if _count_transform_bytes(trial.bitstream) > MAX_TRANSFORMS * count_bytes(trial.bitstream):
+    if _count_transform_bytes(trial.bitstream) > TUNING.most_transforms * count_bytes(trial.bitstream):
         return trial
     job, candidate = trials.job, trials.candidate
-    fine_error = PUBLISHED * Lattice.over(job.sequence.read(0, 1)[0], AFFINE_BITS).step
+    fine_error = TUNING.published_error * Lattice.over(job.sequence.read(0, 1)[0], AFFINE_BITS).step
     rounded = candidate.start.lattice.step / 2  # root mean square error that rounding the base frame leaves
     blend_error = math.sqrt(max(trial.rest**2 - rounded**2, 0.0))
-    if fine_error >= trial.error or blend_error > HOPELESS * fine_error:
+    if fine_error >= trial.error or blend_error > TUNING.hopeless * fine_error:
         return trial
     step = trial.step * (fine_error / trial.error) ** (1 / SLOPE)
     finer = StepTrials(job, _smallest_base(job, candidate, step, fine_error))
-    most = cost(trial, FINE_WORTH)
-    if cost(finer(step), FINE_WORTH) > most:
+    most = cost(trial, TUNING.fine_worth)
+    if cost(finer(step), TUNING.fine_worth) > most:
         return trial
-    fine = find_step(finer, step, fine_error, FINE_BAND, SLOPE, MAX_ROUNDS, levels_off=True)
-    return fine if fine.error <= fine_error and cost(fine, FINE_WORTH) <= most else trial
+    fine = find_step(finer, step, Goal(fine_error, TUNING.fine_error, SLOPE, TUNING.bare_rounds, levels_off=True))
+    return fine if fine.error <= fine_error and cost(fine, TUNING.fine_worth) <= most else trial
 
 
-def _find(trials: StepTrials, step: float, target_error: float, band: tuple[float, float]) -> StepTrial:
+def _find(trials: StepTrials, step: float, target_error: float, close_enough: tuple[float, float]) -> StepTrial:
     """An encode of about a target error; or a finer one, where that costs next to nothing and no other encode is compared."""
-    return find_step(trials, step, target_error, band, SLOPE, MAX_ROUNDS, True, None if trials.job.memo.is_shared else cost)
+    counted = None if trials.job.memo.is_shared else cost
+    return find_step(trials, step, Goal(target_error, close_enough, SLOPE, TUNING.bare_rounds, levels_off=True, cost=counted))
 
 
 def _smallest_base(job: Job, candidate: Candidate, step: float, fine_error: float) -> Candidate:
@@ -99,7 +86,7 @@ def _smallest_base(job: Job, candidate: Candidate, step: float, fine_error: floa
 
     On smooth surfaces that is the coarsest; the others of a large sequence are not tried.
     """
-    parts = FINE_LATTICES[-1:] if job.is_large else FINE_LATTICES
+    parts = TUNING.fine_lattices[-1:] if job.is_large else TUNING.fine_lattices
     bases = (rebase(job, candidate, step, part * fine_error) for part in parts)
     return min(bases, key=lambda based: len(based.start.coded.mesh))
 
@@ -107,40 +94,41 @@ def _smallest_base(job: Job, candidate: Candidate, step: float, fine_error: floa
 def _are_pictures_dear(trials: StepTrials, step: float, target_error: float) -> bool:
     """Whether a blend alone costs less than with pictures, and leaves no error that a finer step cannot take away."""
     whole = trials(step)
-    if count_picture_bytes(whole.bitstream) < SPARED * count_bytes(whole.bitstream):
+    if count_picture_bytes(whole.bitstream) < TUNING.least_pictures * count_bytes(whole.bitstream):
         return False
     trial = trials.alone(step)
     if cost(trial) > cost(whole):
         return False
     if trial.error > target_error:
-        trial = trials.alone(step * (FINER_THAN * target_error / trial.error) ** (1 / SLOPE))
+        trial = trials.alone(step * (TUNING.bare_finer * target_error / trial.error) ** (1 / SLOPE))
     return trial.error <= target_error
 
 
 def _choose_base(
-    trials: StepTrials, trial: StepTrial, target_error: float, band: tuple[float, float]
+    trials: StepTrials, trial: StepTrial, target_error: float, close_enough: tuple[float, float]
 ) -> tuple[StepTrials, StepTrial]:
     """The same blend and error on the base frame that makes the file smallest: coarser ones are tried."""
     job, n_bytes = trials.job, count_bytes(trial.bitstream)
-    for coarsest in COARSEST if len(trial.bitstream.sections["mesh"]) > LARGE_BASE * n_bytes else COARSEST[:1]:
+    has_large_base = len(trial.bitstream.sections["mesh"]) > TUNING.large_base * n_bytes
+    for coarsest in TUNING.coarsest_bases if has_large_base else TUNING.coarsest_bases[:1]:
         lattice_step = min(base_step(trial.step, job.sequence.n_frames), coarsest * target_error)
-        if lattice_step < REBASED * trials.candidate.start.lattice.step:
+        if lattice_step < TUNING.rebased_by * trials.candidate.start.lattice.step:
             continue
         others = StepTrials(job, rebase(job, trials.candidate, trial.step, coarsest * target_error))
-        other = _find(others, trial.step, target_error, band)
+        other = _find(others, trial.step, target_error, close_enough)
         if other.error <= target_error and cost(other) < cost(trial):
             trials, trial = others, other
     return trials, trial
 
 
-def _fit_again(
-    trials: StepTrials, trial: StepTrial, target_error: float, band: tuple[float, float]
+def _fit_on_base(
+    trials: StepTrials, trial: StepTrial, target_error: float, close_enough: tuple[float, float]
 ) -> tuple[StepTrials, StepTrial]:
     """The blend, or another one, fitted on the base frame and for the step that were found, if the file is smaller."""
     others = _fit_anew(trials, trial.step, target_error)
     if others.candidate.fitted is trials.candidate.fitted:
         return trials, trial
-    other = _find(others, trial.step, target_error, band)
+    other = _find(others, trial.step, target_error, close_enough)
     return (others, other) if other.error <= target_error and cost(other) < cost(trial) else (trials, trial)
 
 

@@ -181,7 +181,7 @@ def _choose(
         for j in range(n):
             choices[j] = listed.clusters[j]
         place, motion = places[point], motions[point]
-        fill_gram(n - n, n, place, motion, transforms, candidates)  # a literal 0 would be compiled apart
+        fill_gram(0, n, place, motion, transforms, candidates)
         cost = np.inf
         if price > 0 and n_listed > 0:
             errors[point] = _take_suggestion(listed, n_listed, gram, best)
