@@ -62,6 +62,15 @@ def test_docstrings_name_their_subject() -> None:
                 assert not starts.search(path.read_text(encoding="utf-8")), path
 
 
+def test_messages_that_are_explained_are_those_that_are_raised() -> None:
+    page = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
+    rows = [line.split(" | ")[0] for line in page.splitlines() if line.startswith("| `")]
+    shown = [text for row in rows for text in re.findall(r"`([^`]+)`", row)]
+    sources = [*(ROOT / "gvpipe").rglob("*.py"), *(ROOT / "gvpipe/web/src").rglob("*.js")]
+    texts = "\n".join(path.read_text(encoding="utf-8") for path in sources if "node_modules" not in path.parts)
+    assert len(shown) > 20 and [text for text in shown if text not in texts] == []
+
+
 def test_every_folder_of_modules_is_a_package() -> None:
     """Import contracts do not see others."""
     folders = {path.parent for source in ("gvpipe", "codecs/gvcodecs") for path in (ROOT / source).rglob("*.py")}

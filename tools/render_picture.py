@@ -1,6 +1,8 @@
-"""Makes docs/picture.png from the samples: source, decoded, and where the decoded one is off, for one frame.
+"""Makes docs/picture.png and docs/moving.gif from a sample.
 
-python tools/render_picture.py [OUT.png]
+    python tools/render_picture.py [PICTURE.png [MOVING.gif]]
+
+The picture shows source, decoded, and where the decoded one is off, for one frame; the other shows every third decoded frame.
 """
 
 from __future__ import annotations
@@ -17,16 +19,36 @@ from gvpipe.rasterizer.camera import framing
 
 ROOT = Path(__file__).parents[1]
 FRAME, SIZE, VIEW = 30, (400, 310), (62.0, 14.0)
+MOVING, EVERY, COLOURS = (400, 250), 3, 20
 LEGEND = 110  # pixels, about: the picture with the colour bar is so much wider, to show the fox at the same size
 
 
 def main() -> None:
-    """Draw the picture."""
+    """Draw both."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "target", metavar="OUT.png", nargs="?", default=str(ROOT / "docs" / "picture.png"), help="what to write"
-    )
-    draw(parser.parse_args().target)
+    docs = ROOT / "docs"
+    parser.add_argument("picture", metavar="PICTURE.png", nargs="?", default=str(docs / "picture.png"), help="what to write")
+    parser.add_argument("moving", metavar="MOVING.gif", nargs="?", default=str(docs / "moving.gif"), help="what to write")
+    given = parser.parse_args()
+    draw(given.picture)
+    draw_moving(given.moving)
+
+
+def draw_moving(target: str) -> None:
+    """Encode the sample, draw its frames, and keep every third in few colours."""
+    source = gvpipe.read(ROOT / "samples" / "creature.npz")
+    with tempfile.TemporaryDirectory() as folder:
+        video, film = Path(folder) / "creature.mp4", Path(folder) / "creature.gif"
+        gvpipe.encode(source, video)
+        gvpipe.render(video, film, size=MOVING, view=VIEW, follow=True)
+        with Image.open(film) as drawn:
+            frames = []
+            for k in range(0, source.n_frames, EVERY):
+                drawn.seek(k)
+                frames.append(drawn.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE))
+    milliseconds = round(1000 * EVERY / source.fps)
+    frames[0].save(target, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=True)
+    print(f"{target}: {len(frames)} frames, {Path(target).stat().st_size} bytes")
 
 
 def draw(target: str) -> None:
