@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+import runpy
 import tomllib
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
 from folders import ROOT
@@ -69,6 +71,12 @@ def test_messages_that_are_explained_are_those_that_are_raised() -> None:
     sources = [*(ROOT / "gvpipe").rglob("*.py"), *(ROOT / "gvpipe/web/src").rglob("*.js")]
     texts = "\n".join(path.read_text(encoding="utf-8") for path in sources if "node_modules" not in path.parts)
     assert len(shown) > 20 and [text for text in shown if text not in texts] == []
+
+
+def test_the_public_interface_is_the_recorded_one() -> None:
+    """tools/list_interface.py records it: a line that goes, or changes, breaks somebody's program."""
+    tool: dict[str, Any] = runpy.run_path(str(ROOT / "tools" / "list_interface.py"), run_name="list_interface")
+    assert tool["listed"]() == (ROOT / "tests" / "public_interface.txt").read_text(encoding="utf-8")
 
 
 def test_every_folder_of_modules_is_a_package() -> None:
