@@ -59,7 +59,7 @@ def test_golden_file_decodes_to_the_same_positions(name: str, tmp_path: Path, re
     decoded, wanted = gvpipe.decode(video), gvpipe.read(expected)
     assert np.array_equal(decoded.faces, wanted.faces)
     assert decoded.fps == wanted.fps
-    apart = 0 if name in CURRENT else 1e-6  # older ones were written before decoders had products of their own (decision 0116)
+    apart = 0 if name in CURRENT else 1e-6  # older ones were written before decoders had products of their own (decision 0026)
     assert np.allclose(np.asarray(decoded.positions), np.asarray(wanted.positions), rtol=0, atol=apart)
     for beside in ("parts", "materials", "images", "metadata"):
         assert getattr(decoded, beside) == getattr(wanted, beside)

@@ -43,7 +43,7 @@ SPARE_PIXELS = 1 << 16  # for margins that FFmpeg adds
 MAX_SIDE = 16384  # pixels, of a picture that is read
 SECONDS_PER_PIXEL = 3e-9  # of H.264 without residuals, the cheapest
 QP_RANGE = (1, 51)  # 0 would be lossless, which is another H.264 profile that browsers do not read
-# measured (docs/decisions/0094-mcgv-x264-settings.md, 0217-mcgv-three-b-frames.md): psycho-visual choices and the deblocking
+# measured (docs/decisions/0076-x264-has-three-b-frames-throughout.md): psycho-visual choices and the deblocking
 # filter only cost here, since blocks are separate charts; a pyramid of three B-frames (`B_FRAMES`) throughout beats what x264
 # finds by looking ahead, for which it holds 32 pictures; nothing moves in the pictures, so neither partitions nor more
 # references pay, and both cost decoding time

@@ -110,7 +110,8 @@ class Settings(BaseCodec):
     def choose_placement(self, n_points: int) -> str:
         """The placement of so many points.
 
-        JPEG, which sees no other frame, codes the smoother images of charts for less (docs/decisions/0091-mcgv-jpeg.md).
+        JPEG, which sees no other frame, codes the smoother images of charts for less
+        (docs/decisions/0073-tiles-and-halves-place-blended-pixels.md).
         """
         if self.placement != AUTO:
             return self.placement

@@ -14,7 +14,7 @@ from gvpipe.mesh.lattice import Lattice
 
 AFFINE_BITS = 12  # along the longest side, the paper's
 BITS = 8, 16  # along the longest side, that are chosen unasked, about
-BASE_STEP = 1.3  # times step / sqrt(frames): measured, docs/decisions/0084-mcgv-base-lattice.md
+BASE_STEP = 1.3  # times step / sqrt(frames): measured, docs/decisions/0068-base-lattice-follows-the-target-error.md
 FINER = 2**0.25  # times, a lattice that does not keep enough points distinct
 DISTINCT = 0.85  # part of the positions in a base frame that its lattice must keep distinct; the others give way
 

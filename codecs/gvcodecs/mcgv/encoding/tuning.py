@@ -15,27 +15,27 @@ class Tuning:
     """Factors of errors are parts of the target error unless they say otherwise; a pair bounds from below and above.
 
     Args:
-        blended_guess, affine_guess: step by the error that it leaves, of pictures (0080, 0093).
-        blended_error, affine_error: errors that end a search. The published mode is no finer than asked (0093).
-        bare_error: the same without pictures, where a quality is sought, so that errors of two encodes compare (0095).
-        fine_error: the same for the error of rigid parts (0130).
-        large_first: from this error on, the first encode of a large sequence is kept (0212).
-        keeps_bare_blend, keeps_blend: errors that a first blend without, and with pictures is kept for (0086).
-        second_blend: error that another blend is fitted for (0086).
+        blended_guess, affine_guess: step by the error that it leaves, of pictures (0062, 0079).
+        blended_error, affine_error: errors that end a search. The published mode is no finer than asked (0079).
+        bare_error: the same without pictures, where a quality is sought, so that errors of two encodes compare (0075).
+        fine_error: the same for the error of rigid parts (0067).
+        large_first: from this error on, the first encode of a large sequence is kept (0065).
+        keeps_bare_blend, keeps_blend: errors that a first blend without, and with pictures is kept for (0063).
+        second_blend: error that another blend is fitted for (0063).
         most_change: times, of a step at once.
-        reuse_within: of log(error): as far from a measured encode its blend serves another quality (0010).
+        reuse_within: of log(error): as far from a measured encode its blend serves another quality (0024).
         no_error: below this, an error is none.
-        bare_rounds: encodes in one search without pictures (0095).
-        least_pictures: part of the bytes that pictures must take for an encode without them to be tried (0098).
-        bare_finer: error that a blend alone is to leave at its second attempt (0098).
-        coarsest_bases: lattice steps of base frames, in target errors (0084).
-        large_base: part of the bytes that a base frame must take for the second of them to be tried (0084).
-        rebased_by: a coarser base frame has so many times the lattice step at least (0084).
-        published_error: in lattice steps, what the published mode's base frame leaves at least (0130).
-        most_transforms: part of the bytes that transforms may take for the error of rigid parts to be tried (0096).
-        fine_lattices: lattice steps of base frames for it, in those errors: the smallest mesh is taken (0130).
-        fine_worth: bytes may grow by the quotient of the errors to this power (0130).
-        hopeless: in those errors: where a blend leaves more at any step, it is not tried (0130).
+        bare_rounds: encodes in one search without pictures (0075).
+        least_pictures: part of the bytes that pictures must take for an encode without them to be tried (0075).
+        bare_finer: error that a blend alone is to leave at its second attempt (0075).
+        coarsest_bases: lattice steps of base frames, in target errors (0068).
+        large_base: part of the bytes that a base frame must take for the second of them to be tried (0068).
+        rebased_by: a coarser base frame has so many times the lattice step at least (0068).
+        published_error: in lattice steps, what the published mode's base frame leaves at least (0067).
+        most_transforms: part of the bytes that transforms may take for the error of rigid parts to be tried (0067).
+        fine_lattices: lattice steps of base frames for it, in those errors: the smallest mesh is taken (0067).
+        fine_worth: bytes may grow by the quotient of the errors to this power (0067).
+        hopeless: in those errors: where a blend leaves more at any step, it is not tried (0067).
     """
 
     blended_guess: float = 3.5

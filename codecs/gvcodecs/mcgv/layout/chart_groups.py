@@ -3,7 +3,7 @@
 Mamou, Zaharia and Preteux 2007, section 3.3, give every block of the image to one chart, so that no block is a mixture of
 motions. A cluster may have many charts that are much smaller than a block. A block of few points takes nearly the bits of a
 full one. Charts of one cluster move by one transform. So the small ones are put side by side and fill blocks together; blocks
-still belong to one cluster each (docs/decisions/0219-mcgv-charts-share-blocks.md).
+still belong to one cluster each (docs/decisions/0080-small-charts-share-blocks.md).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """xatlas in processes of its own, which may hang or crash without harm.
 
 xatlas's threads sleep on condition variables. Its destructor wakes them without holding their mutex, so a thread that is about
-to sleep misses it, and the destructor waits for ever (docs/decisions/0123-xatlas-in-a-process.md). Meshes are added to a list
-that moves while threads read it, so each has an atlas (docs/decisions/0188-an-atlas-for-each-mesh.md).
+to sleep misses it, and the destructor waits for ever. Meshes are added to a list that moves while threads read it, so each has
+an atlas (docs/decisions/0074-xatlas-runs-in-its-own-processes.md).
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from gvpipe.media.video import QP_RANGE, Profile
 
 QP_STEP = 0.625  # H.264's quantiser step at QP 0, levels of an orthonormal transform; it doubles every 6 QP
 JPEG_STEPS = 255  # the coarsest step of a baseline JPEG, levels of an orthonormal transform; 1 is the finest
-LEVELS = 2.0, 8.0  # to an effective step, least and most (docs/decisions/0088-mcgv-outliers.md)
+LEVELS = 2.0, 8.0  # to an effective step, least and most (docs/decisions/0077-outliers-are-sent-apart.md)
 OUTLIERS = 0.01  # part of the coordinates that may exceed the range for the sake of finer levels
 MOST_STEPS = 2.0**30  # beyond, the pictures hold all residuals
 BINS = 49  # low bits of a float64 that a magnitude's bin leaves out: eight bins to the octave
