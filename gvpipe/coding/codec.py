@@ -207,7 +207,8 @@ class BaseCodec:
     """Base of codecs: frozen dataclasses of settings.
 
     A codec gives ``id``, ``version`` and ``summary`` as class attributes, and the methods `_encode` and `reader`. All else has
-    a default here. A class attribute or class method that is none of these is refused: misspelt, it would change nothing.
+    a default here. A class attribute or class method whose name is nearly one of these is refused: misspelt, it would change
+    nothing.
 
     Attributes:
         holds: it never sees repeated frames: run lengths around it code them (`gvpipe.coding.repeated_frames`).
@@ -239,8 +240,9 @@ class BaseCodec:
         known = [*OWN, *(name for name in vars(BaseCodec) if not name.startswith("_"))]
         for name, value in vars(cls).items():
             is_own = name.startswith("_") or name in settings or isinstance(value, FunctionType | property)
-            if not is_own and name not in known:
-                raise TypeError(f"{cls.__qualname__}.{name} means nothing to gvpipe{did_you_mean(name, known)}")
+            hint = "" if is_own or name in known else did_you_mean(name, known)
+            if hint:
+                raise TypeError(f"{cls.__qualname__}.{name} means nothing to gvpipe{hint}")
 
     @one_blas_thread  # quicker, and the same bytes whatever the number of cores
     def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Encoded:

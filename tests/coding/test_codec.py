@@ -41,6 +41,7 @@ def test_misspelt_features_are_refused(name: str) -> None:
     """They would turn a feature off in silence."""
     with pytest.raises(TypeError, match=f"{name} means nothing to gvpipe; did you mean "):
         type("Misspelt", (Least,), {name: True, "__annotations__": {name: "ClassVar[bool]"}})
+    type("Own", (Least,), {"TABLE": (1, 2, 3)})
     with pytest.raises(TypeError, match="segment_part means nothing to gvpipe"):
         type("Misspelt", (Least,), {"segment_part": classmethod(lambda cls, bitstream: None)})
 
