@@ -79,6 +79,12 @@ def test_the_public_interface_is_the_recorded_one() -> None:
     assert tool["listed"]() == (ROOT / "tests" / "public_interface.txt").read_text(encoding="utf-8")
 
 
+def test_scripts_name_tests_that_there_are() -> None:
+    scripts = [*(ROOT / ".ci").iterdir(), *(ROOT / ".github" / "workflows").glob("*.yml")]
+    named = {name for path in scripts for name in re.findall(r"\btests(?:/\w+)+(?:\.py)?", path.read_text(encoding="utf-8"))}
+    assert named and [name for name in sorted(named) if not (ROOT / name).exists()] == []
+
+
 def test_every_folder_of_modules_is_a_package() -> None:
     """Import contracts do not see others."""
     folders = {path.parent for source in ("gvpipe", "codecs/gvcodecs") for path in (ROOT / source).rglob("*.py")}
