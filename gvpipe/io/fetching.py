@@ -60,6 +60,11 @@ def borrowed(path: Path) -> contextlib.AbstractContextManager[None]:
     return mirror.borrowed(path) if mirror else contextlib.nullcontext()
 
 
+def is_elsewhere(path: Path) -> bool:
+    """Whether reading a file may mean copying it first."""
+    return _mirror_of(path) is not None
+
+
 def _mirror_of(path: Path) -> Mirror | None:
     """The mirror that a path lies in."""
     return next((mirror for mirror in list(_mirrors) if path.is_relative_to(mirror.root)), None)

@@ -99,3 +99,15 @@ def test_other_elements_of_ply(tmp_path: Path) -> None:
     data = ply([[0, 1, 2, 3]], False, "element edge 2\nproperty int a\nproperty int b\n")
     (tmp_path / "a.ply").write_bytes(data + b"0 1\n1 2\n")
     assert gvpipe.read(tmp_path / "a.ply").not_carried == ("element 'edge' (2)",)
+
+
+def test_numbers_that_only_later_frames_have(tmp_path: Path) -> None:
+    head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{}element face 1\n"
+    head += "property list uchar int vertex_indices\nend_header\n"
+    rows = ["0 0 0", "1 0 0", "0 1 0"]
+    for frame in range(3):
+        more = "property float heat\n" if frame else ""
+        lines = [f"{row} {frame}" if frame else row for row in rows]
+        (tmp_path / f"f{frame}.ply").write_text(head.format(more) + "\n".join([*lines, "3 0 1 2"]) + "\n")
+    found = gvpipe.read(tmp_path)
+    assert found.not_carried == ("heat of later frames",) and any("heat of later frames" in note for note in found.notes)

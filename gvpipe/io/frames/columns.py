@@ -9,6 +9,7 @@ Normals per corner cannot be a field: fields have one row per vertex or triangle
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +18,9 @@ import numpy as np
 from gvpipe.asset.attribute import Attribute, guess_kind
 from gvpipe.asset.field import Field
 from gvpipe.foundation.arrays import Array, Int64
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.damage import FRAME_AGAIN, reading
+from gvpipe.io.fetching import is_elsewhere
 from gvpipe.io.frames.frame_files import FrameFiles
 from gvpipe.io.mesh import FrameValues, Mesh, left_note
 from gvpipe.io.normals.own import FIRST_NORMALS, entries_of, own_rule
@@ -32,6 +35,7 @@ class Columns:
     attributes: dict[str, Attribute]
     fields: dict[str, Field]
     notes: tuple[str, ...] = ()
+    not_carried: tuple[str, ...] = ()
 
 
 class FrameColumn:
@@ -64,6 +68,7 @@ def split_columns(frames: FrameFiles) -> Columns:
     for name in moving:
         frames.keep(name, given[name].values, 1)
     meshes = [frames.load(frame) for frame in samples] if given else []
+    late = _late_names(frames, meshes, {*given, *left})
     settled = {
         name
         for name in statics
@@ -89,7 +94,16 @@ def split_columns(frames: FrameFiles) -> Columns:
         if name in moving - corners
     }
     attributes = {name: each for name, each in statics.items() if name not in fields}
-    return Columns(attributes, fields, (*((FIRST_NORMALS,) if corners else ()), *left_note(left)))
+    notes = (*((FIRST_NORMALS,) if corners else ()), *left_note(left))
+    return Columns(attributes, fields, notes, tuple(f"{name} of later frames" for name in late))
+
+
+def _late_names(frames: FrameFiles, meshes: list[Mesh], known: set[str]) -> list[str]:
+    """Names that the first frame lacks and one that was looked at has, or the last one where it lies on disk."""
+    if not meshes and len(frames.paths) > 1 and not is_elsewhere(frames.paths[-1]):
+        with contextlib.suppress(InputError):  # which whoever asks for that frame gets
+            meshes = [frames.load(len(frames.paths) - 1)]
+    return sorted({name for mesh in meshes for name in mesh.animated} - known)
 
 
 def _keep(frames: FrameFiles, names: set[str], given: dict[str, FrameValues], n_frames: int) -> None:

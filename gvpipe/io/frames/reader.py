@@ -57,7 +57,7 @@ def read_frames(
         first.materials,
         first.images,
         first.metadata,
-        (*first.not_carried, *_changes(files[first_file:stop])),
+        (*first.not_carried, *columns.not_carried, *_changes(files[first_file:stop])),
     )
 
 

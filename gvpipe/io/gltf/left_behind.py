@@ -18,8 +18,8 @@ MOST = 1_000_000  # values of the JSON that are looked at
 MORPHED = ("POSITION", "NORMAL")  # of morph targets
 
 
-def left_behind(document: Document, clip: int | None) -> tuple[str, ...]:
-    """Names of what is not taken; ``clip`` is the number of the animation that is read."""
+def left_behind(document: Document) -> tuple[str, ...]:
+    """Names of what is not taken."""
     left = LeftBehind()
     if any("camera" in node for node in document.items("nodes")):
         left.add("cameras", len(document.items("cameras")))
@@ -32,8 +32,7 @@ def left_behind(document: Document, clip: int | None) -> tuple[str, ...]:
             left.add_all(f"vertex attribute {name}" for name in names if not is_taken(name))
             targets = objects(primitive, "targets", "a primitive")
             left.add_all({f"{name} of morph targets" for target in targets for name in target if name not in MORPHED})
-    if clip is not None:
-        animation = document.items("animations")[clip]
+    for animation in document.items("animations"):  # of clips that are not read, too: no other note names what they lose
         for channel in objects(animation, "channels", "an animation"):
             target = child(channel, "target", "a channel")
             if not animated_property(document, target, "a channel"):

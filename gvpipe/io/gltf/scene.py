@@ -109,7 +109,7 @@ def read_scene(document: Document, clip: str | None = None, is_still: bool = Fal
         looks.images,
         NO_METADATA if moving_alone else _metadata(document, moves.name, moves.start),
         () if moving_alone else (*_notes(document, shown), *hiding, *looks.notes),
-        () if moving_alone else left_behind(document, number),
+        () if moving_alone else left_behind(document),
     )
 
 

@@ -88,7 +88,7 @@ def read_listed(
         first.parts,
         first.polygons,
         metadata=metadata,
-        not_carried=first.not_carried,
+        not_carried=(*first.not_carried, *columns.not_carried),
     )
 
 

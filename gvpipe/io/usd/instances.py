@@ -113,16 +113,16 @@ class InstanceMotion(UsdMotion):
         return np.asarray(local @ np.linalg.inv(root) @ self._instance.instancer.at(time)[0][self._instance.number] @ instancer)
 
 
-def find_instances(prim: Any, start: float) -> tuple[list[tuple[Any, Instance]], int]:
-    """The meshes that a point instancer shows, instance after instance, and how many instancers lie in its prototypes."""
+def find_instances(prim: Any, start: float) -> tuple[list[tuple[Any, Instance]], list[str]]:
+    """The meshes that a point instancer shows, instance after instance, and the types of all other prims in its prototypes."""
     from pxr import Usd, UsdGeom
 
     instancer = Instancer(prim, start)
-    n_nested = 0
+    others: list[str] = []
     meshes: list[list[Any]] = []
     for root in instancer.prototypes:
         below = list(Usd.PrimRange(root, Usd.TraverseInstanceProxies())) if root else []
-        n_nested += sum(each.IsA(UsdGeom.PointInstancer) for each in below)
+        others += [str(each.GetTypeName()) for each in below if not each.IsA(UsdGeom.Mesh)]
         meshes.append([UsdGeom.Mesh(each) for each in below if each.IsA(UsdGeom.Mesh)])
     if len(instancer.numbers) > MOST:
         raise ValueError(f"instancer {prim.GetPath()} has {len(instancer.numbers)} instances; at most {MOST} are read")
@@ -132,4 +132,17 @@ def find_instances(prim: Any, start: float) -> tuple[list[tuple[Any, Instance]],
         if 0 <= prototype < len(meshes)
         for mesh in meshes[prototype]
     ]
-    return found, n_nested
+    return found, others
+
+
+def is_hidden_below(mesh: Any, root: Any) -> bool:
+    """Whether a mesh, or what holds it in its prototype, is never shown; what hides the prototype's parents does not count."""
+    from pxr import UsdGeom
+
+    prim = mesh.GetPrim()
+    while prim and prim.GetPath().HasPrefix(root.GetPath()):
+        visibility = UsdGeom.Imageable(prim).GetVisibilityAttr()
+        if visibility and not visibility.ValueMightBeTimeVarying() and visibility.Get() == UsdGeom.Tokens.invisible:
+            return True
+        prim = prim.GetParent()
+    return False

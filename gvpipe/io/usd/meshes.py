@@ -11,7 +11,7 @@ from gvpipe.foundation.arrays import Array, Int64
 from gvpipe.foundation.errors import TopologyChange
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.scene.frames import first_frame_of
-from gvpipe.io.usd.instances import Instance, find_instances
+from gvpipe.io.usd.instances import Instance, find_instances, is_hidden_below
 from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.motion import visibility_samples
 
@@ -48,10 +48,14 @@ def find_meshes(stage: Any) -> Found:
     left = LeftBehind()
     prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
     for prim in prims:
+        left.add_all(f"other variants of set {name}" for name in prim.GetVariantSets().GetNames())
+        left.add_all(_animated_inputs(prim))
         if prim.IsA(UsdGeom.PointInstancer):
             prims.PruneChildren()  # what lies below is shown where its points are
-            found, n_nested = find_instances(prim, stage.GetStartTimeCode())
-            left.add("point instancers in prototypes", n_nested)
+            found, others = find_instances(prim, stage.GetStartTimeCode())
+            left.add("point instancers in prototypes", others.count("PointInstancer"))
+            left.add_all(f"{kind} prims" for kind in others if kind and kind not in {*TAKEN, "PointInstancer"})
+            left.add_all(f"{name} of an instancer" for name in _own_primvars(prim))
             pairs: list[tuple[Any, Instance | None]] = [*found]
         elif prim.IsA(UsdGeom.Mesh):
             pairs = [(UsdGeom.Mesh(prim), None)]
@@ -63,6 +67,7 @@ def find_meshes(stage: Any) -> Found:
         for mesh, instance in pairs:
             root = instance.instancer.prim if instance else mesh.GetPrim()
             is_hidden = _is_never_visible(root, stage) or UsdGeom.Imageable(mesh).ComputePurpose() in HIDDEN_PURPOSES
+            is_hidden |= instance is not None and is_hidden_below(mesh, instance.root)
             (hidden if is_hidden else shown).append((mesh, instance))
     notes = []
     if hidden and shown:
@@ -75,6 +80,23 @@ def find_meshes(stage: Any) -> Found:
     if cages:
         notes.append(f"{cages} of {len(meshes)} meshes are cages of subdivision surfaces; the cages were read as they are")
     return Found(tuple(meshes), tuple(notes), left.names)
+
+
+def _animated_inputs(prim: Any) -> list[str]:
+    """What of a shader changes over time: materials stand still here."""
+    from pxr import UsdShade
+
+    if not prim.IsA(UsdShade.Shader):
+        return []
+    inputs = UsdShade.Shader(prim).GetInputs()
+    return [f"animation of {each.GetBaseName()}" for each in inputs if each.GetAttr().ValueMightBeTimeVarying()]
+
+
+def _own_primvars(prim: Any) -> list[str]:
+    """Primvars of an instancer: a value for each instance."""
+    from pxr import UsdGeom
+
+    return [f"primvar {each.GetPrimvarName()}" for each in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues()]
 
 
 def _is_never_visible(prim: Any, stage: Any) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -81,6 +82,19 @@ def sampled_of(mesh: Any, polygons: SceneMesh, time: float) -> dict[str, Sampled
             if layer is not None:
                 found["color" if name == "displayColor" else name] = Sampled(Values(primvar), kind, domain)
     return found
+
+
+def animated_primvars(meshes: Iterable[Any]) -> set[str]:
+    """Names of primvars of some meshes that change over time, as fields would have them; normals follow their mesh."""
+    from pxr import UsdGeom
+
+    found = {
+        str(primvar.GetPrimvarName())
+        for mesh in meshes
+        for primvar in UsdGeom.PrimvarsAPI(mesh.GetPrim()).GetPrimvarsWithValues()
+        if primvar.ValueMightBeTimeVarying()
+    }
+    return {"color" if name == "displayColor" else name for name in found - {"normals"} if not name.startswith("skel:")}
 
 
 class Values:

@@ -22,7 +22,7 @@ from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.meshes import find_meshes, groups_of, polygons_of
 from gvpipe.io.usd.motion import Skins, UsdMotion
 from gvpipe.io.usd.names import name_of, parent_path
-from gvpipe.io.usd.primvars import layers_of, sampled_of
+from gvpipe.io.usd.primvars import animated_primvars, layers_of, sampled_of
 from gvpipe.io.usd.stage import check_inside, open_stage, stage_times, usd_errors
 from gvpipe.model.sequence import MeshSequence
 
@@ -79,6 +79,8 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
     sampled = [sampled_of(found.meshes[number][0], mesh, float(times[0])) for number, mesh in zip(kept, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times, where)
+    taken = {name for mesh in (sampled if len(times) > 1 else []) for name in mesh}
+    still = animated_primvars([found.meshes[number][0] for number in kept]) - taken
     misfits = misfit_note("primvars", [*(names for _, names in read), torn])
     drawn, images = materials.drawn()
     hiding = hidden_note(sum(motion.flickers for motion in motions))
@@ -103,7 +105,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
         materials=drawn,
         images=images,
         metadata=_metadata(stage, path, float(times[0])),
-        not_carried=found.not_carried,
+        not_carried=tuple(sorted({*found.not_carried, *(f"animation of primvar {name}" for name in still)})),
     )
     return sequence, any(_has_moving_normals(motion.prim) for motion in motions)
 

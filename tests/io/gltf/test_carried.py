@@ -92,6 +92,17 @@ def test_pointers_to_other_things_are_named(tmp_path: Path) -> None:
     assert any("not carried: animation of /materials/*" in note for note in found.notes)
 
 
+@pytest.mark.parametrize("moves", [False, True])
+def test_clips_that_are_not_read_lose_nothing_unsaid(moves: bool, tmp_path: Path) -> None:
+    file = File()
+    file.add("materials", {"name": "a"})
+    file.add("nodes", {"mesh": file.mesh({**file.square(), "material": 0})})
+    animate(file, pointer(file, "/materials/0/emissiveFactor", [0, 1], file.floats([[0, 0, 0], [1, 0, 0]])))
+    if moves:
+        animate(file, pointer(file, "/nodes/0/translation", [0, 1], file.floats([[0, 0, 0], [1, 0, 0]])))
+    assert read(file, tmp_path).not_carried == ("animation of /materials/*/emissiveFactor",)
+
+
 def test_a_pointer_to_no_node(tmp_path: Path) -> None:
     file = File()
     file.add("nodes", {"mesh": file.mesh(file.square())})
