@@ -24,6 +24,7 @@ from gvpipe.container.sources import check_target, check_video_target, is_remote
 from gvpipe.foundation import notes
 from gvpipe.foundation.arguments import StrPath, check_path, show
 from gvpipe.foundation.budget import Budget
+from gvpipe.foundation.cores import count_cores
 from gvpipe.foundation.errors import InputError, OverBudget, SettingError, in_file
 from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import frame_diagonal
@@ -38,7 +39,7 @@ from gvpipe.rate_control.trials import Trial
 from gvpipe.rendering.poster import poster_of
 from gvpipe.runtime import first_kernels
 from gvpipe.runtime.segment_map import segments_mapped_by
-from gvpipe.tasks.choice import AUTO_WORKERS, count_cores, open_executor
+from gvpipe.tasks.choice import AUTO_WORKERS, open_executor
 from gvpipe.tasks.executor import Executor
 from gvpipe.tasks.segments import RemoteSegments, SharedSegments
 

@@ -20,10 +20,11 @@ from gvpipe.batch.manifest import Entry, Manifest, open_manifest
 from gvpipe.coding.codec import Codec
 from gvpipe.foundation.arguments import StrPath, check_path
 from gvpipe.foundation.atomic import output_error
+from gvpipe.foundation.cores import count_cores
 from gvpipe.foundation.progress import Progress
 from gvpipe.foundation.version import __version__
 from gvpipe.rate_control.purposes import own_settings
-from gvpipe.tasks.choice import count_cores, open_executor
+from gvpipe.tasks.choice import open_executor
 from gvpipe.tasks.executor import Executor, Outcome, WorkerDied
 
 STAGE = "sequences"

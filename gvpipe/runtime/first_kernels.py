@@ -23,6 +23,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from gvpipe.foundation.cores import count_cores
 from gvpipe.foundation.isolation.python import Process, start_python
 from gvpipe.runtime.announcements import announce_compiling
 from gvpipe.runtime.claims import claims_in
@@ -51,7 +52,7 @@ def note_miss() -> None:
 
 @functools.cache  # once in a process
 def _compile_beside(codec: str) -> None:
-    n_helpers, folder = min(MOST, _count_cores() - 1), own_folder()
+    n_helpers, folder = min(MOST, count_cores() - 1), own_folder()
     if n_helpers < 1 or folder is None or codec not in _listed():
         return
     missing = sum(_is_wanted(*kernel) for kernel in islice(_kernels(codec), LOOKED_AT))
@@ -66,10 +67,6 @@ def _end(helpers: list[Process[bytes]]) -> None:
     for helper in helpers:
         helper.kill()
         helper.communicate()
-
-
-def _count_cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @functools.cache

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Iterator
 
 from gvpipe.foundation.errors import SettingError
@@ -11,13 +10,6 @@ from gvpipe.tasks.executor import Executor
 
 MOST_WORKERS = 1024
 AUTO_WORKERS = "auto"
-
-
-def count_cores() -> int:
-    """How many cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 @contextlib.contextmanager

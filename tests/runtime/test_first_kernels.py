@@ -9,6 +9,7 @@ import pytest
 from folders import SAMPLES
 
 from gvpipe.coding.registry import codec_ids
+from gvpipe.foundation.cores import count_cores
 from gvpipe.foundation.isolation.python import run_python
 from gvpipe.runtime import first_kernels
 from gvpipe.runtime.kernel_form import Form, kernel_form
@@ -33,13 +34,13 @@ def test_the_list_names_kernels_that_there_are(codec: str) -> None:
 
 
 def test_an_unknown_codec_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(first_kernels, "_count_cores", lambda: 8)
+    monkeypatch.setattr(first_kernels, "count_cores", lambda: 8)
     monkeypatch.setattr(first_kernels, "start_python", lambda *_: pytest.fail("a process was started"))
     first_kernels._compile_beside.__wrapped__("another")
 
 
 def test_what_is_there_is_not_compiled_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(first_kernels, "_count_cores", lambda: 8)
+    monkeypatch.setattr(first_kernels, "count_cores", lambda: 8)
     monkeypatch.setattr(first_kernels, "_is_wanted", lambda *_: False)
     monkeypatch.setattr(first_kernels, "start_python", lambda *_: pytest.fail("a process was started"))
     first_kernels._compile_beside.__wrapped__("mcgv")
@@ -48,7 +49,7 @@ def test_what_is_there_is_not_compiled_again(monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.slow
 @pytest.mark.skipif(kernel_form() is not Form.QUICK or sys.platform == "win32", reason="it needs quick kernels, and locks")
 def test_a_first_encode_is_helped(tmp_path: Path) -> None:
-    if first_kernels._count_cores() < 2:
+    if count_cores() < 2:
         pytest.skip("there is one core")
     compiled, files = [], []
     for name, alone in (("alone", "1"), ("helped", "")):

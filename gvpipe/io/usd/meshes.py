@@ -28,12 +28,12 @@ class Found:
     Args:
         meshes: each with the instance of a point instancer that shows it, or None.
         notes: a line each.
-        not_carried: names of what else the stage has.
+        left: what else the stage has.
     """
 
     meshes: tuple[tuple[Any, Instance | None], ...]
     notes: tuple[str, ...]
-    not_carried: tuple[str, ...]
+    left: LeftBehind
 
 
 def find_meshes(stage: Any) -> Found:
@@ -79,7 +79,7 @@ def find_meshes(stage: Any) -> Found:
     cages = sum(mesh.GetSubdivisionSchemeAttr().Get() not in (None, "none") for mesh, _ in meshes)
     if cages:
         notes.append(f"{cages} of {len(meshes)} meshes are cages of subdivision surfaces; the cages were read as they are")
-    return Found(tuple(meshes), tuple(notes), left.names)
+    return Found(tuple(meshes), tuple(notes), left)
 
 
 def _animated_inputs(prim: Any) -> list[str]:

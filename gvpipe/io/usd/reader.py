@@ -81,6 +81,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times, where)
     taken = {name for mesh in (sampled if len(times) > 1 else []) for name in mesh}
     still = animated_primvars([found.meshes[number][0] for number in kept]) - taken
+    found.left.add_all(f"animation of primvar {name}" for name in still)
     misfits = misfit_note("primvars", [*(names for _, names in read), torn])
     drawn, images = materials.drawn()
     hiding = hidden_note(sum(motion.flickers for motion in motions))
@@ -105,7 +106,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
         materials=drawn,
         images=images,
         metadata=_metadata(stage, path, float(times[0])),
-        not_carried=tuple(sorted({*found.not_carried, *(f"animation of primvar {name}" for name in still)})),
+        not_carried=found.left.names,
     )
     return sequence, any(_has_moving_normals(motion.prim) for motion in motions)
 

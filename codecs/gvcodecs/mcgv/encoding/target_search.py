@@ -18,12 +18,12 @@ from gvcodecs.mcgv.encoding.bitstream_sizes import cost
 from gvcodecs.mcgv.encoding.candidate import Candidate, CandidateAnchor
 from gvcodecs.mcgv.encoding.initial_skinning import fit_skinning
 from gvcodecs.mcgv.encoding.step_trials import StepTrials, encode
-from gvcodecs.mcgv.encoding.tuning import SLOPE, TUNING
+from gvcodecs.mcgv.encoding.tuning import TUNING
 from gvcodecs.mcgv.encoding.without_pictures import approach, omit_pictures, refine
 from gvpipe.coding.codec import Encoded
 from gvpipe.coding.quality_scale import error_of
 from gvpipe.metrics.vertex_errors import measure_spread
-from gvpipe.rate_control.step_search import Goal, StepTrial, find_step, nearest
+from gvpipe.rate_control.step_search import SLOPE, Goal, StepTrial, find_step, nearest
 
 
 def encode_to_target(job: Job) -> Encoded:

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gvpipe.rate_control.step_search import SLOPE as SLOPE
-
 
 @dataclass(frozen=True)
 class Tuning:

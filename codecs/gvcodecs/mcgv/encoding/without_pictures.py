@@ -14,10 +14,10 @@ from gvcodecs.mcgv.encoding.bitstream_sizes import cost, count_bytes, count_pict
 from gvcodecs.mcgv.encoding.candidate import Candidate, CandidateAnchor, rebase
 from gvcodecs.mcgv.encoding.initial_skinning import fit_skinning
 from gvcodecs.mcgv.encoding.step_trials import StepTrials
-from gvcodecs.mcgv.encoding.tuning import SLOPE, TUNING
+from gvcodecs.mcgv.encoding.tuning import TUNING
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.mesh.lattice import Lattice
-from gvpipe.rate_control.step_search import Goal, StepTrial, find_step
+from gvpipe.rate_control.step_search import SLOPE, Goal, StepTrial, find_step
 
 
 def approach(trials: StepTrials, anchor: CandidateAnchor, step: float, target_error: float) -> StepTrial:
